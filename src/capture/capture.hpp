@@ -1,0 +1,155 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/types.hpp"
+#include "geometry/triangle_mesh.hpp"
+
+namespace pliant {
+
+/// Rigid motion x -> rotation x + translation.
+struct RigidMotion {
+  Matrix3 rotation = Matrix3::Identity();
+  Vector3 translation = Vector3::Zero();
+  Vector3 operator()(const Vector3& point) const { return rotation * point + translation; }
+  RigidMotion inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
+};
+
+/// Pinhole camera with axes as in OpenCV (x right, y down, z forward); pixel centres at whole numbers.
+struct PinholeCamera {
+  int width = 0, height = 0;
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< [pixels]
+  RigidMotion camera_to_world;
+
+  /// World point [m] seen at pixel (u, v) with `depth` [m] along the optical axis.
+  Vector3 unproject(double u, double v, double depth) const {
+    return camera_to_world(Vector3((u - cx) / fx * depth, (v - cy) / fy * depth, depth));
+  }
+  /// (u, v, depth) of a world point; depth <= 0 where it lies behind the camera.
+  Vector3 project(const Vector3& world) const {
+    const Vector3 p = camera_to_world.rotation.transpose() * (world - camera_to_world.translation);
+    return {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy, p.z()};
+  }
+};
+
+/// A region of space at rest: where a point of the object is held, or of another material.
+struct RegionBox { Vector3 min, max; };
+struct RegionSphere { Vector3 centre; double radius; };
+struct RegionHalfSpace { Vector3 point, normal; };    ///< the normal points into the region
+struct RegionVertices { std::vector<int> indices; };  ///< vertices of the object's surface
+using Region = std::variant<RegionBox, RegionSphere, RegionHalfSpace, RegionVertices>;
+
+struct FixedRegion {
+  Region region;
+  std::optional<RigidMotion> displaced_to;  ///< from rest to where it is held; nothing: held where it rests
+};
+
+struct MaterialRegion {
+  std::string name;
+  Region region;
+};
+
+struct Plane {
+  Vector3 point = Vector3::Zero();
+  Vector3 normal = Vector3::UnitY();  ///< unit length, to the side where the object may be
+  bool known = true;
+};
+
+enum class ShapeIs { Reference, Static };
+
+struct Initial {
+  Vector3 linear_velocity = Vector3::Zero();   ///< [m/s], of the centre of mass
+  Vector3 angular_velocity = Vector3::Zero();  ///< [rad/s], about the centre of mass
+  bool known = true;
+  bool released = false;
+};
+
+/// Paths of one file a frame: a printf pattern like "front/%06d.png", beside the capture's folder.
+struct FramePattern {
+  std::string pattern;
+  /// The path for a frame, relative to the capture's folder.
+  std::filesystem::path operator()(int frame) const;
+};
+
+struct DepthCamera {
+  std::string name;
+  PinholeCamera camera;
+  FramePattern images;
+  double depth_scale = 1000.0;  ///< raw units per metre
+  std::optional<FramePattern> masks;
+  std::optional<std::filesystem::path> background;  ///< absolute
+  int every = 1;
+  std::optional<double> noise;  ///< standard deviation of a reading [m]
+};
+
+struct CloudSequence {
+  FramePattern points;
+  int every = 1;
+  std::optional<double> noise;
+};
+
+struct MarkerTrack {
+  std::filesystem::path rest, track;
+};
+
+struct Press {
+  Vector3 force;  ///< [N]
+  Vector3 contact_centre;
+  double contact_radius;
+  std::optional<Plane> probe;
+  std::filesystem::path markers, markers_rest;
+  std::string role = "fit";
+  bool glued = true;
+};
+
+struct Load {
+  double mass;  ///< [kg]
+  Vector3 at;
+  std::optional<std::filesystem::path> cloud, markers;
+  std::string role = "fit";
+};
+
+/// Facts read from a `capture.toml`, valid as a whole (see docs/formats.md). SI units, world coordinates.
+struct Capture {
+  std::filesystem::path folder;  ///< paths of the capture are relative to it
+  std::filesystem::path file;    ///< the capture.toml itself
+  std::string name;
+  std::string sha256;  ///< of capture.toml and the surface file, hexadecimal
+
+  std::optional<TriangleMesh> surface;  ///< nothing: no rest scan, nothing can be fitted
+  std::filesystem::path surface_file;
+  std::optional<double> mass;     ///< [kg]
+  std::optional<double> density;  ///< [kg/m^3]
+  ShapeIs shape_is = ShapeIs::Reference;
+
+  std::optional<Vector3> gravity;  ///< [m/s^2]; nothing: to be estimated
+  Vector3 up = Vector3::UnitY();   ///< opposite to gravity's direction where that is known, else as given
+
+  std::vector<double> times;  ///< [s] of each frame; empty in a capture of presses and loads alone
+  int start_frame = 0;
+  bool is_static = false;
+
+  std::vector<FixedRegion> fixed;
+  std::vector<MaterialRegion> regions;
+  std::vector<Plane> planes;
+  Initial initial;
+
+  std::vector<DepthCamera> depth;
+  std::vector<CloudSequence> clouds;
+  std::vector<MarkerTrack> markers;
+  std::vector<Press> presses;
+  std::vector<Load> loads;
+
+  int frame_count() const { return int(times.size()); }
+};
+
+/// Reads and validates a capture: `path` is the folder or its capture.toml.
+/// Throws InputError with every problem found, each with file, line and column, what was found, what was expected
+/// and what to do. Image files are all opened and their headers checked; pixels are read by `observe`.
+Capture read_capture(const std::filesystem::path& path);
+
+}  // namespace pliant
