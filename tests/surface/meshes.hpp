@@ -1,0 +1,17 @@
+#pragma once
+
+#include "geometry/triangle_mesh.hpp"
+
+namespace pliant::test {
+
+/// A box with 8 vertices and 12 triangles that face outwards.
+inline TriangleMesh box_mesh(const Vector3& min, const Vector3& max) {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.vertices.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(), i & 4 ? max.z() : min.z());
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+}  // namespace pliant::test
