@@ -1,0 +1,337 @@
+#include "report/picture.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <stdexcept>
+
+#include "geometry/look_at.hpp"
+#include "geometry/ray_scene.hpp"
+
+namespace pliant {
+
+namespace {
+
+using Colour = Eigen::Array3d;  // linear light, 0..1
+
+constexpr double pi = std::numbers::pi;
+
+Colour from_srgb(double r, double g, double b) {
+  return Colour(r, g, b).unaryExpr([](double c) { return std::pow(c / 255.0, 2.2); });
+}
+
+uint8_t to_srgb(double linear) {
+  return uint8_t(std::lround(255.0 * std::pow(std::clamp(linear, 0.0, 1.0), 1.0 / 2.2)));
+}
+
+Rgb to_srgb(const Colour& c) { return {to_srgb(c[0]), to_srgb(c[1]), to_srgb(c[2])}; }
+
+// Numbers in [0, 1) that look random but follow from the pixel and the sample alone.
+double hash_number(uint32_t a, uint32_t b, uint32_t c) {
+  uint32_t h = a * 0x9E3779B1u ^ b * 0x85EBCA77u ^ c * 0xC2B2AE3Du;
+  h = (h ^ h >> 15) * 0x2C1B3C6Du;
+  h = (h ^ h >> 12) * 0x297A2D39u;
+  return double((h ^ h >> 15) >> 8) * 0x1p-24;
+}
+
+// Four numbers in [0, 1): the rays of one pixel share an even sequence (Roberts' R4), shifted from pixel to pixel.
+std::array<double, 4> spread_numbers(uint32_t pixel, uint32_t ray) {
+  constexpr std::array<double, 4> steps{0.8566748838545029, 0.7338918566271260, 0.6287067210378087, 0.5385972572236101};
+  std::array<double, 4> numbers;
+  for (uint32_t k = 0; k < 4; ++k) {
+    const double sum = hash_number(pixel, k, 1) + steps[k] * (ray + 1.0);
+    numbers[k] = sum - std::floor(sum);
+  }
+  return numbers;
+}
+
+// A value of 1, 2 or 5 times a power of ten that is not below `value`.
+double round_up_nicely(double value) {
+  const double decade = std::pow(10.0, std::floor(std::log10(value)));
+  for (const double step : {1.0, 2.0, 5.0})
+    if (step * decade >= value * (1.0 - 1e-9)) return step * decade;
+  return 10.0 * decade;
+}
+
+Vector3 scene_up(const PictureScene& scene) {
+  return scene.planes.empty() ? Vector3::UnitY() : scene.planes.front().normal;
+}
+
+class Painter {
+ public:
+  Painter(const PictureScene& scene, const PinholeCamera& camera, const PictureOptions& options)
+      : scene_(scene), camera_(camera), options_(options), up_(scene_up(scene)) {
+    TriangleMesh mesh;
+    for (Eigen::Index i = 0; i < scene.surface.rows(); ++i) {
+      mesh.vertices.emplace_back(scene.surface.row(i));
+      box_.extend(mesh.vertices.back());
+    }
+    mesh.triangles = scene.triangles;
+    normals_ = vertex_normals(mesh);
+    rays_.add(mesh);
+    size_ = mesh.vertices.empty() ? 1.0 : box_.extent().norm();
+    centre_ = mesh.vertices.empty() ? Vector3::Zero().eval() : (0.5 * (box_.min + box_.max)).eval();
+    grid_ = grid_spacing(box_);
+    // the key light comes over the viewer's left shoulder
+    const Matrix3& r = camera.camera_to_world.rotation;
+    key_ = (1.1 * up_ - 0.55 * r.col(0) - 0.45 * r.col(2)).normalized();
+  }
+
+  Colour pixel(int u, int v) const {
+    Colour sum = Colour::Zero();
+    const int n = options_.samples;
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i)
+        sum += sample(u + (i + 0.5) / n - 0.5, v + (j + 0.5) / n - 0.5, uint32_t(v) * 65536u + uint32_t(u),
+                      uint32_t(j * n + i));
+    return sum / double(n * n);
+  }
+
+  // Discs of the observed points; hidden ones are left out.
+  struct Disc {
+    double u, v;
+    Colour colour;
+  };
+  std::vector<Disc> discs() const {
+    const double range = options_.residual_range > 0.0 ? options_.residual_range : residual_range(scene_.residuals);
+    const size_t count = scene_.points.size(), drawn = std::min(count, size_t(options_.max_points));
+    std::vector<Disc> discs;
+    for (size_t k = 0; k < drawn; ++k) {
+      const size_t i = k * count / drawn;
+      const Vector3 seen = camera_.project(scene_.points[i]);
+      if (seen.z() <= 0.0 || is_hidden(scene_.points[i])) continue;
+      const Rgb c = scene_.residuals.empty() ? Rgb{30, 120, 110} : diverging_colour(scene_.residuals[i] / range);
+      discs.push_back({seen.x(), seen.y(), from_srgb(c[0], c[1], c[2])});
+    }
+    return discs;
+  }
+
+ private:
+  struct FloorHit {
+    double distance;
+    const Plane* plane;
+  };
+
+  bool is_hidden(const Vector3& point) const {
+    const Vector3 eye = camera_.camera_to_world.translation, to_point = point - eye;
+    const double distance = to_point.norm(), slack = 0.06 * size_;  // points a little inside the surface still show
+    return rays_.is_blocked(eye, to_point / distance, 0.0, distance - slack);
+  }
+
+  std::optional<FloorHit> floor(const Vector3& eye, const Vector3& direction) const {
+    std::optional<FloorHit> nearest;
+    for (const Plane& plane : scene_.planes) {
+      const double along = plane.normal.dot(direction), height = plane.normal.dot(eye - plane.point);
+      if (along >= -1e-9 || height <= 0.0) continue;  // seen from behind: glass
+      if (const double distance = -height / along; !nearest || distance < nearest->distance)
+        nearest = FloorHit{distance, &plane};
+    }
+    return nearest;
+  }
+
+  Colour sample(double u, double v, uint32_t pixel, uint32_t index) const {
+    const Vector3 eye = camera_.camera_to_world.translation;
+    const Vector3 direction = (camera_.unproject(u, v, 1.0) - eye).normalized();
+    const auto hit = rays_.cast(eye, direction);
+    const auto ground = floor(eye, direction);
+    const Colour sky = background(v);
+    if (hit && (!ground || hit->distance < ground->distance + 1e-6 * size_))
+      return object_colour(eye + hit->distance * direction, *hit, direction, pixel, index);
+    if (ground) return floor_colour(eye + ground->distance * direction, *ground->plane, sky, pixel, index);
+    return sky;
+  }
+
+  Colour background(double v) const {
+    const double t = std::clamp(v / std::max(1, camera_.height - 1), 0.0, 1.0);
+    return (1.0 - t) * from_srgb(238, 242, 246) + t * from_srgb(250, 250, 249);
+  }
+
+  // Part of the sky above a surface that is not covered by the object, cosine weighted, and the part of the broad key
+  // light that reaches it.
+  struct Light {
+    double sky, key;
+  };
+  Light light(const Vector3& point, const Vector3& normal, double reach, uint32_t pixel, uint32_t index) const {
+    const Vector3 a = normal.unitOrthogonal(), b = normal.cross(a);
+    const Vector3 ka = key_.unitOrthogonal(), kb = key_.cross(ka);
+    const Vector3 start = point + 1e-4 * size_ * normal;
+    int open = 0, lit = 0;
+    const int n = options_.light_rays;
+    for (int k = 0; k < n; ++k) {
+      const auto [r1, r2, r3, r4] = spread_numbers(pixel, index * uint32_t(n) + uint32_t(k));
+      const double radius = std::sqrt(r1), angle = 2.0 * pi * r2;
+      const Vector3 to_sky = radius * std::cos(angle) * a + radius * std::sin(angle) * b + std::sqrt(1.0 - r1) * normal;
+      open += !rays_.is_blocked(start, to_sky, 0.0, reach);
+      const double spread = 0.22 * std::sqrt(r3), turn = 2.0 * pi * r4;
+      const Vector3 to_key = key_ + spread * (std::cos(turn) * ka + std::sin(turn) * kb);
+      lit += normal.dot(to_key) > 0.0 && !rays_.is_blocked(start, to_key, 0.0, 1e3 * size_);
+    }
+    return {double(open) / n, double(lit) / n};
+  }
+
+  Vector3 smooth_normal(const RayHit& hit) const {
+    const auto& [a, b, c] = scene_.triangles[hit.triangle];
+    const Vector3 n = (1.0 - hit.u - hit.v) * normals_[a] + hit.u * normals_[b] + hit.v * normals_[c];
+    return n.norm() > 1e-9 ? n.normalized() : hit.normal;
+  }
+
+  Colour object_colour(const Vector3& point, const RayHit& hit, const Vector3& direction, uint32_t pixel,
+                       uint32_t index) const {
+    Vector3 normal = smooth_normal(hit), face = hit.normal;
+    if (face.dot(direction) > 0.0) normal = -normal, face = -face;
+    const Light light_here = light(point, face, 0.6 * size_, pixel, index);
+    const double height = 0.5 + 0.5 * normal.dot(up_);
+    const Colour sky = from_srgb(222, 232, 245), ground = from_srgb(196, 184, 172), key = from_srgb(255, 246, 232);
+    const Colour ambient = (0.35 + 0.65 * light_here.sky) * ((1.0 - height) * ground + height * sky);
+    const double facing = std::max(0.0, normal.dot(key_));
+    const Vector3 half = (key_ - direction).normalized();
+    const double shine = 0.05 * std::pow(std::max(0.0, normal.dot(half)), 24.0) * light_here.key;
+    const Colour albedo = from_srgb(176, 182, 190);
+    return albedo * (0.62 * ambient + 0.75 * light_here.key * facing * key) + shine;
+  }
+
+  Colour floor_colour(const Vector3& point, const Plane& plane, const Colour& sky, uint32_t pixel,
+                      uint32_t index) const {
+    const Vector3 from_centre = point - centre_;
+    const Vector3 within = from_centre - plane.normal.dot(from_centre) * plane.normal;
+    const double fade = std::clamp(1.6 - within.norm() / (1.3 * size_), 0.0, 1.0);
+    if (fade <= 0.0) return sky;
+    const Light light_here = light(point, plane.normal, 0.8 * size_, pixel, index);
+    const double shade = (0.45 + 0.55 * light_here.sky) * (0.72 + 0.28 * light_here.key);
+    Colour floor = from_srgb(243, 242, 239) * (on_grid_line(within + centre_, plane) ? 0.80 : 1.0);
+    const double soft = fade * fade * (3.0 - 2.0 * fade);
+    return soft * shade * floor + (1.0 - soft) * sky;
+  }
+
+  bool on_grid_line(const Vector3& point, const Plane& plane) const {
+    // grid directions follow the world's axes where the plane allows it
+    Eigen::Index least;
+    plane.normal.cwiseAbs().minCoeff(&least);
+    const Vector3 b = plane.normal.cross(Vector3::Unit(least)).normalized(), a = b.cross(plane.normal);
+    const double half_width = 0.006 * grid_;
+    for (const Vector3& axis : {a, b})
+      if (std::abs(std::remainder(axis.dot(point - plane.point), grid_)) < half_width) return true;
+    return false;
+  }
+
+  const PictureScene& scene_;
+  const PinholeCamera& camera_;
+  const PictureOptions& options_;
+  Vector3 up_, key_, centre_;
+  Box box_;
+  double size_ = 1.0, grid_ = 0.1;
+  std::vector<Vector3> normals_;
+  RayScene rays_;
+};
+
+void check(const PictureScene& scene, const PictureOptions& options) {
+  if (!scene.residuals.empty() && scene.residuals.size() != scene.points.size())
+    throw std::invalid_argument("draw: as many residuals as points are needed, or none");
+  if (options.samples < 1 || options.samples > 8) throw std::invalid_argument("draw: samples must be 1..8");
+  if (options.light_rays < 1 || options.light_rays > 64) throw std::invalid_argument("draw: light_rays must be 1..64");
+  if (options.max_points < 1) throw std::invalid_argument("draw: max_points must be at least 1");
+}
+
+// How much of a pixel a disc covers, by the distance of their centres; smooth over one pixel at the rim.
+double coverage(double distance, double radius) { return std::clamp(radius + 0.5 - distance, 0.0, 1.0); }
+
+void paint_disc(std::vector<Colour>& canvas, const PinholeCamera& camera, const Painter::Disc& disc, double radius) {
+  const double rim = 0.55, reach = radius + rim + 1.0;
+  const int u0 = std::max(0, int(std::ceil(disc.u - reach))), u1 = std::min(camera.width - 1, int(disc.u + reach));
+  const int v0 = std::max(0, int(std::ceil(disc.v - reach))), v1 = std::min(camera.height - 1, int(disc.v + reach));
+  for (int v = v0; v <= v1; ++v)
+    for (int u = u0; u <= u1; ++u) {
+      Colour& pixel = canvas[size_t(v) * camera.width + u];
+      const double distance = std::hypot(u - disc.u, v - disc.v);
+      pixel *= 1.0 - 0.55 * coverage(distance, radius + rim);  // dark rim: white discs show on a light surface
+      const double inside = coverage(distance, radius);
+      pixel = (1.0 - inside) * pixel + inside * disc.colour;
+    }
+}
+
+double automatic_radius(const PinholeCamera& camera, size_t discs) {
+  const double spacing = std::sqrt(0.06 * camera.width * camera.height / std::max<double>(1.0, double(discs)));
+  return std::clamp(0.34 * spacing, 0.7, camera.width / 160.0);
+}
+
+// Corners of a box.
+std::array<Vector3, 8> corners(const Box& box) {
+  std::array<Vector3, 8> result;
+  for (int i = 0; i < 8; ++i)
+    for (int k = 0; k < 3; ++k) result[i][k] = i >> k & 1 ? box.max[k] : box.min[k];
+  return result;
+}
+
+}  // namespace
+
+double residual_range(const std::vector<double>& residuals) {
+  std::vector<double> sizes;
+  for (const double r : residuals)
+    if (std::isfinite(r)) sizes.push_back(std::abs(r));
+  if (sizes.empty()) return 1e-3;
+  const auto nth = sizes.begin() + ptrdiff_t(0.95 * double(sizes.size() - 1));
+  std::nth_element(sizes.begin(), nth, sizes.end());
+  return *nth > 0.0 ? round_up_nicely(*nth) : 1e-3;
+}
+
+double grid_spacing(const Box& object) {
+  const double size = object.extent().maxCoeff();
+  return size > 0.0 && std::isfinite(size) ? round_up_nicely(size / 5.0) : 0.1;
+}
+
+Picture draw(const PictureScene& scene, const PinholeCamera& camera, const PictureOptions& options) {
+  check(scene, options);
+  const Painter painter(scene, camera, options);
+  std::vector<Colour> canvas(size_t(camera.width) * camera.height);
+  tbb::parallel_for(tbb::blocked_range<int>(0, camera.height), [&](const tbb::blocked_range<int>& rows) {
+    for (int v = rows.begin(); v != rows.end(); ++v)
+      for (int u = 0; u < camera.width; ++u) canvas[size_t(v) * camera.width + u] = painter.pixel(u, v);
+  });
+  const std::vector<Painter::Disc> discs = painter.discs();
+  const double radius = options.disc_radius > 0.0 ? options.disc_radius : automatic_radius(camera, discs.size());
+  for (const Painter::Disc& disc : discs) paint_disc(canvas, camera, disc, radius);
+  Picture picture(camera.width, camera.height);
+  std::transform(canvas.begin(), canvas.end(), picture.pixels.begin(), [](const Colour& c) { return to_srgb(c); });
+  return picture;
+}
+
+PinholeCamera framed(const PinholeCamera& camera, const Box& box, int width, int height) {
+  PinholeCamera result = camera;
+  result.width = width, result.height = height;
+  Eigen::Array2d low = Eigen::Array2d::Constant(1e300), high = -low;
+  bool in_front = true;
+  for (const Vector3& corner : corners(box)) {
+    const Vector3 seen = camera.project(corner);
+    in_front = in_front && seen.z() > 0.0;
+    low = low.min(seen.head<2>().array()), high = high.max(seen.head<2>().array());
+  }
+  const Eigen::Array2d size(width, height);
+  double zoom = double(width) / camera.width;
+  Eigen::Array2d middle(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
+  if (in_front) {
+    zoom = (0.80 * size / (high - low)).minCoeff();
+    middle = 0.5 * (low + high);
+  }
+  result.fx *= zoom, result.fy *= zoom;
+  result.cx = (camera.cx - middle.x()) * zoom + 0.5 * (width - 1);
+  result.cy = (camera.cy - middle.y()) * zoom + 0.5 * (height - 1);
+  return result;
+}
+
+PinholeCamera view_of(const Box& box, const Vector3& up, int width, int height, double azimuth, double elevation) {
+  Eigen::Index least;
+  up.cwiseAbs().minCoeff(&least);
+  const Vector3 y = up.normalized(), x = y.cross(Vector3::Unit(least)).normalized(), z = x.cross(y);
+  const Vector3 aside = std::sin(azimuth) * x + std::cos(azimuth) * z;
+  const Vector3 towards_eye = std::cos(elevation) * aside + std::sin(elevation) * y;
+  const Vector3 centre = 0.5 * (box.min + box.max);
+  const double distance = 2.6 * std::max(1e-9, box.extent().norm());
+  return framed(look_at(centre + distance * towards_eye, centre, y, width, height, 0.5), box, width, height);
+}
+
+}  // namespace pliant
