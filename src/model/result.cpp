@@ -1,0 +1,335 @@
+#include "model/result.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+
+namespace pliant {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+// ---- writing
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+Json vector(const Vector3& v) { return Json::array({number(v.x()), number(v.y()), number(v.z())}); }
+
+Json value_json(const ParameterValue& value) {
+  if (const auto* scalar = std::get_if<double>(&value)) return number(*scalar);
+  if (const auto* v = std::get_if<Vector3>(&value)) return vector(*v);
+  const auto& plane = std::get<PlaneValue>(value);
+  return {{"point", vector(plane.point)}, {"normal", vector(plane.normal)}};
+}
+
+Json parameter_json(const ParameterResult& parameter) {
+  Json json;
+  json["value"] = value_json(parameter.value);
+  if (!parameter.unit.empty()) json["unit"] = parameter.unit;
+  if (parameter.std) json["std"] = value_json(*parameter.std);
+  if (parameter.start) json["start"] = value_json(*parameter.start);
+  json["estimated"] = parameter.estimated;
+  return json;
+}
+
+Json field_json(const FieldResult& field) {
+  Json points = Json::array();
+  for (const ControlPoint& p : field.control_points)
+    points.push_back(
+        {number(p.position.x()), number(p.position.y()), number(p.position.z()), number(p.value), number(p.std)});
+  Json json{{"control_points", points}};
+  if (!field.per_element.empty()) json["per_element"] = field.per_element;
+  return json;
+}
+
+Json error_json(const ErrorResult& error) {
+  return {{"surface_rms", number(error.surface_rms)},
+          {"surface_max", number(error.surface_max)},
+          {"marker_rms", number(error.marker_rms)},
+          {"unit", "m"},
+          {"points", error.points}};
+}
+
+Json values_json(const std::map<std::string, double>& values) {
+  Json json = Json::object();
+  for (const auto& [name, value] : values) json[name] = number(value);
+  return json;
+}
+
+Json start_json(const StartResult& start) {
+  return {{"start", values_json(start.start)}, {"final", values_json(start.final)}, {"cost", number(start.cost)},
+          {"iterations", start.iterations},    {"converged", start.converged},      {"reason", start.reason}};
+}
+
+Json time_json(const TimeResult& time) {
+  return {{"wall_seconds", number(time.wall_seconds)},
+          {"forward_steps", time.forward_steps},
+          {"ms_per_forward_step", number(time.ms_per_forward_step)},
+          {"ms_per_adjoint_step", number(time.ms_per_adjoint_step)}};
+}
+
+template <class Items, class Write>
+Json list(const Items& items, const Write& write) {
+  Json json = Json::array();
+  for (const auto& item : items) json.push_back(write(item));
+  return json;
+}
+
+Json static_json(const StaticError& error) {
+  return {{"name", error.name},
+          {"role", error.role},
+          {"marker_rms", number(error.marker_rms)},
+          {"marker_max", number(error.marker_max)},
+          {"max_displacement", number(error.max_displacement)},
+          {"relative_error", number(error.relative_error)}};
+}
+
+std::string text(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+// ---- reading
+
+// A member of the document with its path from the top, for messages.
+class Member {
+ public:
+  Member(const Json& json, std::string path, const fs::path& file) : json_(json), path_(std::move(path)), file_(file) {}
+
+  [[noreturn]] void fail(const std::string& expected) const {
+    throw InputError({{file_}, "\"" + path_ + "\" is " + json_.dump().substr(0, 60), expected, ""});
+  }
+  std::string name_of(const std::string& key) const { return path_.empty() ? key : path_ + "." + key; }
+  bool has(const char* key) const { return json_.is_object() && json_.contains(key) && !json_[key].is_null(); }
+
+  Member operator[](const std::string& key) const {
+    if (!json_.is_object()) fail("an object");
+    if (!json_.contains(key)) throw InputError({{file_}, "\"" + name_of(key) + "\" is missing", "", ""});
+    return {json_[key], name_of(key), file_};
+  }
+  template <class Each>
+  void each_key(const Each& each) const {
+    if (!json_.is_object()) fail("an object");
+    for (const auto& [key, value] : json_.items()) each(key, Member(value, name_of(key), file_));
+  }
+  template <class Each>
+  void each_item(const Each& each) const {
+    if (!json_.is_array()) fail("a list");
+    for (size_t i = 0; i < json_.size(); ++i) each(Member(json_[i], path_ + "[" + std::to_string(i) + "]", file_));
+  }
+
+  double number() const { return json_.is_number() ? json_.get<double>() : (fail("a number"), 0.0); }
+  long long count() const { return json_.is_number_integer() ? json_.get<long long>() : (fail("a whole number"), 0); }
+  bool boolean() const { return json_.is_boolean() ? json_.get<bool>() : (fail("true or false"), false); }
+  std::string string() const { return json_.is_string() ? json_.get<std::string>() : (fail("a text"), ""); }
+  Vector3 vector() const {
+    if (!json_.is_array() || json_.size() != 3) fail("three numbers");
+    Vector3 v;
+    for (int k = 0; k < 3; ++k) v[k] = json_[k].is_number() ? json_[k].get<double>() : (fail("three numbers"), 0.0);
+    return v;
+  }
+  ParameterValue value() const {
+    if (json_.is_number()) return number();
+    if (json_.is_array()) return vector();
+    if (json_.is_object()) return PlaneValue{(*this)["point"].vector(), (*this)["normal"].vector()};
+    fail("a number, three numbers or a plane");
+  }
+  size_t size() const { return json_.size(); }
+  const Json& json() const { return json_; }
+
+ private:
+  const Json& json_;
+  std::string path_;
+  const fs::path& file_;
+};
+
+std::string optional_string(const Member& parent, const char* key) {
+  return parent.has(key) ? parent[key].string() : "";
+}
+
+std::optional<double> optional_number(const Member& parent, const char* key) {
+  return parent.has(key) ? std::optional(parent[key].number()) : std::nullopt;
+}
+
+// A standard deviation may hold null where it could not be computed; then it is left out.
+std::optional<ParameterValue> optional_value(const Member& parent, const char* key) {
+  if (!parent.has(key) || parent[key].json().dump().find("null") != std::string::npos) return std::nullopt;
+  return parent[key].value();
+}
+
+ParameterResult read_parameter(const std::string& name, const Member& member) {
+  return {name,
+          member["value"].value(),
+          optional_string(member, "unit"),
+          optional_value(member, "std"),
+          optional_value(member, "start"),
+          member["estimated"].boolean()};
+}
+
+ControlPoint read_control_point(const Member& member) {
+  std::vector<double> numbers;
+  member.each_item([&](const Member& item) { numbers.push_back(item.json().is_null() ? NAN : item.number()); });
+  if (numbers.size() < 4 || numbers.size() > 5) member.fail("[x, y, z, value, std]");
+  for (int k = 0; k < 4; ++k)
+    if (!std::isfinite(numbers[k])) member.fail("[x, y, z, value, std] with finite numbers");
+  ControlPoint point{{numbers[0], numbers[1], numbers[2]}, numbers[3], std::nullopt};
+  if (numbers.size() == 5 && std::isfinite(numbers[4])) point.std = numbers[4];
+  return point;
+}
+
+FieldResult read_field(const std::string& name, const Member& member) {
+  FieldResult field{name, {}, optional_string(member, "per_element")};
+  if (member.has("control_points"))
+    member["control_points"].each_item(
+        [&](const Member& item) { field.control_points.push_back(read_control_point(item)); });
+  return field;
+}
+
+ErrorResult read_error(const Member& member) {
+  return {optional_number(member, "surface_rms"), optional_number(member, "surface_max"),
+          optional_number(member, "marker_rms"), member.has("points") ? member["points"].count() : 0};
+}
+
+CorrelationResult read_correlation(const Member& member) {
+  std::vector<std::string> names;
+  member["parameters"].each_item([&](const Member& item) { names.push_back(item.string()); });
+  if (names.size() != 2) member["parameters"].fail("two names");
+  return {{names[0], names[1]}, member["correlation"].number()};
+}
+
+std::map<std::string, double> read_values(const Member& parent, const char* key) {
+  std::map<std::string, double> values;
+  if (parent.has(key))
+    parent[key].each_key(
+        [&](const std::string& name, const Member& m) { values[name] = m.json().is_null() ? NAN : m.number(); });
+  return values;
+}
+
+StartResult read_start(const Member& member) {
+  return {read_values(member, "start"),      read_values(member, "final"),  optional_number(member, "cost"),
+          int(member["iterations"].count()), member["converged"].boolean(), optional_string(member, "reason")};
+}
+
+TimeResult read_time(const Member& member) {
+  return {optional_number(member, "wall_seconds").value_or(NAN),
+          member.has("forward_steps") ? member["forward_steps"].count() : 0,
+          optional_number(member, "ms_per_forward_step"), optional_number(member, "ms_per_adjoint_step")};
+}
+
+Json parse(const fs::path& path) {
+  const std::string content = read_file(path);
+  try {
+    return Json::parse(content);
+  } catch (const Json::parse_error& error) {
+    Place place{path, 1, 1};
+    for (size_t i = 0; i + 1 < std::min(error.byte, content.size() + 1); ++i)
+      content[i] == '\n' ? (++place.line, place.column = 1) : ++place.column;
+    throw InputError({place, "not JSON, or cut off", "a result.json", ""});
+  }
+}
+
+Result read_all(const Member& top) {
+  if (const std::string format = top["format"].string(); format != "result/1") top["format"].fail("\"result/1\"");
+  Result result;
+  const Member software = top["software"], capture = top["capture"];
+  result.software = {optional_string(software, "name"), optional_string(software, "version"),
+                     optional_string(software, "commit")};
+  result.capture = {optional_string(capture, "name"), optional_string(capture, "sha256")};
+  top["parameters"].each_key(
+      [&](const std::string& name, const Member& m) { result.parameters.push_back(read_parameter(name, m)); });
+  if (top.has("fields"))
+    top["fields"].each_key(
+        [&](const std::string& name, const Member& m) { result.fields.push_back(read_field(name, m)); });
+  result.error = read_error(top["error"]);
+  result.cost = {optional_number(top["cost"], "start").value_or(NAN),
+                 optional_number(top["cost"], "final").value_or(NAN)};
+  if (top.has("identifiability"))
+    top["identifiability"].each_item([&](const Member& m) { result.identifiability.push_back(read_correlation(m)); });
+  if (top.has("starts")) top["starts"].each_item([&](const Member& m) { result.starts.push_back(read_start(m)); });
+  if (top.has("time")) result.time = read_time(top["time"]);
+  if (top.has("notes")) top["notes"].each_item([&](const Member& m) { result.notes.push_back(m.string()); });
+  return result;
+}
+
+std::string csv_number(double value) {
+  std::ostringstream out;
+  out.precision(9);
+  out << value;
+  return out.str();
+}
+
+std::string csv_text(const std::string& value) {
+  if (value.find_first_of(",\"\n") == std::string::npos) return value;
+  std::string quoted = "\"";
+  for (const char c : value) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+}  // namespace
+
+const ParameterResult* Result::find(const std::string& name) const {
+  for (const ParameterResult& parameter : parameters)
+    if (parameter.name == name) return &parameter;
+  return nullptr;
+}
+
+std::string to_json(const Result& result) {
+  Json json{{"format", "result/1"}};
+  json["software"] = {
+      {"name", result.software.name}, {"version", result.software.version}, {"commit", result.software.commit}};
+  json["capture"] = {{"name", result.capture.name}, {"sha256", result.capture.sha256}};
+  json["parameters"] = Json::object();
+  for (const ParameterResult& parameter : result.parameters)
+    json["parameters"][parameter.name] = parameter_json(parameter);
+  json["fields"] = Json::object();
+  for (const FieldResult& field : result.fields) json["fields"][field.name] = field_json(field);
+  json["error"] = error_json(result.error);
+  json["cost"] = {{"start", number(result.cost.start)}, {"final", number(result.cost.final)}};
+  json["identifiability"] = list(result.identifiability, [](const CorrelationResult& c) {
+    return Json{{"parameters", {c.parameters.first, c.parameters.second}}, {"correlation", number(c.correlation)}};
+  });
+  json["starts"] = list(result.starts, start_json);
+  json["time"] = time_json(result.time);
+  if (!result.notes.empty()) json["notes"] = result.notes;
+  return text(json);
+}
+
+void write_result(const fs::path& path, const Result& result) { write_file(path, to_json(result)); }
+
+Result read_result(const fs::path& path) {
+  const Json json = parse(path);
+  return read_all(Member(json, "", path));
+}
+
+void write_convergence(const fs::path& path, const ConvergenceHistory& history) {
+  if (history.units.size() != history.parameters.size())
+    throw std::invalid_argument("write_convergence: as many units as parameters are needed");
+  std::string csv = "start,stage,iteration,cost,damping";
+  for (size_t i = 0; i < history.parameters.size(); ++i)
+    csv += "," + csv_text(history.parameters[i] + " [" + history.units[i] + "]");
+  csv += "\n";
+  for (const ConvergenceRow& row : history.rows) {
+    if (row.parameters.size() != history.parameters.size())
+      throw std::invalid_argument("write_convergence: a row of " + std::to_string(row.parameters.size()) +
+                                  " parameters under a header of " + std::to_string(history.parameters.size()));
+    csv += std::to_string(row.start) + "," + csv_text(row.stage) + "," + std::to_string(row.iteration) + "," +
+           csv_number(row.cost) + "," + csv_number(row.damping);
+    for (const double value : row.parameters) csv += "," + csv_number(value);
+    csv += "\n";
+  }
+  write_file(path, csv);
+}
+
+std::string to_json(const Evaluation& evaluation) {
+  return text({{"format", "evaluation/1"},
+               {"error", error_json(evaluation.error)},
+               {"presses", list(evaluation.presses, static_json)},
+               {"loads", list(evaluation.loads, static_json)}});
+}
+
+void write_evaluation(const fs::path& path, const Evaluation& evaluation) { write_file(path, to_json(evaluation)); }
+
+}  // namespace pliant

@@ -1,0 +1,146 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "base/types.hpp"
+
+namespace pliant {
+
+/// What a fit found: `result.json` of docs/formats.md, member by member. SI units.
+
+/// Value of a plane.
+struct PlaneValue {
+  Vector3 point = Vector3::Zero();    ///< [m]
+  Vector3 normal = Vector3::UnitY();  ///< unit length
+  bool operator==(const PlaneValue&) const = default;
+};
+
+using ParameterValue = std::variant<double, Vector3, PlaneValue>;
+
+/// A parameter, estimated or given; `name` as in the format, with "@region" where it belongs to one.
+struct ParameterResult {
+  std::string name;
+  ParameterValue value = 0.0;
+  std::string unit;                     ///< "Pa", "1", "1/s", ...; empty: none (a plane)
+  std::optional<ParameterValue> std;    ///< one standard deviation, of the value's kind
+  std::optional<ParameterValue> start;  ///< where the estimation began
+  bool estimated = false;
+};
+
+/// A control point of a field of values.
+struct ControlPoint {
+  Vector3 position = Vector3::Zero();  ///< [m], reference shape
+  double value = 0.0;
+  std::optional<double> std;
+};
+
+struct FieldResult {
+  std::string name;  ///< the parameter's
+  std::vector<ControlPoint> control_points;
+  std::string per_element;  ///< file with the values of the elements, beside the result; empty: none
+};
+
+/// Distances between what was seen and what was simulated [m].
+struct ErrorResult {
+  std::optional<double> surface_rms, surface_max, marker_rms;
+  long long points = 0;
+};
+
+struct CostResult {
+  double start = 0.0, final = 0.0;
+};
+
+struct CorrelationResult {
+  std::pair<std::string, std::string> parameters;
+  double correlation = 0.0;  ///< -1..1
+};
+
+/// One run of the optimiser from one starting point.
+struct StartResult {
+  std::map<std::string, double> start, final;  ///< by parameter name
+  std::optional<double> cost;                  ///< nothing: not finite
+  int iterations = 0;
+  bool converged = false;
+  std::string reason;  ///< why it stopped
+};
+
+struct TimeResult {
+  double wall_seconds = 0.0;
+  long long forward_steps = 0;
+  std::optional<double> ms_per_forward_step, ms_per_adjoint_step;
+};
+
+struct Result {
+  struct Software {
+    std::string name = "pliant", version, commit;
+  } software;
+  struct Recording {
+    std::string name, sha256;
+  } capture;
+  std::vector<ParameterResult> parameters;
+  std::vector<FieldResult> fields;
+  ErrorResult error;
+  CostResult cost;
+  std::vector<CorrelationResult> identifiability;
+  std::vector<StartResult> starts;
+  TimeResult time;
+  std::vector<std::string> notes;  ///< plain sentences for the user
+
+  /// The parameter of that name, or null.
+  const ParameterResult* find(const std::string& name) const;
+};
+
+/// JSON text in the format "result/1". A number that is not finite becomes null, so that a fit's end is never lost to
+/// one bad figure; `read_result` takes null as "nothing" where a member is optional.
+std::string to_json(const Result& result);
+
+/// Writes `result.json`, whole or not at all. Throws InputError where it cannot be written.
+void write_result(const std::filesystem::path& path, const Result& result);
+
+/// Reads a `result.json`; keys that it does not know are passed over. Throws InputError naming the place: line and
+/// column where the text is not JSON, the member ("parameters.density.value") where something is missing or of
+/// another kind.
+Result read_result(const std::filesystem::path& path);
+
+/// One iteration of one start of an optimisation.
+struct ConvergenceRow {
+  int start = 0, iteration = 0;
+  std::string stage;  ///< what was being estimated, like "stiffness" or "all"
+  double cost = 0.0;
+  double damping = 0.0;            ///< Levenberg-Marquardt's; 0 where there is none
+  std::vector<double> parameters;  ///< in the order of `ConvergenceHistory::parameters`
+};
+
+struct ConvergenceHistory {
+  std::vector<std::string> parameters, units;  ///< names; as many units
+  std::vector<ConvergenceRow> rows;
+};
+
+/// Writes `convergence.csv`: a header `start,stage,iteration,cost,damping,<parameter [unit]>...`, then the rows.
+/// Throws std::invalid_argument where a row has another number of parameters.
+void write_convergence(const std::filesystem::path& path, const ConvergenceHistory& history);
+
+/// A measurement under a known force or weight, as predicted by a model.
+struct StaticError {
+  std::string name, role;
+  std::optional<double> marker_rms, marker_max;  ///< [m]
+  std::optional<double> max_displacement;        ///< greatest measured displacement [m]
+  std::optional<double> relative_error;          ///< rms over max_displacement
+};
+
+/// What a model is worth on another recording: "evaluation/1" of docs/formats.md.
+struct Evaluation {
+  ErrorResult error;
+  std::vector<StaticError> presses, loads;
+};
+
+std::string to_json(const Evaluation& evaluation);
+void write_evaluation(const std::filesystem::path& path, const Evaluation& evaluation);
+
+}  // namespace pliant

@@ -1,0 +1,152 @@
+#include "model/result.hpp"
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "input_errors.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using test::complaint_of;
+using test::TemporaryFolder;
+using testing::HasSubstr;
+
+Result full_result() {
+  Result r;
+  r.software = {"pliant", "0.1.0", "abc"};
+  r.capture = {"a \"soft\" ring", "00ff"};
+  r.parameters = {
+      {"youngs_modulus", 590.0, "Pa", 21.0, 5000.0, true},
+      {"youngs_modulus@red half", 900.0, "Pa", std::nullopt, std::nullopt, false},
+      {"gravity", Vector3(0, -9.81, 0), "m/s^2", Vector3(0.1, 0.2, 0.3), Vector3(0, -9, 0), true},
+      {"plane", PlaneValue{{0, 0.1, 0}, {0, 1, 0}}, "", PlaneValue{{0, 0.01, 0}, {0, 0, 0}}, std::nullopt, true}};
+  r.fields = {{"youngs_modulus", {{{1, 2, 3}, 4.5, 0.5}, {{1, 2, 4}, 5.5, std::nullopt}}, "model.vtu"}};
+  r.error = {0.0021, 0.009, std::nullopt, 48211};
+  r.cost = {143.9, 8.46};
+  r.identifiability = {{{"youngs_modulus", "stiffness_damping"}, -0.93}};
+  r.starts = {{{{"youngs_modulus", 5000.0}}, {{"youngs_modulus", 590.0}}, 8.46, 12, true, "cost settled"},
+              {{{"youngs_modulus", 1e7}}, {}, std::nullopt, 3, false, "no finite cost"}};
+  r.time = {41.0, 9600, 2.1, std::nullopt};
+  r.notes = {"The floor was taken as known."};
+  return r;
+}
+
+TEST(Result, ComesBackAsItWasWritten) {
+  const TemporaryFolder folder;
+  const auto path = folder / "result.json";
+  write_result(path, full_result());
+  const Result read = read_result(path), truth = full_result();
+  EXPECT_EQ(to_json(read), to_json(truth));
+  ASSERT_EQ(read.parameters.size(), 4u);
+  EXPECT_EQ(std::get<double>(read.find("youngs_modulus@red half")->value), 900.0);
+  EXPECT_EQ(std::get<Vector3>(read.find("gravity")->value), Vector3(0, -9.81, 0));
+  EXPECT_EQ(std::get<PlaneValue>(read.find("plane")->value), (PlaneValue{{0, 0.1, 0}, {0, 1, 0}}));
+  EXPECT_EQ(read.parameters[3].name, "plane");  // the order stays
+  EXPECT_EQ(read.starts[1].cost, std::nullopt);
+  EXPECT_EQ(read.fields[0].control_points[0].std, 0.5);
+  EXPECT_EQ(read.find("nothing"), nullptr);
+}
+
+// The layout is a contract with readers in other languages: names and kinds, looked at without our own reader.
+TEST(Result, HasTheNamesAndKindsOfTheFormat) {
+  const auto json = nlohmann::json::parse(to_json(full_result()));
+  EXPECT_EQ(json["format"], "result/1");
+  EXPECT_EQ(json["parameters"]["youngs_modulus"],
+            nlohmann::json({{"value", 590.0}, {"unit", "Pa"}, {"std", 21.0}, {"start", 5000.0}, {"estimated", true}}));
+  EXPECT_EQ(json["parameters"]["plane"]["value"]["normal"], nlohmann::json({0.0, 1.0, 0.0}));
+  EXPECT_FALSE(json["parameters"]["plane"].contains("unit"));
+  EXPECT_EQ(json["fields"]["youngs_modulus"]["control_points"][0], nlohmann::json({1.0, 2.0, 3.0, 4.5, 0.5}));
+  EXPECT_EQ(json["error"]["unit"], "m");
+  EXPECT_TRUE(json["error"]["marker_rms"].is_null());
+  EXPECT_EQ(json["error"]["points"], 48211);
+  EXPECT_EQ(json["identifiability"][0]["parameters"][1], "stiffness_damping");
+  EXPECT_EQ(json["starts"][0]["reason"], "cost settled");
+  EXPECT_EQ(json["time"]["forward_steps"], 9600);
+  EXPECT_EQ(json["notes"][0], "The floor was taken as known.");
+}
+
+TEST(Result, NumbersThatAreNotFiniteBecomeNullAndAreReadAsNothing) {
+  const TemporaryFolder folder;
+  Result result = full_result();
+  result.parameters[0].std = std::numeric_limits<double>::infinity();
+  result.parameters[2].std = Vector3(1.0, std::nan(""), 1.0);
+  result.starts[0].cost = std::nan("");
+  write_result(folder / "result.json", result);
+  const Result read = read_result(folder / "result.json");
+  EXPECT_FALSE(read.parameters[0].std);
+  EXPECT_FALSE(read.parameters[2].std);
+  EXPECT_FALSE(read.starts[0].cost);
+}
+
+TEST(Result, UnknownKeysArePassedOver) {
+  const TemporaryFolder folder;
+  auto json = nlohmann::json::parse(to_json(full_result()));
+  json["later"] = {{"more", 1}};
+  json["parameters"]["density"] = {{"value", 95.0}, {"estimated", false}, {"colour", "red"}};
+  const Result read = read_result(folder.write("result.json", json.dump()));
+  EXPECT_EQ(std::get<double>(read.find("density")->value), 95.0);
+}
+
+TEST(Result, ReaderNamesTheMemberThatIsWrong) {
+  const TemporaryFolder folder;
+  const auto complaint = [&](const std::string& pointer, const nlohmann::json& value) {
+    auto json = nlohmann::json::parse(to_json(full_result()));
+    json[nlohmann::json::json_pointer(pointer)] = value;
+    return complaint_of([&] { read_result(folder.write("result.json", json.dump())); });
+  };
+  EXPECT_THAT(complaint("/format", "result/9"), HasSubstr("expected \"result/1\""));
+  EXPECT_THAT(complaint("/parameters/youngs_modulus/value", nullptr), HasSubstr("parameters.youngs_modulus.value"));
+  EXPECT_THAT(complaint("/parameters/gravity/value", {1, 2}), HasSubstr("three numbers"));
+  EXPECT_THAT(complaint("/parameters/gravity/estimated", 1), HasSubstr("true or false"));
+  EXPECT_THAT(complaint("/identifiability/0/parameters", {"one"}), HasSubstr("two names"));
+  EXPECT_THAT(complaint("/fields/youngs_modulus/control_points/1", {1, 2}), HasSubstr("control_points[1]"));
+  EXPECT_THAT(complaint("/error/points", 1.5), HasSubstr("error.points"));
+  EXPECT_THAT(complaint("/starts", "none"), HasSubstr("a list"));
+}
+
+TEST(Result, TruncatedAndForeignFilesAreRefusedWithAPlace) {
+  const TemporaryFolder folder;
+  const std::string whole = to_json(full_result());
+  for (size_t length = 0; length + 2 < whole.size(); length += 13) {
+    const auto path = folder.write("result.json", whole.substr(0, length));
+    EXPECT_THAT(complaint_of([&] { read_result(path); }), HasSubstr("result.json:")) << length;
+  }
+  const auto path = folder.write("result.json", "{\n  \"format\": oops}");
+  EXPECT_THAT(complaint_of([&] { read_result(path); }), HasSubstr("result.json:2:1"));
+  EXPECT_THAT(complaint_of([&] { read_result(folder.write("result.json", "[]")); }), HasSubstr("an object"));
+}
+
+TEST(Convergence, IsATableWithNamesAndUnits) {
+  const TemporaryFolder folder;
+  ConvergenceHistory history{{"youngs_modulus", "plane, x"}, {"Pa", "m"}, {}};
+  history.rows = {{0, 1, "all", 12.5, 1e-3, {590.25, 0.1}}, {1, 2, "warm start, \"a\"", 8.0, 0.0, {600.0, 0.2}}};
+  write_convergence(folder / "convergence.csv", history);
+  EXPECT_EQ(read_file(folder / "convergence.csv"),
+            "start,stage,iteration,cost,damping,youngs_modulus [Pa],\"plane, x [m]\"\n"
+            "0,all,1,12.5,0.001,590.25,0.1\n"
+            "1,\"warm start, \"\"a\"\"\",2,8,0,600,0.2\n");
+  history.rows[0].parameters.pop_back();
+  EXPECT_THROW(write_convergence(folder / "convergence.csv", history), std::invalid_argument);
+}
+
+TEST(Evaluation, HasTheNamesOfTheFormat) {
+  const TemporaryFolder folder;
+  write_evaluation(folder / "e.json",
+                   {{0.002, 0.01, std::nullopt, 10}, {{"push 3", "test", 1e-3, 2e-3, 0.02, 0.05}}, {}});
+  const auto json = nlohmann::json::parse(read_file(folder / "e.json"));
+  EXPECT_EQ(json["format"], "evaluation/1");
+  EXPECT_EQ(json["error"]["surface_rms"], 0.002);
+  EXPECT_EQ(json["presses"][0], nlohmann::json({{"name", "push 3"},
+                                                {"role", "test"},
+                                                {"marker_rms", 1e-3},
+                                                {"marker_max", 2e-3},
+                                                {"max_displacement", 0.02},
+                                                {"relative_error", 0.05}}));
+  EXPECT_TRUE(json["loads"].is_array());
+}
+
+}  // namespace
+}  // namespace pliant
