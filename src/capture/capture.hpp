@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "base/error.hpp"
 #include "base/types.hpp"
 #include "geometry/triangle_mesh.hpp"
 
@@ -68,11 +70,13 @@ struct Initial {
   bool released = false;
 };
 
-/// Paths of one file a frame: a printf pattern like "front/%06d.png", beside the capture's folder.
+/// Paths of one file a frame: a printf pattern like "front/%06d.png", relative to the capture's folder.
 struct FramePattern {
   std::string pattern;
   /// The path for a frame, relative to the capture's folder.
   std::filesystem::path operator()(int frame) const;
+  /// Whether the pattern holds exactly one %d (with or without a width), so that frames have different paths.
+  bool is_valid() const;
 };
 
 struct DepthCamera {
@@ -93,29 +97,30 @@ struct CloudSequence {
 };
 
 struct MarkerTrack {
-  std::filesystem::path rest, track;
+  std::filesystem::path rest, track;  ///< absolute
 };
 
 struct Press {
-  Vector3 force;  ///< [N]
-  Vector3 contact_centre;
-  double contact_radius;
+  Vector3 force = Vector3::Zero();           ///< [N], the whole force of the probe on the object
+  Vector3 contact_centre = Vector3::Zero();  ///< on the undeformed surface
+  double contact_radius = 0.0;               ///< [m]
   std::optional<Plane> probe;
-  std::filesystem::path markers, markers_rest;
-  std::string role = "fit";
+  std::filesystem::path markers, markers_rest;  ///< absolute
+  std::string role = "fit";                     ///< "fit" or "test"
   bool glued = true;
 };
 
 struct Load {
-  double mass;  ///< [kg]
-  Vector3 at;
-  std::optional<std::filesystem::path> cloud, markers;
-  std::string role = "fit";
+  double mass = 0.0;             ///< [kg]
+  Vector3 at = Vector3::Zero();  ///< on the undeformed surface
+  std::optional<std::filesystem::path> cloud, markers, markers_rest;  ///< absolute
+  std::map<std::string, std::filesystem::path> images, masks;         ///< absolute, by the depth camera's name
+  std::string role = "fit";                                           ///< "fit" or "test"
 };
 
 /// Facts read from a `capture.toml`, valid as a whole (see docs/formats.md). SI units, world coordinates.
 struct Capture {
-  std::filesystem::path folder;  ///< paths of the capture are relative to it
+  std::filesystem::path folder;  ///< absolute; patterns of the capture are relative to it
   std::filesystem::path file;    ///< the capture.toml itself
   std::string name;
   std::string sha256;  ///< of capture.toml and the surface file, hexadecimal
@@ -145,6 +150,8 @@ struct Capture {
   std::vector<Load> loads;
 
   int frame_count() const { return int(times.size()); }
+  /// Mass [kg] of the object, from its density where that is given. Nothing: neither is known.
+  std::optional<double> total_mass() const;
 };
 
 /// Reads and validates a capture: `path` is the folder or its capture.toml.

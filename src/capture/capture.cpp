@@ -1,0 +1,43 @@
+#include "capture/capture.hpp"
+
+#include <cctype>
+#include <cstdio>
+
+namespace pliant {
+
+namespace {
+
+// Begin and end of the one "%06d" in a pattern; nothing where there is none, or something else after a percent sign.
+std::optional<std::pair<std::size_t, std::size_t>> number_field(const std::string& pattern) {
+  const std::size_t begin = pattern.find('%');
+  if (begin == std::string::npos) return std::nullopt;
+  std::size_t end = begin + 1;
+  while (end < pattern.size() && std::isdigit(static_cast<unsigned char>(pattern[end]))) ++end;
+  const bool is_wide = end - begin > 3;
+  if (end >= pattern.size() || pattern[end] != 'd' || is_wide || pattern.find('%', end) != std::string::npos)
+    return std::nullopt;
+  return std::pair{begin, end + 1};
+}
+
+}  // namespace
+
+bool FramePattern::is_valid() const { return number_field(pattern).has_value(); }
+
+std::filesystem::path FramePattern::operator()(int frame) const {
+  const auto field = number_field(pattern);
+  if (!field) return pattern;
+  const std::string format = pattern.substr(field->first + 1, field->second - field->first - 2);
+  const bool zeros = format.starts_with('0');
+  const std::size_t width = format.empty() ? 0 : std::stoul(format);
+  std::string number = std::to_string(frame);
+  if (number.size() < width) number.insert(0, width - number.size(), zeros ? '0' : ' ');
+  return pattern.substr(0, field->first) + number + pattern.substr(field->second);
+}
+
+std::optional<double> Capture::total_mass() const {
+  if (mass) return mass;
+  if (density && surface) return *density * enclosed_volume(*surface);
+  return std::nullopt;
+}
+
+}  // namespace pliant

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "capture/capture.hpp"
+#include "capture/toml_table.hpp"
+
+namespace pliant {
+
+/// What a rule sees: the capture as read so far, and where to complain.
+struct RuleContext {
+  const Capture& capture;
+  TomlContext& toml;
+};
+
+/// One thing that a valid capture must satisfy. A rule skips what an earlier one or the reader found broken.
+using Rule = void (*)(RuleContext&);
+
+/// @name Rules about the facts alone
+/// @{
+void check_surface_is_solid(RuleContext&);
+void check_object_size(RuleContext&);
+void check_mass_or_density(RuleContext&);
+void check_gravity(RuleContext&);
+void check_timing(RuleContext&);
+void check_start_frame(RuleContext&);
+void check_static(RuleContext&);
+void check_initial_velocity(RuleContext&);
+void check_vertex_lists(RuleContext&);
+void check_fixed_regions(RuleContext&);
+void check_material_regions(RuleContext&);
+void check_planes(RuleContext&);
+void check_camera_names(RuleContext&);
+void check_intrinsics(RuleContext&);
+void check_every(RuleContext&);
+void check_noise(RuleContext&);
+void check_has_observations(RuleContext&);
+void check_presses(RuleContext&);
+void check_loads(RuleContext&);
+/// @}
+
+/// @name Rules that open the recording's files
+/// @{
+void check_depth_files(RuleContext&);
+void check_clouds(RuleContext&);
+void check_markers(RuleContext&);
+void check_press_markers(RuleContext&);
+void check_load_files(RuleContext&);
+void check_depth_scale(RuleContext&);
+void check_cameras_see_object(RuleContext&);
+void check_clouds_near_object(RuleContext&);
+/// @}
+
+/// All of them, in the order in which they are applied.
+std::span<const Rule> capture_rules();
+
+/// Frames that a sequence holds when it has one for every `every`-th of `frame_count`.
+std::vector<int> frames_of(int frame_count, int every);
+
+/// "3, 7-9, 12" from sorted numbers; with many runs the rest is counted.
+std::string ranges_text(std::span<const int> numbers);
+
+}  // namespace pliant

@@ -1,0 +1,45 @@
+#include "capture/depth_frame.hpp"
+
+#include <algorithm>
+#include <string>
+
+namespace pliant {
+
+namespace {
+
+template <class Pixel>
+Image<Pixel> of_size(Image<Pixel> image, const DepthCamera& depth, const std::filesystem::path& path) {
+  const PinholeCamera& camera = depth.camera;
+  if (image.width == camera.width && image.height == camera.height) return image;
+  const auto text = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h) + " pixels"; };
+  throw InputError(Problem{{path},
+                           text(image.width, image.height),
+                           text(camera.width, camera.height) + " as camera \"" + depth.name + "\" has",
+                           ""});
+}
+
+}  // namespace
+
+DepthImage to_metres(const Image<std::uint16_t>& raw, double depth_scale) {
+  DepthImage depth(raw.width, raw.height);
+  std::ranges::transform(raw.pixels, depth.pixels.begin(), [=](std::uint16_t r) { return float(r / depth_scale); });
+  return depth;
+}
+
+DepthImage read_depth(const Capture& capture, const DepthCamera& camera, int frame) {
+  const auto path = capture.folder / camera.images(frame);
+  return to_metres(of_size(read_depth_image(path), camera, path), camera.depth_scale);
+}
+
+std::optional<DepthImage> read_background(const DepthCamera& camera) {
+  if (!camera.background) return std::nullopt;
+  return to_metres(of_size(read_depth_image(*camera.background), camera, *camera.background), camera.depth_scale);
+}
+
+std::optional<Image<std::uint8_t>> read_object_mask(const Capture& capture, const DepthCamera& camera, int frame) {
+  if (!camera.masks) return std::nullopt;
+  const auto path = capture.folder / (*camera.masks)(frame);
+  return of_size(read_mask(path), camera, path);
+}
+
+}  // namespace pliant

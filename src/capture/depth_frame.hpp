@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+
+#include "capture/capture.hpp"
+#include "capture/image_io.hpp"
+
+namespace pliant {
+
+/// Depth [m] along the optical axis; 0 where there is no reading.
+using DepthImage = Image<float>;
+
+/// A depth camera's image of one frame. Throws InputError where it cannot be decoded or has another size.
+DepthImage read_depth(const Capture& capture, const DepthCamera& camera, int frame);
+
+/// The camera's view of the scene without the object; nothing where the capture has none.
+std::optional<DepthImage> read_background(const DepthCamera& camera);
+
+/// 255 where the pixel shows the object; nothing where the capture has no masks.
+std::optional<Image<std::uint8_t>> read_object_mask(const Capture& capture, const DepthCamera& camera, int frame);
+
+/// Raw readings to metres.
+DepthImage to_metres(const Image<std::uint16_t>& raw, double depth_scale);
+
+}  // namespace pliant

@@ -1,0 +1,363 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <set>
+
+#include "capture/capture_rules.hpp"
+#include "capture/region.hpp"
+#include "geometry/mesh_io.hpp"
+
+namespace pliant {
+
+namespace {
+
+// Plausible ranges. Each is far wider than any soft object, and narrower than a slip of a factor 1000.
+constexpr double smallest_object = 1e-3, largest_object = 10.0;      // [m]
+constexpr double least_density = 3.0, greatest_density = 25e3;       // [kg/m^3] foam to metal
+constexpr double least_gravity = 1.0, greatest_gravity = 30.0;       // [m/s^2] the Moon to Jupiter
+constexpr double shortest_interval = 1e-5, longest_interval = 10.0;  // [s] between frames
+constexpr double fastest = 100.0, fastest_spin = 1000.0;             // [m/s], [rad/s]
+constexpr double least_noise = 1e-6, greatest_noise = 0.25;          // [m]
+constexpr double greatest_force = 1e5;                               // [N]
+constexpr double greatest_load = 100.0;                              // times the object's own mass
+constexpr double surface_tolerance = 0.05;                           // of the object's size
+
+std::string text_of(double value, const char* unit) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.4g %s", value, unit);
+  return text;
+}
+
+std::string text_of(const Vector3& v) {
+  char text[96];
+  std::snprintf(text, sizeof text, "[%.4g, %.4g, %.4g]", v.x(), v.y(), v.z());
+  return text;
+}
+
+std::string item(const char* name, std::size_t i, const char* key = "") {
+  return std::string(name) + "[" + std::to_string(i) + "]" + (*key ? "." : "") + key;
+}
+
+double size_of(const TriangleMesh& surface) { return bounding_box(surface).extent().maxCoeff(); }
+
+Vector3 closest_on_triangle(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c) {
+  const auto on_segment = [&](const Vector3& s, const Vector3& e) -> Vector3 {
+    const Vector3 d = e - s;
+    const double length = d.squaredNorm();
+    return length > 0 ? Vector3(s + std::clamp((p - s).dot(d) / length, 0.0, 1.0) * d) : s;
+  };
+  const Vector3 n = (b - a).cross(c - a);
+  const bool inside = n.squaredNorm() > 0 && n.dot((b - a).cross(p - a)) >= 0 && n.dot((c - b).cross(p - b)) >= 0 &&
+                      n.dot((a - c).cross(p - c)) >= 0;
+  if (inside) return p - n * (n.dot(p - a) / n.squaredNorm());
+  Vector3 best = on_segment(a, b);
+  for (const Vector3& other : {on_segment(b, c), on_segment(c, a)})
+    if ((other - p).squaredNorm() < (best - p).squaredNorm()) best = other;
+  return best;
+}
+
+double distance_to(const TriangleMesh& surface, const Vector3& point) {
+  double least = 1e300;
+  for (const auto& [a, b, c] : surface.triangles)
+    least = std::min(
+        least,
+        (closest_on_triangle(point, surface.vertices[a], surface.vertices[b], surface.vertices[c]) - point).norm());
+  return least;
+}
+
+void complain_off_surface(RuleContext& context, const std::string& key, const Vector3& point) {
+  if (!context.capture.surface) return;
+  const double distance = distance_to(*context.capture.surface, point);
+  if (distance > surface_tolerance * size_of(*context.capture.surface))
+    context.toml.complain(key, text_of(point) + " is " + text_of(distance, "m") + " off the rest surface",
+                          "a point on the undeformed surface", "give it in metres, in world coordinates, at rest");
+}
+
+}  // namespace
+
+void check_surface_is_solid(RuleContext& context) {
+  if (!context.capture.surface) return;
+  const MeshReport report = examine(*context.capture.surface);
+  if (report.is_closed_solid) return;
+  std::string wrong;
+  for (const std::string& complaint : report.complaints) wrong += (wrong.empty() ? "" : "; ") + complaint;
+  context.toml.complain("object.surface", "`surface` is no solid: " + wrong, "a closed surface that faces outwards",
+                        "close holes and make orientations agree in a mesh editor");
+}
+
+void check_object_size(RuleContext& context) {
+  if (!context.capture.surface) return;
+  const double size = size_of(*context.capture.surface);
+  if (size >= smallest_object && size <= largest_object) return;
+  context.toml.complain("object.surface", "the object is " + text_of(size, "m") + " long", "1 mm to 10 m",
+                        size > largest_object ? "meshes are in metres: divide by 1000 if this one is in millimetres"
+                                              : "meshes are in metres: check the unit of this one");
+}
+
+void check_mass_or_density(RuleContext& context) {
+  const Capture& capture = context.capture;
+  if (capture.mass && capture.density)
+    context.toml.complain("object.density", "both `mass` and `density`", "one of the two", "keep what was measured");
+  for (const auto& [key, value] :
+       {std::pair("object.mass", capture.mass), std::pair("object.density", capture.density)})
+    if (value && *value <= 0) context.toml.complain(key, text_of(*value, ""), "a number above 0", "");
+  if (capture.density && *capture.density > 0 &&
+      (*capture.density < least_density || *capture.density > greatest_density))
+    context.toml.complain("object.density", "a density of " + text_of(*capture.density, "kg/m^3"), "3 to 25000 kg/m^3",
+                          "1 g/cm^3 is 1000 kg/m^3");
+  if (!capture.mass || *capture.mass <= 0 || !capture.surface) return;
+  const double volume = enclosed_volume(*capture.surface), density = *capture.mass / volume;
+  if (volume > 0 && (density < least_density || density > greatest_density))
+    context.toml.complain(
+        "object.mass",
+        text_of(*capture.mass, "kg") + " in " + text_of(volume, "m^3") + " is " + text_of(density, "kg/m^3"),
+        "3 to 25000 kg/m^3", "mass is in kilograms and the mesh in metres");
+}
+
+void check_gravity(RuleContext& context) {
+  const auto& gravity = context.capture.gravity;
+  if (!gravity) {
+    if (context.toml.places.has("world") && !context.toml.places.has("world.up") && context.toml.is_sound("world"))
+      context.toml.complain("world.gravity", "neither `gravity` nor `up`", "gravity = [x, y, z] in m/s^2",
+                            "where gravity is unknown write `up`, the direction away from the ground");
+    return;
+  }
+  const double strength = gravity->norm();
+  if (strength != 0 && (strength < least_gravity || strength > greatest_gravity))
+    context.toml.complain("world.gravity", "a gravity of " + text_of(strength, "m/s^2"), "about 9.81 m/s^2",
+                          "give it in metres per second squared");
+  if (strength > 0 && context.toml.places.has("world.up") && context.capture.up.dot(*gravity) > -0.5 * strength)
+    context.toml.complain("world.up", "`up` does not point against `gravity`", "the opposite direction",
+                          "leave out `up`");
+}
+
+void check_timing(RuleContext& context) {
+  const Capture& capture = context.capture;
+  const bool is_moving = !capture.depth.empty() || !capture.clouds.empty() || !capture.markers.empty();
+  if (is_moving && !context.toml.places.has("timing"))
+    context.toml.complain("timing", "no table [timing]", "[timing] with `frame_rate` and `frame_count`");
+  if (!context.toml.is_sound("timing")) return;
+  const auto& times = capture.times;
+  const std::string key = context.toml.places.has("timing.timestamps") ? "timing.timestamps" : "timing.frame_rate";
+  for (std::size_t i = 1; i < times.size(); ++i)
+    if (times[i] <= times[i - 1]) {
+      context.toml.complain(
+          key, "time " + std::to_string(i) + " (" + text_of(times[i], "s") + ") is not after the one before",
+          "times that increase", "sort the frames by time");
+      return;
+    }
+  if (times.size() < 2 || capture.is_static) return;
+  const double interval = (times.back() - times.front()) / double(times.size() - 1);
+  if (interval < shortest_interval || interval > longest_interval)
+    context.toml.complain(key, text_of(interval, "s") + " between frames", "0.00001 to 10 s",
+                          "times are in seconds; looks at one equilibrium need `static = true`");
+}
+
+void check_start_frame(RuleContext& context) {
+  const Capture& capture = context.capture;
+  if (!context.toml.is_sound("timing") || capture.times.empty()) return;
+  if (capture.start_frame < 0 || capture.start_frame >= capture.frame_count())
+    context.toml.complain("timing.start_frame", "`start_frame` is " + std::to_string(capture.start_frame),
+                          "0 to " + std::to_string(capture.frame_count() - 1), "frames are counted from 0");
+}
+
+void check_static(RuleContext& context) {
+  const Capture& capture = context.capture;
+  if (!capture.is_static) return;
+  if (capture.initial.released)
+    context.toml.complain("initial.released", "a static capture that is released", "one of the two",
+                          "remove `static` or `released`");
+  if (capture.initial.linear_velocity.norm() > 0 || capture.initial.angular_velocity.norm() > 0)
+    context.toml.complain("initial", "a static capture with a velocity", "an object at rest",
+                          "remove the velocity or `static`");
+}
+
+void check_initial_velocity(RuleContext& context) {
+  const Initial& initial = context.capture.initial;
+  if (const double speed = initial.linear_velocity.norm(); speed > fastest)
+    context.toml.complain("initial.linear_velocity", text_of(speed, "m/s"), "at most 100 m/s",
+                          "give it in metres per second");
+  if (const double spin = initial.angular_velocity.norm(); spin > fastest_spin)
+    context.toml.complain("initial.angular_velocity", text_of(spin, "rad/s"), "at most 1000 rad/s",
+                          "give it in radians per second");
+}
+
+void check_vertex_lists(RuleContext& context) {
+  if (!context.capture.surface) return;
+  const int count = int(context.capture.surface->vertices.size());
+  const auto check = [&](const Region& region, const std::string& key) {
+    const auto* list = std::get_if<RegionVertices>(&region);
+    if (!list || !context.toml.is_sound(key)) return;
+    const auto bad = std::ranges::find_if(list->indices, [&](int v) { return v < 0 || v >= count; });
+    if (bad != list->indices.end())
+      context.toml.complain(key + ".vertices", "vertex " + std::to_string(*bad) + " in the list",
+                            "0 to " + std::to_string(count - 1), "indices count the surface file's vertices from 0");
+  };
+  for (std::size_t i = 0; i < context.capture.fixed.size(); ++i)
+    check(context.capture.fixed[i].region, item("fixed", i));
+  for (std::size_t i = 0; i < context.capture.regions.size(); ++i)
+    check(context.capture.regions[i].region, item("region", i));
+}
+
+void check_fixed_regions(RuleContext& context) {
+  const Capture& capture = context.capture;
+  if (!capture.surface) return;
+  for (std::size_t i = 0; i < capture.fixed.size(); ++i) {
+    if (!context.toml.is_sound(item("fixed", i))) continue;
+    const Region& region = capture.fixed[i].region;
+    if (!touches_solid(region, *capture.surface))
+      context.toml.complain(item("fixed", i), "no point of the object lies in this fixed region",
+                            "a region that holds a part of it",
+                            "the object's box is " + text_of(bounding_box(*capture.surface).min) + " to " +
+                                text_of(bounding_box(*capture.surface).max));
+    bool holds_all = true;
+    for (int v = 0; holds_all && v < int(capture.surface->vertices.size()); ++v)
+      holds_all = contains_vertex(region, *capture.surface, v);
+    if (holds_all)
+      context.toml.complain(item("fixed", i), "the whole object lies in this fixed region", "a part of it",
+                            "nothing could move");
+  }
+}
+
+void check_material_regions(RuleContext& context) {
+  const Capture& capture = context.capture;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < capture.regions.size(); ++i) {
+    const MaterialRegion& part = capture.regions[i];
+    if (!context.toml.is_sound(item("region", i))) continue;
+    if (!names.insert(part.name).second)
+      context.toml.complain(item("region", i, "name"), "a second region \"" + part.name + "\"", "different names");
+    if (part.name.find('@') != std::string::npos)
+      context.toml.complain(item("region", i, "name"), "the name \"" + part.name + "\"", "a name without @",
+                            "parameters are listed as name@region");
+    if (capture.surface && !touches_solid(part.region, *capture.surface))
+      context.toml.complain(item("region", i), "no point of the object lies in region \"" + part.name + "\"",
+                            "a region that holds a part of it", "check its unit and the side of its normal");
+  }
+}
+
+void check_planes(RuleContext& context) {
+  const Capture& capture = context.capture;
+  // A released or static object is not in its rest pose when it is seen.
+  if (!capture.surface || capture.initial.released || capture.is_static) return;
+  const double size = size_of(*capture.surface);
+  for (std::size_t i = 0; i < capture.planes.size(); ++i) {
+    const Plane& plane = capture.planes[i];
+    if (!context.toml.is_sound(item("plane", i))) continue;
+    double deepest = 1e300, highest = -1e300;
+    for (const Vector3& vertex : capture.surface->vertices) {
+      const double height = plane.normal.dot(vertex - plane.point);
+      deepest = std::min(deepest, height);
+      highest = std::max(highest, height);
+    }
+    // A guess may cut the object; a known plane may touch it as deep as scan errors and a soft sole allow.
+    const bool is_wrong = plane.known ? deepest < -0.1 * size : highest < 0.0;
+    if (is_wrong)
+      context.toml.complain(item("plane", i), "the object starts " + text_of(-deepest, "m") + " below this plane",
+                            "the object on the side to which the normal points",
+                            "turn the normal round or move the point");
+  }
+}
+
+void check_camera_names(RuleContext& context) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i)
+    if (const std::string& name = context.capture.depth[i].name; !name.empty() && !names.insert(name).second)
+      context.toml.complain(item("depth", i, "name"), "a second camera \"" + name + "\"", "different names");
+}
+
+void check_intrinsics(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
+    const PinholeCamera& camera = context.capture.depth[i].camera;
+    for (const auto& [key, value] : {std::pair("width", camera.width), std::pair("height", camera.height)})
+      if (context.toml.is_sound(item("depth", i, key)) && (value < 2 || value > 32768))
+        context.toml.reject(item("depth", i, key), "`" + std::string(key) + "` is " + std::to_string(value),
+                            "2 to 32768 pixels");
+    if (!context.toml.is_sound(item("depth", i))) continue;
+    // From a view of 150 degrees to a long telephoto lens.
+    for (const auto& [key, value] : {std::pair("fx", camera.fx), std::pair("fy", camera.fy)})
+      if (value < 0.13 * camera.width || value > 30.0 * camera.width)
+        context.toml.reject(item("depth", i, key),
+                            "a focal length of " + text_of(value, "pixels") + " in an image " +
+                                std::to_string(camera.width) + " pixels wide",
+                            "0.13 to 30 times the width",
+                            "focal lengths are in pixels: millimetres / sensor width x image width");
+    const bool is_normalised = camera.cx <= 1.0 && camera.cy <= 1.0;
+    const auto is_off = [](double c, int side) { return c < -0.5 * side || c > 1.5 * side; };
+    if (is_normalised || is_off(camera.cx, camera.width) || is_off(camera.cy, camera.height))
+      context.toml.reject(item("depth", i, "cx"),
+                          "the principal point (" + text_of(camera.cx, "") + ", " + text_of(camera.cy, "") + ")",
+                          "a point in the image, in pixels", "mostly near (width / 2, height / 2)");
+  }
+}
+
+void check_every(RuleContext& context) {
+  const auto check = [&](int every, const std::string& key) {
+    if (every < 1 || (context.capture.frame_count() > 0 && every > context.capture.frame_count()))
+      context.toml.reject(key, "`every` is " + std::to_string(every), "1 to the number of frames",
+                          "2 means every other frame");
+  };
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i)
+    check(context.capture.depth[i].every, item("depth", i, "every"));
+  for (std::size_t i = 0; i < context.capture.clouds.size(); ++i)
+    check(context.capture.clouds[i].every, item("cloud", i, "every"));
+}
+
+void check_noise(RuleContext& context) {
+  const auto check = [&](const std::optional<double>& noise, const std::string& key) {
+    if (noise && (*noise < least_noise || *noise > greatest_noise))
+      context.toml.complain(key, "a noise of " + text_of(*noise, "m"), "0.000001 to 0.25 m",
+                            "a standard deviation in metres");
+  };
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i)
+    check(context.capture.depth[i].noise, item("depth", i, "noise"));
+  for (std::size_t i = 0; i < context.capture.clouds.size(); ++i)
+    check(context.capture.clouds[i].noise, item("cloud", i, "noise"));
+}
+
+void check_has_observations(RuleContext& context) {
+  for (const char* kind : {"depth", "cloud", "markers", "press", "load"})
+    if (context.toml.places.has(kind)) return;
+  context.toml.complain("", "no observation", "a block [[depth]], [[cloud]], [[markers]], [[press]] or [[load]]",
+                        "say what was recorded");
+}
+
+void check_presses(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.presses.size(); ++i) {
+    const Press& press = context.capture.presses[i];
+    if (!context.toml.is_sound(item("press", i))) continue;
+    if (const double force = press.force.norm(); force == 0 || force > greatest_force)
+      context.toml.complain(item("press", i, "force"), "a force of " + text_of(force, "N"),
+                            "above 0 and at most 100000 N", "forces are in newtons");
+    const double limit = context.capture.surface ? size_of(*context.capture.surface) : largest_object;
+    if (press.contact_radius <= 0 || press.contact_radius > limit)
+      context.toml.complain(item("press", i, "contact"), "a contact radius of " + text_of(press.contact_radius, "m"),
+                            "above 0 and smaller than the object", "radii are in metres");
+    complain_off_surface(context, item("press", i, "contact"), press.contact_centre);
+  }
+}
+
+void check_loads(RuleContext& context) {
+  const Capture& capture = context.capture;
+  for (std::size_t i = 0; i < capture.loads.size(); ++i) {
+    const Load& load = capture.loads[i];
+    if (!context.toml.is_sound(item("load", i))) continue;
+    const double limit = greatest_load * capture.total_mass().value_or(largest_object);
+    if (load.mass <= 0 || load.mass > limit)
+      context.toml.complain(item("load", i, "mass"), "a hung mass of " + text_of(load.mass, "kg"),
+                            "above 0 and at most " + text_of(limit, "kg"), "masses are in kilograms");
+    complain_off_surface(context, item("load", i, "at"), load.at);
+    if (!load.cloud && !load.markers && load.images.empty())
+      context.toml.complain(item("load", i), "a load without observation", "`cloud`, `markers` or `images`");
+    if (load.markers && !load.markers_rest)
+      context.toml.complain(item("load", i, "markers"), "`markers` without `markers_rest`", "both",
+                            "name the markers at rest");
+    for (const auto& [name, path] : load.images)
+      if (std::ranges::none_of(capture.depth, [&](const DepthCamera& camera) { return camera.name == name; }))
+        context.toml.complain(item("load", i, "images"), "no depth camera \"" + name + "\"",
+                              "the name of a [[depth]] block");
+  }
+}
+
+}  // namespace pliant

@@ -1,0 +1,386 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "capture/capture_rules.hpp"
+#include "capture/depth_frame.hpp"
+#include "capture/image_io.hpp"
+#include "capture/markers.hpp"
+#include "capture/point_cloud.hpp"
+
+namespace pliant {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double nearest_scene = 0.02, farthest_scene = 50.0;  // [m] median depth of an image
+constexpr int least_pixels = 10;                               // that show something near the object
+
+std::string item(const char* name, std::size_t i, const char* key = "") {
+  return std::string(name) + "[" + std::to_string(i) + "]" + (*key ? "." : "") + key;
+}
+
+std::string text_of(double value, const char* unit) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.4g %s", value, unit);
+  return text;
+}
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+// Frames whose file is not there.
+std::vector<int> missing_frames(const Capture& capture, const FramePattern& pattern, const std::vector<int>& frames) {
+  std::vector<int> missing;
+  for (const int frame : frames)
+    if (!fs::is_regular_file(capture.folder / pattern(frame))) missing.push_back(frame);
+  return missing;
+}
+
+bool complain_missing(RuleContext& context, const std::string& key, const FramePattern& pattern,
+                      const std::vector<int>& frames) {
+  const std::vector<int> missing = missing_frames(context.capture, pattern, frames);
+  if (missing.empty()) return false;
+  const std::string of = " of " + std::to_string(frames.size());
+  context.toml.reject(
+      key,
+      missing.size() == frames.size()
+          ? "no file \"" + pattern(frames.front()).string() + "\", nor for any other frame"
+          : "no file for " + std::to_string(missing.size()) + of + " frames: " + ranges_text(missing),
+      "a file for each frame from 0 to " + std::to_string(frames.back()),
+      "correct the pattern or `frame_count`, or give `every` where images exist for every n-th frame only");
+  return true;
+}
+
+enum class Kind { Depth, Mask };
+
+// What is wrong with an image's header; "" where nothing is.
+std::string header_fault(const fs::path& path, const PinholeCamera& camera, Kind kind) {
+  try {
+    const ImageHeader header = read_image_header(path);
+    if (header.width != camera.width || header.height != camera.height)
+      return size_text(header.width, header.height) + " pixels";
+    if (kind == Kind::Depth && (header.bits != 16 || header.channels != 1))
+      return std::to_string(header.bits) + " bits, " + std::to_string(header.channels) + " channels";
+    if (kind == Kind::Mask && header.bits > 8) return std::to_string(header.bits) + " bits a channel";
+    return "";
+  } catch (const InputError& error) {
+    return error.problems().front().found;
+  }
+}
+
+void check_header(RuleContext& context, const std::string& key, const fs::path& path, const PinholeCamera& camera,
+                  Kind kind) {
+  const std::string fault = header_fault(path, camera, kind);
+  if (fault.empty()) return;
+  context.toml.reject(
+      key, "\"" + fs::relative(path, context.capture.folder).string() + "\" has " + fault,
+      size_text(camera.width, camera.height) + (kind == Kind::Depth ? " pixels of 16-bit grey" : " pixels of 8 bits"),
+      "correct the camera's size, or write the images again");
+}
+
+// The first fault of a sequence, with the number of files that share it.
+void check_sequence(RuleContext& context, std::size_t i, const char* name, const FramePattern& pattern, Kind kind) {
+  const DepthCamera& camera = context.capture.depth[i];
+  const std::vector<int> frames = frames_of(context.capture.frame_count(), camera.every);
+  const std::string key = item("depth", i, name);
+  if (frames.empty() || complain_missing(context, key, pattern, frames)) return;
+  for (const int frame : frames) {
+    const fs::path path = context.capture.folder / pattern(frame);
+    if (header_fault(path, camera.camera, kind).empty()) continue;
+    check_header(context, key, path, camera.camera, kind);
+    return;
+  }
+}
+
+// The first frame of a sequence that shows the object free.
+int first_free_frame(const Capture& capture, int every) {
+  const int frame = (capture.start_frame + every - 1) / every * every;
+  return frame < capture.frame_count() ? frame : (capture.frame_count() - 1) / every * every;
+}
+
+struct Sphere {
+  Vector3 centre;
+  double radius;
+};
+
+// Where the object may be: around its place at rest, and on the way of a fall. Generous on purpose.
+std::vector<Sphere> possible_places(const Capture& capture) {
+  const Box box = bounding_box(*capture.surface);
+  const double own = 0.5 * box.extent().norm();
+  const double radius = (capture.is_static || capture.initial.released ? 3.0 : 1.5) * own;
+  std::vector<Sphere> places{{0.5 * (box.min + box.max), radius}};
+  const bool may_fall = capture.fixed.empty() && !capture.is_static;
+  for (double fallen = own; may_fall && fallen < 2.0; fallen += own)
+    places.push_back({places[0].centre - fallen * capture.up, radius});
+  for (const FixedRegion& fixed : capture.fixed)
+    if (fixed.displaced_to) places.push_back({(*fixed.displaced_to)(places[0].centre), radius});
+  return places;
+}
+
+bool may_see(const PinholeCamera& camera, const Sphere& sphere) {
+  const Vector3 seen = camera.project(sphere.centre);
+  if (seen.z() < sphere.radius) return seen.z() > -sphere.radius;
+  const double du = camera.fx * sphere.radius / seen.z(), dv = camera.fy * sphere.radius / seen.z();
+  return seen.x() + du > 0 && seen.x() - du < camera.width && seen.y() + dv > 0 && seen.y() - dv < camera.height;
+}
+
+bool is_near(const std::vector<Sphere>& places, const Vector3& point) {
+  return std::ranges::any_of(places,
+                             [&](const Sphere& s) { return (point - s.centre).squaredNorm() < s.radius * s.radius; });
+}
+
+int pixels_near(const Capture& capture, const DepthCamera& camera, int frame, const std::vector<Sphere>& places) {
+  const DepthImage depth = read_depth(capture, camera, frame);
+  const auto mask = read_object_mask(capture, camera, frame);
+  int count = 0;
+  for (int v = 0; v < depth.height; ++v)
+    for (int u = 0; u < depth.width; ++u)
+      if (depth(u, v) > 0 && (!mask || (*mask)(u, v)) && is_near(places, camera.camera.unproject(u, v, depth(u, v))))
+        ++count;
+  return count;
+}
+
+std::vector<Rule> make_rules() {
+  return {check_surface_is_solid,
+          check_object_size,
+          check_mass_or_density,
+          check_gravity,
+          check_timing,
+          check_start_frame,
+          check_static,
+          check_initial_velocity,
+          check_vertex_lists,
+          check_fixed_regions,
+          check_material_regions,
+          check_planes,
+          check_camera_names,
+          check_intrinsics,
+          check_every,
+          check_noise,
+          check_has_observations,
+          check_presses,
+          check_loads,
+          check_depth_files,
+          check_clouds,
+          check_markers,
+          check_press_markers,
+          check_load_files,
+          check_depth_scale,
+          check_cameras_see_object,
+          check_clouds_near_object};
+}
+
+void add_problems(RuleContext& context, const std::string& key, const InputError& error) {
+  for (const Problem& problem : error.problems()) context.toml.problems.push_back(problem);
+  context.toml.broken.insert(key);
+}
+
+// Markers that are followed must be known at rest.
+void check_ids(RuleContext& context, const std::string& key, const MarkerPositions& seen, const MarkerPositions& rest) {
+  for (const auto& [id, position] : seen)
+    if (!rest.contains(id)) {
+      context.toml.complain(key, "marker " + std::to_string(id) + " is not among the markers at rest",
+                            "ids as in the file of rest positions", "add its position at rest or remove its rows");
+      return;
+    }
+}
+
+void check_markers_on_object(RuleContext& context, const std::string& key, const MarkerPositions& rest) {
+  if (!context.capture.surface || rest.empty()) return;
+  const Box box = bounding_box(*context.capture.surface);
+  const double margin = 0.1 * box.extent().maxCoeff();
+  for (const auto& [id, p] : rest)
+    if ((p.array() < box.min.array() - margin).any() || (p.array() > box.max.array() + margin).any()) {
+      context.toml.complain(key, "marker " + std::to_string(id) + " at rest lies outside the object",
+                            "markers on or in the object", "give markers in metres, in the surface's coordinates");
+      return;
+    }
+}
+
+void check_marker_pair(RuleContext& context, const std::string& block, const fs::path& markers_path,
+                       const fs::path& rest_path) {
+  try {
+    const MarkerPositions rest = read_markers(rest_path), seen = read_markers(markers_path);
+    if (seen.empty()) context.toml.complain(block + ".markers", "a file without markers", "one marker at least");
+    check_ids(context, block + ".markers", seen, rest);
+    check_markers_on_object(context, block + ".markers_rest", rest);
+  } catch (const InputError& error) {
+    add_problems(context, block, error);
+  }
+}
+
+}  // namespace
+
+std::span<const Rule> capture_rules() {
+  static const std::vector<Rule> rules = make_rules();
+  return rules;
+}
+
+std::vector<int> frames_of(int frame_count, int every) {
+  std::vector<int> frames;
+  for (int frame = 0; every > 0 && frame < frame_count; frame += every) frames.push_back(frame);
+  return frames;
+}
+
+std::string ranges_text(std::span<const int> numbers) {
+  constexpr int most_runs = 8;
+  std::string text;
+  int runs = 0;
+  for (std::size_t begin = 0; begin < numbers.size();) {
+    std::size_t end = begin;
+    while (end + 1 < numbers.size() && numbers[end + 1] == numbers[end] + 1) ++end;
+    if (++runs > most_runs) return text + ", and " + std::to_string(numbers.size() - begin) + " more";
+    text += (text.empty() ? "" : ", ") + std::to_string(numbers[begin]);
+    if (end > begin) text += "-" + std::to_string(numbers[end]);
+    begin = end + 1;
+  }
+  return text;
+}
+
+void check_depth_files(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
+    const DepthCamera& camera = context.capture.depth[i];
+    if (!context.toml.is_sound(item("depth", i))) continue;
+    check_sequence(context, i, "images", camera.images, Kind::Depth);
+    if (camera.masks) check_sequence(context, i, "masks", *camera.masks, Kind::Mask);
+    if (camera.background)
+      check_header(context, item("depth", i, "background"), *camera.background, camera.camera, Kind::Depth);
+  }
+}
+
+void check_clouds(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.clouds.size(); ++i) {
+    const CloudSequence& cloud = context.capture.clouds[i];
+    const std::vector<int> frames = frames_of(context.capture.frame_count(), cloud.every);
+    if (!context.toml.is_sound(item("cloud", i)) || frames.empty()) continue;
+    if (complain_missing(context, item("cloud", i, "points"), cloud.points, frames)) continue;
+    try {
+      for (const int frame : frames) (void)read_point_count(context.capture.folder / cloud.points(frame));
+    } catch (const InputError& error) {
+      add_problems(context, item("cloud", i), error);
+    }
+  }
+}
+
+void check_markers(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.markers.size(); ++i) {
+    if (!context.toml.is_sound(item("markers", i))) continue;
+    try {
+      const MarkerPositions rest = read_markers(context.capture.markers[i].rest);
+      const auto track = read_marker_track(context.capture.markers[i].track);
+      check_markers_on_object(context, item("markers", i, "rest"), rest);
+      if (track.empty()) context.toml.complain(item("markers", i, "track"), "a track without rows", "one row at least");
+      if (!track.empty() && !context.capture.times.empty() && track.rbegin()->first >= context.capture.frame_count())
+        context.toml.complain(item("markers", i, "track"), "frame " + std::to_string(track.rbegin()->first),
+                              "0 to " + std::to_string(context.capture.frame_count() - 1), "frames are counted from 0");
+      for (const auto& [frame, seen] : track) check_ids(context, item("markers", i, "track"), seen, rest);
+    } catch (const InputError& error) {
+      add_problems(context, item("markers", i), error);
+    }
+  }
+}
+
+void check_press_markers(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.presses.size(); ++i)
+    if (context.toml.is_sound(item("press", i)))
+      check_marker_pair(context, item("press", i), context.capture.presses[i].markers,
+                        context.capture.presses[i].markers_rest);
+}
+
+void check_load_files(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.loads.size(); ++i) {
+    const Load& load = context.capture.loads[i];
+    if (!context.toml.is_sound(item("load", i))) continue;
+    if (load.markers && load.markers_rest)
+      check_marker_pair(context, item("load", i), *load.markers, *load.markers_rest);
+    for (const DepthCamera& camera : context.capture.depth) {
+      if (load.images.contains(camera.name))
+        check_header(context, item("load", i, "images"), load.images.at(camera.name), camera.camera, Kind::Depth);
+      if (load.masks.contains(camera.name))
+        check_header(context, item("load", i, "masks"), load.masks.at(camera.name), camera.camera, Kind::Mask);
+    }
+    try {
+      if (load.cloud) (void)read_point_count(*load.cloud);
+    } catch (const InputError& error) {
+      add_problems(context, item("load", i), error);
+    }
+  }
+}
+
+void check_depth_scale(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
+    const DepthCamera& camera = context.capture.depth[i];
+    if (!context.toml.is_sound(item("depth", i)) || context.capture.times.empty()) continue;
+    try {
+      auto readings = read_depth(context.capture, camera, first_free_frame(context.capture, camera.every)).pixels;
+      std::erase_if(readings, [](float z) { return !(z > 0); });
+      if (readings.empty()) {
+        context.toml.reject(item("depth", i, "images"), "the first image of the free object has no reading",
+                            "depth readings", "0 means no reading");
+        continue;
+      }
+      const auto middle = readings.begin() + std::ptrdiff_t(readings.size() / 2);
+      std::nth_element(readings.begin(), middle, readings.end());
+      if (*middle < nearest_scene || *middle > farthest_scene)
+        context.toml.reject(item("depth", i, "depth_scale"), "a scene " + text_of(*middle, "m") + " away (median)",
+                            "0.02 to 50 m", "depth_scale is raw units per metre: 1000 for millimetres");
+    } catch (const InputError& error) {
+      add_problems(context, item("depth", i), error);
+    }
+  }
+}
+
+void check_cameras_see_object(RuleContext& context) {
+  const Capture& capture = context.capture;
+  if (!capture.surface || capture.times.empty()) return;
+  const std::vector<Sphere> places = possible_places(capture);
+  for (std::size_t i = 0; i < capture.depth.size(); ++i) {
+    const DepthCamera& camera = capture.depth[i];
+    if (!context.toml.is_sound(item("depth", i))) continue;
+    const std::string key = item("depth", i, "camera_to_world");
+    const auto sees = [&](const Sphere& sphere) { return may_see(camera.camera, sphere); };
+    const std::string advice = "the pose maps camera (x right, y down, z forward) to world coordinates, in metres";
+    if (std::ranges::none_of(places, sees)) {
+      context.toml.complain(key, "camera \"" + camera.name + "\" looks past the rest surface", "the object in its view",
+                            advice);
+      continue;
+    }
+    const int last = (capture.frame_count() - 1) / camera.every * camera.every;
+    const int first = first_free_frame(capture, camera.every);
+    const int middle = (first + last) / 2 / camera.every * camera.every;
+    int seen = 0;
+    try {
+      for (const int frame : {first, middle, last}) seen = std::max(seen, pixels_near(capture, camera, frame, places));
+    } catch (const InputError& error) {
+      add_problems(context, item("depth", i), error);
+      continue;
+    }
+    if (seen < least_pixels)
+      context.toml.complain(key,
+                            "camera \"" + camera.name + "\" has " +
+                                (seen == 0 ? "no" : "only " + std::to_string(seen)) + " readings near the rest surface",
+                            "readings of the object", advice);
+  }
+}
+
+void check_clouds_near_object(RuleContext& context) {
+  const Capture& capture = context.capture;
+  if (!capture.surface || capture.times.empty()) return;
+  const std::vector<Sphere> places = possible_places(capture);
+  for (std::size_t i = 0; i < capture.clouds.size(); ++i) {
+    const CloudSequence& cloud = capture.clouds[i];
+    if (!context.toml.is_sound(item("cloud", i))) continue;
+    try {
+      const auto points = read_points(capture.folder / cloud.points(first_free_frame(capture, cloud.every)));
+      if (std::ranges::none_of(points, [&](const Vector3& p) { return is_near(places, p); }))
+        context.toml.complain(item("cloud", i, "points"), "no point near the rest surface", "points on the object",
+                              "clouds are in metres, in world coordinates");
+    } catch (const InputError& error) {
+      add_problems(context, item("cloud", i), error);
+    }
+  }
+}
+
+}  // namespace pliant

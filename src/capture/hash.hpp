@@ -1,0 +1,12 @@
+#pragma once
+
+#include <initializer_list>
+#include <string>
+#include <string_view>
+
+namespace pliant {
+
+/// SHA-256 of the parts one after another, 64 hexadecimal digits.
+std::string sha256(std::initializer_list<std::string_view> parts);
+
+}  // namespace pliant

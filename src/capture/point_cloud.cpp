@@ -1,0 +1,264 @@
+#include "capture/point_cloud.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <string_view>
+
+#include "base/files.hpp"
+#include "geometry/ply.hpp"
+
+namespace pliant {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void fail(Place place, std::string found, std::string expected, std::string advice = "") {
+  throw InputError(Problem{std::move(place), std::move(found), std::move(expected), std::move(advice)});
+}
+
+bool has_ending(const fs::path& path, std::string_view ending) {
+  std::string own = path.extension().string();
+  std::ranges::transform(own, own.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return own == ending;
+}
+
+enum class PcdData { Ascii, Binary };
+
+struct PcdField {
+  std::string name;
+  std::size_t size = 4;
+  char type = 'F';
+  std::size_t count = 1;
+};
+
+struct PcdHeader {
+  std::vector<PcdField> fields;
+  std::size_t points = 0;
+  PcdData data = PcdData::Ascii;
+  std::size_t body = 0;  // first byte behind the line DATA
+  int lines = 0;
+};
+
+class PcdReader {
+ public:
+  PcdReader(const fs::path& path, std::string_view content) : path_(path), content_(content) { read_header(); }
+
+  const PcdHeader& header() const { return header_; }
+
+  std::vector<Vector3> points() const {
+    if (header_.points > content_.size()) fail_short(0);  // each takes a byte at least
+    std::vector<Vector3> points(header_.points);
+    header_.data == PcdData::Binary ? read_binary(points) : read_ascii(points);
+    return points;
+  }
+
+ private:
+  void read_header() {
+    int& line_number = header_.lines;
+    for (std::size_t at = 0; at < content_.size();) {
+      const std::size_t end = content_.find('\n', at);
+      if (end == std::string_view::npos) break;
+      std::istringstream words{std::string(content_.substr(at, end - at))};
+      at = end + 1;
+      ++line_number;
+      std::string keyword;
+      words >> keyword;
+      if (keyword == "DATA") {
+        read_data_kind(words);
+        header_.body = at;
+        find_columns();
+        return;
+      }
+      read_declaration(keyword, words);
+    }
+    fail({path_, line_number, 0}, "no line \"DATA\"", "a PCD file", "the file was cut short or is no PCD file");
+  }
+
+  void read_data_kind(std::istringstream& words) {
+    std::string kind;
+    words >> kind;
+    if (kind != "ascii" && kind != "binary")
+      fail({path_, header_.lines, 0}, "PCD data \"" + kind.substr(0, 40) + "\"", "ascii or binary",
+           "convert the file with pcl_convert_pcd_ascii_binary");
+    header_.data = kind == "binary" ? PcdData::Binary : PcdData::Ascii;
+  }
+
+  void read_declaration(const std::string& keyword, std::istringstream& words) {
+    if (keyword.starts_with('#') || keyword.empty() || keyword == "VERSION" || keyword == "VIEWPOINT") return;
+    std::string word;
+    std::size_t i = 0;
+    if (keyword == "FIELDS") {
+      while (words >> word) header_.fields.push_back({word});
+    } else if (keyword == "SIZE" || keyword == "COUNT") {
+      for (std::size_t value; i < header_.fields.size() && words >> value; ++i)
+        (keyword == "SIZE" ? header_.fields[i].size : header_.fields[i].count) = value;
+    } else if (keyword == "TYPE") {
+      for (; i < header_.fields.size() && words >> word; ++i) header_.fields[i].type = word[0];
+    } else if (keyword == "POINTS") {
+      words >> header_.points;
+    } else if (keyword != "WIDTH" && keyword != "HEIGHT") {
+      std::string shown = keyword.substr(0, 20);
+      for (char& c : shown)
+        if (c < 32 || c > 126) c = '?';
+      fail({path_, header_.lines, 0}, "the header line \"" + shown + "\"", "a PCD header (VERSION, FIELDS, SIZE, ...)");
+    }
+  }
+
+  void find_columns() {
+    std::size_t offset = 0, column = 0;
+    std::array<bool, 3> found{};
+    for (const PcdField& field : header_.fields) {
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (field.name == std::string(1, char('x' + axis))) {
+          if (field.type != 'F' || (field.size != 4 && field.size != 8) || field.count != 1)
+            fail({path_}, "the field " + field.name + " is not a floating point number", "TYPE F and SIZE 4 or 8");
+          found[axis] = true;
+          offsets_[axis] = offset;
+          columns_[axis] = column;
+          sizes_[axis] = field.size;
+        }
+      offset += field.size * field.count;
+      column += field.count;
+    }
+    stride_ = offset;
+    column_count_ = column;
+    if (!found[0] || !found[1] || !found[2]) fail({path_, header_.lines, 0}, "no fields x, y and z", "FIELDS x y z");
+  }
+
+  [[noreturn]] void fail_short(std::size_t point) const {
+    fail({path_}, "the file ends in point " + std::to_string(point) + " of " + std::to_string(header_.points),
+         std::to_string(header_.points) + " points, as its header says",
+         "the file was cut short; write or copy it again");
+  }
+
+  void read_binary(std::vector<Vector3>& points) const {
+    const std::string_view body = content_.substr(header_.body);
+    if (stride_ == 0 || body.size() / stride_ < points.size()) fail_short(stride_ == 0 ? 0 : body.size() / stride_);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        points[i][Eigen::Index(axis)] = number_at(body.data() + i * stride_ + offsets_[axis], sizes_[axis]);
+  }
+
+  static double number_at(const char* bytes, std::size_t size) {
+    static_assert(std::endian::native == std::endian::little, "PCD data lie in the writer's byte order: little endian");
+    double value;
+    float narrow;
+    if (size == 8)
+      std::memcpy(&value, bytes, 8);
+    else
+      std::memcpy(&narrow, bytes, 4), value = double(narrow);
+    return value;
+  }
+
+  void read_ascii(std::vector<Vector3>& points) const {
+    const std::string_view body = content_.substr(header_.body);
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      for (std::size_t column = 0; column < column_count_; ++column) {
+        at = body.find_first_not_of(" \t\r\n", at);
+        if (at == std::string_view::npos) fail_short(i);
+        const std::size_t end = std::min(body.find_first_of(" \t\r\n", at), body.size());
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          if (columns_[axis] == column) points[i][Eigen::Index(axis)] = number_in(body.substr(at, end - at), i);
+        at = end;
+      }
+  }
+
+  double number_in(std::string_view word, std::size_t point) const {
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc() && end == word.data() + word.size()) return value;
+    fail({path_, header_.lines + 1 + int(point), 0},
+         "\"" + std::string(word.substr(0, 40)) + "\" in point " + std::to_string(point), "a number");
+  }
+
+  const fs::path& path_;
+  std::string_view content_;
+  PcdHeader header_;
+  std::array<std::size_t, 3> offsets_{}, columns_{}, sizes_{};
+  std::size_t stride_ = 0, column_count_ = 0;
+};
+
+std::vector<Vector3> ply_positions(const fs::path& path) {
+  const PlyFile ply = read_ply(path);
+  const PlyElement* vertex = ply.element("vertex");
+  const PlyProperty* columns[3] = {};
+  for (int axis = 0; vertex && axis < 3; ++axis) columns[axis] = vertex->property(std::string(1, char('x' + axis)));
+  for (const PlyProperty* column : columns)
+    if (!column || column->is_list) fail({path}, "no vertices with x, y and z", "a point cloud");
+  std::vector<Vector3> points(vertex->count);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    points[i] = {columns[0]->values[i], columns[1]->values[i], columns[2]->values[i]};
+  return points;
+}
+
+[[noreturn]] void fail_ending(const fs::path& path) {
+  fail({path}, "a point cloud with the ending \"" + path.extension().string() + "\"", ".ply or .pcd",
+       "convert the file");
+}
+
+std::size_t ply_point_count(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream || fs::is_directory(path)) fail({path}, "the file cannot be read", "a point cloud", "check the path");
+  std::string line;
+  std::getline(stream, line);
+  if (!line.starts_with("ply")) fail({path, 1, 0}, "the first line is not \"ply\"", "a PLY file");
+  for (int number = 2; std::getline(stream, line) && number < 200; ++number) {
+    std::istringstream words(line);
+    std::string keyword, name;
+    std::size_t count = 0;
+    words >> keyword >> name >> count;
+    if (keyword == "element" && name == "vertex") return count;
+    if (keyword == "end_header") break;
+  }
+  fail({path}, "the header has no element \"vertex\"", "a point cloud");
+}
+
+}  // namespace
+
+std::vector<Vector3> read_points(const fs::path& path) {
+  std::vector<Vector3> points;
+  if (has_ending(path, ".ply")) {
+    points = ply_positions(path);
+  } else if (has_ending(path, ".pcd")) {
+    const std::string content = read_file(path);
+    points = PcdReader(path, content).points();
+  } else {
+    fail_ending(path);
+  }
+  std::erase_if(points, [](const Vector3& point) { return !point.allFinite(); });
+  if (points.empty())
+    fail({path}, "the file has no finite point", "a point cloud", "leave out frames without points with `every`");
+  return points;
+}
+
+std::size_t read_point_count(const fs::path& path) {
+  if (has_ending(path, ".ply")) return ply_point_count(path);
+  if (!has_ending(path, ".pcd")) fail_ending(path);
+  const std::string content = read_file(path);
+  return PcdReader(path, content).header().points;
+}
+
+void write_points(const fs::path& path, std::span<const Vector3> points) {
+  write_file(path, [&](std::ostream& stream) {
+    stream << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size()
+           << "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    for (const Vector3& point : points) {
+      const std::array<float, 3> xyz = {float(point.x()), float(point.y()), float(point.z())};
+      stream.write(reinterpret_cast<const char*>(xyz.data()), sizeof xyz);
+    }
+  });
+}
+
+}  // namespace pliant

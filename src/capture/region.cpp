@@ -1,0 +1,73 @@
+#include "capture/region.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace pliant {
+
+namespace {
+
+struct Contains {
+  const Vector3& point;
+  bool operator()(const RegionBox& box) const {
+    return (point.array() >= box.min.array()).all() && (point.array() <= box.max.array()).all();
+  }
+  bool operator()(const RegionSphere& sphere) const { return (point - sphere.centre).norm() <= sphere.radius; }
+  bool operator()(const RegionHalfSpace& half) const { return half.normal.dot(point - half.point) >= 0.0; }
+  bool operator()(const RegionVertices&) const { return false; }
+};
+
+// Van Oosterom and Strackee 1983: the solid angle of a triangle.
+double winding_number(const TriangleMesh& surface, const Vector3& point) {
+  double angle = 0.0;
+  for (const auto& [i, j, k] : surface.triangles) {
+    const Vector3 a = surface.vertices[i] - point, b = surface.vertices[j] - point, c = surface.vertices[k] - point;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    angle += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return angle / (4.0 * std::numbers::pi);
+}
+
+// The part of the surface's bounding box in which the region lies.
+Box overlap(const Region& region, const TriangleMesh& surface) {
+  Box box = bounding_box(surface);
+  Vector3 min = box.min, max = box.max;
+  if (const auto* own = std::get_if<RegionBox>(&region)) min = own->min, max = own->max;
+  if (const auto* own = std::get_if<RegionSphere>(&region)) {
+    min = own->centre.array() - own->radius;
+    max = own->centre.array() + own->radius;
+  }
+  box.min = box.min.cwiseMax(min);
+  box.max = box.max.cwiseMin(max);
+  return box;
+}
+
+}  // namespace
+
+bool contains(const Region& region, const Vector3& point) { return std::visit(Contains{point}, region); }
+
+bool contains_vertex(const Region& region, const TriangleMesh& surface, int vertex) {
+  if (const auto* list = std::get_if<RegionVertices>(&region))
+    return std::ranges::find(list->indices, vertex) != list->indices.end();
+  return contains(region, surface.vertices[std::size_t(vertex)]);
+}
+
+bool touches_solid(const Region& region, const TriangleMesh& surface) {
+  if (const auto* list = std::get_if<RegionVertices>(&region)) return !list->indices.empty();
+  if (std::ranges::any_of(surface.vertices, [&](const Vector3& v) { return contains(region, v); })) return true;
+  const Box box = overlap(region, surface);
+  if ((box.min.array() > box.max.array()).any()) return false;
+  constexpr int steps = 8;  // a region that slips between these points holds next to nothing of the solid
+  for (int i = 0; i < steps; ++i)
+    for (int j = 0; j < steps; ++j)
+      for (int k = 0; k < steps; ++k) {
+        const Vector3 fraction = (Vector3(i, j, k).array() + 0.5) / steps;
+        const Vector3 point = box.min + fraction.cwiseProduct(box.max - box.min);
+        if (contains(region, point) && winding_number(surface, point) > 0.5) return true;
+      }
+  return false;
+}
+
+}  // namespace pliant

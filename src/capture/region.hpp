@@ -1,0 +1,16 @@
+#pragma once
+
+#include "capture/capture.hpp"
+
+namespace pliant {
+
+/// Whether a point [m] at rest lies in a region or on its border. A list of vertices contains no point of space: false.
+bool contains(const Region& region, const Vector3& point);
+
+/// Whether a vertex of the object's surface lies in the region (by index for a list of vertices).
+bool contains_vertex(const Region& region, const TriangleMesh& surface, int vertex);
+
+/// Whether any point of the solid lies in the region: a vertex of the surface, or a point inside it.
+bool touches_solid(const Region& region, const TriangleMesh& surface);
+
+}  // namespace pliant
