@@ -1,0 +1,38 @@
+#pragma once
+
+#include "elasticity/parameters.hpp"
+#include "solvers/block_matrix.hpp"
+
+namespace pliant {
+
+/// A force of the scene, made affine about a lag point p for one linearly implicit step:
+///   f(z | p) = f_p - K_p z.
+/// Each term knows its force, its matrix, and the two products that differentiation needs; nothing else in the program
+/// differentiates physics. Positions and forces are n x 3 [m], [N].
+class ForceTerm {
+ public:
+  virtual ~ForceTerm() = default;
+
+  enum class Lag { Current, Predicted };  ///< p: the positions at the step's start, or those plus dt v
+  enum class At { Blended, End };         ///< z: theta-weighted with the damping's share, or the step's end
+
+  virtual Lag lag() const = 0;
+  virtual At at() const = 0;
+
+  /// Takes the term's own parameters out of theta (elasticity/parameters.hpp).
+  virtual void set_parameters(const VectorX& theta) = 0;
+  /// Fixes the lag point; the calls below refer to it.
+  virtual void linearise(const Points& lag) = 0;
+  /// force += f(z | p)
+  virtual void add_force(const Points& z, Points& force) = 0;
+  /// matrix += scale K_p
+  virtual void add_matrix(double scale, BlockMatrix& matrix) = 0;
+  /// force += df for changes of p, z and theta
+  virtual void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                                 Points& force) = 0;
+  /// Adds the cotangents of p, z and theta for the cotangent `w` of f.
+  virtual void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
+                                 VectorX& theta_bar) = 0;
+};
+
+}  // namespace pliant

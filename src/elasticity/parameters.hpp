@@ -1,0 +1,33 @@
+#pragma once
+
+#include "base/types.hpp"
+
+namespace pliant {
+
+/// Everything that the physics of one scene depends on, as one vector theta, so that tangents and adjoints with respect
+/// to any of it are products with one matrix. Per plane there follow its point and its normal.
+namespace theta {
+enum Index : int {
+  youngs_modulus = 0,    ///< [Pa]
+  poissons_ratio = 1,    ///< [-]
+  mass_damping = 2,      ///< Rayleigh, [1/s]
+  stiffness_damping = 3, ///< Rayleigh, [s]
+  density = 4,           ///< [kg/m^3]
+  gravity = 5,           ///< 3, [m/s^2]
+  linear_velocity = 8,   ///< 3, of the centre of mass at the start [m/s]
+  angular_velocity = 11, ///< 3, about the centre of mass at the start [rad/s]
+  first_plane = 14,
+};
+inline int plane_point(int plane) { return first_plane + 6 * plane; }       ///< 3, [m]
+inline int plane_normal(int plane) { return first_plane + 6 * plane + 3; }  ///< 3, unit
+inline int size(int planes) { return first_plane + 6 * planes; }
+inline Vector3 vector_at(const VectorX& theta, int index) { return theta.segment<3>(index); }
+}  // namespace theta
+
+/// Lame's constants for a unit Young's modulus and their derivatives with respect to Poisson's ratio.
+struct UnitLame {
+  double lambda, mu, d_lambda, d_mu;
+};
+UnitLame unit_lame(double poissons_ratio);
+
+}  // namespace pliant

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "geometry/triangle_mesh.hpp"
+
+namespace pliant {
+
+/// Signed distance to a closed surface on a regular grid [m], negative inside, interpolated trilinearly.
+/// Beyond the grid the value of the nearest grid point plus the distance to the grid is given, so that it keeps growing.
+class SignedDistance {
+ public:
+  struct Sample {
+    double value;      ///< [m]
+    Vector3 gradient;  ///< [-], of the interpolant
+  };
+
+  SignedDistance() = default;
+
+  /// Resamples any function onto a grid that covers `box` (analytic shapes, tests).
+  template <class Function>
+  SignedDistance(const Box& box, double spacing, Function&& function);
+
+  [[nodiscard]] double value(const Vector3& point) const;
+  [[nodiscard]] Sample sample(const Vector3& point) const;
+
+  double spacing() const { return spacing_; }
+  /// Box of the grid, not of the object.
+  Box box() const { return {origin_, origin_ + spacing_ * (size_.cast<double>().array() - 1.0).matrix()}; }
+
+ private:
+  friend SignedDistance signed_distance(const TriangleMesh&, double, double);
+  void allocate(const Box& box, double spacing);
+  float& at(int i, int j, int k) { return values_[(std::size_t(k) * size_.y() + j) * size_.x() + i]; }
+  const float* corner(const Vector3& point, Vector3& local, Vector3& outside) const;
+
+  Vector3 origin_ = Vector3::Zero();
+  double spacing_ = 0.0;
+  Eigen::Vector3i size_ = Eigen::Vector3i::Zero();
+  std::vector<float> values_;
+};
+
+/// Signed distance of a closed, outward oriented mesh, by OpenVDB.
+/// @param spacing  of the distance grid [m]
+/// @param margin   how far outside the mesh's box the grid reaches [m]
+/// Throws InputError where the mesh encloses no grid point.
+SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double margin);
+
+template <class Function>
+SignedDistance::SignedDistance(const Box& box, double spacing, Function&& function) {
+  allocate(box, spacing);
+  for (int k = 0; k < size_.z(); ++k)
+    for (int j = 0; j < size_.y(); ++j)
+      for (int i = 0; i < size_.x(); ++i)
+        at(i, j, k) = float(function(Vector3(origin_ + spacing_ * Vector3(i, j, k))));
+}
+
+}  // namespace pliant

@@ -1,0 +1,31 @@
+#include "motion/body_forces.hpp"
+
+namespace pliant {
+
+Gravity::Gravity(const Body& body) {
+  Points ones = Points::Ones(body.node_count(), 3), sum = Points::Zero(body.node_count(), 3);
+  body.add_mass_product(1.0, ones, sum);
+  nodal_volume_ = sum.col(0);
+}
+
+void Gravity::set_parameters(const VectorX& parameters) {
+  density_ = parameters[theta::density];
+  gravity_ = theta::vector_at(parameters, theta::gravity);
+}
+
+void Gravity::add_force(const Points&, Points& force) {
+  force.noalias() += nodal_volume_ * (density_ * gravity_).transpose();
+}
+
+void Gravity::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
+  const Vector3 change = d_theta[theta::density] * gravity_ + density_ * theta::vector_at(d_theta, theta::gravity);
+  force.noalias() += nodal_volume_ * change.transpose();
+}
+
+void Gravity::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
+  const Vector3 sum = w.transpose() * nodal_volume_;
+  theta_bar[theta::density] += gravity_.dot(sum);
+  theta_bar.segment<3>(theta::gravity) += density_ * sum;
+}
+
+}  // namespace pliant

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "elasticity/body.hpp"
+#include "elasticity/force_term.hpp"
+
+namespace pliant {
+
+/// Weight: f = rho M1 g.
+class Gravity : public ForceTerm {
+ public:
+  explicit Gravity(const Body& body);
+  Lag lag() const override { return Lag::Current; }
+  At at() const override { return At::End; }
+  void set_parameters(const VectorX& theta) override;
+  void linearise(const Points&) override {}
+  void add_force(const Points& z, Points& force) override;
+  void add_matrix(double, BlockMatrix&) override {}
+  void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                         Points& force) override;
+  void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+
+ private:
+  VectorX nodal_volume_;  // M1 summed over columns [m^3]
+  double density_ = 0.0;
+  Vector3 gravity_ = Vector3::Zero();
+};
+
+}  // namespace pliant

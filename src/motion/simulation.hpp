@@ -1,0 +1,92 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "elasticity/body.hpp"
+#include "motion/fixed_regions.hpp"
+#include "motion/lagged_stepper.hpp"
+#include "motion/plane_contact.hpp"
+
+namespace pliant {
+
+/// A scene in motion: what is fixed about it while parameters vary.
+struct SimulationOptions {
+  std::vector<double> times;  ///< [s] of each frame; the first is when the object is let go
+  double max_dt = 0.0;        ///< [s], > 0: each interval is cut into equal steps no longer than this
+  double newmark_theta = 0.55;
+  SolverOptions solver;
+  ContactOptions contact;
+  int planes = 0;              ///< in theta
+  std::vector<Hold> holds;     ///< held regions
+  bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method
+  std::size_t memory_budget = std::size_t(256) << 20;  ///< [bytes] for states kept for the adjoint
+};
+
+struct RolloutSummary {
+  bool succeeded = false;
+  int steps = 0, frames = 0, solver_iterations = 0;
+  std::string failure;  ///< why it stopped, in words
+};
+
+/// Runs one body through a scene's frames, with tangents or adjoint. Not for concurrent use; copies are cheap to make
+/// with the same body.
+class Simulation {
+ public:
+  Simulation(std::shared_ptr<const Body> body, SimulationOptions options);
+
+  const Body& body() const { return *body_; }
+  const SimulationOptions& options() const { return options_; }
+  int frame_count() const { return int(options_.times.size()); }
+  int theta_size() const { return theta::size(options_.planes); }
+
+  /// Called at each frame, also the first, with the state and its tangents; false ends the run there (as a success).
+  using OnFrame = std::function<bool(int frame, const State& state, std::span<const State> tangents)>;
+
+  /// @param directions  theta_size x p: changes of theta whose tangents are carried along; may have no columns
+  /// @param last_frame  where to stop (inclusive)
+  RolloutSummary run(const VectorX& theta, const MatrixX& directions, int last_frame, const OnFrame& on_frame);
+  RolloutSummary run(const VectorX& theta, const OnFrame& on_frame);
+
+  /// Reverse sweep of a scalar cost that is a sum over frames.
+  /// @param cost      called at each frame, forwards: adds nothing to the state, returns false to fail
+  /// @param cotangent called at each frame, backwards: adds the cost's derivative by positions to `x_bar` (n x 3)
+  /// @param theta_bar out: derivative of the summed cost by theta
+  /// Keeps states within the memory budget, and beyond it the first state of each of about sqrt(steps) segments, which
+  /// are run again when the sweep reaches them.
+  RolloutSummary run_adjoint(const VectorX& theta, int last_frame, const std::function<bool(int, const State&)>& cost,
+                             const std::function<void(int, const State&, Points&)>& cotangent, VectorX& theta_bar);
+  /// Bytes of states that the last reverse sweep held at its most.
+  std::size_t peak_state_bytes() const { return peak_state_bytes_; }
+
+ private:
+  struct StepPlan {
+    double dt;
+    int frame_after;  ///< frame reached by this step, -1: none
+  };
+  void set_parameters(const VectorX& theta);
+  State initial_state(const VectorX& theta) const;
+  State initial_tangent(const VectorX& theta, const VectorX& d_theta) const;
+  void initial_adjoint(const VectorX& theta, const State& bar, VectorX& theta_bar) const;
+  bool forward_step(const StepPlan& plan, State& state, RolloutSummary& summary);
+  std::size_t state_bytes() const { return 2 * 3 * sizeof(double) * std::size_t(body_->node_count()); }
+  std::size_t segment_length(std::size_t steps) const;
+
+  std::shared_ptr<const Body> body_;
+  SimulationOptions options_;
+  LaggedStepper stepper_;
+  std::vector<StepPlan> plan_;
+  Points delta_, rest_, lever_;
+  std::size_t peak_state_bytes_ = 0;
+};
+
+/// Stiffness and smoothing of contact that suit an object of this size and weight: its weight on its projected area
+/// presses it in by 1e-4 of its size.
+ContactOptions default_contact(const Body& body, double mass, double gravity);
+
+/// The longest step that suits an object of this size falling under this gravity.
+double default_time_step(const Body& body, double gravity);
+
+}  // namespace pliant

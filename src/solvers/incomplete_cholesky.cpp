@@ -1,0 +1,187 @@
+#include "solvers/incomplete_cholesky.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "solvers/wide.hpp"
+
+namespace pliant {
+
+namespace {
+using Block = Eigen::Map<Matrix3>;
+using ConstBlock = Eigen::Map<const Matrix3>;
+}  // namespace
+
+IncompleteCholesky::IncompleteCholesky(const BlockPattern& pattern) : rows_(pattern.rows) {
+  row_start_.push_back(0);
+  product_start_.push_back(0);
+  std::vector<int> position(rows_, -1);  // of column k in the row at hand
+  for (int i = 0; i < rows_; ++i) {
+    const int first = int(column_.size());
+    for (int b = pattern.row_start[i]; b < pattern.diagonal[i]; ++b) {
+      const int j = pattern.column[b];
+      for (int l = row_start_[j]; l < row_start_[j + 1]; ++l)
+        if (position[column_[l]] >= 0) products_.push_back({position[column_[l]], l});
+      position[j] = int(column_.size());
+      column_.push_back(j);
+      source_.push_back(b);
+      product_start_.push_back(int(products_.size()));
+    }
+    for (int l = first; l < int(column_.size()); ++l) position[column_[l]] = -1;
+    source_diagonal_.push_back(pattern.diagonal[i]);
+    row_start_.push_back(int(column_.size()));
+  }
+  lower_.resize(9 * column_.size());
+  forward_.resize(9 * column_.size() + 3);
+  backward_.resize(9 * column_.size() + 3);
+  inverse_diagonal_.resize(9 * std::size_t(rows_));
+  work_.resize(4 * std::size_t(rows_));
+}
+
+bool IncompleteCholesky::factorise(const BlockMatrix& matrix) {
+  for (double shift = 0.0; shift < 1.0; shift = shift == 0.0 ? 1e-3 : 4.0 * shift)
+    if (try_factorise(matrix, shift)) return true;
+  return false;
+}
+
+bool IncompleteCholesky::try_factorise(const BlockMatrix& matrix, double shift) {
+  for (int i = 0; i < rows_; ++i) {
+    Matrix3 pivot = ConstBlock(matrix.block(source_diagonal_[i]));
+    pivot.diagonal() *= 1.0 + shift;
+    for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
+      Matrix3 sum = ConstBlock(matrix.block(source_[l]));
+      for (int p = product_start_[l]; p < product_start_[l + 1]; ++p)
+        sum.noalias() -= ConstBlock(&lower_[9 * std::size_t(products_[p].left)]) *
+                         ConstBlock(&lower_[9 * std::size_t(products_[p].right)]).transpose();
+      Block lower(&lower_[9 * std::size_t(l)]);
+      lower.noalias() = sum * ConstBlock(&inverse_diagonal_[9 * std::size_t(column_[l])]).transpose();
+      pivot.noalias() -= lower * lower.transpose();
+    }
+    const double scale = pivot.trace();
+    const double l00 = pivot(0, 0);
+    if (!(l00 > 1e-12 * scale)) return false;
+    const double a = std::sqrt(l00), b = pivot(1, 0) / a, c = pivot(2, 0) / a;
+    const double l11 = pivot(1, 1) - b * b;
+    if (!(l11 > 1e-12 * scale)) return false;
+    const double d = std::sqrt(l11), e = (pivot(2, 1) - b * c) / d;
+    const double l22 = pivot(2, 2) - c * c - e * e;
+    if (!(l22 > 1e-12 * scale)) return false;
+    const double f = std::sqrt(l22);
+    Block inverse(&inverse_diagonal_[9 * std::size_t(i)]);
+    inverse << 1 / a, 0, 0, -b / (a * d), 1 / d, 0, (b * e - c * d) / (a * d * f), -e / (d * f), 1 / f;
+  }
+  for (std::size_t l = 0; l < column_.size(); ++l) {
+    const ConstBlock block(&lower_[9 * l]);
+    Eigen::Map<Eigen::Matrix3f>{&forward_[9 * l]} = block.cast<float>();
+    Eigen::Map<Eigen::Matrix3f>{&backward_[9 * l]} = block.transpose().cast<float>();
+  }
+  return true;
+}
+
+void IncompleteCholesky::apply(const std::vector<double>& r, std::vector<double>& z) const {
+  float* w = work_.data();
+  for (int i = 0; i < rows_; ++i) {
+    const double* ri = &r[4 * std::size_t(i)];
+    Wide<float> sum = {float(ri[0]), float(ri[1]), float(ri[2]), 0.0f};
+    for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
+      const float* v = &w[4 * std::size_t(column_[l])];
+      sum -= block_times(&forward_[9 * std::size_t(l)], v[0], v[1], v[2]);
+    }
+    const double* inv = &inverse_diagonal_[9 * std::size_t(i)];
+    float* wi = &w[4 * std::size_t(i)];
+    wi[0] = float(inv[0]) * sum[0];
+    wi[1] = float(inv[1]) * sum[0] + float(inv[4]) * sum[1];
+    wi[2] = float(inv[2]) * sum[0] + float(inv[5]) * sum[1] + float(inv[8]) * sum[2];
+  }
+  for (int i = rows_ - 1; i >= 0; --i) {
+    const double* inv = &inverse_diagonal_[9 * std::size_t(i)];
+    float* wi = &w[4 * std::size_t(i)];
+    const float x0 = float(inv[0]) * wi[0] + float(inv[1]) * wi[1] + float(inv[2]) * wi[2];
+    const float x1 = float(inv[4]) * wi[1] + float(inv[5]) * wi[2];
+    const float x2 = float(inv[8]) * wi[2];
+    for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
+      float* v = &w[4 * std::size_t(column_[l])];
+      store_wide(v, load_wide(v) - block_times(&backward_[9 * std::size_t(l)], x0, x1, x2));
+    }
+    double* zi = &z[4 * std::size_t(i)];
+    zi[0] = x0, zi[1] = x1, zi[2] = x2, zi[3] = 0.0;
+  }
+}
+
+ConjugateGradients::ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
+    : pattern_(std::move(pattern)), options_(options), preconditioner_(*pattern_) {
+  const std::size_t size = 4 * std::size_t(pattern_->rows);
+  for (auto* v : {&x_, &r_, &z_, &p_, &ap_}) v->assign(size, 0.0);
+}
+
+std::unique_ptr<LinearSolver> ConjugateGradients::clone() const {
+  return std::make_unique<ConjugateGradients>(pattern_, options_);
+}
+
+bool ConjugateGradients::factorise(const BlockMatrix& matrix) {
+  matrix_ = &matrix;
+  return preconditioner_.factorise(matrix);
+}
+
+/// ap = A p; returns p . ap.
+double ConjugateGradients::multiply(const std::vector<double>& p, std::vector<double>& ap) const {
+  const BlockPattern& pattern = *pattern_;
+  const int* column = pattern.column.data();
+  double dot = 0.0;
+  for (int row = 0; row < pattern.rows; ++row) {
+    Wide<double> sum{};
+    for (int b = pattern.row_start[row]; b < pattern.row_start[row + 1]; ++b) {
+      const double* v = &p[4 * std::size_t(column[b])];
+      sum += block_times(matrix_->block(b), v[0], v[1], v[2]);
+    }
+    sum[3] = 0.0;
+    store_wide(&ap[4 * std::size_t(row)], sum);
+    const double* pr = &p[4 * std::size_t(row)];
+    dot += pr[0] * sum[0] + pr[1] * sum[1] + pr[2] * sum[2];
+  }
+  return dot;
+}
+
+SolveSummary ConjugateGradients::solve(const VectorX& b, VectorX& x) {
+  const int n = pattern_->rows;
+  const std::size_t size = 4 * std::size_t(n);
+  for (int i = 0; i < n; ++i)
+    for (int d = 0; d < 3; ++d) x_[4 * std::size_t(i) + d] = x[3 * Eigen::Index(i) + d];
+  multiply(x_, ap_);
+  double b_norm = 0.0, r_norm = 0.0;
+  for (int i = 0; i < n; ++i)
+    for (int d = 0; d < 3; ++d) {
+      const double bi = b[3 * Eigen::Index(i) + d];
+      const double ri = bi - ap_[4 * std::size_t(i) + d];
+      r_[4 * std::size_t(i) + d] = ri;
+      b_norm += bi * bi, r_norm += ri * ri;
+    }
+  SolveSummary summary;
+  const double target = options_.tolerance * options_.tolerance * b_norm;
+  double rz = 0.0;
+  for (;; ++summary.iterations) {
+    summary.converged = r_norm <= target;
+    if (summary.converged || summary.iterations >= options_.max_iterations || !std::isfinite(r_norm)) break;
+    preconditioner_.apply(r_, z_);
+    double rz_new = 0.0;
+    for (std::size_t i = 0; i < size; ++i) rz_new += r_[i] * z_[i];
+    const double beta = summary.iterations == 0 ? 0.0 : rz_new / rz;
+    rz = rz_new;
+    for (std::size_t i = 0; i < size; ++i) p_[i] = z_[i] + beta * p_[i];
+    const double curvature = multiply(p_, ap_);
+    if (!(curvature > 0.0)) break;
+    const double alpha = rz / curvature;
+    r_norm = 0.0;
+    for (std::size_t i = 0; i < size; ++i) {
+      x_[i] += alpha * p_[i];
+      r_[i] -= alpha * ap_[i];
+      r_norm += r_[i] * r_[i];
+    }
+  }
+  summary.residual = b_norm > 0.0 ? std::sqrt(r_norm / b_norm) : 0.0;
+  for (int i = 0; i < n; ++i)
+    for (int d = 0; d < 3; ++d) x[3 * Eigen::Index(i) + d] = x_[4 * std::size_t(i) + d];
+  return summary;
+}
+
+}  // namespace pliant

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "solvers/block_matrix.hpp"
+
+namespace pliant {
+
+/// What one solve did.
+struct SolveSummary {
+  bool converged = false;
+  int iterations = 0;      ///< 0 for direct solvers
+  double residual = 0.0;   ///< |b - A x| / |b|, as the iteration saw it; 0 for direct solvers
+};
+
+/// Solves A x = b for symmetric positive definite A with an unchanging pattern.
+class LinearSolver {
+ public:
+  virtual ~LinearSolver() = default;
+  /// Numerical factorisation (or preconditioner) of a matrix; it must stay alive and unchanged while solving.
+  /// Returns false where the matrix is not positive definite.
+  [[nodiscard]] virtual bool factorise(const BlockMatrix& matrix) = 0;
+  /// @param x  in: a first guess; out: the solution, 3 n
+  virtual SolveSummary solve(const VectorX& b, VectorX& x) = 0;
+  virtual std::string name() const = 0;
+  /// A solver of the same kind and pattern, for another thread.
+  virtual std::unique_ptr<LinearSolver> clone() const = 0;
+};
+
+enum class SolverKind {
+  Automatic,   ///< by size, as measured: see docs/performance.md
+  Iterative,   ///< conjugate gradients with an incomplete Cholesky factor of 3 x 3 blocks
+  Cholmod,     ///< supernodal sparse Cholesky (needs PLIANT_WITH_CHOLMOD)
+  Simplicial,  ///< Eigen's sparse Cholesky
+};
+
+struct SolverOptions {
+  SolverKind kind = SolverKind::Automatic;
+  double tolerance = 1e-8;   ///< relative residual of the iterative solver, (0, 1)
+  int max_iterations = 500;  ///< of the iterative solver, >= 1
+};
+
+/// Throws std::invalid_argument where the kind was not built in.
+std::unique_ptr<LinearSolver> make_linear_solver(std::shared_ptr<const BlockPattern> pattern,
+                                                 const SolverOptions& options = {});
+
+}  // namespace pliant
