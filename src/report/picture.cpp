@@ -20,6 +20,7 @@ namespace {
 using Colour = Eigen::Array3d;  // linear light, 0..1
 
 constexpr double pi = std::numbers::pi;
+constexpr double key_spread = 0.22;  // radius of the key light at distance 1: how soft shadows are
 
 Colour from_srgb(double r, double g, double b) {
   return Colour(r, g, b).unaryExpr([](double c) { return std::pow(c / 255.0, 2.2); });
@@ -157,6 +158,7 @@ class Painter {
     double sky, key;
   };
   Light light(const Vector3& point, const Vector3& normal, double reach, uint32_t pixel, uint32_t index) const {
+    if (is_far_from_shadow(point, reach)) return {1.0, 1.0};
     const Vector3 a = normal.unitOrthogonal(), b = normal.cross(a);
     const Vector3 ka = key_.unitOrthogonal(), kb = key_.cross(ka);
     const Vector3 start = point + 1e-4 * size_ * normal;
@@ -167,11 +169,20 @@ class Painter {
       const double radius = std::sqrt(r1), angle = 2.0 * pi * r2;
       const Vector3 to_sky = radius * std::cos(angle) * a + radius * std::sin(angle) * b + std::sqrt(1.0 - r1) * normal;
       open += !rays_.is_blocked(start, to_sky, 0.0, reach);
-      const double spread = 0.22 * std::sqrt(r3), turn = 2.0 * pi * r4;
+      const double spread = key_spread * std::sqrt(r3), turn = 2.0 * pi * r4;
       const Vector3 to_key = key_ + spread * (std::cos(turn) * ka + std::sin(turn) * kb);
       lit += normal.dot(to_key) > 0.0 && !rays_.is_blocked(start, to_key, 0.0, 1e3 * size_);
     }
     return {double(open) / n, double(lit) / n};
+  }
+
+  // Whether the sphere around the object is out of reach and clear of the cone towards the key light.
+  bool is_far_from_shadow(const Vector3& point, double reach) const {
+    const Vector3 to_centre = centre_ - point;
+    const double radius = 0.5 * size_, distance = to_centre.norm();
+    if (distance < radius + reach) return false;
+    const double aside = std::acos(std::clamp(to_centre.dot(key_) / distance, -1.0, 1.0));
+    return aside > std::asin(radius / distance) + std::atan(key_spread);
   }
 
   Vector3 smooth_normal(const RayHit& hit) const {

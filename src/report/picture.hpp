@@ -22,7 +22,7 @@ struct PictureScene {
 
 struct PictureOptions {
   int samples = 3;     ///< rays a pixel along each side, 1..8
-  int light_rays = 6;  ///< rays towards the sky for each of them, 1..64: how soft and how clean the shadows are
+  int light_rays = 2;  ///< rays towards the sky for each of them, 1..64: how soft and how clean the shadows are
   double residual_range = 0.0;  ///< [m], residual that gets the full colour; 0: the scene's own (see residual_range)
   double disc_radius = 0.0;     ///< [pixels]; 0: by the number of points
   int max_points = 2500;        ///< an even, deterministic part of the points is drawn where there are more

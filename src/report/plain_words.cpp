@@ -1,0 +1,148 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "report/plot.hpp"
+#include "report/report.hpp"
+
+namespace pliant {
+
+namespace {
+
+struct Scaled {
+  double factor;
+  std::string unit;
+};
+
+// A prefix that brings the value to 1..1000, for units that people write with one.
+Scaled scaled_unit(double value, const std::string& unit) {
+  const double size = std::abs(value);
+  if (unit == "Pa" && size >= 1e9) return {1e-9, "GPa"};
+  if (unit == "Pa" && size >= 1e6) return {1e-6, "MPa"};
+  if (unit == "Pa" && size >= 1e4) return {1e-3, "kPa"};
+  if (unit == "m" && size < 0.1 && size > 0.0) return {1e3, "mm"};
+  if (unit == "s" && size < 0.1 && size > 0.0) return {1e3, "ms"};
+  static const std::map<std::string, std::string> spoken{
+      {"kg/m^3", "kg/m³"}, {"m/s^2", "m/s²"}, {"1", ""}, {"Pa/m", "Pa/m"}};
+  const auto found = spoken.find(unit);
+  return {1.0, found == spoken.end() ? unit : found->second};
+}
+
+std::string with_unit(const std::string& number, const std::string& unit) {
+  return unit.empty() ? number : number + "\u00a0" + unit;
+}
+
+std::string millimetres(double metres) { return with_unit(readable(1e3 * metres, 2), "mm"); }
+
+// People's names keep their capital.
+std::string within_sentence(const std::string& name) {
+  std::string words = spoken_name(name);
+  if (words.find("'s ") == std::string::npos && words[0] >= 'A' && words[0] <= 'Z')
+    words[0] = char(words[0] - 'A' + 'a');
+  return words;
+}
+
+std::string agreement_sentence(const ReportData& data) {
+  const ErrorResult& error = data.result.error;
+  if (!error.surface_rms && error.marker_rms)
+    return fmt::format("The simulated markers lie {} (root mean square) from the recorded ones.",
+                       millimetres(*error.marker_rms));
+  if (!error.surface_rms) return "";
+  std::string text = fmt::format("The simulated surface lies {} (root mean square) from the {} observed points",
+                                 millimetres(*error.surface_rms), readable(double(error.points), 6));
+  double squares = 0.0, points = 0.0;
+  for (const FrameResidual& frame : data.residuals)
+    if (frame.noise) squares += frame.points * *frame.noise * *frame.noise, points += frame.points;
+  if (points <= 0.0 || squares <= 0.0) return text + ".";
+  const double noise = std::sqrt(squares / points), ratio = *error.surface_rms / noise;
+  text += fmt::format("; the sensor's noise alone would give {}. ", millimetres(noise));
+  if (ratio < 0.7) return text + "The noise seems to be stated too high.";
+  if (ratio < 1.3) return text + "The model explains the recording down to its noise.";
+  if (ratio < 2.0) return text + "A little of the motion is not explained by the model.";
+  return text +
+         "Part of the motion is not explained by this model: look where in the pictures and when in the plot below.";
+}
+
+// How well a scalar is known, in words; empty where nothing can be said.
+std::string trust_sentence(const ParameterResult& p) {
+  const auto* value = std::get_if<double>(&p.value);
+  if (!p.estimated || !value) return "";
+  if (!p.std || !std::isfinite(std::get<double>(*p.std)))
+    return fmt::format("{} could not be given an uncertainty: the recording may hardly depend on it.",
+                       spoken_name(p.name));
+  const double relative = std::get<double>(*p.std) / std::abs(*value);
+  if (relative < 0.3) return "";
+  return fmt::format("{} is known poorly (± {} %): the recording depends little on it.", spoken_name(p.name),
+                     readable(100.0 * relative, 2));
+}
+
+std::string correlation_sentence(const CorrelationResult& c) {
+  if (!(std::abs(c.correlation) > 0.8)) return "";
+  return fmt::format(
+      "{} and {} are hard to tell apart in this recording (correlation {}): an error in one is made up by {} error in "
+      "the other.",
+      spoken_name(c.parameters.first), within_sentence(c.parameters.second), readable(c.correlation, 2),
+      c.correlation > 0 ? "a like" : "an opposite");
+}
+
+std::string given_sentence(const Result& result) {
+  std::string names;
+  for (const ParameterResult& p : result.parameters)
+    if (!p.estimated && std::holds_alternative<double>(p.value))
+      names += (names.empty() ? "" : ", ") + within_sentence(p.name) + " (" +
+               value_with_uncertainty(std::get<double>(p.value), std::nullopt, p.unit) + ")";
+  return names.empty() ? "" : "Taken as given, not estimated: " + names + ".";
+}
+
+std::string starts_sentence(const Result& result) {
+  if (result.starts.size() < 2) return "";
+  double best = HUGE_VAL;
+  for (const StartResult& s : result.starts) best = std::min(best, s.cost.value_or(HUGE_VAL));
+  const auto same = std::count_if(result.starts.begin(), result.starts.end(),
+                                  [&](const StartResult& s) { return s.cost.value_or(HUGE_VAL) <= 1.02 * best; });
+  return fmt::format("{} of {} starts ended at the same best cost{}.", same, result.starts.size(),
+                     same > 1 ? "" : ", so look at the other starts before trusting it");
+}
+
+}  // namespace
+
+std::string spoken_name(const std::string& name) {
+  static const std::map<std::string, std::string> spoken{{"youngs_modulus", "Young's modulus"},
+                                                         {"poisson_ratio", "Poisson's ratio"},
+                                                         {"mass_damping", "Mass damping"},
+                                                         {"stiffness_damping", "Stiffness damping"}};
+  const size_t at = name.find('@');
+  const std::string base = name.substr(0, at), region = at == std::string::npos ? "" : " (" + name.substr(at + 1) + ")";
+  if (const auto found = spoken.find(base); found != spoken.end()) return found->second + region;
+  std::string words = base;
+  std::replace(words.begin(), words.end(), '_', ' ');
+  if (!words.empty() && words[0] >= 'a' && words[0] <= 'z') words[0] = char(words[0] - 'a' + 'A');
+  return words + region;
+}
+
+std::string value_with_uncertainty(double value, std::optional<double> std, const std::string& unit) {
+  const Scaled scaled = scaled_unit(value, unit);
+  const double shown = value * scaled.factor;
+  if (!std || !std::isfinite(*std) || *std <= 0.0 || !std::isfinite(value))
+    return with_unit(readable(shown, 4), scaled.unit);
+  const double spread = *std * scaled.factor;
+  const int spread_exponent = int(std::floor(std::log10(spread) + 1e-12));
+  const int value_exponent = shown == 0.0 ? spread_exponent : int(std::floor(std::log10(std::abs(shown)) + 1e-12));
+  const int digits = std::clamp(value_exponent - spread_exponent + 2, 1, 9);
+  return with_unit(readable(shown, digits) + " ± " + readable(spread, 2), scaled.unit);
+}
+
+std::vector<std::string> plain_sentences(const ReportData& data) {
+  std::vector<std::string> sentences{agreement_sentence(data)};
+  for (const ParameterResult& p : data.result.parameters) sentences.push_back(trust_sentence(p));
+  for (const CorrelationResult& c : data.result.identifiability) sentences.push_back(correlation_sentence(c));
+  sentences.push_back(starts_sentence(data.result));
+  sentences.push_back(given_sentence(data.result));
+  for (const std::string& note : data.result.notes) sentences.push_back(note);
+  std::erase(sentences, "");
+  return sentences;
+}
+
+}  // namespace pliant

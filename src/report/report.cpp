@@ -1,0 +1,306 @@
+#include "report/report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <stdexcept>
+
+#include "base/files.hpp"
+#include "model/base64.hpp"
+#include "report/image.hpp"
+#include "report/page_style.hpp"
+#include "report/plot.hpp"
+
+namespace pliant {
+
+namespace {
+
+std::string section(const std::string& title, const std::string& body) {
+  return body.empty() ? "" : "<section><h2>" + title + "</h2>\n" + body + "</section>\n";
+}
+
+std::optional<double> scalar(const std::optional<ParameterValue>& value) {
+  if (!value || !std::holds_alternative<double>(*value)) return std::nullopt;
+  return std::get<double>(*value);
+}
+
+std::string vector_text(const Vector3& v, const std::optional<Vector3>& std) {
+  std::string text;
+  for (int k = 0; k < 3; ++k)
+    text += (k ? ", " : "(") + value_with_uncertainty(v[k], std ? std::optional((*std)[k]) : std::nullopt, "1");
+  return text + ")";
+}
+
+// Any value with its uncertainty.
+std::string value_text(const ParameterValue& value, const std::optional<ParameterValue>& std, const std::string& unit) {
+  if (const auto* number = std::get_if<double>(&value)) return value_with_uncertainty(*number, scalar(std), unit);
+  const std::string spoken_unit = unit == "m/s^2" ? " m/s²" : unit.empty() || unit == "1" ? "" : " " + unit;
+  if (const auto* v = std::get_if<Vector3>(&value)) {
+    const auto* spread = std ? std::get_if<Vector3>(&*std) : nullptr;
+    return vector_text(*v, spread ? std::optional(*spread) : std::nullopt) + spoken_unit;
+  }
+  const auto& plane = std::get<PlaneValue>(value);
+  return "point " + vector_text(plane.point, std::nullopt) + " m, normal " + vector_text(plane.normal, std::nullopt);
+}
+
+// ---- headline
+
+// The interval of one standard deviation and the start on a scale around the value, where that says something.
+std::string error_bar(double value, double std) {
+  if (!(std > 0.0) || !std::isfinite(std) || value == 0.0) return "";
+  const double relative = std::min(1.0, std / std::abs(value)), half = 100.0 * relative;
+  return fmt::format(
+      R"svg(<svg viewBox="0 0 220 16" preserveAspectRatio="none" aria-hidden="true">)svg"
+      R"svg(<rect x="0" y="6.5" width="220" height="3" rx="1.5" style="fill:var(--grid)"/>)svg"
+      R"svg(<rect x="{:.1f}" y="4" width="{:.1f}" height="8" rx="3" style="fill:var(--accent);opacity:.35"/>)svg"
+      R"svg(<rect x="108.5" y="1" width="3" height="14" rx="1" style="fill:var(--accent)"/></svg>)svg",
+      110.0 - half, std::max(2.0, 2.0 * half));
+}
+
+std::string card(const ParameterResult& p) {
+  std::string html = "<div class=\"card\"><div class=\"name\">" + escape_html(spoken_name(p.name)) + "</div>";
+  html += "<div class=\"value\">" + escape_html(value_text(p.value, p.std, p.unit)) + "</div>";
+  const auto value = scalar(p.value), std = scalar(p.std);
+  if (value && std) html += error_bar(*value, *std);
+  std::string from;
+  if (value && std && *value != 0.0) from = "± " + readable(100.0 * *std / std::abs(*value), 2) + " %";
+  if (p.start) from += (from.empty() ? "" : ", ") + ("began at " + value_text(*p.start, std::nullopt, p.unit));
+  return html + "<div class=\"from\">" + escape_html(from) + "</div></div>\n";
+}
+
+std::string headline(const Result& result) {
+  std::string cards;
+  for (const ParameterResult& p : result.parameters)
+    if (p.estimated) cards += card(p);
+  return cards.empty() ? "" : "<div class=\"cards\">\n" + cards + "</div>\n";
+}
+
+std::string words(const ReportData& data) {
+  std::string items;
+  for (const std::string& sentence : plain_sentences(data)) items += "<li>" + escape_html(sentence) + "</li>\n";
+  return items.empty() ? "" : "<ul class=\"words\">\n" + items + "</ul>\n";
+}
+
+// ---- pictures
+
+std::string colour_scale(double range) {
+  if (range <= 0.0) return "";
+  std::string svg =
+      R"svg(<div class="scale"><svg viewBox="0 0 520 46" role="img" aria-label="colours of the residuals" )svg"
+      R"svg(style="font:12px system-ui,sans-serif;fill:var(--muted)"><defs><linearGradient id="residual-scale">)svg";
+  for (int k = 0; k <= 16; ++k)
+    svg +=
+        fmt::format(R"svg(<stop offset="{:.4f}" stop-color="{}"/>)svg", k / 16.0, css(diverging_colour(k / 8.0 - 1.0)));
+  svg +=
+      R"svg(</linearGradient></defs><rect x="1" y="4" width="518" height="14" rx="3" fill="url(#residual-scale)" )svg"
+      R"svg(style="stroke:var(--grid)"/>)svg";
+  const std::string mm = readable(1e3 * range, 3);
+  svg += fmt::format(R"svg(<text x="1" y="36">−{} mm, seen inside the surface</text>)svg", mm);
+  svg += R"svg(<text x="260" y="36" text-anchor="middle">0</text>)svg";
+  svg += fmt::format(R"svg(<text x="519" y="36" text-anchor="end">seen outside, +{} mm</text>)svg", mm);
+  return svg + "</svg></div>\n";
+}
+
+std::string pictures(const ReportData& data) {
+  if (data.pictures.empty()) return "";
+  std::string html =
+      "<p>Dots are observed points; the grey surface is the simulation with the estimated parameters.</p>\n" +
+      colour_scale(data.residual_range) + "<div class=\"pictures\">\n";
+  for (const ReportPicture& picture : data.pictures) {
+    const std::string caption = escape_html(picture.caption);
+    html += "<figure><img alt=\"" + caption + "\" src=\"data:image/png;base64," + encode_base64(picture.png) +
+            "\"><figcaption>" + caption + "</figcaption></figure>\n";
+  }
+  return html + "</div>\n";
+}
+
+// ---- plots
+
+std::string panel(const std::string& content) { return "<div class=\"panel\">" + content + "</div>\n"; }
+
+std::string residual_plot(const std::vector<FrameResidual>& residuals) {
+  if (residuals.empty()) return "";
+  Series rms{"simulation against recording", {}, {}, Mark::LineAndDots, {}, {}, 0};
+  Series noise{"the sensor's noise alone", {}, {}, Mark::DashedLine, {}, {}, 1};
+  for (const FrameResidual& frame : residuals) {
+    rms.x.push_back(frame.time), rms.y.push_back(1e3 * frame.rms);
+    if (frame.noise) noise.x.push_back(frame.time), noise.y.push_back(1e3 * *frame.noise);
+  }
+  PlotOptions options;
+  options.x_label = "time [s]", options.y_label = "rms distance [mm]", options.zero_y = true;
+  std::vector<Series> series{rms};
+  if (!noise.x.empty()) series.push_back(noise);
+  return panel(plot_svg(series, options));
+}
+
+// Rows of one start, numbered on through its stages.
+std::map<int, std::vector<const ConvergenceRow*>> rows_by_start(const ConvergenceHistory& history) {
+  std::map<int, std::vector<const ConvergenceRow*>> starts;
+  for (const ConvergenceRow& row : history.rows) starts[row.start].push_back(&row);
+  return starts;
+}
+
+Series start_series(int start, const std::vector<const ConvergenceRow*>& rows, bool labelled,
+                    const std::function<double(const ConvergenceRow&)>& value) {
+  Series series{labelled ? "start " + std::to_string(start + 1) : "", {}, {}, Mark::LineAndDots, {}, {}, start};
+  for (size_t i = 0; i < rows.size(); ++i) series.x.push_back(double(i)), series.y.push_back(value(*rows[i]));
+  return series;
+}
+
+std::string cost_plot(const ConvergenceHistory& history) {
+  std::vector<Series> series;
+  const auto starts = rows_by_start(history);
+  for (const auto& [start, rows] : starts)
+    series.push_back(start_series(start, rows, starts.size() > 1 && starts.size() <= 8,
+                                  [](const ConvergenceRow& row) { return row.cost; }));
+  PlotOptions options;
+  options.x_label = "iteration", options.y_label = "cost", options.log_y = true;
+  return panel(plot_svg(series, options));
+}
+
+std::string parameter_plot(const ReportData& data, size_t index) {
+  const ConvergenceHistory& history = data.convergence;
+  std::vector<Series> series;
+  bool positive = true;
+  for (const auto& [start, rows] : rows_by_start(history)) {
+    series.push_back(
+        start_series(start, rows, false, [&](const ConvergenceRow& row) { return row.parameters[index]; }));
+    for (const ConvergenceRow* row : rows) positive = positive && row->parameters[index] > 0.0;
+  }
+  PlotOptions options;
+  const std::string& unit = history.units[index];
+  options.title = spoken_name(history.parameters[index]);
+  options.x_label = "iteration", options.y_label = unit.empty() || unit == "1" ? "value" : "[" + unit + "]";
+  options.width = 460, options.height = 250, options.log_y = positive;
+  const ParameterResult* p = data.result.find(history.parameters[index]);
+  if (p && scalar(p->value)) options.levels = {{*scalar(p->value), "", scalar(p->std).value_or(0.0)}};
+  return panel(plot_svg(series, options));
+}
+
+void check(const ConvergenceHistory& history) {
+  if (history.units.size() != history.parameters.size())
+    throw std::invalid_argument("report_html: as many units as parameters are needed in the convergence");
+  for (const ConvergenceRow& row : history.rows)
+    if (row.parameters.size() != history.parameters.size())
+      throw std::invalid_argument("report_html: a convergence row does not fit its parameters' names");
+}
+
+std::string convergence(const ReportData& data) {
+  check(data.convergence);
+  if (data.convergence.rows.empty()) return "";
+  std::string html = cost_plot(data.convergence), small;
+  for (size_t i = 0; i < data.convergence.parameters.size(); ++i) small += parameter_plot(data, i);
+  return html + (small.empty() ? "" : "<div class=\"small-plots\">\n" + small + "</div>\n");
+}
+
+// ---- tables
+
+std::string table(const std::string& head, const std::string& body) {
+  return "<div class=\"panel table\"><table><thead><tr>" + head + "</tr></thead><tbody>\n" + body +
+         "</tbody></table></div>\n";
+}
+
+std::string parameter_table(const Result& result) {
+  std::string body;
+  for (const ParameterResult& p : result.parameters)
+    body += fmt::format(
+        "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", p.estimated ? "" : " class=\"given\"",
+        escape_html(spoken_name(p.name)), escape_html(value_text(p.value, p.std, p.unit)),
+        p.start ? escape_html(value_text(*p.start, std::nullopt, p.unit)) : "", p.estimated ? "estimated" : "given");
+  return body.empty() ? "" : table("<th>parameter</th><th>value</th><th>start</th><th></th>", body);
+}
+
+// Readable on the diverging colours of both ends.
+std::string correlation_cell(double value) {
+  const Rgb colour = diverging_colour(value);
+  const char* ink = std::abs(value) > 0.7 ? "#fff" : "#222";
+  return fmt::format("<td class=\"cell\" style=\"background:{};color:{}\">{}{:.2f}</td>", css(colour), ink,
+                     value < 0 ? "−" : "", std::abs(value));
+}
+
+std::string correlation_table(const CorrelationTable& correlations) {
+  const auto n = Eigen::Index(correlations.names.size());
+  if (correlations.values.rows() != n || correlations.values.cols() != n)
+    throw std::invalid_argument("report_html: the correlations do not fit their names");
+  if (n < 2) return "";
+  std::string head = "<th></th>", body;
+  for (const std::string& name : correlations.names)
+    head += "<th style=\"text-align:center\">" + escape_html(spoken_name(name)) + "</th>";
+  for (Eigen::Index i = 0; i < n; ++i) {
+    body += "<tr><td>" + escape_html(spoken_name(correlations.names[i])) + "</td>";
+    for (Eigen::Index j = 0; j < n; ++j)
+      body += i == j ? "<td class=\"cell given\">1</td>" : correlation_cell(correlations.values(i, j));
+    body += "</tr>\n";
+  }
+  return table(head, body) +
+         "<p class=\"given\">Near −1 or 1 the recording cannot tell the two apart: their uncertainties belong "
+         "together.</p>\n";
+}
+
+std::string starts_table(const Result& result) {
+  if (result.starts.empty()) return "";
+  std::string body;
+  for (size_t i = 0; i < result.starts.size(); ++i) {
+    const StartResult& s = result.starts[i];
+    std::string ends;
+    for (const auto& [name, value] : s.final) {
+      const ParameterResult* p = result.find(name);
+      ends += (ends.empty() ? "" : "; ") + spoken_name(name) + " " +
+              value_with_uncertainty(value, std::nullopt, p ? p->unit : "1");
+    }
+    body += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}{}</td><td>{}</td></tr>\n", i + 1,
+                        s.cost ? readable(*s.cost, 4) : "not finite", s.iterations,
+                        s.converged ? "" : "not converged: ", escape_html(s.reason), escape_html(ends));
+  }
+  return table("<th>start</th><th>cost</th><th>iterations</th><th>why it stopped</th><th>ended at</th>", body);
+}
+
+std::string usage(const ReportData& data) {
+  const std::string capture = data.capture_path.empty() ? "CAPTURE" : data.capture_path;
+  const std::string model = escape_html(data.model_file);
+  return "<p>The model stands beside this page: <code>" + model +
+         "</code> with its volume mesh and surface. All numbers are SI.</p>\n<pre>"
+         "# predict another recording with this model and compare\npliant evaluate " +
+         model + " OTHER_CAPTURE\n\n# repeat this fit\npliant fit " + escape_html(capture) +
+         " --out OUT</pre>\n<p>The simulated motion opens in ParaView: <code>trajectory.pvd</code>. "
+         "The figures of this page are in <code>result.json</code> and <code>convergence.csv</code>.</p>\n";
+}
+
+std::string footer(const Result& result) {
+  std::string text = result.software.name + " " + result.software.version;
+  if (!result.software.commit.empty()) text += " (" + result.software.commit.substr(0, 12) + ")";
+  if (result.time.wall_seconds > 0.0) text += "; " + readable(result.time.wall_seconds, 3) + " s";
+  if (result.time.forward_steps > 0) text += ", " + readable(double(result.time.forward_steps), 7) + " time steps";
+  if (result.time.ms_per_forward_step) text += ", " + readable(*result.time.ms_per_forward_step, 3) + " ms a step";
+  if (!result.capture.sha256.empty()) text += "; recording " + result.capture.sha256.substr(0, 16);
+  return "<footer>" + escape_html(text) + "</footer>\n";
+}
+
+}  // namespace
+
+std::string report_html(const ReportData& data) {
+  const std::string title = escape_html(data.title.empty() ? data.result.capture.name : data.title);
+  std::string html =
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+      "<meta name=\"color-scheme\" content=\"light dark\"><title>" +
+      title + "</title><style>" + page_style + "</style></head><body><main>\n";
+  html += "<h1>" + title + "</h1>\n<p class=\"sub\">" + escape_html(data.result.capture.name) + "</p>\n";
+  html += headline(data.result);
+  html += section("What this means", words(data));
+  html += section("Seen and simulated", pictures(data));
+  html += section("Agreement over time", residual_plot(data.residuals));
+  html += section("How the estimation went", convergence(data));
+  html += section("All parameters", parameter_table(data.result));
+  html += section("Which parameters go together", correlation_table(data.correlations));
+  html += section("Starting points", starts_table(data.result));
+  html += section("Using the model", usage(data));
+  return html + footer(data.result) + "</main></body></html>\n";
+}
+
+void write_report(const std::filesystem::path& path, const ReportData& data) { write_file(path, report_html(data)); }
+
+}  // namespace pliant

@@ -1,0 +1,172 @@
+#include "report/report.hpp"
+
+#include <cmath>
+#include <cstdlib>
+
+#include "geometry/primitives.hpp"
+#include "geometry/ray_scene.hpp"
+#include "report/picture.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+ConvergenceHistory falling_history() {
+  ConvergenceHistory history{{"youngs_modulus", "stiffness_damping"}, {"Pa", "s"}, {}};
+  for (int start = 0; start < 3; ++start)
+    for (int i = 0; i < 12; ++i) {
+      const double left = std::exp(-0.7 * i);
+      history.rows.push_back({start,
+                              i,
+                              "all",
+                              8.46 + 140.0 * (start + 1) * left,
+                              1e-3,
+                              {590.0 * std::exp((start - 0.7) * 3.0 * left), 0.027 * std::exp((1 - start) * left)}});
+    }
+  return history;
+}
+
+Picture example_picture(double squash, double range, int width, int height) {
+  PictureScene scene;
+  const TriangleMesh ring = make_torus(0.15, 0.06, 64, 32);
+  scene.triangles = ring.triangles;
+  scene.planes = {Plane{}};
+  scene.surface = vertex_points(ring);
+  for (Eigen::Index i = 0; i < scene.surface.rows(); ++i) {
+    Eigen::RowVector3d p = scene.surface.row(i);
+    p.y() = squash * p.y() + 0.06 * squash, p.head<1>() *= 2.0 - squash;
+    scene.surface.row(i) = p;
+    if (i % 3 == 0 && ring.vertices[i].y() > -0.02) {
+      scene.residuals.push_back(0.003 * std::sin(9.0 * double(i)));
+      scene.points.push_back(p.transpose() + Vector3(0, scene.residuals.back(), 0));
+    }
+  }
+  PictureOptions options;
+  options.residual_range = range;
+  if (width < 300) options.samples = 1;
+  return draw(scene, view_of({{-0.25, 0, -0.25}, {0.25, 0.15, 0.25}}, Vector3::UnitY(), width, height), options);
+}
+
+ReportData example(int width, int height) {
+  ReportData data;
+  data.title = "Soft ring, dropped on the floor";
+  Result& r = data.result;
+  r.software = {"pliant", "0.1.0", "abcdef123456789"};
+  r.capture = {"soft ring <dropped>", "00ff00ff00ff00ff00ff"};
+  r.parameters = {{"youngs_modulus", 590.0, "Pa", 21.0, 5000.0, true},
+                  {"poisson_ratio", 0.35, "1", std::nullopt, std::nullopt, false},
+                  {"mass_damping", 0.24, "1/s", 0.11, 0.1, true},
+                  {"stiffness_damping", 0.027, "s", 0.004, 0.01, true},
+                  {"density", 95.0, "kg/m^3", std::nullopt, std::nullopt, false},
+                  {"gravity", Vector3(0, -9.81, 0), "m/s^2", std::nullopt, std::nullopt, false},
+                  {"plane", PlaneValue{}, "", std::nullopt, std::nullopt, false}};
+  r.error = {0.0023, 0.009, std::nullopt, 48211};
+  r.cost = {143.9, 8.46};
+  r.identifiability = {{{"youngs_modulus", "stiffness_damping"}, -0.93}, {{"youngs_modulus", "mass_damping"}, 0.1}};
+  for (int i = 0; i < 3; ++i)
+    r.starts.push_back({{{"youngs_modulus", 5000.0}},
+                        {{"youngs_modulus", 590.0 + i}},
+                        8.46 + 3.0 * (i == 2),
+                        12,
+                        i < 2,
+                        i < 2 ? "the cost settled" : "too many iterations"});
+  r.time = {41.0, 9600, 2.1, 2.4};
+  r.notes = {"The floor was taken as known."};
+  data.convergence = falling_history();
+  for (int i = 0; i < 60; ++i)
+    data.residuals.push_back({i, i / 60.0, 0.0021 + 0.0004 * std::pow(std::sin(0.2 * i), 2), 800, 0.0021});
+  data.residual_range = 0.005;
+  for (const double squash : {1.0, 0.8, 0.6, 0.9})
+    data.pictures.push_back({encode_png(example_picture(squash, 0.005, width, height)), "squash"});
+  data.correlations.names = {"youngs_modulus", "mass_damping", "stiffness_damping"};
+  data.correlations.values.resize(3, 3);
+  data.correlations.values << 1, 0.1, -0.93, 0.1, 1, 0.4, -0.93, 0.4, 1;
+  data.capture_path = "examples/ring";
+  return data;
+}
+
+TEST(ValueWithUncertainty, RoundsBothToTheSamePlace) {
+  EXPECT_EQ(value_with_uncertainty(590.3, 21.4, "Pa"), "590 ± 21\u00a0Pa");
+  EXPECT_EQ(value_with_uncertainty(0.2437, 0.052, "1/s"), "0.244 ± 0.052\u00a01/s");
+  EXPECT_EQ(value_with_uncertainty(12345.0, 432.0, "Pa"), "12.35 ± 0.43\u00a0kPa");
+  EXPECT_EQ(value_with_uncertainty(0.0271, 0.004, "s"), "27.1 ± 4\u00a0ms");
+  EXPECT_EQ(value_with_uncertainty(0.35, std::nullopt, "1"), "0.35");
+  EXPECT_EQ(value_with_uncertainty(95.0, std::nullopt, "kg/m^3"), "95\u00a0kg/m³");
+  EXPECT_EQ(value_with_uncertainty(590.0, std::nan(""), "Pa"), "590\u00a0Pa");
+}
+
+TEST(SpokenName, IsWordsWithTheRegion) {
+  EXPECT_EQ(spoken_name("youngs_modulus@red half"), "Young's modulus (red half)");
+  EXPECT_EQ(spoken_name("linear_velocity"), "Linear velocity");
+}
+
+TEST(PlainSentences, SayHowFarTheFitCanBeTrusted) {
+  ReportData data = example(8, 5);
+  const auto words = plain_sentences(data);
+  EXPECT_THAT(words, Contains(HasSubstr("2.3\u00a0mm (root mean square) from the 48\u202f211 observed points")));
+  EXPECT_THAT(words, Contains(HasSubstr("explains the recording down to its noise")));
+  EXPECT_THAT(words, Contains(HasSubstr("Mass damping is known poorly (± 46 %)")));
+  EXPECT_THAT(words, Contains(HasSubstr("Young's modulus and stiffness damping are hard to tell apart")));
+  EXPECT_THAT(words, Not(Contains(HasSubstr("correlation 0.10"))));
+  EXPECT_THAT(words, Contains(HasSubstr("2 of 3 starts")));
+  EXPECT_THAT(words, Contains(HasSubstr("Taken as given, not estimated: Poisson's ratio (0.35), density (95")));
+  EXPECT_THAT(words, Contains("The floor was taken as known."));
+  data.result.error.surface_rms = 0.0063;
+  EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("not explained by this model")));
+}
+
+TEST(Report, IsOneSelfContainedPage) {
+  const std::string html = report_html(example(64, 40));
+  for (const char* outside : {"<script", "http://", "https://", "<link", "src=\"/", "url(/", "@import"}) {
+    std::string without_namespace = html;
+    for (size_t at; (at = without_namespace.find("xmlns=\"http://www.w3.org/2000/svg\"")) != std::string::npos;)
+      without_namespace.erase(at, 34);
+    EXPECT_THAT(without_namespace, Not(HasSubstr(outside)));
+  }
+  EXPECT_THAT(html, HasSubstr("590 ± 21"));
+  EXPECT_THAT(html, HasSubstr("soft ring &lt;dropped&gt;"));
+  EXPECT_THAT(html, HasSubstr("pliant evaluate model.toml"));
+  EXPECT_THAT(html, HasSubstr("examples/ring"));
+  EXPECT_THAT(html, HasSubstr("data:image/png;base64,"));
+  EXPECT_THAT(html, HasSubstr("−0.93"));
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
+}
+
+TEST(Report, EmptyPartsAreLeftOut) {
+  ReportData data;
+  data.result.capture.name = "nothing";
+  const std::string html = report_html(data);
+  for (const char* title : {"Seen and simulated", "Agreement over time", "How the estimation went", "Starting points"})
+    EXPECT_THAT(html, Not(HasSubstr(title)));
+}
+
+TEST(Report, RefusesTablesThatDoNotFit) {
+  ReportData data = example(8, 5);
+  data.correlations.names.pop_back();
+  EXPECT_THROW(report_html(data), std::invalid_argument);
+  data = example(8, 5);
+  data.convergence.rows[3].parameters.pop_back();
+  EXPECT_THROW(report_html(data), std::invalid_argument);
+}
+
+TEST(Report, IsWrittenWhole) {
+  const test::TemporaryFolder folder;
+  const ReportData data = example(8, 5);
+  write_report(folder / "report.html", data);
+  EXPECT_EQ(read_file(folder / "report.html"), report_html(data));
+}
+
+// With PLIANT_PICTURES=folder a page with pictures of full size is left there for people to look at.
+TEST(Report, ExamplePage) {
+  const char* keep = std::getenv("PLIANT_PICTURES");
+  const std::string html = report_html(keep ? example(760, 475) : example(76, 47));
+  if (keep) write_file(std::filesystem::path(keep) / "report.html", html);
+  EXPECT_GT(html.size(), 20000u);
+}
+
+}  // namespace
+}  // namespace pliant
