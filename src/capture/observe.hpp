@@ -10,19 +10,19 @@ namespace pliant {
 /// What sensors saw of the object in one frame.
 struct ObservedFrame {
   int frame = 0;
-  std::vector<Vector3> points;     ///< [m], world, on the object's surface
-  std::vector<float> noise;        ///< standard deviation of each point along the surface normal [m]
-  std::vector<Vector3> view;       ///< unit direction from the sensor to the point; zero for clouds
-  std::vector<int> camera;         ///< index into Capture::depth; -1 for clouds
-  std::vector<int> pixel;          ///< row * width + column; -1 for clouds
+  std::vector<Vector3> points;  ///< [m], world, on the object's surface
+  std::vector<float> noise;     ///< standard deviation of each point along the surface normal [m]
+  std::vector<Vector3> view;    ///< unit direction from the sensor to the point; zero for clouds
+  std::vector<int> camera;      ///< index into Capture::depth; -1 for clouds
+  std::vector<int> pixel;       ///< row * width + column; -1 for clouds
 };
 
 struct ObserveOptions {
-  double plane_margin = 0.0;    ///< [m] pixels this close to a known plane are dropped; 0: three times the noise
-  double edge_jump = 0.0;       ///< [m] depth jump between neighbours that marks an edge; 0: from the noise
-  double band = 0.0;            ///< [m] without mask or background: keep points this near the rest surface's
-                                ///< bounding box; 0: the object's size
-  int max_points_per_frame = 0; ///< 0: all; else an even, deterministic subset of the pixels
+  double plane_margin = 0.0;     ///< [m] pixels this close to a known plane are dropped; 0: three times the noise
+  double edge_jump = 0.0;        ///< [m] depth jump between neighbours that marks an edge; 0: from the noise
+  double band = 0.0;             ///< [m] without mask or background: keep points this near the rest surface's
+                                 ///< bounding box; 0: the object's size
+  int max_points_per_frame = 0;  ///< 0: all; else an even, deterministic subset of the pixels
 };
 
 /// Points on the object for every frame that was observed, in order of frames (several cameras and clouds merged).

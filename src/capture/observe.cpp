@@ -1,0 +1,113 @@
+#include "capture/observe.hpp"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <set>
+
+#include "capture/capture_rules.hpp"
+#include "capture/depth_frame.hpp"
+#include "capture/depth_points.hpp"
+#include "capture/pixel_kinds.hpp"
+#include "capture/point_cloud.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double default_cloud_noise = 0.002;  // [m] fused structured-light or time-of-flight sensors at a metre
+
+void append_pixels(ObservedFrame& frame, const PixelSorter& sorter, const DepthCamera& camera, int index,
+                   const DepthImage& depth, const Image<PixelKind>& kinds) {
+  const PinholeCamera& lens = camera.camera;
+  for (int v = 0; v < depth.height; ++v)
+    for (int u = 0; u < depth.width; ++u) {
+      if (kinds(u, v) != PixelKind::Object) continue;
+      const double z = depth(u, v);
+      const Vector3 point = lens.unproject(u, v, z);
+      const Vector3 view = (point - lens.camera_to_world.translation).normalized();
+      const Vector3 normal = surface_normal(depth, lens, u, v, sorter.jump(z));
+      const double cosine = normal.isZero() ? 1.0 : std::min(1.0, -normal.dot(view));
+      frame.points.push_back(point);
+      frame.noise.push_back(float(sorter.noise().along_normal(z, std::acos(cosine))));
+      frame.view.push_back(view);
+      frame.camera.push_back(index);
+      frame.pixel.push_back(v * depth.width + u);
+    }
+}
+
+void append_camera(ObservedFrame& frame, const Capture& capture, const PixelSorter& sorter, int index) {
+  const DepthCamera& camera = capture.depth[std::size_t(index)];
+  const DepthImage depth = read_depth(capture, camera, frame.frame);
+  const auto mask = read_object_mask(capture, camera, frame.frame);
+  append_pixels(frame, sorter, camera, index, depth, sorter.sort(depth, mask));
+}
+
+void append_cloud(ObservedFrame& frame, const Capture& capture, const CloudSequence& cloud,
+                  const ObserveOptions& options) {
+  const double size = capture.surface ? bounding_box(*capture.surface).extent().maxCoeff() : 0.0;
+  const auto reachable = reachable_box(capture, options.band > 0 ? options.band : size);
+  for (const Vector3& point : read_points(capture.folder / cloud.points(frame.frame))) {
+    if (reachable && ((point.array() < reachable->min.array()).any() || (point.array() > reachable->max.array()).any()))
+      continue;
+    frame.points.push_back(point);
+    frame.noise.push_back(float(cloud.noise.value_or(default_cloud_noise)));
+    frame.view.push_back(Vector3::Zero());
+    frame.camera.push_back(-1);
+    frame.pixel.push_back(-1);
+  }
+}
+
+template <class T>
+void keep_every(std::vector<T>& values, std::size_t wanted) {
+  for (std::size_t i = 0; i < wanted; ++i) values[i] = values[i * values.size() / wanted];
+  values.resize(wanted);
+}
+
+void thin_out(ObservedFrame& frame, int most) {
+  const std::size_t wanted = std::size_t(most);
+  if (most <= 0 || frame.points.size() <= wanted) return;
+  keep_every(frame.points, wanted);
+  keep_every(frame.noise, wanted);
+  keep_every(frame.view, wanted);
+  keep_every(frame.camera, wanted);
+  keep_every(frame.pixel, wanted);
+}
+
+std::vector<int> observed_frames(const Capture& capture) {
+  std::set<int> frames;
+  for (const DepthCamera& camera : capture.depth)
+    for (const int frame : frames_of(capture.frame_count(), camera.every)) frames.insert(frame);
+  for (const CloudSequence& cloud : capture.clouds)
+    for (const int frame : frames_of(capture.frame_count(), cloud.every)) frames.insert(frame);
+  return {frames.begin(), frames.end()};
+}
+
+}  // namespace
+
+std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions& options,
+                                   const std::function<void(int, int)>& progress) {
+  std::vector<PixelSorter> sorters;
+  for (const DepthCamera& camera : capture.depth) sorters.emplace_back(capture, camera, options);
+  const std::vector<int> numbers = observed_frames(capture);
+  std::vector<ObservedFrame> frames(numbers.size());
+  std::mutex mutex;
+  int done = 0;
+  tbb::parallel_for(std::size_t(0), numbers.size(), [&](std::size_t i) {
+    ObservedFrame& frame = frames[i];
+    frame.frame = numbers[i];
+    for (std::size_t c = 0; c < capture.depth.size(); ++c)
+      if (frame.frame % capture.depth[c].every == 0) append_camera(frame, capture, sorters[c], int(c));
+    for (const CloudSequence& cloud : capture.clouds)
+      if (frame.frame % cloud.every == 0) append_cloud(frame, capture, cloud, options);
+    thin_out(frame, options.max_points_per_frame);
+    if (!progress) return;
+    const std::lock_guard lock(mutex);
+    progress(++done, int(numbers.size()));
+  });
+  return frames;
+}
+
+}  // namespace pliant
