@@ -91,10 +91,10 @@ Image<PixelKind> PixelSorter::sort(const DepthImage& depth, const std::optional<
       const float z = depth(u, v);
       if (!(z > 0)) continue;
       const Vector3 point = camera_.unproject(u, v, z);
-      kinds(u, v) = !may_show_object(z, u, v, point, own_mask) ? PixelKind::Elsewhere
-                    : is_on_plane(point, noise_.axial(z))      ? PixelKind::OnPlane
-                    : is_at_edge(depth, own_mask, u, v)        ? PixelKind::AtEdge
-                                                               : PixelKind::Object;
+      kinds(u, v) = is_on_plane(point, noise_.axial(z))          ? PixelKind::OnPlane
+                    : !may_show_object(z, u, v, point, own_mask) ? PixelKind::Elsewhere
+                    : is_at_edge(depth, own_mask, u, v)          ? PixelKind::AtEdge
+                                                                 : PixelKind::Object;
     }
   return kinds;
 }

@@ -15,7 +15,7 @@ namespace pliant {
 enum class PixelKind : std::uint8_t {
   NoReading,
   Object,
-  OnPlane,    ///< of the object's mask or surroundings, but on a plane
+  OnPlane,    ///< on a plane, or behind it
   AtEdge,     ///< at a depth edge: flying, or a mixture of two surfaces
   Elsewhere,  ///< outside the mask, as in the background image, or far from the object
 };

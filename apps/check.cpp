@@ -1,0 +1,326 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+#include "capture/capture.hpp"
+#include "capture/capture_rules.hpp"
+#include "capture/depth_frame.hpp"
+#include "capture/depth_picture.hpp"
+#include "capture/observe.hpp"
+#include "capture/pixel_kinds.hpp"
+#include "capture/point_cloud.hpp"
+#include "capture/survey.hpp"
+#include "commands.hpp"
+#include "geometry/mesh_io.hpp"
+
+namespace pliant::apps {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+struct Arguments {
+  std::string capture, out, compare_masks;
+  int pictures = 3;
+};
+
+template <class... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[512];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+void say(const std::string& heading, const std::string& text) {
+  std::cout << formatted("%-13s", heading.c_str()) << text << '\n';
+}
+
+std::string vector_text(const Vector3& v) { return formatted("[%.4g, %.4g, %.4g]", v.x(), v.y(), v.z()); }
+
+Json vector_json(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
+
+void describe_object(const Capture& capture, Json& json) {
+  if (!capture.surface) {
+    say("object", "no scan of it at rest");
+    return;
+  }
+  const MeshReport mesh = examine(*capture.surface);
+  const Vector3 extent = mesh.box.extent();
+  say("object", formatted("%.4g x %.4g x %.4g m, volume %.4g m^3", extent.x(), extent.y(), extent.z(), mesh.volume));
+  if (const auto mass = capture.total_mass())
+    say("", formatted("mass %.4g kg, density %.4g kg/m^3 (%s given)", *mass, *mass / mesh.volume,
+                      capture.mass ? "mass" : "density"));
+  else
+    say("", "mass and density unknown");
+  say("surface",
+      formatted("%zu vertices, %zu triangles, closed, %d part%s, %d triangles without area, %d vertices unused",
+                capture.surface->vertices.size(), capture.surface->triangles.size(), mesh.components,
+                mesh.components == 1 ? "" : "s", mesh.degenerate_triangles, mesh.unused_vertices));
+  for (const std::string& complaint : mesh.complaints) say("", "note: " + complaint);
+  json["object"] = {{"extent", vector_json(extent)}, {"volume", mesh.volume}, {"parts", mesh.components}};
+  if (const auto mass = capture.total_mass()) json["object"]["mass"] = *mass;
+}
+
+void describe_world(const Capture& capture) {
+  say("gravity",
+      capture.gravity ? vector_text(*capture.gravity) + " m/s^2" : "unknown; up is " + vector_text(capture.up));
+  if (!capture.times.empty())
+    say("frames", formatted("%d in %.4g s, free from frame %d%s", capture.frame_count(),
+                            capture.times.back() - capture.times.front(), capture.start_frame,
+                            capture.is_static ? ", all of one equilibrium (static)" : ""));
+  if (!capture.fixed.empty())
+    say("held", formatted("%zu region%s", capture.fixed.size(), capture.fixed.size() == 1 ? "" : "s"));
+  if (capture.initial.released) say("start", "released from a held, deformed pose");
+}
+
+void describe_sensors(const Capture& capture) {
+  for (const DepthCamera& camera : capture.depth) {
+    const PinholeCamera& lens = camera.camera;
+    const double fov = 2.0 * degrees(std::atan(0.5 * lens.width / lens.fx));
+    say("camera",
+        formatted("\"%s\" %d x %d, view of %.0f degrees, %s%s", camera.name.c_str(), lens.width, lens.height, fov,
+                  camera.masks        ? "masks"
+                  : camera.background ? "background image"
+                                      : "neither masks nor background",
+                  camera.every > 1 ? formatted(", every %d frames", camera.every).c_str() : ""));
+  }
+  for (const CloudSequence& cloud : capture.clouds) say("clouds", cloud.points.pattern);
+  for (const MarkerTrack& track : capture.markers) say("markers", track.track.filename().string());
+  const auto is_test = [](const auto& item) { return item.role == "test"; };
+  if (!capture.presses.empty())
+    say("presses", formatted("%zu, of them %d for test only", capture.presses.size(),
+                             int(std::ranges::count_if(capture.presses, is_test))));
+  if (!capture.loads.empty())
+    say("loads", formatted("%zu, of them %d for test only", capture.loads.size(),
+                           int(std::ranges::count_if(capture.loads, is_test))));
+}
+
+void describe_observations(const Capture& capture, const Survey& seen, Json& json) {
+  if (!capture.surface || seen.points.greatest == 0) return;
+  const std::string count = seen.points.least == seen.points.greatest
+                                ? std::to_string(seen.points.least)
+                                : formatted("%d to %d a frame", seen.points.least, seen.points.greatest);
+  say("points", count + formatted(" on the object; noise %.2g mm", 1e3 * seen.median_noise));
+  if (!seen.points.empty_frames.empty())
+    say("", "note: no point on the object in frames " + ranges_text(seen.points.empty_frames));
+  if (seen.seen_share) say("", formatted("%.0f %% of the surface is seen at the start", 100.0 * *seen.seen_share));
+  if (!capture.is_static)
+    say("motion",
+        (seen.moves ? formatted("the seen points move by up to %.3g m", seen.travel) : std::string("none seen")) +
+            (seen.first_contact ? formatted(", first contact with a plane about frame %d", *seen.first_contact) : ""));
+  json["points"] = {{"least", seen.points.least}, {"median", seen.points.median}, {"greatest", seen.points.greatest}};
+  json["noise"] = seen.median_noise;
+  json["travel"] = seen.travel;
+  json["moves"] = seen.moves;
+  if (seen.seen_share) json["seen_share"] = *seen.seen_share;
+  if (seen.first_contact) json["first_contact"] = *seen.first_contact;
+}
+
+void describe_planes(const Capture& capture, const Survey& seen, Json& json) {
+  for (std::size_t i = 0; i < capture.planes.size(); ++i) {
+    const PlaneSurvey& plane = seen.planes[i];
+    const std::string known = capture.planes[i].known ? "known" : "roughly known";
+    if (!plane.seen) {
+      say("plane", known + ", not seen by any camera");
+      continue;
+    }
+    say("plane", known + formatted(", seen with %.2f mm rms, %.2f degrees and %.1f mm from what is declared",
+                                   1e3 * plane.seen->rms, degrees(plane.angle), 1e3 * plane.distance));
+    json["planes"].push_back({{"rms", plane.seen->rms},
+                              {"point", vector_json(plane.seen->point)},
+                              {"normal", vector_json(plane.seen->normal)},
+                              {"angle_to_declared_deg", degrees(plane.angle)},
+                              {"distance_to_declared", plane.distance}});
+  }
+}
+
+void describe_scene(const Segmentation& scene, const std::string& camera, Json& json) {
+  Json own = {{"camera", camera}};
+  for (const PlaneFit& plane : scene.planes) {
+    say("scene", formatted("a plane of %d pixels, %.2f mm rms", plane.inliers, 1e3 * plane.rms));
+    own["planes"].push_back({{"pixels", plane.inliers},
+                             {"rms", plane.rms},
+                             {"point", vector_json(plane.point)},
+                             {"normal", vector_json(plane.normal)}});
+  }
+  for (const SceneObject& object : scene.objects) {
+    say("",
+        formatted("an object of %d pixels, %.3g x %.3g x %.3g m seen%s", object.pixels, object.extent.x(),
+                  object.extent.y(), object.extent.z(),
+                  object.stands_on_plane ? formatted(", %.3g m high on the first plane", object.height).c_str() : ""));
+    own["objects"].push_back({{"pixels", object.pixels},
+                              {"extent", vector_json(object.extent)},
+                              {"centroid", vector_json(object.centroid)},
+                              {"stands_on_plane", object.stands_on_plane},
+                              {"height", object.height}});
+  }
+  json["scenes"].push_back(own);
+}
+
+void describe_prospects(const Prospects& prospects, Json& json) {
+  std::cout << '\n';
+  for (const std::string& text : prospects.possible) std::cout << "+ " << text << '\n';
+  for (const std::string& text : prospects.impossible) std::cout << "- " << text << '\n';
+  json["possible"] = prospects.possible;
+  json["impossible"] = prospects.impossible;
+}
+
+// A few frames spread over the recording, among those of the camera; the start is one of them.
+std::vector<int> chosen_frames(const Capture& capture, const DepthCamera& camera, int wanted) {
+  const std::vector<int> all = frames_of(capture.frame_count(), camera.every);
+  std::vector<int> chosen;
+  const int count = std::min(wanted, int(all.size()));
+  for (int i = 0; i < count; ++i)
+    chosen.push_back(all[std::size_t(count == 1 ? 0 : std::size_t(i) * (all.size() - 1) / std::size_t(count - 1))]);
+  return chosen;
+}
+
+std::string frame_name(const std::string& camera, int frame) { return camera + formatted("_%06d", frame); }
+
+void write_sorted_pictures(const Capture& capture, const Arguments& arguments) {
+  for (const DepthCamera& camera : capture.depth) {
+    const PixelSorter sorter(capture, camera, {});
+    for (const int frame : chosen_frames(capture, camera, arguments.pictures)) {
+      const DepthImage depth = read_depth(capture, camera, frame);
+      const auto kinds = sorter.sort(depth, read_object_mask(capture, camera, frame));
+      write_png(fs::path(arguments.out) / (frame_name(camera.name, frame) + ".png"), picture(depth, kinds));
+    }
+  }
+}
+
+void write_clouds(const std::vector<ObservedFrame>& frames, const Arguments& arguments) {
+  for (const ObservedFrame& frame : frames)
+    write_points(fs::path(arguments.out) / "points" / formatted("%06d.ply", frame.frame), frame.points);
+}
+
+void write_scene(const DepthCamera& camera, int frame, const DepthImage& depth, const Segmentation& scene,
+                 const Arguments& arguments) {
+  const fs::path out = arguments.out;
+  const std::string name = frame_name(camera.name, frame);
+  write_png(out / (name + ".png"), picture(depth, scene));
+  for (int i = 0; i < int(scene.objects.size()); ++i) {
+    std::vector<Vector3> points;
+    for (int v = 0; v < depth.height; ++v)
+      for (int u = 0; u < depth.width; ++u)
+        if (scene.label(u, v) == i) points.push_back(camera.camera.unproject(u, v, depth(u, v)));
+    write_points(out / (name + formatted("_object%d.ply", i + 1)), points);
+  }
+}
+
+struct Overlap {
+  int both = 0, either = 0;
+  double ratio() const { return either > 0 ? double(both) / either : 0.0; }
+};
+
+// The object that agrees best with a reference mask, over the pixels with a reading.
+std::pair<int, Overlap> best_overlap(const DepthImage& depth, const Segmentation& scene,
+                                     const Image<std::uint8_t>& mask) {
+  std::pair<int, Overlap> best{-1, {}};
+  for (int i = 0; i < int(scene.objects.size()); ++i) {
+    Overlap overlap;
+    for (std::size_t p = 0; p < depth.pixels.size(); ++p) {
+      const bool own = scene.label.pixels[p] == i, reference = mask.pixels[p] != 0 && depth.pixels[p] > 0;
+      overlap.both += own && reference;
+      overlap.either += own || reference;
+    }
+    if (best.first < 0 || overlap.ratio() > best.second.ratio()) best = {i, overlap};
+  }
+  return best;
+}
+
+void compare_with_masks(const Capture& capture, const Arguments& arguments, Json& json) {
+  const FramePattern pattern{arguments.compare_masks};
+  if (!pattern.is_valid())
+    throw InputError(Problem{
+        {arguments.compare_masks}, "the pattern of --compare-masks", "one %06d where the frame's number stands", ""});
+  for (const DepthCamera& camera : capture.depth)
+    for (const int frame : chosen_frames(capture, camera, arguments.pictures)) {
+      stop_if_interrupted();
+      const DepthImage depth = read_depth(capture, camera, frame);
+      const Segmentation scene = segment(depth, camera.camera, DepthNoise(camera, 1.0));
+      const auto mask = read_mask(capture.folder / pattern(frame));
+      if (mask.width != depth.width || mask.height != depth.height)
+        throw InputError(Problem{
+            {capture.folder / pattern(frame)}, "a mask of another size than the depth image", "the same size", ""});
+      const auto [object, overlap] = best_overlap(depth, scene, mask);
+      say("mask", formatted("frame %d: object %d, intersection over union %.3f", frame, object + 1, overlap.ratio()));
+      json["mask_overlap"].push_back(
+          {{"camera", camera.name}, {"frame", frame}, {"object", object + 1}, {"iou", overlap.ratio()}});
+    }
+}
+
+void write_scenes(const Capture& capture, const Arguments& arguments) {
+  for (const DepthCamera& camera : capture.depth)
+    for (const int frame : chosen_frames(capture, camera, arguments.pictures)) {
+      const DepthImage depth = read_depth(capture, camera, frame);
+      write_scene(camera, frame, depth, segment(depth, camera.camera, DepthNoise(camera, 1.0)), arguments);
+    }
+}
+
+void check(const Arguments& arguments) {
+  const Capture capture = read_capture(arguments.capture);
+  const auto frames = observe(capture, {}, [](int done, int total) {
+    stop_if_interrupted();
+    show_progress("reading frames", done, total);
+  });
+  const Survey seen = survey(capture, frames);
+  Json json = {{"capture", capture.name}, {"sha256", capture.sha256}, {"frames", capture.frame_count()}};
+  std::cout << capture.name << '\n';
+  describe_object(capture, json);
+  describe_world(capture);
+  describe_sensors(capture);
+  describe_observations(capture, seen, json);
+  describe_planes(capture, seen, json);
+  for (std::size_t i = 0; i < seen.scenes.size(); ++i) describe_scene(seen.scenes[i], capture.depth[i].name, json);
+  if (!arguments.compare_masks.empty()) compare_with_masks(capture, arguments, json);
+  describe_prospects(prospects(capture, seen), json);
+  if (arguments.out.empty()) return;
+  if (capture.surface)
+    write_sorted_pictures(capture, arguments);
+  else
+    write_scenes(capture, arguments);
+  if (capture.surface || capture.depth.empty()) write_clouds(frames, arguments);
+  write_file(fs::path(arguments.out) / "check.json", json.dump(2) + "\n");
+}
+
+constexpr const char* footer = R"(Examples:
+  pliant check recordings/bear
+  pliant check recordings/bear --out look --pictures 8
+
+Without --out nothing is written. With it, the folder gets check.json (the figures), a picture of a few frames of each
+depth camera (the object from yellow to violet by depth; planes blue; pixels removed at edges red; the rest grey), and
+the points on the object as PLY files. A capture without a scan of the object at rest is split into planes and objects.)";
+
+}  // namespace
+
+void add_check(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("check", "Validate a capture and say what can be estimated from it");
+  command->add_option("capture", arguments->capture, "the capture's folder, or its capture.toml")->required();
+  command->add_option("--out", arguments->out, "folder for pictures, point clouds and figures");
+  command->add_option("--pictures", arguments->pictures, "frames of each camera to picture")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  command->add_option(
+      "--compare-masks", arguments->compare_masks,
+      "pattern of reference masks, relative to the capture: report how well found objects agree with them");
+  command->footer(footer);
+  command->callback([arguments, &exit_code] {
+    check(*arguments);
+    exit_code = Fine;
+  });
+}
+
+}  // namespace pliant::apps

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "capture/depth_frame.hpp"
+#include "capture/image_io.hpp"
+#include "capture/pixel_kinds.hpp"
+#include "capture/segment.hpp"
+
+namespace pliant {
+
+/// A picture of sorted pixels: the object from yellow (near) to violet (far), planes blue, edges red, the rest grey by
+/// depth, black without a reading.
+Image<Rgb> picture(const DepthImage& depth, const Image<PixelKind>& kinds);
+
+/// A picture of a segmented scene: each object in a colour of its own, planes blue, shaded by the surface's slope.
+Image<Rgb> picture(const DepthImage& depth, const Segmentation& scene);
+
+}  // namespace pliant

@@ -1,0 +1,255 @@
+#include "capture/survey.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "capture/depth_frame.hpp"
+#include "capture/depth_noise.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double moving = 4.0;        // standard deviations of a point; the centroid of hundreds is far steadier
+constexpr double contact_gap = 0.02;  // of the object's size: how near a plane counts as touching it
+constexpr double plane_reach = 3.0;   // standard deviations within which observe() drops a plane's pixels
+
+template <class T>
+T median_of(std::vector<T> values) {
+  if (values.empty()) return T{};
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+PointCounts count_points(std::span<const ObservedFrame> frames) {
+  PointCounts counts;
+  std::vector<int> all;
+  for (const ObservedFrame& frame : frames) {
+    all.push_back(int(frame.points.size()));
+    if (frame.points.empty()) counts.empty_frames.push_back(frame.frame);
+  }
+  if (all.empty()) return counts;
+  counts.least = *std::ranges::min_element(all);
+  counts.greatest = *std::ranges::max_element(all);
+  counts.median = median_of(all);
+  return counts;
+}
+
+double median_noise(std::span<const ObservedFrame> frames) {
+  std::vector<float> noise;
+  for (const ObservedFrame& frame : frames)
+    if (!frame.noise.empty()) noise.push_back(median_of(frame.noise));
+  return double(median_of(noise));
+}
+
+Vector3 centroid_of(const std::vector<Vector3>& points) {
+  Vector3 sum = Vector3::Zero();
+  for (const Vector3& point : points) sum += point;
+  return sum / double(points.size());
+}
+
+// Height of the second percentile: the lowest points without the few that noise throws further down.
+double low_height(const std::vector<Vector3>& points, const Plane& plane) {
+  std::vector<double> heights;
+  for (const Vector3& point : points) heights.push_back(plane.normal.dot(point - plane.point));
+  const auto low = heights.begin() + std::ptrdiff_t(heights.size() / 50);
+  std::nth_element(heights.begin(), low, heights.end());
+  return *low;
+}
+
+double greatest_travel(std::span<const ObservedFrame> frames) {
+  const auto first = std::ranges::find_if(frames, [](const ObservedFrame& frame) { return !frame.points.empty(); });
+  if (first == frames.end()) return 0.0;
+  const Vector3 start = centroid_of(first->points);
+  double travel = 0.0;
+  for (const ObservedFrame& frame : frames)
+    if (!frame.points.empty()) travel = std::max(travel, (centroid_of(frame.points) - start).norm());
+  return travel;
+}
+
+// How far the seen points' centroid has moved along a direction since the object was let go.
+std::vector<double> shifts(const Capture& capture, std::span<const ObservedFrame> frames, const Vector3& direction) {
+  std::vector<double> result(frames.size(), 0.0);
+  std::optional<Vector3> start;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].frame < capture.start_frame || frames[i].points.empty()) continue;
+    const Vector3 now = centroid_of(frames[i].points);
+    if (!start) start = now;
+    result[i] = direction.dot(now - *start);
+  }
+  return result;
+}
+
+// Lowest point of the rest surface above a plane [m].
+double clearance(const TriangleMesh& surface, const Plane& plane) {
+  double lowest = 1e300;
+  for (const Vector3& vertex : surface.vertices) lowest = std::min(lowest, plane.normal.dot(vertex - plane.point));
+  return lowest;
+}
+
+// The side on which an object touches a plane is mostly hidden, so contact follows from the seen side too: when it has
+// come nearer to the plane by the clearance at the start.
+std::optional<int> first_contact(const Capture& capture, std::span<const ObservedFrame> frames, double noise,
+                                 const std::vector<PlaneSurvey>& seen) {
+  if (!capture.surface || capture.is_static) return std::nullopt;
+  const double gap = plane_reach * noise + contact_gap * bounding_box(*capture.surface).extent().maxCoeff();
+  std::optional<int> first;
+  for (std::size_t p = 0; p < capture.planes.size(); ++p) {
+    const Plane plane = seen[p].seen ? Plane(*seen[p].seen) : capture.planes[p];
+    const std::vector<double> shift = shifts(capture, frames, plane.normal);
+    const double start = capture.initial.released ? 1e300 : clearance(*capture.surface, plane);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (frames[i].frame < capture.start_frame || frames[i].points.empty()) continue;
+      if (low_height(frames[i].points, plane) >= gap && start + shift[i] >= gap) continue;
+      first = std::min(first.value_or(frames[i].frame), frames[i].frame);
+      break;
+    }
+  }
+  return first;
+}
+
+// Share of the rest surface's vertices with a seen point near them.
+std::optional<double> seen_share(const Capture& capture, std::span<const ObservedFrame> frames, double noise) {
+  if (!capture.surface || capture.is_static || capture.initial.released) return std::nullopt;
+  const auto start = std::ranges::find_if(
+      frames, [&](const ObservedFrame& frame) { return frame.frame >= capture.start_frame && !frame.points.empty(); });
+  if (start == frames.end()) return std::nullopt;
+  const double reach = std::max(3.0 * noise, 0.02 * bounding_box(*capture.surface).extent().maxCoeff());
+  const auto is_seen = [&](const Vector3& vertex) {
+    return std::ranges::any_of(start->points,
+                               [&](const Vector3& p) { return (p - vertex).squaredNorm() < reach * reach; });
+  };
+  const auto& vertices = capture.surface->vertices;
+  return double(std::ranges::count_if(vertices, is_seen)) / double(vertices.size());
+}
+
+std::vector<PlaneSurvey> survey_planes(const Capture& capture) {
+  std::vector<PlaneSurvey> planes;
+  for (const Plane& declared : capture.planes) {
+    PlaneSurvey& plane = planes.emplace_back();
+    plane.seen = find_plane(capture, declared);
+    if (!plane.seen) continue;
+    plane.angle = std::acos(std::min(1.0, declared.normal.dot(plane.seen->normal)));
+    plane.distance = (plane.seen->point - declared.point).norm();
+  }
+  return planes;
+}
+
+std::vector<Segmentation> survey_scenes(const Capture& capture) {
+  std::vector<Segmentation> scenes;
+  if (capture.surface) return scenes;
+  for (const DepthCamera& camera : capture.depth)
+    if (capture.frame_count() > 0)
+      scenes.push_back(segment(read_depth(capture, camera, 0), camera.camera, DepthNoise(camera, 1.0)));
+  return scenes;
+}
+
+std::string millimetres(double metres) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f mm", 1e3 * metres);
+  return text;
+}
+
+bool has_forces_to_fit(const Capture& capture) {
+  const auto is_fit = [](const auto& item) { return item.role == "fit"; };
+  return std::ranges::any_of(capture.presses, is_fit) || std::ranges::any_of(capture.loads, is_fit);
+}
+
+void add_scale(const Capture& capture, Prospects& result) {
+  if (has_forces_to_fit(capture))
+    result.possible.push_back("Pascals are anchored by measured forces: `[[press]]` or `[[load]]`.");
+  else if (capture.mass || capture.density)
+    result.possible.push_back(std::string("Pascals are anchored by the ") + (capture.mass ? "mass." : "density."));
+  else
+    result.impossible.push_back(
+        "Nothing anchors pascals: neither mass, density nor a force is known. Only the ratio of stiffness to density "
+        "can "
+        "be estimated; weigh the object and write `mass`.");
+}
+
+void add_stiffness(const Capture& capture, const Survey& seen, Prospects& result) {
+  const bool is_held = !capture.fixed.empty(), touches = seen.first_contact.has_value();
+  const bool has_forces = has_forces_to_fit(capture);
+  if (has_forces)
+    result.possible.push_back("Stiffness, and Poisson's ratio to some degree: from shapes under known forces.");
+  if (capture.times.empty()) return;
+  if (capture.is_static) {
+    result.possible.push_back(is_held ? "Stiffness: from how far the held object sags under gravity."
+                                      : "Stiffness, if what carries the object is given: it rests under gravity.");
+  } else if (!seen.moves) {
+    result.impossible.push_back("The object does not move: neither stiffness nor damping shows in its motion.");
+  } else if (is_held || capture.initial.released || touches) {
+    result.possible.push_back(std::string("Stiffness: from ") +
+                              (touches ? "the impact and the motion after it." : "the swinging of the held object."));
+  } else if (!has_forces) {
+    result.impossible.push_back(
+        "Stiffness does not show: the object neither touches a plane nor is held, and in free fall nothing strains "
+        "it.");
+  }
+}
+
+void add_damping(const Capture& capture, const Survey& seen, Prospects& result) {
+  if (capture.times.empty())
+    result.impossible.push_back("Damping does not show: under presses and loads the object is at rest.");
+  else if (capture.is_static)
+    result.impossible.push_back("Damping does not show: the object is at rest in every frame (`static = true`).");
+  else if (seen.moves && (!capture.fixed.empty() || capture.initial.released || seen.first_contact))
+    result.possible.push_back("Damping: from how the motion dies out.");
+}
+
+void add_surroundings(const Capture& capture, const Survey& seen, Prospects& result) {
+  if (!capture.gravity) result.possible.push_back("Gravity is unknown and has to be estimated from the motion.");
+  if (!capture.initial.known)
+    result.possible.push_back("The velocity at the start has to be estimated from the first frames.");
+  if (capture.shape_is == ShapeIs::Static)
+    result.possible.push_back("The load-free shape is unknown (`shape_is = \"static\"`) and has to be estimated too.");
+  for (std::size_t i = 0; i < capture.regions.size(); ++i)
+    result.possible.push_back("Region \"" + capture.regions[i].name + "\" can have a stiffness of its own.");
+  for (std::size_t i = 0; i < capture.planes.size(); ++i) {
+    const std::string name = "Plane " + std::to_string(i + 1);
+    if (seen.planes[i].seen && !capture.planes[i].known)
+      result.possible.push_back(name + " is only roughly known; the cameras see it (" +
+                                millimetres(seen.planes[i].seen->rms) + " rms), and its place is taken from there.");
+    else if (!capture.planes[i].known)
+      result.possible.push_back(
+          name + " is only roughly known and no camera sees it: it has to be estimated from the impact.");
+  }
+}
+
+}  // namespace
+
+Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
+  Survey result;
+  result.points = count_points(frames);
+  result.median_noise = median_noise(frames);
+  result.travel = greatest_travel(frames);
+  result.moves = !capture.is_static && result.travel > moving * result.median_noise;
+  result.planes = survey_planes(capture);
+  result.first_contact = first_contact(capture, frames, result.median_noise, result.planes);
+  result.seen_share = seen_share(capture, frames, result.median_noise);
+  result.scenes = survey_scenes(capture);
+  return result;
+}
+
+Prospects prospects(const Capture& capture, const Survey& seen) {
+  Prospects result;
+  if (!capture.surface) {
+    result.impossible.push_back(
+        "Nothing can be fitted: there is no scan of the object at rest. Scan it all around and write `[object] "
+        "surface`.");
+    if (capture.frame_count() > 0)
+      result.possible.push_back("The seen side of the scene can be split into planes and objects.");
+    add_scale(capture, result);
+    std::erase_if(result.possible, [](const std::string& text) { return text.starts_with("Pascals"); });
+    return result;
+  }
+  add_stiffness(capture, seen, result);
+  add_scale(capture, result);
+  add_damping(capture, seen, result);
+  add_surroundings(capture, seen, result);
+  return result;
+}
+
+}  // namespace pliant

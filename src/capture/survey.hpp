@@ -1,0 +1,50 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "capture/capture.hpp"
+#include "capture/find_plane.hpp"
+#include "capture/observe.hpp"
+#include "capture/segment.hpp"
+
+namespace pliant {
+
+/// Number of points per frame.
+struct PointCounts {
+  int least = 0, median = 0, greatest = 0;
+  std::vector<int> empty_frames;
+};
+
+/// A declared plane against what the cameras see of it.
+struct PlaneSurvey {
+  std::optional<FoundPlane> seen;
+  double angle = 0.0;     ///< between the declared and the seen normal [rad]
+  double distance = 0.0;  ///< from the declared point to the seen plane [m]
+};
+
+/// What a recording shows, in figures.
+struct Survey {
+  PointCounts points;
+  double median_noise = 0.0;  ///< of points along the surface normal [m]
+  double travel = 0.0;        ///< greatest displacement of the seen points' centroid or box from the first frame [m]
+  bool moves = false;         ///< travel beyond the noise
+  std::optional<int> first_contact;  ///< first frame after `start_frame` in which points come down to a plane
+  std::optional<double>
+      seen_share;  ///< of the rest surface's vertices, at the start; nothing where it is not in that pose
+  std::vector<PlaneSurvey> planes;   ///< of each Capture::planes
+  std::vector<Segmentation> scenes;  ///< of each camera's first frame, where there is no rest surface
+};
+
+Survey survey(const Capture& capture, std::span<const ObservedFrame> frames);
+
+/// What can be estimated from a recording, what cannot, and why: plain sentences.
+struct Prospects {
+  std::vector<std::string> possible, impossible;
+};
+
+Prospects prospects(const Capture& capture, const Survey& survey);
+
+}  // namespace pliant
