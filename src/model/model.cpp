@@ -1,0 +1,219 @@
+#include "model/model.hpp"
+
+#include <fmt/format.h>
+
+#include <sstream>
+#include <stdexcept>
+
+#include "base/files.hpp"
+#include "capture/toml_facts.hpp"
+#include "geometry/mesh_io.hpp"
+#include "model/vtu.hpp"
+
+namespace pliant {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* modulus_field = "youngs_modulus [Pa]";
+constexpr const char* ratio_field = "poisson_ratio";
+constexpr const char* fill_field = "fill";
+
+// ---- writing
+
+void line(std::ostream& out, const char* key, double value, const char* comment) {
+  out << fmt::format("{:<18}= {:<24}# {}\n", key, toml_text(value), comment);
+}
+
+void line(std::ostream& out, const char* key, int value, const char* comment) {
+  out << fmt::format("{:<18}= {:<24}# {}\n", key, value, comment);
+}
+
+std::string vertices_file(size_t number) { return fmt::format("fixed_{}.txt", number); }
+
+std::string model_toml(const Model& m) {
+  std::ostringstream out;
+  out << "# A fitted elastic object, ready to be simulated. All quantities are SI.\n"
+         "format = \"model/1\"\nname = "
+      << toml_text(m.name)
+      << "\n\n[object]\nsurface = \"surface.ply\"          # free of load, world frame of the recording\n";
+  if (!m.volume.cells.empty()) out << "volume_mesh = \"model.vtu\"        # hexahedra with the material of each\n";
+  line(out, "mass", m.mass, "kg");
+  line(out, "density", m.density, "kg/m^3");
+  out << "\n[material]                          # isotropic, linear in the rotated frame of each element\n";
+  line(out, "youngs_modulus", m.youngs_modulus, "Pa; the mean where elements differ");
+  line(out, "poisson_ratio", m.poisson_ratio, "-1 .. 0.5");
+  line(out, "mass_damping", m.mass_damping, "Rayleigh, 1/s");
+  line(out, "stiffness_damping", m.stiffness_damping, "Rayleigh, s");
+  out << "\n[world]\n";
+  if (m.gravity) out << "gravity = " << toml_text(*m.gravity) << "   # m/s^2\n";
+  if (m.frames > 0) {
+    out << "\n[timing]                            # of the recording behind the fit\n";
+    line(out, "frame_rate", m.frame_rate, "Hz");
+    line(out, "frame_count", m.frames, "");
+    line(out, "start_frame", m.start_frame, "the first frame in which the object moves freely");
+  }
+  out << "\n[simulation]\n";
+  line(out, "cell_size", m.cell_size, "edge of the hexahedral grid's cells, m");
+  out << "grid_origin = " << toml_text(m.grid_origin) << "   # m\n";
+  line(out, "substeps", m.substeps, "time steps a frame");
+  line(out, "newmark_theta", m.theta, "weight of a step's end, 0.5 .. 1");
+  line(out, "contact_stiffness", m.contact_stiffness, "pressure by penetration, Pa/m");
+  line(out, "contact_smoothing", m.contact_smoothing, "length over which contact sets in, m");
+  out << "\n";
+  write_toml(out, m.initial);
+  for (const Plane& plane : m.planes) write_toml(out, plane);
+  for (size_t i = 0; i < m.fixed.size(); ++i) write_toml(out, m.fixed[i], vertices_file(i));
+  return std::move(out).str();
+}
+
+void write_volume(const fs::path& path, const ModelVolume& volume) {
+  VtuGrid grid;
+  grid.points = volume.nodes;
+  for (const auto& cell : volume.cells)
+    for (const int corner : vtk_hexahedron(cell)) grid.connectivity.push_back(corner);
+  grid.cell_data = {
+      {modulus_field, 1, volume.youngs_modulus}, {ratio_field, 1, volume.poisson_ratio}, {fill_field, 1, volume.fill}};
+  write_vtu(path, grid);
+}
+
+void write_vertices(const fs::path& folder, const Model& model) {
+  for (size_t i = 0; i < model.fixed.size(); ++i)
+    if (const auto* vertices = std::get_if<RegionVertices>(&model.fixed[i].region))
+      write_file(folder / vertices_file(i), fmt::format("{}\n", fmt::join(vertices->indices, "\n")));
+}
+
+// ---- reading
+
+class Reader {
+ public:
+  Reader(const fs::path& folder, TomlContext& context) : folder_(folder), context_(context) {}
+
+  Model read(const toml::table& table) {
+    TomlTable root(table, "", context_);
+    if (const auto format = root.required<std::string>("format"); format && *format != "model/1")
+      context_.complain("format", "the format \"" + *format + "\"", "\"model/1\"",
+                        "use a program that knows this format");
+    model_.name = root.required<std::string>("name").value_or("");
+    for (const auto& [name, read_part] : {std::pair{"object", &Reader::read_object},
+                                          {"material", &Reader::read_material},
+                                          {"world", &Reader::read_world},
+                                          {"simulation", &Reader::read_simulation}})
+      read_table(root, name, read_part);
+    if (root.has("timing")) read_table(root, "timing", &Reader::read_timing);
+    if (auto initial = root.table("initial")) model_.initial = read_initial(*initial);
+    for (TomlTable& block : root.blocks("plane")) model_.planes.push_back(read_plane(block));
+    for (TomlTable& block : root.blocks("fixed")) model_.fixed.push_back(read_fixed(block, folder_));
+    root.finish();
+    return std::move(model_);
+  }
+
+ private:
+  void read_table(TomlTable& root, const std::string& name, void (Reader::*read_part)(TomlTable&)) {
+    if (auto table = root.table(name)) {
+      (this->*read_part)(*table);
+      table->finish();
+    } else if (!root.has(name)) {
+      context_.complain(name, "no table [" + name + "]", "[" + name + "]", "save the model again");
+    }
+  }
+
+  // Reads another file of the model; its problems join the others.
+  template <class Read>
+  void with_file(const fs::path& path, const Read& read) {
+    if (path.empty()) return;
+    try {
+      read(path);
+    } catch (const InputError& error) {
+      context_.problems.insert(context_.problems.end(), error.problems().begin(), error.problems().end());
+    }
+  }
+
+  void read_object(TomlTable& object) {
+    with_file(read_path(object, "surface", folder_), [&](const fs::path& path) { model_.surface = read_mesh(path); });
+    if (object.has("volume_mesh"))
+      with_file(read_path(object, "volume_mesh", folder_), [&](const fs::path& path) { read_volume(path); });
+    model_.mass = read_number(object, "mass", {.low = 0.0, .low_allowed = false, .meaning = "the mass in kilograms"});
+    model_.density =
+        read_number(object, "density", {.low = 0.0, .low_allowed = false, .meaning = "the density in kg/m^3"});
+  }
+
+  void read_material(TomlTable& material) {
+    model_.youngs_modulus = read_number(material, "youngs_modulus",
+                                        {.low = 0.0, .low_allowed = false, .meaning = "Young's modulus in pascals"});
+    model_.poisson_ratio = read_number(
+        material, "poisson_ratio",
+        {.low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"});
+    model_.mass_damping = read_number(material, "mass_damping", {.low = 0.0, .meaning = "Rayleigh's, in 1/s"}, 0.0);
+    model_.stiffness_damping =
+        read_number(material, "stiffness_damping", {.low = 0.0, .meaning = "Rayleigh's, in s"}, 0.0);
+  }
+
+  void read_world(TomlTable& world) { model_.gravity = world.optional<Vector3>("gravity"); }
+
+  void read_timing(TomlTable& timing) {
+    model_.frame_rate =
+        read_number(timing, "frame_rate", {.low = 0.0, .low_allowed = false, .meaning = "frames a second"});
+    model_.frames = read_count(timing, "frame_count", 1, 10'000'000);
+    model_.start_frame = read_count(timing, "start_frame", 0, std::max(0, model_.frames - 1), 0);
+  }
+
+  void read_simulation(TomlTable& simulation) {
+    model_.cell_size = read_number(simulation, "cell_size",
+                                   {.low = 0.0, .low_allowed = false, .meaning = "the cells' edge in metres"});
+    model_.grid_origin = simulation.required<Vector3>("grid_origin").value_or(Vector3::Zero());
+    model_.substeps = read_count(simulation, "substeps", 1, 100'000, 1);
+    model_.theta = read_number(simulation, "newmark_theta",
+                               {.low = 0.5, .high = 1.0, .meaning = "0.5 does not damp by itself"}, 0.5);
+    model_.contact_stiffness = read_number(simulation, "contact_stiffness", {.low = 0.0, .meaning = "in Pa/m"}, 0.0);
+    model_.contact_smoothing = read_number(simulation, "contact_smoothing", {.low = 0.0, .meaning = "in metres"}, 0.0);
+  }
+
+  static std::vector<double> field(const fs::path& path, const VtuGrid& grid, const char* name) {
+    const VtuArray* array = grid.find_cell_data(name);
+    if (!array || array->components != 1)
+      throw InputError(
+          {{path}, std::string("no cell field \"") + name + "\"", "one number a cell", "save the model again"});
+    return array->values;
+  }
+
+  void read_volume(const fs::path& path) {
+    const VtuGrid grid = read_vtu(path);
+    if (grid.kind != VtuCell::Hexahedron)
+      throw InputError({{path}, "cells that are no hexahedra", "hexahedra", "save the model again"});
+    ModelVolume& volume = model_.volume;
+    volume.nodes = grid.points;
+    for (int i = 0; i < grid.cell_count(); ++i) {
+      std::array<int, 8> cell;
+      std::copy_n(grid.connectivity.begin() + 8 * i, 8, cell.begin());
+      volume.cells.push_back(vtk_hexahedron(cell));
+    }
+    volume.youngs_modulus = field(path, grid, modulus_field);
+    volume.poisson_ratio = field(path, grid, ratio_field);
+    volume.fill = field(path, grid, fill_field);
+  }
+
+  fs::path folder_;
+  TomlContext& context_;
+  Model model_;
+};
+
+}  // namespace
+
+void save_model(const fs::path& folder, const Model& model) {
+  if (!model.volume.cells.empty()) write_volume(folder / "model.vtu", model.volume);
+  write_mesh(folder / "surface.ply", model.surface);
+  write_vertices(folder, model);
+  write_file(folder / "model.toml", model_toml(model));
+}
+
+Model load_model(const fs::path& path) {
+  const toml::table table = parse_toml(read_file(path), path);
+  TomlContext context{TomlPlaces(path), {}, {}};
+  Model model = Reader(fs::absolute(path).parent_path(), context).read(table);
+  throw_problems(context);
+  return model;
+}
+
+}  // namespace pliant

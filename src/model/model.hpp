@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/capture.hpp"
+#include "geometry/triangle_mesh.hpp"
+
+namespace pliant {
+
+/// The volume mesh of a model, with its material.
+struct ModelVolume {
+  Points nodes;                           ///< [m], n x 3, reference shape
+  std::vector<std::array<int, 8>> cells;  ///< hexahedra, corners in the order i + 2 j + 4 k
+  std::vector<double> youngs_modulus;     ///< [Pa], one a cell
+  std::vector<double> poisson_ratio;      ///< one a cell
+  std::vector<double> fill;               ///< part of the cell that the object fills, one a cell
+};
+
+/// A fitted object, ready to be simulated. SI units, the capture's world frame.
+struct Model {
+  std::string name;
+  TriangleMesh surface;  ///< free of load [m]
+
+  double youngs_modulus = 0.0;     ///< [Pa] > 0; with fields: the volume-weighted mean
+  double poisson_ratio = 0.0;      ///< (-1, 0.5)
+  double mass_damping = 0.0;       ///< [1/s] >= 0
+  double stiffness_damping = 0.0;  ///< [s] >= 0
+  double density = 0.0;            ///< [kg/m^3] > 0
+  double mass = 0.0;               ///< [kg] > 0
+
+  std::optional<Vector3> gravity;  ///< [m/s^2]
+  std::vector<Plane> planes;
+  std::vector<FixedRegion> fixed;
+  Initial initial;
+
+  int frames = 0;           ///< of the recording; 0: static
+  double frame_rate = 0.0;  ///< [Hz]; 0: static
+  int start_frame = 0;
+
+  double cell_size = 0.0;                 ///< of the hexahedral grid [m] > 0
+  Vector3 grid_origin = Vector3::Zero();  ///< lattice point (0, 0, 0) [m]
+  int substeps = 1;                       ///< time steps a frame, >= 1
+  double theta = 0.5;                     ///< weight of a time step's end [0.5, 1]
+  double contact_stiffness = 0.0;         ///< pressure by penetration [Pa/m] >= 0
+  double contact_smoothing = 0.0;         ///< length over which contact sets in [m] >= 0
+
+  ModelVolume volume;  ///< may be empty: then no `model.vtu` is written
+};
+
+/// Writes `model.toml` (with comments and units), `surface.ply` and `model.vtu` into a folder.
+/// Throws std::invalid_argument where a field does not have one value a cell, InputError where a file cannot be
+/// written.
+void save_model(const std::filesystem::path& folder, const Model& model);
+
+/// Reads a model by the path of its `model.toml`, strictly. Throws InputError with every problem found, with file, line
+/// and column: unknown keys (and the nearest known one), missing files, numbers that are not finite or out of range,
+/// a volume mesh without its fields.
+Model load_model(const std::filesystem::path& path);
+
+}  // namespace pliant

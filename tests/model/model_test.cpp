@@ -1,0 +1,167 @@
+#include "model/model.hpp"
+
+#include "geometry/primitives.hpp"
+#include "input_errors.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using test::complaint_of;
+using test::TemporaryFolder;
+using testing::HasSubstr;
+
+Model full_model() {
+  Model m;
+  m.name = "a \"soft\" ring \\ with\ttab";
+  m.surface = make_torus(0.15, 0.06, 12, 8);
+  m.youngs_modulus = 590.1234567890123, m.poisson_ratio = 1.0 / 3.0, m.mass_damping = 0.24, m.stiffness_damping = 0.027;
+  m.density = 95.0, m.mass = 0.456;
+  m.gravity = Vector3(0.1, -9.81, 1e-17);
+  m.planes = {{{0, 0.1, 0}, Vector3(0.6, 0.8, 0), false}, {}};
+  m.fixed = {{RegionBox{{-1, -1, -1}, {0.01, 1, 1}}, std::nullopt},
+             {RegionSphere{{0, 0, 1}, 0.02},
+              RigidMotion{Eigen::AngleAxisd(0.3, Vector3::UnitX()).toRotationMatrix(), {1, 2, 3}}},
+             {RegionHalfSpace{{0, 0, 0}, {1, 0, 0}}, std::nullopt},
+             {RegionVertices{{3, 1, 4}}, std::nullopt}};
+  m.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true};
+  m.frames = 80, m.frame_rate = 60.0, m.start_frame = 4;
+  m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
+  m.substeps = 4, m.theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;
+  m.volume.nodes = Points::Random(12, 3);
+  m.volume.cells = {{0, 1, 2, 3, 4, 5, 6, 7}, {4, 5, 6, 7, 8, 9, 10, 11}};
+  m.volume.youngs_modulus = {500, 680}, m.volume.poisson_ratio = {0.3, 0.4}, m.volume.fill = {1.0, 0.25};
+  return m;
+}
+
+TEST(Model, ComesBackAsItWasSaved) {
+  const TemporaryFolder folder;
+  const Model m = full_model();
+  save_model(folder.path(), m);
+  const Model read = load_model(folder / "model.toml");
+  EXPECT_EQ(read.name, m.name);
+  EXPECT_EQ(read.surface.triangles, m.surface.triangles);
+  for (size_t i = 0; i < m.surface.vertices.size(); ++i)
+    EXPECT_LT((read.surface.vertices[i] - m.surface.vertices[i]).norm(), 1e-7);
+  EXPECT_EQ(read.youngs_modulus, m.youngs_modulus);
+  EXPECT_EQ(read.poisson_ratio, m.poisson_ratio);
+  EXPECT_EQ(read.mass_damping, m.mass_damping);
+  EXPECT_EQ(read.stiffness_damping, m.stiffness_damping);
+  EXPECT_EQ(read.density, m.density);
+  EXPECT_EQ(read.mass, m.mass);
+  EXPECT_EQ(read.gravity, m.gravity);
+  EXPECT_EQ(read.frames, 80);
+  EXPECT_EQ(read.frame_rate, 60.0);
+  EXPECT_EQ(read.start_frame, 4);
+  EXPECT_EQ(read.cell_size, m.cell_size);
+  EXPECT_EQ(read.grid_origin, m.grid_origin);
+  EXPECT_EQ(read.substeps, 4);
+  EXPECT_EQ(read.theta, 0.55);
+  EXPECT_EQ(read.contact_stiffness, 1e6);
+  EXPECT_EQ(read.contact_smoothing, 1e-3);
+  EXPECT_EQ(read.volume.nodes, m.volume.nodes);
+  EXPECT_EQ(read.volume.cells, m.volume.cells);
+  EXPECT_EQ(read.volume.youngs_modulus, m.volume.youngs_modulus);
+  EXPECT_EQ(read.volume.poisson_ratio, m.volume.poisson_ratio);
+  EXPECT_EQ(read.volume.fill, m.volume.fill);
+}
+
+TEST(Model, PlanesRegionsAndVelocitiesComeBack) {
+  const TemporaryFolder folder;
+  const Model m = full_model();
+  save_model(folder.path(), m);
+  const Model read = load_model(folder / "model.toml");
+  ASSERT_EQ(read.planes.size(), 2u);
+  EXPECT_LT((read.planes[0].normal - m.planes[0].normal).norm(), 1e-15);
+  EXPECT_FALSE(read.planes[0].known);
+  EXPECT_TRUE(read.planes[1].known);
+  ASSERT_EQ(read.fixed.size(), 4u);
+  EXPECT_EQ(std::get<RegionBox>(read.fixed[0].region).max, Vector3(0.01, 1, 1));
+  EXPECT_EQ(std::get<RegionSphere>(read.fixed[1].region).radius, 0.02);
+  EXPECT_LT((read.fixed[1].displaced_to->rotation - m.fixed[1].displaced_to->rotation).norm(), 1e-14);
+  EXPECT_EQ(read.fixed[1].displaced_to->translation, Vector3(1, 2, 3));
+  EXPECT_EQ(std::get<RegionHalfSpace>(read.fixed[2].region).normal, Vector3(1, 0, 0));
+  EXPECT_EQ(std::get<RegionVertices>(read.fixed[3].region).indices, (std::vector<int>{3, 1, 4}));
+  EXPECT_EQ(read.initial.linear_velocity, m.initial.linear_velocity);
+  EXPECT_EQ(read.initial.angular_velocity, m.initial.angular_velocity);
+  EXPECT_FALSE(read.initial.known);
+  EXPECT_TRUE(read.initial.released);
+}
+
+TEST(Model, MayHaveNoVolumeNoGravityAndNoTiming) {
+  const TemporaryFolder folder;
+  Model m = full_model();
+  m.volume = {}, m.gravity.reset(), m.frames = 0;
+  save_model(folder.path(), m);
+  EXPECT_FALSE(std::filesystem::exists(folder / "model.vtu"));
+  const Model read = load_model(folder / "model.toml");
+  EXPECT_FALSE(read.gravity);
+  EXPECT_EQ(read.frames, 0);
+  EXPECT_TRUE(read.volume.cells.empty());
+}
+
+// What is said about a model.toml in which one text was replaced by another.
+class ModelFile : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+  void SetUp() override { save_model(folder.path(), full_model()); }
+  std::string after(const std::string& from, const std::string& to) {
+    std::string text = read_file(folder / "model.toml");
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from << "\n" << text;
+    const auto path = folder.write("changed.toml", text.replace(at, from.size(), to));
+    return complaint_of([&] { load_model(path); });
+  }
+};
+
+TEST_F(ModelFile, UnknownKeysNameTheNearestKnownOne) {
+  EXPECT_THAT(after("mass_damping ", "mass_damping = 0.1\nmass_dampnig "), HasSubstr("did you mean `mass_damping`"));
+  EXPECT_THAT(after("[material]", "[materiel]"), HasSubstr("no table [material]"));
+}
+
+TEST_F(ModelFile, PlacesAreNamedByLineAndColumn) {
+  const std::string complaint = after("youngs_modulus    = 590.1234567890123", "youngs_modulus    = -1.0");
+  EXPECT_THAT(complaint, testing::ContainsRegex("changed.toml:[0-9]+:1: `youngs_modulus` is -1; expected above 0"));
+}
+
+TEST_F(ModelFile, RefusesWhatIsOutOfRangeNotFiniteOrMissing) {
+  EXPECT_THAT(after("poisson_ratio     = 0.333", "poisson_ratio = 0.5 # 0.333"), HasSubstr("below 0.5"));
+  EXPECT_THAT(after("density           = 95.0", "density = nan"), HasSubstr("finite"));
+  EXPECT_THAT(after("mass              = 0.456", "mass = \"heavy\""), HasSubstr("a number"));
+  EXPECT_THAT(after("substeps          = 4", "substeps = 0"), HasSubstr("1 to 100000"));
+  EXPECT_THAT(after("start_frame       = 4", "start_frame = 80"), HasSubstr("0 to 79"));
+  EXPECT_THAT(after("cell_size         = 0.0243", ""), HasSubstr("no `cell_size`"));
+  EXPECT_THAT(after("model/1", "model/2"), HasSubstr("expected \"model/1\""));
+  EXPECT_THAT(after("surface.ply", "other.ply"), HasSubstr("other.ply"));
+  EXPECT_THAT(after("normal = [0.6, 0.8, 0.0]", "normal = [0, 0, 0]"), HasSubstr("without length"));
+  EXPECT_THAT(after("box = { min", "sphere = { centre = [0,0,0], radius = 1 }\nbox = { min"), HasSubstr("2 regions"));
+  EXPECT_THAT(after("radius = 0.02", "radius = 0"), HasSubstr("above 0"));
+  EXPECT_THAT(after("format =", "format ="), "");
+}
+
+TEST_F(ModelFile, AllProblemsAreToldAtOnce) {
+  std::string text = read_file(folder / "model.toml");
+  for (const std::string key : {"newmark_theta     = 0.55", "contact_smoothing = 0.001"})
+    text.replace(text.find(key), key.size(), key.substr(0, 19) + " -3.0");
+  const auto path = folder.write("changed.toml", text);
+  const std::string complaint = complaint_of([&] { load_model(path); });
+  EXPECT_THAT(complaint, HasSubstr("newmark_theta"));
+  EXPECT_THAT(complaint, HasSubstr("contact_smoothing"));
+}
+
+TEST_F(ModelFile, DamagedFilesBesideItAreNamed) {
+  folder.write("fixed_3.txt", "3\nfour\n");
+  EXPECT_THAT(complaint_of([&] { load_model(folder / "model.toml"); }), HasSubstr("fixed_3.txt:2:1"));
+  folder.write("fixed_3.txt", "3\n");
+  const std::string volume = read_file(folder / "model.vtu");
+  folder.write("model.vtu", volume.substr(0, volume.size() / 2));
+  EXPECT_THAT(complaint_of([&] { load_model(folder / "model.toml"); }), HasSubstr("model.vtu"));
+  std::string renamed = volume;
+  renamed.replace(renamed.find("\"fill\""), 6, "\"fall\"");
+  folder.write("model.vtu", renamed);
+  EXPECT_THAT(complaint_of([&] { load_model(folder / "model.toml"); }), HasSubstr("no cell field \"fill\""));
+  EXPECT_THAT(complaint_of([&] { load_model(folder / "nowhere.toml"); }), HasSubstr("nowhere.toml"));
+}
+
+}  // namespace
+}  // namespace pliant
