@@ -81,8 +81,8 @@ SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double 
 
   using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I>;
   const Adapter adapter(points, triangles);
-  const float wide = float(distance.size_.maxCoeff()) * 1.8f;
-  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, openvdb::math::Transform(), wide, wide);
+  const float band = float(margin / spacing) + 3.0f;
+  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, openvdb::math::Transform(), band, band);
   auto accessor = grid->getConstAccessor();
   bool encloses = false;
   for (int k = 0; k < distance.size_.z(); ++k)

@@ -1,0 +1,158 @@
+#include "estimation/parameter_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace pliant {
+
+namespace {
+
+/// Two unit vectors that span a plane.
+Eigen::Matrix<double, 3, 2> tangents_of(const Vector3& normal) {
+  Eigen::Matrix<double, 3, 2> t;
+  t.col(0) = normal.unitOrthogonal();
+  t.col(1) = normal.cross(t.col(0));
+  return t;
+}
+
+double logit_half(double nu) { return std::log(nu / (0.5 - nu)); }
+double logistic_half(double p) { return 0.5 / (1.0 + std::exp(-p)); }
+
+}  // namespace
+
+ParameterSet::ParameterSet(std::vector<Parameter> parameters, VectorX reference)
+    : parameters_(std::move(parameters)), reference_(std::move(reference)) {}
+
+const Parameter* ParameterSet::find(const std::string& name) const {
+  const auto it = std::find_if(parameters_.begin(), parameters_.end(), [&](const Parameter& p) { return p.name == name; });
+  return it == parameters_.end() ? nullptr : &*it;
+}
+
+void ParameterSet::set_estimated(const std::string& name, bool estimated) {
+  const Parameter* found = find(name);
+  if (!found) throw std::invalid_argument("there is no parameter " + name);
+  parameters_[std::size_t(found - parameters_.data())].estimated = estimated;
+}
+
+template <class Function>
+void ParameterSet::for_each_estimated(Function&& function) const {
+  int offset = 0;
+  for (const Parameter& parameter : parameters_) {
+    if (!parameter.estimated) continue;
+    function(parameter, offset);
+    offset += parameter.dimension();
+  }
+}
+
+int ParameterSet::dimension() const {
+  int sum = 0;
+  for_each_estimated([&](const Parameter& parameter, int) { sum += parameter.dimension(); });
+  return sum;
+}
+
+std::vector<std::string> ParameterSet::coordinate_names() const {
+  std::vector<std::string> names;
+  for_each_estimated([&](const Parameter& p, int) {
+    if (p.dimension() == 1)
+      names.push_back(p.name);
+    else if (p.transform == Transform::Vector)
+      for (const char* axis : {".x", ".y", ".z"}) names.push_back(p.name + axis);
+    else
+      for (const char* part : {".offset", ".tilt_1", ".tilt_2"}) names.push_back(p.name + part);
+  });
+  return names;
+}
+
+VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
+  VectorX p(dimension());
+  for_each_estimated([&](const Parameter& q, int at) {
+    const int i = q.theta_index;
+    switch (q.transform) {
+      case Transform::Logarithm: p[at] = std::log(theta[i]); break;
+      case Transform::LogitHalf: p[at] = logit_half(theta[i]); break;
+      case Transform::Vector: p.segment<3>(at) = theta.segment<3>(i) / q.scale; break;
+      case Transform::PlanePosition: {
+        const Vector3 n0 = reference_.segment<3>(i + 3), point = theta.segment<3>(i), n = theta.segment<3>(i + 3);
+        p[at] = n0.dot(point - Vector3(reference_.segment<3>(i))) / q.scale;
+        p.segment<2>(at + 1) = tangents_of(n0).transpose() * n / n.dot(n0);
+        break;
+      }
+    }
+  });
+  return p;
+}
+
+VectorX ParameterSet::to_theta(const VectorX& p) const {
+  VectorX theta = reference_;
+  for_each_estimated([&](const Parameter& q, int at) {
+    const int i = q.theta_index;
+    switch (q.transform) {
+      case Transform::Logarithm: theta[i] = std::exp(p[at]); break;
+      case Transform::LogitHalf: theta[i] = logistic_half(p[at]); break;
+      case Transform::Vector: theta.segment<3>(i) = p.segment<3>(at) * q.scale; break;
+      case Transform::PlanePosition: {
+        const Vector3 n0 = reference_.segment<3>(i + 3);
+        theta.segment<3>(i) += p[at] * q.scale * n0;
+        theta.segment<3>(i + 3) = (n0 + tangents_of(n0) * p.segment<2>(at + 1)).normalized();
+        break;
+      }
+    }
+  });
+  return theta;
+}
+
+MatrixX ParameterSet::jacobian(const VectorX& p) const {
+  MatrixX J = MatrixX::Zero(reference_.size(), dimension());
+  for_each_estimated([&](const Parameter& q, int at) {
+    const int i = q.theta_index;
+    switch (q.transform) {
+      case Transform::Logarithm: J(i, at) = std::exp(p[at]); break;
+      case Transform::LogitHalf: {
+        const double nu = logistic_half(p[at]);
+        J(i, at) = nu * (1.0 - 2.0 * nu);
+        break;
+      }
+      case Transform::Vector: J.block<3, 3>(i, at) = q.scale * Matrix3::Identity(); break;
+      case Transform::PlanePosition: {
+        const Vector3 n0 = reference_.segment<3>(i + 3);
+        const auto T = tangents_of(n0);
+        J.block<3, 1>(i, at) = q.scale * n0;
+        const Vector3 m = n0 + T * p.segment<2>(at + 1);
+        const Vector3 n = m.normalized();
+        J.block<3, 2>(i + 3, at + 1) = (Matrix3::Identity() - n * n.transpose()) * T / m.norm();
+        break;
+      }
+    }
+  });
+  return J;
+}
+
+VectorX ParameterSet::clamp(const VectorX& p) const {
+  VectorX out = p;
+  for_each_estimated([&](const Parameter& q, int at) {
+    if (q.transform == Transform::Logarithm)
+      out[at] = std::clamp(p[at], std::log(std::max(q.lower, 1e-300)), std::log(q.upper));
+    else if (q.transform == Transform::LogitHalf)
+      out[at] = std::clamp(p[at], logit_half(std::max(q.lower, 1e-4)), logit_half(std::min(q.upper, 0.4999)));
+  });
+  return out;
+}
+
+double ParameterSet::prior(const VectorX& p, VectorX* gradient, VectorX* curvature) const {
+  double sum = 0.0;
+  if (gradient) gradient->setZero(p.size());
+  if (curvature) curvature->setZero(p.size());
+  for_each_estimated([&](const Parameter& q, int at) {
+    if (!std::isfinite(q.prior_std)) return;
+    for (int d = 0; d < q.dimension(); ++d) {
+      const double t = (p[at + d] - q.prior_mean[d]) / q.prior_std;
+      sum += 0.5 * t * t;
+      if (gradient) (*gradient)[at + d] = t / q.prior_std;
+      if (curvature) (*curvature)[at + d] = 1.0 / (q.prior_std * q.prior_std);
+    }
+  });
+  return sum;
+}
+
+}  // namespace pliant

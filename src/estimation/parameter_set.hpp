@@ -1,0 +1,72 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "elasticity/parameters.hpp"
+
+namespace pliant {
+
+/// How a physical value becomes unconstrained numbers of order one.
+enum class Transform {
+  Logarithm,      ///< positive scalars: p = ln(value)
+  LogitHalf,      ///< Poisson's ratio in (0, 1/2): p = ln(nu / (1/2 - nu))
+  Vector,         ///< three numbers: p = value / scale
+  PlanePosition,  ///< three numbers: shift along the start's normal / scale, then two tilts of the normal [rad]
+};
+
+/// One estimable quantity of the scene, a scalar, a vector or a plane.
+struct Parameter {
+  std::string name;  ///< as in result.json
+  std::string unit;
+  Transform transform = Transform::Logarithm;
+  int theta_index = 0;    ///< of its first number; a plane's point, followed by its normal
+  double scale = 1.0;     ///< [unit] of an unconstrained step of one, for vectors and planes
+  double lower = 0.0;     ///< bounds of a scalar's value
+  double upper = std::numeric_limits<double>::infinity();
+  bool estimated = false;
+  /// Normal prior in the unconstrained numbers, around `prior_mean`; infinite: none.
+  double prior_std = std::numeric_limits<double>::infinity();
+  VectorX prior_mean = {};
+
+  int dimension() const { return transform == Transform::Logarithm || transform == Transform::LogitHalf ? 1 : 3; }
+};
+
+/// The estimated parameters of a scene as one unconstrained vector p, with its map to theta.
+class ParameterSet {
+ public:
+  ParameterSet() = default;
+  /// @param reference  theta of everything that is not estimated, and about which planes tilt
+  ParameterSet(std::vector<Parameter> parameters, VectorX reference);
+
+  const std::vector<Parameter>& parameters() const { return parameters_; }
+  const Parameter* find(const std::string& name) const;
+  /// Chooses whether a parameter is estimated. Throws std::invalid_argument for an unknown name.
+  void set_estimated(const std::string& name, bool estimated);
+  const VectorX& reference() const { return reference_; }
+  void set_reference(const VectorX& theta) { reference_ = theta; }
+
+  int dimension() const;
+  /// Name of each number of p: "youngs_modulus", "linear_velocity.x", "plane.tilt_1", ...
+  std::vector<std::string> coordinate_names() const;
+
+  [[nodiscard]] VectorX to_unconstrained(const VectorX& theta) const;
+  [[nodiscard]] VectorX to_theta(const VectorX& p) const;
+  /// d theta / d p, theta_size x dimension.
+  [[nodiscard]] MatrixX jacobian(const VectorX& p) const;
+  /// Moves p into the bounds.
+  [[nodiscard]] VectorX clamp(const VectorX& p) const;
+
+  /// Negative logarithm of the priors (up to a constant), its gradient and its curvature's diagonal.
+  double prior(const VectorX& p, VectorX* gradient = nullptr, VectorX* curvature = nullptr) const;
+
+ private:
+  template <class Function>
+  void for_each_estimated(Function&& function) const;
+
+  std::vector<Parameter> parameters_;
+  VectorX reference_;
+};
+
+}  // namespace pliant

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "geometry/hex_grid.hpp"
+
+namespace pliant {
+
+/// Carries the displacement of the body's nodes out into a band around it (Weiss 2020, section 4.3): g = E u, E linear,
+/// fixed and built once. Inside it is the nodes' own; outside it solves Laplace's equation on the lattice. Departing
+/// from the paper, the best affine motion of the body is continued exactly and only the rest diffuses: a body that has
+/// turned keeps true distances in its band.
+class DisplacementExtension {
+ public:
+  /// @param band  how far from the surface the extension reaches [m], > 0
+  DisplacementExtension(const HexGrid& grid, const SignedDistance& distance, double band);
+  ~DisplacementExtension();
+  DisplacementExtension(DisplacementExtension&&) noexcept;
+
+  const Points& rest_positions() const { return rest_; }                     ///< m x 3 [m], of the band's lattice nodes
+  const std::vector<std::array<int, 8>>& cells() const { return cells_; }    ///< of the band, inside ones included
+  const std::vector<Vector3>& cell_corners() const { return cell_corners_; } ///< rest position of local node 0
+  double cell_size() const { return cell_size_; }
+  double band() const { return band_; }
+
+  /// g = E u: n x 3 at the body's nodes to m x 3 at the band's.
+  [[nodiscard]] Points apply(const Points& u) const;
+  /// E^T g: m x 3 to n x 3.
+  [[nodiscard]] Points apply_transpose(const Points& g) const;
+
+ private:
+  struct Factor;
+  double cell_size_, band_;
+  int body_nodes_;
+  Points rest_;
+  std::vector<std::array<int, 8>> cells_;
+  std::vector<Vector3> cell_corners_;
+  std::vector<int> known_band_, known_body_;  // band nodes that are body nodes, and which
+  std::vector<int> free_band_;                // the others
+  std::unique_ptr<Factor> factor_;
+  MatrixX affine_fit_;                        // 4 x n: least-squares affine motion from u
+  MatrixX affine_rest_;                       // free x 4: what Laplace's equation misses of an affine motion
+};
+
+}  // namespace pliant

@@ -1,0 +1,121 @@
+#include "mismatch/surface_constraints.hpp"
+
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <cmath>
+
+namespace pliant {
+
+namespace {
+
+namespace bg = boost::geometry;
+using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
+using TreeBox = bg::model::box<TreePoint>;
+using Tree = bg::index::rtree<std::pair<TreeBox, int>, bg::index::quadratic<8>>;
+
+Tree cell_tree(const std::vector<std::array<int, 8>>& cells, const Points& lattice) {
+  std::vector<std::pair<TreeBox, int>> boxes;
+  boxes.reserve(cells.size());
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    Box box;
+    for (const int n : cells[c]) box.extend(lattice.row(n).transpose());
+    boxes.emplace_back(TreeBox({box.min.x(), box.min.y(), box.min.z()}, {box.max.x(), box.max.y(), box.max.z()}), int(c));
+  }
+  return Tree(boxes);  // packed
+}
+
+}  // namespace
+
+double RobustLoss::value(double r) const {
+  const double t = r / scale;
+  if (std::abs(t) >= 1.0) return outlier();
+  const double s = 1.0 - t * t;
+  return outlier() * (1.0 - s * s * s);
+}
+
+double RobustLoss::weight(double r) const {
+  const double t = r / scale;
+  if (std::abs(t) >= 1.0) return 0.0;
+  const double s = 1.0 - t * t;
+  return s * s;
+}
+
+SurfaceConstraints::SurfaceConstraints(std::shared_ptr<const Body> body,
+                                       std::shared_ptr<const SignedDistance> distance, double band)
+    : body_(std::move(body)), distance_(std::move(distance)), extension_(body_->grid, *distance_, band) {}
+
+/// Newton's iteration for the local coordinates of a point in a deformed cell (Weiss 2020, algorithm 1).
+bool SurfaceConstraints::pull_back(int cell, const Points& lattice, const Vector3& point, Vector3& local,
+                                   Matrix3& jacobian) const {
+  const auto& nodes = extension_.cells()[cell];
+  const double size = extension_.cell_size();
+  local.setConstant(0.5);
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    const auto N = shape_functions(local);
+    const auto G = shape_gradients(local);
+    Vector3 residual = -point;
+    jacobian.setZero();
+    for (int a = 0; a < 8; ++a) {
+      const Vector3 x = lattice.row(nodes[a]);
+      residual += N[a] * x;
+      jacobian.noalias() += x * G.row(a);
+    }
+    if (jacobian.determinant() < 1e-3 * size * size * size) return false;  // flat or inverted
+    const Vector3 step = jacobian.inverse() * residual;
+    if (residual.squaredNorm() < 1e-24 * size * size) break;
+    local -= step;
+    if ((local.array() - 0.5).abs().maxCoeff() > 2.0) return false;
+  }
+  return (local.array() > -1e-9).all() && (local.array() < 1.0 + 1e-9).all();
+}
+
+std::vector<PointMatch> SurfaceConstraints::match(std::span<const SurfaceObservation> points,
+                                                  const Points& positions) const {
+  const Points lattice = extension_.rest_positions() + extension_.apply(positions - body_->reference_positions());
+  const Tree tree = cell_tree(extension_.cells(), lattice);
+  std::vector<PointMatch> matches(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    PointMatch& best = matches[i];
+    const Vector3& p = points[i].position;
+    const TreePoint at(p.x(), p.y(), p.z());
+    for (auto it = tree.qbegin(bg::index::intersects(at)); it != tree.qend(); ++it) {
+      Vector3 local;
+      Matrix3 jacobian;
+      if (!pull_back(it->second, lattice, p, local, jacobian)) continue;
+      const auto sample = distance_->sample(extension_.cell_corners()[it->second] + extension_.cell_size() * local);
+      if (best.cell >= 0 && std::abs(sample.value) >= std::abs(best.distance)) continue;
+      best.cell = it->second;
+      best.distance = sample.value;
+      best.direction = -extension_.cell_size() * (jacobian.transpose().inverse() * sample.gradient);
+      best.stretch = best.direction.norm();
+      best.weights = shape_functions(local);
+    }
+  }
+  return matches;
+}
+
+VectorX SurfaceConstraints::tangent(const std::vector<PointMatch>& matches, const Points& d_positions) const {
+  const Points g = extension_.apply(d_positions);
+  VectorX change = VectorX::Zero(Eigen::Index(matches.size()));
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const PointMatch& m = matches[i];
+    if (m.cell < 0) continue;
+    Vector3 moved = Vector3::Zero();
+    for (int a = 0; a < 8; ++a) moved += m.weights[a] * g.row(extension_.cells()[m.cell][a]).transpose();
+    change[Eigen::Index(i)] = m.direction.dot(moved);
+  }
+  return change;
+}
+
+Points SurfaceConstraints::adjoint(const std::vector<PointMatch>& matches, const VectorX& distance_bar) const {
+  Points g_bar = Points::Zero(extension_.rest_positions().rows(), 3);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const PointMatch& m = matches[i];
+    if (m.cell < 0 || distance_bar[Eigen::Index(i)] == 0.0) continue;
+    for (int a = 0; a < 8; ++a)
+      g_bar.row(extension_.cells()[m.cell][a]) += distance_bar[Eigen::Index(i)] * m.weights[a] * m.direction.transpose();
+  }
+  return extension_.apply_transpose(g_bar);
+}
+
+}  // namespace pliant

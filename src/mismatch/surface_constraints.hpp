@@ -1,0 +1,65 @@
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "elasticity/body.hpp"
+#include "mismatch/displacement_extension.hpp"
+
+namespace pliant {
+
+/// A point that a sensor saw on the object, with its standard deviation.
+struct SurfaceObservation {
+  Vector3 position;  ///< [m], world
+  double noise;      ///< [m], > 0
+};
+
+/// One observed point pulled back through the motion to the shape at rest.
+struct PointMatch {
+  int cell = -1;                  ///< of the band; -1: in no deformed cell
+  double distance = 0.0;          ///< phi_0(x') [m], rest metric, negative inside
+  double stretch = 1.0;           ///< |d phi / dx|: distance / stretch is the distance to the deformed surface
+  Vector3 direction;              ///< d phi = direction . sum_a w_a dg_a
+  std::array<double, 8> weights;  ///< w_a, of the cell's nodes
+};
+
+/// Sparse surface constraints (Weiss 2020, section 4.2): observed points are pulled back through the deformed cells of
+/// the band and should lie on the surface at rest, where the signed distance vanishes.
+class SurfaceConstraints {
+ public:
+  /// @param band  [m] how far points may lie from the surface and still be matched
+  SurfaceConstraints(std::shared_ptr<const Body> body, std::shared_ptr<const SignedDistance> distance, double band);
+
+  const DisplacementExtension& extension() const { return extension_; }
+  double band() const { return extension_.band(); }
+
+  /// Matches points against node positions (n x 3). A point in several cells (self-intersection) takes the smallest
+  /// |distance|. Cells are found by a bounding-volume tree over the deformed cells. Safe to call from several threads.
+  [[nodiscard]] std::vector<PointMatch> match(std::span<const SurfaceObservation> points, const Points& positions) const;
+
+  /// Changes of the distances for a change of the node positions (n x 3); 0 for unmatched points.
+  [[nodiscard]] VectorX tangent(const std::vector<PointMatch>& matches, const Points& d_positions) const;
+
+  /// Cotangent of the node positions (n x 3) for one of the distances.
+  [[nodiscard]] Points adjoint(const std::vector<PointMatch>& matches, const VectorX& distance_bar) const;
+
+ private:
+  bool pull_back(int cell, const Points& lattice, const Vector3& point, Vector3& local, Matrix3& jacobian) const;
+
+  std::shared_ptr<const Body> body_;
+  std::shared_ptr<const SignedDistance> distance_;
+  DisplacementExtension extension_;
+};
+
+/// Half the robust square of a distance with an outlier scale c, Tukey's biweight: quadratic near zero, constant c^2/6
+/// beyond c, twice continuously differentiable in between. Points outside the band cost that constant, so that they can
+/// never lower the cost by leaving.
+struct RobustLoss {
+  double scale;                    ///< c [m]
+  double value(double r) const;    ///< [m^2]
+  double derivative(double r) const { return r * weight(r); }
+  double weight(double r) const;   ///< derivative / r
+  double outlier() const { return scale * scale / 6.0; }
+};
+
+}  // namespace pliant
