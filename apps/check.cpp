@@ -155,9 +155,13 @@ void describe_scene(const Segmentation& scene, const std::string& camera, Json& 
                              {"point", vector_json(plane.point)},
                              {"normal", vector_json(plane.normal)}});
   }
-  for (const SceneObject& object : scene.objects) {
-    say("",
-        formatted("an object of %d pixels, %.3g x %.3g x %.3g m seen%s", object.pixels, object.extent.x(),
+  constexpr std::size_t most_shown = 6;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const SceneObject& object = scene.objects[i];
+    if (i == most_shown) say("", formatted("and %zu smaller ones", scene.objects.size() - i));
+    if (i < most_shown)
+      say("", formatted(
+                  "an object of %d pixels, %.3g x %.3g x %.3g m seen%s", object.pixels, object.extent.x(),
                   object.extent.y(), object.extent.z(),
                   object.stands_on_plane ? formatted(", %.3g m high on the first plane", object.height).c_str() : ""));
     own["objects"].push_back({{"pixels", object.pixels},
@@ -167,6 +171,18 @@ void describe_scene(const Segmentation& scene, const std::string& camera, Json& 
                               {"height", object.height}});
   }
   json["scenes"].push_back(own);
+}
+
+void describe_cloud(const CloudScene& scene, Json& json) {
+  const Vector3 extent = scene.box.extent();
+  say("cloud", formatted("%d points, %.3g x %.3g x %.3g m", scene.points, extent.x(), extent.y(), extent.z()));
+  Json own = {{"points", scene.points}, {"extent", vector_json(extent)}};
+  if (scene.plane) {
+    const double share = double(scene.plane->inliers) / scene.points;
+    say("", formatted("%.0f %% of them on a plane, %.2f mm rms", 100.0 * share, 1e3 * scene.plane->rms));
+    own["plane"] = {{"share", share}, {"rms", scene.plane->rms}};
+  }
+  json["clouds"].push_back(own);
 }
 
 void describe_prospects(const Prospects& prospects, Json& json) {
@@ -284,6 +300,7 @@ void check(const Arguments& arguments) {
   describe_observations(capture, seen, json);
   describe_planes(capture, seen, json);
   for (std::size_t i = 0; i < seen.scenes.size(); ++i) describe_scene(seen.scenes[i], capture.depth[i].name, json);
+  for (const CloudScene& scene : seen.clouds) describe_cloud(scene, json);
   if (!arguments.compare_masks.empty()) compare_with_masks(capture, arguments, json);
   describe_prospects(prospects(capture, seen), json);
   if (arguments.out.empty()) return;

@@ -77,6 +77,8 @@ struct FramePattern {
   std::filesystem::path operator()(int frame) const;
   /// Whether the pattern holds exactly one %d (with or without a width), so that frames have different paths.
   bool is_valid() const;
+  /// Whether it holds no percent sign: the name of one file, enough for a recording of one frame.
+  bool is_plain() const { return pattern.find('%') == std::string::npos; }
 };
 
 struct DepthCamera {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -75,6 +76,20 @@ std::optional<PlaneFit> refined(const PlaneFit& plane, std::span<const Vector3> 
   return result;
 }
 
+// How much less than their noise claims the points on a plane scatter: 1, or down to a third.
+double relative_scatter(const PlaneFit& plane, std::span<const Vector3> points, std::span<const float> noise,
+                        double reach) {
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (is_on(plane, points[i], noise[i], reach))
+      ratios.push_back(std::abs(plane.height(points[i])) / double(noise[i]));
+  if (ratios.empty()) return 1.0;
+  const auto middle = ratios.begin() + std::ptrdiff_t(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  constexpr double median_to_deviation = 1.4826;  // of a normal distribution
+  return std::clamp(median_to_deviation * *middle, 1.0 / 3.0, 1.0);
+}
+
 }  // namespace
 
 std::optional<PlaneFit> fit_plane(std::span<const Vector3> points, std::span<const float> noise,
@@ -83,7 +98,8 @@ std::optional<PlaneFit> fit_plane(std::span<const Vector3> points, std::span<con
   std::optional<PlaneFit> plane = best_hypothesis(points, noise, options);
   for (int i = 0, before = -1; plane && i < 20 && plane->inliers != before; ++i) {
     before = plane->inliers;
-    plane = refined(*plane, points, noise, options.reach);
+    const double reach = options.reach * relative_scatter(*plane, points, noise, options.reach);
+    plane = refined(*plane, points, noise, reach);
   }
   if (!plane || !is_allowed(plane->normal, options)) return std::nullopt;
   if (options.normal && plane->normal.dot(*options.normal) < 0) plane->normal = -plane->normal;

@@ -28,7 +28,8 @@ struct PlaneFitOptions {
 };
 
 /// The plane that most points lie on: random hypotheses (Fischler and Bolles 1981), then least squares weighted by
-/// 1 / noise^2 on the points it explains, repeated until these no longer change.
+/// 1 / noise^2 on the points it explains, repeated until these no longer change. Where the points scatter less than
+/// their noise claims, the reach shrinks with them: what lies flat on a table does not count as table.
 /// @param points  [m], n
 /// @param noise   standard deviation of each along the plane's normal [m], n
 /// @return        nothing for fewer than three points, or where all of them lie on a line

@@ -95,7 +95,7 @@ class Reader {
 
   FramePattern checked_pattern(TomlTable& table, const std::string& name, const std::optional<std::string>& text) {
     const FramePattern pattern{text.value_or("")};
-    if (text && !pattern.is_valid())
+    if (text && !pattern.is_valid() && !(pattern.is_plain() && capture_.frame_count() == 1))
       context_.reject(table.key_of(name), "the pattern \"" + *text + "\"", "one %06d where the frame's number stands",
                       "name the files \"000000.png\", \"000001.png\" and write \"%06d.png\"");
     if (text && fs::path(*text).is_absolute())

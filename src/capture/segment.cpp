@@ -18,6 +18,40 @@ constexpr double least_height = 0.015;  // [m] what is flatter is a stain, a she
 
 int plane_label(std::size_t plane) { return -2 - int(plane); }
 
+// Pixels connected with `seed` among those labelled `from`, up to `reach` pixels apart and without a jump in depth;
+// they get the label `value`.
+std::vector<int> grow(const DepthImage& depth, const DepthNoise& noise, int seed, Image<int>& label, int from,
+                      int value, int pixel_reach, double gap) {
+  std::vector<int> members{seed};
+  label.pixels[std::size_t(seed)] = value;
+  for (std::size_t next = 0; next < members.size(); ++next) {
+    const int u = members[next] % depth.width, v = members[next] / depth.width;
+    const double limit = std::max(gap, noise.jump(depth(u, v)));
+    for (int dv = -pixel_reach; dv <= pixel_reach; ++dv)
+      for (int du = -pixel_reach; du <= pixel_reach; ++du) {
+        if (!depth.contains(u + du, v + dv) || label(u + du, v + dv) != from) continue;
+        if (std::abs(depth(u + du, v + dv) - depth(u, v)) > limit) continue;
+        label(u + du, v + dv) = value;
+        members.push_back((v + dv) * depth.width + u + du);
+      }
+  }
+  return members;
+}
+
+// A plane is what is connected: islands of less than a twentieth of its pixels are given back.
+void keep_connected(const DepthImage& depth, const DepthNoise& noise, int own, Image<int>& label) {
+  constexpr int visiting = -60;
+  std::vector<std::vector<int>> parts;
+  std::size_t total = 0;
+  for (int p = 0; p < int(label.pixels.size()); ++p) {
+    if (label.pixels[std::size_t(p)] != own) continue;
+    parts.push_back(grow(depth, noise, p, label, own, visiting, 2, 0.0));
+    total += parts.back().size();
+  }
+  for (const auto& part : parts)
+    for (const int p : part) label.pixels[std::size_t(p)] = part.size() * 20 < total ? unlabelled : own;
+}
+
 // Removes large planes one after another; the readings on them get the plane's label.
 void find_planes(const DepthImage& depth, const PinholeCamera& camera, const DepthNoise& noise,
                  const SegmentOptions& options, Segmentation& result) {
@@ -29,27 +63,16 @@ void find_planes(const DepthImage& depth, const PinholeCamera& camera, const Dep
     auto plane = fit_plane(left.points, left.noise);
     if (!plane || plane->inliers < options.least_plane * double(readings)) return;
     if (plane->height(camera.camera_to_world.translation) < 0) plane->normal = -plane->normal;
+    const int own = plane_label(result.planes.size());
     for (std::size_t k = 0; k < left.points.size(); ++k)
-      if (std::abs(plane->height(left.points[k])) < reach * std::max(double(left.noise[k]), plane->rms))
-        label[std::size_t(left.pixel[k])] = plane_label(result.planes.size());
-    result.planes.push_back(*plane);
+      if (std::abs(plane->height(left.points[k])) < reach * double(left.noise[k]))
+        label[std::size_t(left.pixel[k])] = own;
+    keep_connected(depth, noise, own, result.label);
+    const DepthPoints kept = points_of(depth, camera, noise, [&](int p) { return label[std::size_t(p)] == own; });
+    PlaneFitOptions same_side;
+    same_side.normal = plane->normal;
+    result.planes.push_back(fit_plane(kept.points, kept.noise, same_side).value_or(*plane));
   }
-}
-
-// Pixels connected with `seed` through unlabelled pixels without a depth jump.
-std::vector<int> grow(const DepthImage& depth, const DepthNoise& noise, int seed, Image<int>& label, int value) {
-  std::vector<int> members{seed};
-  label.pixels[std::size_t(seed)] = value;
-  for (std::size_t next = 0; next < members.size(); ++next) {
-    const int u = members[next] % depth.width, v = members[next] / depth.width;
-    for (const auto& [du, dv] : {std::pair(1, 0), std::pair(-1, 0), std::pair(0, 1), std::pair(0, -1)}) {
-      if (!depth.contains(u + du, v + dv) || label(u + du, v + dv) != unlabelled) continue;
-      if (std::abs(depth(u + du, v + dv) - depth(u, v)) > noise.jump(depth(u, v))) continue;
-      label(u + du, v + dv) = value;
-      members.push_back((v + dv) * depth.width + u + du);
-    }
-  }
-  return members;
 }
 
 SceneObject describe(const std::vector<int>& members, const DepthImage& depth, const PinholeCamera& camera,
@@ -112,7 +135,7 @@ Segmentation segment(const DepthImage& depth, const PinholeCamera& camera, const
         result.label(u, v) = Segmentation::small;
   for (int p = 0; p < int(result.label.pixels.size()); ++p) {
     if (result.label.pixels[std::size_t(p)] != unlabelled) continue;
-    const auto members = grow(depth, noise, p, result.label, int(result.objects.size()));
+    const auto members = grow(depth, noise, p, result.label, unlabelled, int(result.objects.size()), 2, options.gap);
     if (int(members.size()) >= options.least_pixels)
       result.objects.push_back(describe(members, depth, camera, result.planes));
     else

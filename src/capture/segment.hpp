@@ -31,10 +31,12 @@ struct SegmentOptions {
   double least_plane = 0.15;  ///< share of the readings that a plane must explain
   int most_planes = 3;
   int least_pixels = 150;  ///< of an object
+  double gap = 0.08;       ///< [m] depth jump that one object may have, as between a chin and the belly behind it
 };
 
-/// Splits a depth image into large planes and connected objects: neighbours belong together where their depths differ
-/// by less than the noise allows.
+/// Splits a depth image into large planes and connected objects: pixels up to two apart belong together where their
+/// depths differ by less than `gap` and the noise allow. A plane ends where its pixels do: what merely crosses its
+/// extension elsewhere is not part of it.
 [[nodiscard]] Segmentation segment(const DepthImage& depth, const PinholeCamera& camera, const DepthNoise& noise,
                                    const SegmentOptions& options = {});
 

@@ -6,6 +6,7 @@
 
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
+#include "capture/point_cloud.hpp"
 
 namespace pliant {
 
@@ -146,6 +147,22 @@ std::vector<Segmentation> survey_scenes(const Capture& capture) {
   return scenes;
 }
 
+std::vector<CloudScene> survey_clouds(const Capture& capture) {
+  constexpr double least_share = 0.2;
+  std::vector<CloudScene> scenes;
+  if (capture.surface || capture.frame_count() == 0) return scenes;
+  for (const CloudSequence& cloud : capture.clouds) {
+    const auto points = read_points(capture.folder / cloud.points(0));
+    CloudScene& scene = scenes.emplace_back();
+    scene.points = int(points.size());
+    for (const Vector3& point : points) scene.box.extend(point);
+    const std::vector<float> noise(points.size(), float(cloud.noise.value_or(0.002)));
+    scene.plane = fit_plane(points, noise);
+    if (scene.plane && scene.plane->inliers < least_share * scene.points) scene.plane.reset();
+  }
+  return scenes;
+}
+
 std::string millimetres(double metres) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f mm", 1e3 * metres);
@@ -230,6 +247,7 @@ Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
   result.first_contact = first_contact(capture, frames, result.median_noise, result.planes);
   result.seen_share = seen_share(capture, frames, result.median_noise);
   result.scenes = survey_scenes(capture);
+  result.clouds = survey_clouds(capture);
   return result;
 }
 
@@ -239,8 +257,9 @@ Prospects prospects(const Capture& capture, const Survey& seen) {
     result.impossible.push_back(
         "Nothing can be fitted: there is no scan of the object at rest. Scan it all around and write `[object] "
         "surface`.");
-    if (capture.frame_count() > 0)
+    if (!seen.scenes.empty())
       result.possible.push_back("The seen side of the scene can be split into planes and objects.");
+    if (!seen.clouds.empty()) result.possible.push_back("The points can be looked at and measured.");
     add_scale(capture, result);
     std::erase_if(result.possible, [](const std::string& text) { return text.starts_with("Pascals"); });
     return result;

@@ -25,6 +25,13 @@ struct PlaneSurvey {
   double distance = 0.0;  ///< from the declared point to the seen plane [m]
 };
 
+/// A point cloud of which nothing is known: its size, and the plane that most of it lies on.
+struct CloudScene {
+  int points = 0;
+  Box box;
+  std::optional<PlaneFit> plane;  ///< where it explains a fifth of the points at least
+};
+
 /// What a recording shows, in figures.
 struct Survey {
   PointCounts points;
@@ -36,6 +43,7 @@ struct Survey {
       seen_share;  ///< of the rest surface's vertices, at the start; nothing where it is not in that pose
   std::vector<PlaneSurvey> planes;   ///< of each Capture::planes
   std::vector<Segmentation> scenes;  ///< of each camera's first frame, where there is no rest surface
+  std::vector<CloudScene> clouds;    ///< of each cloud sequence's first frame, where there is no rest surface
 };
 
 Survey survey(const Capture& capture, std::span<const ObservedFrame> frames);
