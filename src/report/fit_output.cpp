@@ -1,0 +1,369 @@
+#include "report/fit_output.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "base/files.hpp"
+#include "elasticity/corotated.hpp"
+#include "model/vtu.hpp"
+#include "report/picture.hpp"
+#include "report/report.hpp"
+
+namespace pliant {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+ParameterValue value_of(const Parameter& p, const VectorX& theta) {
+  if (p.transform == Transform::PlanePosition)
+    return PlaneValue{theta.segment<3>(p.theta_index), theta.segment<3>(p.theta_index + 3)};
+  if (p.transform == Transform::Vector) return Vector3(theta.segment<3>(p.theta_index));
+  return theta[p.theta_index];
+}
+
+/// Standard deviation of a value from that of its unconstrained numbers, by the transform's derivative.
+ParameterValue std_of(const Parameter& p, const VectorX& std, const MatrixX& jacobian, int at) {
+  if (p.dimension() == 1) return std::abs(jacobian(p.theta_index, at)) * std[at];
+  const MatrixX spread = jacobian.middleCols(at, 3) * std.segment<3>(at).asDiagonal();
+  const auto row_norm = [&](int row) { return Vector3(spread.row(row).norm(), spread.row(row + 1).norm(), spread.row(row + 2).norm()); };
+  if (p.transform == Transform::Vector) return row_norm(p.theta_index);
+  return PlaneValue{row_norm(p.theta_index), row_norm(p.theta_index + 3)};
+}
+
+std::map<std::string, double> scalars_of(const ParameterSet& parameters, const VectorX& theta) {
+  std::map<std::string, double> values;
+  for (const Parameter& p : parameters.parameters()) {
+    if (p.dimension() == 1) {
+      values[p.name] = theta[p.theta_index];
+    } else {
+      for (int d = 0; d < 3; ++d) values[p.name + "." + "xyz"[d]] = theta[p.theta_index + d];
+      if (p.transform == Transform::PlanePosition)
+        for (int d = 0; d < 3; ++d) values[p.name + ".normal." + "xyz"[d]] = theta[p.theta_index + 3 + d];
+    }
+  }
+  return values;
+}
+
+void add_correlations(Result& result, const FitOutcome& outcome) {
+  if (outcome.correlation.size() == 0) return;
+  const auto names = outcome.parameters.coordinate_names();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      result.identifiability.push_back({{names[j], names[i]}, outcome.correlation(Eigen::Index(i), Eigen::Index(j))});
+  std::stable_sort(result.identifiability.begin(), result.identifiability.end(),
+                   [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
+}
+
+ConvergenceHistory history_of(const FitOutcome& outcome) {
+  ConvergenceHistory history;
+  std::vector<const Parameter*> shown;
+  for (const Parameter& p : outcome.parameters.parameters())
+    if (p.dimension() == 1 && (p.estimated || p.name == "youngs_modulus")) shown.push_back(&p);
+  for (const Parameter* p : shown) history.parameters.push_back(p->name), history.units.push_back(p->unit);
+  for (const FitEvent& e : outcome.history) {
+    ConvergenceRow row{e.start, e.iteration, e.stage, e.cost, e.damping, {}};
+    for (const Parameter* p : shown) row.parameters.push_back(e.theta[p->theta_index]);
+    history.rows.push_back(std::move(row));
+  }
+  std::stable_sort(history.rows.begin(), history.rows.end(), [](const auto& a, const auto& b) { return a.start < b.start; });
+  return history;
+}
+
+std::vector<double> six(const Matrix3& m) { return {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(1, 2), m(0, 2)}; }
+
+VtuGrid frame_grid(const Body& body, const VectorX& parameters, const State& state, CorotatedElasticity& elasticity) {
+  VtuGrid grid;
+  grid.points = state.x;
+  VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}}, stress{"stress [Pa]", 6, {}};
+  const Points u = state.x - body.reference_positions();
+  displacement.values.assign(u.data(), u.data() + u.size());
+  velocity.values.assign(state.v.data(), state.v.data() + state.v.size());
+  elasticity.linearise(state.x);
+  const UnitLame c = unit_lame(parameters[theta::poissons_ratio]);
+  for (int e = 0; e < body.grid.cell_count(); ++e) {
+    const auto cell = vtk_hexahedron(body.grid.cells[e]);
+    grid.connectivity.insert(grid.connectivity.end(), cell.begin(), cell.end());
+    const Polar& polar = elasticity.rotation(e);
+    const Matrix3 in_body = polar.S - Matrix3::Identity();
+    const double E = parameters[theta::youngs_modulus] * body.relative_modulus[e];
+    const Matrix3 in_world = polar.R * in_body * polar.R.transpose();
+    const Matrix3 sigma = E * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world);
+    for (const double v : six(in_world)) strain.values.push_back(v);
+    for (const double v : six(sigma)) stress.values.push_back(v);
+  }
+  grid.point_data = {std::move(displacement), std::move(velocity)};
+  grid.cell_data = {std::move(strain), std::move(stress)};
+  return grid;
+}
+
+/// A few frames that tell the story: the first, the last, and evenly between.
+std::vector<int> told_frames(const std::vector<FrameFit>& frames, int count) {
+  std::vector<int> chosen;
+  for (int i = 0; i < count && !frames.empty(); ++i) {
+    const int frame = frames[std::size_t(i) * (frames.size() - 1) / std::size_t(std::max(1, count - 1))].frame;
+    if (chosen.empty() || chosen.back() != frame) chosen.push_back(frame);
+  }
+  return chosen;
+}
+
+struct FramePicture {
+  int frame;
+  PictureScene scene;
+};
+
+std::vector<FramePicture> picture_scenes(const Capture& capture, const std::vector<ObservedFrame>& observed,
+                                         const FitOutcome& outcome) {
+  const Discretisation& d = outcome.discretisation;
+  const std::vector<int> told = told_frames(outcome.evaluation.frames, 6);
+  const Embedding embedding(d.body->grid, capture.surface->vertices);
+  std::vector<Plane> planes = capture.planes;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    planes[i].point = outcome.theta.segment<3>(theta::plane_point(int(i)));
+    planes[i].normal = outcome.theta.segment<3>(theta::plane_normal(int(i)));
+  }
+  std::vector<FramePicture> pictures;
+  Simulation simulation(d.body, d.simulation);
+  simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
+    if (std::find(told.begin(), told.end(), frame) == told.end()) return true;
+    FramePicture picture{frame, {}};
+    picture.scene.surface = embedding.positions(state.x);
+    picture.scene.triangles = capture.surface->triangles;
+    picture.scene.planes = planes;
+    for (const ObservedFrame& seen : observed) {
+      if (seen.frame != frame + capture.start_frame) continue;
+      std::vector<SurfaceObservation> points;
+      for (const Vector3& p : seen.points) points.push_back({p, 1.0});
+      const auto matches = d.constraints->match(points, state.x);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        if (matches[i].cell < 0) continue;
+        picture.scene.points.push_back(points[i].position);
+        picture.scene.residuals.push_back(matches[i].distance / matches[i].stretch);
+      }
+    }
+    pictures.push_back(std::move(picture));
+    return frame < told.back();
+  });
+  return pictures;
+}
+
+void add_pictures(ReportData& report, const Capture& capture, const std::vector<ObservedFrame>& observed,
+                  const FitOutcome& outcome) {
+  const auto scenes = picture_scenes(capture, observed, outcome);
+  if (scenes.empty()) return;
+  Box box;
+  std::vector<double> residuals;
+  for (const FramePicture& p : scenes) {
+    for (Eigen::Index v = 0; v < p.scene.surface.rows(); ++v) box.extend(p.scene.surface.row(v).transpose());
+    residuals.insert(residuals.end(), p.scene.residuals.begin(), p.scene.residuals.end());
+  }
+  PictureOptions options;
+  options.residual_range = report.residual_range = residual_range(residuals);
+  constexpr int width = 480, height = 400;
+  const PinholeCamera camera = capture.depth.empty() ? view_of(box, capture.up, width, height)
+                                                     : framed(capture.depth.front().camera, box, width, height);
+  for (const FramePicture& p : scenes) {
+    char caption[120];
+    const int frame = p.frame + capture.start_frame;
+    std::snprintf(caption, sizeof caption, "Frame %d, %.3f s after the start", frame, capture.times[std::size_t(frame)] - capture.times[std::size_t(capture.start_frame)]);
+    report.pictures.push_back({encode_png(draw(p.scene, camera, options)), caption});
+  }
+}
+
+VectorX model_theta(const Model& model, const Vector3& gravity) {
+  VectorX theta = VectorX::Zero(theta::size(int(model.planes.size())));
+  theta[theta::youngs_modulus] = model.youngs_modulus;
+  theta[theta::poissons_ratio] = model.poisson_ratio;
+  theta[theta::mass_damping] = model.mass_damping;
+  theta[theta::stiffness_damping] = model.stiffness_damping;
+  theta[theta::density] = model.density;
+  theta.segment<3>(theta::gravity) = gravity;
+  theta.segment<3>(theta::linear_velocity) = model.initial.linear_velocity;
+  theta.segment<3>(theta::angular_velocity) = model.initial.angular_velocity;
+  for (int i = 0; i < int(model.planes.size()); ++i) {
+    theta.segment<3>(theta::plane_point(i)) = model.planes[i].point;
+    theta.segment<3>(theta::plane_normal(i)) = model.planes[i].normal;
+  }
+  return theta;
+}
+
+/// A model as the capture that it would have been fitted to: the same scene builder serves both.
+Capture as_capture(const Model& model) {
+  Capture capture;
+  capture.name = model.name;
+  capture.surface = model.surface;
+  capture.mass = model.mass;
+  capture.gravity = model.gravity;
+  capture.planes = model.planes;
+  capture.fixed = model.fixed;
+  capture.initial = model.initial;
+  for (int f = 0; f < model.frames; ++f) capture.times.push_back(f / model.frame_rate);
+  capture.start_frame = model.start_frame;
+  return capture;
+}
+
+}  // namespace
+
+SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
+  SurfaceErrors errors;
+  double max = 0.0;
+  for (const FrameFit& f : evaluation.frames) {
+    errors.error.points += f.points;
+    max = std::max(max, f.max_distance);
+    if (f.points > 0)
+      errors.frames.push_back({f.frame, std::sqrt(f.sum_squares / f.points), std::sqrt(f.sum_noise_squares / f.points), f.points});
+  }
+  errors.error.surface_rms = evaluation.surface_rms();
+  errors.error.surface_max = max;
+  return errors;
+}
+
+Result make_result(const Capture& capture, const FitOutcome& outcome, const RunFacts& facts) {
+  Result result;
+  result.software.version = facts.version;
+  result.software.commit = facts.commit;
+  result.capture = {capture.name, capture.sha256};
+  const bool has_std = outcome.std.size() > 0;
+  const MatrixX jacobian = has_std ? outcome.parameters.jacobian(outcome.parameters.to_unconstrained(outcome.theta)) : MatrixX();
+  int at = 0;
+  for (const Parameter& p : outcome.parameters.parameters()) {
+    ParameterResult r{p.name, value_of(p, outcome.theta), p.unit, {}, {}, p.estimated};
+    if (p.estimated) {
+      r.start = value_of(p, outcome.start_theta);
+      if (has_std) r.std = std_of(p, outcome.std, jacobian, at);
+      at += p.dimension();
+    }
+    result.parameters.push_back(std::move(r));
+  }
+  result.error = surface_errors(outcome.evaluation).error;
+  result.cost = {outcome.start_cost, outcome.final_cost};
+  add_correlations(result, outcome);
+  for (const FitStart& s : outcome.starts) {
+    StartResult r{scalars_of(outcome.parameters, s.start), scalars_of(outcome.parameters, s.final), {}, s.iterations, s.converged, s.reason};
+    if (std::isfinite(s.cost)) r.cost = s.cost;
+    result.starts.push_back(std::move(r));
+  }
+  result.time.wall_seconds = facts.wall_seconds;
+  result.time.forward_steps = outcome.forward_steps;
+  if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
+  if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
+  result.notes = outcome.notes;
+  return result;
+}
+
+Model make_model(const Capture& capture, const FitOutcome& outcome) {
+  const Discretisation& d = outcome.discretisation;
+  const VectorX& t = outcome.theta;
+  Model model;
+  model.name = capture.name;
+  model.surface = *capture.surface;
+  model.youngs_modulus = t[theta::youngs_modulus];
+  model.poisson_ratio = t[theta::poissons_ratio];
+  model.mass_damping = t[theta::mass_damping];
+  model.stiffness_damping = t[theta::stiffness_damping];
+  model.density = t[theta::density];
+  model.mass = t[theta::density] * enclosed_volume(*capture.surface);
+  model.gravity = theta::vector_at(t, theta::gravity);
+  model.planes = capture.planes;
+  for (std::size_t i = 0; i < model.planes.size(); ++i) {
+    model.planes[i].point = t.segment<3>(theta::plane_point(int(i)));
+    model.planes[i].normal = t.segment<3>(theta::plane_normal(int(i)));
+    model.planes[i].known = true;
+  }
+  model.fixed = capture.fixed;
+  model.initial = capture.initial;
+  model.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
+  model.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);
+  model.initial.known = true;
+  model.frames = capture.frame_count();
+  model.frame_rate = (capture.frame_count() - 1) / (capture.times.back() - capture.times.front());
+  model.start_frame = capture.start_frame;
+  model.cell_size = d.body->grid.cell_size;
+  model.grid_origin = d.body->grid.origin;
+  model.substeps = std::max(1, int(std::ceil(1.0 / (model.frame_rate * d.simulation.max_dt) - 1e-9)));
+  model.theta = d.simulation.newmark_theta;
+  model.contact_stiffness = d.simulation.contact.stiffness;
+  model.contact_smoothing = d.simulation.contact.smoothing;
+  model.volume.nodes = d.body->reference_positions();
+  model.volume.cells = d.body->grid.cells;
+  for (int e = 0; e < d.body->grid.cell_count(); ++e) {
+    model.volume.youngs_modulus.push_back(model.youngs_modulus * d.body->relative_modulus[e]);
+    model.volume.poisson_ratio.push_back(model.poisson_ratio);
+    model.volume.fill.push_back(d.body->grid.quadrature[e].volume_fraction());
+  }
+  return model;
+}
+
+ModelScene make_scene(const Model& model) {
+  const CaptureScene scene = make_scene(model, as_capture(model));
+  SimulationOptions options = scene.discretisation.simulation;
+  options.max_dt = 1.0 / (model.frame_rate * model.substeps) * (1.0 + 1e-9);
+  return {scene.discretisation.distance, scene.discretisation.body, options, scene.theta};
+}
+
+CaptureScene make_scene(const Model& model, const Capture& capture) {
+  CaptureScene scene;
+  const auto distance = capture_distance(capture, 0.15);
+  Model situated = model;
+  situated.planes = capture.planes;
+  situated.initial = capture.initial;
+  const Vector3 gravity = capture.gravity.value_or(model.gravity.value_or(-9.81 * capture.up));
+  scene.theta = model_theta(situated, gravity);
+  SimulationOptions settings;
+  settings.newmark_theta = model.theta;
+  Resolution resolution;
+  resolution.cells = object_size(capture) / model.cell_size;
+  scene.discretisation = discretise(capture, distance, resolution, scene.theta, settings);
+  scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
+  const double dt = 1.0 / (model.frame_rate * model.substeps);
+  if (model.frame_rate > 0.0) scene.discretisation.simulation.max_dt = dt * (1.0 + 1e-9);
+  return scene;
+}
+
+RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Body> body,
+                                const SimulationOptions& options, const VectorX& parameters,
+                                const std::function<bool(int, int)>& progress) {
+  std::vector<PvdEntry> entries;
+  CorotatedElasticity elasticity(body);
+  elasticity.set_parameters(parameters);
+  Simulation simulation(body, options);
+  const RolloutSummary summary = simulation.run(parameters, [&](int frame, const State& state, auto) {
+    char name[32];
+    std::snprintf(name, sizeof name, "frames/%06d.vtu", frame);
+    write_vtu(folder / name, frame_grid(*body, parameters, state, elasticity), VtuPrecision::Single);
+    entries.push_back({options.times[std::size_t(frame)] - options.times.front(), name});
+    return !progress || progress(frame + 1, simulation.frame_count());
+  });
+  write_pvd(folder / "trajectory.pvd", entries);
+  return summary;
+}
+
+void write_fit_output(const fs::path& folder, const Capture& capture, const std::vector<ObservedFrame>& observed,
+                      const FitOutcome& outcome, const RunFacts& facts,
+                      const std::function<void(const char*, int, int)>& progress) {
+  const auto tell = [&](const char* what, int done, int total) {
+    if (progress) progress(what, done, total);
+  };
+  ReportData report;
+  report.title = capture.name;
+  report.result = make_result(capture, outcome, facts);
+  report.convergence = history_of(outcome);
+  write_result(folder / "result.json", report.result);
+  write_convergence(folder / "convergence.csv", report.convergence);
+  save_model(folder, make_model(capture, outcome));
+  write_trajectory(folder, outcome.discretisation.body, outcome.discretisation.simulation, outcome.theta,
+                   [&](int done, int total) { return tell("trajectory", done, total), true; });
+  report.capture_path = facts.capture_path;
+  for (const auto& f : surface_errors(outcome.evaluation).frames) {
+    const auto frame = std::size_t(f.frame + capture.start_frame);
+    report.residuals.push_back({int(frame), capture.times[frame], f.rms, f.points, f.noise});
+  }
+  if (outcome.correlation.size() > 0) report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
+  tell("pictures", 0, 1);
+  add_pictures(report, capture, observed, outcome);
+  tell("pictures", 1, 1);
+  write_report(folder / "report.html", report);
+}
+
+}  // namespace pliant

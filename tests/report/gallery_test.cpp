@@ -1,0 +1,54 @@
+#include "report/gallery.hpp"
+
+#include "geometry/primitives.hpp"
+#include "geometry/ray_scene.hpp"
+
+namespace pliant {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+Gallery falling_ball() {
+  Gallery gallery;
+  const TriangleMesh ball = make_sphere(0.1, 2);
+  gallery.triangles = ball.triangles;
+  gallery.planes = {Plane{}};
+  gallery.width = 60, gallery.height = 40;
+  for (const int frame : {3, 9}) {
+    const Vector3 centre(0, frame == 3 ? 0.5 : 0.1, 0);
+    GalleryFrame& f = gallery.frames.emplace_back();
+    f.frame = frame, f.time = frame / 60.0;
+    f.surface = vertex_points(ball).rowwise() + centre.transpose();
+    f.points = {centre + Vector3(0, 0.103, 0), centre + Vector3(0, 0.104, 0)};
+    f.residuals = {0.003, 0.004};
+  }
+  return gallery;
+}
+
+TEST(SpreadFrames, IncludesBothEnds) {
+  EXPECT_THAT(spread_frames(4, 63, 4), ElementsAre(4, 24, 43, 63));
+  EXPECT_THAT(spread_frames(4, 5, 6), ElementsAre(4, 5));
+  EXPECT_THAT(spread_frames(4, 9, 1), ElementsAre(4));
+  EXPECT_TRUE(spread_frames(4, 3, 2).empty());
+}
+
+TEST(Gallery, CaptionsTellTimeAgreementAndScale) {
+  const auto pictures = draw_gallery(falling_ball());
+  ASSERT_EQ(pictures.size(), 2u);
+  EXPECT_EQ(pictures[0].caption, "Frame 3, 0.05 s: 2 points, 3.5 mm rms; floor grid 50 mm");
+  EXPECT_THAT(pictures[1].caption, HasSubstr("Frame 9, 0.15 s"));
+  EXPECT_NE(pictures[0].png, pictures[1].png);
+  EXPECT_EQ(all_residuals(falling_ball()).size(), 4u);
+}
+
+TEST(Gallery, FramesShareOneViewThatHoldsTheWholeMotion) {
+  Gallery gallery = falling_ball();
+  const auto both = draw_gallery(gallery);
+  gallery.frames.pop_back();
+  EXPECT_NE(draw_gallery(gallery)[0].png, both[0].png);  // alone it is framed closer
+  EXPECT_TRUE(draw_gallery(Gallery{}).empty());
+}
+
+}  // namespace
+}  // namespace pliant
