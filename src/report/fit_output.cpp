@@ -27,7 +27,9 @@ ParameterValue value_of(const Parameter& p, const VectorX& theta) {
 ParameterValue std_of(const Parameter& p, const VectorX& std, const MatrixX& jacobian, int at) {
   if (p.dimension() == 1) return std::abs(jacobian(p.theta_index, at)) * std[at];
   const MatrixX spread = jacobian.middleCols(at, 3) * std.segment<3>(at).asDiagonal();
-  const auto row_norm = [&](int row) { return Vector3(spread.row(row).norm(), spread.row(row + 1).norm(), spread.row(row + 2).norm()); };
+  const auto row_norm = [&](int row) {
+    return Vector3(spread.row(row).norm(), spread.row(row + 1).norm(), spread.row(row + 2).norm());
+  };
   if (p.transform == Transform::Vector) return row_norm(p.theta_index);
   return PlaneValue{row_norm(p.theta_index), row_norm(p.theta_index + 3)};
 }
@@ -67,7 +69,8 @@ ConvergenceHistory history_of(const FitOutcome& outcome) {
     for (const Parameter* p : shown) row.parameters.push_back(e.theta[p->theta_index]);
     history.rows.push_back(std::move(row));
   }
-  std::stable_sort(history.rows.begin(), history.rows.end(), [](const auto& a, const auto& b) { return a.start < b.start; });
+  std::stable_sort(history.rows.begin(), history.rows.end(),
+                   [](const auto& a, const auto& b) { return a.start < b.start; });
   return history;
 }
 
@@ -76,7 +79,8 @@ std::vector<double> six(const Matrix3& m) { return {m(0, 0), m(1, 1), m(2, 2), m
 VtuGrid frame_grid(const Body& body, const VectorX& parameters, const State& state, CorotatedElasticity& elasticity) {
   VtuGrid grid;
   grid.points = state.x;
-  VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}}, stress{"stress [Pa]", 6, {}};
+  VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}},
+      stress{"stress [Pa]", 6, {}};
   const Points u = state.x - body.reference_positions();
   displacement.values.assign(u.data(), u.data() + u.size());
   velocity.values.assign(state.v.data(), state.v.data() + state.v.size());
@@ -166,7 +170,8 @@ void add_pictures(ReportData& report, const Capture& capture, const std::vector<
   for (const FramePicture& p : scenes) {
     char caption[120];
     const int frame = p.frame + capture.start_frame;
-    std::snprintf(caption, sizeof caption, "Frame %d, %.3f s after the start", frame, capture.times[std::size_t(frame)] - capture.times[std::size_t(capture.start_frame)]);
+    std::snprintf(caption, sizeof caption, "Frame %d, %.3f s after the start", frame,
+                  capture.times[std::size_t(frame)] - capture.times[std::size_t(capture.start_frame)]);
     report.pictures.push_back({encode_png(draw(p.scene, camera, options)), caption});
   }
 }
@@ -212,7 +217,8 @@ SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
     errors.error.points += f.points;
     max = std::max(max, f.max_distance);
     if (f.points > 0)
-      errors.frames.push_back({f.frame, std::sqrt(f.sum_squares / f.points), std::sqrt(f.sum_noise_squares / f.points), f.points});
+      errors.frames.push_back(
+          {f.frame, std::sqrt(f.sum_squares / f.points), std::sqrt(f.sum_noise_squares / f.points), f.points});
   }
   errors.error.surface_rms = evaluation.surface_rms();
   errors.error.surface_max = max;
@@ -225,7 +231,8 @@ Result make_result(const Capture& capture, const FitOutcome& outcome, const RunF
   result.software.commit = facts.commit;
   result.capture = {capture.name, capture.sha256};
   const bool has_std = outcome.std.size() > 0;
-  const MatrixX jacobian = has_std ? outcome.parameters.jacobian(outcome.parameters.to_unconstrained(outcome.theta)) : MatrixX();
+  const MatrixX jacobian =
+      has_std ? outcome.parameters.jacobian(outcome.parameters.to_unconstrained(outcome.theta)) : MatrixX();
   int at = 0;
   for (const Parameter& p : outcome.parameters.parameters()) {
     ParameterResult r{p.name, value_of(p, outcome.theta), p.unit, {}, {}, p.estimated};
@@ -240,7 +247,12 @@ Result make_result(const Capture& capture, const FitOutcome& outcome, const RunF
   result.cost = {outcome.start_cost, outcome.final_cost};
   add_correlations(result, outcome);
   for (const FitStart& s : outcome.starts) {
-    StartResult r{scalars_of(outcome.parameters, s.start), scalars_of(outcome.parameters, s.final), {}, s.iterations, s.converged, s.reason};
+    StartResult r{scalars_of(outcome.parameters, s.start),
+                  scalars_of(outcome.parameters, s.final),
+                  {},
+                  s.iterations,
+                  s.converged,
+                  s.reason};
     if (std::isfinite(s.cost)) r.cost = s.cost;
     result.starts.push_back(std::move(r));
   }
@@ -359,7 +371,8 @@ void write_fit_output(const fs::path& folder, const Capture& capture, const std:
     const auto frame = std::size_t(f.frame + capture.start_frame);
     report.residuals.push_back({int(frame), capture.times[frame], f.rms, f.points, f.noise});
   }
-  if (outcome.correlation.size() > 0) report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
+  if (outcome.correlation.size() > 0)
+    report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   tell("pictures", 0, 1);
   add_pictures(report, capture, observed, outcome);
   tell("pictures", 1, 1);

@@ -32,7 +32,7 @@ std::string caption(const Gallery& gallery, const GalleryFrame& frame) {
     text += fmt::format(": {} points, {} mm rms", readable(double(frame.residuals.size()), 6),
                         readable(1e3 * std::sqrt(squares / double(frame.residuals.size())), 2));
   if (!gallery.planes.empty())
-    text += fmt::format("; floor grid {} mm", readable(1e3 * grid_spacing(box_of(frame.surface)), 3));
+    text += fmt::format("; grid {} mm", readable(1e3 * grid_spacing(box_of(frame.surface)), 3));
   return text;
 }
 

@@ -100,10 +100,11 @@ class Painter {
   };
   std::vector<Disc> discs() const {
     const double range = options_.residual_range > 0.0 ? options_.residual_range : residual_range(scene_.residuals);
-    const size_t count = scene_.points.size(), drawn = std::min(count, size_t(options_.max_points));
+    // a random part, not every n-th: the points come row by row from an image
+    const double part = double(options_.max_points) / std::max<double>(1.0, double(scene_.points.size()));
     std::vector<Disc> discs;
-    for (size_t k = 0; k < drawn; ++k) {
-      const size_t i = k * count / drawn;
+    for (size_t i = 0; i < scene_.points.size(); ++i) {
+      if (hash_number(uint32_t(i), 0, 2) >= part) continue;
       const Vector3 seen = camera_.project(scene_.points[i]);
       if (seen.z() <= 0.0 || is_hidden(scene_.points[i])) continue;
       const Rgb c = scene_.residuals.empty() ? Rgb{30, 120, 110} : diverging_colour(scene_.residuals[i] / range);
@@ -252,22 +253,26 @@ void check(const PictureScene& scene, const PictureOptions& options) {
 double coverage(double distance, double radius) { return std::clamp(radius + 0.5 - distance, 0.0, 1.0); }
 
 void paint_disc(std::vector<Colour>& canvas, const PinholeCamera& camera, const Painter::Disc& disc, double radius) {
-  const double rim = 0.55, reach = radius + rim + 1.0;
+  const double rim = 0.5, rim_darkness = radius > 1.5 ? 0.5 : 0.3, reach = radius + rim + 1.0;
   const int u0 = std::max(0, int(std::ceil(disc.u - reach))), u1 = std::min(camera.width - 1, int(disc.u + reach));
   const int v0 = std::max(0, int(std::ceil(disc.v - reach))), v1 = std::min(camera.height - 1, int(disc.v + reach));
   for (int v = v0; v <= v1; ++v)
     for (int u = u0; u <= u1; ++u) {
       Colour& pixel = canvas[size_t(v) * camera.width + u];
       const double distance = std::hypot(u - disc.u, v - disc.v);
-      pixel *= 1.0 - 0.55 * coverage(distance, radius + rim);  // dark rim: white discs show on a light surface
+      pixel *= 1.0 - rim_darkness * coverage(distance, radius + rim);  // dark rim: white discs show on a light surface
       const double inside = coverage(distance, radius);
       pixel = (1.0 - inside) * pixel + inside * disc.colour;
     }
 }
 
-double automatic_radius(const PinholeCamera& camera, size_t discs) {
-  const double spacing = std::sqrt(0.06 * camera.width * camera.height / std::max<double>(1.0, double(discs)));
-  return std::clamp(0.34 * spacing, 0.7, camera.width / 160.0);
+// So large that discs spread evenly over what they cover leave most of it free.
+double automatic_radius(const PinholeCamera& camera, const std::vector<Painter::Disc>& discs) {
+  Eigen::AlignedBox2d box;
+  for (const Painter::Disc& disc : discs) box.extend(Eigen::Vector2d(disc.u, disc.v));
+  const double covered = discs.empty() ? 0.0 : 0.6 * (box.sizes().array() + 1.0).prod();
+  const double spacing = std::sqrt(covered / std::max<double>(1.0, double(discs.size())));
+  return std::clamp(0.26 * spacing, 0.8, camera.width / 180.0);
 }
 
 // Corners of a box.
@@ -304,7 +309,7 @@ Picture draw(const PictureScene& scene, const PinholeCamera& camera, const Pictu
       for (int u = 0; u < camera.width; ++u) canvas[size_t(v) * camera.width + u] = painter.pixel(u, v);
   });
   const std::vector<Painter::Disc> discs = painter.discs();
-  const double radius = options.disc_radius > 0.0 ? options.disc_radius : automatic_radius(camera, discs.size());
+  const double radius = options.disc_radius > 0.0 ? options.disc_radius : automatic_radius(camera, discs);
   for (const Painter::Disc& disc : discs) paint_disc(canvas, camera, disc, radius);
   Picture picture(camera.width, camera.height);
   std::transform(canvas.begin(), canvas.end(), picture.pixels.begin(), [](const Colour& c) { return to_srgb(c); });

@@ -25,7 +25,7 @@ struct PictureOptions {
   int light_rays = 2;  ///< rays towards the sky for each of them, 1..64: how soft and how clean the shadows are
   double residual_range = 0.0;  ///< [m], residual that gets the full colour; 0: the scene's own (see residual_range)
   double disc_radius = 0.0;     ///< [pixels]; 0: by the number of points
-  int max_points = 2500;        ///< an even, deterministic part of the points is drawn where there are more
+  int max_points = 900;         ///< about so many of the points are drawn where there are more, always the same ones
 };
 
 /// Draws a scene as a camera sees it; no display is needed. The picture has the camera's size. Deterministic, and the

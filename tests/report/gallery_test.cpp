@@ -36,7 +36,7 @@ TEST(SpreadFrames, IncludesBothEnds) {
 TEST(Gallery, CaptionsTellTimeAgreementAndScale) {
   const auto pictures = draw_gallery(falling_ball());
   ASSERT_EQ(pictures.size(), 2u);
-  EXPECT_EQ(pictures[0].caption, "Frame 3, 0.05 s: 2 points, 3.5 mm rms; floor grid 50 mm");
+  EXPECT_EQ(pictures[0].caption, "Frame 3, 0.05 s: 2 points, 3.5 mm rms; grid 50 mm");
   EXPECT_THAT(pictures[1].caption, HasSubstr("Frame 9, 0.15 s"));
   EXPECT_NE(pictures[0].png, pictures[1].png);
   EXPECT_EQ(all_residuals(falling_ball()).size(), 4u);
