@@ -13,6 +13,9 @@ namespace pliant::apps {
 enum ExitCode : int { Fine = 0, BadInput = 2, NotConverged = 3, WasInterrupted = 130 };
 
 void add_check(CLI::App& app, int& exit_code);
+void add_fit(CLI::App& app, int& exit_code);
+void add_simulate(CLI::App& app, int& exit_code);
+void add_evaluate(CLI::App& app, int& exit_code);
 void add_synth(CLI::App& app, int& exit_code);
 
 /// Thrown where a command notices that the user pressed Ctrl-C.

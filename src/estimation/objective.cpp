@@ -7,14 +7,14 @@
 
 namespace pliant {
 
-double Evaluation::surface_rms() const {
+double CostEvaluation::surface_rms() const {
   double sum = 0.0;
   long long count = 0;
   for (const FrameFit& f : frames) sum += f.sum_squares, count += f.points;
   return count > 0 ? std::sqrt(sum / double(count)) : 0.0;
 }
 
-double Evaluation::matched_fraction() const {
+double CostEvaluation::matched_fraction() const {
   long long matched = 0, count = 0;
   for (const FrameFit& f : frames) matched += f.matched, count += f.points;
   return count > 0 ? double(matched) / double(count) : 0.0;
@@ -71,11 +71,11 @@ FrameFit Objective::fit_frame(const FrameObservations& seen, const Points& posit
   return fit;
 }
 
-Evaluation Objective::run(const VectorX& p, bool with_tangents) {
+CostEvaluation Objective::run(const VectorX& p, bool with_tangents) {
   const VectorX theta = parameters_.to_theta(p);
   const MatrixX directions = with_tangents ? parameters_.jacobian(p) : MatrixX(theta.size(), 0);
   const auto& observations = *observations_;
-  Evaluation evaluation;
+  CostEvaluation evaluation;
   std::vector<FrameFit> fits(observations.size());
   std::size_t next = 0;
   tbb::task_group beside;
@@ -110,14 +110,14 @@ Evaluation Objective::run(const VectorX& p, bool with_tangents) {
   return evaluation;
 }
 
-Evaluation Objective::evaluate(const VectorX& p) { return run(p, false); }
-Evaluation Objective::linearise(const VectorX& p) { return run(p, true); }
+CostEvaluation Objective::evaluate(const VectorX& p) { return run(p, false); }
+CostEvaluation Objective::linearise(const VectorX& p) { return run(p, true); }
 
-Evaluation Objective::gradient(const VectorX& p) {
+CostEvaluation Objective::gradient(const VectorX& p) {
   const VectorX theta = parameters_.to_theta(p);
   const auto& observations = *observations_;
   const RobustLoss loss{options_.outlier_scale};
-  Evaluation evaluation;
+  CostEvaluation evaluation;
   const auto seen_in = [&](int frame) -> const FrameObservations* {
     const auto it = std::lower_bound(observations.begin(), observations.end(), frame,
                                      [](const FrameObservations& o, int f) { return o.frame < f; });

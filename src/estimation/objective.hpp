@@ -27,7 +27,7 @@ struct FrameFit {
   double sum_noise_squares = 0.0;  ///< [m^2] of the sensor's standard deviations
 };
 
-struct Evaluation {
+struct CostEvaluation {
   bool succeeded = false;
   std::string failure;
   double cost = 0.0;
@@ -61,15 +61,15 @@ class Objective {
   Simulation& simulation() { return simulation_; }
 
   /// Cost alone.
-  [[nodiscard]] Evaluation evaluate(const VectorX& p);
+  [[nodiscard]] CostEvaluation evaluate(const VectorX& p);
   /// Cost, gradient and Gauss-Newton matrix by tangents: for few parameters.
-  [[nodiscard]] Evaluation linearise(const VectorX& p);
+  [[nodiscard]] CostEvaluation linearise(const VectorX& p);
   /// Cost and gradient by the adjoint: any number of parameters.
-  [[nodiscard]] Evaluation gradient(const VectorX& p);
+  [[nodiscard]] CostEvaluation gradient(const VectorX& p);
 
  private:
   FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents) const;
-  Evaluation run(const VectorX& p, bool with_tangents);
+  CostEvaluation run(const VectorX& p, bool with_tangents);
   double frame_weight(const FrameObservations& seen) const;
 
   std::shared_ptr<const SurfaceConstraints> constraints_;

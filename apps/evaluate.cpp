@@ -1,0 +1,59 @@
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "base/error.hpp"
+#include "commands.hpp"
+#include "report/fit_output.hpp"
+
+namespace pliant::apps {
+
+namespace {
+
+struct Arguments {
+  std::string model, capture, out;
+};
+
+int run(const Arguments& arguments) {
+  const Model model = load_model(arguments.model);
+  const Capture capture = read_capture(arguments.capture);
+  if (!capture.presses.empty() || !capture.loads.empty())
+    std::cerr << "pliant: presses and loads of this capture are passed over: models of moving objects predict motion\n";
+  ObserveOptions options;
+  options.max_points_per_frame = 1000;
+  const auto observed = observe(capture, options, [](int done, int total) { show_progress("read", done, total); });
+  stop_if_interrupted();
+  const auto seen = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed));
+  if (seen->empty())
+    throw InputError({{capture.file}, "no frame shows any point of the object", "depth images or clouds that see it", ""});
+  const CaptureScene scene = make_scene(model, capture);
+  ObjectiveOptions objective_options;
+  objective_options.outlier_scale = 0.05 * object_size(capture);
+  objective_options.last_frame = scene.discretisation.simulation.times.empty() ? 0 : int(scene.discretisation.simulation.times.size()) - 1;
+  Objective objective(scene.discretisation.constraints, scene.discretisation.body, scene.discretisation.simulation, seen,
+                      ParameterSet({}, scene.theta), objective_options);
+  const CostEvaluation evaluation = objective.evaluate(VectorX(0));
+  if (!evaluation.succeeded) {
+    std::cerr << "pliant: the simulation stopped: " << evaluation.failure << "\n";
+    return NotConverged;
+  }
+  Evaluation result;
+  result.error = surface_errors(evaluation).error;
+  std::cout << to_json(result) << "\n";
+  if (!arguments.out.empty()) write_evaluation(arguments.out, result);
+  return Fine;
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("evaluate", "Predict another recording with a fitted model, and say how well");
+  command->add_option("model", arguments->model, "model.toml of a fit")->required()->type_name("MODEL");
+  command->add_option("capture", arguments->capture, "recording of the same object")->required()->type_name("CAPTURE");
+  command->add_option("-o,--out", arguments->out, "file for the figures (JSON)")->type_name("FILE");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace pliant::apps

@@ -1,0 +1,211 @@
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+#include "commands.hpp"
+#include "estimation/fit_config.hpp"
+#include "estimation/fit_state.hpp"
+#include "report/fit_output.hpp"
+#include "report/report.hpp"
+
+namespace pliant::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+struct Arguments {
+  std::string capture, out, config;
+  std::vector<std::string> settings;
+  int threads = 0;
+  std::optional<unsigned> seed;
+  bool resume = false;
+};
+
+/// Lines for people on stderr, kept for log.txt.
+class Log {
+ public:
+  void line(const std::string& text) {
+    clear_live();
+    std::fprintf(stderr, "%s\n", text.c_str());
+    text_ += text + "\n";
+  }
+  /// Replaces the last live line on a terminal; elsewhere an ordinary line.
+  void live(const std::string& text) {
+    if (!terminal_) return line(text);
+    text_ += text + "\n";
+    std::fprintf(stderr, "\r\033[K%s", text.c_str());
+    std::fflush(stderr);
+    is_live_ = true;
+  }
+  void clear_live() {
+    if (is_live_) std::fprintf(stderr, "\n");
+    is_live_ = false;
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  bool terminal_ = ::isatty(STDERR_FILENO) != 0, is_live_ = false;
+  std::string text_;
+};
+
+std::string with_prefix(double value, const char* unit) {
+  char text[48];
+  const double size = std::abs(value);
+  const bool pascal = std::string(unit) == "Pa", second = std::string(unit) == "s";
+  if (pascal && size >= 1e6)
+    std::snprintf(text, sizeof text, "%.4g MPa", value * 1e-6);
+  else if (pascal && size >= 1e4)
+    std::snprintf(text, sizeof text, "%.4g kPa", value * 1e-3);
+  else if (second && size < 0.1)
+    std::snprintf(text, sizeof text, "%.3g ms", value * 1e3);
+  else
+    std::snprintf(text, sizeof text, "%.4g%s%s", value, *unit && std::string(unit) != "1" ? " " : "", std::string(unit) == "1" ? "" : unit);
+  return text;
+}
+
+std::string describe(const FitEvent& event, double seconds) {
+  char head[160];
+  std::snprintf(head, sizeof head, "%-15s start %d  iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(), event.start + 1,
+                event.iteration, event.cost, 1e3 * event.surface_rms);
+  std::string text = head;
+  text += "  E " + with_prefix(event.theta[theta::youngs_modulus], "Pa");
+  text += "  nu " + with_prefix(event.theta[theta::poissons_ratio], "1");
+  text += "  damping " + with_prefix(event.theta[theta::mass_damping], "1/s") + ", " + with_prefix(event.theta[theta::stiffness_damping], "s");
+  if (event.fraction_done > 0.02) {
+    char left[40];
+    std::snprintf(left, sizeof left, "  about %.0f s left", seconds * (1.0 - event.fraction_done) / event.fraction_done);
+    text += left;
+  }
+  return text;
+}
+
+FitOptions read_options(const Arguments& arguments) {
+  FitOptions options;
+  if (!arguments.config.empty()) read_fit_options(arguments.config, options);
+  for (const std::string& assignment : arguments.settings) set_fit_option(options, assignment);
+  if (arguments.seed) options.seed = *arguments.seed;
+  if (const std::string wrong = options.validate(); !wrong.empty()) throw InputError({{arguments.config}, wrong, "", "see `pliant fit --help`"});
+  return options;
+}
+
+void print_result(const Result& result, const FitOutcome& outcome, const fs::path& out, double seconds) {
+  std::cout << result.capture.name << "\n";
+  for (const ParameterResult& p : result.parameters) {
+    if (!p.estimated) continue;
+    if (const auto* value = std::get_if<double>(&p.value)) {
+      std::optional<double> std;
+      if (p.std) std = std::get<double>(*p.std);
+      std::cout << "  " << spoken_name(p.name) << ": " << value_with_uncertainty(*value, std, p.unit) << "\n";
+    } else if (const auto* vector = std::get_if<Vector3>(&p.value)) {
+      std::cout << "  " << spoken_name(p.name) << ": " << vector->transpose() << " " << p.unit << "\n";
+    } else if (const auto* plane = std::get_if<PlaneValue>(&p.value)) {
+      std::cout << "  " << spoken_name(p.name) << ": through " << plane->point.transpose() << " m, normal " << plane->normal.transpose() << "\n";
+    }
+  }
+  char line[200];
+  std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points; %s after %.0f s\n", 1e3 * result.error.surface_rms.value_or(0.0),
+                result.error.points, outcome.reason.c_str(), seconds);
+  std::cout << line;
+  for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
+  std::cout << "Look at " << (out / "report.html").string() << "; simulate with: pliant simulate " << (out / "model.toml").string()
+            << " --out DIR\n";
+}
+
+int run(const Arguments& arguments) {
+  const auto begin = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  const FitOptions options = read_options(arguments);
+  const Capture capture = read_capture(arguments.capture);
+  const fs::path out = arguments.out;
+  fs::create_directories(out);
+
+  std::optional<tbb::global_control> threads;
+  if (arguments.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(arguments.threads));
+
+  Log log;
+  log.line("pliant " PLIANT_VERSION " fit " + arguments.capture);
+  ObserveOptions observe_options;
+  observe_options.max_points_per_frame = options.points_per_frame;
+  const auto observed = observe(capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
+  stop_if_interrupted();
+
+  const std::string key = capture.sha256 + "\n" + to_toml(options);
+  const fs::path state_file = out / "state.json";
+  FitState state;
+  if (arguments.resume) {
+    if (!fs::exists(state_file))
+      throw InputError({{state_file}, "there is no interrupted fit to resume", "the state that an interrupted fit leaves", "leave out --resume"});
+    state = read_fit_state(state_file, key);
+    log.line("resuming the fit in " + out.string());
+  }
+  write_file(out / "fit.toml", to_toml(options));
+
+  FitMonitor monitor;
+  monitor.on_event = [&](const FitEvent& event) { log.live(describe(event, seconds())); };
+  monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
+  monitor.interrupted = [] { return is_interrupted(); };
+  const FitOutcome outcome = fit(capture, observed, options, monitor, std::move(state));
+  log.clear_live();
+  if (!outcome.evaluation.succeeded) {
+    log.line("the fit ended without a result: " + outcome.reason);
+    write_file(out / "log.txt", log.text());
+    return outcome.interrupted ? WasInterrupted : NotConverged;
+  }
+  const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, arguments.capture, seconds()};
+  write_fit_output(out, capture, observed, outcome, facts, show_progress);
+  const Result result = make_result(capture, outcome, facts);
+  log.line(outcome.reason);
+  write_file(out / "log.txt", log.text());
+  print_result(result, outcome, out, seconds());
+  if (outcome.interrupted) {
+    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << arguments.capture << " --out " << out.string() << " --resume\n";
+    return WasInterrupted;
+  }
+  fs::remove(state_file);
+  return outcome.converged ? Fine : NotConverged;
+}
+
+std::string key_help() {
+  std::ostringstream text;
+  text << "Keys of --set and --config:\n";
+  for (const FitKey& k : fit_keys()) {
+    text << "  " << k.name << " = " << k.standard << "   " << k.sentence;
+    if (!k.range.empty()) text << " (" << k.range << (k.unit.empty() ? "" : " " + k.unit) << ")";
+    text << "\n";
+  }
+  text << parameter_key_help() << "\n\nExamples:\n"
+       << "  pliant fit recordings/bear --out out/bear\n"
+       << "  pliant fit recordings/bear --out out/bear --set cells=16 --set poisson_ratio=0.3 --set poisson_ratio.estimate=false\n"
+       << "Ctrl-C leaves the best result so far; --resume goes on from there.";
+  return text.str();
+}
+
+}  // namespace
+
+void add_fit(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("fit", "Estimate stiffness, damping and what else a recording leaves unknown");
+  command->add_option("capture", arguments->capture, "the recording: a folder with capture.toml in it")->required()->type_name("CAPTURE");
+  command->add_option("--out,-o", arguments->out, "folder for the result")->required()->type_name("DIR");
+  command->add_option("--config", arguments->config, "choices (TOML); none is needed")->type_name("FILE");
+  command->add_option("--set", arguments->settings, "one choice; may be given many times")->type_name("KEY=VALUE");
+  command->add_option("--threads", arguments->threads, "most threads to use; all processors where left out")->check(CLI::PositiveNumber);
+  command->add_option("--seed", arguments->seed, "of everything random; the same seed gives the same result");
+  command->add_flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
+  command->footer(key_help());
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace pliant::apps

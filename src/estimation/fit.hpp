@@ -1,0 +1,108 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimation/optimiser.hpp"
+#include "estimation/problem.hpp"
+
+namespace pliant {
+
+/// Choices about a fit; none of them is needed. `validate` answers in words.
+struct FitOptions {
+  double cells = 12.0;           ///< hexahedra along the object's longest axis, [4, 64]
+  double coarse_cells = 8.0;     ///< of the grid that finds the neighbourhood, [4, 64]
+  double steps = 1.0;            ///< time steps per default step, (0, 16]
+  int points_per_frame = 1000;   ///< >= 10: an even subset of the pixels; 0: all
+  int scan_per_decade = 3;       ///< values of Young's modulus tried in each decade, >= 1
+  int starts = 3;                ///< best ones of the scan that are followed, >= 1
+  int max_iterations = 25;       ///< of each stage of the optimiser, >= 1
+  double wide_band = 0.12;       ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
+  double fine_band = 0.05;       ///< of the last stage, (0, 0.5)
+  double newmark_theta = 0.55;   ///< [0.5, 1)
+  OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
+  SolverKind solver = SolverKind::Automatic;
+  double solver_tolerance = 1e-8;
+  bool hold_strongly = false;    ///< eliminate nodes in held regions instead of Nitsche's method
+  unsigned seed = 0;
+  /// By parameter name: a start value (a number, or three), and whether it is estimated.
+  struct Override {
+    std::optional<VectorX> start;
+    std::optional<bool> estimated;
+    std::optional<double> prior_std;  ///< of the logarithm, logit or scaled vector
+  };
+  std::map<std::string, Override> parameters;
+
+  /// What is wrong with the options; empty: nothing.
+  std::string validate() const;
+};
+
+/// A step of the fit, for progress and convergence.csv.
+struct FitEvent {
+  std::string stage;  ///< "motion", "scan", "coarse", "fine"
+  int start = 0;      ///< which start
+  int iteration = 0;
+  double cost = 0.0, damping = 0.0, surface_rms = 0.0;
+  VectorX theta;
+  double fraction_done = 0.0;  ///< a guess at how much of the whole is done
+};
+
+/// One start that was followed.
+struct FitStart {
+  VectorX start, final;  ///< theta
+  double start_cost = 0.0, cost = 0.0;
+  int iterations = 0;
+  bool converged = false;
+  std::string reason;
+};
+
+/// Where a fit stands, to go on after an interruption.
+struct FitState {
+  std::vector<std::pair<double, double>> scan;  ///< Young's modulus and cost; infinite where it cannot be simulated
+  std::optional<VectorX> motion;                ///< theta after the first stage
+  std::vector<FitStart> starts;                 ///< those that are done
+  std::optional<VectorX> fine;                  ///< best theta of the last stage so far
+};
+
+struct FitOutcome {
+  ParameterSet parameters;      ///< as used, with the reference at the solution
+  VectorX theta, start_theta;
+  VectorX std;                  ///< of each unconstrained coordinate
+  MatrixX covariance, correlation;
+  double start_cost = 0.0, final_cost = 0.0;
+  CostEvaluation evaluation;    ///< at the solution, all points of the fit
+  Discretisation discretisation;
+  std::vector<FitStart> starts;
+  std::vector<FitEvent> history;
+  bool converged = false, interrupted = false;
+  std::string reason;
+  std::vector<std::string> notes;  ///< plain sentences
+  long long forward_steps = 0;
+  double ms_per_forward_step = 0.0, ms_per_adjoint_step = 0.0;  ///< at the solution, measured by one rollout of each
+};
+
+/// Watches a fit. All members may be empty.
+struct FitMonitor {
+  std::function<void(const FitEvent&)> on_event;
+  std::function<void(const FitState&)> on_state;  ///< something is done that a resumed fit need not do again
+  std::function<bool()> interrupted;
+};
+
+/// Estimates a capture's unknown parameters from its depth images and clouds: initial motion from the first frames
+/// where it is unknown, a scan over decades of Young's modulus on a coarse grid, the best starts followed there in a
+/// wide band and a growing horizon, then the best on the full grid in a narrow band.
+/// @param resume  what an interrupted fit of the same capture and options had done
+/// Throws InputError where the capture cannot be fitted, with the reason.
+FitOutcome fit(const Capture& capture, const std::vector<ObservedFrame>& observed, const FitOptions& options,
+               const FitMonitor& monitor = {}, FitState resume = {});
+
+/// Standard deviations of the estimate from the curvature of the cost and the scatter of the frames' gradients
+/// (sandwich estimate; gradients of neighbouring frames may be correlated, Newey and West 1987), never below what the
+/// curvature alone gives.
+MatrixX parameter_covariance(const CostEvaluation& evaluation);
+
+}  // namespace pliant

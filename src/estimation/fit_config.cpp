@@ -1,0 +1,272 @@
+#include "estimation/fit_config.hpp"
+
+#include <charconv>
+#include <functional>
+#include <optional>
+#include <sstream>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+#include "capture/toml_table.hpp"
+
+namespace pliant {
+
+namespace {
+
+const std::vector<std::pair<std::string, OptimiserKind>> optimisers = {
+    {"levenberg_marquardt", OptimiserKind::LevenbergMarquardt},
+    {"rprop", OptimiserKind::Rprop},
+    {"gradient_descent", OptimiserKind::GradientDescent}};
+const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", SolverKind::Automatic},
+                                                                 {"iterative", SolverKind::Iterative},
+                                                                 {"cholmod", SolverKind::Cholmod},
+                                                                 {"simplicial", SolverKind::Simplicial}};
+const std::set<std::string> parameter_names = {"youngs_modulus", "poisson_ratio",   "mass_damping",     "stiffness_damping",
+                                               "density",        "gravity",         "linear_velocity",  "angular_velocity",
+                                               "plane",          "plane_2",         "plane_3",          "plane_4"};
+
+std::string text_of(double value) {
+  std::ostringstream out;
+  out.precision(12);
+  out << value;
+  return out.str();
+}
+
+template <class Kind>
+std::string name_of(const std::vector<std::pair<std::string, Kind>>& names, Kind kind) {
+  for (const auto& [name, k] : names)
+    if (k == kind) return name;
+  return "";
+}
+
+/// One key with how its value is written and read as text. `read` returns what was expected, or nothing if fine.
+struct Entry {
+  FitKey key;
+  std::function<std::string(const FitOptions&)> write;
+  std::function<std::optional<std::string>(FitOptions&, const std::string&)> read;
+};
+
+std::optional<double> number(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+}
+
+Entry real_entry(const char* name, const char* unit, const char* range, const char* sentence, double FitOptions::*member) {
+  return {{name, "number", unit, text_of(FitOptions{}.*member), range, sentence},
+          [=](const FitOptions& o) { return text_of(o.*member); },
+          [=](FitOptions& o, const std::string& text) -> std::optional<std::string> {
+            const auto value = number(text);
+            if (!value) return "a number";
+            o.*member = *value;
+            return std::nullopt;
+          }};
+}
+
+template <class Integer>
+Entry integer_entry(const char* name, const char* range, const char* sentence, Integer FitOptions::*member) {
+  return {{name, "whole number", "", std::to_string(FitOptions{}.*member), range, sentence},
+          [=](const FitOptions& o) { return std::to_string(o.*member); },
+          [=](FitOptions& o, const std::string& text) -> std::optional<std::string> {
+            const auto value = number(text);
+            if (!value || *value != double(Integer(*value)) || *value < 0) return "a whole number, not negative";
+            o.*member = Integer(*value);
+            return std::nullopt;
+          }};
+}
+
+template <class Kind>
+Entry choice_entry(const char* name, const char* sentence, const std::vector<std::pair<std::string, Kind>>& names, Kind FitOptions::*member) {
+  std::string range;
+  for (const auto& [text, kind] : names) range += (range.empty() ? "" : ", ") + text;
+  return {{name, "name", "", name_of(names, FitOptions{}.*member), range, sentence},
+          [&names, member](const FitOptions& o) { return '"' + name_of(names, o.*member) + '"'; },
+          [&names, member, range](FitOptions& o, const std::string& text) -> std::optional<std::string> {
+            for (const auto& [known, kind] : names)
+              if (known == text) {
+                o.*member = kind;
+                return std::nullopt;
+              }
+            return "one of " + range;
+          }};
+}
+
+Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*member) {
+  return {{name, "true or false", "", FitOptions{}.*member ? "true" : "false", "", sentence},
+          [=](const FitOptions& o) { return std::string(o.*member ? "true" : "false"); },
+          [=](FitOptions& o, const std::string& text) -> std::optional<std::string> {
+            if (text != "true" && text != "false") return "true or false";
+            o.*member = text == "true";
+            return std::nullopt;
+          }};
+}
+
+const std::vector<Entry>& entries() {
+  static const std::vector<Entry> all = {
+      real_entry("cells", "", "4..64", "hexahedra along the object's longest axis; more is finer and slower", &FitOptions::cells),
+      real_entry("steps", "", "0..16", "time steps per default step; 2 halves the step", &FitOptions::steps),
+      integer_entry("points_per_frame", "0, or 10 and more", "observed points used of each frame, evenly spread; 0: all", &FitOptions::points_per_frame),
+      integer_entry("starts", "1 and more", "best starting points of the scan that are followed", &FitOptions::starts),
+      integer_entry("max_iterations", "1 and more", "of each stage of the optimiser", &FitOptions::max_iterations),
+      real_entry("coarse_cells", "", "4..64", "as cells, of the grid on which starts are followed", &FitOptions::coarse_cells),
+      integer_entry("scan_per_decade", "1 and more", "values of Young's modulus tried in each decade", &FitOptions::scan_per_decade),
+      real_entry("wide_band", "object sizes", "0..0.5", "distance at which a point stops counting, in the early stages", &FitOptions::wide_band),
+      real_entry("fine_band", "object sizes", "0..0.5", "the same, in the last stage", &FitOptions::fine_band),
+      choice_entry("optimiser", "how the cost is minimised", optimisers, &FitOptions::optimiser),
+      choice_entry("solver", "for the linear system of a time step", solvers, &FitOptions::solver),
+      real_entry("solver_tolerance", "", "0..1", "relative residual of the iterative solver", &FitOptions::solver_tolerance),
+      real_entry("newmark_theta", "", "0.5..1", "weight of a time step's end; above 0.5 adds numerical damping", &FitOptions::newmark_theta),
+      flag_entry("hold_strongly", "held regions fix grid nodes instead of using Nitsche's method", &FitOptions::hold_strongly),
+      integer_entry("seed", "", "of everything random", &FitOptions::seed),
+  };
+  return all;
+}
+
+const Entry* find_entry(const std::string& name) {
+  for (const Entry& e : entries())
+    if (e.key.name == name) return &e;
+  return nullptr;
+}
+
+[[noreturn]] void reject_unknown(const std::string& key) {
+  std::set<std::string> known = parameter_names;
+  for (const Entry& e : entries()) known.insert(e.key.name);
+  const std::string near = nearest_name(key, known);
+  throw InputError({{}, "unknown key \"" + key + "\"", near.empty() ? "" : '"' + near + '"', "see `pliant fit --help` for all keys"});
+}
+
+void set_parameter(FitOptions& options, const std::string& name, const std::string& part, const std::string& value) {
+  FitOptions::Override& change = options.parameters[name];
+  const auto fail = [&](const char* expected) {
+    throw InputError({{}, name + (part.empty() ? "" : "." + part) + " is \"" + value + "\"", expected, ""});
+  };
+  if (part == "estimate") {
+    if (value != "true" && value != "false") fail("true or false");
+    change.estimated = value == "true";
+  } else if (part == "prior_std") {
+    const auto std = number(value);
+    if (!std || !(*std > 0.0)) fail("a positive number");
+    change.prior_std = *std;
+  } else if (part.empty() || part == "start") {
+    std::vector<double> numbers;
+    std::string list = value;
+    for (char& c : list)
+      if (c == ',' || c == '[' || c == ']') c = ' ';
+    std::istringstream words(list);
+    for (std::string word; words >> word;) {
+      const auto n = number(word);
+      if (!n) fail("a number, or three");
+      numbers.push_back(*n);
+    }
+    if (numbers.size() != 1 && numbers.size() != 3) fail("a number, or three");
+    change.start = Eigen::Map<VectorX>(numbers.data(), Eigen::Index(numbers.size()));
+  } else {
+    reject_unknown(name + "." + part);
+  }
+}
+
+}  // namespace
+
+const std::vector<FitKey>& fit_keys() {
+  static const std::vector<FitKey> keys = [] {
+    std::vector<FitKey> list;
+    for (const Entry& e : entries()) list.push_back(e.key);
+    return list;
+  }();
+  return keys;
+}
+
+std::string parameter_key_help() {
+  return "Parameters (youngs_modulus, poisson_ratio, mass_damping, stiffness_damping, density, gravity, linear_velocity,\n"
+         "angular_velocity, plane, plane_2 ..) have three keys each:\n"
+         "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
+         "  NAME.estimate=BOOL   estimate it, or keep the start value\n"
+         "  NAME.prior_std=X     width of the prior: of the logarithm for moduli, dampings and density";
+}
+
+void set_fit_option(FitOptions& options, const std::string& assignment) {
+  const auto equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw InputError({{}, "\"" + assignment + "\"", "key=value", "for example --set cells=16"});
+  const std::string key = assignment.substr(0, equals), value = assignment.substr(equals + 1);
+  if (const Entry* entry = find_entry(key)) {
+    if (const auto expected = entry->read(options, value))
+      throw InputError({{}, key + " is \"" + value + "\"", *expected, ""});
+    return;
+  }
+  const auto dot = key.find('.');
+  const std::string name = key.substr(0, dot);
+  if (!parameter_names.contains(name)) reject_unknown(key);
+  set_parameter(options, name, dot == std::string::npos ? "" : key.substr(dot + 1), value);
+}
+
+void read_fit_options(const std::filesystem::path& path, FitOptions& options) {
+  const toml::table table = parse_toml(read_file(path), path);
+  std::vector<Problem> problems;
+  const auto place = [&](const toml::node& node) {
+    return Place{path, int(node.source().begin.line), int(node.source().begin.column)};
+  };
+  const auto assign = [&](const std::string& key, const toml::node& node) {
+    std::ostringstream text;
+    if (const auto* array = node.as_array()) {
+      for (const auto& item : *array) text << (&item == &array->front() ? "" : ",") << toml::node_view(item);
+    } else if (const auto* string = node.as_string()) {
+      text << string->get();
+    } else if (const auto* real = node.as_floating_point()) {
+      text << text_of(real->get());
+    } else {
+      text << toml::node_view(node);
+    }
+    try {
+      set_fit_option(options, key + "=" + text.str());
+    } catch (const InputError& error) {
+      Problem problem = error.problems().front();
+      problem.place = place(node);
+      problems.push_back(std::move(problem));
+    }
+  };
+  for (const auto& [key, node] : table) {
+    const std::string name(key.str());
+    if (name == "parameters" && node.is_table()) {
+      for (const auto& [parameter, settings] : *node.as_table()) {
+        if (!settings.is_table()) {
+          assign(std::string(parameter.str()), settings);
+          continue;
+        }
+        for (const auto& [part, value] : *settings.as_table())
+          assign(std::string(parameter.str()) + "." + std::string(part.str()), value);
+      }
+    } else {
+      assign(name, node);
+    }
+  }
+  if (!problems.empty()) throw InputError(std::move(problems));
+}
+
+std::string to_toml(const FitOptions& options) {
+  std::ostringstream out;
+  out << "# Choices of a fit; `pliant fit CAPTURE --config THIS` repeats them.\n";
+  for (const Entry& e : entries()) {
+    out << e.key.name << " = " << e.write(options) << "  # " << e.key.sentence;
+    if (!e.key.range.empty()) out << " (" << e.key.range << (e.key.unit.empty() ? "" : " " + e.key.unit) << ")";
+    out << "\n";
+  }
+  for (const auto& [name, change] : options.parameters) {
+    out << "\n[parameters." << name << "]\n";
+    if (change.start) {
+      out << "start = ";
+      if (change.start->size() == 1) {
+        out << text_of((*change.start)[0]);
+      } else {
+        for (int d = 0; d < 3; ++d) out << (d == 0 ? "[" : ", ") << text_of((*change.start)[d]);
+        out << "]";
+      }
+      out << "\n";
+    }
+    if (change.estimated) out << "estimate = " << (*change.estimated ? "true" : "false") << "\n";
+    if (change.prior_std) out << "prior_std = " << text_of(*change.prior_std) << "\n";
+  }
+  return out.str();
+}
+
+}  // namespace pliant

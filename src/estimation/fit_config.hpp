@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "estimation/fit.hpp"
+
+namespace pliant {
+
+/// One choice of a fit, as help, documentation and error messages know it.
+struct FitKey {
+  std::string name, type, unit, standard, range, sentence;
+};
+
+/// All keys, in the order of their importance. Parameters have keys of their own: see `parameter_key_help`.
+const std::vector<FitKey>& fit_keys();
+std::string parameter_key_help();
+
+/// Sets one key from "key=value" (the form of `--set`). Parameters: "youngs_modulus=5000" is a start value,
+/// "poisson_ratio.estimate=false" a choice, "density.prior_std=0.1" a prior's width.
+/// Throws InputError for an unknown key (with the nearest known one) or a value of another type.
+void set_fit_option(FitOptions& options, const std::string& assignment);
+
+/// Reads a configuration (TOML) over the options. Throws InputError with every problem found and its place.
+void read_fit_options(const std::filesystem::path& path, FitOptions& options);
+
+/// The options as TOML that `read_fit_options` reads back.
+std::string to_toml(const FitOptions& options);
+
+}  // namespace pliant

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "estimation/fit.hpp"
+
+namespace pliant {
+
+/// Writes where a fit stands, whole or not at all. `key` names the capture and the options that it belongs to.
+void write_fit_state(const std::filesystem::path& path, const FitState& state, const std::string& key);
+
+/// Reads it back. Throws InputError where the file is damaged or belongs to another capture or other options.
+FitState read_fit_state(const std::filesystem::path& path, const std::string& key);
+
+}  // namespace pliant

@@ -1,0 +1,73 @@
+#include "estimation/notes.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+namespace pliant {
+
+namespace {
+
+std::string spoken(std::string name) {
+  for (char& c : name)
+    if (c == '_') c = ' ';
+  return name;
+}
+
+void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
+  if (!capture.mass && !capture.density)
+    outcome.notes.push_back(
+        "Neither mass nor density is known, so nothing anchors pascals: only the ratio of Young's modulus to density is "
+        "measured. The values hold for the density listed; weigh the object to fix them.");
+}
+
+void say_what_is_inseparable(FitOutcome& outcome) {
+  const auto names = outcome.parameters.coordinate_names();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const double r = outcome.correlation(Eigen::Index(i), Eigen::Index(j));
+      if (std::abs(r) < 0.9) continue;
+      char text[64];
+      std::snprintf(text, sizeof text, " (correlation %.2f).", r);
+      outcome.notes.push_back("This recording can hardly tell " + spoken(names[j]) + " and " + spoken(names[i]) + " apart" + text);
+    }
+}
+
+void say_what_is_assumed(FitOutcome& outcome) {
+  int at = 0;
+  for (const Parameter& p : outcome.parameters.parameters()) {
+    if (!p.estimated) continue;
+    if (std::isfinite(p.prior_std) && outcome.std.segment(at, p.dimension()).maxCoeff() > 0.7 * p.prior_std)
+      outcome.notes.push_back("The recording says little about " + spoken(p.name) + ": its value is close to what was assumed beforehand.");
+    at += p.dimension();
+  }
+}
+
+void say_if_starts_disagree(FitOutcome& outcome) {
+  double low = INFINITY, high = 0.0;
+  for (const FitStart& s : outcome.starts) {
+    if (!std::isfinite(s.cost)) continue;
+    low = std::min(low, s.final[theta::youngs_modulus]);
+    high = std::max(high, s.final[theta::youngs_modulus]);
+  }
+  if (high > 1.25 * low) {
+    char text[160];
+    std::snprintf(text, sizeof text, "Starts ended at different stiffness, from %.3g to %.3g Pa; the one with the lowest cost was followed.", low, high);
+    outcome.notes.push_back(text);
+  }
+}
+
+}  // namespace
+
+void add_notes(FitOutcome& outcome, const Capture& capture) {
+  say_what_anchors(outcome, capture);
+  if (outcome.correlation.size() > 0) {
+    say_what_is_inseparable(outcome);
+    say_what_is_assumed(outcome);
+  }
+  say_if_starts_disagree(outcome);
+  if (outcome.evaluation.succeeded && outcome.evaluation.matched_fraction() < 0.9)
+    outcome.notes.push_back("More than a tenth of the observed points lie too far from the simulated object to be matched: "
+                            "check mass, planes, the pose of the scan and the segmentation.");
+}
+
+}  // namespace pliant

@@ -1,0 +1,10 @@
+#pragma once
+
+#include "estimation/fit.hpp"
+
+namespace pliant {
+
+/// Adds plain sentences about what the estimate can and cannot be trusted for.
+void add_notes(FitOutcome& outcome, const Capture& capture);
+
+}  // namespace pliant

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "estimation/objective.hpp"
+
+namespace pliant {
+
+enum class OptimiserKind {
+  LevenbergMarquardt,  ///< Gauss-Newton on the residuals, by tangents: the default
+  Rprop,               ///< sign of the adjoint gradient (Riedmiller and Braun 1993), the choice of Weiss 2020
+  GradientDescent,     ///< adjoint gradient with an adaptive step
+};
+
+struct OptimiserOptions {
+  OptimiserKind kind = OptimiserKind::LevenbergMarquardt;
+  int max_iterations = 25;        ///< >= 1
+  double step_tolerance = 1e-3;   ///< stop when no unconstrained number moves more than this, > 0
+  double cost_tolerance = 2e-4;   ///< or the cost falls by less than this fraction, > 0
+  double max_step = 0.7;          ///< most that any unconstrained number moves in one iteration (a factor of two), > 0
+};
+
+/// One accepted or rejected iteration, as it happens.
+struct Iteration {
+  int number = 0;
+  double cost = 0.0;
+  double damping = 0.0;  ///< Levenberg-Marquardt's lambda; a step length for the others
+  bool accepted = true;
+  VectorX p;
+  double surface_rms = 0.0;
+};
+
+struct OptimiserSummary {
+  VectorX p;
+  CostEvaluation evaluation;       ///< at p; with derivatives where the optimiser had them
+  double start_cost = 0.0;
+  int iterations = 0, evaluations = 0;
+  long long steps = 0;         ///< time steps simulated
+  bool converged = false, interrupted = false, succeeded = false;
+  std::string reason = "not run";
+};
+
+/// Minimises from p. A failed or non-finite evaluation is a step back, not an end; only a start that cannot be
+/// evaluated fails.
+/// @param on_iteration  called after each; false stops ("interrupted")
+OptimiserSummary minimise(Objective& objective, const VectorX& p, const OptimiserOptions& options,
+                          const std::function<bool(const Iteration&)>& on_iteration = {});
+
+}  // namespace pliant
