@@ -158,7 +158,7 @@ void check_start_frame(RuleContext& context) {
   const Capture& capture = context.capture;
   if (!context.toml.is_sound("timing") || capture.times.empty()) return;
   if (capture.start_frame < 0 || capture.start_frame >= capture.frame_count())
-    context.toml.complain("timing.start_frame", "`start_frame` is " + std::to_string(capture.start_frame),
+    context.toml.reject("timing.start_frame", "`start_frame` is " + std::to_string(capture.start_frame),
                           "0 to " + std::to_string(capture.frame_count() - 1), "frames are counted from 0");
 }
 

@@ -94,6 +94,11 @@ void check_sequence(RuleContext& context, std::size_t i, const char* name, const
   }
 }
 
+// Whether there are frames, and `start_frame` is one of them.
+bool has_start(const RuleContext& context) {
+  return !context.capture.times.empty() && context.toml.is_sound("timing.start_frame");
+}
+
 // The first frame of a sequence that shows the object free.
 int first_free_frame(const Capture& capture, int every) {
   const int frame = (capture.start_frame + every - 1) / every * every;
@@ -312,7 +317,7 @@ void check_load_files(RuleContext& context) {
 void check_depth_scale(RuleContext& context) {
   for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
     const DepthCamera& camera = context.capture.depth[i];
-    if (!context.toml.is_sound(item("depth", i)) || context.capture.times.empty()) continue;
+    if (!context.toml.is_sound(item("depth", i)) || !has_start(context)) continue;
     try {
       auto readings = read_depth(context.capture, camera, first_free_frame(context.capture, camera.every)).pixels;
       std::erase_if(readings, [](float z) { return !(z > 0); });
@@ -334,7 +339,7 @@ void check_depth_scale(RuleContext& context) {
 
 void check_cameras_see_object(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.surface || capture.times.empty()) return;
+  if (!capture.surface || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
   for (std::size_t i = 0; i < capture.depth.size(); ++i) {
     const DepthCamera& camera = capture.depth[i];
@@ -367,7 +372,7 @@ void check_cameras_see_object(RuleContext& context) {
 
 void check_clouds_near_object(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.surface || capture.times.empty()) return;
+  if (!capture.surface || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
   for (std::size_t i = 0; i < capture.clouds.size(); ++i) {
     const CloudSequence& cloud = capture.clouds[i];

@@ -14,7 +14,7 @@ struct FoundPlane : Plane {
 
 /// Fits a plane that is only roughly known to what the depth cameras saw of it: the background images, else the first
 /// frames without the object's pixels. Looks within 25 degrees of the guess and a distance that grows with how far a
-/// reading lies from `guess.point`.
+/// reading lies from `guess.point`; a plane more than 0.1 m from that point is another one.
 /// @return  the plane, its point nearest to `guess.point`, its normal to the guess's side, `known` true;
 ///          nothing where no camera sees enough of such a plane
 /// Throws InputError where an image cannot be decoded.

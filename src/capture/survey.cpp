@@ -98,7 +98,8 @@ std::optional<int> first_contact(const Capture& capture, std::span<const Observe
   const double gap = plane_reach * noise + contact_gap * bounding_box(*capture.surface).extent().maxCoeff();
   std::optional<int> first;
   for (std::size_t p = 0; p < capture.planes.size(); ++p) {
-    const Plane plane = seen[p].seen ? Plane(*seen[p].seen) : capture.planes[p];
+    const bool is_found = !capture.planes[p].known && seen[p].seen;
+    const Plane plane = is_found ? Plane(*seen[p].seen) : capture.planes[p];
     const std::vector<double> shift = shifts(capture, frames, plane.normal);
     const double start = capture.initial.released ? 1e300 : clearance(*capture.surface, plane);
     for (std::size_t i = 0; i < frames.size(); ++i) {

@@ -1,0 +1,327 @@
+#include "capture/capture_rules.hpp"
+
+#include <filesystem>
+
+#include "capture/small_capture.hpp"
+#include "input_errors.hpp"
+
+namespace pliant {
+namespace {
+
+using test::complaint_of;
+using test::SmallCapture;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+// A slip in an otherwise valid capture: `from` becomes `to`, and exactly one problem is reported, at the line on
+// which `at` then stands.
+struct Slip {
+  const char* name;
+  const char* from;
+  const char* to;
+  const char* says;
+  const char* at;
+};
+
+void PrintTo(const Slip& slip, std::ostream* stream) { *stream << slip.name; }
+
+class CaptureSlip : public ::testing::TestWithParam<Slip> {};
+
+TEST_P(CaptureSlip, IsReportedAtItsLine) {
+  SmallCapture small;
+  const Slip& slip = GetParam();
+  small.edit(slip.from, slip.to);
+  try {
+    (void)small.read();
+    FAIL() << "nothing was reported";
+  } catch (const InputError& error) {
+    ASSERT_THAT(error.problems(), SizeIs(1)) << error.what();
+    EXPECT_THAT(error.what(), HasSubstr(slip.says));
+    const Place& place = error.problems()[0].place;
+    EXPECT_EQ(place.file.filename(), "capture.toml");
+    EXPECT_EQ(place.line, small.line_of(slip.at)) << error.what();
+    EXPECT_GT(place.column, 0);
+  }
+}
+
+const Slip slips[] = {
+    {"UnknownKey", "mass = 0.8", "mas = 0.8", "did you mean `mass`", "mas ="},
+    {"UnknownTable", "[[region]]", "[[regions]]", "did you mean `region`", "[[regions]]"},
+    {"UnknownFormat", "capture/1", "capture/9", "expected \"capture/1\"", "format"},
+    {"MissingName", "name = \"box\"", "", "the file has no `name`", "format"},
+    {"MissingKey", "fx = 80.0\n", "", "has no `fx`", "[[depth]]"},
+    {"WrongType", "mass = 0.8", "mass = \"0.8\"", "`mass` is a text; expected a number", "mass"},
+    {"NotFinite", "mass = 0.8", "mass = nan", "expected a finite number", "mass"},
+    {"NotFiniteVector", "[0.0, 9.81, 0.0]", "[0.0, inf, 0.0]", "three numbers", "gravity"},
+    {"ShortVector", "[0.0, 9.81, 0.0]", "[0.0, 9.81]", "a list of 2", "gravity"},
+    {"FractionalCount", "frame_count = 4", "frame_count = 4.5", "expected a whole number", "frame_count"},
+    {"OneTableTwice", "[timing]", "[[timing]]", "expected a table [timing]", "[[timing]]"},
+    {"BlockWithSingleBrackets", "[[plane]]", "[plane]", "expected blocks [[plane]]", "[plane]"},
+    {"SurfaceMissing", "rest.ply", "rset.ply", "\"rset.ply\" is not there", "surface"},
+    {"AbsolutePath", "\"rest.ply\"", "\"/rest.ply\"", "relative to the capture's folder", "surface"},
+    {"ShapeIs", "mass = 0.8", "mass = 0.8\nshape_is = \"loaded\"", "expected \"reference\" or \"static\"", "shape_is"},
+    {"MassInGrams", "mass = 0.8", "mass = 800.0", "mass is in kilograms", "mass"},
+    {"MassZero", "mass = 0.8", "mass = 0.0", "expected a number above 0", "mass"},
+    {"DensityInGramsPerCubicCentimetre", "mass = 0.8", "density = 1.08", "1 g/cm^3 is 1000 kg/m^3", "density"},
+    {"MassAndDensity", "mass = 0.8", "mass = 0.8\ndensity = 100.0", "both `mass` and `density`", "density"},
+    {"GravityInCentimetres", "9.81", "981.0", "expected about 9.81", "gravity"},
+    {"NeitherGravityNorUp", "gravity = [0.0, 9.81, 0.0]", "", "neither `gravity` nor `up`", "[world]"},
+    {"UpAlongGravity", "gravity = [0.0, 9.81, 0.0]", "gravity = [0.0, 9.81, 0.0]\nup = [0, 1, 0]",
+     "does not point against", "up ="},
+    {"UpWithoutLength", "gravity = [0.0, 9.81, 0.0]", "up = [0, 0, 0]", "no length", "up ="},
+    {"NoRate", "frame_rate = 60.0", "", "neither `frame_rate` nor `timestamps`", "[timing]"},
+    {"NoCount", "frame_count = 4", "", "has no `frame_count`", "[timing]"},
+    {"RateZero", "frame_rate = 60.0", "frame_rate = 0.0", "expected above 0", "frame_rate"},
+    {"RateInMilliseconds", "frame_rate = 60.0", "frame_rate = 0.016", "times are in seconds", "frame_rate"},
+    {"StartBeyondEnd", "start_frame = 1", "start_frame = 4", "expected 0 to 3", "start_frame"},
+    {"StartNegative", "start_frame = 1", "start_frame = -1", "expected 0 to 3", "start_frame"},
+    {"StaticWithVelocity", "start_frame = 1", "static = true\n[initial]\nlinear_velocity = [0, 1, 0]",
+     "an object at rest", "[initial]"},
+    {"StaticReleased", "start_frame = 1", "static = true\n[initial]\nreleased = true",
+     "a static capture that is released", "released"},
+    {"VelocityInMillimetres", "[[plane]]", "[initial]\nlinear_velocity = [0, 2100, 0]\n[[plane]]", "at most 100 m/s",
+     "linear_velocity"},
+    {"SpinInDegrees", "[[plane]]", "[initial]\nangular_velocity = [0, 3600, 0]\n[[plane]]", "radians per second",
+     "angular_velocity"},
+    {"PlaneTurnedRound", "normal = [0.0, -2.0, 0.0]", "normal = [0.0, 1.0, 0.0]", "below this plane", "[[plane]]"},
+    {"PlaneWithoutNormal", "normal = [0.0, -2.0, 0.0]", "normal = [0, 0, 0]", "a normal without length",
+     "normal = [0, 0, 0]"},
+    {"FixedOutside", "[[plane]]", "[[fixed]]\nsphere = { centre = [1, 0, 0], radius = 0.02 }\n[[plane]]",
+     "no point of the object lies in this fixed region", "[[fixed]]"},
+    {"FixedAll", "[[plane]]", "[[fixed]]\nsphere = { centre = [0, 0, 0], radius = 2 }\n[[plane]]", "nothing could move",
+     "[[fixed]]"},
+    {"FixedTwice", "[[plane]]",
+     "[[fixed]]\nvertices = \"held.txt\"\nsphere = { centre = [0, 0, 0], radius = 0.1 }\n[[plane]]",
+     "2 regions in one block", "[[fixed]]"},
+    {"FixedNothing", "[[plane]]", "[[fixed]]\n[[plane]]", "no region", "[[fixed]]"},
+    {"BoxInsideOut", "[[plane]]", "[[fixed]]\nbox = { min = [1, 0, 0], max = [0, 1, 1] }\n[[plane]]", "swap them",
+     "box = {"},
+    {"SphereRadius", "[[plane]]", "[[fixed]]\nsphere = { centre = [0, 0, 0], radius = 0 }\n[[plane]]",
+     "a radius of 0 or less", "sphere"},
+    {"DisplacedByAShear", "[[plane]]",
+     "[[fixed]]\nvertices = \"held.txt\"\ndisplaced_to = [[1, 0.5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, "
+     "1]]\n[[plane]]",
+     "not orthonormal", "displaced_to"},
+    {"RegionOutside", "point = [0, 0, 0], normal = [-1, 0, 0]", "point = [5, 0, 0], normal = [1, 0, 0]",
+     "no point of the object lies in region", "[[region]]"},
+    {"RegionTwice", "[[depth]]",
+     "[[region]]\nname = \"left\"\nsphere = { centre = [0, 0, 0], radius = 0.1 }\n[[depth]]", "a second region",
+     "name = \"left\"\nsphere"},
+    {"RegionName", "\"left\"", "\"a@b\"", "a name without @", "a@b"},
+    {"PoseScaled", "[1, 0, 0, 0]", "[1000, 0, 0, 0]", "not orthonormal", "camera_to_world"},
+    {"PoseMirrored", "[1, 0, 0, 0]", "[-1, 0, 0, 0]", "mirrors", "camera_to_world"},
+    {"PoseTransposed", "[0, 0, 1, -1], [0, 0, 0, 1]", "[0, 0, 1, 0], [0, 0, -1, 1]", "transposed", "camera_to_world"},
+    {"PoseShort", ", [0, 0, 0, 1]]", "]", "a 4 x 4 matrix", "camera_to_world"},
+    {"PoseLooksAway", "[0, 0, 1, -1]", "[0, 0, 1, 9]", "looks past the rest surface", "camera_to_world"},
+    {"PoseOffTheReadings", "[0, 0, 1, -1]", "[0, 0, 1, -30]", "no readings near the rest surface", "camera_to_world"},
+    {"FocalInMillimetres", "fx = 80.0", "fx = 3.6", "focal lengths are in pixels", "fx"},
+    {"PrincipalPointNormalised", "cx = 39.5\ncy = 29.5", "cx = 0.5\ncy = 0.5", "a point in the image, in pixels", "cx"},
+    {"ImagesMissing", "\"front/%06d.png\"", "\"back/%06d.png\"", "nor for any other frame", "images"},
+    {"PatternWithoutNumber", "\"front/%06d.png\"", "\"front/000000.png\"", "one %06d", "images"},
+    {"PatternWithText", "\"front/%06d.png\"", "\"front/%s.png\"", "one %06d", "images"},
+    {"DepthScaleOne", "depth_scale = 1000.0", "depth_scale = 1.0", "1000 for millimetres", "depth_scale"},
+    {"DepthScaleZero", "depth_scale = 1000.0", "depth_scale = 0.0", "0 or less", "depth_scale"},
+    {"MaskIsDepth", "front/mask_%06d.png", "front/%06d.png", "16 bits a channel", "masks"},
+    {"BackgroundMissing", "noise = 0.002", "background = \"none.png\"", "\"none.png\" is not there", "background"},
+    {"EveryZero", "noise = 0.002", "every = 0", "`every` is 0", "every"},
+    {"NoiseInMillimetres", "noise = 0.002", "noise = 2.0", "a standard deviation in metres", "noise"},
+};
+
+INSTANTIATE_TEST_SUITE_P(Facts, CaptureSlip, ::testing::ValuesIn(slips),
+                         [](const auto& slip) { return slip.param.name; });
+
+TEST(CaptureRules, AcceptTheCaptureThatTheSlipsStartFrom) {
+  SmallCapture small;
+  EXPECT_EQ(complaint_of([&] { (void)small.read(); }), "");
+}
+
+TEST(CaptureRules, ReportEverythingTogetherInTheOrderOfTheFile) {
+  SmallCapture small;
+  small.edit("mass = 0.8", "mas = 0.8").edit("fx = 80.0", "fx = 3.6").edit("9.81", "981.0");
+  const std::string said = complaint_of([&] { (void)small.read(); });
+  EXPECT_LT(said.find("`mas`"), said.find("981"));
+  EXPECT_LT(said.find("981"), said.find("3.6"));
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 2);
+}
+
+TEST(CaptureRules, RefuseASurfaceThatIsOpen) {
+  SmallCapture small;
+  TriangleMesh open = test::box_mesh(Vector3::Constant(-0.1), Vector3::Constant(0.1));
+  open.triangles.pop_back();
+  write_mesh(small.folder / "rest.ply", open);
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }),
+              AllOf(HasSubstr("`surface` is no solid"), HasSubstr("has holes")));
+}
+
+TEST(CaptureRules, RefuseASurfaceInMillimetres) {
+  SmallCapture small;
+  write_mesh(small.folder / "rest.ply", test::box_mesh(Vector3::Constant(-100), Vector3::Constant(100)));
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("divide by 1000 if this one is in millimetres"));
+}
+
+TEST(CaptureRules, RefuseAVertexListOutOfRange) {
+  SmallCapture small;
+  small.folder.write("held.txt", "0\n8\n");
+  small.edit("[[plane]]", "[[fixed]]\nvertices = \"held.txt\"\n[[plane]]");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), AllOf(HasSubstr("vertex 8"), HasSubstr("expected 0 to 7")));
+}
+
+TEST(CaptureRules, NameTheLineOfABadIndex) {
+  SmallCapture small;
+  small.folder.write("held.txt", "0\none\n");
+  small.edit("[[plane]]", "[[fixed]]\nvertices = \"held.txt\"\n[[plane]]");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("held.txt:2:1: \"one\""));
+}
+
+TEST(CaptureRules, RefuseTimesThatDoNotIncrease) {
+  SmallCapture small;
+  small.folder.write("times.txt", "0\n0.1\n0.1\n0.2\n");
+  small.edit("frame_rate = 60.0", "timestamps = \"times.txt\"");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("time 2"));
+}
+
+TEST(CaptureRules, RefuseAnotherNumberOfTimes) {
+  SmallCapture small;
+  small.folder.write("times.txt", "0\n0.1\n0.2\n");
+  small.edit("frame_rate = 60.0", "timestamps = \"times.txt\"");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("the timestamps are 3"));
+}
+
+TEST(CaptureRules, NameTheLineOfABadTime) {
+  SmallCapture small;
+  small.folder.write("times.txt", "0\nnan\n");
+  small.edit("frame_rate = 60.0", "timestamps = \"times.txt\"");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("times.txt:2:1"));
+}
+
+TEST(CaptureRules, RefuseTwoCamerasOfOneName) {
+  SmallCapture small;
+  small.append(small.text.substr(small.text.find("[[depth]]")));
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("a second camera \"front\""));
+}
+
+TEST(CaptureRules, RefuseAnImageOfAnotherDepth) {
+  SmallCapture small;
+  write_png(small.folder / "front/000002.png", SmallCapture::mask_image(0));
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }),
+              AllOf(HasSubstr("front/000002.png"), HasSubstr("16-bit grey")));
+}
+
+TEST(CaptureRules, RefuseAnotherImageSize) {
+  SmallCapture small;
+  small.edit("width = 80", "width = 64");
+  EXPECT_THAT(
+      complaint_of([&] { (void)small.read(); }),
+      AllOf(HasSubstr("\"front/000000.png\" has 80 x 60 pixels; expected 64 x 60"), HasSubstr("mask_000000.png")));
+}
+
+TEST(CaptureRules, NameTheFramesThatAreMissing) {
+  SmallCapture small;
+  small.edit("frame_count = 4", "frame_count = 6");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("no file for 2 of 6 frames: 4-5"));
+}
+
+TEST(CaptureRules, RefuseAnImageThatIsCutShort) {
+  SmallCapture small;
+  const auto path = small.folder / "front/000001.png";
+  write_file(path, read_file(path).substr(0, 60));
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("cannot be decoded"));
+}
+
+TEST(CaptureRules, RefuseACaptureWithoutObservations) {
+  SmallCapture small;
+  small.text.resize(small.text.find("[[depth]]"));
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("no observation"));
+}
+
+TEST(CaptureRules, CheckMarkers) {
+  const std::string block = "\n[[markers]]\nrest = \"markers_rest.csv\"\ntrack = \"markers.csv\"\n";
+  EXPECT_EQ(complaint_of([&] { (void)SmallCapture().append(block).read(); }), "");
+  {
+    SmallCapture small;
+    write_markers(small.folder / "markers_rest.csv", {{0, {0, 0, -0.1}}});
+    EXPECT_THAT(complaint_of([&] { (void)small.append(block).read(); }), HasSubstr("marker 7 is not among"));
+  }
+  {
+    SmallCapture small;
+    write_markers(small.folder / "markers_rest.csv", {{0, {0, 0, -100}}, {7, {0, 0, 0}}});
+    EXPECT_THAT(complaint_of([&] { (void)small.append(block).read(); }), HasSubstr("marker 0 at rest lies outside"));
+  }
+  SmallCapture small;
+  write_marker_track(small.folder / "markers.csv", {{4, {{0, {0, 0, 0}}}}});
+  EXPECT_THAT(complaint_of([&] { (void)small.append(block).read(); }), HasSubstr("frame 4; expected 0 to 3"));
+}
+
+const char* const press = R"(
+[[press]]
+force = [0.0, 0.0, 3.0]
+contact = { centre = [0.0, 0.0, -0.1], radius = 0.01 }
+probe = { point = [0.0, 0.0, -0.1], normal = [0.0, 0.0, 1.0] }
+markers = "markers_rest.csv"
+markers_rest = "markers_rest.csv"
+)";
+
+std::string press_with(std::string from, const std::string& to) {
+  std::string text = press;
+  return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(CaptureRules, CheckPresses) {
+  const auto said = [](const std::string& block) {
+    return complaint_of([&] { (void)SmallCapture().append(block).read(); });
+  };
+  EXPECT_EQ(said(press), "");
+  EXPECT_THAT(said(press_with("[0.0, 0.0, 3.0]", "[0.0, 0.0, 0.0]")), HasSubstr("a force of 0 N"));
+  EXPECT_THAT(said(press_with("radius = 0.01", "radius = 10")), HasSubstr("a contact radius of 10 m"));
+  EXPECT_THAT(said(press_with("[0.0, 0.0, -0.1], radius", "[0.0, 0.0, -0.3], radius")),
+              HasSubstr("off the rest surface"));
+  EXPECT_THAT(said(press_with("markers_rest =", "role = \"train\"\nmarkers_rest =")),
+              HasSubstr("expected \"fit\" or \"test\""));
+  EXPECT_THAT(said(press_with("markers = \"markers_rest.csv\"\n", "")), HasSubstr("has no `markers`"));
+}
+
+TEST(CaptureRules, CheckLoads) {
+  const auto said = [](const std::string& block) {
+    return complaint_of([&] { (void)SmallCapture().append("\n[[load]]\n" + block).read(); });
+  };
+  EXPECT_EQ(said("mass = 0.1\nat = [0, 0.1, 0]\ncloud = \"load.ply\""), "");
+  EXPECT_EQ(said("mass = 0.1\nat = [0, 0.1, 0]\nimages = { front = \"front/000000.png\" }"), "");
+  EXPECT_THAT(said("mass = 100\nat = [0, 0.1, 0]\ncloud = \"load.ply\""), HasSubstr("masses are in kilograms"));
+  EXPECT_THAT(said("mass = 0.1\nat = [0, 0.1, 0]"), HasSubstr("a load without observation"));
+  EXPECT_THAT(said("mass = 0.1\nat = [0, 0.5, 0]\ncloud = \"load.ply\""), HasSubstr("off the rest surface"));
+  EXPECT_THAT(said("mass = 0.1\nat = [0, 0.1, 0]\nmarkers = \"markers_rest.csv\""),
+              HasSubstr("without `markers_rest`"));
+  EXPECT_THAT(said("mass = 0.1\nat = [0, 0.1, 0]\nimages = { back = \"front/000000.png\" }"),
+              HasSubstr("no depth camera \"back\""));
+}
+
+TEST(CaptureRules, CheckClouds) {
+  SmallCapture small;
+  small.append("\n[[cloud]]\npoints = \"clouds/%d.ply\"\nevery = 3\n");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("\"clouds/0.ply\", nor for any other"));
+  for (const int frame : {0, 3})
+    write_points(small.folder / ("clouds/" + std::to_string(frame) + ".ply"), std::vector<Vector3>{{0, 0, 0}});
+  EXPECT_EQ(complaint_of([&] { (void)small.read(); }), "");
+  write_points(small.folder / "clouds/3.ply", std::vector<Vector3>{{0, 0, 900}});
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("no point near the rest surface"));
+  small.folder.write("clouds/3.ply", "solid\n");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("clouds/3.ply"));
+}
+
+TEST(FramesOf, CountsFromZero) {
+  EXPECT_THAT(frames_of(5, 2), ElementsAre(0, 2, 4));
+  EXPECT_THAT(frames_of(1, 3), ElementsAre(0));
+  EXPECT_THAT(frames_of(0, 1), SizeIs(0));
+}
+
+TEST(RangesText, JoinsRunsAndCountsTheRest) {
+  EXPECT_EQ(ranges_text(std::vector{3, 7, 8, 9, 12}), "3, 7-9, 12");
+  std::vector<int> odd;
+  for (int i = 1; i < 40; i += 2) odd.push_back(i);
+  EXPECT_THAT(ranges_text(odd), HasSubstr(", and 12 more"));
+}
+
+}  // namespace
+}  // namespace pliant
