@@ -18,15 +18,14 @@ h2{font-size:1.15rem;margin:2.4rem 0 .7rem;font-weight:650}
 .cards{display:grid;grid-template-columns:repeat(auto-fill,minmax(215px,1fr));gap:14px}
 .card{background:var(--card);border:1px solid var(--grid);border-radius:10px;padding:14px 16px}
 .card .name{color:var(--muted);font-size:.85rem}
-.card .value{font-size:1.25rem;font-weight:620;margin:.15rem 0 .5rem;font-variant-numeric:tabular-nums}
+.card .value{font-size:1.13rem;white-space:nowrap;font-weight:620;margin:.15rem 0 .5rem;font-variant-numeric:tabular-nums}
 .card .from{color:var(--muted);font-size:.8rem}
 .card svg{display:block;width:100%;height:16px;margin-bottom:.35rem}
 ul.words{margin:.2rem 0 0;padding-left:1.15rem}ul.words li{margin:.3rem 0}
 .panel{background:var(--card);border:1px solid var(--grid);border-radius:10px;padding:12px 14px;margin:0 0 14px}
 .plot{display:block;width:100%;height:auto}
-.small-plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(300px,1fr));gap:14px}
-.pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(380px,1fr));gap:14px}
-@media(max-width:480px){.pictures,.small-plots{grid-template-columns:1fr}}
+.small-plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(400px,100%),1fr));gap:14px}
+.pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(380px,100%),1fr));gap:14px}
 figure{margin:0;background:var(--card);border:1px solid var(--grid);border-radius:10px;overflow:hidden}
 figure img{display:block;width:100%;height:auto}
 figcaption{padding:8px 14px;color:var(--muted);font-size:.88rem}

@@ -272,7 +272,7 @@ double automatic_radius(const PinholeCamera& camera, const std::vector<Painter::
   for (const Painter::Disc& disc : discs) box.extend(Eigen::Vector2d(disc.u, disc.v));
   const double covered = discs.empty() ? 0.0 : 0.6 * (box.sizes().array() + 1.0).prod();
   const double spacing = std::sqrt(covered / std::max<double>(1.0, double(discs.size())));
-  return std::clamp(0.26 * spacing, 0.8, camera.width / 180.0);
+  return std::clamp(0.3 * spacing, 0.8, camera.width / 180.0);
 }
 
 // Corners of a box.

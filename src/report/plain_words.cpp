@@ -34,7 +34,10 @@ std::string with_unit(const std::string& number, const std::string& unit) {
   return unit.empty() ? number : number + "\u00a0" + unit;
 }
 
-std::string millimetres(double metres) { return with_unit(readable(1e3 * metres, 2), "mm"); }
+std::string millimetres(double metres) {
+  const double mm = 1e3 * metres;
+  return with_unit(mm >= 1.0 && mm < 9.95 ? fmt::format("{:.1f}", mm) : readable(mm, 2), "mm");
+}
 
 // People's names keep their capital.
 std::string within_sentence(const std::string& name) {

@@ -136,7 +136,7 @@ std::string residual_plot(const std::vector<FrameResidual>& residuals) {
   return panel(plot_svg(series, options));
 }
 
-// Rows of one start, numbered on through its stages.
+// Rows of each start, numbered on through its stages. Lines are broken between stages: their costs count other things.
 std::map<int, std::vector<const ConvergenceRow*>> rows_by_start(const ConvergenceHistory& history) {
   std::map<int, std::vector<const ConvergenceRow*>> starts;
   for (const ConvergenceRow& row : history.rows) starts[row.start].push_back(&row);
@@ -146,7 +146,10 @@ std::map<int, std::vector<const ConvergenceRow*>> rows_by_start(const Convergenc
 Series start_series(int start, const std::vector<const ConvergenceRow*>& rows, bool labelled,
                     const std::function<double(const ConvergenceRow&)>& value) {
   Series series{labelled ? "start " + std::to_string(start + 1) : "", {}, {}, Mark::LineAndDots, {}, {}, start};
-  for (size_t i = 0; i < rows.size(); ++i) series.x.push_back(double(i)), series.y.push_back(value(*rows[i]));
+  for (size_t i = 0; i < rows.size(); ++i) {
+    if (i > 0 && rows[i]->stage != rows[i - 1]->stage) series.x.push_back(double(i)), series.y.push_back(NAN);
+    series.x.push_back(double(i)), series.y.push_back(value(*rows[i]));
+  }
   return series;
 }
 
@@ -193,6 +196,13 @@ std::string convergence(const ReportData& data) {
   if (data.convergence.rows.empty()) return "";
   std::string html = cost_plot(data.convergence), small;
   for (size_t i = 0; i < data.convergence.parameters.size(); ++i) small += parameter_plot(data, i);
+  const bool has_stages = std::any_of(data.convergence.rows.begin(), data.convergence.rows.end(), [&](const auto& row) {
+    return row.stage != data.convergence.rows.front().stage;
+  });
+  if (has_stages)
+    html +=
+        "<p class=\"given\">A line is broken where a start goes on at another resolution; costs on both sides do not "
+        "compare.</p>\n";
   return html + (small.empty() ? "" : "<div class=\"small-plots\">\n" + small + "</div>\n");
 }
 
@@ -288,7 +298,8 @@ std::string report_html(const ReportData& data) {
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
       "<meta name=\"color-scheme\" content=\"light dark\"><title>" +
       title + "</title><style>" + page_style + "</style></head><body><main>\n";
-  html += "<h1>" + title + "</h1>\n<p class=\"sub\">" + escape_html(data.result.capture.name) + "</p>\n";
+  const std::string recording = escape_html(data.result.capture.name);
+  html += "<h1>" + title + "</h1>\n<p class=\"sub\">" + (recording == title ? "" : recording) + "</p>\n";
   html += headline(data.result);
   html += section("What this means", words(data));
   html += section("Seen and simulated", pictures(data));

@@ -115,6 +115,8 @@ TEST(PlainSentences, SayHowFarTheFitCanBeTrusted) {
   EXPECT_THAT(words, Contains(HasSubstr("2 of 3 starts")));
   EXPECT_THAT(words, Contains(HasSubstr("Taken as given, not estimated: Poisson's ratio (0.35), density (95")));
   EXPECT_THAT(words, Contains("The floor was taken as known."));
+  data.result.error.surface_rms = 0.00201;
+  EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("lies 2.0\u00a0mm")));
   data.result.error.surface_rms = 0.0063;
   EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("not explained by this model")));
 }
@@ -134,6 +136,23 @@ TEST(Report, IsOneSelfContainedPage) {
   EXPECT_THAT(html, HasSubstr("data:image/png;base64,"));
   EXPECT_THAT(html, HasSubstr("−0.93"));
   EXPECT_THAT(html, Not(HasSubstr("nan")));
+}
+
+TEST(Report, LinesAreBrokenBetweenStages) {
+  ReportData data;
+  data.convergence = falling_history();
+  const auto strokes = [&] {
+    const std::string html = report_html(data);
+    const size_t at = html.find("<path d=\"");
+    const std::string path = html.substr(at, html.find("style", at) - at);
+    return std::count(path.begin(), path.end(), 'M');
+  };
+  EXPECT_EQ(strokes(), 1);
+  EXPECT_THAT(report_html(data), Not(HasSubstr("another resolution")));
+  for (ConvergenceRow& row : data.convergence.rows)
+    if (row.iteration >= 6) row.stage = "fine";
+  EXPECT_EQ(strokes(), 2);
+  EXPECT_THAT(report_html(data), HasSubstr("another resolution"));
 }
 
 TEST(Report, EmptyPartsAreLeftOut) {
