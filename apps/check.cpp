@@ -216,6 +216,12 @@ void write_sorted_pictures(const Capture& capture, const Arguments& arguments) {
   }
 }
 
+void write_cloud_picture(const std::vector<ObservedFrame>& frames, const Arguments& arguments) {
+  const auto seen = std::ranges::find_if(frames, [](const ObservedFrame& frame) { return !frame.points.empty(); });
+  if (seen == frames.end()) return;
+  write_png(fs::path(arguments.out) / formatted("points_%06d.png", seen->frame), picture(seen->points));
+}
+
 void write_clouds(const std::vector<ObservedFrame>& frames, const Arguments& arguments) {
   for (const ObservedFrame& frame : frames)
     write_points(fs::path(arguments.out) / "points" / formatted("%06d.ply", frame.frame), frame.points);
@@ -309,6 +315,7 @@ void check(const Arguments& arguments) {
   else
     write_scenes(capture, arguments);
   if (capture.surface || capture.depth.empty()) write_clouds(frames, arguments);
+  if (!capture.clouds.empty()) write_cloud_picture(frames, arguments);
   write_file(fs::path(arguments.out) / "check.json", json.dump(2) + "\n");
 }
 

@@ -1,5 +1,6 @@
 #include "capture/depth_picture.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -103,6 +104,32 @@ Image<Rgb> picture(const DepthImage& depth, const Segmentation& scene) {
       else
         image(u, v) = shaded(blue, light * (label == -2 ? 1.0 : 0.6));
     }
+  return image;
+}
+
+Image<Rgb> picture(std::span<const Vector3> points, int side) {
+  if (points.empty()) return Image<Rgb>(side, side, black);
+  Vector3 mean = Vector3::Zero();
+  for (const Vector3& point : points) mean += point / double(points.size());
+  Matrix3 moment = Matrix3::Zero();
+  for (const Vector3& point : points) moment += (point - mean) * (point - mean).transpose();
+  const Matrix3 axes = Eigen::SelfAdjointEigenSolver<Matrix3>(moment).eigenvectors();  // the least extent first
+  Box box;
+  for (const Vector3& point : points) box.extend(axes.transpose() * (point - mean));
+  const double scale = (side - 20) / std::max(box.extent().z(), 1e-9);
+  Image<Rgb> image(side, int(scale * box.extent().y()) + 21, black);
+  Image<float> nearest(image.width, image.height, 2.0f);
+  for (const Vector3& point : points) {
+    const Vector3 own = axes.transpose() * (point - mean) - box.min;
+    const double depth = own.x() / std::max(box.extent().x(), 1e-9);
+    for (int dv = 0; dv < 2; ++dv)
+      for (int du = 0; du < 2; ++du) {
+        const int u = 10 + du + int(scale * own.z()), v = 10 + dv + int(scale * own.y());
+        if (!image.contains(u, v) || float(depth) >= nearest(u, v)) continue;
+        nearest(u, v) = float(depth);
+        image(u, v) = ramp_at(depth);
+      }
+  }
   return image;
 }
 
