@@ -5,8 +5,6 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "capture/capture.hpp"
-
 namespace pliant {
 
 PinholeCamera look_at(const Vector3& eye, const Vector3& target, const Vector3& up, int width, int height,

@@ -1,10 +1,9 @@
 #pragma once
 
 #include "base/types.hpp"
+#include "geometry/camera.hpp"
 
 namespace pliant {
-
-struct PinholeCamera;  // capture/capture.hpp
 
 /// Camera at `eye` that sees `target` in the middle of its image, with `up` upwards in it.
 /// @param vertical_field_of_view  [rad], 0 < angle < pi, over the whole height of the image

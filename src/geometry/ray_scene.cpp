@@ -8,8 +8,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "capture/capture.hpp"
-
 namespace pliant {
 
 namespace {

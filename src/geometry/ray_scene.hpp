@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "base/types.hpp"
+#include "geometry/camera.hpp"
 #include "geometry/triangle_mesh.hpp"
 
 namespace pliant {
-
-struct PinholeCamera;  // capture/capture.hpp
 
 /// The nearest triangle that a ray meets.
 struct RayHit {
