@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "base/files.hpp"
 #include "elasticity/corotated.hpp"
 #include "model/vtu.hpp"
-#include "report/picture.hpp"
+#include "report/gallery.hpp"
 #include "report/report.hpp"
 
 namespace pliant {
@@ -102,78 +103,77 @@ VtuGrid frame_grid(const Body& body, const VectorX& parameters, const State& sta
   return grid;
 }
 
-/// A few frames that tell the story: the first, the last, and evenly between.
-std::vector<int> told_frames(const std::vector<FrameFit>& frames, int count) {
-  std::vector<int> chosen;
-  for (int i = 0; i < count && !frames.empty(); ++i) {
-    const int frame = frames[std::size_t(i) * (frames.size() - 1) / std::size_t(std::max(1, count - 1))].frame;
-    if (chosen.empty() || chosen.back() != frame) chosen.push_back(frame);
+/// What was observed in a frame, and how far it lies from the simulated surface; points outside the band are left out.
+void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, const Discretisation& d,
+                      const Points& nodes) {
+  std::vector<SurfaceObservation> points;
+  for (const Vector3& p : seen) points.push_back({p, 1.0});
+  const auto matches = d.constraints->match(points, nodes);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (matches[i].cell < 0) continue;
+    frame.points.push_back(points[i].position);
+    frame.residuals.push_back(matches[i].distance / matches[i].stretch);
   }
-  return chosen;
 }
 
-struct FramePicture {
-  int frame;
-  PictureScene scene;
-};
-
-std::vector<FramePicture> picture_scenes(const Capture& capture, const std::vector<ObservedFrame>& observed,
-                                         const FitOutcome& outcome) {
-  const Discretisation& d = outcome.discretisation;
-  const std::vector<int> told = told_frames(outcome.evaluation.frames, 6);
-  const Embedding embedding(d.body->grid, capture.surface->vertices);
+std::vector<Plane> planes_of(const Capture& capture, const VectorX& theta) {
   std::vector<Plane> planes = capture.planes;
   for (std::size_t i = 0; i < planes.size(); ++i) {
-    planes[i].point = outcome.theta.segment<3>(theta::plane_point(int(i)));
-    planes[i].normal = outcome.theta.segment<3>(theta::plane_normal(int(i)));
+    planes[i].point = theta.segment<3>(theta::plane_point(int(i)));
+    planes[i].normal = theta.segment<3>(theta::plane_normal(int(i)));
   }
-  std::vector<FramePicture> pictures;
-  Simulation simulation(d.body, d.simulation);
-  simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
-    if (std::find(told.begin(), told.end(), frame) == told.end()) return true;
-    FramePicture picture{frame, {}};
-    picture.scene.surface = embedding.positions(state.x);
-    picture.scene.triangles = capture.surface->triangles;
-    picture.scene.planes = planes;
-    for (const ObservedFrame& seen : observed) {
-      if (seen.frame != frame + capture.start_frame) continue;
-      std::vector<SurfaceObservation> points;
-      for (const Vector3& p : seen.points) points.push_back({p, 1.0});
-      const auto matches = d.constraints->match(points, state.x);
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        if (matches[i].cell < 0) continue;
-        picture.scene.points.push_back(points[i].position);
-        picture.scene.residuals.push_back(matches[i].distance / matches[i].stretch);
-      }
-    }
-    pictures.push_back(std::move(picture));
-    return frame < told.back();
-  });
-  return pictures;
+  return planes;
 }
 
-void add_pictures(ReportData& report, const Capture& capture, const std::vector<ObservedFrame>& observed,
-                  const FitOutcome& outcome) {
-  const auto scenes = picture_scenes(capture, observed, outcome);
-  if (scenes.empty()) return;
-  Box box;
-  std::vector<double> residuals;
-  for (const FramePicture& p : scenes) {
-    for (Eigen::Index v = 0; v < p.scene.surface.rows(); ++v) box.extend(p.scene.surface.row(v).transpose());
-    residuals.insert(residuals.end(), p.scene.residuals.begin(), p.scene.residuals.end());
-  }
-  PictureOptions options;
-  options.residual_range = report.residual_range = residual_range(residuals);
-  constexpr int width = 480, height = 400;
-  const PinholeCamera camera = capture.depth.empty() ? view_of(box, capture.up, width, height)
-                                                     : framed(capture.depth.front().camera, box, width, height);
-  for (const FramePicture& p : scenes) {
-    char caption[120];
-    const int frame = p.frame + capture.start_frame;
-    std::snprintf(caption, sizeof caption, "Frame %d, %.3f s after the start", frame,
-                  capture.times[std::size_t(frame)] - capture.times[std::size_t(capture.start_frame)]);
-    report.pictures.push_back({encode_png(draw(p.scene, camera, options)), caption});
-  }
+/// A few of the fitted frames that tell the story, simulated with the estimate and drawn over what was observed.
+Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& observed, const FitOutcome& outcome) {
+  const Discretisation& d = outcome.discretisation;
+  Gallery gallery;
+  gallery.triangles = capture.surface->triangles;
+  gallery.planes = planes_of(capture, outcome.theta);
+  if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
+  gallery.up = capture.up;
+  gallery.width = 480, gallery.height = 400;
+  const auto& fitted = outcome.evaluation.frames;
+  std::vector<int> told;
+  for (const int i : spread_frames(0, int(fitted.size()) - 1, 6)) told.push_back(fitted[std::size_t(i)].frame);
+  if (told.empty()) return gallery;
+  const Embedding embedding(d.body->grid, capture.surface->vertices);
+  const double start = capture.times[std::size_t(capture.start_frame)];
+  Simulation simulation(d.body, d.simulation);
+  simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
+    if (!std::ranges::binary_search(told, frame)) return true;
+    const int recorded = frame + capture.start_frame;
+    GalleryFrame drawn{recorded, capture.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
+    const auto seen = std::ranges::find(observed, recorded, &ObservedFrame::frame);
+    if (seen != observed.end()) add_observations(drawn, seen->points, d, state.x);
+    gallery.frames.push_back(std::move(drawn));
+    return frame < told.back();
+  });
+  return gallery;
+}
+
+void add_pictures(ReportData& report, const Gallery& gallery) {
+  if (gallery.frames.empty()) return;
+  report.residual_range = residual_range(all_residuals(gallery));
+  report.pictures = draw_gallery(gallery, report.residual_range);
+}
+
+/// A stage's name for people.
+std::string spoken_stage(const std::string& stage) {
+  static const std::map<std::string, std::string> names = {{"motion", "motion at the start"},
+                                                           {"coarse", "coarse grid"},
+                                                           {"fine, wide band", "fine grid, outliers kept"},
+                                                           {"fine", "fine grid"}};
+  const auto it = names.find(stage);
+  return it == names.end() ? stage : it->second;
+}
+
+/// The convergence that the page draws: the scan's trials are no iterations.
+ConvergenceHistory drawn_history(ConvergenceHistory history) {
+  std::erase_if(history.rows, [](const ConvergenceRow& row) { return row.stage == "scan"; });
+  for (ConvergenceRow& row : history.rows) row.stage = spoken_stage(row.stage);
+  return history;
 }
 
 VectorX model_theta(const Model& model, const Vector3& gravity) {
@@ -360,9 +360,10 @@ void write_fit_output(const fs::path& folder, const Capture& capture, const std:
   ReportData report;
   report.title = capture.name;
   report.result = make_result(capture, outcome, facts);
-  report.convergence = history_of(outcome);
+  const ConvergenceHistory history = history_of(outcome);
+  report.convergence = drawn_history(history);
   write_result(folder / "result.json", report.result);
-  write_convergence(folder / "convergence.csv", report.convergence);
+  write_convergence(folder / "convergence.csv", history);
   save_model(folder, make_model(capture, outcome));
   write_trajectory(folder, outcome.discretisation.body, outcome.discretisation.simulation, outcome.theta,
                    [&](int done, int total) { return tell("trajectory", done, total), true; });
@@ -374,7 +375,7 @@ void write_fit_output(const fs::path& folder, const Capture& capture, const std:
   if (outcome.correlation.size() > 0)
     report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   tell("pictures", 0, 1);
-  add_pictures(report, capture, observed, outcome);
+  add_pictures(report, gallery_of(capture, observed, outcome));
   tell("pictures", 1, 1);
   write_report(folder / "report.html", report);
 }

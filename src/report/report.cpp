@@ -191,18 +191,24 @@ void check(const ConvergenceHistory& history) {
       throw std::invalid_argument("report_html: a convergence row does not fit its parameters' names");
 }
 
+// The stages in the order in which they came, where there is more than one.
+std::string stages_sentence(const ConvergenceHistory& history) {
+  std::vector<std::string> stages;
+  for (const ConvergenceRow& row : history.rows)
+    if (std::find(stages.begin(), stages.end(), row.stage) == stages.end()) stages.push_back(row.stage);
+  if (stages.size() < 2) return "";
+  std::string names;
+  for (const std::string& stage : stages) names += (names.empty() ? "" : " → ") + escape_html(stage);
+  return "<p class=\"given\">Stages: " + names +
+         ". A line is broken between them; costs on both sides do not compare.</p>\n";
+}
+
 std::string convergence(const ReportData& data) {
   check(data.convergence);
   if (data.convergence.rows.empty()) return "";
   std::string html = cost_plot(data.convergence), small;
   for (size_t i = 0; i < data.convergence.parameters.size(); ++i) small += parameter_plot(data, i);
-  const bool has_stages = std::any_of(data.convergence.rows.begin(), data.convergence.rows.end(), [&](const auto& row) {
-    return row.stage != data.convergence.rows.front().stage;
-  });
-  if (has_stages)
-    html +=
-        "<p class=\"given\">A line is broken where a start goes on at another resolution; costs on both sides do not "
-        "compare.</p>\n";
+  html += stages_sentence(data.convergence);
   return html + (small.empty() ? "" : "<div class=\"small-plots\">\n" + small + "</div>\n");
 }
 
