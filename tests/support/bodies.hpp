@@ -42,12 +42,12 @@ inline HexGrid sphere_grid(double radius, double cell_size, const HexGridOptions
 /// A box around the origin whose faces lie on lattice planes where `cell_size` divides its edges.
 inline std::shared_ptr<const Body> box_body(const Vector3& size, double cell_size, const BodyOptions& options = {}) {
   const Vector3 half = 0.5 * size;
-  // The surface is drawn in by a trace, so that it is on the same side of every lattice point on a face.
+  // The surface lies a trace outside, so that every lattice point on a face is inside and edges stay sharp.
   const double trace = 1e-7 * cell_size;
   Box covered = centred_box(half + Vector3::Constant(3 * cell_size));
   const SignedDistance distance(covered, cell_size / 4, [=](const Vector3& p) {
     const Vector3 q = p.cwiseAbs() - half;
-    return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0) + trace;
+    return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0) - trace;
   });
   return std::make_shared<Body>(make_body(make_hex_grid(distance, centred_box(half * (1.0 - 1e-9)), cell_size), options));
 }
