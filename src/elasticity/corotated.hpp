@@ -12,7 +12,7 @@ class CorotatedElasticity : public ForceTerm {
  public:
   explicit CorotatedElasticity(std::shared_ptr<const Body> body);
 
-  Lag lag() const override { return Lag::Current; }
+  Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::Blended; }
   void set_parameters(const VectorX& theta) override;
   void linearise(const Points& lag) override;

@@ -13,8 +13,12 @@ class ForceTerm {
  public:
   virtual ~ForceTerm() = default;
 
-  enum class Lag { Current, Predicted };  ///< p: the positions at the step's start, or those plus dt v
-  enum class At { Blended, End };         ///< z: theta-weighted with the damping's share, or the step's end
+  /// p: where the start's velocities would bring the positions within the step, at the time that suits rotations or
+  /// at the time that suits contact.
+  enum class Lag { Rotation, Contact };
+  /// z: between the step's start and end by Newmark's theta, with the stiffness damping's share; by the contact's own
+  /// weight; or the step's end.
+  enum class At { Blended, Contact, End };
 
   virtual Lag lag() const = 0;
   virtual At at() const = 0;

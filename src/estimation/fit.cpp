@@ -8,6 +8,7 @@
 #include <cmath>
 #include <mutex>
 #include <numeric>
+#include <tuple>
 
 #include "base/error.hpp"
 #include "capture/find_plane.hpp"
@@ -221,8 +222,13 @@ class Fit {
       if (is_valley(a) != is_valley(b)) return is_valley(a);
       return cost(a) < cost(b);
     });
+    const double least = std::min_element(state_.scan.begin(), state_.scan.end(), [](const auto& a, const auto& b) {
+                           return a.second < b.second;
+                         })->second;
+    constexpr double hopeless = 4.0;  // valleys this much above the lowest are not worth following
     for (const int i : order) {
       if (int(start_moduli_.size()) >= options_.starts || !std::isfinite(cost(i))) break;
+      if (cost(i) > hopeless * least) continue;
       start_moduli_.push_back(state_.scan[std::size_t(i)].first);
     }
     if (start_moduli_.empty())
@@ -234,12 +240,17 @@ class Fit {
     if (outcome_.interrupted) return;
     if (!scanned_) start_moduli_ = {parameters_.reference()[theta::youngs_modulus]};
     const std::size_t count = start_moduli_.size();
-    if (state_.starts.size() == count) return;
+    if (state_.starts.size() == count) {
+      outcome_.starts = state_.starts;
+      return;
+    }
     std::vector<FitStart> starts(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) { starts[i] = follow(int(i), start_moduli_[i]); }, tbb::simple_partitioner());
     if (interrupted()) outcome_.interrupted = true;
-    state_.starts = starts;
-    if (!outcome_.interrupted) save_state();
+    outcome_.starts = starts;
+    if (outcome_.interrupted) return;  // half-followed starts are a result, but nothing to go on from
+    state_.starts = std::move(starts);
+    save_state();
   }
 
   /// One start on the coarse grid: wide band, horizon growing as the early frames match.
@@ -278,12 +289,13 @@ class Fit {
   }
 
   void refine() {
-    outcome_.starts = state_.starts;
     VectorX theta = parameters_.reference();
-    const auto best = std::min_element(state_.starts.begin(), state_.starts.end(),
+    const auto best = std::min_element(outcome_.starts.begin(), outcome_.starts.end(),
                                        [](const FitStart& a, const FitStart& b) { return a.cost < b.cost; });
-    if (best != state_.starts.end() && std::isfinite(best->cost)) theta = best->final;
+    const int index = best == outcome_.starts.end() ? 0 : int(best - outcome_.starts.begin());
+    if (best != outcome_.starts.end() && std::isfinite(best->cost)) theta = best->final;
     if (state_.fine) theta = *state_.fine;
+    const bool was_interrupted = outcome_.interrupted;
     ParameterSet parameters = parameters_;
     parameters.set_reference(theta);
     int counter = 0;
@@ -293,18 +305,27 @@ class Fit {
       const int iterations = outcome_.interrupted ? 1 : last ? options_.max_iterations : std::max(1, options_.max_iterations / 4);
       if (outcome_.interrupted && !last) continue;
       Objective objective = make_objective(fine_, parameters, band, last_frame_);
-      s = optimise(objective, parameters.to_unconstrained(parameters.reference()), last ? "fine" : "fine, wide band", 0,
+      s = optimise(objective, parameters.to_unconstrained(parameters.reference()), last ? "fine" : "fine, wide band", index,
                    iterations, counter, last ? 0.6 : 0.45, last ? 1.0 : 0.6);
       if (!s.succeeded) break;
       parameters.set_reference(parameters.to_theta(s.p));
-      state_.fine = parameters.reference();
-      save_state();
+      if (!was_interrupted) {
+        state_.fine = parameters.reference();
+        save_state();
+      }
       if (s.interrupted) outcome_.interrupted = true;
     }
     finish(parameters, s);
   }
 
+  /// Starts run side by side; their history is told in an order that does not depend on who was faster.
+  void sort_history() {
+    const auto rank = [](const FitEvent& e) { return e.stage == "motion" ? 0 : e.stage == "scan" ? 1 : e.stage == "coarse" ? 2 : 3; };
+    std::ranges::stable_sort(outcome_.history, {}, [&](const FitEvent& e) { return std::tuple(rank(e), e.start, e.iteration); });
+  }
+
   void finish(ParameterSet& parameters, OptimiserSummary& s) {
+    sort_history();
     outcome_.discretisation = fine_;
     outcome_.converged = s.converged && !outcome_.interrupted;
     outcome_.reason = outcome_.interrupted ? "interrupted" : s.reason;

@@ -23,7 +23,7 @@ struct FitOptions {
   int max_iterations = 25;       ///< of each stage of the optimiser, >= 1
   double wide_band = 0.12;       ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
   double fine_band = 0.05;       ///< of the last stage, (0, 0.5)
-  double newmark_theta = 0.55;   ///< [0.5, 1)
+  double newmark_theta = 0.51;   ///< [0.5, 1)
   OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
   SolverKind solver = SolverKind::Automatic;
   double solver_tolerance = 1e-8;

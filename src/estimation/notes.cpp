@@ -43,9 +43,10 @@ void say_what_is_assumed(FitOutcome& outcome) {
 }
 
 void say_if_starts_disagree(FitOutcome& outcome) {
-  double low = INFINITY, high = 0.0;
+  double low = INFINITY, high = 0.0, least = INFINITY;
+  for (const FitStart& s : outcome.starts) least = std::min(least, s.cost);
   for (const FitStart& s : outcome.starts) {
-    if (!std::isfinite(s.cost)) continue;
+    if (!(s.cost < 1.5 * least)) continue;  // a start that fits far worse is no rival
     low = std::min(low, s.final[theta::youngs_modulus]);
     high = std::max(high, s.final[theta::youngs_modulus]);
   }

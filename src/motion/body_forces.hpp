@@ -9,7 +9,7 @@ namespace pliant {
 class Gravity : public ForceTerm {
  public:
   explicit Gravity(const Body& body);
-  Lag lag() const override { return Lag::Current; }
+  Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
   void set_parameters(const VectorX& theta) override;
   void linearise(const Points&) override {}

@@ -26,7 +26,7 @@ class FixedRegions : public ForceTerm {
   /// Throws InputError where a hold contains nothing of the object.
   FixedRegions(std::shared_ptr<const Body> body, const std::vector<Hold>& holds, double penalty = 40.0);
 
-  Lag lag() const override { return Lag::Current; }
+  Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
   void set_parameters(const VectorX& theta) override;
   void linearise(const Points&) override {}

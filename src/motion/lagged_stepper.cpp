@@ -12,9 +12,15 @@ LaggedStepper::LaggedStepper(std::shared_ptr<const Body> body, std::vector<std::
   if (!(options.newmark_theta >= 0.5 && options.newmark_theta < 1.0))
     throw std::invalid_argument("Newmark's theta must lie in [0.5, 1)");
   solver_ = make_linear_solver(body_->pattern, options.solver);
-  for (Points* p : {&predicted_, &blended_, &end_, &force_, &d_blended_, &d_end_, &d_predicted_, &d_force_, &w_,
-                    &blended_bar_, &end_bar_, &predicted_bar_, &current_bar_, &mass_part_})
-    p->setZero(body_->node_count(), 3);
+  if (!(options_.contact_weight > 0.5 && options_.contact_weight <= 1.0))
+    throw std::invalid_argument("the contact's weight must lie in (0.5, 1]");
+  if (!(options_.rotation_prediction >= 0.0 && options_.rotation_prediction <= 1.0))
+    throw std::invalid_argument("the prediction of rotations must lie in [0, 1]");
+  for (Points* p : {&force_, &d_blended_, &d_force_, &w_, &mass_part_}) p->setZero(body_->node_count(), 3);
+  for (auto* points : {&lag_, &d_lag_, &lag_bar_})
+    for (Points& p : *points) p.setZero(body_->node_count(), 3);
+  for (auto* points : {&points_at_, &bar_at_})
+    for (Points& p : *points) p.setZero(body_->node_count(), 3);
   solution_.setZero(3 * body_->node_count());
 }
 
@@ -25,8 +31,22 @@ void LaggedStepper::set_parameters(const VectorX& parameters) {
   for (auto& term : terms_) term->set_parameters(parameters);
 }
 
-const Points& LaggedStepper::lag_point(const ForceTerm& term, const State& start) {
-  return term.lag() == ForceTerm::Lag::Current ? start.x : predicted_;
+namespace {
+constexpr std::array all_lags = {ForceTerm::Lag::Rotation, ForceTerm::Lag::Contact};
+}
+
+double LaggedStepper::weight(ForceTerm::At at) const {
+  switch (at) {
+    case ForceTerm::At::Blended: return options_.newmark_theta + stiffness_damping_ / options_.dt;
+    case ForceTerm::At::Contact: return options_.contact_weight;
+    case ForceTerm::At::End: break;
+  }
+  return 1.0;
+}
+
+void LaggedStepper::set_points_at(const State& start, const Points& delta) {
+  for (const auto at : {ForceTerm::At::Blended, ForceTerm::At::Contact, ForceTerm::At::End})
+    points_at_[std::size_t(at)] = start.x + weight(at) * delta;
 }
 
 void LaggedStepper::clear_held(Points& points) const {
@@ -35,7 +55,7 @@ void LaggedStepper::clear_held(Points& points) const {
 
 bool LaggedStepper::prepare(const State& start) {
   if (!start.x.allFinite() || !start.v.allFinite()) return false;
-  predicted_ = start.x + options_.dt * start.v;
+  for (const auto lag : all_lags) lag_[std::size_t(lag)] = start.x + prediction(lag) * start.v;
   const double m = mass_factor();
   const std::vector<double>& mass = body_->mass;
   matrix_.set_zero();
@@ -44,8 +64,8 @@ bool LaggedStepper::prepare(const State& start) {
     block[0] = block[4] = block[8] = m * mass[b];
   }
   for (auto& term : terms_) {
-    term->linearise(lag_point(*term, start));
-    term->add_matrix(term->at() == ForceTerm::At::Blended ? options_.dt * blend() : options_.dt, matrix_);
+    term->linearise(lag_[std::size_t(term->lag())]);
+    term->add_matrix(options_.dt * weight(term->at()), matrix_);
   }
   for (const int node : held_) matrix_.constrain(node);
   return solver_->factorise(matrix_);
@@ -75,15 +95,14 @@ void LaggedStepper::advance(const Points& delta, State& state) const {
 void LaggedStepper::tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change) {
   const double dt = options_.dt, t = options_.newmark_theta;
   const double d_beta = d_theta[theta::stiffness_damping];
-  blended_ = start.x + blend() * delta;
-  end_ = start.x + delta;
+  set_points_at(start, delta);
   d_blended_ = change.x + d_beta / dt * delta;
-  d_predicted_ = change.x + dt * change.v;
+  for (const auto lag : all_lags) d_lag_[std::size_t(lag)] = change.x + prediction(lag) * change.v;
   d_force_.setZero();
   for (auto& term : terms_) {
-    const bool blended = term->at() == ForceTerm::At::Blended, current = term->lag() == ForceTerm::Lag::Current;
-    term->add_force_tangent(blended ? blended_ : end_, current ? change.x : d_predicted_, blended ? d_blended_ : change.x,
-                            d_theta, d_force_);
+    const bool blended = term->at() == ForceTerm::At::Blended;
+    term->add_force_tangent(points_at_[std::size_t(term->at())], d_lag_[std::size_t(term->lag())],
+                            blended ? d_blended_ : change.x, d_theta, d_force_);
   }
   d_force_ *= dt;
   mass_part_ = density_ / t * change.v;
@@ -100,8 +119,7 @@ void LaggedStepper::tangent(const State& start, const Points& delta, const Vecto
 
 void LaggedStepper::adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar) {
   const double dt = options_.dt, t = options_.newmark_theta;
-  blended_ = start.x + blend() * delta;
-  end_ = start.x + delta;
+  set_points_at(start, delta);
   force_ = bar.x + bar.v / (t * dt);
   clear_held(force_);
   solution_.setZero();
@@ -116,15 +134,19 @@ void LaggedStepper::adjoint(const State& start, const Points& delta, State& bar,
   theta_bar[theta::density] += mass_part_.cwiseProduct(start.v).sum() / t - (1.0 / (t * dt) + mass_damping_) * w_m_delta;
 
   w_ *= dt;
-  for (Points* p : {&blended_bar_, &end_bar_, &predicted_bar_, &current_bar_}) p->setZero();
+  for (Points& p : lag_bar_) p.setZero();
+  for (Points& p : bar_at_) p.setZero();
   for (auto& term : terms_) {
-    const bool blended = term->at() == ForceTerm::At::Blended, current = term->lag() == ForceTerm::Lag::Current;
-    term->add_force_adjoint(blended ? blended_ : end_, w_, current ? current_bar_ : predicted_bar_,
-                            blended ? blended_bar_ : end_bar_, theta_bar);
+    const auto at = std::size_t(term->at());
+    term->add_force_adjoint(points_at_[at], w_, lag_bar_[std::size_t(term->lag())], bar_at_[at], theta_bar);
   }
-  theta_bar[theta::stiffness_damping] += blended_bar_.cwiseProduct(delta).sum() / dt;
-  bar.x += current_bar_ + predicted_bar_ + blended_bar_ + end_bar_;
-  bar.v = -(1.0 - t) / t * bar.v + density_ / t * mass_part_ + dt * predicted_bar_;
+  theta_bar[theta::stiffness_damping] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
+  bar.v = -(1.0 - t) / t * bar.v + density_ / t * mass_part_;
+  for (const Points& p : bar_at_) bar.x += p;
+  for (const auto lag : all_lags) {
+    bar.x += lag_bar_[std::size_t(lag)];
+    bar.v += prediction(lag) * lag_bar_[std::size_t(lag)];
+  }
 }
 
 }  // namespace pliant

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -17,14 +18,20 @@ struct State {
 struct StepOptions {
   double dt = 0.0;             ///< [s], > 0
   double newmark_theta = 0.5;  ///< [0.5, 1): weight of the step's end; above 0.5 adds numerical damping
+  /// Where in the step contact acts, (0.5, 1]: 1 is backward Euler, which damps an impact by an error of first order;
+  /// near 0.5 the error nearly vanishes, but stiff contact rings.
+  double contact_weight = 0.6;
+  /// Rotations are those of x + this dt v, [0, 1]: 0 takes the start's, as in the paper, an error of first order;
+  /// 1/2 predicts the middle of the step, of second order.
+  double rotation_prediction = 0.5;
   SolverOptions solver;
 };
 
 /// One step of the Newmark scheme with lagged rotations (Weiss 2020, eq. 14-15, the sign of the (1 - theta) dt K term
 /// corrected: it is subtracted). With Delta = x' - x and the terms' affine forces,
-///   (1/(theta dt) + alpha) M Delta = M v / theta + dt [ sum of f(x + (theta + beta/dt) Delta) + sum of f(x + Delta) ],
+///   (1/(theta dt) + alpha) M Delta = M v / theta + dt sum of f(x + s Delta),
 ///   v' = Delta / (theta dt) - (1 - theta)/theta v,
-/// the first sum over terms blended with the step's start and the stiffness damping, the second over terms at the end.
+/// s = theta + beta/dt for blended terms (the stiffness damping's share with them), the contact's weight, or 1.
 /// One linear system a step; its tangent and adjoint solve with the same (symmetric) matrix.
 class LaggedStepper {
  public:
@@ -55,8 +62,12 @@ class LaggedStepper {
   const BlockMatrix& matrix() const { return matrix_; }
 
  private:
-  const Points& lag_point(const ForceTerm& term, const State& start);
-  double blend() const { return options_.newmark_theta + stiffness_damping_ / options_.dt; }
+  double prediction(ForceTerm::Lag lag) const {
+    return options_.dt * (lag == ForceTerm::Lag::Rotation ? options_.rotation_prediction : options_.contact_weight);
+  }
+  double weight(ForceTerm::At at) const;
+  /// Sets `points_at_` to the positions x + s Delta at which terms act.
+  void set_points_at(const State& start, const Points& delta);
   double mass_factor() const { return density_ * (1.0 / (options_.newmark_theta * options_.dt) + mass_damping_); }
   void clear_held(Points& points) const;
 
@@ -69,8 +80,9 @@ class LaggedStepper {
 
   BlockMatrix matrix_;
   std::unique_ptr<LinearSolver> solver_;
-  Points predicted_, blended_, end_, force_, d_blended_, d_end_, d_predicted_, d_force_, w_;
-  Points blended_bar_, end_bar_, predicted_bar_, current_bar_, mass_part_;
+  std::array<Points, 3> points_at_, bar_at_;    // by ForceTerm::At
+  std::array<Points, 2> lag_, d_lag_, lag_bar_;  // by ForceTerm::Lag
+  Points force_, d_blended_, d_force_, w_, mass_part_;
   VectorX solution_;
 };
 

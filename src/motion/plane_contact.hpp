@@ -12,16 +12,16 @@ struct ContactOptions {
 
 /// Penalty contact of the surface with one plane: pressure k softplus(-gap), the soft minimum of Weiss 2020, eq. 18,
 /// integrated over surface samples through the embedding.
-/// The force at the step's end follows from the time derivative (eq. 19), taken further than the paper does: it is
-/// linearised about the predicted positions x + dt v, with its slope in the step's matrix, so that a fast impact is
+/// The force during the step follows from the time derivative (eq. 19), taken further than the paper does: it is
+/// linearised about the predicted positions x + w dt v, with its slope in the step's matrix, so that a fast impact is
 /// stopped in the step in which it happens and stiff contact stays stable.
 class PlaneContact : public ForceTerm {
  public:
   /// @param plane  which plane of theta
   PlaneContact(std::shared_ptr<const Body> body, int plane, const ContactOptions& options);
 
-  Lag lag() const override { return Lag::Predicted; }
-  At at() const override { return At::End; }
+  Lag lag() const override { return Lag::Contact; }
+  At at() const override { return At::Contact; }
   void set_parameters(const VectorX& theta) override;
   void linearise(const Points& lag) override;
   void add_force(const Points& z, Points& force) override;

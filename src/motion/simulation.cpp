@@ -27,7 +27,8 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(body),
       options_(std::move(options)),
-      stepper_(body, make_terms(body, options_), {options_.max_dt, options_.newmark_theta, options_.solver}),
+      stepper_(body, make_terms(body, options_), {options_.max_dt, options_.newmark_theta, options_.contact_weight, options_.rotation_prediction,
+                options_.solver}),
       rest_(body->reference_positions()) {
   if (options_.hold_strongly) {
     stepper_.hold(held_nodes(*body_, options_.holds));
@@ -190,7 +191,7 @@ ContactOptions default_contact(const Body& body, double mass, double gravity) {
 double default_time_step(const Body& body, double gravity) {
   Box box;
   for (Eigen::Index n = 0; n < body.grid.nodes.rows(); ++n) box.extend(body.grid.nodes.row(n).transpose());
-  return 0.025 * std::sqrt(box.extent().maxCoeff() / gravity);
+  return 0.0125 * std::sqrt(box.extent().maxCoeff() / gravity);
 }
 
 }  // namespace pliant

@@ -16,7 +16,8 @@ namespace pliant {
 struct SimulationOptions {
   std::vector<double> times;  ///< [s] of each frame; the first is when the object is let go
   double max_dt = 0.0;        ///< [s], > 0: each interval is cut into equal steps no longer than this
-  double newmark_theta = 0.55;
+  double newmark_theta = 0.51;
+  double contact_weight = 0.6, rotation_prediction = 0.5;  ///< see StepOptions
   SolverOptions solver;
   ContactOptions contact;
   int planes = 0;              ///< in theta
