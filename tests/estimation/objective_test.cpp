@@ -1,0 +1,174 @@
+#include "estimation/objective.hpp"
+
+#include "support/derivatives.hpp"
+#include "support/recordings.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+constexpr double cell_size = 0.05;
+
+/// A recording seen from other parameters than those that made it.
+struct Scene {
+  explicit Scene(int planes) : recording(test::torus_recording(cell_size, 6, planes, 1e-3)) {
+    VectorX theta = recording.truth;
+    theta[theta::youngs_modulus] *= 1.4;
+    theta[theta::poissons_ratio] = 0.3;
+    theta[theta::mass_damping] *= 1.5;
+    theta[theta::stiffness_damping] *= 0.7;
+    theta[theta::density] *= 1.1;
+    theta.segment<3>(theta::gravity) += Vector3(0.1, 0.2, -0.1);
+    theta.segment<3>(theta::linear_velocity) += Vector3(0.02, -0.03, 0.04);
+    theta.segment<3>(theta::angular_velocity) += Vector3(-0.2, 0.1, 0.1);
+    if (planes > 0) theta.segment<3>(theta::plane_point(0)) += Vector3(0.0, 2e-3, 0.0);
+    parameters = test::torus_parameters(theta, planes);
+    std::vector<Parameter> list = parameters.parameters();
+    for (Parameter& q : list) q.estimated = true;
+    list[1].prior_std = 0.5;
+    list[1].prior_mean = VectorX::Zero(1);
+    parameters = ParameterSet(list, theta);
+    p = parameters.to_unconstrained(theta);
+    p.array() += 0.01;
+  }
+  test::Recording recording;
+  ParameterSet parameters;
+  VectorX p;
+};
+
+class Gradient : public ::testing::TestWithParam<int> {};
+
+TEST_P(Gradient, SceneIsWorthDifferentiating) {
+  Scene scene(GetParam());
+  Objective objective = scene.recording.objective(scene.parameters);
+  const CostEvaluation e = objective.evaluate(scene.p);
+  ASSERT_TRUE(e.succeeded) << e.failure;
+  EXPECT_EQ(e.frames.size(), 5u);
+  EXPECT_GT(e.matched_fraction(), 0.95);
+  EXPECT_GT(e.surface_rms(), 1e-3);
+  EXPECT_LT(e.surface_rms(), 0.03);
+}
+
+TEST_P(Gradient, AdjointTangentsAndEvaluationAgree) {
+  Scene scene(GetParam());
+  Objective objective = scene.recording.objective(scene.parameters);
+  const CostEvaluation by_adjoint = objective.gradient(scene.p), by_tangents = objective.linearise(scene.p);
+  ASSERT_TRUE(by_adjoint.succeeded && by_tangents.succeeded);
+  EXPECT_NEAR(by_adjoint.cost, by_tangents.cost, tolerance(1e-10) * by_adjoint.cost);
+  EXPECT_NEAR(objective.evaluate(scene.p).cost, by_tangents.cost, tolerance(1e-12) * by_adjoint.cost);
+  const VectorX scale = by_tangents.gauss_newton.diagonal().cwiseSqrt();  // what each gradient is measured by
+  for (Eigen::Index i = 0; i < scene.p.size(); ++i) {
+    ASSERT_GT(std::abs(by_tangents.gradient[i]), 1e-6 * scale[i]) << scene.parameters.coordinate_names()[std::size_t(i)];
+    EXPECT_NEAR(by_adjoint.gradient[i], by_tangents.gradient[i], tolerance(1e-8) * std::max(std::abs(by_tangents.gradient[i]), scale[i]))
+        << scene.parameters.coordinate_names()[std::size_t(i)];
+  }
+}
+
+TEST_P(Gradient, MatchesCentralDifferencesInEveryParameter) {
+  Scene scene(GetParam());
+  Objective objective = scene.recording.objective(scene.parameters);
+  const VectorX gradient = objective.gradient(scene.p).gradient;
+  for (Eigen::Index i = 0; i < scene.p.size(); ++i) {
+    const auto along = [&](double h) {
+      return VectorX::Constant(1, objective.evaluate(scene.p + h * VectorX::Unit(scene.p.size(), i)).cost);
+    };
+    const double error = test::best_relative_error(along, VectorX::Constant(1, gradient[i]), 0.1);
+    EXPECT_LT(error, tolerance(1e-5)) << scene.parameters.coordinate_names()[std::size_t(i)];
+  }
+}
+
+TEST_P(Gradient, GaussNewtonMatrixIsThatOfTheResiduals) {
+  Scene scene(GetParam());
+  Objective objective = scene.recording.objective(scene.parameters);
+  const CostEvaluation e = objective.linearise(scene.p);
+  Simulation simulation(scene.recording.scene.body, scene.recording.scene.options);
+  const auto& seen = *scene.recording.observations;
+  const auto distances = [&](const VectorX& p) {
+    std::vector<double> all;
+    simulation.run(scene.parameters.to_theta(p), [&](int frame, const State& state, auto) {
+      if (frame > 0)
+        for (const PointMatch& m : scene.recording.constraints->match(seen[std::size_t(frame - 1)].points, state.x))
+          all.push_back(m.cell < 0 ? 1.0 : m.distance);
+      return true;
+    });
+    return VectorX(Eigen::Map<VectorX>(all.data(), Eigen::Index(all.size())));
+  };
+  const VectorX r = distances(scene.p);
+  MatrixX J(r.size(), scene.p.size());
+  for (Eigen::Index i = 0; i < scene.p.size(); ++i) {
+    const VectorX step = 1e-6 * VectorX::Unit(scene.p.size(), i);
+    J.col(i) = (distances(scene.p + step) - distances(scene.p - step)) / 2e-6;
+  }
+  const RobustLoss loss{objective.options().outlier_scale};
+  const VectorX w = r.unaryExpr([&](double d) { return loss.weight(d) / (1e-3 * 1e-3); });  // 40 points: all count in full
+  VectorX curvature, unused;
+  scene.parameters.prior(scene.p, &unused, &curvature);
+  const MatrixX expected = J.transpose() * w.asDiagonal() * J + MatrixX(curvature.asDiagonal());
+  const VectorX scale = expected.diagonal().cwiseSqrt().cwiseInverse();
+  const MatrixX difference = scale.asDiagonal() * (e.gauss_newton - expected) * scale.asDiagonal();
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), tolerance(1e-4));  // kinks of the distance's grid within the steps
+  EXPECT_GT(curvature.maxCoeff(), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(FlightAndContact, Gradient, ::testing::Values(0, 1),
+                         [](const auto& kind) { return kind.param ? "Contact" : "Flight"; });
+
+TEST(Objective, FreeFlightKnowsOnlyTheRatioOfStiffnessAndDensity) {
+  test::Recording recording = test::torus_recording(cell_size, 6, 0, 1e-3);
+  ParameterSet parameters = recording.parameters;
+  parameters.set_estimated("youngs_modulus", true);
+  parameters.set_estimated("density", true);
+  Objective objective = recording.objective(parameters);
+  VectorX p = parameters.to_unconstrained(recording.truth);
+  p[0] += 0.2;
+  const CostEvaluation e = objective.linearise(p);
+  ASSERT_GT(std::abs(e.gradient[0]), 1e-3);
+  EXPECT_NEAR(e.gradient[0], -e.gradient[1], tolerance(1e-8) * std::abs(e.gradient[0]));
+  const double cost = objective.evaluate(p + VectorX::Constant(2, 0.5)).cost;
+  EXPECT_NEAR(cost, e.cost, tolerance(1e-8) * e.cost);
+}
+
+TEST(Objective, ManyPointsOfAFrameCountAsFew) {
+  const test::Recording few = test::torus_recording(cell_size, 3, 1, 1e-3, 1, 40);
+  const test::Recording many = test::torus_recording(cell_size, 3, 1, 1e-3, 1, 400);
+  const double one = few.objective(few.parameters).evaluate(VectorX(0)).cost;
+  const double ten = many.objective(many.parameters).evaluate(VectorX(0)).cost;
+  // 400 points count as 50; the expected cost of noise is half a point's.
+  EXPECT_NEAR(ten / one, 50.0 / 40.0, 0.4);
+}
+
+TEST(Objective, PointsBeyondTheBandCostAConstantAndNothingMore) {
+  const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
+  const double clean = recording.objective(recording.parameters).evaluate(VectorX(0)).cost;
+  test::Recording dirty = recording;
+  dirty.observations = std::make_shared<std::vector<FrameObservations>>(*recording.observations);
+  SurfaceObservation& point = (*dirty.observations)[1].points[3];
+  std::vector<double> costs;
+  for (const double away : {0.5, 3.0}) {
+    point.position = Vector3(away, away, away);
+    const CostEvaluation e = dirty.objective(dirty.parameters).evaluate(VectorX(0));
+    EXPECT_EQ(e.frames[1].matched, 39);
+    costs.push_back(e.cost);
+  }
+  EXPECT_EQ(costs[0], costs[1]);
+  EXPECT_GT(costs[0], clean + 100.0);
+  EXPECT_LT(costs[0], clean + RobustLoss{0.03}.outlier() / 1e-6 + 1e-6);
+}
+
+TEST(Objective, AFailedSimulationIsReportedNotThrown) {
+  test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
+  recording.scene.options.solver.max_iterations = 1;
+  ParameterSet parameters = recording.parameters;
+  parameters.set_estimated("youngs_modulus", true);
+  Objective objective = recording.objective(parameters);
+  const VectorX p = parameters.to_unconstrained(recording.truth);
+  for (const CostEvaluation& e : {objective.evaluate(p), objective.linearise(p), objective.gradient(p)}) {
+    EXPECT_FALSE(e.succeeded);
+    EXPECT_FALSE(e.failure.empty());
+  }
+}
+
+}  // namespace
+}  // namespace pliant
