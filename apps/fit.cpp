@@ -149,6 +149,8 @@ int run(const Arguments& arguments) {
       throw InputError({{state_file}, "there is no interrupted fit to resume", "the state that an interrupted fit leaves", "leave out --resume"});
     state = read_fit_state(state_file, key);
     log.line("resuming the fit in " + out.string());
+  } else {
+    fs::remove(state_file);
   }
   write_file(out / "fit.toml", to_toml(options));
 
@@ -158,6 +160,7 @@ int run(const Arguments& arguments) {
   monitor.interrupted = [] { return is_interrupted(); };
   const FitOutcome outcome = fit(capture, observed, options, monitor, std::move(state));
   log.clear_live();
+  if (outcome.interrupted && !fs::exists(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
   if (!outcome.evaluation.succeeded) {
     log.line("the fit ended without a result: " + outcome.reason);
     write_file(out / "log.txt", log.text());

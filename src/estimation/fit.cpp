@@ -44,17 +44,31 @@ void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
   parameters = ParameterSet(std::move(list), std::move(theta));
 }
 
-/// A capture with what its images show of planes that are only roughly known.
-Capture with_planes_seen(Capture capture, std::vector<std::string>& notes) {
-  for (std::size_t i = 0; i < capture.planes.size(); ++i) {
-    if (capture.planes[i].known) continue;
-    const auto found = find_plane(capture, capture.planes[i]);
-    if (!found) continue;
-    capture.planes[i].point = found->point;
-    capture.planes[i].normal = found->normal;
-    notes.push_back("Plane " + std::to_string(i + 1) + " is visible in the depth images; the fit starts from where it is seen there.");
+/// Puts planes that are only roughly known where the depth images show them. Returns the numbers of those found.
+std::vector<int> take_planes_from_images(Capture& capture) {
+  std::vector<int> found;
+  for (int i = 0; i < int(capture.planes.size()); ++i) {
+    Plane& plane = capture.planes[std::size_t(i)];
+    if (plane.known) continue;
+    const auto seen = find_plane(capture, plane);
+    if (!seen) continue;
+    plane.point = seen->point;
+    plane.normal = seen->normal;
+    found.push_back(i);
   }
-  return capture;
+  return found;
+}
+
+/// Thousands of readings fix a visible plane; what is left is the sensor's bias and the softness of contact, about this
+/// part of the object's size, and as many radians.
+constexpr double seen_plane_std = 0.003;
+
+void trust_planes_seen(ParameterSet& parameters, const std::vector<int>& planes) {
+  std::vector<Parameter> list = parameters.parameters();
+  for (Parameter& p : list)
+    for (const int plane : planes)
+      if (p.theta_index == theta::plane_point(plane)) p.prior_std = seen_plane_std;
+  parameters = ParameterSet(std::move(list), parameters.reference());
 }
 
 class Fit {
@@ -62,13 +76,18 @@ class Fit {
   Fit(const Capture& capture, const std::vector<ObservedFrame>& observed, const FitOptions& options,
       const FitMonitor& monitor, FitState state)
       : options_(options), monitor_(monitor), state_(std::move(state)) {
-    capture_ = with_planes_seen(capture, outcome_.notes);
+    capture_ = capture;
     require_fittable(capture_);
+    const std::vector<int> planes_seen = take_planes_from_images(capture_);
+    for (const int plane : planes_seen)
+      outcome_.notes.push_back("Plane " + std::to_string(plane + 1) +
+                               " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
     observations_ = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture_, observed));
     if (observations_->empty())
       throw InputError({{capture.file}, "no frame shows any point of the object", "depth images or clouds that see it",
                         "run `pliant check` on the capture to see what the cameras saw"});
     parameters_ = default_parameters(capture_, enclosed_volume(*capture_.surface));
+    trust_planes_seen(parameters_, planes_seen);
     apply_overrides(parameters_, options_);
     const double band = std::max(options_.wide_band, options_.fine_band) * 1.25;
     distance_ = capture_distance(capture_, band);

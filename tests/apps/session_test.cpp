@@ -1,0 +1,222 @@
+// One user's session on a small recording: synth, check, fit, simulate, evaluate; with interruptions.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <pugixml.hpp>
+#include <set>
+
+#include "apps/program.hpp"
+#include "base/files.hpp"
+
+namespace pliant::test {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr int fine = 0, not_converged = 3, was_interrupted = 130;
+constexpr int frames = 14;  // of scene.toml
+
+json read_json(const fs::path& path) { return json::parse(read_file(path)); }
+
+double value(const json& result, const char* name) { return result["parameters"][name]["value"]; }
+
+/// The parts of a result that the same seed must reproduce.
+std::string without_times(json result) {
+  result.erase("time");
+  return result.dump(1);
+}
+
+class Session : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("pliant.session." + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    const ProgramRun synth = run_pliant({"synth", PLIANT_TEST_SCENE, "--out", capture()});
+    ASSERT_EQ(synth.exit_code, fine) << synth.err;
+    fit_ = new ProgramRun(run_fit("fit", {"--threads", "2"}));
+    ASSERT_EQ(fit_->exit_code, fine) << fit_->err << fit_->out;
+  }
+  static void TearDownTestSuite() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+    delete fit_;
+  }
+
+  static std::string at(const std::string& name) { return (folder_ / name).string(); }
+  static std::string capture() { return at("capture"); }
+
+  /// A fit of a few seconds.
+  static ProgramRun run_fit(const std::string& name, std::vector<std::string> more = {}, const std::string& interrupt_at = "") {
+    std::vector<std::string> arguments = {"fit", capture(), "--out", at(name), "--seed", "3"};
+    for (const char* choice : {"cells=6", "coarse_cells=5", "points_per_frame=100", "scan_per_decade=1", "starts=1", "steps=0.4"})
+      arguments.insert(arguments.end(), {"--set", choice});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_pliant(arguments, interrupt_at);
+  }
+  static json result(const std::string& name = "fit") { return read_json(at(name) + "/result.json"); }
+
+  static inline fs::path folder_;
+  static inline ProgramRun* fit_ = nullptr;
+};
+
+TEST_F(Session, CheckDescribesTheRecording) {
+  const ProgramRun run = run_pliant({"check", capture()});
+  EXPECT_EQ(run.exit_code, fine) << run.err;
+  for (const char* text : {"a small ball", "64 x 64", "14 in", "+ "}) EXPECT_THAT(run.out, HasSubstr(text));
+}
+
+TEST_F(Session, FitFindsTheTruthAndSaysSo) {
+  const json found = result();
+  const json truth = read_json(capture() + "/truth.json");
+  const double youngs_modulus = truth["parameters"]["youngs_modulus"]["value"];
+  // Another grid, other steps and a hundred noisy points a frame.
+  EXPECT_NEAR(value(found, "youngs_modulus") / youngs_modulus, 1.0, 0.10);
+  EXPECT_THAT(fit_->out, HasSubstr("Young's modulus"));
+  EXPECT_THAT(fit_->out, HasSubstr("report.html"));
+}
+
+TEST_F(Session, FitWritesEveryPromisedFile) {
+  for (const char* name : {"result.json", "model.toml", "model.vtu", "trajectory.pvd", "convergence.csv", "report.html", "log.txt"})
+    EXPECT_TRUE(fs::is_regular_file(at("fit") + "/" + name)) << name;
+  EXPECT_FALSE(fs::exists(at("fit") + "/state.json")) << "a finished fit leaves no state";
+}
+
+TEST_F(Session, ResultHoldsWhatTheFormatPromises) {
+  const json found = result();
+  EXPECT_EQ(found["format"], "result/1");
+  for (const char* key : {"software", "capture", "parameters", "error", "cost", "identifiability", "starts", "time"})
+    EXPECT_TRUE(found.contains(key)) << key;
+  EXPECT_EQ(found["software"]["name"], "pliant");
+  EXPECT_EQ(found["capture"]["sha256"].get<std::string>().size(), 64U);
+  for (const char* name : {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping", "density", "gravity", "plane",
+                           "linear_velocity", "angular_velocity"}) {
+    ASSERT_TRUE(found["parameters"].contains(name)) << name;
+    const json& p = found["parameters"][name];
+    EXPECT_TRUE(p.contains("value")) << name;
+    EXPECT_EQ(p.contains("std") && p.contains("start"), p["estimated"].get<bool>()) << name;
+  }
+  EXPECT_GT(found["parameters"]["youngs_modulus"]["std"].get<double>(), 0.0);
+  EXPECT_EQ(found["parameters"]["youngs_modulus"]["unit"], "Pa");
+  EXPECT_EQ(found["error"]["points"], 100 * frames);
+  EXPECT_GT(found["cost"]["start"].get<double>(), found["cost"]["final"].get<double>());
+  EXPECT_EQ(found["starts"].size(), 1U);
+  EXPECT_GT(found["time"]["ms_per_forward_step"].get<double>(), 0.0);
+}
+
+TEST_F(Session, TrajectoryIsWhole) {
+  pugi::xml_document pvd;
+  ASSERT_TRUE(pvd.load_file((at("fit") + "/trajectory.pvd").c_str()));
+  int count = 0;
+  for (const pugi::xml_node entry : pvd.child("VTKFile").child("Collection").children("DataSet")) {
+    const fs::path file = fs::path(at("fit")) / entry.attribute("file").value();
+    pugi::xml_document frame;
+    ASSERT_TRUE(frame.load_file(file.c_str())) << file;
+    const pugi::xml_node piece = frame.child("VTKFile").child("UnstructuredGrid").child("Piece");
+    EXPECT_GT(piece.attribute("NumberOfCells").as_int(), 0);
+    std::set<std::string> arrays;
+    for (const char* data : {"PointData", "CellData"})
+      for (const pugi::xml_node array : piece.child(data).children()) arrays.insert(array.attribute("Name").value());
+    EXPECT_THAT(arrays, testing::IsSupersetOf({"displacement [m]", "velocity [m/s]", "strain [1]", "stress [Pa]"}));
+    ++count;
+  }
+  EXPECT_EQ(count, frames);
+}
+
+TEST_F(Session, ReportStandsAlone) {
+  const std::string page = read_file(at("fit") + "/report.html");
+  EXPECT_THAT(page, HasSubstr("a small ball"));
+  EXPECT_THAT(page, HasSubstr("data:image/png;base64,"));
+  EXPECT_THAT(page, HasSubstr("mm rms"));
+  for (const char* link : {"src=\"http", "href=\"http", "<script", "@import"}) EXPECT_THAT(page, Not(HasSubstr(link)));
+}
+
+TEST_F(Session, ConvergenceHasARowForEachIteration) {
+  const std::string table = read_file(at("fit") + "/convergence.csv");
+  EXPECT_THAT(table, testing::StartsWith("start,stage,iteration,cost,damping,youngs_modulus [Pa]"));
+  for (const char* stage : {"scan", "coarse", "fine"}) EXPECT_THAT(table, HasSubstr(stage));
+}
+
+TEST_F(Session, SavedChoicesReproduceTheResult) {
+  const ProgramRun run = run_pliant({"fit", capture(), "--out", at("again"), "--config", at("fit") + "/fit.toml"});
+  ASSERT_EQ(run.exit_code, fine) << run.err;
+  EXPECT_EQ(without_times(result("again")), without_times(result()));
+}
+
+TEST_F(Session, ThreadsDoNotChangeTheResult) {
+  ASSERT_EQ(run_fit("one thread", {"--threads", "1"}).exit_code, fine);
+  EXPECT_EQ(without_times(result("one thread")), without_times(result()));
+  for (const char* file : {"model.toml", "model.vtu", "convergence.csv", "frames/000013.vtu"})
+    EXPECT_EQ(read_file(at("one thread") + "/" + file), read_file(at("fit") + "/" + file)) << file;
+}
+
+TEST_F(Session, SimulateRepeatsTheFittedMotion) {
+  const ProgramRun run = run_pliant({"simulate", at("fit") + "/model.toml", "--out", at("simulated")});
+  ASSERT_EQ(run.exit_code, fine) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("14 frames"));
+  EXPECT_TRUE(fs::is_regular_file(at("simulated") + "/trajectory.pvd"));
+  // The model file keeps what a simulation needs: last frames agree to the figures that it writes.
+  const auto size_of_last = [&](const std::string& folder) { return fs::file_size(at(folder) + "/frames/000013.vtu"); };
+  EXPECT_EQ(size_of_last("simulated"), size_of_last("fit"));
+}
+
+TEST_F(Session, EvaluateAgreesWithTheFit) {
+  const ProgramRun run = run_pliant({"evaluate", at("fit") + "/model.toml", capture(), "-o", at("evaluation.json")});
+  ASSERT_EQ(run.exit_code, fine) << run.err;
+  const json evaluation = read_json(at("evaluation.json"));
+  EXPECT_EQ(json::parse(run.out), evaluation);
+  EXPECT_EQ(evaluation["format"], "evaluation/1");
+  const double fitted = result()["error"]["surface_rms"], evaluated = evaluation["error"]["surface_rms"];
+  EXPECT_NEAR(evaluated / fitted, 1.0, 0.1) << "more points of the same frames, the same noise";
+}
+
+TEST_F(Session, TooFewIterationsAreNotConverged) {
+  const ProgramRun run = run_fit("short", {"--set", "max_iterations=1", "--set", "optimiser=rprop"});
+  EXPECT_EQ(run.exit_code, not_converged) << run.err;
+  EXPECT_TRUE(fs::is_regular_file(at("short") + "/result.json"));
+  EXPECT_TRUE(fs::is_regular_file(at("short") + "/report.html"));
+}
+
+class InterruptedSession : public Session, public testing::WithParamInterface<const char*> {};
+
+TEST_P(InterruptedSession, LeavesAResultAndIsResumed) {
+  const std::string name = std::string("interrupted at ") + GetParam();
+  const ProgramRun stopped = run_fit(name, {}, std::string("\n") + GetParam());
+  EXPECT_EQ(stopped.exit_code, was_interrupted) << stopped.err;
+  EXPECT_THAT(stopped.out, HasSubstr("--resume"));
+  EXPECT_TRUE(fs::is_regular_file(at(name) + "/result.json"));
+  EXPECT_TRUE(fs::is_regular_file(at(name) + "/report.html"));
+  EXPECT_TRUE(fs::is_regular_file(at(name) + "/state.json"));
+
+  const ProgramRun resumed = run_fit(name, {"--resume"});
+  ASSERT_EQ(resumed.exit_code, fine) << resumed.err;
+  EXPECT_FALSE(fs::exists(at(name) + "/state.json"));
+  const json whole = result(), pieced = result(name);
+  // Interrupted before the last stage, the same path is taken again; within it, another one to the same place.
+  for (const char* parameter : {"youngs_modulus", "poisson_ratio", "stiffness_damping"}) {
+    const double std = whole["parameters"][parameter]["std"];
+    EXPECT_NEAR(value(pieced, parameter), value(whole, parameter), 0.1 * std) << parameter;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Stages, InterruptedSession, testing::Values("scan", "coarse", "fine"),
+                         [](const auto& choice) { return std::string(choice.param); });
+
+TEST_F(Session, AStateOfAnotherFitIsRefused) {
+  const ProgramRun stopped = run_fit("other", {}, "\nscan");
+  ASSERT_EQ(stopped.exit_code, was_interrupted);
+  const ProgramRun resumed = run_fit("other", {"--resume", "--set", "cells=7"});
+  EXPECT_EQ(resumed.exit_code, 2);
+  EXPECT_THAT(resumed.err, HasSubstr("state.json"));
+  const ProgramRun nothing = run_fit("never begun", {"--resume"});
+  EXPECT_EQ(nothing.exit_code, 2);
+}
+
+}  // namespace
+}  // namespace pliant::test
