@@ -1,0 +1,183 @@
+#include "estimation/fit_config.hpp"
+
+#include "estimation/fit_state.hpp"
+#include "input_errors.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using ::testing::HasSubstr;
+
+FitOptions changed() {
+  FitOptions o;
+  o.cells = 17.5;
+  o.coarse_cells = 6.0;
+  o.steps = 2.0;
+  o.points_per_frame = 0;
+  o.scan_per_decade = 5;
+  o.starts = 2;
+  o.max_iterations = 31;
+  o.wide_band = 0.2;
+  o.fine_band = 0.04;
+  o.newmark_theta = 0.6;
+  o.optimiser = OptimiserKind::Rprop;
+  o.solver = SolverKind::Cholmod;
+  o.solver_tolerance = 1e-6;
+  o.hold_strongly = true;
+  o.seed = 42;
+  o.parameters["youngs_modulus"].start = VectorX::Constant(1, 5120.25);
+  o.parameters["poisson_ratio"].estimated = false;
+  o.parameters["density"].prior_std = 0.125;
+  VectorX g(3);
+  g << 0.0, -9.5, 0.25;
+  o.parameters["gravity"].start = g;
+  o.parameters["gravity"].estimated = true;
+  return o;
+}
+
+TEST(FitConfig, RoundTripsEveryKey) {
+  const test::TemporaryFolder folder;
+  const FitOptions written = changed();
+  FitOptions read;
+  read_fit_options(folder.write("fit.toml", to_toml(written)), read);
+  EXPECT_EQ(to_toml(read), to_toml(written));
+  EXPECT_EQ(read.cells, 17.5);
+  EXPECT_EQ(read.points_per_frame, 0);
+  EXPECT_EQ(read.optimiser, OptimiserKind::Rprop);
+  EXPECT_EQ(read.solver, SolverKind::Cholmod);
+  EXPECT_EQ(read.solver_tolerance, 1e-6);
+  EXPECT_TRUE(read.hold_strongly);
+  EXPECT_EQ(read.seed, 42u);
+  ASSERT_TRUE(read.parameters.contains("gravity"));
+  EXPECT_EQ(*read.parameters.at("gravity").start, *written.parameters.at("gravity").start);
+  EXPECT_EQ(read.parameters.at("gravity").estimated, true);
+  EXPECT_EQ(*read.parameters.at("youngs_modulus").start, VectorX::Constant(1, 5120.25));
+  EXPECT_EQ(read.parameters.at("density").prior_std, 0.125);
+  EXPECT_EQ(read.validate(), "");
+}
+
+TEST(FitConfig, DefaultsRoundTripAndEveryKeyIsWritten) {
+  const test::TemporaryFolder folder;
+  const std::string text = to_toml({});
+  FitOptions read = changed();
+  read.parameters.clear();
+  read_fit_options(folder.write("fit.toml", text), read);
+  EXPECT_EQ(to_toml(read), text);
+  for (const FitKey& key : fit_keys()) {
+    EXPECT_THAT(text, HasSubstr("\n" + key.name + " = "));
+    EXPECT_FALSE(key.sentence.empty());
+    FitOptions o;
+    EXPECT_NO_THROW(set_fit_option(o, key.name + "=" + key.standard)) << "the default shown in the help is not accepted";
+    EXPECT_EQ(to_toml(o), text) << "the help shows another default than is used: " << key.name;
+  }
+}
+
+TEST(FitConfig, UnknownKeysSuggestTheNearest) {
+  FitOptions o;
+  EXPECT_THAT(test::complaint_of([&] { set_fit_option(o, "max_iteration=3"); }), HasSubstr("max_iterations"));
+  EXPECT_THAT(test::complaint_of([&] { set_fit_option(o, "youngs_modulos=3"); }), HasSubstr("youngs_modulus"));
+  EXPECT_NE(test::complaint_of([&] { set_fit_option(o, "density.prior=3"); }), "");
+  EXPECT_NE(test::complaint_of([&] { set_fit_option(o, "cells"); }), "");
+  EXPECT_NE(test::complaint_of([&] { set_fit_option(o, "=4"); }), "");
+  EXPECT_EQ(to_toml(o).find("[parameters.max"), std::string::npos);
+}
+
+TEST(FitConfig, ValuesOfAnotherTypeAreRefused) {
+  for (const char* bad : {"cells=many", "cells=", "cells=12x", "starts=1.5", "starts=-1", "optimiser=newton", "solver=fast",
+                          "hold_strongly=yes", "youngs_modulus=stiff", "gravity=1,2", "gravity.estimate=maybe", "density.prior_std=-1",
+                          "density.prior_std=0"}) {
+    FitOptions o;
+    EXPECT_NE(test::complaint_of([&] { set_fit_option(o, bad); }), "") << bad;
+  }
+}
+
+TEST(FitConfig, AFileReportsEveryProblemWithItsPlace) {
+  const test::TemporaryFolder folder;
+  const auto path = folder.write("fit.toml", "cells = \"many\"\nstarts = 2\nmax_iteration = 3\n[parameters.densty]\nstart = 4\n");
+  FitOptions o;
+  const std::string complaint = test::complaint_of([&] { read_fit_options(path, o); });
+  EXPECT_THAT(complaint, HasSubstr("fit.toml:1:"));
+  EXPECT_THAT(complaint, HasSubstr("fit.toml:3:"));
+  EXPECT_THAT(complaint, HasSubstr("max_iterations"));
+  EXPECT_THAT(complaint, HasSubstr("fit.toml:5:"));
+  EXPECT_THAT(complaint, HasSubstr("densty"));
+  EXPECT_NE(test::complaint_of([&] { read_fit_options(folder.write("broken.toml", "cells = = 3"), o); }), "");
+  EXPECT_NE(test::complaint_of([&] { read_fit_options(folder / "missing.toml", o); }), "");
+}
+
+TEST(FitOptions, ValidateNamesWhatIsOutOfRange) {
+  EXPECT_EQ(FitOptions{}.validate(), "");
+  const auto complaint = [](auto&& change) {
+    FitOptions o;
+    change(o);
+    return o.validate();
+  };
+  EXPECT_THAT(complaint([](FitOptions& o) { o.cells = 2; }), HasSubstr("cells"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.cells = std::nan(""); }), HasSubstr("cells"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.coarse_cells = 100; }), HasSubstr("coarse_cells"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.steps = 0; }), HasSubstr("steps"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.points_per_frame = 3; }), HasSubstr("points_per_frame"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.starts = 0; }), HasSubstr("starts"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.scan_per_decade = 0; }), HasSubstr("scan_per_decade"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.max_iterations = 0; }), HasSubstr("max_iterations"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.wide_band = 0.7; }), HasSubstr("band"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.fine_band = 0.0; }), HasSubstr("band"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.newmark_theta = 0.4; }), HasSubstr("newmark_theta"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.solver_tolerance = 1.0; }), HasSubstr("solver_tolerance"));
+}
+
+FitState some_state() {
+  FitState state;
+  state.scan = {{100.0, 2.5}, {1000.0, std::numeric_limits<double>::infinity()}, {1.0 / 3.0, 1e-300}};
+  state.motion = VectorX::LinSpaced(20, -1.0, 3.0) / 7.0;
+  FitStart start;
+  start.start = VectorX::Constant(4, 0.1);
+  start.final = VectorX::Constant(4, 1.0 / 3.0);
+  start.start_cost = 12.0;
+  start.cost = std::numeric_limits<double>::infinity();
+  start.iterations = 7;
+  start.converged = true;
+  start.reason = "steps became \"short\"";
+  state.starts = {start, start};
+  state.fine = VectorX::Constant(3, 2.0 / 7.0);
+  return state;
+}
+
+TEST(FitState, RoundTripsToTheLastBit) {
+  const test::TemporaryFolder folder;
+  const FitState written = some_state();
+  write_fit_state(folder / "state.json", written, "key");
+  const FitState read = read_fit_state(folder / "state.json", "key");
+  EXPECT_EQ(read.scan, written.scan);
+  EXPECT_EQ(*read.motion, *written.motion);
+  EXPECT_EQ(*read.fine, *written.fine);
+  ASSERT_EQ(read.starts.size(), 2u);
+  EXPECT_EQ(read.starts[1].start, written.starts[1].start);
+  EXPECT_EQ(read.starts[1].final, written.starts[1].final);
+  EXPECT_EQ(read.starts[1].start_cost, 12.0);
+  EXPECT_EQ(read.starts[1].cost, written.starts[1].cost);
+  EXPECT_EQ(read.starts[1].iterations, 7);
+  EXPECT_TRUE(read.starts[1].converged);
+  EXPECT_EQ(read.starts[1].reason, written.starts[1].reason);
+  write_fit_state(folder / "empty.json", {}, "key");
+  EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").motion.has_value());
+}
+
+TEST(FitState, RefusesAnotherKeyAndDamage) {
+  const test::TemporaryFolder folder;
+  write_fit_state(folder / "state.json", some_state(), "key");
+  EXPECT_THAT(test::complaint_of([&] { (void)read_fit_state(folder / "state.json", "other"); }), HasSubstr("another capture"));
+  EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder / "missing.json", "key"); }), "");
+  const std::string whole = read_file(folder / "state.json");
+  for (const std::size_t length : {std::size_t(0), std::size_t(1), whole.size() / 2, whole.size() - 2})
+    EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder.write("cut.json", whole.substr(0, length)), "key"); }), "") << length;
+  for (const char* text : {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})",
+                           R"({"format": "fit-state/0", "key": "key", "scan": [], "starts": []})",
+                           R"({"format": "fit-state/1", "key": "key", "scan": [[1]], "starts": []})",
+                           R"({"format": "fit-state/1", "key": "key", "scan": [], "starts": [], "fine": ["x"]})"})
+    EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder.write("bad.json", text), "key"); }), "") << text;
+}
+
+}  // namespace
+}  // namespace pliant

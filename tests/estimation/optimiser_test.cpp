@@ -1,0 +1,201 @@
+#include "estimation/optimiser.hpp"
+
+#include "estimation/fit.hpp"
+#include "support/recordings.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+constexpr double cell_size = 0.05;
+
+ParameterSet estimating(const test::Recording& recording, const std::vector<std::string>& names, const VectorX& start) {
+  ParameterSet set = recording.parameters;
+  for (const std::string& name : names) set.set_estimated(name, true);
+  set.set_reference(start);
+  return set;
+}
+
+VectorX with_modulus(VectorX theta, double factor) {
+  theta[theta::youngs_modulus] *= factor;
+  return theta;
+}
+
+double fitted_modulus(const test::Recording& recording, double start_factor, const OptimiserOptions& options,
+                      OptimiserSummary* out = nullptr) {
+  const ParameterSet set = estimating(recording, {"youngs_modulus"}, with_modulus(recording.truth, start_factor));
+  Objective objective = recording.objective(set, 0.033);
+  const OptimiserSummary summary = minimise(objective, set.to_unconstrained(set.reference()), options);
+  EXPECT_TRUE(summary.succeeded) << summary.reason;
+  EXPECT_LE(summary.evaluation.cost, summary.start_cost);
+  if (out) *out = summary;
+  return set.to_theta(summary.p)[theta::youngs_modulus];
+}
+
+/// An inverse crime on purpose: the fitting model made the data, so the truth has to come back.
+TEST(LevenbergMarquardt, RecoversTheModulusOfItsOwnModelFromFarOff) {
+  const test::Recording recording = test::torus_recording(cell_size, 9, 1, 0.0, 1, 40, 0.0, 1.0, 1e-10);
+  const double truth = recording.truth[theta::youngs_modulus];
+  for (const double start : {0.3, 3.0}) {
+    OptimiserSummary summary;
+    const double found = fitted_modulus(recording, start, {}, &summary);
+    EXPECT_TRUE(summary.converged) << summary.reason;
+    EXPECT_LE(summary.iterations, 15);
+    // The surface samples lie on the distance's grid only up to its own error, spacing^2 / (4 tube radius).
+    EXPECT_NEAR(found / truth, 1.0, tolerance(0.01)) << "from " << start;
+  }
+}
+
+TEST(LevenbergMarquardt, RecoversTheModulusOfAFinerModel) {
+  const test::Recording recording = test::torus_recording(0.03, 10, 1, 0.5e-3, 2, 40, 0.02, 0.5, 1e-8);
+  OptimiserSummary summary;
+  const double found = fitted_modulus(recording, 0.5, {}, &summary) / recording.truth[theta::youngs_modulus];
+  RecordProperty("ratio", std::to_string(found));
+  EXPECT_NEAR(found, 1.0, tolerance(0.05));
+}
+
+TEST(LevenbergMarquardt, RecoversSeveralParametersTogether) {
+  const test::Recording recording = test::torus_recording(cell_size, 9, 1, 0.0, 1, 40, 0.0, 1.0, 1e-10);
+  VectorX start = with_modulus(recording.truth, 0.6);
+  start[theta::stiffness_damping] *= 2.0;
+  start.segment<3>(theta::linear_velocity) += Vector3(0.05, -0.05, 0.05);
+  start.segment<3>(theta::plane_point(0)) += Vector3(0.0, 2e-3, 0.0);
+  const ParameterSet set = estimating(recording, {"youngs_modulus", "stiffness_damping", "linear_velocity", "plane"}, start);
+  Objective objective = recording.objective(set, 0.033);
+  OptimiserOptions options;
+  options.cost_tolerance = 1e-6;
+  const OptimiserSummary summary = minimise(objective, set.to_unconstrained(start), options);
+  ASSERT_TRUE(summary.succeeded);
+  const VectorX theta = set.to_theta(summary.p);
+  EXPECT_NEAR(theta[theta::youngs_modulus] / recording.truth[theta::youngs_modulus], 1.0, tolerance(0.05));
+  EXPECT_LT((theta - recording.truth).segment<3>(theta::linear_velocity).norm(), tolerance(0.01));
+  EXPECT_LT(summary.evaluation.cost, 0.02 * summary.start_cost);
+}
+
+class BaselineOptimiser : public ::testing::TestWithParam<OptimiserKind> {};
+
+TEST_P(BaselineOptimiser, LowersTheCostAndComesClose) {
+  const test::Recording recording = test::torus_recording(cell_size, 9, 1, 0.0, 1, 40, 0.0, 1.0, 1e-10);
+  OptimiserOptions options;
+  options.kind = GetParam();
+  options.max_iterations = 40;
+  OptimiserSummary summary;
+  const double found = fitted_modulus(recording, 2.0, options, &summary);
+  EXPECT_LT(summary.evaluation.cost, 0.1 * summary.start_cost);
+  EXPECT_NEAR(found / recording.truth[theta::youngs_modulus], 1.0, tolerance(0.03));
+  EXPECT_FALSE(summary.reason.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, BaselineOptimiser, ::testing::Values(OptimiserKind::Rprop, OptimiserKind::GradientDescent, OptimiserKind::LevenbergMarquardt));
+
+TEST_P(BaselineOptimiser, AStartThatIsNoNumberFailsWithAReason) {
+  const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
+  const ParameterSet set = estimating(recording, {"linear_velocity"}, recording.truth);
+  Objective objective = recording.objective(set);
+  OptimiserOptions options;
+  options.kind = GetParam();
+  const OptimiserSummary summary = minimise(objective, VectorX::Constant(3, std::nan("")), options);
+  EXPECT_FALSE(summary.succeeded);
+  EXPECT_NE(summary.reason, "not run");
+  EXPECT_FALSE(summary.reason.empty());
+}
+
+/// Stiffer bodies need more iterations of the linear solver than it is allowed: every step that far fails.
+TEST_P(BaselineOptimiser, BacksOffFromStepsThatCannotBeSimulated) {
+  test::Recording recording = test::torus_recording(cell_size, 6, 0, 0.0, 1, 40, 0.0, 1.0, 1e-10);
+  recording.scene.options.max_dt = 1.0;  // a step a frame: the stiffness weighs more
+  const VectorX start = with_modulus(recording.truth, 0.25);
+  ParameterSet set = estimating(recording, {"youngs_modulus"}, start);
+  const VectorX p = set.to_unconstrained(start);
+  int allowed = 5;
+  for (;; ++allowed) {
+    recording.scene.options.solver.max_iterations = allowed;
+    if (recording.objective(set).linearise(p).succeeded && recording.objective(set).gradient(p).succeeded) break;
+    ASSERT_LT(allowed, 100);
+  }
+  Objective objective = recording.objective(set);
+  ASSERT_FALSE(objective.evaluate(p + VectorX::Constant(1, 1.4)).succeeded) << "the truth can be simulated: nothing fails";
+  OptimiserOptions options;
+  options.kind = GetParam();
+  options.max_iterations = 8;
+  int rejected = 0;
+  const OptimiserSummary summary = minimise(objective, p, options, [&](const Iteration& i) {
+    rejected += !i.accepted;
+    EXPECT_TRUE(std::isfinite(i.cost));
+    return true;
+  });
+  EXPECT_TRUE(summary.succeeded);
+  EXPECT_TRUE(summary.evaluation.succeeded);
+  EXPECT_LE(summary.evaluation.cost, summary.start_cost);
+  EXPECT_GT(rejected, 0);
+}
+
+TEST_P(BaselineOptimiser, StopsWhenTold) {
+  const test::Recording recording = test::torus_recording(cell_size, 6, 1, 0.0, 1, 40, 0.0, 1.0, 1e-8);
+  const ParameterSet set = estimating(recording, {"youngs_modulus"}, with_modulus(recording.truth, 3.0));
+  Objective objective = recording.objective(set);
+  OptimiserOptions options;
+  options.kind = GetParam();
+  const OptimiserSummary stopped = minimise(objective, set.to_unconstrained(set.reference()), options, [](const Iteration& i) { return i.number < 2; });
+  EXPECT_TRUE(stopped.interrupted);
+  EXPECT_FALSE(stopped.converged);
+  EXPECT_EQ(stopped.iterations, 2);
+  options.max_iterations = 1;
+  const OptimiserSummary one = minimise(objective, set.to_unconstrained(set.reference()), options);
+  EXPECT_EQ(one.iterations, 1);
+  EXPECT_FALSE(one.interrupted);
+}
+
+TEST(Minimise, NothingToEstimateIsDoneAtOnce) {
+  const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
+  Objective objective = recording.objective(recording.parameters);
+  const OptimiserSummary summary = minimise(objective, VectorX(0), {});
+  EXPECT_TRUE(summary.succeeded);
+  EXPECT_EQ(summary.iterations, 0);
+}
+
+/// Frames that each measure a line's slope and offset with independent noise: the truth is the least-squares covariance.
+TEST(ParameterCovariance, OfALinearModel) {
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  const int frames = 400, points = 5;
+  CostEvaluation e;
+  e.gauss_newton = MatrixX::Zero(2, 2);
+  MatrixX total = MatrixX::Zero(2, 2);
+  for (int f = 0; f < frames; ++f) {
+    FrameFit fit;
+    fit.gradient = VectorX::Zero(2);
+    fit.gauss_newton = MatrixX::Zero(2, 2);
+    for (int i = 0; i < points; ++i) {
+      VectorX row(2);
+      row << 1.0, double(i) - 1.0;
+      fit.gradient += row * normal(random);
+      fit.gauss_newton += row * row.transpose();
+    }
+    total += fit.gauss_newton;
+    e.frames.push_back(fit);
+  }
+  e.gauss_newton = total;
+  const MatrixX least_squares = total.inverse(), covariance = parameter_covariance(e);
+  EXPECT_LT((covariance - covariance.transpose()).norm(), tolerance(1e-12) * covariance.norm());
+  for (int i = 0; i < 2; ++i) {
+    const double ratio = covariance(i, i) / least_squares(i, i);
+    EXPECT_GE(ratio, 1.0) << "never surer than the curvature";
+    EXPECT_LT(ratio, 3.0);
+  }
+  // Errors that a frame's points share count as the few that they are.
+  for (FrameFit& fit : e.frames) fit.gradient *= 3.0;
+  const MatrixX shared = parameter_covariance(e);
+  EXPECT_GT(shared(0, 0), 5.0 * least_squares(0, 0));
+}
+
+TEST(ParameterCovariance, StaysFiniteWithoutFrames) {
+  CostEvaluation e;
+  e.gauss_newton = 4.0 * MatrixX::Identity(3, 3);
+  EXPECT_LT((parameter_covariance(e) - 0.25 * MatrixX::Identity(3, 3)).norm(), tolerance(1e-14));
+}
+
+}  // namespace
+}  // namespace pliant
