@@ -18,8 +18,14 @@ function(pliant_room name)
   cmake_parse_arguments(ROOM "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   add_library(pliant_${name} STATIC ${ROOM_SOURCES})
   add_library(pliant::${name} ALIAS pliant_${name})
-  target_include_directories(pliant_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>)
+  set_target_properties(pliant_${name} PROPERTIES EXPORT_NAME ${name})
+  set_property(GLOBAL APPEND PROPERTY PLIANT_ROOMS ${name})
+  target_include_directories(pliant_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include/pliant>)
   target_compile_features(pliant_${name} PUBLIC cxx_std_20)
+  if(PLIANT_NATIVE) # Eigen aligns by the processor's vectors: who links such a library must be compiled alike
+    target_compile_options(pliant_${name} INTERFACE $<INSTALL_INTERFACE:-march=native>)
+  endif()
   target_link_libraries(pliant_${name} PUBLIC ${ROOM_DEPENDS} PRIVATE $<BUILD_INTERFACE:pliant_options> ${ROOM_PRIVATE_DEPENDS})
 endfunction()
 

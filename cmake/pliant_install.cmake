@@ -1,0 +1,23 @@
+# cmake --install: the program, the rooms' libraries and headers, and a package that find_package(pliant) finds.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+get_property(rooms GLOBAL PROPERTY PLIANT_ROOMS)
+add_library(pliant_library INTERFACE)
+add_library(pliant::pliant ALIAS pliant_library)
+list(TRANSFORM rooms PREPEND pliant_ OUTPUT_VARIABLE room_targets)
+target_link_libraries(pliant_library INTERFACE ${room_targets})
+set_target_properties(pliant_library PROPERTIES EXPORT_NAME pliant)
+
+set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pliant)
+install(TARGETS pliant RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS pliant_library ${room_targets} EXPORT pliantTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pliant FILES_MATCHING PATTERN "*.hpp")
+install(EXPORT pliantTargets NAMESPACE pliant:: DESTINATION ${package_folder})
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/docs/licences.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/pliantConfig.cmake.in ${PROJECT_BINARY_DIR}/pliantConfig.cmake
+  INSTALL_DESTINATION ${package_folder})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/pliantConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/pliantConfig.cmake ${PROJECT_BINARY_DIR}/pliantConfigVersion.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/FindCHOLMOD.cmake DESTINATION ${package_folder})
