@@ -1,0 +1,114 @@
+"""What every experiment needs: run the program, time it, and keep figures as JSON. Standard library only."""
+import argparse
+import csv
+import json
+import math
+import os
+import pathlib
+import platform
+import subprocess
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DEFAULT_PROGRAM = ROOT / "build/release/apps/pliant"
+
+
+def arguments(description, **more):
+    """Arguments that all experiments share: the program, and where its large files go."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("program", nargs="?", type=pathlib.Path, default=DEFAULT_PROGRAM, help="the pliant binary")
+    parser.add_argument("--work", type=pathlib.Path, help="folder for captures and fits; a temporary one where left out")
+    for name, options in more.items():
+        parser.add_argument("--" + name, **options)
+    parsed = parser.parse_args()
+    parsed.program = parsed.program.resolve()
+    parsed.work = parsed.work or pathlib.Path(tempfile.mkdtemp(prefix="pliant."))
+    parsed.work.mkdir(parents=True, exist_ok=True)
+    return parsed
+
+
+def shared_data():
+    """The folder of shared recordings: PLIANT_SHARED_DATA, or beside the source tree."""
+    return pathlib.Path(os.environ.get("PLIANT_SHARED_DATA", ROOT.parent / "shared/data"))
+
+
+def run(program, *words, allowed=(0,)):
+    """Runs a command of the program. Returns its wall time [s], processor time [s] and peak memory [MiB]."""
+    begin = time.monotonic()
+    child = subprocess.Popen([str(program), *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    output = child.stdout.read()
+    _, status, usage = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode not in allowed:
+        raise SystemExit(f"pliant {' '.join(map(str, words))} returned {child.returncode}:\n{output[-2000:]}")
+    return {"exit_code": child.returncode, "wall_seconds": round(time.monotonic() - begin, 2),
+            "processor_seconds": round(usage.ru_utime + usage.ru_stime, 2), "peak_memory_mib": round(usage.ru_maxrss / 1024, 1)}
+
+
+def settings(choices):
+    words = []
+    for key, value in choices.items():
+        words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
+    return words
+
+
+def fit(program, capture, out, choices=None, threads=None):
+    """Fits a capture. Returns the run's figures, the result, and the iterations by stage."""
+    words = ["fit", capture, "--out", out, *settings(choices or {})]
+    if threads:
+        words += ["--threads", threads]
+    figures = run(program, *words, allowed=(0, 3))
+    figures["result"] = read(pathlib.Path(out) / "result.json")
+    with open(pathlib.Path(out) / "convergence.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    stages = [row["stage"] for row in rows]
+    figures["iterations"] = {stage: stages.count(stage) for stage in dict.fromkeys(stages)}
+    return figures
+
+
+def evaluate(program, model, capture, out):
+    run(program, "evaluate", model, capture, "-o", out)
+    return read(out)
+
+
+def read(path):
+    return json.loads(pathlib.Path(path).read_text())
+
+
+def number(value, digits=5):
+    return None if value is None else float(f"{value:.{digits}g}")
+
+
+def machine():
+    """What the figures were measured on."""
+    model = platform.machine()
+    try:
+        for line in open("/proc/cpuinfo"):
+            if line.startswith("model name"):
+                model = line.split(":", 1)[1].strip()
+                break
+    except OSError:
+        pass
+    return {"processor": model, "cores": os.cpu_count(), "load": round(os.getloadavg()[0], 1)}
+
+
+def write_results(script, figures):
+    """Writes results.json beside an experiment's script."""
+    path = pathlib.Path(script).resolve().parent / "results.json"
+    path.write_text(json.dumps({"machine": machine(), **figures}, indent=1, allow_nan=False) + "\n")
+    print(path)
+
+
+def relative_error(estimate, truth):
+    return estimate / truth - 1.0
+
+
+def median(values):
+    ordered = sorted(values)
+    middle = len(ordered) // 2
+    return ordered[middle] if len(ordered) % 2 else 0.5 * (ordered[middle - 1] + ordered[middle])
+
+
+def log_uniform(random, low, high):
+    return math.exp(random.uniform(math.log(low), math.log(high)))
