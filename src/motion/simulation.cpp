@@ -185,7 +185,7 @@ ContactOptions default_contact(const Body& body, double mass, double gravity) {
   const double size = box.extent().maxCoeff();
   double projected = 0.0;  // a convex body's mean projected area is a quarter of its surface
   for (const SurfacePoint& point : body.grid.surface) projected += 0.25 * point.area;
-  return {mass * gravity / (projected * 1e-4 * size), 2e-3 * size};
+  return {mass * gravity / (projected * 1e-4 * size), 1e-3 * size};
 }
 
 double default_time_step(const Body& body, double gravity) {

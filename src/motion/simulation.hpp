@@ -84,7 +84,8 @@ class Simulation {
 };
 
 /// Stiffness and smoothing of contact that suit an object of this size and weight: its weight on its projected area
-/// presses it in by 1e-4 of its size.
+/// presses it in by 1e-4 of its size, and contact sets in over 1e-3 of it: the smallest that steps of the default length
+/// resolve. Softer contact lets the object hover and rebound more than a rigid floor does.
 ContactOptions default_contact(const Body& body, double mass, double gravity);
 
 /// The longest step that suits an object of this size falling under this gravity.
