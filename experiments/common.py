@@ -54,13 +54,20 @@ def settings(choices):
 
 
 def fit(program, capture, out, choices=None, threads=None):
-    """Fits a capture. Returns the run's figures, the result, and the iterations by stage."""
+    """Fits a capture. Returns the run's figures, the result, and the iterations by stage.
+
+    A fit whose figures are in its folder already is not run again: an experiment that was stopped goes on."""
     words = ["fit", capture, "--out", out, *settings(choices or {})]
     if threads:
         words += ["--threads", threads]
-    figures = run(program, *words, allowed=(0, 3))
-    figures["result"] = read(pathlib.Path(out) / "result.json")
-    with open(pathlib.Path(out) / "convergence.csv", newline="") as file:
+    out = pathlib.Path(out)
+    if (out / "figures.json").exists():
+        figures = read(out / "figures.json")
+    else:
+        figures = run(program, *words, allowed=(0, 3))
+        (out / "figures.json").write_text(json.dumps(figures))
+    figures["result"] = read(out / "result.json")
+    with open(out / "convergence.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     stages = [row["stage"] for row in rows]
     figures["iterations"] = {stage: stages.count(stage) for stage in dict.fromkeys(stages)}
