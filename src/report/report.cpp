@@ -256,6 +256,12 @@ std::string correlation_table(const CorrelationTable& correlations) {
          "together.</p>\n";
 }
 
+// The parameter that a start's number belongs to: "linear_velocity.x" is one of three.
+const ParameterResult* parameter_of(const Result& result, const std::string& name) {
+  const ParameterResult* p = result.find(name);
+  return p ? p : result.find(name.substr(0, name.find('.')));
+}
+
 std::string starts_table(const Result& result) {
   if (result.starts.empty()) return "";
   std::string body;
@@ -263,7 +269,8 @@ std::string starts_table(const Result& result) {
     const StartResult& s = result.starts[i];
     std::string ends;
     for (const auto& [name, value] : s.final) {
-      const ParameterResult* p = result.find(name);
+      const ParameterResult* p = parameter_of(result, name);
+      if (p && !p->estimated) continue;  // the same for all starts
       ends += (ends.empty() ? "" : "; ") + spoken_name(name) + " " +
               value_with_uncertainty(value, std::nullopt, p ? p->unit : "1");
     }
