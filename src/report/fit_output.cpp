@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <tuple>
 #include <map>
 
 #include "base/files.hpp"
@@ -70,8 +71,13 @@ ConvergenceHistory history_of(const FitOutcome& outcome) {
     for (const Parameter* p : shown) row.parameters.push_back(e.theta[p->theta_index]);
     history.rows.push_back(std::move(row));
   }
+  // Starts, and the values of a scan, are worked on side by side: their order must not depend on the threads.
+  const auto place = [](const ConvergenceRow& row) {
+    const int stage = row.stage == "motion" ? 0 : row.stage == "scan" ? 1 : 2;
+    return std::tuple(row.start, stage, stage == 1 ? row.iteration : 0);
+  };
   std::stable_sort(history.rows.begin(), history.rows.end(),
-                   [](const auto& a, const auto& b) { return a.start < b.start; });
+                   [&](const auto& a, const auto& b) { return place(a) < place(b); });
   return history;
 }
 
