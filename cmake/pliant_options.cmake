@@ -4,7 +4,7 @@ target_compile_features(pliant_options INTERFACE cxx_std_20)
 target_compile_options(pliant_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow)
 # GCC 12 sees overlapping copies in "text" + std::string where there are none (its bug 105329).
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  target_compile_options(pliant_options INTERFACE -Wno-restrict -Wno-maybe-uninitialized)
+  target_compile_options(pliant_options INTERFACE -Wno-restrict -Wno-maybe-uninitialized -Wno-psabi)
 endif()
 if(PLIANT_WARNINGS_AS_ERRORS)
   target_compile_options(pliant_options INTERFACE -Werror)

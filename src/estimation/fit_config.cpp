@@ -196,7 +196,7 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
   }
   const auto dot = key.find('.');
   const std::string name = key.substr(0, dot);
-  if (!parameter_names.contains(name)) reject_unknown(key);
+  if (!parameter_names.contains(name)) reject_unknown(name);
   set_parameter(options, name, dot == std::string::npos ? "" : key.substr(dot + 1), value);
 }
 

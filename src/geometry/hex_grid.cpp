@@ -45,6 +45,9 @@ struct SurfacePatch {
   double area = 0.0;
 };
 
+/// The surface in a cell, by octant and by the axis that it faces most: the faces that meet at a sharp edge stay apart.
+using Patches = std::array<SurfacePatch, 24>;
+
 /// Integrates over the inside part of one cell by splitting it into small tetrahedra, on each of which the signed
 /// distance is taken as linear. Works in unit-cube coordinates.
 class CellCutter {
@@ -58,7 +61,7 @@ class CellCutter {
   }
 
   /// Returns false where no sample lies inside.
-  bool run(CellQuadrature& quadrature, std::array<SurfacePatch, 8>& patches) {
+  bool run(CellQuadrature& quadrature, Patches& patches) {
     if (std::none_of(values_.begin(), values_.end(), [](double v) { return v < 0.0; })) return false;
     quadrature_ = &quadrature;
     patches_ = &patches;
@@ -138,17 +141,21 @@ class CellCutter {
   }
 
   void triangle(const Vector3& a, const Vector3& b, const Vector3& c) {
-    const double area = 0.5 * (b - a).cross(c - a).norm();
+    const Vector3 normal = 0.5 * (b - a).cross(c - a);
+    const double area = normal.norm();
     const Vector3 centre = (a + b + c) / 3.0;
     const int octant = (centre.x() > 0.5) + 2 * (centre.y() > 0.5) + 4 * (centre.z() > 0.5);
-    (*patches_)[octant].area += area;
-    (*patches_)[octant].moment += area * centre;
+    int axis = 0;
+    normal.cwiseAbs().maxCoeff(&axis);
+    SurfacePatch& patch = (*patches_)[std::size_t(8 * axis + octant)];
+    patch.area += area;
+    patch.moment += area * centre;
   }
 
   int n_;
   std::vector<double> values_;
   CellQuadrature* quadrature_ = nullptr;
-  std::array<SurfacePatch, 8>* patches_ = nullptr;
+  Patches* patches_ = nullptr;
 };
 
 struct LatticeCell {
@@ -277,7 +284,7 @@ HexGrid make_hex_grid(const SignedDistance& distance, const Box& object, double 
     const Vector3 corner = grid.lattice_position(l);
     const double centre_distance = distance.value(corner + Vector3::Constant(0.5 * cell_size));
     if (centre_distance > cell_size) continue;  // sqrt(3)/2 h reaches the corner; the rest is slack
-    std::array<SurfacePatch, 8> patches;
+    Patches patches;
     CellCutter cutter(distance, corner, cell_size, options.subdivisions);
     if (!cutter.run(cells[l].quadrature, patches)) continue;
     cells[l].fraction = cells[l].quadrature.volume_fraction();
