@@ -375,8 +375,8 @@ void write_fit_output(const fs::path& folder, const Capture& capture, const std:
                    [&](int done, int total) { return tell("trajectory", done, total), true; });
   report.capture_path = facts.capture_path;
   for (const auto& f : surface_errors(outcome.evaluation).frames) {
-    const auto frame = std::size_t(f.frame + capture.start_frame);
-    report.residuals.push_back({int(frame), capture.times[frame], f.rms, f.points, f.noise});
+    const int frame = f.frame + capture.start_frame;
+    report.residuals.push_back({frame, capture.times[std::size_t(frame)], f.rms, f.points, f.noise});
   }
   if (outcome.correlation.size() > 0)
     report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
