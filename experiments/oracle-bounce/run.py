@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Recordings of a ring made by another simulator (other elements, another material law, a sensor's faults).
 
-Two bounces are fitted with no choice of ours; each model predicts the other bounce. A third recording, on a ramp, is
+Two bounces are fitted with no choice of ours; each model predicts the other bounce. A third recording, of a pebble on a tilted board, is
 fitted alike. truth.json is read for judging only."""
 import pathlib
 import sys
