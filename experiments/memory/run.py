@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Peak memory of a fit of 600 frames at about 2,400 nodes: tangents (the default optimiser) and adjoint (Rprop).
 
-The steps are made four times as long as the default and iterations are few: memory, not accuracy, is looked at.
+The steps are made twice as long as the default and iterations are few: memory, not accuracy, is looked at.
 A shorter recording shows what of the memory grows with the frames."""
 import csv
 import io
@@ -15,7 +15,7 @@ sys.path.insert(0, str(HERE.parent))
 import common
 
 CELLS = 24  # about 2,400 nodes
-CHOICES = {"cells": CELLS, "coarse_cells": 4, "steps": 0.25, "max_iterations": 1, "points_per_frame": 200,
+CHOICES = {"cells": CELLS, "coarse_cells": 4, "steps": 0.5, "max_iterations": 1, "points_per_frame": 200,
            "youngs_modulus": 5000, "poisson_ratio.estimate": False}
 
 
