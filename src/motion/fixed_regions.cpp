@@ -66,7 +66,7 @@ FixedRegions::FixedRegions(std::shared_ptr<const Body> body, const std::vector<H
     HeldCell held{key.second, key.first, Matrix24::Zero(), Matrix24::Zero(), {}, {}};
     for (const HeldSample& s : samples) {
       const auto N = shape_functions(s.local);
-      const auto G = shape_gradients(s.local) / h;
+      const Eigen::Matrix<double, 8, 3> G = shape_gradients(s.local) / h;
       Eigen::Matrix<double, 3, 24> value, traction_lambda, traction_mu;
       for (int a = 0; a < 8; ++a) {
         const Vector3 g = G.row(a).transpose();
