@@ -1,6 +1,7 @@
 #include "elasticity/corotated.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 namespace pliant {
 
@@ -32,13 +33,16 @@ CorotatedElasticity::CorotatedElasticity(std::shared_ptr<const Body> body) : bod
 }
 
 void CorotatedElasticity::set_parameters(const VectorX& parameters) {
+  // Rotations start from those of the step before; a run must not start from those of the run before.
+  std::ranges::fill(polar_, Polar{});
   youngs_modulus_ = parameters[theta::youngs_modulus];
   const double nu = parameters[theta::poissons_ratio];
   if (nu == poissons_ratio_) return;
   poissons_ratio_ = nu;
   for (std::size_t c = 0; c < stiffness_.size(); ++c) {
     const int e = body_->class_representative[c];
-    const HexStiffness unit = hex_stiffness(body_->grid.quadrature[e], body_->grid.cell_size, nu, body_->options.formulation);
+    const HexStiffness unit =
+        hex_stiffness(body_->grid.quadrature[e], body_->grid.cell_size, nu, body_->options.formulation);
     Stiffness& s = stiffness_[c];
     s.K = unit.value;
     s.dK = unit.d_poissons_ratio;
@@ -98,7 +102,8 @@ void CorotatedElasticity::add_matrix(double scale, BlockMatrix& matrix) {
     const double factor = scale * modulus(int(e));
     for (int i = 0; i < 3; ++i)  // R K
       for (int l = 0; l < 3; ++l)
-        half.col(3 * i + l) = Column(R(i, 0) * s.upper.col(l) + R(i, 1) * s.upper.col(3 + l) + R(i, 2) * s.upper.col(6 + l)) * factor;
+        half.col(3 * i + l) =
+            Column(R(i, 0) * s.upper.col(l) + R(i, 1) * s.upper.col(3 + l) + R(i, 2) * s.upper.col(6 + l)) * factor;
     for (int i = 0; i < 3; ++i)  // (R K) R^T
       for (int j = 0; j < 3; ++j)
         full.col(3 * i + j) = R(j, 0) * half.col(3 * i) + R(j, 1) * half.col(3 * i + 1) + R(j, 2) * half.col(3 * i + 2);

@@ -31,9 +31,11 @@ void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
       throw InputError({{}, "there is no parameter \"" + name + "\" in this recording", "", "see `pliant fit --help`"});
     if (change.start) {
       if (change.start->size() != it->dimension() || it->transform == Transform::PlanePosition)
-        throw InputError({{}, "the start of " + name + " has " + std::to_string(change.start->size()) + " numbers",
+        throw InputError({{},
+                          "the start of " + name + " has " + std::to_string(change.start->size()) + " numbers",
                           it->transform == Transform::PlanePosition ? "planes to start where the capture has them"
-                                                                    : std::to_string(it->dimension()) + " numbers", ""});
+                                                                    : std::to_string(it->dimension()) + " numbers",
+                          ""});
       theta.segment(it->theta_index, it->dimension()) = *change.start;
       if (it->transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
         throw InputError({{}, "the start of " + name + " is not positive", "a number above 0", ""});
@@ -80,11 +82,14 @@ class Fit {
     require_fittable(capture_);
     const std::vector<int> planes_seen = take_planes_from_images(capture_);
     for (const int plane : planes_seen)
-      outcome_.notes.push_back("Plane " + std::to_string(plane + 1) +
-                               " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
+      outcome_.notes.push_back(
+          "Plane " + std::to_string(plane + 1) +
+          " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
     observations_ = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture_, observed));
     if (observations_->empty())
-      throw InputError({{capture.file}, "no frame shows any point of the object", "depth images or clouds that see it",
+      throw InputError({{capture.file},
+                        "no frame shows any point of the object",
+                        "depth images or clouds that see it",
                         "run `pliant check` on the capture to see what the cameras saw"});
     parameters_ = default_parameters(capture_, enclosed_volume(*capture_.surface));
     trust_planes_seen(parameters_, planes_seen);
@@ -100,7 +105,8 @@ class Fit {
 
   FitOutcome run() {
     outcome_.start_theta = parameters_.reference();
-    if (!options_.parameters.contains("youngs_modulus") || !options_.parameters.at("youngs_modulus").start) scanned_ = true;
+    if (!options_.parameters.contains("youngs_modulus") || !options_.parameters.at("youngs_modulus").start)
+      scanned_ = true;
     estimate_initial_motion();
     if (scanned_) scan();
     follow_starts();
@@ -114,13 +120,17 @@ class Fit {
       throw InputError({{capture.file}, found, "a moving object seen by depth cameras or clouds", advice});
     };
     if (!capture.surface) refuse("there is no scan of the object at rest", "add [object] surface");
-    if (capture.is_static) refuse("the recording is static", "fits of objects at rest under gravity are not part of this version");
+    if (capture.is_static)
+      refuse("the recording is static", "fits of objects at rest under gravity are not part of this version");
     if (capture.depth.empty() && capture.clouds.empty()) refuse("there are no depth cameras and no clouds", "");
     if (capture.shape_is == ShapeIs::Static)
-      refuse("the scan was taken sagging (shape_is = \"static\")", "scan the object free of load; load-free shapes are not estimated in this version");
+      refuse("the scan was taken sagging (shape_is = \"static\")",
+             "scan the object free of load; load-free shapes are not estimated in this version");
     if (capture.initial.released)
-      refuse("the object is released from a held, deformed pose ([initial] released)", "start the recording in the scanned pose");
-    if (capture.frame_count() - capture.start_frame < 2) refuse("fewer than two frames follow start_frame", "record longer");
+      refuse("the object is released from a held, deformed pose ([initial] released)",
+             "start the recording in the scanned pose");
+    if (capture.frame_count() - capture.start_frame < 2)
+      refuse("fewer than two frames follow start_frame", "record longer");
   }
 
   Discretisation make_level(double cells, double band) const {
@@ -136,11 +146,16 @@ class Fit {
   /// Before this frame the object only flies or hangs; stiffness shows after it.
   int first_frame_of_interest() const { return std::max(1, last_frame_ / 3); }
 
-  Objective make_objective(const Discretisation& level, const ParameterSet& parameters, double band, int last_frame) const {
+  Objective make_objective(const Discretisation& level, const ParameterSet& parameters, double band,
+                           int last_frame) const {
     ObjectiveOptions o;
     o.outlier_scale = band * size_;
     o.last_frame = last_frame;
     return {level.constraints, level.body, level.simulation, observations_, parameters, o};
+  }
+
+  static OptimiserState start_of(const ParameterSet& parameters) {
+    return {0, parameters.to_unconstrained(parameters.reference()), {}};
   }
 
   bool interrupted() const { return monitor_.interrupted && monitor_.interrupted(); }
@@ -154,14 +169,17 @@ class Fit {
     if (monitor_.on_state) monitor_.on_state(state_);
   }
 
-  OptimiserSummary optimise(Objective& objective, const VectorX& p, const std::string& stage, int start, int iterations,
-                            int& counter, double done_from, double done_to) {
+  OptimiserSummary optimise(Objective& objective, const OptimiserState& from, const std::string& stage, int start,
+                            int iterations, int& counter, double done_from, double done_to,
+                            const std::function<void(const OptimiserState&)>& on_state = {}) {
     OptimiserOptions o;
     o.kind = options_.optimiser;
     o.max_iterations = iterations;
     const int first = counter;
-    OptimiserSummary s = minimise(objective, p, o, [&](const Iteration& i) {
+    counter += from.iterations;
+    OptimiserSummary s = minimise(objective, from, o, [&](const Iteration& i) {
       ++counter;
+      if (on_state) on_state(i.state());
       const double part = double(counter - first) / iterations;
       emit({stage, start, counter, i.cost, i.damping, i.surface_rms, objective.parameters().to_theta(i.p),
             done_from + (done_to - done_from) * std::min(1.0, part)});
@@ -181,7 +199,8 @@ class Fit {
     ParameterSet motion = parameters_;
     bool any = false;
     for (const Parameter& p : parameters_.parameters()) {
-      const bool moves = p.estimated && (p.name == "linear_velocity" || p.name == "angular_velocity" || p.name == "gravity");
+      const bool moves =
+          p.estimated && (p.name == "linear_velocity" || p.name == "angular_velocity" || p.name == "gravity");
       motion.set_estimated(p.name, moves);
       any = any || moves;
     }
@@ -190,7 +209,7 @@ class Fit {
     for (const int part : {8, 4}) {
       const int horizon = std::max(2, last_frame_ / part);
       Objective objective = make_objective(coarse_, motion, options_.wide_band, std::min(horizon, last_frame_));
-      const OptimiserSummary s = optimise(objective, motion.to_unconstrained(motion.reference()), "motion", 0, 12, counter, 0.0, 0.05);
+      const OptimiserSummary s = optimise(objective, start_of(motion), "motion", 0, 12, counter, 0.0, 0.05);
       if (s.succeeded) motion.set_reference(motion.to_theta(s.p));
       if (interrupted()) return;
     }
@@ -210,19 +229,22 @@ class Fit {
     if (int(state_.scan.size()) != count) {
       state_.scan.assign(std::size_t(count), {});
       std::atomic<int> done = 0;
-      tbb::parallel_for(0, count, [&](int i) {
-        VectorX trial = theta;
-        trial[theta::youngs_modulus] = stress * std::pow(10.0, 0.0 + double(i) / options_.scan_per_decade);
-        state_.scan[i] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
-        if (interrupted()) return;
-        ParameterSet fixed = parameters_;
-        for (const Parameter& p : parameters_.parameters()) fixed.set_estimated(p.name, false);
-        fixed.set_reference(trial);
-        Objective objective = make_objective(coarse_, fixed, options_.wide_band, last_frame_);
-        const CostEvaluation e = objective.evaluate(VectorX(0));
-        if (e.succeeded) state_.scan[i].second = e.cost;
-        emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
-      }, tbb::simple_partitioner());
+      tbb::parallel_for(
+          0, count,
+          [&](int i) {
+            VectorX trial = theta;
+            trial[theta::youngs_modulus] = stress * std::pow(10.0, 0.0 + double(i) / options_.scan_per_decade);
+            state_.scan[i] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
+            if (interrupted()) return;
+            ParameterSet fixed = parameters_;
+            for (const Parameter& p : parameters_.parameters()) fixed.set_estimated(p.name, false);
+            fixed.set_reference(trial);
+            Objective objective = make_objective(coarse_, fixed, options_.wide_band, last_frame_);
+            const CostEvaluation e = objective.evaluate(VectorX(0));
+            if (e.succeeded) state_.scan[i].second = e.cost;
+            emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
+          },
+          tbb::simple_partitioner());
       if (interrupted()) {
         state_.scan.clear();
         outcome_.interrupted = true;
@@ -251,7 +273,11 @@ class Fit {
       start_moduli_.push_back(state_.scan[std::size_t(i)].first);
     }
     if (start_moduli_.empty())
-      throw InputError({{capture_.file}, "no stiffness between " + std::to_string(stress) + " Pa and ten thousand times that can be simulated", "", "check mass, gravity and the size of the scan"});
+      throw InputError(
+          {{capture_.file},
+           "no stiffness between " + std::to_string(stress) + " Pa and ten thousand times that can be simulated",
+           "",
+           "check mass, gravity and the size of the scan"});
     outcome_.start_theta[theta::youngs_modulus] = start_moduli_.front();
   }
 
@@ -264,7 +290,9 @@ class Fit {
       return;
     }
     std::vector<FitStart> starts(count);
-    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) { starts[i] = follow(int(i), start_moduli_[i]); }, tbb::simple_partitioner());
+    tbb::parallel_for(
+        std::size_t(0), count, [&](std::size_t i) { starts[i] = follow(int(i), start_moduli_[i]); },
+        tbb::simple_partitioner());
     if (interrupted()) outcome_.interrupted = true;
     outcome_.starts = starts;
     if (outcome_.interrupted) return;  // half-followed starts are a result, but nothing to go on from
@@ -286,9 +314,10 @@ class Fit {
     for (const double part : {0.6, 1.0, 1.0}) {
       const bool last = part == 1.0 && counter > 0;
       const double from = 0.15 + 0.3 * (part < 1.0 ? 0.0 : 0.4);
-      Objective objective = make_objective(coarse_, parameters, options_.wide_band, std::max(horizon_start_, int(part * last_frame_)));
-      const OptimiserSummary s = optimise(objective, parameters.to_unconstrained(parameters.reference()), "coarse", index,
-                                          last ? 10 : 5, counter, from, from + 0.15);
+      Objective objective =
+          make_objective(coarse_, parameters, options_.wide_band, std::max(horizon_start_, int(part * last_frame_)));
+      const OptimiserSummary s =
+          optimise(objective, start_of(parameters), "coarse", index, last ? 10 : 5, counter, from, from + 0.15);
       start.iterations += s.iterations;
       start.converged = s.converged;
       start.reason = s.reason;
@@ -313,34 +342,43 @@ class Fit {
                                        [](const FitStart& a, const FitStart& b) { return a.cost < b.cost; });
     const int index = best == outcome_.starts.end() ? 0 : int(best - outcome_.starts.begin());
     if (best != outcome_.starts.end() && std::isfinite(best->cost)) theta = best->final;
-    if (state_.fine) theta = *state_.fine;
     const bool was_interrupted = outcome_.interrupted;
     ParameterSet parameters = parameters_;
-    parameters.set_reference(theta);
     int counter = 0;
     OptimiserSummary s;
-    for (const double band : {options_.wide_band, options_.fine_band}) {
-      const bool last = band == options_.fine_band;
-      const int iterations = outcome_.interrupted ? 1 : last ? options_.max_iterations : std::max(1, options_.max_iterations / 4);
-      if (outcome_.interrupted && !last) continue;
-      Objective objective = make_objective(fine_, parameters, band, last_frame_);
-      s = optimise(objective, parameters.to_unconstrained(parameters.reference()), last ? "fine" : "fine, wide band", index,
-                   iterations, counter, last ? 0.6 : 0.45, last ? 1.0 : 0.6);
+    FitState::Fine now{0, theta, {}};
+    if (state_.fine) now = *state_.fine;
+    for (; now.band < 2; ++now.band, now.optimiser = {}) {
+      const bool last = now.band == 1;
+      if (was_interrupted && !last) continue;
+      parameters.set_reference(now.reference);
+      if (now.optimiser.p.size() == 0) now.optimiser = start_of(parameters);
+      const int iterations = outcome_.interrupted ? 1
+                             : last               ? options_.max_iterations
+                                                  : std::max(1, options_.max_iterations / 4);
+      Objective objective =
+          make_objective(fine_, parameters, last ? options_.fine_band : options_.wide_band, last_frame_);
+      s = optimise(objective, now.optimiser, last ? "fine" : "fine, wide band", index, iterations, counter,
+                   last ? 0.6 : 0.45, last ? 1.0 : 0.6, [&](const OptimiserState& optimiser) {
+                     if (outcome_.interrupted) return;  // a last look at what was reached is no state to go on from
+                     state_.fine = {now.band, now.reference, optimiser};
+                     save_state();
+                   });
       if (!s.succeeded) break;
-      parameters.set_reference(parameters.to_theta(s.p));
-      if (!was_interrupted) {
-        state_.fine = parameters.reference();
-        save_state();
-      }
+      now.reference = parameters.to_theta(s.p);
       if (s.interrupted) outcome_.interrupted = true;
     }
+    parameters.set_reference(now.reference);
     finish(parameters, s);
   }
 
   /// Starts run side by side; their history is told in an order that does not depend on who was faster.
   void sort_history() {
-    const auto rank = [](const FitEvent& e) { return e.stage == "motion" ? 0 : e.stage == "scan" ? 1 : e.stage == "coarse" ? 2 : 3; };
-    std::ranges::stable_sort(outcome_.history, {}, [&](const FitEvent& e) { return std::tuple(rank(e), e.start, e.iteration); });
+    const auto rank = [](const FitEvent& e) {
+      return e.stage == "motion" ? 0 : e.stage == "scan" ? 1 : e.stage == "coarse" ? 2 : 3;
+    };
+    std::ranges::stable_sort(outcome_.history, {},
+                             [&](const FitEvent& e) { return std::tuple(rank(e), e.start, e.iteration); });
   }
 
   void finish(ParameterSet& parameters, OptimiserSummary& s) {
@@ -416,7 +454,8 @@ std::string FitOptions::validate() const {
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
   if (starts < 1) return "starts must be at least 1";
   if (max_iterations < 1) return "max_iterations must be at least 1";
-  if (!(wide_band > 0.0 && wide_band < 0.5) || !(fine_band > 0.0 && fine_band < 0.5)) return "bands must lie in (0, 0.5)";
+  if (!(wide_band > 0.0 && wide_band < 0.5) || !(fine_band > 0.0 && fine_band < 0.5))
+    return "bands must lie in (0, 0.5)";
   if (!(newmark_theta >= 0.5 && newmark_theta < 1.0)) return "newmark_theta must lie in [0.5, 1)";
   if (!(solver_tolerance > 0.0 && solver_tolerance < 1.0)) return "solver_tolerance must lie in (0, 1)";
   return "";

@@ -14,20 +14,20 @@ namespace pliant {
 
 /// Choices about a fit; none of them is needed. `validate` answers in words.
 struct FitOptions {
-  double cells = 12.0;           ///< hexahedra along the object's longest axis, [4, 64]
-  double coarse_cells = 8.0;     ///< of the grid that finds the neighbourhood, [4, 64]
-  double steps = 1.0;            ///< time steps per default step, (0, 16]
-  int points_per_frame = 1000;   ///< >= 10: an even subset of the pixels; 0: all
-  int scan_per_decade = 3;       ///< values of Young's modulus tried in each decade, >= 1
-  int starts = 3;                ///< best ones of the scan that are followed, >= 1
-  int max_iterations = 25;       ///< of each stage of the optimiser, >= 1
-  double wide_band = 0.12;       ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
-  double fine_band = 0.05;       ///< of the last stage, (0, 0.5)
-  double newmark_theta = 0.51;   ///< [0.5, 1)
+  double cells = 12.0;          ///< hexahedra along the object's longest axis, [4, 64]
+  double coarse_cells = 8.0;    ///< of the grid that finds the neighbourhood, [4, 64]
+  double steps = 1.0;           ///< time steps per default step, (0, 16]
+  int points_per_frame = 1000;  ///< >= 10: an even subset of the pixels; 0: all
+  int scan_per_decade = 3;      ///< values of Young's modulus tried in each decade, >= 1
+  int starts = 3;               ///< best ones of the scan that are followed, >= 1
+  int max_iterations = 25;      ///< of each stage of the optimiser, >= 1
+  double wide_band = 0.12;      ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
+  double fine_band = 0.05;      ///< of the last stage, (0, 0.5)
+  double newmark_theta = 0.51;  ///< [0.5, 1)
   OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
   SolverKind solver = SolverKind::Automatic;
   double solver_tolerance = 1e-8;
-  bool hold_strongly = false;    ///< eliminate nodes in held regions instead of Nitsche's method
+  bool hold_strongly = false;  ///< eliminate nodes in held regions instead of Nitsche's method
   unsigned seed = 0;
   /// By parameter name: a start value (a number, or three), and whether it is estimated.
   struct Override {
@@ -65,16 +65,22 @@ struct FitState {
   std::vector<std::pair<double, double>> scan;  ///< Young's modulus and cost; infinite where it cannot be simulated
   std::optional<VectorX> motion;                ///< theta after the first stage
   std::vector<FitStart> starts;                 ///< those that are done
-  std::optional<VectorX> fine;                  ///< best theta of the last stage so far
+  /// The stage on the full grid that was under way.
+  struct Fine {
+    int band = 0;              ///< 0: wide, 1: fine
+    VectorX reference;         ///< theta at the beginning of the stage
+    OptimiserState optimiser;  ///< p is empty before the first iteration
+  };
+  std::optional<Fine> fine;
 };
 
 struct FitOutcome {
-  ParameterSet parameters;      ///< as used, with the reference at the solution
+  ParameterSet parameters;  ///< as used, with the reference at the solution
   VectorX theta, start_theta;
-  VectorX std;                  ///< of each unconstrained coordinate
+  VectorX std;  ///< of each unconstrained coordinate
   MatrixX covariance, correlation;
   double start_cost = 0.0, final_cost = 0.0;
-  CostEvaluation evaluation;    ///< at the solution, all points of the fit
+  CostEvaluation evaluation;  ///< at the solution, all points of the fit
   Discretisation discretisation;
   std::vector<FitStart> starts;
   std::vector<FitEvent> history;

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/1";
+constexpr const char* format = "fit-state/2";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -19,7 +19,9 @@ VectorX to_vector(const Json& json) {
   return Eigen::Map<const VectorX>(values.data(), Eigen::Index(values.size()));
 }
 /// JSON knows no infinity: null stands for it.
-double to_cost(const Json& json) { return json.is_null() ? std::numeric_limits<double>::infinity() : json.get<double>(); }
+double to_cost(const Json& json) {
+  return json.is_null() ? std::numeric_limits<double>::infinity() : json.get<double>();
+}
 Json from_cost(double cost) { return std::isfinite(cost) ? Json(cost) : Json(); }
 
 }  // namespace
@@ -28,10 +30,20 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
   Json json = {{"format", format}, {"key", key}, {"scan", Json::array()}, {"starts", Json::array()}};
   for (const auto& [modulus, cost] : state.scan) json["scan"].push_back({modulus, from_cost(cost)});
   for (const FitStart& s : state.starts)
-    json["starts"].push_back({{"start", from_vector(s.start)}, {"final", from_vector(s.final)}, {"start_cost", from_cost(s.start_cost)},
-                              {"cost", from_cost(s.cost)}, {"iterations", s.iterations}, {"converged", s.converged}, {"reason", s.reason}});
+    json["starts"].push_back({{"start", from_vector(s.start)},
+                              {"final", from_vector(s.final)},
+                              {"start_cost", from_cost(s.start_cost)},
+                              {"cost", from_cost(s.cost)},
+                              {"iterations", s.iterations},
+                              {"converged", s.converged},
+                              {"reason", s.reason}});
   if (state.motion) json["motion"] = from_vector(*state.motion);
-  if (state.fine) json["fine"] = from_vector(*state.fine);
+  if (const auto& fine = state.fine)
+    json["fine"] = {{"band", fine->band},
+                    {"reference", from_vector(fine->reference)},
+                    {"iterations", fine->optimiser.iterations},
+                    {"p", from_vector(fine->optimiser.p)},
+                    {"memory", from_vector(fine->optimiser.memory)}};
   write_file(path, json.dump(1));
 }
 
@@ -41,18 +53,28 @@ FitState read_fit_state(const std::filesystem::path& path, const std::string& ke
     const Json json = Json::parse(read_file(path));
     if (json.at("format") != format) throw std::runtime_error("another format");
     if (json.at("key") != key)
-      throw InputError({{path}, "the interrupted fit was of another capture or with other choices", "the same ones",
+      throw InputError({{path},
+                        "the interrupted fit was of another capture or with other choices",
+                        "the same ones",
                         "leave out --resume to start anew, or give the same capture and options"});
     for (const Json& entry : json.at("scan")) state.scan.emplace_back(entry.at(0).get<double>(), to_cost(entry.at(1)));
     for (const Json& s : json.at("starts"))
-      state.starts.push_back({to_vector(s.at("start")), to_vector(s.at("final")), to_cost(s.at("start_cost")), to_cost(s.at("cost")),
-                              s.at("iterations").get<int>(), s.at("converged").get<bool>(), s.at("reason").get<std::string>()});
+      state.starts.push_back({to_vector(s.at("start")), to_vector(s.at("final")), to_cost(s.at("start_cost")),
+                              to_cost(s.at("cost")), s.at("iterations").get<int>(), s.at("converged").get<bool>(),
+                              s.at("reason").get<std::string>()});
     if (json.contains("motion")) state.motion = to_vector(json["motion"]);
-    if (json.contains("fine")) state.fine = to_vector(json["fine"]);
+    if (json.contains("fine")) {
+      const Json& fine = json["fine"];
+      state.fine = {fine.at("band").get<int>(),
+                    to_vector(fine.at("reference")),
+                    {fine.at("iterations").get<int>(), to_vector(fine.at("p")), to_vector(fine.at("memory"))}};
+    }
   } catch (const InputError&) {
     throw;
   } catch (const std::exception& error) {
-    throw InputError({{path}, std::string("cannot be read as the state of a fit: ") + error.what(), "",
+    throw InputError({{path},
+                      std::string("cannot be read as the state of a fit: ") + error.what(),
+                      "",
                       "leave out --resume to start anew"});
   }
   return state;

@@ -20,24 +20,30 @@ class Run {
     summary.steps += e.steps;
     return e;
   }
-  bool begin(const VectorX& p, bool by_adjoint) {
-    summary.p = objective_.parameters().clamp(p);
+  bool begin(const OptimiserState& state, bool by_adjoint) {
+    summary.p = objective_.parameters().clamp(state.p);
+    summary.iterations = state.iterations;
     summary.evaluation = evaluate(summary.p, by_adjoint);
     summary.succeeded = summary.evaluation.succeeded;
     summary.start_cost = summary.evaluation.cost;
     if (!summary.succeeded) summary.reason = "the start cannot be simulated: " + summary.evaluation.failure;
     return summary.succeeded;
   }
-  /// Reports an iteration; true where the run is to end.
-  bool report(double damping, bool accepted) {
+  /// Reports an iteration; true where the run is to end. An end that was reached cannot be interrupted any more.
+  bool report(double damping, bool accepted, VectorX memory, bool finished = false) {
     ++summary.iterations;
-    if (on_iteration_ && !on_iteration_({summary.iterations, summary.evaluation.cost, damping, accepted, summary.p,
-                                         summary.evaluation.surface_rms()})) {
+    const bool go_on =
+        !on_iteration_ || on_iteration_({summary.iterations, summary.evaluation.cost, damping, accepted, summary.p,
+                                         summary.evaluation.surface_rms(), std::move(memory)});
+    if (finished) return true;
+    if (!go_on) {
       summary.interrupted = true;
       return end(false, "interrupted");
     }
-    if (summary.iterations >= options_.max_iterations) return end(false, "reached the most iterations allowed");
-    return false;
+    return has_done_all();
+  }
+  bool has_done_all() {
+    return summary.iterations >= options_.max_iterations && end(false, "reached the most iterations allowed");
   }
   bool end(bool converged, const char* reason) {
     summary.converged = converged;
@@ -54,9 +60,9 @@ class Run {
   const std::function<bool(const Iteration&)>& on_iteration_;
 };
 
-void levenberg_marquardt(Run& run, const OptimiserOptions& options) {
+void levenberg_marquardt(Run& run, const OptimiserOptions& options, const VectorX& memory) {
   OptimiserSummary& s = run.summary;
-  double lambda = 1e-2;
+  double lambda = memory.size() > 0 ? memory[0] : 1e-2;
   for (bool done = false; !done;) {
     const MatrixX& H = s.evaluation.gauss_newton;
     const VectorX& g = s.evaluation.gradient;
@@ -85,25 +91,24 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options) {
       if (small) done = run.end(true, "the cost no longer falls");
     } else {
       // Where a step promises or moves next to nothing, the point is as good as the cost's smoothness allows.
-      if (moved < options.step_tolerance || predicted < options.cost_tolerance * s.evaluation.cost) done = run.end(true, "no step lowers the cost");
+      if (moved < options.step_tolerance || predicted < options.cost_tolerance * s.evaluation.cost)
+        done = run.end(true, "no step lowers the cost");
       lambda = std::min(std::max(lambda, 1e-3) * 5.0, 1e8);
     }
-    const bool finished = done;
-    const std::string reason = s.reason;
-    if (run.report(lambda, accepted) && finished && !s.interrupted) {
-      s.converged = true;
-      s.reason = reason;
-    }
-    done = done || s.interrupted || s.iterations >= options.max_iterations;
+    done = run.report(lambda, accepted, VectorX::Constant(1, lambda), done);
   }
 }
 
-void rprop(Run& run, const OptimiserOptions& options) {
+void rprop(Run& run, const OptimiserOptions& options, const VectorX& memory) {
   OptimiserSummary& s = run.summary;
-  VectorX p = s.p, gradient = s.evaluation.gradient, last = VectorX::Zero(p.size());
-  VectorX length = VectorX::Constant(p.size(), 0.1);
+  const Eigen::Index n = s.p.size();
+  VectorX p = s.p, gradient = s.evaluation.gradient, last = VectorX::Zero(n), length = VectorX::Constant(n, 0.1);
+  if (memory.size() > 0) {
+    p = memory.head(n), last = memory.segment(n, n), length = memory.tail(n);
+    if (p != s.p) gradient = run.evaluate(p, true).gradient;
+  }
   for (;;) {
-    for (Eigen::Index i = 0; i < p.size(); ++i) {
+    for (Eigen::Index i = 0; i < n; ++i) {
       const double sign = gradient[i] * last[i];
       if (sign > 0.0) length[i] = std::min(length[i] * 1.2, options.max_step);
       if (sign < 0.0) length[i] *= 0.5, gradient[i] = 0.0;
@@ -119,17 +124,16 @@ void rprop(Run& run, const OptimiserOptions& options) {
       p = s.p, gradient = s.evaluation.gradient, length *= 0.25;
     }
     if (better) s.p = p, s.evaluation = std::move(e);
-    if (run.report(length.maxCoeff(), better)) return;
-    if (length.maxCoeff() < options.step_tolerance) {
-      run.end(true, "steps became short");
-      return;
-    }
+    const bool finished = length.maxCoeff() < options.step_tolerance && run.end(true, "steps became short");
+    VectorX state(3 * n);
+    state << p, last, length;
+    if (run.report(length.maxCoeff(), better, std::move(state), finished)) return;
   }
 }
 
-void gradient_descent(Run& run, const OptimiserOptions& options) {
+void gradient_descent(Run& run, const OptimiserOptions& options, const VectorX& memory) {
   OptimiserSummary& s = run.summary;
-  double length = 0.1;
+  double length = memory.size() > 0 ? memory[0] : 0.1;
   for (;;) {
     const VectorX direction = -s.evaluation.gradient / std::max(s.evaluation.gradient.cwiseAbs().maxCoeff(), 1e-300);
     const VectorX trial = run.clamp(s.p + length * direction);
@@ -137,31 +141,40 @@ void gradient_descent(Run& run, const OptimiserOptions& options) {
     const bool better = e.succeeded && e.cost < s.evaluation.cost;
     if (better) s.p = trial, s.evaluation = std::move(e);
     length = better ? std::min(1.5 * length, options.max_step) : 0.4 * length;
-    if (run.report(length, better)) return;
-    if (length < options.step_tolerance) {
-      run.end(true, "steps became short");
-      return;
-    }
+    const bool finished = length < options.step_tolerance && run.end(true, "steps became short");
+    if (run.report(length, better, VectorX::Constant(1, length), finished)) return;
   }
 }
 
 }  // namespace
 
-OptimiserSummary minimise(Objective& objective, const VectorX& p, const OptimiserOptions& options,
+OptimiserSummary minimise(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration) {
   Run run(objective, options, on_iteration);
   const bool by_adjoint = options.kind != OptimiserKind::LevenbergMarquardt;
-  if (!run.begin(p, by_adjoint)) return run.summary;
+  if (!run.begin(state, by_adjoint)) return run.summary;
   if (run.summary.p.size() == 0) {
     run.end(true, "nothing is estimated");
     return run.summary;
   }
+  if (run.has_done_all()) return run.summary;
   switch (options.kind) {
-    case OptimiserKind::LevenbergMarquardt: levenberg_marquardt(run, options); break;
-    case OptimiserKind::Rprop: rprop(run, options); break;
-    case OptimiserKind::GradientDescent: gradient_descent(run, options); break;
+    case OptimiserKind::LevenbergMarquardt:
+      levenberg_marquardt(run, options, state.memory);
+      break;
+    case OptimiserKind::Rprop:
+      rprop(run, options, state.memory);
+      break;
+    case OptimiserKind::GradientDescent:
+      gradient_descent(run, options, state.memory);
+      break;
   }
   return run.summary;
+}
+
+OptimiserSummary minimise(Objective& objective, const VectorX& p, const OptimiserOptions& options,
+                          const std::function<bool(const Iteration&)>& on_iteration) {
+  return minimise(objective, OptimiserState{0, p, {}}, options, on_iteration);
 }
 
 }  // namespace pliant

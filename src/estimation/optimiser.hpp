@@ -15,10 +15,17 @@ enum class OptimiserKind {
 
 struct OptimiserOptions {
   OptimiserKind kind = OptimiserKind::LevenbergMarquardt;
-  int max_iterations = 25;        ///< >= 1
-  double step_tolerance = 1e-3;   ///< stop when no unconstrained number moves more than this, > 0
-  double cost_tolerance = 2e-4;   ///< or the cost falls by less than this fraction, > 0
-  double max_step = 0.7;          ///< most that any unconstrained number moves in one iteration (a factor of two), > 0
+  int max_iterations = 25;       ///< >= 1
+  double step_tolerance = 1e-3;  ///< stop when no unconstrained number moves more than this, > 0
+  double cost_tolerance = 2e-4;  ///< or the cost falls by less than this fraction, > 0
+  double max_step = 0.7;         ///< most that any unconstrained number moves in one iteration (a factor of two), > 0
+};
+
+/// Where a run stands between two iterations: going on from here takes the path that an undisturbed run takes.
+struct OptimiserState {
+  int iterations = 0;  ///< done
+  VectorX p;           ///< the best point
+  VectorX memory;      ///< the optimiser's own: damping, step lengths, the last trial and signs
 };
 
 /// One accepted or rejected iteration, as it happens.
@@ -29,14 +36,17 @@ struct Iteration {
   bool accepted = true;
   VectorX p;
   double surface_rms = 0.0;
+  VectorX memory;  ///< with `number` and `p`, the state to go on from
+
+  OptimiserState state() const { return {number, p, memory}; }
 };
 
 struct OptimiserSummary {
   VectorX p;
-  CostEvaluation evaluation;       ///< at p; with derivatives where the optimiser had them
+  CostEvaluation evaluation;  ///< at p; with derivatives where the optimiser had them
   double start_cost = 0.0;
   int iterations = 0, evaluations = 0;
-  long long steps = 0;         ///< time steps simulated
+  long long steps = 0;  ///< time steps simulated
   bool converged = false, interrupted = false, succeeded = false;
   std::string reason = "not run";
 };
@@ -45,6 +55,10 @@ struct OptimiserSummary {
 /// evaluated fails.
 /// @param on_iteration  called after each; false stops ("interrupted")
 OptimiserSummary minimise(Objective& objective, const VectorX& p, const OptimiserOptions& options,
+                          const std::function<bool(const Iteration&)>& on_iteration = {});
+
+/// Goes on from where a run of the same objective, options and kind of optimiser stood.
+OptimiserSummary minimise(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration = {});
 
 }  // namespace pliant

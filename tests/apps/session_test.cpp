@@ -53,9 +53,11 @@ class Session : public testing::Test {
   static std::string capture() { return at("capture"); }
 
   /// A fit of a few seconds.
-  static ProgramRun run_fit(const std::string& name, std::vector<std::string> more = {}, const std::string& interrupt_at = "") {
+  static ProgramRun run_fit(const std::string& name, std::vector<std::string> more = {},
+                            const std::string& interrupt_at = "") {
     std::vector<std::string> arguments = {"fit", capture(), "--out", at(name), "--seed", "3"};
-    for (const char* choice : {"cells=6", "coarse_cells=5", "points_per_frame=100", "scan_per_decade=1", "starts=1", "steps=0.4"})
+    for (const char* choice :
+         {"cells=6", "coarse_cells=5", "points_per_frame=100", "scan_per_decade=1", "starts=1", "steps=0.4"})
       arguments.insert(arguments.end(), {"--set", choice});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_pliant(arguments, interrupt_at);
@@ -83,7 +85,8 @@ TEST_F(Session, FitFindsTheTruthAndSaysSo) {
 }
 
 TEST_F(Session, FitWritesEveryPromisedFile) {
-  for (const char* name : {"result.json", "model.toml", "model.vtu", "trajectory.pvd", "convergence.csv", "report.html", "log.txt"})
+  for (const char* name :
+       {"result.json", "model.toml", "model.vtu", "trajectory.pvd", "convergence.csv", "report.html", "log.txt"})
     EXPECT_TRUE(fs::is_regular_file(at("fit") + "/" + name)) << name;
   EXPECT_FALSE(fs::exists(at("fit") + "/state.json")) << "a finished fit leaves no state";
 }
@@ -95,8 +98,8 @@ TEST_F(Session, ResultHoldsWhatTheFormatPromises) {
     EXPECT_TRUE(found.contains(key)) << key;
   EXPECT_EQ(found["software"]["name"], "pliant");
   EXPECT_EQ(found["capture"]["sha256"].get<std::string>().size(), 64U);
-  for (const char* name : {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping", "density", "gravity", "plane",
-                           "linear_velocity", "angular_velocity"}) {
+  for (const char* name : {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping", "density", "gravity",
+                           "plane", "linear_velocity", "angular_velocity"}) {
     ASSERT_TRUE(found["parameters"].contains(name)) << name;
     const json& p = found["parameters"][name];
     EXPECT_TRUE(p.contains("value")) << name;
@@ -197,16 +200,15 @@ TEST_P(InterruptedSession, LeavesAResultAndIsResumed) {
   const ProgramRun resumed = run_fit(name, {"--resume"});
   ASSERT_EQ(resumed.exit_code, fine) << resumed.err;
   EXPECT_FALSE(fs::exists(at(name) + "/state.json"));
-  const json whole = result(), pieced = result(name);
-  // Interrupted before the last stage, the same path is taken again; within it, another one to the same place.
-  for (const char* parameter : {"youngs_modulus", "poisson_ratio", "stiffness_damping"}) {
-    const double std = whole["parameters"][parameter]["std"];
-    EXPECT_NEAR(value(pieced, parameter), value(whole, parameter), 0.1 * std) << parameter;
-  }
+  // The same path is taken again, to the last bit.
+  EXPECT_EQ(without_times(result(name)), without_times(result()));
 }
 
-INSTANTIATE_TEST_SUITE_P(Stages, InterruptedSession, testing::Values("scan", "coarse", "fine"),
-                         [](const auto& choice) { return std::string(choice.param); });
+INSTANTIATE_TEST_SUITE_P(Stages, InterruptedSession, testing::Values("scan", "coarse", "fine,", "fine "),
+                         [](const auto& choice) {
+                           const std::string stage = choice.param;
+                           return stage == "fine," ? "wide_band" : stage == "fine " ? "fine_band" : stage;
+                         });
 
 TEST_F(Session, AStateOfAnotherFitIsRefused) {
   const ProgramRun stopped = run_fit("other", {}, "\nscan");

@@ -12,7 +12,8 @@ TEST(Coverage, NinetyPercentIntervalsOfTheModulusHoldTheTruth) {
   std::vector<double> z;
   double claimed = 0.0;
   for (int seed = 0; seed < seeds; ++seed) {
-    const test::Recording recording = test::torus_recording(0.05, 12, 1, noise, 100 + unsigned(seed), 40, 0.0, 1.0, 1e-8);
+    const test::Recording recording =
+        test::torus_recording(0.05, 12, 1, noise, 100 + unsigned(seed), 40, 0.0, 1.0, 1e-8);
     ParameterSet set = recording.parameters;
     for (const char* name : {"youngs_modulus", "stiffness_damping", "linear_velocity"}) set.set_estimated(name, true);
     VectorX start = recording.truth;

@@ -68,7 +68,8 @@ TEST(FitConfig, DefaultsRoundTripAndEveryKeyIsWritten) {
     EXPECT_THAT(text, HasSubstr("\n" + key.name + " = "));
     EXPECT_FALSE(key.sentence.empty());
     FitOptions o;
-    EXPECT_NO_THROW(set_fit_option(o, key.name + "=" + key.standard)) << "the default shown in the help is not accepted";
+    EXPECT_NO_THROW(set_fit_option(o, key.name + "=" + key.standard))
+        << "the default shown in the help is not accepted";
     EXPECT_EQ(to_toml(o), text) << "the help shows another default than is used: " << key.name;
   }
 }
@@ -84,9 +85,9 @@ TEST(FitConfig, UnknownKeysSuggestTheNearest) {
 }
 
 TEST(FitConfig, ValuesOfAnotherTypeAreRefused) {
-  for (const char* bad : {"cells=many", "cells=", "cells=12x", "starts=1.5", "starts=-1", "optimiser=newton", "solver=fast",
-                          "hold_strongly=yes", "youngs_modulus=stiff", "gravity=1,2", "gravity.estimate=maybe", "density.prior_std=-1",
-                          "density.prior_std=0"}) {
+  for (const char* bad : {"cells=many", "cells=", "cells=12x", "starts=1.5", "starts=-1", "optimiser=newton",
+                          "solver=fast", "hold_strongly=yes", "youngs_modulus=stiff", "gravity=1,2",
+                          "gravity.estimate=maybe", "density.prior_std=-1", "density.prior_std=0"}) {
     FitOptions o;
     EXPECT_NE(test::complaint_of([&] { set_fit_option(o, bad); }), "") << bad;
   }
@@ -94,7 +95,8 @@ TEST(FitConfig, ValuesOfAnotherTypeAreRefused) {
 
 TEST(FitConfig, AFileReportsEveryProblemWithItsPlace) {
   const test::TemporaryFolder folder;
-  const auto path = folder.write("fit.toml", "cells = \"many\"\nstarts = 2\nmax_iteration = 3\n[parameters.densty]\nstart = 4\n");
+  const auto path =
+      folder.write("fit.toml", "cells = \"many\"\nstarts = 2\nmax_iteration = 3\n[parameters.densty]\nstart = 4\n");
   FitOptions o;
   const std::string complaint = test::complaint_of([&] { read_fit_options(path, o); });
   EXPECT_THAT(complaint, HasSubstr("fit.toml:1:"));
@@ -140,7 +142,8 @@ FitState some_state() {
   start.converged = true;
   start.reason = "steps became \"short\"";
   state.starts = {start, start};
-  state.fine = VectorX::Constant(3, 2.0 / 7.0);
+  state.fine = {
+      1, VectorX::Constant(20, 2.0 / 7.0), {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
   return state;
 }
 
@@ -151,7 +154,12 @@ TEST(FitState, RoundTripsToTheLastBit) {
   const FitState read = read_fit_state(folder / "state.json", "key");
   EXPECT_EQ(read.scan, written.scan);
   EXPECT_EQ(*read.motion, *written.motion);
-  EXPECT_EQ(*read.fine, *written.fine);
+  ASSERT_TRUE(read.fine.has_value());
+  EXPECT_EQ(read.fine->band, 1);
+  EXPECT_EQ(read.fine->reference, written.fine->reference);
+  EXPECT_EQ(read.fine->optimiser.iterations, 4);
+  EXPECT_EQ(read.fine->optimiser.p, written.fine->optimiser.p);
+  EXPECT_EQ(read.fine->optimiser.memory, written.fine->optimiser.memory);
   ASSERT_EQ(read.starts.size(), 2u);
   EXPECT_EQ(read.starts[1].start, written.starts[1].start);
   EXPECT_EQ(read.starts[1].final, written.starts[1].final);
@@ -167,11 +175,14 @@ TEST(FitState, RoundTripsToTheLastBit) {
 TEST(FitState, RefusesAnotherKeyAndDamage) {
   const test::TemporaryFolder folder;
   write_fit_state(folder / "state.json", some_state(), "key");
-  EXPECT_THAT(test::complaint_of([&] { (void)read_fit_state(folder / "state.json", "other"); }), HasSubstr("another capture"));
+  EXPECT_THAT(test::complaint_of([&] { (void)read_fit_state(folder / "state.json", "other"); }),
+              HasSubstr("another capture"));
   EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder / "missing.json", "key"); }), "");
   const std::string whole = read_file(folder / "state.json");
   for (const std::size_t length : {std::size_t(0), std::size_t(1), whole.size() / 2, whole.size() - 2})
-    EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder.write("cut.json", whole.substr(0, length)), "key"); }), "") << length;
+    EXPECT_NE(
+        test::complaint_of([&] { (void)read_fit_state(folder.write("cut.json", whole.substr(0, length)), "key"); }), "")
+        << length;
   for (const char* text : {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})",
                            R"({"format": "fit-state/0", "key": "key", "scan": [], "starts": []})",
                            R"({"format": "fit-state/1", "key": "key", "scan": [[1]], "starts": []})",

@@ -60,8 +60,10 @@ TEST_P(Gradient, AdjointTangentsAndEvaluationAgree) {
   EXPECT_NEAR(objective.evaluate(scene.p).cost, by_tangents.cost, tolerance(1e-12) * by_adjoint.cost);
   const VectorX scale = by_tangents.gauss_newton.diagonal().cwiseSqrt();  // what each gradient is measured by
   for (Eigen::Index i = 0; i < scene.p.size(); ++i) {
-    ASSERT_GT(std::abs(by_tangents.gradient[i]), 1e-6 * scale[i]) << scene.parameters.coordinate_names()[std::size_t(i)];
-    EXPECT_NEAR(by_adjoint.gradient[i], by_tangents.gradient[i], tolerance(1e-8) * std::max(std::abs(by_tangents.gradient[i]), scale[i]))
+    ASSERT_GT(std::abs(by_tangents.gradient[i]), 1e-6 * scale[i])
+        << scene.parameters.coordinate_names()[std::size_t(i)];
+    EXPECT_NEAR(by_adjoint.gradient[i], by_tangents.gradient[i],
+                tolerance(1e-8) * std::max(std::abs(by_tangents.gradient[i]), scale[i]))
         << scene.parameters.coordinate_names()[std::size_t(i)];
   }
 }
@@ -102,7 +104,8 @@ TEST_P(Gradient, GaussNewtonMatrixIsThatOfTheResiduals) {
     J.col(i) = (distances(scene.p + step) - distances(scene.p - step)) / 2e-6;
   }
   const RobustLoss loss{objective.options().outlier_scale};
-  const VectorX w = r.unaryExpr([&](double d) { return loss.weight(d) / (1e-3 * 1e-3); });  // 40 points: all count in full
+  const VectorX w =
+      r.unaryExpr([&](double d) { return loss.weight(d) / (1e-3 * 1e-3); });  // 40 points: all count in full
   VectorX curvature, unused;
   scene.parameters.prior(scene.p, &unused, &curvature);
   const MatrixX expected = J.transpose() * w.asDiagonal() * J + MatrixX(curvature.asDiagonal());

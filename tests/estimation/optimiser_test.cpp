@@ -63,7 +63,8 @@ TEST(LevenbergMarquardt, RecoversSeveralParametersTogether) {
   start[theta::stiffness_damping] *= 1.5;
   start.segment<3>(theta::linear_velocity) += Vector3(0.03, -0.03, 0.03);
   start.segment<3>(theta::plane_point(0)) += Vector3(0.0, 2e-3, 0.0);
-  const ParameterSet set = estimating(recording, {"youngs_modulus", "stiffness_damping", "linear_velocity", "plane"}, start);
+  const ParameterSet set =
+      estimating(recording, {"youngs_modulus", "stiffness_damping", "linear_velocity", "plane"}, start);
   Objective objective = recording.objective(set, 0.033);
   OptimiserOptions options;
   options.cost_tolerance = 1e-6;
@@ -89,7 +90,9 @@ TEST_P(BaselineOptimiser, LowersTheCostAndComesClose) {
   EXPECT_FALSE(summary.reason.empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, BaselineOptimiser, ::testing::Values(OptimiserKind::Rprop, OptimiserKind::GradientDescent, OptimiserKind::LevenbergMarquardt));
+INSTANTIATE_TEST_SUITE_P(Kinds, BaselineOptimiser,
+                         ::testing::Values(OptimiserKind::Rprop, OptimiserKind::GradientDescent,
+                                           OptimiserKind::LevenbergMarquardt));
 
 TEST_P(BaselineOptimiser, AStartThatIsNoNumberFailsWithAReason) {
   const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
@@ -117,7 +120,8 @@ TEST_P(BaselineOptimiser, BacksOffFromStepsThatCannotBeSimulated) {
     ASSERT_LT(allowed, 100);
   }
   Objective objective = recording.objective(set);
-  ASSERT_FALSE(objective.evaluate(p + VectorX::Constant(1, 1.4)).succeeded) << "the truth can be simulated: nothing fails";
+  ASSERT_FALSE(objective.evaluate(p + VectorX::Constant(1, 1.4)).succeeded)
+      << "the truth can be simulated: nothing fails";
   OptimiserOptions options;
   options.kind = GetParam();
   options.max_iterations = 8;
@@ -139,7 +143,8 @@ TEST_P(BaselineOptimiser, StopsWhenTold) {
   Objective objective = recording.objective(set);
   OptimiserOptions options;
   options.kind = GetParam();
-  const OptimiserSummary stopped = minimise(objective, set.to_unconstrained(set.reference()), options, [](const Iteration& i) { return i.number < 2; });
+  const OptimiserSummary stopped = minimise(objective, set.to_unconstrained(set.reference()), options,
+                                            [](const Iteration& i) { return i.number < 2; });
   EXPECT_TRUE(stopped.interrupted);
   EXPECT_FALSE(stopped.converged);
   EXPECT_EQ(stopped.iterations, 2);
@@ -147,6 +152,30 @@ TEST_P(BaselineOptimiser, StopsWhenTold) {
   const OptimiserSummary one = minimise(objective, set.to_unconstrained(set.reference()), options);
   EXPECT_EQ(one.iterations, 1);
   EXPECT_FALSE(one.interrupted);
+}
+
+TEST_P(BaselineOptimiser, GoesOnFromAnyIterationAlongTheSamePath) {
+  const test::Recording recording = test::torus_recording(cell_size, 6, 1, 0.0, 1, 40, 0.0, 1.0, 1e-8);
+  const ParameterSet set =
+      estimating(recording, {"youngs_modulus", "stiffness_damping"}, with_modulus(recording.truth, 3.0));
+  OptimiserOptions options;
+  options.kind = GetParam();
+  options.max_iterations = 6;
+  std::vector<OptimiserState> states;
+  Objective objective = recording.objective(set);
+  const OptimiserSummary whole =
+      minimise(objective, set.to_unconstrained(set.reference()), options, [&](const Iteration& i) {
+        states.push_back(i.state());
+        return true;
+      });
+  ASSERT_GE(states.size(), 3U);
+  for (std::size_t k = 0; k + 1 < states.size(); ++k) {
+    Objective anew = recording.objective(set);
+    const OptimiserSummary rest = minimise(anew, states[k], options);
+    EXPECT_EQ(rest.iterations, whole.iterations) << "from " << k + 1;
+    EXPECT_EQ(rest.p, whole.p) << "from " << k + 1;
+    EXPECT_EQ(rest.reason, whole.reason);
+  }
 }
 
 TEST(Minimise, NothingToEstimateIsDoneAtOnce) {
@@ -157,7 +186,8 @@ TEST(Minimise, NothingToEstimateIsDoneAtOnce) {
   EXPECT_EQ(summary.iterations, 0);
 }
 
-/// Frames that each measure a line's slope and offset with independent noise: the truth is the least-squares covariance.
+/// Frames that each measure a line's slope and offset with independent noise: the truth is the least-squares
+/// covariance.
 TEST(ParameterCovariance, OfALinearModel) {
   std::mt19937 random(9);
   std::normal_distribution<double> normal;

@@ -27,7 +27,8 @@ TEST(ParameterSet, RoundTrips) {
   const VectorX p = somewhere(set), theta = set.to_theta(p);
   EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-12));
   EXPECT_LT((set.to_theta(set.to_unconstrained(theta)) - theta).norm(), tolerance(1e-12) * theta.norm());
-  EXPECT_LT((set.to_theta(set.to_unconstrained(set.reference())) - set.reference()).norm(), tolerance(1e-12) * theta.norm());
+  EXPECT_LT((set.to_theta(set.to_unconstrained(set.reference())) - set.reference()).norm(),
+            tolerance(1e-12) * theta.norm());
   EXPECT_NEAR(theta.segment<3>(theta::plane_normal(0)).norm(), 1.0, tolerance(1e-14));
 }
 
@@ -39,7 +40,8 @@ TEST(ParameterSet, JacobianMatchesCentralDifferences) {
   for (int i = 0; i < set.dimension(); ++i) {
     ASSERT_GT(J.col(i).norm(), 0.0);
     const auto along = [&](double h) -> VectorX { return set.to_theta(p + h * VectorX::Unit(p.size(), i)); };
-    EXPECT_LT(test::best_relative_error(along, J.col(i), 1.0), tolerance(1e-8)) << set.coordinate_names()[std::size_t(i)];
+    EXPECT_LT(test::best_relative_error(along, J.col(i), 1.0), tolerance(1e-8))
+        << set.coordinate_names()[std::size_t(i)];
   }
 }
 
