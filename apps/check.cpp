@@ -97,7 +97,6 @@ void describe_sensors(const Capture& capture) {
                   camera.every > 1 ? formatted(", every %d frames", camera.every).c_str() : ""));
   }
   for (const CloudSequence& cloud : capture.clouds) say("clouds", cloud.points.pattern);
-  for (const MarkerTrack& track : capture.markers) say("markers", track.track.filename().string());
   const auto is_test = [](const auto& item) { return item.role == "test"; };
   if (!capture.presses.empty())
     say("presses", formatted("%zu, of them %d for test only", capture.presses.size(),
@@ -105,6 +104,44 @@ void describe_sensors(const Capture& capture) {
   if (!capture.loads.empty())
     say("loads", formatted("%zu, of them %d for test only", capture.loads.size(),
                            int(std::ranges::count_if(capture.loads, is_test))));
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t most_shown = 10;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), most_shown); ++i)
+    text += (i == 0 ? "\"" : ", \"") + names[i] + "\"";
+  return names.size() > most_shown ? text + formatted(" and %zu more", names.size() - most_shown) : text;
+}
+
+void describe_markers(const Capture& capture, const Survey& seen, Json& json) {
+  for (std::size_t i = 0; i < seen.markers.size(); ++i) {
+    const MarkerSurvey& markers = seen.markers[i];
+    const std::string file = capture.markers[i].track.filename().string();
+    const int frames_seen = markers.frames - int(markers.empty_frames.size());
+    say("markers", formatted("%d of \"%s\", seen in %d of %d frames, %.3g %% of positions missing", markers.markers,
+                             file.c_str(), frames_seen, markers.frames, 100.0 * markers.missing));
+    say("", formatted("they move by up to %.3g m", markers.travel) +
+                (markers.noise ? formatted("; noise about %.2g mm a coordinate", 1e3 * *markers.noise) : ""));
+    if (!markers.empty_frames.empty()) say("", "note: no marker in frames " + ranges_text(markers.empty_frames));
+    if (!markers.never_seen.empty()) say("", "note: never seen: " + listed(markers.never_seen));
+    if (!markers.left_out.empty()) say("", "left out, not among those at rest: " + listed(markers.left_out));
+    json["markers"].push_back({{"file", file},
+                               {"markers", markers.markers},
+                               {"frames", frames_seen},
+                               {"missing", markers.missing},
+                               {"travel", markers.travel}});
+    if (markers.noise) json["markers"].back()["noise"] = *markers.noise;
+    if (markers.frame_rate) json["markers"].back()["frame_rate"] = *markers.frame_rate;
+  }
+  if (!seen.loaded_markers) return;
+  const MarkerSurvey& loaded = *seen.loaded_markers;
+  say("markers", formatted("%d under %d presses and loads, %.3g %% of positions missing, moved by up to %.3g m",
+                           loaded.markers, loaded.frames, 100.0 * loaded.missing, loaded.travel));
+  json["loaded_markers"] = {{"markers", loaded.markers},
+                            {"measurements", loaded.frames},
+                            {"missing", loaded.missing},
+                            {"travel", loaded.travel}};
 }
 
 void describe_observations(const Capture& capture, const Survey& seen, Json& json) {
@@ -303,6 +340,7 @@ void check(const Arguments& arguments) {
   describe_object(capture, json);
   describe_world(capture);
   describe_sensors(capture);
+  describe_markers(capture, seen, json);
   describe_observations(capture, seen, json);
   describe_planes(capture, seen, json);
   for (std::size_t i = 0; i < seen.scenes.size(); ++i) describe_scene(seen.scenes[i], capture.depth[i].name, json);

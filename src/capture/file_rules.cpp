@@ -17,6 +17,8 @@ namespace {
 
 constexpr double nearest_scene = 0.02, farthest_scene = 50.0;  // [m] median depth of an image
 constexpr int least_pixels = 10;                               // that show something near the object
+constexpr double farthest_markers = 100.0;                     // sizes of the object from where they rest (median)
+constexpr double rate_tolerance = 5e-4;                        // tells 59.94 Hz from 60 Hz
 
 std::string item(const char* name, std::size_t i, const char* key = "") {
   return std::string(name) + "[" + std::to_string(i) + "]" + (*key ? "." : "") + key;
@@ -177,40 +179,64 @@ std::vector<Rule> make_rules() {
           check_clouds_near_object};
 }
 
+// What is wrong with a file that several blocks name is told once.
 void add_problems(RuleContext& context, const std::string& key, const InputError& error) {
-  for (const Problem& problem : error.problems()) context.toml.problems.push_back(problem);
+  std::vector<Problem>& told = context.toml.problems;
+  for (const Problem& problem : error.problems()) {
+    const auto is_same = [&](const Problem& other) { return to_string(other) == to_string(problem); };
+    if (std::ranges::none_of(told, is_same)) told.push_back(problem);
+  }
   context.toml.broken.insert(key);
 }
 
-// Markers that are followed must be known at rest.
-void check_ids(RuleContext& context, const std::string& key, const MarkerPositions& seen, const MarkerPositions& rest) {
-  for (const auto& [id, position] : seen)
-    if (!rest.contains(id)) {
-      context.toml.complain(key, "marker " + std::to_string(id) + " is not among the markers at rest",
-                            "ids as in the file of rest positions", "add its position at rest or remove its rows");
-      return;
-    }
-}
-
-void check_markers_on_object(RuleContext& context, const std::string& key, const MarkerPositions& rest) {
-  if (!context.capture.surface || rest.empty()) return;
+void check_markers_on_object(RuleContext& context, const std::string& key, const MarkerSet& markers) {
+  if (!context.capture.surface) return;
   const Box box = bounding_box(*context.capture.surface);
   const double margin = 0.1 * box.extent().maxCoeff();
-  for (const auto& [id, p] : rest)
-    if ((p.array() < box.min.array() - margin).any() || (p.array() > box.max.array() + margin).any()) {
-      context.toml.complain(key, "marker " + std::to_string(id) + " at rest lies outside the object",
-                            "markers on or in the object", "give markers in metres, in the surface's coordinates");
-      return;
-    }
+  for (Eigen::Index i = 0; i < markers.rest.rows(); ++i) {
+    const Vector3 p = markers.rest.row(i);
+    if ((p.array() >= box.min.array() - margin).all() && (p.array() <= box.max.array() + margin).all()) continue;
+    context.toml.complain(key, "marker \"" + markers.ids[std::size_t(i)] + "\" at rest lies outside the object",
+                          "markers on or in the object", "give markers in metres, in the surface's coordinates");
+    return;
+  }
 }
 
-void check_marker_pair(RuleContext& context, const std::string& block, const fs::path& markers_path,
-                       const fs::path& rest_path) {
+// Followed markers in another unit than those at rest: far beyond where the object can have got.
+void check_marker_unit(RuleContext& context, const std::string& key, const MarkerSet& markers) {
+  if (!context.capture.surface) return;
+  const double size = bounding_box(*context.capture.surface).extent().maxCoeff();
+  std::vector<double> ways;
+  for (const Points& frame : markers.frames)
+    for (Eigen::Index i = 0; i < frame.rows(); ++i)
+      if (const double way = (frame.row(i) - markers.rest.row(i)).norm(); std::isfinite(way)) ways.push_back(way);
+  if (ways.empty()) return;
+  const auto middle = ways.begin() + std::ptrdiff_t(ways.size() / 2);
+  std::nth_element(ways.begin(), middle, ways.end());
+  if (*middle > std::max(farthest_markers * size, 2.0))
+    context.toml.complain(key, "markers " + text_of(*middle, "m") + " away from where they rest (median)",
+                          "positions near the object", "give markers in metres, in the surface's coordinates");
+}
+
+// The capture's facts and those of the track's file must be one recording.
+void check_marker_rate(RuleContext& context, const std::string& key, const fs::path& track, const MarkerSet& markers) {
+  const std::vector<double>& times = context.capture.times;
+  if (!markers.frame_rate || times.size() < 2 || !context.toml.is_sound("timing")) return;
+  const double rate = double(times.size() - 1) / (times.back() - times.front());
+  if (std::abs(*markers.frame_rate / rate - 1.0) <= rate_tolerance) return;
+  const std::string stated = context.toml.places.has("timing.timestamps") ? "`timestamps` are at " : "`frame_rate` is ";
+  context.toml.complain(key,
+                        "\"" + track.filename().string() + "\" has frames at " + text_of(*markers.frame_rate, "Hz") +
+                            " (POINT:RATE), " + stated + text_of(rate, "Hz"),
+                        "one rate", "correct [timing], or export the track at the rate of the other sensors");
+}
+
+void check_marker_pair(RuleContext& context, const std::string& block, const fs::path& rest,
+                       const fs::path& under_load) {
   try {
-    const MarkerPositions rest = read_markers(rest_path), seen = read_markers(markers_path);
-    if (seen.empty()) context.toml.complain(block + ".markers", "a file without markers", "one marker at least");
-    check_ids(context, block + ".markers", seen, rest);
-    check_markers_on_object(context, block + ".markers_rest", rest);
+    const MarkerSet markers = read_marker_pair(rest, under_load);
+    check_markers_on_object(context, block + ".markers_rest", markers);
+    check_marker_unit(context, block + ".markers", markers);
   } catch (const InputError& error) {
     add_problems(context, block, error);
   }
@@ -270,17 +296,15 @@ void check_clouds(RuleContext& context) {
 }
 
 void check_markers(RuleContext& context) {
+  if (context.capture.times.empty()) return;
   for (std::size_t i = 0; i < context.capture.markers.size(); ++i) {
     if (!context.toml.is_sound(item("markers", i))) continue;
+    const MarkerTrack& files = context.capture.markers[i];
     try {
-      const MarkerPositions rest = read_markers(context.capture.markers[i].rest);
-      const auto track = read_marker_track(context.capture.markers[i].track);
-      check_markers_on_object(context, item("markers", i, "rest"), rest);
-      if (track.empty()) context.toml.complain(item("markers", i, "track"), "a track without rows", "one row at least");
-      if (!track.empty() && !context.capture.times.empty() && track.rbegin()->first >= context.capture.frame_count())
-        context.toml.complain(item("markers", i, "track"), "frame " + std::to_string(track.rbegin()->first),
-                              "0 to " + std::to_string(context.capture.frame_count() - 1), "frames are counted from 0");
-      for (const auto& [frame, seen] : track) check_ids(context, item("markers", i, "track"), seen, rest);
+      const MarkerSet markers = read_markers(files, context.capture.frame_count());
+      check_markers_on_object(context, item("markers", i, "rest"), markers);
+      check_marker_unit(context, item("markers", i, "track"), markers);
+      check_marker_rate(context, item("markers", i, "track"), files.track, markers);
     } catch (const InputError& error) {
       add_problems(context, item("markers", i), error);
     }
@@ -290,8 +314,8 @@ void check_markers(RuleContext& context) {
 void check_press_markers(RuleContext& context) {
   for (std::size_t i = 0; i < context.capture.presses.size(); ++i)
     if (context.toml.is_sound(item("press", i)))
-      check_marker_pair(context, item("press", i), context.capture.presses[i].markers,
-                        context.capture.presses[i].markers_rest);
+      check_marker_pair(context, item("press", i), context.capture.presses[i].markers_rest,
+                        context.capture.presses[i].markers);
 }
 
 void check_load_files(RuleContext& context) {
@@ -299,7 +323,7 @@ void check_load_files(RuleContext& context) {
     const Load& load = context.capture.loads[i];
     if (!context.toml.is_sound(item("load", i))) continue;
     if (load.markers && load.markers_rest)
-      check_marker_pair(context, item("load", i), *load.markers, *load.markers_rest);
+      check_marker_pair(context, item("load", i), *load.markers_rest, *load.markers);
     for (const DepthCamera& camera : context.capture.depth) {
       if (load.images.contains(camera.name))
         check_header(context, item("load", i, "images"), load.images.at(camera.name), camera.camera, Kind::Depth);

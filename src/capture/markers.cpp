@@ -1,14 +1,21 @@
 #include "capture/markers.hpp"
 
-#include <charconv>
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <limits>
+#include <map>
 #include <ostream>
-#include <string>
-#include <string_view>
+#include <set>
+#include <stdexcept>
+#include <unordered_map>
 
 #include "base/files.hpp"
+#include "capture/c3d.hpp"
+#include "capture/csv.hpp"
+#include "capture/toml_table.hpp"
 
 namespace pliant {
 
@@ -16,110 +23,247 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-  const auto begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+constexpr std::size_t most_problems = 20;  // told of one pair of files; the rest is counted
+constexpr const char* header_of_positions = "id,x,y,z";
+constexpr const char* header_of_track = "frame,id,x,y,z";
+
+using Problems = std::vector<Problem>;
+using Numbers = std::unordered_map<std::string, int>;  // of markers, by id
+
+void throw_problems(Problems& problems, const fs::path& path) {
+  if (problems.empty()) return;
+  const std::size_t count = problems.size();
+  problems.resize(std::min(count, most_problems));
+  if (count > most_problems)
+    problems.push_back(
+        {{path}, std::to_string(count - most_problems) + " more problems", "none", "correct these first"});
+  throw InputError(std::move(problems));
 }
 
-std::vector<std::string_view> cells_of(std::string_view line) {
-  std::vector<std::string_view> cells;
-  for (std::size_t at = 0; at <= line.size();) {
-    const std::size_t end = std::min(line.find(',', at), line.size());
-    cells.push_back(trimmed(line.substr(at, end - at)));
-    at = end + 1;
+// Runs a reader; what it throws joins the problems.
+template <class Read>
+void gather(Problems& problems, const Read& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    problems.insert(problems.end(), error.problems().begin(), error.problems().end());
   }
-  return cells;
 }
 
-double number_in(std::string_view cell, const Place& place) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error == std::errc() && end == cell.data() + cell.size() && std::isfinite(value)) return value;
-  throw InputError(Problem{place, "\"" + std::string(cell.substr(0, 40)) + "\"", "a finite number",
-                           "leave out rows of markers that were not seen"});
+std::string in_quotes(const std::string& text) { return '"' + text.substr(0, 60) + '"'; }
+
+std::string marker_named(const std::string& id) { return "marker " + in_quotes(id); }
+
+Numbers numbers_of(const std::vector<std::string>& ids) {
+  Numbers numbers;
+  for (const std::string& id : ids) numbers.emplace(id, int(numbers.size()));
+  return numbers;
 }
 
-int index_in(std::string_view cell, const Place& place) {
-  const double value = number_in(cell, place);
-  if (value == std::floor(value) && value >= 0 && value < 2e9) return int(value);
-  throw InputError(Problem{place, "\"" + std::string(cell.substr(0, 40)) + "\"", "a whole number from 0", ""});
+// The cells x, y, z; nothing, with complaints, where one is no number.
+std::optional<Vector3> position_in(CsvRow& row, std::size_t first) {
+  const auto x = row.number(first), y = row.number(first + 1), z = row.number(first + 2);
+  return x && y && z ? std::optional(Vector3(*x, *y, *z)) : std::nullopt;
 }
 
-using Row = std::function<void(const std::vector<std::string_view>&, const Place&)>;
+// Rows of a file `id,x,y,z`, each id once. An id counts as there also where its position is broken.
+MarkerPositions read_positions(const fs::path& path, Problems& problems) {
+  MarkerPositions markers;
+  std::vector<Vector3> positions;
+  std::map<std::string, int> line_of;
+  gather(problems, [&] {
+    read_csv(path, header_of_positions, problems, [&](CsvRow& row) {
+      const auto id = row.text(0);
+      const auto position = position_in(row, 1);
+      if (!id) return;
+      if (const auto [first, is_new] = line_of.emplace(*id, row.line()); !is_new) {
+        row.complain(0, marker_named(*id) + " appears a second time", "each id once",
+                     "it stands in line " + std::to_string(first->second) + " already");
+        return;
+      }
+      markers.ids.push_back(*id);
+      positions.push_back(position.value_or(Vector3::Zero()));
+    });
+  });
+  markers.positions.resize(Eigen::Index(positions.size()), 3);
+  for (std::size_t i = 0; i < positions.size(); ++i) markers.positions.row(Eigen::Index(i)) = positions[i];
+  return markers;
+}
 
-// Calls `row` for each line below the header, with as many cells as the header has.
-void read_csv(const fs::path& path, std::string_view header, const Row& row) {
-  const std::string content = read_file(path);
-  const std::size_t columns = cells_of(header).size();
-  int number = 0;
-  for (std::size_t at = 0; at < content.size();) {
-    const std::size_t end = std::min(content.find('\n', at), content.size());
-    const std::string_view line = trimmed(std::string_view(content).substr(at, end - at));
-    at = end + 1;
-    const Place place{path, ++number, 1};
-    const auto cells = cells_of(line);
-    if (number == 1) {
-      if (cells != cells_of(header))
-        throw InputError(Problem{place, "the header \"" + std::string(line.substr(0, 60)) + "\"",
-                                 "\"" + std::string(header) + "\"", "name the columns so, in this order"});
-    } else if (!line.empty()) {
-      if (cells.size() != columns)
-        throw InputError(
-            Problem{place, std::to_string(cells.size()) + " cells", std::to_string(columns) + " cells", ""});
-      row(cells, place);
+// The markers at rest, and frames in which none is seen yet.
+MarkerSet begin_set(const fs::path& rest, int frame_count, Problems& problems) {
+  MarkerPositions markers = read_positions(rest, problems);
+  MarkerSet set;
+  set.ids = std::move(markers.ids);
+  set.rest = std::move(markers.positions);
+  set.frames.assign(std::size_t(frame_count),
+                    Points::Constant(set.rest.rows(), 3, std::numeric_limits<double>::quiet_NaN()));
+  return set;
+}
+
+// Puts rows of one or many frames into a set; complains about ids that are unknown (once each) or come twice.
+class Collector {
+ public:
+  Collector(MarkerSet& set, bool rest_is_sound) : set_(set), numbers_(numbers_of(set.ids)), knows_ids_(rest_is_sound) {}
+
+  void add(CsvRow& row, int frame, std::size_t id_column) {
+    const auto id = row.text(id_column);
+    const auto position = position_in(row, id_column + 1);
+    if (!id) return;
+    const auto found = numbers_.find(*id);
+    if (found == numbers_.end()) {
+      if (knows_ids_ && unknown_.insert(*id).second)
+        row.complain(id_column, marker_named(*id) + " is not among the markers at rest",
+                     "ids as in the file of rest positions", "add its position at rest or remove its rows");
+      return;
+    }
+    if (!seen_.insert({frame, found->second}).second)
+      row.complain(id_column, marker_named(*id) + " appears a second time" + in_frame(frame), "each id once",
+                   "remove one of the rows");
+    else if (position)
+      set_.frames[std::size_t(frame)].row(found->second) = *position;
+  }
+
+ private:
+  std::string in_frame(int frame) const {
+    return set_.frames.size() > 1 ? " in frame " + std::to_string(frame) : std::string();
+  }
+
+  MarkerSet& set_;
+  Numbers numbers_;
+  bool knows_ids_;
+  std::set<std::string> unknown_;
+  std::set<std::pair<int, int>> seen_;
+};
+
+void read_csv_track(const fs::path& path, MarkerSet& set, Problems& problems) {
+  Collector collector(set, problems.empty());
+  const int frame_count = int(set.frames.size());
+  read_csv(path, header_of_track, problems, [&](CsvRow& row) {
+    const auto frame = row.index(0);
+    if (!frame) return;
+    if (*frame < frame_count)
+      collector.add(row, *frame, 1);
+    else
+      row.complain(0, "frame " + std::to_string(*frame), "0 to " + std::to_string(frame_count - 1),
+                   "frames are counted from 0; correct `frame_count` or remove the rows");
+  });
+}
+
+std::string known_labels(const std::set<std::string>& labels) {
+  std::string text;
+  for (const std::string& label : labels) {
+    if (text.size() > 200) return text + ", ...";
+    text += (text.empty() ? "" : ", ") + in_quotes(label);
+  }
+  return text.empty() ? "labels in POINT:LABELS" : "one of " + text;
+}
+
+// The trajectory of each marker at rest; -1, with a complaint, where it has none or several.
+std::vector<int> match_labels(const fs::path& path, const std::vector<std::string>& ids,
+                              const std::vector<std::string>& labels, Problems& problems) {
+  std::set<std::string> known(labels.begin(), labels.end());
+  known.erase("");
+  std::vector<int> columns;
+  for (const std::string& id : ids) {
+    const auto found = std::ranges::find(labels, id);
+    columns.push_back(found == labels.end() ? -1 : int(found - labels.begin()));
+    if (found == labels.end()) {
+      const std::string nearest = nearest_name(id, known);
+      problems.push_back({{path},
+                          "no trajectory with the label " + in_quotes(id),
+                          known_labels(known),
+                          nearest.empty()
+                              ? "name the markers at rest as the trajectories are labelled"
+                              : "did you mean " + in_quotes(nearest) + "? Ids of markers at rest are labels"});
+    } else if (std::find(found + 1, labels.end(), id) != labels.end()) {
+      problems.push_back({{path},
+                          "several trajectories with the label " + in_quotes(id),
+                          "one",
+                          "join or rename them where they were recorded"});
     }
   }
-  if (number == 0)
-    throw InputError(
-        Problem{{path}, "the file is empty", "a CSV file with the header \"" + std::string(header) + "\"", ""});
+  return columns;
 }
 
-void add_marker(MarkerPositions& markers, const std::vector<std::string_view>& cells, std::size_t first,
-                const Place& place) {
-  const int id = index_in(cells[first], place);
-  const Vector3 position(number_in(cells[first + 1], place), number_in(cells[first + 2], place),
-                         number_in(cells[first + 3], place));
-  if (!markers.emplace(id, position).second)
-    throw InputError(Problem{place, "marker " + std::to_string(id) + " appears a second time", "each id once", ""});
+void read_c3d_track(const fs::path& path, MarkerSet& set, Problems& problems) {
+  const C3dTrajectories file = read_c3d(path);
+  set.frame_rate = file.frame_rate;
+  if (file.frames.size() > set.frames.size())
+    problems.push_back({{path},
+                        std::to_string(file.frames.size()) + " frames",
+                        std::to_string(set.frames.size()) + " at most, the capture's frames",
+                        "correct `frame_count`, or export those frames alone"});
+  const std::size_t before = problems.size();
+  const std::vector<int> columns = match_labels(path, set.ids, file.labels, problems);
+  for (const std::string& label : file.labels)
+    if (!label.empty() && std::ranges::find(set.ids, label) == set.ids.end()) set.left_out.push_back(label);
+  if (problems.size() > before) return;
+  for (std::size_t f = 0; f < std::min(file.frames.size(), set.frames.size()); ++f)
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      set.frames[f].row(Eigen::Index(i)) = file.frames[f].row(columns[i]);
 }
 
-void write_cells(std::ostream& stream, int id, const Vector3& p) {
-  char text[128];
-  std::snprintf(text, sizeof text, "%d,%.9g,%.9g,%.9g\n", id, p.x(), p.y(), p.z());
-  stream << text;
+bool is_c3d(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return ending == ".c3d";
+}
+
+void write_row(std::ostream& stream, const std::string& id, const Eigen::RowVector3d& p) {
+  if (id.empty() || id.find_first_of(",\"\n\r") != std::string::npos)
+    throw std::invalid_argument("a marker's id must have no comma, quote or line's end: \"" + id + "\"");
+  char text[96];
+  std::snprintf(text, sizeof text, ",%.9g,%.9g,%.9g\n", p.x(), p.y(), p.z());
+  stream << id << text;
 }
 
 }  // namespace
 
-MarkerPositions read_markers(const fs::path& path) {
-  MarkerPositions markers;
-  read_csv(path, "id,x,y,z", [&](const auto& cells, const Place& place) { add_marker(markers, cells, 0, place); });
+MarkerPositions read_marker_positions(const fs::path& path) {
+  Problems problems;
+  MarkerPositions markers = read_positions(path, problems);
+  throw_problems(problems, path);
   return markers;
 }
 
-std::map<int, MarkerPositions> read_marker_track(const fs::path& path) {
-  std::map<int, MarkerPositions> track;
-  read_csv(path, "frame,id,x,y,z", [&](const auto& cells, const Place& place) {
-    add_marker(track[index_in(cells[0], place)], cells, 1, place);
-  });
-  return track;
+MarkerSet read_marker_pair(const fs::path& rest, const fs::path& under_load) {
+  Problems problems;
+  MarkerSet set = begin_set(rest, 1, problems);
+  Collector collector(set, problems.empty());
+  gather(problems,
+         [&] { read_csv(under_load, header_of_positions, problems, [&](CsvRow& row) { collector.add(row, 0, 0); }); });
+  throw_problems(problems, under_load);
+  return set;
 }
 
-void write_markers(const fs::path& path, const MarkerPositions& markers) {
+MarkerSet read_markers(const MarkerTrack& files, int frame_count) {
+  Problems problems;
+  MarkerSet set = begin_set(files.rest, frame_count, problems);
+  gather(problems, [&] {
+    is_c3d(files.track) ? read_c3d_track(files.track, set, problems) : read_csv_track(files.track, set, problems);
+  });
+  throw_problems(problems, files.track);
+  return set;
+}
+
+void write_marker_positions(const fs::path& path, const MarkerPositions& markers) {
   write_file(path, [&](std::ostream& stream) {
-    stream << "id,x,y,z\n";
-    for (const auto& [id, position] : markers) write_cells(stream, id, position);
+    stream << header_of_positions << '\n';
+    for (std::size_t i = 0; i < markers.ids.size(); ++i)
+      write_row(stream, markers.ids[i], markers.positions.row(Eigen::Index(i)));
   });
 }
 
-void write_marker_track(const fs::path& path, const std::map<int, MarkerPositions>& track) {
+void write_marker_track(const fs::path& path, std::span<const std::string> ids, std::span<const Points> frames) {
   write_file(path, [&](std::ostream& stream) {
-    stream << "frame,id,x,y,z\n";
-    for (const auto& [frame, markers] : track)
-      for (const auto& [id, position] : markers) {
+    stream << header_of_track << '\n';
+    for (std::size_t frame = 0; frame < frames.size(); ++frame)
+      for (std::size_t i = 0; i < ids.size(); ++i) {
+        const Eigen::RowVector3d position = frames[frame].row(Eigen::Index(i));
+        if (!position.allFinite()) continue;
         stream << frame << ',';
-        write_cells(stream, id, position);
+        write_row(stream, ids[i], position);
       }
   });
 }

@@ -6,15 +6,17 @@
 
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
+#include "capture/markers.hpp"
 #include "capture/point_cloud.hpp"
 
 namespace pliant {
 
 namespace {
 
-constexpr double moving = 4.0;        // standard deviations of a point; the centroid of hundreds is far steadier
-constexpr double contact_gap = 0.02;  // of the object's size: how near a plane counts as touching it
-constexpr double plane_reach = 3.0;   // standard deviations within which observe() drops a plane's pixels
+constexpr double moving = 4.0;          // standard deviations of a point; the centroid of hundreds is far steadier
+constexpr double moving_markers = 8.0;  // the same of markers: they are few
+constexpr double contact_gap = 0.02;    // of the object's size: how near a plane counts as touching it
+constexpr double plane_reach = 3.0;     // standard deviations within which observe() drops a plane's pixels
 
 template <class T>
 T median_of(std::vector<T> values) {
@@ -164,6 +166,119 @@ std::vector<CloudScene> survey_clouds(const Capture& capture) {
   return scenes;
 }
 
+// Standard deviation of a coordinate, from second differences over three neighbouring frames: of three independent
+// deviations, 1, -2 and 1 times. Steady motion drops out, acceleration does not: of fast motion it is an upper bound.
+std::optional<double> marker_noise(const MarkerSet& markers) {
+  constexpr double deviation_per_median = 1.4826;
+  std::vector<double> differences;
+  for (std::size_t f = 2; f < markers.frames.size(); ++f) {
+    const Points difference = markers.frames[f] - 2.0 * markers.frames[f - 1] + markers.frames[f - 2];
+    for (const double d : difference.reshaped())
+      if (std::isfinite(d)) differences.push_back(std::abs(d));
+  }
+  if (differences.empty()) return std::nullopt;
+  return deviation_per_median * median_of(std::move(differences)) / std::sqrt(6.0);
+}
+
+// The greatest way over all frames, of the frame's median marker.
+double median_travel(const MarkerSet& markers) {
+  double travel = 0.0;
+  Points first = Points::Constant(markers.rest.rows(), 3, std::nan(""));
+  for (int f = 0; f < int(markers.frames.size()); ++f) {
+    const Points& frame = markers.frames[std::size_t(f)];
+    std::vector<double> ways;
+    for (int i = 0; i < markers.marker_count(); ++i) {
+      if (!markers.is_seen(f, i)) continue;
+      if (std::isnan(first(i, 0))) first.row(i) = frame.row(i);
+      ways.push_back((frame.row(i) - first.row(i)).norm());
+    }
+    travel = std::max(travel, median_of(std::move(ways)));
+  }
+  return travel;
+}
+
+MarkerSurvey survey_markers(const MarkerSet& markers) {
+  MarkerSurvey result;
+  result.markers = markers.marker_count();
+  result.frames = int(markers.frames.size());
+  std::vector<int> sightings(markers.ids.size(), 0);
+  for (int f = 0; f < result.frames; ++f) {
+    int seen = 0;
+    for (int i = 0; i < result.markers; ++i)
+      if (markers.is_seen(f, i)) ++seen, ++sightings[std::size_t(i)];
+    if (seen == 0) result.empty_frames.push_back(f);
+    result.missing += result.markers - seen;
+  }
+  result.missing /= std::max(1.0, double(result.markers) * result.frames);
+  for (std::size_t i = 0; i < sightings.size(); ++i)
+    if (sightings[i] == 0) result.never_seen.push_back(markers.ids[i]);
+  result.left_out = markers.left_out;
+  result.noise = marker_noise(markers);
+  result.travel = median_travel(markers);
+  result.frame_rate = markers.frame_rate;
+  return result;
+}
+
+std::optional<MarkerSurvey> survey_loaded_markers(const Capture& capture) {
+  std::vector<MarkerSet> sets;
+  for (const Press& press : capture.presses) sets.push_back(read_marker_pair(press.markers_rest, press.markers));
+  for (const Load& load : capture.loads)
+    if (load.markers && load.markers_rest) sets.push_back(read_marker_pair(*load.markers_rest, *load.markers));
+  if (sets.empty()) return std::nullopt;
+  MarkerSurvey result;
+  double positions = 0.0;
+  for (const MarkerSet& set : sets) {
+    result.markers = std::max(result.markers, set.marker_count());
+    positions += set.marker_count();
+    std::vector<double> ways;
+    for (int i = 0; i < set.marker_count(); ++i)
+      if (set.is_seen(0, i)) ways.push_back((set.frames[0].row(i) - set.rest.row(i)).norm());
+    result.missing += double(set.marker_count()) - double(ways.size());
+    if (!ways.empty()) result.travel = std::max(result.travel, *std::ranges::max_element(ways));
+  }
+  result.missing /= positions;
+  result.frames = int(sets.size());
+  return result;
+}
+
+// Whether a marker is at the plane, or the seen ones have come nearer to it by the object's clearance at rest.
+bool touches(const MarkerSet& markers, int frame, const Plane& plane, double start, double gap) {
+  double way = 0.0, lowest = 1e300;
+  int seen = 0;
+  for (int i = 0; i < markers.marker_count(); ++i) {
+    if (!markers.is_seen(frame, i)) continue;
+    const Vector3 now = markers.frames[std::size_t(frame)].row(i), rest = markers.rest.row(i);
+    lowest = std::min(lowest, plane.normal.dot(now - plane.point));
+    way += plane.normal.dot(now - rest);
+    ++seen;
+  }
+  return seen > 0 && (lowest < gap || start + way / seen < gap);
+}
+
+std::optional<int> first_contact(const Capture& capture, const MarkerSet& markers, double noise) {
+  if (!capture.surface || capture.is_static) return std::nullopt;
+  const double gap = plane_reach * noise + contact_gap * bounding_box(*capture.surface).extent().maxCoeff();
+  for (int frame = capture.start_frame; frame < capture.frame_count(); ++frame)
+    for (const Plane& plane : capture.planes) {
+      const double start = capture.initial.released ? 1e300 : clearance(*capture.surface, plane);
+      if (touches(markers, frame, plane, start, gap)) return frame;
+    }
+  return std::nullopt;
+}
+
+void add_markers(const Capture& capture, Survey& result) {
+  for (const MarkerTrack& files : capture.markers) {
+    const MarkerSet markers = read_markers(files, capture.frame_count());
+    const MarkerSurvey own = survey_markers(markers);
+    const double noise = own.noise.value_or(0.0);
+    result.moves = result.moves || (!capture.is_static && own.travel > moving_markers * noise);
+    if (const auto contact = first_contact(capture, markers, noise))
+      result.first_contact = std::min(result.first_contact.value_or(*contact), *contact);
+    result.markers.push_back(own);
+  }
+  result.loaded_markers = survey_loaded_markers(capture);
+}
+
 std::string millimetres(double metres) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f mm", 1e3 * metres);
@@ -249,6 +364,7 @@ Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
   result.seen_share = seen_share(capture, frames, result.median_noise);
   result.scenes = survey_scenes(capture);
   result.clouds = survey_clouds(capture);
+  add_markers(capture, result);
   return result;
 }
 

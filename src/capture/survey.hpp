@@ -32,20 +32,38 @@ struct CloudScene {
   std::optional<PlaneFit> plane;  ///< where it explains a fifth of the points at least
 };
 
+/// Markers of one [[markers]] block, or of all presses and loads together.
+struct MarkerSurvey {
+  int markers = 0;                      ///< at rest; the most of one file of presses and loads
+  int frames = 0;                       ///< of the capture; or presses and loads with markers
+  std::vector<int> empty_frames;        ///< in which no marker was seen
+  double missing = 0.0;                 ///< share of positions that were not seen
+  std::vector<std::string> never_seen;  ///< ids
+  std::vector<std::string> left_out;    ///< labels that no marker at rest has
+  std::optional<double> noise;          ///< [m] scatter of a coordinate between neighbouring frames; nothing: unknown
+  double travel = 0.0;               ///< [m] greatest way of the seen markers (their median) from the first sighting;
+                                     ///< under loads: from rest
+  std::optional<double> frame_rate;  ///< [Hz] as the track's file states it
+};
+
 /// What a recording shows, in figures.
 struct Survey {
   PointCounts points;
   double median_noise = 0.0;  ///< of points along the surface normal [m]
   double travel = 0.0;        ///< greatest displacement of the seen points' centroid or box from the first frame [m]
-  bool moves = false;         ///< travel beyond the noise
-  std::optional<int> first_contact;  ///< first frame after `start_frame` in which points come down to a plane
+  bool moves = false;         ///< travel of points or markers beyond their noise
+  std::optional<int> first_contact;  ///< first frame after `start_frame` in which points or markers come to a plane
   std::optional<double>
       seen_share;  ///< of the rest surface's vertices, at the start; nothing where it is not in that pose
-  std::vector<PlaneSurvey> planes;   ///< of each Capture::planes
-  std::vector<Segmentation> scenes;  ///< of each camera's first frame, where there is no rest surface
-  std::vector<CloudScene> clouds;    ///< of each cloud sequence's first frame, where there is no rest surface
+  std::vector<PlaneSurvey> planes;             ///< of each Capture::planes
+  std::vector<Segmentation> scenes;            ///< of each camera's first frame, where there is no rest surface
+  std::vector<CloudScene> clouds;              ///< of each cloud sequence's first frame, where there is no rest surface
+  std::vector<MarkerSurvey> markers;           ///< of each Capture::markers
+  std::optional<MarkerSurvey> loaded_markers;  ///< of all presses and loads that have markers
 };
 
+/// @param frames  as `observe` gives them; markers are read here
+/// Throws InputError where a file cannot be read.
 Survey survey(const Capture& capture, std::span<const ObservedFrame> frames);
 
 /// What can be estimated from a recording, what cannot, and why: plain sentences.

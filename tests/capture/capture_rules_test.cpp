@@ -4,6 +4,7 @@
 
 #include "capture/small_capture.hpp"
 #include "input_errors.hpp"
+#include "support/c3d_writer.hpp"
 
 namespace pliant {
 namespace {
@@ -236,24 +237,6 @@ TEST(CaptureRules, RefuseACaptureWithoutObservations) {
   EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("no observation"));
 }
 
-TEST(CaptureRules, CheckMarkers) {
-  const std::string block = "\n[[markers]]\nrest = \"markers_rest.csv\"\ntrack = \"markers.csv\"\n";
-  EXPECT_EQ(complaint_of([&] { (void)SmallCapture().append(block).read(); }), "");
-  {
-    SmallCapture small;
-    write_markers(small.folder / "markers_rest.csv", {{0, {0, 0, -0.1}}});
-    EXPECT_THAT(complaint_of([&] { (void)small.append(block).read(); }), HasSubstr("marker 7 is not among"));
-  }
-  {
-    SmallCapture small;
-    write_markers(small.folder / "markers_rest.csv", {{0, {0, 0, -100}}, {7, {0, 0, 0}}});
-    EXPECT_THAT(complaint_of([&] { (void)small.append(block).read(); }), HasSubstr("marker 0 at rest lies outside"));
-  }
-  SmallCapture small;
-  write_marker_track(small.folder / "markers.csv", {{4, {{0, {0, 0, 0}}}}});
-  EXPECT_THAT(complaint_of([&] { (void)small.append(block).read(); }), HasSubstr("frame 4; expected 0 to 3"));
-}
-
 const char* const press = R"(
 [[press]]
 force = [0.0, 0.0, 3.0]
@@ -262,6 +245,56 @@ probe = { point = [0.0, 0.0, -0.1], normal = [0.0, 0.0, 1.0] }
 markers = "markers_rest.csv"
 markers_rest = "markers_rest.csv"
 )";
+
+const char* const markers = "\n[[markers]]\nrest = \"markers_rest.csv\"\ntrack = \"markers.csv\"\n";
+
+std::string said_of_markers(const std::string& rest, const std::string& track) {
+  SmallCapture small;
+  if (!rest.empty()) small.folder.write("markers_rest.csv", "id,x,y,z\n" + rest);
+  if (!track.empty()) small.folder.write("markers.csv", "frame,id,x,y,z\n" + track);
+  return complaint_of([&] { (void)small.append(markers).read(); });
+}
+
+TEST(CaptureRules, CheckMarkers) {
+  EXPECT_EQ(said_of_markers("", ""), "");
+  EXPECT_THAT(said_of_markers("0,0,0,-0.1\n", ""), HasSubstr("markers.csv:3:3: marker \"7\" is not among"));
+  EXPECT_THAT(said_of_markers("0,0,0,-100\n7,0,0,0\n", ""), HasSubstr("marker \"0\" at rest lies outside"));
+  EXPECT_THAT(said_of_markers("", "4,0,0,0,0\n"), HasSubstr("markers.csv:2:1: frame 4; expected 0 to 3"));
+  EXPECT_THAT(said_of_markers("", "0,0,0,0,-100\n1,0,0,80,-100\n"),
+              AllOf(HasSubstr("capture.toml"), HasSubstr("away from where they rest (median)")));
+}
+
+TEST(CaptureRules, CheckTheRateOfMarkersAgainstTheCaptures) {
+  test::C3dWriter track;
+  track.labels = {"0", "7"};
+  track.units = "m";
+  track.rate = 60.0;
+  track.frames.assign(2, Points::Constant(2, 3, 0.05));
+  const auto said = [&](const char* timing) {
+    SmallCapture small;
+    small.folder.write("markers.c3d", track.bytes());
+    small.folder.write("times.txt", "0\n0.01\n0.02\n0.03\n");
+    small.append("\n[[markers]]\nrest = \"markers_rest.csv\"\ntrack = \"markers.c3d\"\n");
+    return complaint_of([&] { (void)small.edit("frame_rate = 60.0", timing).read(); });
+  };
+  EXPECT_EQ(said("frame_rate = 60.0"), "");
+  EXPECT_THAT(
+      said("frame_rate = 59.94"),
+      HasSubstr("\"markers.c3d\" has frames at 60 Hz (POINT:RATE), `frame_rate` is 59.94 Hz; expected one rate"));
+  EXPECT_THAT(said("timestamps = \"times.txt\""), HasSubstr("`timestamps` are at 100 Hz"));
+  track.rate = 100.0;
+  EXPECT_EQ(said("timestamps = \"times.txt\""), "");
+  track.rate = 0.0;
+  EXPECT_EQ(said("frame_rate = 60.0"), "") << "a file that states no rate contradicts nothing";
+}
+
+TEST(CaptureRules, TellFaultsOfASharedFileOnce) {
+  SmallCapture small;
+  small.folder.write("markers_rest.csv", "id,x,y,z\n0,0,0,bad\n");
+  const std::string said = complaint_of([&] { (void)small.append(press).append(press).read(); });
+  EXPECT_THAT(said, HasSubstr("markers_rest.csv:2:7"));
+  EXPECT_EQ(said.find("markers_rest.csv:2:7"), said.rfind("markers_rest.csv:2:7"));
+}
 
 std::string press_with(std::string from, const std::string& to) {
   std::string text = press;

@@ -7,7 +7,6 @@
 #include "capture/capture.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/image_io.hpp"
-#include "capture/markers.hpp"
 #include "capture/point_cloud.hpp"
 #include "geometry/mesh_io.hpp"
 #include "surface/meshes.hpp"
@@ -30,8 +29,8 @@ class SmallCapture {
       write_png(folder / ("front/mask_00000" + std::to_string(frame) + ".png"), mask_image(fallen));
     }
     write_png(folder / "front/background.png", depth_image(1e3));
-    write_markers(folder / "markers_rest.csv", {{0, {0, 0, -0.1}}, {7, {0.05, 0, 0.1}}});
-    write_marker_track(folder / "markers.csv", {{0, {{0, {0, 0, -0.1}}}}, {2, {{7, {0.05, 0.08, 0.1}}}}});
+    folder.write("markers_rest.csv", "id,x,y,z\n0,0,0,-0.1\n7,0.05,0,0.1\n");
+    folder.write("markers.csv", "frame,id,x,y,z\n0,0,0,0,-0.1\n2,7,0.05,0.08,0.1\n");
     write_points(folder / "load.ply", std::vector<Vector3>{{0, 0, -0.1}});
     folder.write("held.txt", "0\n1\n");
     text = R"(format = "capture/1"

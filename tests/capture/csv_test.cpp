@@ -1,0 +1,74 @@
+#include "capture/csv.hpp"
+
+#include "input_errors.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using test::complaint_of;
+using test::TemporaryFolder;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// Reads a file with the columns name, count and length.
+struct Reading {
+  explicit Reading(const std::string& content) {
+    const TemporaryFolder folder;
+    std::vector<Problem> problems;
+    read_csv(folder.write("a.csv", content), "name,count,length", problems, [&](CsvRow& row) {
+      const auto name = row.text(0);
+      const auto count = row.index(1);
+      const auto length = row.number(2);
+      if (name && count && length)
+        rows.push_back(*name + "|" + std::to_string(*count) + "|" + std::to_string(*length) + "|" +
+                       std::to_string(row.line()));
+    });
+    for (Problem& problem : problems) {
+      problem.place.file = problem.place.file.filename();
+      said.push_back(to_string(problem));
+    }
+  }
+  std::vector<std::string> rows, said;
+};
+
+TEST(Csv, IsReadRowByRow) {
+  const Reading read("name,count,length\na b,3,-2.5e-1\n7,0,1\n");
+  EXPECT_THAT(read.rows, ElementsAre("a b|3|-0.250000|2", "7|0|1.000000|3"));
+  EXPECT_THAT(read.said, IsEmpty());
+}
+
+TEST(Csv, TakesSpacesEmptyLinesWindowsLinesAndAByteOrderMark) {
+  const Reading read("\xEF\xBB\xBFname, count ,length\r\n\r\n a ,\t1, 2 \r\n\n");
+  EXPECT_THAT(read.rows, ElementsAre("a|1|2.000000|3"));
+  EXPECT_THAT(read.said, IsEmpty());
+}
+
+TEST(Csv, NamesLineAndColumnOfEveryFault) {
+  const Reading read("name,count,length\na,1.5,x\n\"b\",-1, inf\n,1,2\nc,1\nd,1,2\n");
+  EXPECT_THAT(read.rows, ElementsAre("d|1|2.000000|6"));
+  EXPECT_THAT(read.said, ElementsAre(HasSubstr("a.csv:2:3: \"1.5\"; expected a whole number from 0"),
+                                     HasSubstr("a.csv:2:7: \"x\"; expected a finite number"),
+                                     HasSubstr("a.csv:3:1: \"\"b\"\"; expected a name without commas and quotes"),
+                                     HasSubstr("a.csv:3:5: \"-1\""), HasSubstr("a.csv:3:9: \"inf\""),
+                                     HasSubstr("a.csv:4:1: an empty cell"),
+                                     HasSubstr("a.csv:5:1: 2 cells; expected 3 cells: name,count,length")));
+}
+
+TEST(Csv, RefusesAnotherHeaderAndEmptyFiles) {
+  EXPECT_THAT(Reading("name,length\na,1\n").said,
+              ElementsAre(HasSubstr("a.csv:1:1: the header \"name,length\"; expected \"name,count,length\"")));
+  EXPECT_THAT(Reading("name;count;length\n").said, ElementsAre(HasSubstr("the header")));
+  EXPECT_THAT(Reading("").said, ElementsAre(HasSubstr("a.csv: the file is empty")));
+  EXPECT_THAT(Reading("name,count,length\n\n").said, ElementsAre(HasSubstr("no row below the header")));
+}
+
+TEST(Csv, ThrowsWhereThereIsNoFile) {
+  std::vector<Problem> problems;
+  EXPECT_THAT(complaint_of([&] { read_csv("nowhere/a.csv", "x", problems, [](CsvRow&) {}); }),
+              HasSubstr("cannot be read"));
+}
+
+}  // namespace
+}  // namespace pliant
