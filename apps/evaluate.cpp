@@ -31,7 +31,7 @@ int run(const Arguments& arguments) {
   ObjectiveOptions objective_options;
   objective_options.outlier_scale = 0.05 * object_size(capture);
   objective_options.last_frame = scene.discretisation.simulation.times.empty() ? 0 : int(scene.discretisation.simulation.times.size()) - 1;
-  Objective objective(scene.discretisation.constraints, scene.discretisation.body, scene.discretisation.simulation, seen,
+  Objective objective(scene.discretisation.mismatch, scene.discretisation.body, scene.discretisation.simulation, seen,
                       ParameterSet({}, scene.theta), objective_options);
   const CostEvaluation evaluation = objective.evaluate(VectorX(0));
   if (!evaluation.succeeded) {

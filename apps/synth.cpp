@@ -63,7 +63,7 @@ SimulationOptions options_of(const Scene& scene, const Body& body) {
 
 std::vector<Points> simulate(const Scene& scene) {
   const std::shared_ptr<const Body> body = body_of(scene);
-  const Embedding embedding(body->grid, scene.surface.vertices);
+  const Embedding embedding(*body, scene.surface.vertices);
   std::vector<Points> frames(size_t(scene.start_frame), vertex_points(scene.surface));
   Simulation simulation(body, options_of(scene, *body));
   const auto on_frame = [&](int, const State& state, std::span<const State>) {

@@ -51,7 +51,7 @@ int run(int argc, char** argv) {
   ObjectiveOptions options;
   options.outlier_scale = 0.12 * object_size(capture);
   options.last_frame = int(scene.simulation.times.size()) - 1;
-  Objective objective(scene.constraints, scene.body, scene.simulation, observations, parameters, options);
+  Objective objective(scene.mismatch, scene.body, scene.simulation, observations, parameters, options);
   std::printf("youngs_modulus,cost,gradient_adjoint,gradient_tangent,surface_rms\n");
   for (int i = 0; i < count; ++i) {
     const double modulus = from * std::pow(to / from, count > 1 ? double(i) / (count - 1) : 0.0);

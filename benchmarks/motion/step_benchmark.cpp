@@ -46,21 +46,25 @@ std::shared_ptr<const Body> teddy() {
 /// A stepper in the middle of an impact.
 struct Impact {
   std::shared_ptr<const Body> body;
-  std::unique_ptr<LaggedStepper> stepper;
+  std::unique_ptr<Stepper> stepper;
   State start;
   Points delta;
 
   Impact(std::shared_ptr<const Body> of, const SolverOptions& solver) : body(std::move(of)) {
     VectorX theta = test::torus_scene(0.04, 2).theta;
-    double lowest = body->grid.nodes.col(1).minCoeff();
-    theta.segment<3>(theta::plane_point(0)) = Vector3(0, lowest + 0.3 * body->grid.cell_size, 0);
+    double lowest = body->nodes.col(1).minCoeff();
+    theta.segment<3>(theta::plane_point(0)) = Vector3(0, lowest + 0.3 * body->grid().cell_size, 0);
     theta.segment<3>(theta::plane_normal(0)) = Vector3::UnitY();
     std::vector<std::unique_ptr<ForceTerm>> terms;
-    terms.push_back(std::make_unique<CorotatedElasticity>(body));
+    terms.push_back(make_elasticity(body));
     terms.push_back(std::make_unique<Gravity>(*body));
     terms.push_back(std::make_unique<PlaneContact>(body, 0, default_contact(*body, theta[theta::density] * body->volume(), 9.81)));
     const double dt = default_time_step(*body, 9.81);
-    stepper = std::make_unique<LaggedStepper>(body, std::move(terms), StepOptions{dt, 0.51, 0.6, 0.5, solver});
+    StepOptions options;
+    options.dt = dt;
+    options.newmark_theta = 0.51;
+    options.solver = solver;
+    stepper = std::make_unique<Stepper>(body, std::move(terms), options);
     stepper->set_parameters(theta);
     start = {body->reference_positions(), Points::Zero(body->node_count(), 3)};
     start.v.col(1).setConstant(-1.5);
@@ -72,7 +76,7 @@ struct Impact {
     }
   }
   void label(benchmark::State& state) const {
-    state.counters["elements"] = body->grid.cell_count();
+    state.counters["elements"] = body->element_count();
     state.counters["nodes"] = body->node_count();
   }
 };
@@ -128,7 +132,8 @@ void linear_solve(benchmark::State& state, MakeBody make, SolverOptions options)
 
 void assembly(benchmark::State& state, MakeBody make) {
   const auto body = make();
-  CorotatedElasticity elasticity(body);
+  const auto elasticity_term = make_elasticity(body);
+  Elasticity& elasticity = *elasticity_term;
   VectorX theta = test::torus_scene(0.04, 2).theta;
   elasticity.set_parameters(theta);
   BlockMatrix matrix(body->pattern);

@@ -125,6 +125,11 @@ class C3dReader {
     return value;
   }
 
+  int signed_byte(std::size_t offset) const {
+    const int value = at<std::uint8_t>(offset);
+    return value < 128 ? value : value - 256;
+  }
+
   std::string_view bytes(std::size_t offset, std::size_t count, const char* what) const {
     if (offset > content_.size() || content_.size() - offset < count)
       fail("the file ends after " + std::to_string(content_.size()) + " bytes, in its " + what, "a whole C3D file",
@@ -155,9 +160,9 @@ class C3dReader {
     check_byte_order(at<std::uint8_t>(begin + 3));
     std::map<int, std::string> groups;
     std::map<std::pair<int, std::string>, Parameter> found;
-    for (std::size_t record = begin + 4; at<std::int8_t>(record) != 0;) {
-      const auto length = std::size_t(std::abs(int(at<std::int8_t>(record))));  // negative: locked
-      const int group = at<std::int8_t>(record + 1);
+    for (std::size_t record = begin + 4; signed_byte(record) != 0;) {
+      const auto length = std::size_t(std::abs(signed_byte(record)));  // negative: locked
+      const int group = signed_byte(record + 1);
       if (group == 0) break;
       const std::string name = in_upper_case(bytes(record + 2, length, "parameters"));
       const std::size_t offset_at = record + 2 + length;
@@ -183,7 +188,7 @@ class C3dReader {
 
   Parameter read_parameter(std::size_t offset, const std::string& name) const {
     Parameter parameter;
-    parameter.type = at<std::int8_t>(offset);
+    parameter.type = signed_byte(offset);
     if (parameter.type != -1 && parameter.type != 1 && parameter.type != 2 && parameter.type != 4)
       fail("the parameter " + in_quotes(name) + " has items of type " + std::to_string(parameter.type),
            "-1 (text), 1, 2 (integers) or 4 (numbers)", "export the recording again");

@@ -159,7 +159,7 @@ void check_start_frame(RuleContext& context) {
   if (!context.toml.is_sound("timing") || capture.times.empty()) return;
   if (capture.start_frame < 0 || capture.start_frame >= capture.frame_count())
     context.toml.reject("timing.start_frame", "`start_frame` is " + std::to_string(capture.start_frame),
-                          "0 to " + std::to_string(capture.frame_count() - 1), "frames are counted from 0");
+                        "0 to " + std::to_string(capture.frame_count() - 1), "frames are counted from 0");
 }
 
 void check_static(RuleContext& context) {
@@ -354,7 +354,7 @@ void check_loads(RuleContext& context) {
       context.toml.complain(item("load", i, "markers"), "`markers` without `markers_rest`", "both",
                             "name the markers at rest");
     for (const auto& [name, path] : load.images)
-      if (std::ranges::none_of(capture.depth, [&](const DepthCamera& camera) { return camera.name == name; }))
+      if (std::ranges::find(capture.depth, name, &DepthCamera::name) == capture.depth.end())
         context.toml.complain(item("load", i, "images"), "no depth camera \"" + name + "\"",
                               "the name of a [[depth]] block");
   }

@@ -47,9 +47,9 @@ std::optional<ImageHeader> png_header(std::string_view content) {
   const std::uint32_t width = big_endian_32(&content[16]), height = big_endian_32(&content[20]);
   if (width == 0 || height == 0 || width > largest_side || height > largest_side) return std::nullopt;
   static constexpr int channels_of[] = {1, 0, 3, 3, 2, 0, 4};
-  const int kind = content[25];
-  if (kind < 0 || kind > 6 || channels_of[kind] == 0) return std::nullopt;
-  return ImageHeader{int(width), int(height), content[24], channels_of[kind]};
+  const auto bits = static_cast<unsigned char>(content[24]), kind = static_cast<unsigned char>(content[25]);
+  if (kind > 6 || channels_of[kind] == 0) return std::nullopt;
+  return ImageHeader{int(width), int(height), bits, channels_of[kind]};
 }
 
 struct PgmHeader {

@@ -1,17 +1,24 @@
 #pragma once
 
 #include <memory>
+#include <span>
+#include <variant>
 #include <vector>
 
 #include "elasticity/hex_element.hpp"
 #include "geometry/hex_grid.hpp"
+#include "geometry/tet_mesh.hpp"
 #include "solvers/block_matrix.hpp"
 
 namespace pliant {
 
+/// Elements by their count of nodes.
+enum class ElementKind : int { Tetrahedron = 4, Hexahedron = 8, QuadraticTetrahedron = 10 };
+
 enum class MassKind {
   Consistent,
-  Lumped,  ///< diagonal, scaled so that the mass is kept (Hinton, Rock, Zienkiewicz 1976): positive in cut cells too
+  Lumped,  ///< diagonal, scaled so that the mass is kept (Hinton, Rock, Zienkiewicz 1976): positive in cut cells and for
+           ///< quadratic elements too
 };
 
 struct BodyOptions {
@@ -19,55 +26,112 @@ struct BodyOptions {
   MassKind mass = MassKind::Consistent;
 };
 
-/// The elastic object, free of load: nodes, elements and what does not change while it moves.
+/// How stiff each element is, as control moduli mixed in the logarithm:
+///   ln E_e = ln r_e + sum_k w_ek ln E_k,   sum_k w_ek = 1.
+/// One control modulus is a homogeneous object, regions are weights of 0 and 1, control points spread smoothly, and one
+/// control modulus an element is a field that is free everywhere.
+struct ModulusField {
+  int controls = 1;                ///< m >= 1
+  MatrixX weights;                 ///< elements x m; empty where m = 1
+  std::vector<double> relative;    ///< r_e [-], one an element
+};
+
+/// The elastic object, free of load: nodes, elements and what does not change while it moves. Everything beyond this
+/// room works with any kind of element.
 struct Body {
-  HexGrid grid;
+  ElementKind kind = ElementKind::Hexahedron;
+  std::variant<HexGrid, TetMesh> mesh;
   BodyOptions options;
-  std::vector<double> relative_modulus;  ///< of each element, times the object's Young's modulus [-]
+
+  Points nodes;                        ///< n x 3, rest positions [m]
+  std::vector<int> connectivity;       ///< nodes_per_element() nodes an element
+  std::vector<double> element_volume;  ///< [m^3], of a cut cell its inside part
+  std::vector<SurfacePoint> surface;   ///< samples of the surface, with areas: where contact acts
+  ModulusField modulus;
 
   std::shared_ptr<const BlockPattern> pattern;
   std::vector<double> mass;  ///< for unit density [m^3]: one number a block of the pattern, times the 3 x 3 identity
-  std::vector<Eigen::Matrix<double, 8, 3>> mean_gradient;  ///< [1/m], of each element
-  std::vector<int> element_class;  ///< elements of one class share their stiffness; all full cells are class 0
+  Points mean_gradient;      ///< [1/m], of each element's nodes in turn: F_e = sum_a x_a g_a^T (Weiss 2020, eq. 30)
+  std::vector<int> element_class;         ///< elements of one class share their stiffness; all full cells are class 0
   std::vector<int> class_representative;  ///< an element of each class
 
-  const Points& reference_positions() const { return grid.nodes; }
-  int node_count() const { return grid.node_count(); }
-  double volume() const { return grid.volume(); }
+  int nodes_per_element() const { return int(kind); }
+  int node_count() const { return int(nodes.rows()); }
+  int element_count() const { return int(connectivity.size()) / nodes_per_element(); }
+  std::span<const int> element(int e) const {
+    return {connectivity.data() + std::size_t(e) * std::size_t(nodes_per_element()), std::size_t(nodes_per_element())};
+  }
+  auto gradients(int e) const { return mean_gradient.middleRows(Eigen::Index(e) * nodes_per_element(), nodes_per_element()); }
+  const Points& reference_positions() const { return nodes; }
+  double volume() const;
   Vector3 centre_of_mass() const;
+  /// Longest edge of the nodes' box [m].
+  double size() const;
+  /// The hexahedral grid of a body made from one. Throws std::bad_variant_access for another.
+  const HexGrid& grid() const { return std::get<HexGrid>(mesh); }
 
   /// out += scale M x for unit density, n x 3.
   void add_mass_product(double scale, const Points& x, Points& out) const;
 };
 
 Body make_body(HexGrid grid, const BodyOptions& options = {});
+Body make_body(TetMesh mesh, const BodyOptions& options = {});
 
-/// Points of the object as weighted sums of nodes: rows of eight weights.
+/// Calls function.template operator()<N>() with the body's nodes per element as a constant, so that element loops are
+/// unrolled for each kind.
+template <class Function>
+decltype(auto) with_node_count(const Body& body, Function&& function) {
+  switch (body.kind) {
+    case ElementKind::Tetrahedron: return function.template operator()<4>();
+    case ElementKind::QuadraticTetrahedron: return function.template operator()<10>();
+    case ElementKind::Hexahedron: break;
+  }
+  return function.template operator()<8>();
+}
+
+/// Stiffness of an element for E = 1 Pa, 3 N x 3 N [m], and its derivative by Poisson's ratio.
+template <int N>
+struct UnitStiffness {
+  Eigen::Matrix<double, 3 * N, 3 * N> value, d_poissons_ratio;
+};
+template <int N>
+UnitStiffness<N> unit_stiffness(const Body& body, int element, double poissons_ratio);
+
+/// Points of the object as weighted sums of one element's nodes.
 class Embedding {
  public:
   Embedding() = default;
-  Embedding(const HexGrid& grid, const std::vector<Vector3>& rest_points);
+  /// Points outside every element follow the nearest one, extrapolated.
+  Embedding(const Body& body, const std::vector<Vector3>& rest_points);
 
-  int point_count() const { return int(cell_.size()); }
+  int point_count() const { return int(element_.size()); }
+  int nodes_per_point() const { return stride_; }
   Vector3 position(int point, const Points& nodes) const {
+    const int* n = nodes_.data() + std::size_t(point) * std::size_t(stride_);
+    const double* w = weights_.data() + std::size_t(point) * std::size_t(stride_);
     Vector3 p = Vector3::Zero();
-    for (int a = 0; a < 8; ++a) p += weights_[point][a] * nodes.row(cells_[cell_[point]][a]).transpose();
+    for (int a = 0; a < stride_; ++a) p += w[a] * nodes.row(n[a]).transpose();
     return p;
   }
   /// m x 3 positions for n x 3 node positions.
   Points positions(const Points& nodes) const;
   /// nodes += the transpose applied to one point's vector.
   void add_transpose(int point, const Vector3& vector, Points& nodes) const {
-    for (int a = 0; a < 8; ++a) nodes.row(cells_[cell_[point]][a]) += weights_[point][a] * vector.transpose();
+    const int* n = nodes_.data() + std::size_t(point) * std::size_t(stride_);
+    const double* w = weights_.data() + std::size_t(point) * std::size_t(stride_);
+    for (int a = 0; a < stride_; ++a) nodes.row(n[a]) += w[a] * vector.transpose();
   }
-  const std::array<int, 8>& nodes(int point) const { return cells_[cell_[point]]; }
-  const std::array<double, 8>& weights(int point) const { return weights_[point]; }
-  int cell(int point) const { return cell_[point]; }
+  std::span<const int> nodes(int point) const { return {nodes_.data() + std::size_t(point) * std::size_t(stride_), std::size_t(stride_)}; }
+  std::span<const double> weights(int point) const { return {weights_.data() + std::size_t(point) * std::size_t(stride_), std::size_t(stride_)}; }
+  int element(int point) const { return element_[std::size_t(point)]; }
 
  private:
-  std::vector<std::array<int, 8>> cells_;
-  std::vector<int> cell_;
-  std::vector<std::array<double, 8>> weights_;
+  int stride_ = 0;
+  std::vector<int> element_, nodes_;
+  std::vector<double> weights_;
 };
+
+/// Where block (a, b) of an element's N x N blocks goes in the matrix: N x N numbers an element.
+std::vector<int> element_blocks(const Body& body);
 
 }  // namespace pliant

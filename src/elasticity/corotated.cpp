@@ -16,90 +16,130 @@ auto node(const Eigen::MatrixBase<Derived>& v, int a) {
   return v.template segment<3>(3 * a);
 }
 
-}  // namespace
+template <int N>
+class CorotatedElasticity : public Elasticity {
+ public:
+  explicit CorotatedElasticity(std::shared_ptr<const Body> body);
 
-CorotatedElasticity::CorotatedElasticity(std::shared_ptr<const Body> body) : body_(std::move(body)) {
-  const HexGrid& grid = body_->grid;
-  polar_.resize(grid.cells.size());
+  void set_parameters(const VectorX& theta) override;
+  void linearise(const Points& lag) override;
+  void add_force(const Points& z, Points& force) override;
+  void add_matrix(double scale, BlockMatrix& matrix) override;
+  void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
+  void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                         Points& force) override;
+  void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+  double energy(const Points& z) const override;
+
+ private:
+  static constexpr int pairs = N * (N + 1) / 2;
+  static constexpr int padded_pairs = (pairs + 7) / 8 * 8;
+  using Vector = Eigen::Matrix<double, 3 * N, 1>;
+  using Matrix = Eigen::Matrix<double, 3 * N, 3 * N>;
+  struct Stiffness {
+    Matrix K, dK;                                 ///< for E = 1, and derivative by Poisson's ratio
+    Eigen::Matrix<double, padded_pairs, 9> upper; ///< entry (i, j) in column 3 i + j of the blocks a <= b, padded
+  };
+  const int* nodes_of(int element) const { return body_->connectivity.data() + std::size_t(element) * N; }
+  const int* blocks_of(int element) const { return blocks_.data() + std::size_t(element) * (N * N); }
+  Eigen::Matrix<double, N, 3> gradients(int element) const { return body_->mean_gradient.middleRows<N>(Eigen::Index(element) * N); }
+  const Stiffness& stiffness(int element) const { return stiffness_[std::size_t(body_->element_class[std::size_t(element)])]; }
+  int count() const { return int(polar_.size()); }
+  /// R^T z for the element's nodes, relative to the first.
+  Vector unrotated(int element, const Points& z) const;
+
+  std::shared_ptr<const Body> body_;
+  ElementModuli modulus_;
+  double poissons_ratio_ = -2.0;
+  std::vector<Stiffness> stiffness_;
+  std::vector<Vector> reference_;  // X of the element's nodes, relative to the first
+  std::vector<int> blocks_;
+};
+
+template <int N>
+CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body)
+    : body_(std::move(body)), modulus_(body_), blocks_(element_blocks(*body_)) {
+  polar_.resize(std::size_t(body_->element_count()));
   stiffness_.resize(body_->class_representative.size());
-  for (const auto& cell : grid.cells) {
-    Vector24 X;
-    for (int a = 0; a < 8; ++a) node(X, a) = (grid.nodes.row(cell[a]) - grid.nodes.row(cell[0])).transpose();
-    reference_.push_back(X);
-    auto& pairs = block_of_pair_.emplace_back();
-    for (int a = 0; a < 8; ++a)
-      for (int b = 0; b < 8; ++b) pairs[8 * a + b] = body_->pattern->find(cell[a], cell[b]);
-  }
+  reference_.resize(polar_.size());
+  for (int e = 0; e < count(); ++e)
+    for (int a = 0; a < N; ++a)
+      node(reference_[e], a) = (body_->nodes.row(nodes_of(e)[a]) - body_->nodes.row(nodes_of(e)[0])).transpose();
 }
 
-void CorotatedElasticity::set_parameters(const VectorX& parameters) {
+template <int N>
+void CorotatedElasticity<N>::set_parameters(const VectorX& parameters) {
   // Rotations start from those of the step before; a run must not start from those of the run before.
   std::ranges::fill(polar_, Polar{});
-  youngs_modulus_ = parameters[theta::youngs_modulus];
+  modulus_.set_parameters(parameters);
   const double nu = parameters[theta::poissons_ratio];
   if (nu == poissons_ratio_) return;
   poissons_ratio_ = nu;
   for (std::size_t c = 0; c < stiffness_.size(); ++c) {
-    const int e = body_->class_representative[c];
-    const HexStiffness unit =
-        hex_stiffness(body_->grid.quadrature[e], body_->grid.cell_size, nu, body_->options.formulation);
+    const UnitStiffness<N> unit = unit_stiffness<N>(*body_, body_->class_representative[c], nu);
     Stiffness& s = stiffness_[c];
     s.K = unit.value;
     s.dK = unit.d_poissons_ratio;
     s.upper.setZero();
     int block = 0;
-    for (int a = 0; a < 8; ++a)
-      for (int b = a; b < 8; ++b, ++block)
+    for (int a = 0; a < N; ++a)
+      for (int b = a; b < N; ++b, ++block)
         for (int i = 0; i < 3; ++i)
           for (int j = 0; j < 3; ++j) s.upper(block, 3 * i + j) = s.K(3 * a + i, 3 * b + j);
   }
 }
 
-void CorotatedElasticity::linearise(const Points& lag) {
-  for (std::size_t e = 0; e < polar_.size(); ++e) {
-    const auto& cell = body_->grid.cells[e];
+template <int N>
+void CorotatedElasticity<N>::linearise(const Points& lag) {
+  for (int e = 0; e < count(); ++e) {
+    const int* nodes = nodes_of(e);
+    const auto g = gradients(e);
     Matrix3 F = Matrix3::Zero();
-    for (int a = 0; a < 8; ++a) F.noalias() += lag.row(cell[a]).transpose() * body_->mean_gradient[e].row(a);
+    for (int a = 0; a < N; ++a) F.noalias() += lag.row(nodes[a]).transpose() * g.row(a);
     polar_[e] = polar_decomposition(F, polar_[e].quaternion);
   }
 }
 
-CorotatedElasticity::Vector24 CorotatedElasticity::unrotated(int e, const Points& z) const {
-  const auto& cell = body_->grid.cells[e];
+template <int N>
+auto CorotatedElasticity<N>::unrotated(int e, const Points& z) const -> Vector {
+  const int* nodes = nodes_of(e);
   const Matrix3 Rt = polar_[e].R.transpose();
-  const Vector3 first = z.row(cell[0]);
-  Vector24 local;
-  for (int a = 0; a < 8; ++a) node(local, a).noalias() = Rt * (z.row(cell[a]).transpose() - first);
+  const Vector3 first = z.row(nodes[0]);
+  Vector local;
+  for (int a = 0; a < N; ++a) node(local, a).noalias() = Rt * (z.row(nodes[a]).transpose() - first);
   return local;
 }
 
-void CorotatedElasticity::add_force(const Points& z, Points& force) {
-  for (std::size_t e = 0; e < polar_.size(); ++e) {
-    const auto& cell = body_->grid.cells[e];
-    const Vector24 d = unrotated(int(e), z) - reference_[e];
-    Vector24 y;
-    y.noalias() = stiffness(int(e)).K * d;
-    const Matrix3 R = modulus(int(e)) * polar_[e].R;
-    for (int a = 0; a < 8; ++a) force.row(cell[a]).noalias() -= (R * node(y, a)).transpose();
+template <int N>
+void CorotatedElasticity<N>::add_force(const Points& z, Points& force) {
+  for (int e = 0; e < count(); ++e) {
+    const int* nodes = nodes_of(e);
+    const Vector d = unrotated(e, z) - reference_[e];
+    Vector y;
+    y.noalias() = stiffness(e).K * d;
+    const Matrix3 R = modulus_[e] * polar_[e].R;
+    for (int a = 0; a < N; ++a) force.row(nodes[a]).noalias() -= (R * node(y, a)).transpose();
   }
 }
 
-double CorotatedElasticity::energy(const Points& z) const {
+template <int N>
+double CorotatedElasticity<N>::energy(const Points& z) const {
   double sum = 0.0;
-  for (std::size_t e = 0; e < polar_.size(); ++e) {
-    const Vector24 d = unrotated(int(e), z) - reference_[e];
-    sum += 0.5 * modulus(int(e)) * d.dot(stiffness(int(e)).K * d);
+  for (int e = 0; e < count(); ++e) {
+    const Vector d = unrotated(e, z) - reference_[e];
+    sum += 0.5 * modulus_[e] * d.dot(stiffness(e).K * d);
   }
   return sum;
 }
 
-void CorotatedElasticity::add_matrix(double scale, BlockMatrix& matrix) {
-  using Column = Eigen::Matrix<double, 40, 1>;
-  Eigen::Matrix<double, 40, 9> half, full;
-  for (std::size_t e = 0; e < polar_.size(); ++e) {
+template <int N>
+void CorotatedElasticity<N>::add_matrix(double scale, BlockMatrix& matrix) {
+  using Column = Eigen::Matrix<double, padded_pairs, 1>;
+  Eigen::Matrix<double, padded_pairs, 9> half, full;
+  for (int e = 0; e < count(); ++e) {
     const Matrix3& R = polar_[e].R;
-    const Stiffness& s = stiffness(int(e));
-    const double factor = scale * modulus(int(e));
+    const Stiffness& s = stiffness(e);
+    const double factor = scale * modulus_[e];
     for (int i = 0; i < 3; ++i)  // R K
       for (int l = 0; l < 3; ++l)
         half.col(3 * i + l) =
@@ -107,15 +147,15 @@ void CorotatedElasticity::add_matrix(double scale, BlockMatrix& matrix) {
     for (int i = 0; i < 3; ++i)  // (R K) R^T
       for (int j = 0; j < 3; ++j)
         full.col(3 * i + j) = R(j, 0) * half.col(3 * i) + R(j, 1) * half.col(3 * i + 1) + R(j, 2) * half.col(3 * i + 2);
-    const auto& pairs = block_of_pair_[e];
+    const int* blocks = blocks_of(e);
     int block = 0;
-    for (int a = 0; a < 8; ++a) {
-      for (int b = a; b < 8; ++b, ++block) {
-        double* upper = matrix.block(pairs[8 * a + b]);
+    for (int a = 0; a < N; ++a) {
+      for (int b = a; b < N; ++b, ++block) {
+        double* upper = matrix.block(blocks[N * a + b]);
         for (int j = 0; j < 3; ++j)
           for (int i = 0; i < 3; ++i) upper[3 * j + i] += full(block, 3 * i + j);
         if (a == b) continue;
-        double* lower = matrix.block(pairs[8 * b + a]);
+        double* lower = matrix.block(blocks[N * b + a]);
         for (int j = 0; j < 3; ++j)
           for (int i = 0; i < 3; ++i) lower[3 * j + i] += full(block, 3 * j + i);
       }
@@ -123,56 +163,95 @@ void CorotatedElasticity::add_matrix(double scale, BlockMatrix& matrix) {
   }
 }
 
-void CorotatedElasticity::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
-                                            const VectorX& d_theta, Points& force) {
-  const double d_log_modulus = d_theta[theta::youngs_modulus] / youngs_modulus_;
-  const double d_nu = d_theta[theta::poissons_ratio];
-  for (std::size_t e = 0; e < polar_.size(); ++e) {
-    const auto& cell = body_->grid.cells[e];
-    const Stiffness& s = stiffness(int(e));
-    Matrix3 dF = Matrix3::Zero();
-    for (int a = 0; a < 8; ++a) dF.noalias() += d_lag.row(cell[a]).transpose() * body_->mean_gradient[e].row(a);
-    const Vector3 w = rotation_rate(polar_[e], dF);
-    const Vector24 q = unrotated(int(e), z);
-    const Vector24 d = q - reference_[e];
-    Vector24 dd = unrotated(int(e), d_z);
-    for (int a = 0; a < 8; ++a) node(dd, a) -= w.cross(Vector3(node(q, a)));
-    Vector24 y, dy;
-    y.noalias() = s.K * d;
-    dy.noalias() = s.K * dd;
-    dy += d_log_modulus * y;
-    if (d_nu != 0.0) dy.noalias() += d_nu * (s.dK * d);
-    const Matrix3 R = modulus(int(e)) * polar_[e].R;
-    for (int a = 0; a < 8; ++a)
-      force.row(cell[a]).noalias() -= (R * (w.cross(Vector3(node(y, a))) + node(dy, a))).transpose();
+/// A change dp turns the element by w = sum_b W_b dp_b, W_b = (tr(S) I - S)^-1 [g_b]x R^T, and the force changes by
+/// -R G_a w, G_a = sum_b K_ab [q_b]x - [y_a]x with q = R^T z, y = K (q - X).
+template <int N>
+void CorotatedElasticity<N>::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
+  for (int e = 0; e < count(); ++e) {
+    const Stiffness& s = stiffness(e);
+    const Vector q = unrotated(e, z);
+    Vector y;
+    y.noalias() = s.K * (q - reference_[e]);
+    Eigen::Matrix<double, 3 * N, 3> Q, G;
+    for (int a = 0; a < N; ++a) Q.template middleRows<3>(3 * a) = cross_matrix(node(q, a));
+    G.noalias() = s.K * Q;
+    const Matrix3 R = polar_[e].R;
+    for (int a = 0; a < N; ++a)
+      G.template middleRows<3>(3 * a) = (scale * modulus_[e]) * R * (G.template middleRows<3>(3 * a) - cross_matrix(node(y, a)));
+    const auto g = gradients(e);
+    const int* blocks = blocks_of(e);
+    for (int b = 0; b < N; ++b) {
+      const Matrix3 W = polar_[e].rate_inverse * cross_matrix(g.row(b).transpose()) * R.transpose();
+      for (int a = 0; a < N; ++a)
+        Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).noalias() += G.template middleRows<3>(3 * a) * W;
+    }
   }
 }
 
-void CorotatedElasticity::add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
-                                            VectorX& theta_bar) {
-  for (std::size_t e = 0; e < polar_.size(); ++e) {
-    const auto& cell = body_->grid.cells[e];
-    const Stiffness& s = stiffness(int(e));
+template <int N>
+void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
+                                               const VectorX& d_theta, Points& force) {
+  modulus_.set_change(d_theta);
+  const double d_nu = d_theta[theta::poissons_ratio];
+  for (int e = 0; e < count(); ++e) {
+    const int* nodes = nodes_of(e);
+    const Stiffness& s = stiffness(e);
+    const auto g = gradients(e);
+    Matrix3 dF = Matrix3::Zero();
+    for (int a = 0; a < N; ++a) dF.noalias() += d_lag.row(nodes[a]).transpose() * g.row(a);
+    const Vector3 w = rotation_rate(polar_[e], dF);
+    const Vector q = unrotated(e, z);
+    const Vector d = q - reference_[e];
+    Vector dd = unrotated(e, d_z);
+    for (int a = 0; a < N; ++a) node(dd, a) -= w.cross(Vector3(node(q, a)));
+    Vector y, dy;
+    y.noalias() = s.K * d;
+    dy.noalias() = s.K * dd;
+    dy += modulus_.log_change(e) * y;
+    if (d_nu != 0.0) dy.noalias() += d_nu * (s.dK * d);
+    const Matrix3 R = modulus_[e] * polar_[e].R;
+    for (int a = 0; a < N; ++a)
+      force.row(nodes[a]).noalias() -= (R * (w.cross(Vector3(node(y, a))) + node(dy, a))).transpose();
+  }
+}
+
+template <int N>
+void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
+                                               VectorX& theta_bar) {
+  modulus_.begin_adjoint();
+  for (int e = 0; e < count(); ++e) {
+    const int* nodes = nodes_of(e);
+    const Stiffness& s = stiffness(e);
     const Matrix3& R = polar_[e].R;
-    const double E = modulus(int(e));
-    const Vector24 q = unrotated(int(e), z);
-    const Vector24 d = q - reference_[e];
-    Vector24 c;
-    for (int a = 0; a < 8; ++a) node(c, a).noalias() = R.transpose() * w.row(cell[a]).transpose();
-    Vector24 y, k;
+    const double E = modulus_[e];
+    const Vector q = unrotated(e, z);
+    const Vector d = q - reference_[e];
+    Vector c;
+    for (int a = 0; a < N; ++a) node(c, a).noalias() = R.transpose() * w.row(nodes[a]).transpose();
+    Vector y, k;
     y.noalias() = s.K * d;
     k.noalias() = s.K * c;
     Vector3 rate_bar = Vector3::Zero();
-    for (int a = 0; a < 8; ++a)
+    for (int a = 0; a < N; ++a)
       rate_bar += Vector3(node(q, a)).cross(Vector3(node(k, a))) - Vector3(node(y, a)).cross(Vector3(node(c, a)));
     const Matrix3 F_bar = rotation_rate_adjoint(polar_[e], E * rate_bar);
-    for (int a = 0; a < 8; ++a) {
-      z_bar.row(cell[a]).noalias() -= E * (R * node(k, a)).transpose();
-      lag_bar.row(cell[a]).noalias() += (F_bar * body_->mean_gradient[e].row(a).transpose()).transpose();
+    const auto g = gradients(e);
+    for (int a = 0; a < N; ++a) {
+      z_bar.row(nodes[a]).noalias() -= E * (R * node(k, a)).transpose();
+      lag_bar.row(nodes[a]).noalias() += (F_bar * g.row(a).transpose()).transpose();
     }
-    theta_bar[theta::youngs_modulus] -= E / youngs_modulus_ * c.dot(y);
+    modulus_.add_log_adjoint(e, -E * c.dot(y));
     theta_bar[theta::poissons_ratio] -= E * c.dot(s.dK * d);
   }
+  modulus_.end_adjoint(theta_bar);
+}
+
+}  // namespace
+
+std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body) {
+  return with_node_count(*body, [&]<int N>() -> std::unique_ptr<Elasticity> {
+    return std::make_unique<CorotatedElasticity<N>>(body);
+  });
 }
 
 }  // namespace pliant

@@ -5,7 +5,9 @@
 namespace pliant {
 
 /// Everything that the physics of one scene depends on, as one vector theta, so that tangents and adjoints with respect
-/// to any of it are products with one matrix. Per plane there follow its point and its normal.
+/// to any of it are products with one matrix. After the numbers that every scene has there follow, per plane, its point
+/// and its normal, and at the very end the control moduli of an object of several (all but the first, which stands at
+/// `youngs_modulus`).
 namespace theta {
 enum Index : int {
   youngs_modulus = 0,    ///< [Pa]
@@ -20,7 +22,9 @@ enum Index : int {
 };
 inline int plane_point(int plane) { return first_plane + 6 * plane; }       ///< 3, [m]
 inline int plane_normal(int plane) { return first_plane + 6 * plane + 3; }  ///< 3, unit
-inline int size(int planes) { return first_plane + 6 * planes; }
+inline int size(int planes, int moduli = 1) { return first_plane + 6 * planes + (moduli - 1); }
+/// Where control modulus k of m stands in a theta of this size, [Pa].
+inline int modulus(int k, int moduli, Eigen::Index theta_size) { return k == 0 ? int(youngs_modulus) : int(theta_size) - moduli + k; }
 inline Vector3 vector_at(const VectorX& theta, int index) { return theta.segment<3>(index); }
 }  // namespace theta
 

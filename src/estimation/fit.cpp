@@ -85,13 +85,15 @@ class Fit {
       outcome_.notes.push_back(
           "Plane " + std::to_string(plane + 1) +
           " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
-    observations_ = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture_, observed));
+    tracked_ = tracked_points(capture_);
+    observations_ = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture_, observed, tracked_));
     if (observations_->empty())
       throw InputError({{capture.file},
                         "no frame shows any point of the object",
                         "depth images or clouds that see it",
                         "run `pliant check` on the capture to see what the cameras saw"});
-    parameters_ = default_parameters(capture_, enclosed_volume(*capture_.surface));
+    controls_ = capture_.regions.empty() ? options_.control_points : int(capture_.regions.size()) + 1;
+    parameters_ = default_parameters(capture_, enclosed_volume(*capture_.surface), controls_);
     trust_planes_seen(parameters_, planes_seen);
     apply_overrides(parameters_, options_);
     const double band = std::max(options_.wide_band, options_.fine_band) * 1.25;
@@ -117,19 +119,21 @@ class Fit {
  private:
   static void require_fittable(const Capture& capture) {
     const auto refuse = [&](const std::string& found, const std::string& advice) {
-      throw InputError({{capture.file}, found, "a moving object seen by depth cameras or clouds", advice});
+      throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
     };
     if (!capture.surface) refuse("there is no scan of the object at rest", "add [object] surface");
-    if (capture.is_static)
-      refuse("the recording is static", "fits of objects at rest under gravity are not part of this version");
-    if (capture.depth.empty() && capture.clouds.empty()) refuse("there are no depth cameras and no clouds", "");
+    if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty())
+      refuse("there are no depth cameras, no clouds and no markers", "");
+    if (capture.is_static && capture.fixed.empty() && capture.planes.empty())
+      refuse("the recording is static, but nothing holds the object",
+             "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
     if (capture.shape_is == ShapeIs::Static)
       refuse("the scan was taken sagging (shape_is = \"static\")",
              "scan the object free of load; load-free shapes are not estimated in this version");
     if (capture.initial.released)
       refuse("the object is released from a held, deformed pose ([initial] released)",
              "start the recording in the scanned pose");
-    if (capture.frame_count() - capture.start_frame < 2)
+    if (!capture.is_static && capture.frame_count() - capture.start_frame < 2)
       refuse("fewer than two frames follow start_frame", "record longer");
   }
 
@@ -139,19 +143,20 @@ class Fit {
     settings.solver.kind = options_.solver;
     settings.solver.tolerance = options_.solver_tolerance;
     settings.hold_strongly = options_.hold_strongly;
-    Resolution resolution{cells, options_.steps, band};
-    return discretise(capture_, distance_, resolution, parameters_.reference(), settings);
+    settings.integrator = options_.integrator;
+    const Resolution resolution{options_.element, {options_.control_points, options_.control_weights}, cells, options_.steps, band};
+    return discretise(capture_, distance_, resolution, parameters_.reference(), settings, tracked_.rest);
   }
 
   /// Before this frame the object only flies or hangs; stiffness shows after it.
-  int first_frame_of_interest() const { return std::max(1, last_frame_ / 3); }
+  int first_frame_of_interest() const { return capture_.is_static ? last_frame_ : std::max(1, last_frame_ / 3); }
 
   Objective make_objective(const Discretisation& level, const ParameterSet& parameters, double band,
                            int last_frame) const {
     ObjectiveOptions o;
     o.outlier_scale = band * size_;
     o.last_frame = last_frame;
-    return {level.constraints, level.body, level.simulation, observations_, parameters, o};
+    return {level.mismatch, level.body, level.simulation, observations_, parameters, o};
   }
 
   static OptimiserState start_of(const ParameterSet& parameters) {
@@ -233,7 +238,7 @@ class Fit {
           0, count,
           [&](int i) {
             VectorX trial = theta;
-            trial[theta::youngs_modulus] = stress * std::pow(10.0, 0.0 + double(i) / options_.scan_per_decade);
+            set_moduli(trial, controls_, stress * std::pow(10.0, double(i) / options_.scan_per_decade));
             state_.scan[i] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
             if (interrupted()) return;
             ParameterSet fixed = parameters_;
@@ -278,7 +283,7 @@ class Fit {
            "no stiffness between " + std::to_string(stress) + " Pa and ten thousand times that can be simulated",
            "",
            "check mass, gravity and the size of the scan"});
-    outcome_.start_theta[theta::youngs_modulus] = start_moduli_.front();
+    set_moduli(outcome_.start_theta, controls_, start_moduli_.front());
   }
 
   void follow_starts() {
@@ -304,7 +309,7 @@ class Fit {
   FitStart follow(int index, double modulus) {
     ParameterSet parameters = parameters_;
     VectorX theta = parameters_.reference();
-    theta[theta::youngs_modulus] = modulus;
+    if (scanned_) set_moduli(theta, controls_, modulus);
     parameters.set_reference(theta);
     // Poisson's ratio is told from the rest only once the fit is close.
     parameters.set_estimated("poisson_ratio", false);
@@ -432,6 +437,7 @@ class Fit {
   FitState state_;
   FitOutcome outcome_;
   Capture capture_;
+  TrackedPoints tracked_;
   std::shared_ptr<const std::vector<FrameObservations>> observations_;
   ParameterSet parameters_;
   std::shared_ptr<const SignedDistance> distance_;
@@ -440,6 +446,7 @@ class Fit {
   int last_frame_ = 0, horizon_start_ = 1;
   bool scanned_ = false;
   std::vector<double> start_moduli_;
+  int controls_ = 1;  // moduli of the object
   std::mutex mutex_;
 };
 
@@ -452,6 +459,7 @@ std::string FitOptions::validate() const {
   if (!(steps > 0.0 && steps <= 16.0)) return "steps must lie in (0, 16]";
   if (points_per_frame != 0 && points_per_frame < 10) return "points_per_frame must be 0 (all) or at least 10";
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
+  if (control_points < 1 || control_points > 500) return "control_points must lie in 1..500";
   if (starts < 1) return "starts must be at least 1";
   if (max_iterations < 1) return "max_iterations must be at least 1";
   if (!(wide_band > 0.0 && wide_band < 0.5) || !(fine_band > 0.0 && fine_band < 0.5))

@@ -14,7 +14,7 @@ namespace pliant {
 
 /// Choices about a fit; none of them is needed. `validate` answers in words.
 struct FitOptions {
-  double cells = 12.0;          ///< hexahedra along the object's longest axis, [4, 64]
+  double cells = 12.0;          ///< elements along the object's longest axis, [4, 64]
   double coarse_cells = 8.0;    ///< of the grid that finds the neighbourhood, [4, 64]
   double steps = 1.0;           ///< time steps per default step, (0, 16]
   int points_per_frame = 1000;  ///< >= 10: an even subset of the pixels; 0: all
@@ -24,6 +24,10 @@ struct FitOptions {
   double wide_band = 0.12;      ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
   double fine_band = 0.05;      ///< of the last stage, (0, 0.5)
   double newmark_theta = 0.51;  ///< [0.5, 1)
+  ElementKind element = ElementKind::Hexahedron;
+  Integrator integrator = Integrator::Lagged;
+  int control_points = 1;  ///< of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous
+  FieldOptions::Weights control_weights = FieldOptions::Weights::Linear;
   OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
   SolverKind solver = SolverKind::Automatic;
   double solver_tolerance = 1e-8;

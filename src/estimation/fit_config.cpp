@@ -21,6 +21,14 @@ const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", S
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
+const std::vector<std::pair<std::string, ElementKind>> elements = {{"hexahedra", ElementKind::Hexahedron},
+                                                                   {"tetrahedra", ElementKind::Tetrahedron},
+                                                                   {"quadratic_tetrahedra", ElementKind::QuadraticTetrahedron}};
+const std::vector<std::pair<std::string, Integrator>> integrators = {{"lagged", Integrator::Lagged}, {"newton", Integrator::Newton}};
+const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights = {
+    {"linear", FieldOptions::Weights::Linear},
+    {"harmonic", FieldOptions::Weights::Harmonic},
+    {"inverse_distance", FieldOptions::Weights::InverseDistance}};
 const std::set<std::string> parameter_names = {"youngs_modulus", "poisson_ratio",   "mass_damping",     "stiffness_damping",
                                                "density",        "gravity",         "linear_velocity",  "angular_velocity",
                                                "plane",          "plane_2",         "plane_3",          "plane_4"};
@@ -103,7 +111,7 @@ Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*membe
 
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = {
-      real_entry("cells", "", "4..64", "hexahedra along the object's longest axis; more is finer and slower", &FitOptions::cells),
+      real_entry("cells", "", "4..64", "elements along the object's longest axis; more is finer and slower", &FitOptions::cells),
       real_entry("steps", "", "0..16", "time steps per default step; 2 halves the step", &FitOptions::steps),
       integer_entry("points_per_frame", "0, or 10 and more", "observed points used of each frame, evenly spread; 0: all", &FitOptions::points_per_frame),
       integer_entry("starts", "1 and more", "best starting points of the scan that are followed", &FitOptions::starts),
@@ -112,6 +120,10 @@ const std::vector<Entry>& entries() {
       integer_entry("scan_per_decade", "1 and more", "values of Young's modulus tried in each decade", &FitOptions::scan_per_decade),
       real_entry("wide_band", "object sizes", "0..0.5", "distance at which a point stops counting, in the early stages", &FitOptions::wide_band),
       real_entry("fine_band", "object sizes", "0..0.5", "the same, in the last stage", &FitOptions::fine_band),
+      choice_entry("element", "what the object is divided into", elements, &FitOptions::element),
+      choice_entry("integrator", "how time steps are taken: rotations predicted, or fully implicit", integrators, &FitOptions::integrator),
+      integer_entry("control_points", "1..500", "of Young's modulus over the object, where the capture names no regions", &FitOptions::control_points),
+      choice_entry("control_weights", "how moduli spread between control points", control_weights, &FitOptions::control_weights),
       choice_entry("optimiser", "how the cost is minimised", optimisers, &FitOptions::optimiser),
       choice_entry("solver", "for the linear system of a time step", solvers, &FitOptions::solver),
       real_entry("solver_tolerance", "", "0..1", "relative residual of the iterative solver", &FitOptions::solver_tolerance),
@@ -194,10 +206,17 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
       throw InputError({{}, key + " is \"" + value + "\"", *expected, ""});
     return;
   }
-  const auto dot = key.find('.');
-  const std::string name = key.substr(0, dot);
-  if (!parameter_names.contains(name)) reject_unknown(name);
-  set_parameter(options, name, dot == std::string::npos ? "" : key.substr(dot + 1), value);
+  // A region's or control point's modulus has its name after an @, which may hold dots itself.
+  std::string name = key, part;
+  for (const char* known : {".estimate", ".prior_std", ".start"})
+    if (key.ends_with(known)) name = key.substr(0, key.size() - std::string_view(known).size()), part = std::string(known).substr(1);
+  if (!name.starts_with("youngs_modulus@")) {
+    const auto dot = key.find('.');
+    name = key.substr(0, dot);
+    part = dot == std::string::npos ? "" : key.substr(dot + 1);
+    if (!parameter_names.contains(name)) reject_unknown(name);
+  }
+  set_parameter(options, name, part, value);
 }
 
 void read_fit_options(const std::filesystem::path& path, FitOptions& options) {
@@ -252,7 +271,7 @@ std::string to_toml(const FitOptions& options) {
     out << "\n";
   }
   for (const auto& [name, change] : options.parameters) {
-    out << "\n[parameters." << name << "]\n";
+    out << "\n[parameters.\"" << name << "\"]\n";
     if (change.start) {
       out << "start = ";
       if (change.start->size() == 1) {

@@ -14,16 +14,22 @@ double CostEvaluation::surface_rms() const {
   return count > 0 ? std::sqrt(sum / double(count)) : 0.0;
 }
 
+double CostEvaluation::track_rms() const {
+  double sum = 0.0;
+  long long count = 0;
+  for (const FrameFit& f : frames) sum += f.track_sum_squares, count += f.tracks;
+  return count > 0 ? std::sqrt(sum / double(count)) : 0.0;
+}
+
 double CostEvaluation::matched_fraction() const {
   long long matched = 0, count = 0;
   for (const FrameFit& f : frames) matched += f.matched, count += f.points;
   return count > 0 ? double(matched) / double(count) : 0.0;
 }
 
-Objective::Objective(std::shared_ptr<const SurfaceConstraints> constraints, std::shared_ptr<const Body> body,
-                     SimulationOptions simulation, std::shared_ptr<const std::vector<FrameObservations>> observations,
+Objective::Objective(Mismatch mismatch, std::shared_ptr<const Body> body, SimulationOptions simulation, std::shared_ptr<const std::vector<FrameObservations>> observations,
                      ParameterSet parameters, ObjectiveOptions options)
-    : constraints_(std::move(constraints)),
+    : mismatch_(std::move(mismatch)),
       observations_(std::move(observations)),
       parameters_(std::move(parameters)),
       options_(options),
@@ -34,17 +40,15 @@ double Objective::frame_weight(const FrameObservations& seen) const {
   return std::min(1.0, options_.independent_points / count);
 }
 
-FrameFit Objective::fit_frame(const FrameObservations& seen, const Points& positions,
-                              const std::vector<Points>& tangents) const {
-  FrameFit fit;
-  fit.frame = seen.frame;
+void Objective::fit_surface(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+                            FrameFit& fit) const {
   fit.points = int(seen.points.size());
-  const auto matches = constraints_->match(seen.points, positions);
+  const auto matches = mismatch_.surface->match(seen.points, positions);
   const RobustLoss loss{options_.outlier_scale};
   const double share = frame_weight(seen);
   MatrixX J(fit.points, Eigen::Index(tangents.size()));
   for (std::size_t c = 0; c < tangents.size(); ++c)
-    J.col(Eigen::Index(c)) = constraints_->tangent(matches, tangents[c]);
+    J.col(Eigen::Index(c)) = mismatch_.surface->tangent(matches, tangents[c]);
   VectorX weight(fit.points), weighted(fit.points);
   for (int i = 0; i < fit.points; ++i) {
     const double noise = seen.points[i].noise, w = share / (noise * noise);
@@ -65,9 +69,42 @@ FrameFit Objective::fit_frame(const FrameObservations& seen, const Points& posit
     weighted[i] = weight[i] * m.distance;
   }
   if (!tangents.empty()) {
-    fit.gradient = J.transpose() * weighted;
-    fit.gauss_newton = J.transpose() * weight.asDiagonal() * J;
+    fit.gradient += J.transpose() * weighted;
+    fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
   }
+}
+
+void Objective::fit_tracks(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+                           FrameFit& fit) const {
+  fit.tracks = int(seen.tracks.size());
+  const Points r = mismatch_.tracks->residuals(seen.tracks, positions);
+  const RobustLoss loss{options_.outlier_scale};
+  VectorX weight(3 * r.rows());
+  for (int i = 0; i < fit.tracks; ++i) {
+    const double distance = r.row(i).norm(), w = 1.0 / (seen.tracks[i].noise * seen.tracks[i].noise);
+    fit.cost += w * loss.value(distance);
+    fit.track_sum_squares += std::pow(std::min(distance, options_.outlier_scale), 2);
+    weight.segment<3>(3 * i).setConstant(w * loss.weight(distance));
+  }
+  if (tangents.empty()) return;
+  MatrixX J(weight.size(), Eigen::Index(tangents.size()));
+  for (std::size_t c = 0; c < tangents.size(); ++c)
+    J.col(Eigen::Index(c)) = flat(mismatch_.tracks->tangent(seen.tracks, tangents[c]));
+  fit.gradient += J.transpose() * weight.cwiseProduct(flat(r));
+  fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
+}
+
+FrameFit Objective::fit_frame(const FrameObservations& seen, const Points& positions,
+                              const std::vector<Points>& tangents) const {
+  FrameFit fit;
+  fit.frame = seen.frame;
+  const auto n = Eigen::Index(tangents.size());
+  if (n > 0) {
+    fit.gradient.setZero(n);
+    fit.gauss_newton.setZero(n, n);
+  }
+  if (!seen.points.empty()) fit_surface(seen, positions, tangents, fit);
+  if (!seen.tracks.empty()) fit_tracks(seen, positions, tangents, fit);
   return fit;
 }
 
@@ -133,12 +170,22 @@ CostEvaluation Objective::gradient(const VectorX& p) {
       [&](int frame, const State& state, Points& x_bar) {
         const auto* seen = seen_in(frame);
         if (!seen) return;
-        const auto matches = constraints_->match(seen->points, state.x);
-        VectorX bar = VectorX::Zero(Eigen::Index(matches.size()));
-        for (std::size_t i = 0; i < matches.size(); ++i)
-          if (matches[i].cell >= 0)
-            bar[Eigen::Index(i)] = frame_weight(*seen) / std::pow(seen->points[i].noise, 2) * loss.derivative(matches[i].distance);
-        x_bar += constraints_->adjoint(matches, bar);
+        if (!seen->points.empty()) {
+          const auto matches = mismatch_.surface->match(seen->points, state.x);
+          VectorX bar = VectorX::Zero(Eigen::Index(matches.size()));
+          for (std::size_t i = 0; i < matches.size(); ++i)
+            if (matches[i].cell >= 0)
+              bar[Eigen::Index(i)] = frame_weight(*seen) / std::pow(seen->points[i].noise, 2) * loss.derivative(matches[i].distance);
+          x_bar += mismatch_.surface->adjoint(matches, bar);
+        }
+        if (!seen->tracks.empty()) {
+          Points bar = mismatch_.tracks->residuals(seen->tracks, state.x);
+          for (std::size_t i = 0; i < seen->tracks.size(); ++i) {
+            const double distance = bar.row(Eigen::Index(i)).norm();
+            bar.row(Eigen::Index(i)) *= loss.weight(distance) / std::pow(seen->tracks[i].noise, 2);
+          }
+          mismatch_.tracks->add_adjoint(seen->tracks, bar, x_bar);
+        }
       },
       theta_bar);
   evaluation.steps = summary.steps;

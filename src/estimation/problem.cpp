@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "base/error.hpp"
+#include "capture/markers.hpp"
 #include "capture/region.hpp"
+#include "elasticity/modulus_field.hpp"
 
 namespace pliant {
 
@@ -59,14 +61,56 @@ std::shared_ptr<const SignedDistance> capture_distance(const Capture& capture, d
   return std::make_shared<SignedDistance>(signed_distance(*capture.surface, size / 80.0, (band + 0.1) * size));
 }
 
+namespace {
+
+std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDistance& distance, const Resolution& resolution,
+                                         std::vector<Vector3>& control_points) {
+  const double edge = object_size(capture) / resolution.cells;
+  Body body;
+  if (resolution.element == ElementKind::Hexahedron) {
+    body = make_body(make_hex_grid(distance, bounding_box(*capture.surface), edge));
+  } else {
+    TetMeshOptions options;
+    options.cell_size = edge;
+    options.quadratic = resolution.element == ElementKind::QuadraticTetrahedron;
+    body = make_body(make_tet_mesh(*capture.surface, options));
+  }
+  if (!capture.regions.empty()) {
+    std::vector<std::function<bool(const Vector3&)>> regions;
+    for (const MaterialRegion& region : capture.regions) regions.push_back(region_test(capture, region.region));
+    body.modulus = region_field(body, regions).field;
+  } else if (resolution.field.control_points > 1) {
+    const int count = resolution.field.control_points;
+    ControlledField field;
+    if (resolution.field.weights == FieldOptions::Weights::Linear) {
+      Eigen::Index longest = 0;
+      bounding_box(*capture.surface).extent().maxCoeff(&longest);
+      field = linear_field(body, Vector3::Unit(longest), count);
+    } else if (resolution.field.weights == FieldOptions::Weights::Harmonic) {
+      field = harmonic_field(body, farthest_points(body, count));
+    } else {
+      field = inverse_distance_field(body, farthest_points(body, count));
+    }
+    body.modulus = std::move(field.field);
+    control_points = std::move(field.points);
+  }
+  return std::make_shared<Body>(std::move(body));
+}
+
+}  // namespace
+
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
-                          const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings) {
+                          const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings,
+                          const std::vector<Vector3>& tracked) {
   Discretisation d;
   d.distance = std::move(distance);
   const double size = object_size(capture);
-  d.body = std::make_shared<Body>(make_body(make_hex_grid(*d.distance, bounding_box(*capture.surface), size / resolution.cells)));
-  d.constraints = std::make_shared<SurfaceConstraints>(d.body, d.distance, resolution.band * size);
+  d.body = make_body_of(capture, *d.distance, resolution, d.control_points);
+  if (!capture.depth.empty() || !capture.clouds.empty())
+    d.mismatch.surface = std::make_shared<SurfaceConstraints>(d.body, d.distance, resolution.band * size, size / resolution.cells);
+  if (!tracked.empty()) d.mismatch.tracks = std::make_shared<PointTracks>(*d.body, tracked);
   d.simulation = settings;
+  d.simulation.is_static = capture.is_static;
   d.simulation.times.assign(capture.times.begin() + capture.start_frame, capture.times.end());
   const double gravity = std::max(theta::vector_at(parameters, theta::gravity).norm(), 0.1);
   d.simulation.max_dt = default_time_step(*d.body, gravity) / resolution.steps;
@@ -79,7 +123,24 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   return d;
 }
 
-ParameterSet default_parameters(const Capture& capture, double volume) {
+std::vector<std::string> modulus_names(const Capture& capture, int controls) {
+  std::vector<std::string> names;
+  for (int k = 0; k < controls; ++k) {
+    if (controls == 1 || (k == 0 && !capture.regions.empty()))
+      names.emplace_back("youngs_modulus");
+    else if (!capture.regions.empty())
+      names.push_back("youngs_modulus@" + capture.regions[std::size_t(k) - 1].name);
+    else
+      names.push_back("youngs_modulus@" + std::to_string(k + 1));
+  }
+  return names;
+}
+
+void set_moduli(VectorX& theta, int controls, double youngs_modulus) {
+  for (int k = 0; k < controls; ++k) theta[theta::modulus(k, controls, theta.size())] = youngs_modulus;
+}
+
+ParameterSet default_parameters(const Capture& capture, double volume, int controls) {
   const double size = object_size(capture);
   const double gravity = capture.gravity ? capture.gravity->norm() : gravity_guess;
   const double density = capture.mass      ? *capture.mass / volume
@@ -88,8 +149,8 @@ ParameterSet default_parameters(const Capture& capture, double volume) {
   const double time = std::sqrt(size / std::max(gravity, 0.1));  // of a fall through the object's own size
   const double stress = density * std::max(gravity, 0.1) * size; // under its own weight
 
-  VectorX theta = VectorX::Zero(theta::size(int(capture.planes.size())));
-  theta[theta::youngs_modulus] = 20.0 * stress;
+  VectorX theta = VectorX::Zero(theta::size(int(capture.planes.size()), controls));
+  set_moduli(theta, controls, 20.0 * stress);
   theta[theta::poissons_ratio] = 0.35;
   theta[theta::mass_damping] = 0.05 / time;
   theta[theta::stiffness_damping] = 0.02 * time;
@@ -100,18 +161,20 @@ ParameterSet default_parameters(const Capture& capture, double volume) {
 
   std::vector<Parameter> p;
   // Priors are wide: they say what soft solids are like and only matter where the recording says nothing.
-  add_scalar(p, "youngs_modulus", "Pa", Transform::Logarithm, theta::youngs_modulus, 1e-2 * stress, 1e8 * stress,
-             std::log(theta[theta::youngs_modulus]), std::numeric_limits<double>::infinity(), true);
+  const std::vector<std::string> names = modulus_names(capture, controls);
+  for (int k = 0; k < controls; ++k)
+    add_scalar(p, names[std::size_t(k)].c_str(), "Pa", Transform::Logarithm, theta::modulus(k, controls, theta.size()), 1e-2 * stress,
+               1e8 * stress, std::log(theta[theta::youngs_modulus]), std::numeric_limits<double>::infinity(), true);
   add_scalar(p, "poisson_ratio", "1", Transform::LogitHalf, theta::poissons_ratio, 0.02, 0.495, std::log(0.35 / 0.15), 0.5, true);
   add_scalar(p, "mass_damping", "1/s", Transform::Logarithm, theta::mass_damping, 1e-4 / time, 20.0 / time,
-             std::log(theta[theta::mass_damping]), 1.5, true);
+             std::log(theta[theta::mass_damping]), 1.5, !capture.is_static);
   add_scalar(p, "stiffness_damping", "s", Transform::Logarithm, theta::stiffness_damping, 1e-5 * time, 2.0 * time,
-             std::log(theta[theta::stiffness_damping]), 1.5, true);
+             std::log(theta[theta::stiffness_damping]), 1.5, !capture.is_static);
   add_scalar(p, "density", "kg/m^3", Transform::Logarithm, theta::density, 0.1, 3e4, std::log(density), 0.5, false);
   add_vector(p, "gravity", "m/s^2", Transform::Vector, theta::gravity, 1.0, theta.segment<3>(theta::gravity),
              capture.gravity ? 0.2 : 10.0, !capture.gravity);
   const double speed = std::sqrt(gravity * size);
-  const bool moves = !capture.initial.known;
+  const bool moves = !capture.initial.known && !capture.is_static;
   add_vector(p, "linear_velocity", "m/s", Transform::Vector, theta::linear_velocity, speed,
              theta.segment<3>(theta::linear_velocity) / speed, 3.0, moves);
   add_vector(p, "angular_velocity", "rad/s", Transform::Vector, theta::angular_velocity, 1.0 / time,
@@ -129,15 +192,35 @@ ParameterSet default_parameters(const Capture& capture, double volume) {
   return {std::move(p), std::move(theta)};
 }
 
-std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed) {
-  std::vector<FrameObservations> frames;
-  for (const ObservedFrame& seen : observed) {
-    if (seen.frame < capture.start_frame || seen.points.empty()) continue;
-    FrameObservations& frame = frames.emplace_back();
-    frame.frame = seen.frame - capture.start_frame;
-    for (std::size_t i = 0; i < seen.points.size(); ++i) frame.points.push_back({seen.points[i], double(seen.noise[i])});
+TrackedPoints tracked_points(const Capture& capture) {
+  TrackedPoints tracked;
+  const double noise = capture.surface ? 1e-3 * object_size(capture) : 1e-3;
+  for (const MarkerTrack& block : capture.markers) {
+    const MarkerSet set = read_markers(block, capture.frame_count());
+    const int first = int(tracked.rest.size());
+    for (int m = 0; m < set.marker_count(); ++m) tracked.rest.push_back(set.rest.row(m).transpose());
+    for (int frame = 0; frame < int(set.frames.size()); ++frame)
+      for (int m = 0; m < set.marker_count(); ++m)
+        if (set.is_seen(frame, m))
+          tracked.frames[frame].push_back({first + m, set.frames[std::size_t(frame)].row(m).transpose(), noise});
   }
-  return frames;
+  return tracked;
+}
+
+std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
+                                                  const TrackedPoints& tracked) {
+  std::map<int, FrameObservations> frames;
+  for (const ObservedFrame& seen : observed)
+    for (std::size_t i = 0; i < seen.points.size(); ++i)
+      frames[seen.frame].points.push_back({seen.points[i], double(seen.noise[i])});
+  for (const auto& [frame, points] : tracked.frames) frames[frame].tracks = points;
+  std::vector<FrameObservations> from_start;
+  for (auto& [frame, seen] : frames) {
+    if (frame < capture.start_frame || frame >= capture.frame_count()) continue;
+    seen.frame = frame - capture.start_frame;
+    from_start.push_back(std::move(seen));
+  }
+  return from_start;
 }
 
 }  // namespace pliant

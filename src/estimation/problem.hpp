@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -9,9 +10,18 @@
 
 namespace pliant {
 
-/// How finely the body and its motion are resolved.
+/// How Young's modulus varies over the object where the capture names no regions.
+struct FieldOptions {
+  enum class Weights { Linear, Harmonic, InverseDistance };
+  int control_points = 1;               ///< >= 1; 1: homogeneous
+  Weights weights = Weights::Linear;    ///< linear ones stand along the object's longest axis, the others spread over it
+};
+
+/// How finely the body and its motion are resolved, and by what elements.
 struct Resolution {
-  double cells = 12.0;   ///< along the object's longest axis
+  ElementKind element = ElementKind::Hexahedron;
+  FieldOptions field;
+  double cells = 12.0;   ///< elements along the object's longest axis
   double steps = 1.0;    ///< time steps per default step: 2 halves the step
   double band = 0.15;    ///< of the mismatch, times the object's longest axis
 };
@@ -20,7 +30,8 @@ struct Resolution {
 struct Discretisation {
   std::shared_ptr<const SignedDistance> distance;
   std::shared_ptr<const Body> body;
-  std::shared_ptr<const SurfaceConstraints> constraints;  ///< null where nothing was observed
+  Mismatch mismatch;
+  std::vector<Vector3> control_points;  ///< of the field of moduli; empty: homogeneous, or regions
   SimulationOptions simulation;
 };
 
@@ -31,17 +42,36 @@ double object_size(const Capture& capture);
 /// Throws InputError where the capture has no surface.
 std::shared_ptr<const SignedDistance> capture_distance(const Capture& capture, double band);
 
-/// Body, scene and constraints of a capture. `theta` gives the weight and gravity that contact is scaled by.
+/// Body, scene and mismatch of a capture. `theta` gives the weight and gravity that contact is scaled by.
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
-                          const Resolution& resolution, const VectorX& theta, const SimulationOptions& settings = {});
+                          const Resolution& resolution, const VectorX& theta, const SimulationOptions& settings = {},
+                          const std::vector<Vector3>& tracked = {});
 
 /// All parameters of a capture with their start values, bounds and priors. What the capture leaves unknown is
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
 /// it does not give.
-/// @param volume  of the object [m^3], for the density that belongs to a mass
-ParameterSet default_parameters(const Capture& capture, double volume);
+/// @param volume    of the object [m^3], for the density that belongs to a mass
+/// @param controls  control moduli of the body: `modulus_names` tells what they are called
+ParameterSet default_parameters(const Capture& capture, double volume, int controls = 1);
+
+/// "youngs_modulus" alone; with regions followed by "youngs_modulus@name" of each; with control points
+/// "youngs_modulus@1", "youngs_modulus@2", ...
+std::vector<std::string> modulus_names(const Capture& capture, int controls);
+
+/// Sets every control modulus of a theta [Pa].
+void set_moduli(VectorX& theta, int controls, double youngs_modulus);
+
+/// Points of the object that the capture's [[markers]] follow.
+struct TrackedPoints {
+  std::vector<Vector3> rest;                              ///< [m], all blocks' markers one after the other
+  std::map<int, std::vector<TrackObservation>> frames;    ///< by the recording's frame
+};
+
+/// Reads them. Where the capture does not say how noisy they are, a thousandth of the object's size stands in.
+TrackedPoints tracked_points(const Capture& capture);
 
 /// Observations of the frames from the start on, numbered from it.
-std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed);
+std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
+                                                  const TrackedPoints& tracked = {});
 
 }  // namespace pliant

@@ -72,7 +72,10 @@ class CellCutter {
   }
 
  private:
-  double& value(int i, int j, int k) { return values_[std::size_t((k * (n_ + 1) + j) * (n_ + 1) + i)]; }
+  double& value(int i, int j, int k) {
+    const auto n = std::size_t(n_) + 1;
+    return values_[(std::size_t(k) * n + std::size_t(j)) * n + std::size_t(i)];
+  }
 
   struct Corner {
     Vector3 at;
@@ -147,7 +150,7 @@ class CellCutter {
     const int octant = (centre.x() > 0.5) + 2 * (centre.y() > 0.5) + 4 * (centre.z() > 0.5);
     int axis = 0;
     normal.cwiseAbs().maxCoeff(&axis);
-    SurfacePatch& patch = (*patches_)[std::size_t(8 * axis + octant)];
+    SurfacePatch& patch = (*patches_)[8 * std::size_t(axis) + std::size_t(octant)];
     patch.area += area;
     patch.moment += area * centre;
   }

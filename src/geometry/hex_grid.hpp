@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "geometry/signed_distance.hpp"
+#include "geometry/surface_point.hpp"
 
 namespace pliant {
 
@@ -23,13 +24,6 @@ struct CellQuadrature {
   double volume_fraction() const;
   /// Adds the integral functional of one weighted point (unit-cube coordinates, may lie outside the cube).
   void add(const Vector3& local, double weight);
-};
-
-/// A point of the surface with its share of area.
-struct SurfacePoint {
-  Vector3 position;  ///< rest [m]
-  Vector3 normal;    ///< outward, unit
-  double area;       ///< [m^2]
 };
 
 /// Where a rest point lies: cell and unit-cube coordinates (outside [0,1]^3 where the cell was extended over it).

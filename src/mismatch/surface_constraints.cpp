@@ -3,6 +3,7 @@
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <cmath>
+#include <stdexcept>
 
 namespace pliant {
 
@@ -24,6 +25,16 @@ Tree cell_tree(const std::vector<std::array<int, 8>>& cells, const Points& latti
   return Tree(boxes);  // packed
 }
 
+/// The body's own grid, or one laid over another kind of body.
+std::shared_ptr<const HexGrid> lattice_of(const std::shared_ptr<const Body>& body, const SignedDistance& distance,
+                                          double cell_size) {
+  if (body->kind == ElementKind::Hexahedron) return {body, &body->grid()};
+  if (!(cell_size > 0.0)) throw std::invalid_argument("a lattice over tetrahedra needs a cell size");
+  Box box;
+  for (Eigen::Index n = 0; n < body->nodes.rows(); ++n) box.extend(body->nodes.row(n).transpose());
+  return std::make_shared<HexGrid>(make_hex_grid(distance, box, cell_size));
+}
+
 }  // namespace
 
 double RobustLoss::value(double r) const {
@@ -41,8 +52,29 @@ double RobustLoss::weight(double r) const {
 }
 
 SurfaceConstraints::SurfaceConstraints(std::shared_ptr<const Body> body,
-                                       std::shared_ptr<const SignedDistance> distance, double band)
-    : body_(std::move(body)), distance_(std::move(distance)), extension_(body_->grid, *distance_, band) {}
+                                       std::shared_ptr<const SignedDistance> distance, double band, double cell_size)
+    : body_(std::move(body)),
+      distance_(std::move(distance)),
+      grid_(lattice_of(body_, *distance_, cell_size)),
+      extension_(*grid_, *distance_, band) {
+  if (body_->kind == ElementKind::Hexahedron) return;
+  std::vector<Vector3> points;
+  for (Eigen::Index n = 0; n < grid_->nodes.rows(); ++n) points.push_back(grid_->nodes.row(n).transpose());
+  lattice_in_body_ = Embedding(*body_, points);
+}
+
+Points SurfaceConstraints::extended(const Points& u) const {
+  return extension_.apply(lattice_in_body_.point_count() > 0 ? lattice_in_body_.positions(u) : u);
+}
+
+Points SurfaceConstraints::extended_transpose(const Points& g) const {
+  const Points on_lattice = extension_.apply_transpose(g);
+  if (lattice_in_body_.point_count() == 0) return on_lattice;
+  Points u = Points::Zero(body_->node_count(), 3);
+  for (int p = 0; p < lattice_in_body_.point_count(); ++p)
+    lattice_in_body_.add_transpose(p, on_lattice.row(p).transpose(), u);
+  return u;
+}
 
 /// Newton's iteration for the local coordinates of a point in a deformed cell (Weiss 2020, algorithm 1).
 bool SurfaceConstraints::pull_back(int cell, const Points& lattice, const Vector3& point, Vector3& local,
@@ -71,7 +103,7 @@ bool SurfaceConstraints::pull_back(int cell, const Points& lattice, const Vector
 
 std::vector<PointMatch> SurfaceConstraints::match(std::span<const SurfaceObservation> points,
                                                   const Points& positions) const {
-  const Points lattice = extension_.rest_positions() + extension_.apply(positions - body_->reference_positions());
+  const Points lattice = extension_.rest_positions() + extended(positions - body_->reference_positions());
   const Tree tree = cell_tree(extension_.cells(), lattice);
   std::vector<PointMatch> matches(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -95,7 +127,7 @@ std::vector<PointMatch> SurfaceConstraints::match(std::span<const SurfaceObserva
 }
 
 VectorX SurfaceConstraints::tangent(const std::vector<PointMatch>& matches, const Points& d_positions) const {
-  const Points g = extension_.apply(d_positions);
+  const Points g = extended(d_positions);
   VectorX change = VectorX::Zero(Eigen::Index(matches.size()));
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const PointMatch& m = matches[i];
@@ -115,7 +147,7 @@ Points SurfaceConstraints::adjoint(const std::vector<PointMatch>& matches, const
     for (int a = 0; a < 8; ++a)
       g_bar.row(extension_.cells()[m.cell][a]) += distance_bar[Eigen::Index(i)] * m.weights[a] * m.direction.transpose();
   }
-  return extension_.apply_transpose(g_bar);
+  return extended_transpose(g_bar);
 }
 
 }  // namespace pliant

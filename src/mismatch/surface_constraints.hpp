@@ -27,8 +27,10 @@ struct PointMatch {
 /// the band and should lie on the surface at rest, where the signed distance vanishes.
 class SurfaceConstraints {
  public:
-  /// @param band  [m] how far points may lie from the surface and still be matched
-  SurfaceConstraints(std::shared_ptr<const Body> body, std::shared_ptr<const SignedDistance> distance, double band);
+  /// @param band       [m] how far points may lie from the surface and still be matched
+  /// @param cell_size  [m] of the lattice that carries the motion into the band, > 0; a body of hexahedra uses its own
+  SurfaceConstraints(std::shared_ptr<const Body> body, std::shared_ptr<const SignedDistance> distance, double band,
+                     double cell_size = 0.0);
 
   const DisplacementExtension& extension() const { return extension_; }
   double band() const { return extension_.band(); }
@@ -44,10 +46,15 @@ class SurfaceConstraints {
   [[nodiscard]] Points adjoint(const std::vector<PointMatch>& matches, const VectorX& distance_bar) const;
 
  private:
+  /// g = E u for the body's nodes, and its transpose.
+  Points extended(const Points& u) const;
+  Points extended_transpose(const Points& g) const;
   bool pull_back(int cell, const Points& lattice, const Vector3& point, Vector3& local, Matrix3& jacobian) const;
 
   std::shared_ptr<const Body> body_;
   std::shared_ptr<const SignedDistance> distance_;
+  std::shared_ptr<const HexGrid> grid_;
+  Embedding lattice_in_body_;  // of the grid's nodes; empty where they are the body's own
   DisplacementExtension extension_;
 };
 

@@ -38,7 +38,7 @@ std::string model_toml(const Model& m) {
          "format = \"model/1\"\nname = "
       << toml_text(m.name)
       << "\n\n[object]\nsurface = \"surface.ply\"          # free of load, world frame of the recording\n";
-  if (!m.volume.cells.empty()) out << "volume_mesh = \"model.vtu\"        # hexahedra with the material of each\n";
+  if (!m.volume.connectivity.empty()) out << "volume_mesh = \"model.vtu\"        # elements with the material of each\n";
   line(out, "mass", m.mass, "kg");
   line(out, "density", m.density, "kg/m^3");
   out << "\n[material]                          # isotropic, linear in the rotated frame of each element\n";
@@ -71,8 +71,11 @@ std::string model_toml(const Model& m) {
 void write_volume(const fs::path& path, const ModelVolume& volume) {
   VtuGrid grid;
   grid.points = volume.nodes;
-  for (const auto& cell : volume.cells)
-    for (const int corner : vtk_hexahedron(cell)) grid.connectivity.push_back(corner);
+  grid.kind = volume.kind;
+  const auto points = std::size_t(corner_count(volume.kind));
+  for (std::size_t i = 0; i < volume.connectivity.size(); i += points)
+    for (const int point : to_vtk_order(volume.kind, std::span(volume.connectivity).subspan(i, points)))
+      grid.connectivity.push_back(point);
   grid.cell_data = {
       {modulus_field, 1, volume.youngs_modulus}, {ratio_field, 1, volume.poisson_ratio}, {fill_field, 1, volume.fill}};
   write_vtu(path, grid);
@@ -180,15 +183,15 @@ class Reader {
 
   void read_volume(const fs::path& path) {
     const VtuGrid grid = read_vtu(path);
-    if (grid.kind != VtuCell::Hexahedron)
-      throw InputError({{path}, "cells that are no hexahedra", "hexahedra", "save the model again"});
+    if (grid.kind == VtuCell::Triangle)
+      throw InputError({{path}, "triangles", "hexahedra or tetrahedra", "save the model again"});
     ModelVolume& volume = model_.volume;
     volume.nodes = grid.points;
-    for (int i = 0; i < grid.cell_count(); ++i) {
-      std::array<int, 8> cell;
-      std::copy_n(grid.connectivity.begin() + 8 * i, 8, cell.begin());
-      volume.cells.push_back(vtk_hexahedron(cell));
-    }
+    volume.kind = grid.kind;
+    const auto points = std::size_t(corner_count(grid.kind));
+    for (std::size_t i = 0; i < grid.connectivity.size(); i += points)
+      for (const int point : from_vtk_order(grid.kind, std::span(grid.connectivity).subspan(i, points)))
+        volume.connectivity.push_back(point);
     volume.youngs_modulus = field(path, grid, modulus_field);
     volume.poisson_ratio = field(path, grid, ratio_field);
     volume.fill = field(path, grid, fill_field);
@@ -202,7 +205,7 @@ class Reader {
 }  // namespace
 
 void save_model(const fs::path& folder, const Model& model) {
-  if (!model.volume.cells.empty()) write_volume(folder / "model.vtu", model.volume);
+  if (!model.volume.connectivity.empty()) write_volume(folder / "model.vtu", model.volume);
   write_mesh(folder / "surface.ply", model.surface);
   write_vertices(folder, model);
   write_file(folder / "model.toml", model_toml(model));

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -8,13 +7,15 @@
 
 #include "capture/capture.hpp"
 #include "geometry/triangle_mesh.hpp"
+#include "model/vtu.hpp"
 
 namespace pliant {
 
 /// The volume mesh of a model, with its material.
 struct ModelVolume {
   Points nodes;                           ///< [m], n x 3, reference shape
-  std::vector<std::array<int, 8>> cells;  ///< hexahedra, corners in the order i + 2 j + 4 k
+  VtuCell kind = VtuCell::Hexahedron;
+  std::vector<int> connectivity;          ///< points of each cell, in this program's order (see to_vtk_order)
   std::vector<double> youngs_modulus;     ///< [Pa], one a cell
   std::vector<double> poisson_ratio;      ///< one a cell
   std::vector<double> fill;               ///< part of the cell that the object fills, one a cell

@@ -204,8 +204,8 @@ class Reader {
   void read_cells(pugi::xml_node node, int cells, VtuGrid& grid) const {
     const VtuArray types = named(node, "types", cells), offsets = named(node, "offsets", cells);
     const int kind = cells > 0 ? int(types.values[0]) : int(VtuCell::Hexahedron);
-    if (kind != 5 && kind != 10 && kind != 12)
-      fail(path_, "cells of VTK type " + std::to_string(kind), "triangles (5), tetrahedra (10) or hexahedra (12)");
+    if (kind != 5 && kind != 10 && kind != 12 && kind != 24)
+      fail(path_, "cells of VTK type " + std::to_string(kind), "triangles (5), tetrahedra (10 or, quadratic, 24) or hexahedra (12)");
     grid.kind = VtuCell(kind);
     const int corners = corner_count(grid.kind);
     for (int i = 0; i < cells; ++i)
@@ -230,13 +230,42 @@ const VtuArray* find(const std::vector<VtuArray>& arrays, const std::string& nam
 
 }  // namespace
 
-int corner_count(VtuCell kind) { return kind == VtuCell::Triangle ? 3 : kind == VtuCell::Tetrahedron ? 4 : 8; }
+int corner_count(VtuCell kind) {
+  switch (kind) {
+    case VtuCell::Triangle: return 3;
+    case VtuCell::Tetrahedron: return 4;
+    case VtuCell::QuadraticTetrahedron: return 10;
+    case VtuCell::Hexahedron: break;
+  }
+  return 8;
+}
 
 const VtuArray* VtuGrid::find_point_data(const std::string& name) const { return find(point_data, name); }
 const VtuArray* VtuGrid::find_cell_data(const std::string& name) const { return find(cell_data, name); }
 
-std::array<int, 8> vtk_hexahedron(const std::array<int, 8>& c) {
-  return {c[0], c[1], c[3], c[2], c[4], c[5], c[7], c[6]};
+namespace {
+/// Which of our points stands at each place of VTK's order; nothing: the orders agree.
+std::span<const int> vtk_places(VtuCell kind) {
+  static constexpr std::array hexahedron = {0, 1, 3, 2, 4, 5, 7, 6};
+  static constexpr std::array quadratic_tetrahedron = {0, 1, 2, 3, 4, 7, 5, 6, 8, 9};
+  if (kind == VtuCell::Hexahedron) return hexahedron;
+  if (kind == VtuCell::QuadraticTetrahedron) return quadratic_tetrahedron;
+  return {};
+}
+}  // namespace
+
+std::vector<int> to_vtk_order(VtuCell kind, std::span<const int> points) {
+  std::vector<int> ordered(points.begin(), points.end());
+  const auto places = vtk_places(kind);
+  for (std::size_t i = 0; i < places.size(); ++i) ordered[i] = points[std::size_t(places[i])];
+  return ordered;
+}
+
+std::vector<int> from_vtk_order(VtuCell kind, std::span<const int> points) {
+  std::vector<int> ordered(points.begin(), points.end());
+  const auto places = vtk_places(kind);
+  for (std::size_t i = 0; i < places.size(); ++i) ordered[std::size_t(places[i])] = points[i];
+  return ordered;
 }
 
 void write_vtu(const fs::path& path, const VtuGrid& grid, VtuPrecision precision) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,9 @@
 namespace pliant {
 
 /// Kinds of cells with VTK's own numbers. A grid has cells of one kind.
-enum class VtuCell { Triangle = 5, Tetrahedron = 10, Hexahedron = 12 };
+enum class VtuCell { Triangle = 5, Tetrahedron = 10, Hexahedron = 12, QuadraticTetrahedron = 24 };
 
-/// Vertices of a cell: 3, 4 or 8.
+/// Points of a cell: 3, 4, 8 or 10.
 int corner_count(VtuCell kind);
 
 /// Values at points or cells: row by row, `components` a row (1 scalar, 3 vector, 6 symmetric tensor in VTK's order
@@ -31,7 +32,7 @@ struct VtuArray {
 struct VtuGrid {
   Points points;  ///< [m], n x 3
   VtuCell kind = VtuCell::Hexahedron;
-  std::vector<int> connectivity;  ///< corner_count(kind) point numbers a cell, in VTK's order (see vtk_hexahedron)
+  std::vector<int> connectivity;  ///< corner_count(kind) point numbers a cell, in VTK's order (see to_vtk_order)
   std::vector<VtuArray> point_data, cell_data;
 
   int cell_count() const { return int(connectivity.size()) / corner_count(kind); }
@@ -43,9 +44,11 @@ struct VtuGrid {
 /// Precision of the values in a file; points are always written in double precision.
 enum class VtuPrecision { Single, Double };
 
-/// Corners of a hexahedron in VTK's order (around the bottom, then around the top) from the order i + 2 j + 4 k that
-/// hexahedral grids use here. The permutation is its own inverse.
-std::array<int, 8> vtk_hexahedron(const std::array<int, 8>& corners);
+/// A cell's points in VTK's order, from the orders used here: hexahedra i + 2 j + 4 k (VTK goes around the bottom, then
+/// around the top), mid-edge points of quadratic tetrahedra 01 02 03 12 13 23 (VTK: 01 12 02 03 13 23).
+std::vector<int> to_vtk_order(VtuCell kind, std::span<const int> points);
+/// And back.
+std::vector<int> from_vtk_order(VtuCell kind, std::span<const int> points);
 
 /// Writes `.vtu`: XML with base64 arrays, little endian, whole or not at all.
 /// Throws std::invalid_argument where an array's length does not fit or a cell names a point that is not there, and

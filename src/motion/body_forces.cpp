@@ -28,4 +28,27 @@ void Gravity::add_force_adjoint(const Points&, const Points& w, Points&, Points&
   theta_bar.segment<3>(theta::gravity) += density_ * sum;
 }
 
+HungWeights::HungWeights(const Body& body, const std::vector<HungWeight>& weights) {
+  std::vector<Vector3> at;
+  for (const HungWeight& weight : weights) {
+    at.push_back(weight.at);
+    mass_.push_back(weight.mass);
+  }
+  points_ = Embedding(body, at);
+}
+
+void HungWeights::add_force(const Points&, Points& force) {
+  for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * gravity_, force);
+}
+
+void HungWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
+  const Vector3 change = theta::vector_at(d_theta, theta::gravity);
+  for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * change, force);
+}
+
+void HungWeights::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
+  for (int i = 0; i < points_.point_count(); ++i)
+    theta_bar.segment<3>(theta::gravity) += mass_[std::size_t(i)] * points_.position(i, w);
+}
+
 }  // namespace pliant

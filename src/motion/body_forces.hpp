@@ -25,4 +25,30 @@ class Gravity : public ForceTerm {
   Vector3 gravity_ = Vector3::Zero();
 };
 
+/// A small heavy thing that hangs at a point of the object.
+struct HungWeight {
+  Vector3 at;         ///< rest position [m]
+  double mass = 0.0;  ///< [kg]
+};
+
+/// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is left out: they are for bodies at rest.
+class HungWeights : public ForceTerm {
+ public:
+  HungWeights(const Body& body, const std::vector<HungWeight>& weights);
+  Lag lag() const override { return Lag::Rotation; }
+  At at() const override { return At::End; }
+  void set_parameters(const VectorX& theta) override { gravity_ = theta::vector_at(theta, theta::gravity); }
+  void linearise(const Points&) override {}
+  void add_force(const Points& z, Points& force) override;
+  void add_matrix(double, BlockMatrix&) override {}
+  void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                         Points& force) override;
+  void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+
+ private:
+  Embedding points_;
+  std::vector<double> mass_;
+  Vector3 gravity_ = Vector3::Zero();
+};
+
 }  // namespace pliant

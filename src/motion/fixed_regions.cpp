@@ -1,5 +1,6 @@
 #include "motion/fixed_regions.hpp"
 
+#include <Eigen/Geometry>
 #include <map>
 
 #include "base/error.hpp"
@@ -18,7 +19,7 @@ using SamplesOfCell = std::map<std::pair<int, int>, std::vector<HeldSample>>;
 
 SamplesOfCell collect(const Body& body, const std::vector<Hold>& holds) {
   SamplesOfCell samples;
-  const HexGrid& grid = body.grid;
+  const HexGrid& grid = body.grid();
   for (int h = 0; h < int(holds.size()); ++h) {
     bool any = false;
     for (const SurfacePoint& point : grid.surface) {
@@ -48,11 +49,18 @@ SamplesOfCell collect(const Body& body, const std::vector<Hold>& holds) {
 
 }  // namespace
 
+Hold part_of_the_way(const Hold& hold, double share, const Vector3& middle) {
+  const Eigen::AngleAxisd turn(hold.rotation);
+  const Matrix3 R = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+  const Vector3 moved = share * (hold.rotation * middle + hold.translation - middle);
+  return {hold.contains, R, middle + moved - R * middle};
+}
+
 std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds) {
   std::vector<int> nodes;
   for (int n = 0; n < body.node_count(); ++n)
     for (const Hold& hold : holds)
-      if (hold.contains(body.grid.nodes.row(n).transpose())) {
+      if (hold.contains(body.nodes.row(n).transpose())) {
         nodes.push_back(n);
         break;
       }
@@ -60,8 +68,8 @@ std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds) {
 }
 
 FixedRegions::FixedRegions(std::shared_ptr<const Body> body, const std::vector<Hold>& holds, double penalty)
-    : body_(std::move(body)), holds_(holds) {
-  const double h = body_->grid.cell_size;
+    : body_(std::move(body)), holds_(holds), modulus_(body_) {
+  const double h = body_->grid().cell_size;
   for (const auto& [key, samples] : collect(*body_, holds)) {
     HeldCell held{key.second, key.first, Matrix24::Zero(), Matrix24::Zero(), {}, {}};
     for (const HeldSample& s : samples) {
@@ -85,7 +93,7 @@ FixedRegions::FixedRegions(std::shared_ptr<const Body> body, const std::vector<H
 }
 
 void FixedRegions::set_parameters(const VectorX& parameters) {
-  youngs_modulus_ = parameters[theta::youngs_modulus];
+  modulus_.set_parameters(parameters);
   const UnitLame c = unit_lame(parameters[theta::poissons_ratio]);
   for (HeldCell& held : cells_) {
     held.K = c.lambda * held.K_lambda + c.mu * held.K_mu;
@@ -94,7 +102,7 @@ void FixedRegions::set_parameters(const VectorX& parameters) {
 }
 
 FixedRegions::Vector24 FixedRegions::rotated_back(const HeldCell& held, const Points& vectors) const {
-  const auto& cell = body_->grid.cells[held.cell];
+  const auto cell = body_->element(held.cell);
   Vector24 d;
   for (int a = 0; a < 8; ++a)
     d.segment<3>(3 * a) = holds_[held.hold].rotation.transpose() * vectors.row(cell[a]).transpose();
@@ -102,28 +110,28 @@ FixedRegions::Vector24 FixedRegions::rotated_back(const HeldCell& held, const Po
 }
 
 FixedRegions::Vector24 FixedRegions::displacement(const HeldCell& held, const Points& z) const {
-  const auto& cell = body_->grid.cells[held.cell];
+  const auto cell = body_->element(held.cell);
   const Hold& hold = holds_[held.hold];
   Vector24 d;
   for (int a = 0; a < 8; ++a)
     d.segment<3>(3 * a) = hold.rotation.transpose() * (z.row(cell[a]).transpose() - hold.translation) -
-                          body_->grid.nodes.row(cell[a]).transpose();
+                          body_->nodes.row(cell[a]).transpose();
   return d;
 }
 
 void FixedRegions::add_force(const Points& z, Points& force) {
   for (const HeldCell& held : cells_) {
-    const auto& cell = body_->grid.cells[held.cell];
-    const Vector24 f = -youngs_modulus_ * body_->relative_modulus[held.cell] * (held.K * displacement(held, z));
+    const auto cell = body_->element(held.cell);
+    const Vector24 f = -modulus_[held.cell] * (held.K * displacement(held, z));
     for (int a = 0; a < 8; ++a) force.row(cell[a]) += (holds_[held.hold].rotation * f.segment<3>(3 * a)).transpose();
   }
 }
 
 void FixedRegions::add_matrix(double scale, BlockMatrix& matrix) {
   for (const HeldCell& held : cells_) {
-    const auto& cell = body_->grid.cells[held.cell];
+    const auto cell = body_->element(held.cell);
     const Matrix3& R = holds_[held.hold].rotation;
-    const double factor = scale * youngs_modulus_ * body_->relative_modulus[held.cell];
+    const double factor = scale * modulus_[held.cell];
     for (int a = 0; a < 8; ++a)
       for (int b = 0; b < 8; ++b)
         Eigen::Map<Matrix3>(matrix.block(body_->pattern->find(cell[a], cell[b]))) +=
@@ -133,28 +141,30 @@ void FixedRegions::add_matrix(double scale, BlockMatrix& matrix) {
 
 void FixedRegions::add_force_tangent(const Points& z, const Points&, const Points& d_z, const VectorX& d_theta,
                                      Points& force) {
+  modulus_.set_change(d_theta);
   for (const HeldCell& held : cells_) {
-    const auto& cell = body_->grid.cells[held.cell];
+    const auto cell = body_->element(held.cell);
     const Vector24 u = displacement(held, z);
-    const double scale = body_->relative_modulus[held.cell];
-    const Vector24 df = -scale * (d_theta[theta::youngs_modulus] * (held.K * u) +
-                                  youngs_modulus_ * (held.K * rotated_back(held, d_z)) +
-                                  youngs_modulus_ * d_theta[theta::poissons_ratio] * (held.dK * u));
+    const Vector24 df = -modulus_[held.cell] * (modulus_.log_change(held.cell) * (held.K * u) +
+                                                held.K * rotated_back(held, d_z) +
+                                                d_theta[theta::poissons_ratio] * (held.dK * u));
     for (int a = 0; a < 8; ++a) force.row(cell[a]) += (holds_[held.hold].rotation * df.segment<3>(3 * a)).transpose();
   }
 }
 
 void FixedRegions::add_force_adjoint(const Points& z, const Points& w, Points&, Points& z_bar, VectorX& theta_bar) {
+  modulus_.begin_adjoint();
   for (const HeldCell& held : cells_) {
-    const auto& cell = body_->grid.cells[held.cell];
+    const auto cell = body_->element(held.cell);
     const Vector24 u = displacement(held, z), c = rotated_back(held, w);
-    const double scale = body_->relative_modulus[held.cell];
+    const double E = modulus_[held.cell];
     const Vector24 Kc = held.K * c;
     for (int a = 0; a < 8; ++a)
-      z_bar.row(cell[a]) -= scale * youngs_modulus_ * (holds_[held.hold].rotation * Kc.segment<3>(3 * a)).transpose();
-    theta_bar[theta::youngs_modulus] -= scale * Kc.dot(u);
-    theta_bar[theta::poissons_ratio] -= scale * youngs_modulus_ * c.dot(held.dK * u);
+      z_bar.row(cell[a]) -= E * (holds_[held.hold].rotation * Kc.segment<3>(3 * a)).transpose();
+    modulus_.add_log_adjoint(held.cell, -E * Kc.dot(u));
+    theta_bar[theta::poissons_ratio] -= E * c.dot(held.dK * u);
   }
+  modulus_.end_adjoint(theta_bar);
 }
 
 }  // namespace pliant

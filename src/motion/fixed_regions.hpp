@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "elasticity/body.hpp"
+#include "elasticity/element_moduli.hpp"
 #include "elasticity/force_term.hpp"
 
 namespace pliant {
@@ -14,6 +14,10 @@ struct Hold {
   Vector3 translation = Vector3::Zero();
 };
 
+/// A part of the way from rest to where a region is held, [0, 1]: turned by that part of the angle about the same axis,
+/// and moved so that the region's middle goes straight.
+Hold part_of_the_way(const Hold& hold, double share, const Vector3& middle);
+
 /// Nodes inside any hold.
 std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds);
 
@@ -23,6 +27,7 @@ std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds);
 class FixedRegions : public ForceTerm {
  public:
   /// @param penalty  in units of (lambda + 2 mu) / h; large enough that the form stays positive definite on cut cells
+  /// The body is one of hexahedra: tetrahedra follow the shape, so their nodes are held themselves.
   /// Throws InputError where a hold contains nothing of the object.
   FixedRegions(std::shared_ptr<const Body> body, const std::vector<Hold>& holds, double penalty = 40.0);
 
@@ -35,6 +40,9 @@ class FixedRegions : public ForceTerm {
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+
+  /// Moves the regions to where these hold them; they contain what they contained.
+  void move_to(const std::vector<Hold>& holds) { holds_ = holds; }
 
   int held_cell_count() const { return int(cells_.size()); }
 
@@ -52,7 +60,7 @@ class FixedRegions : public ForceTerm {
   std::shared_ptr<const Body> body_;
   std::vector<Hold> holds_;
   std::vector<HeldCell> cells_;
-  double youngs_modulus_ = 0.0;
+  ElementModuli modulus_;
 };
 
 }  // namespace pliant

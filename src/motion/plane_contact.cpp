@@ -14,13 +14,9 @@ PlaneContact::PlaneContact(std::shared_ptr<const Body> body, int plane, const Co
   if (!(options.stiffness > 0.0) || !(options.smoothing > 0.0))
     throw std::invalid_argument("plane contact needs a positive stiffness and smoothing length");
   std::vector<Vector3> samples;
-  for (const SurfacePoint& point : body_->grid.surface) samples.push_back(point.position);
-  embedding_ = Embedding(body_->grid, samples);
-  for (const auto& cell : body_->grid.cells) {
-    auto& pairs = block_of_pair_.emplace_back();
-    for (int a = 0; a < 8; ++a)
-      for (int b = 0; b < 8; ++b) pairs[8 * a + b] = body_->pattern->find(cell[a], cell[b]);
-  }
+  for (const SurfacePoint& point : body_->surface) samples.push_back(point.position);
+  embedding_ = Embedding(*body_, samples);
+  blocks_ = element_blocks(*body_);
   active_.reserve(samples.size());
 }
 
@@ -36,7 +32,7 @@ void PlaneContact::linearise(const Points& lag) {
     const Vector3 position = embedding_.position(p, lag);
     const double d = gap(position);
     if (d > reach * eps) continue;
-    const double scale = options_.stiffness * body_->grid.surface[p].area;
+    const double scale = options_.stiffness * body_->surface[std::size_t(p)].area;
     const double t = -d / eps;
     const double sigmoid = t > 0.0 ? 1.0 / (1.0 + std::exp(-t)) : std::exp(t) / (1.0 + std::exp(t));
     const double softplus = t > 0.0 ? t + std::log1p(std::exp(-t)) : std::log1p(std::exp(t));
@@ -54,12 +50,12 @@ void PlaneContact::add_force(const Points& z, Points& force) {
 void PlaneContact::add_matrix(double scale, BlockMatrix& matrix) {
   const Matrix3 nn = normal_ * normal_.transpose();
   for (const Active& c : active_) {
-    const auto& w = embedding_.weights(c.point);
-    const auto& pairs = block_of_pair_[embedding_.cell(c.point)];
+    const auto w = embedding_.weights(c.point);
+    const int n = embedding_.nodes_per_point();
+    const int* blocks = blocks_.data() + std::size_t(embedding_.element(c.point)) * std::size_t(n * n);
     const double factor = -scale * c.slope;
-    for (int a = 0; a < 8; ++a)
-      for (int b = 0; b < 8; ++b)
-        Eigen::Map<Matrix3>(matrix.block(pairs[8 * a + b])) += factor * w[a] * w[b] * nn;
+    for (int a = 0; a < n; ++a)
+      for (int b = 0; b < n; ++b) Eigen::Map<Matrix3>(matrix.block(blocks[n * a + b])) += factor * w[a] * w[b] * nn;
   }
 }
 

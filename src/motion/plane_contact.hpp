@@ -46,7 +46,7 @@ class PlaneContact : public ForceTerm {
   int plane_;
   ContactOptions options_;
   Embedding embedding_;
-  std::vector<std::array<int, 64>> block_of_pair_;  // of each sample's cell
+  std::vector<int> blocks_;  // where each element's blocks go in the matrix
   Vector3 plane_point_ = Vector3::Zero(), normal_ = Vector3::UnitY();
   std::vector<Active> active_;
 };

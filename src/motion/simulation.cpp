@@ -1,8 +1,11 @@
 #include "motion/simulation.hpp"
 
 #include <algorithm>
+#include <Eigen/Geometry>
 #include <cmath>
+#include <limits>
 
+#include "base/error.hpp"
 #include "motion/body_forces.hpp"
 #include "elasticity/corotated.hpp"
 
@@ -10,15 +13,23 @@ namespace pliant {
 
 namespace {
 
+bool holds_strongly(const Body& body, const SimulationOptions& options) {
+  return options.hold_strongly || body.kind != ElementKind::Hexahedron;
+}
+
 std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const Body>& body,
-                                                   const SimulationOptions& options) {
+                                                   const SimulationOptions& options, FixedRegions*& fixed) {
   std::vector<std::unique_ptr<ForceTerm>> terms;
-  terms.push_back(std::make_unique<CorotatedElasticity>(body));
+  terms.push_back(make_elasticity(body));
   terms.push_back(std::make_unique<Gravity>(*body));
   for (int plane = 0; plane < options.planes; ++plane)
     terms.push_back(std::make_unique<PlaneContact>(body, plane, options.contact));
-  if (!options.holds.empty() && !options.hold_strongly)
-    terms.push_back(std::make_unique<FixedRegions>(body, options.holds));
+  if (!options.weights.empty()) terms.push_back(std::make_unique<HungWeights>(*body, options.weights));
+  if (!options.holds.empty() && !holds_strongly(*body, options)) {
+    auto regions = std::make_unique<FixedRegions>(body, options.holds);
+    fixed = regions.get();
+    terms.push_back(std::move(regions));
+  }
   return terms;
 }
 
@@ -27,17 +38,20 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(body),
       options_(std::move(options)),
-      stepper_(body, make_terms(body, options_), {options_.max_dt, options_.newmark_theta, options_.contact_weight, options_.rotation_prediction,
-                options_.solver}),
+      stepper_(body, make_terms(body, options_, fixed_regions_), {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight, options_.rotation_prediction,
+                options_.solver, options_.integrator, options_.newton}),
       rest_(body->reference_positions()) {
-  if (options_.hold_strongly) {
-    stepper_.hold(held_nodes(*body_, options_.holds));
-    for (const Hold& hold : options_.holds)
-      for (const int node : held_nodes(*body_, {hold}))
-        rest_.row(node) = (hold.rotation * body_->reference_positions().row(node).transpose() + hold.translation).transpose();
+  if (holds_strongly(*body_, options_)) {
+    std::vector<int> held = held_nodes(*body_, options_.holds);
+    if (held.empty() && !options_.holds.empty())
+      throw InputError({{}, "the held regions contain no node of the object", "regions that hold a part of it",
+                        "move them onto the object, make them larger, or use smaller elements"});
+    stepper_.hold(std::move(held));
   }
+  prepare_holds();
+  if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->reference_positions().rowwise() - body_->centre_of_mass().transpose();
-  for (int frame = 1; frame < frame_count(); ++frame) {
+  for (int frame = 1; frame < frame_count() && !options_.is_static; ++frame) {
     const double interval = options_.times[frame] - options_.times[frame - 1];
     const int steps = std::max(1, int(std::ceil(interval / options_.max_dt - 1e-9)));
     for (int s = 1; s <= steps; ++s) plan_.push_back({interval / steps, s == steps ? frame : -1});
@@ -68,6 +82,73 @@ void Simulation::initial_adjoint(const VectorX&, const State& bar, VectorX& thet
   }
 }
 
+void Simulation::prepare_holds() {
+  const Points& X = body_->nodes;
+  hold_share_.setZero(X.rows(), Eigen::Index(options_.holds.size()));
+  for (std::size_t h = 0; h < options_.holds.size(); ++h) {
+    const std::vector<int> nodes = held_nodes(*body_, {options_.holds[h]});
+    Vector3 middle = Vector3::Zero();
+    for (const int node : nodes) middle += X.row(node).transpose() / double(nodes.size());
+    hold_middle_.push_back(middle);
+    for (Eigen::Index n = 0; n < X.rows(); ++n) {
+      double nearest = nodes.empty() ? 1.0 : std::numeric_limits<double>::infinity();
+      for (const int node : nodes) nearest = std::min(nearest, (X.row(n) - X.row(node)).squaredNorm());
+      hold_share_(n, Eigen::Index(h)) = 1.0 / (nearest + 1e-12 * std::pow(body_->size(), 2));
+    }
+  }
+  for (Eigen::Index n = 0; n < X.rows(); ++n)
+    if (hold_share_.cols() > 0) hold_share_.row(n) /= hold_share_.row(n).sum();
+}
+
+void Simulation::move_holds(double from, double to, Points& positions) {
+  std::vector<Hold> there;
+  const Points before = positions;
+  for (std::size_t h = 0; h < options_.holds.size(); ++h) {
+    const Hold start = part_of_the_way(options_.holds[h], from, hold_middle_[h]);
+    there.push_back(part_of_the_way(options_.holds[h], to, hold_middle_[h]));
+    const Matrix3 R = there[h].rotation * start.rotation.transpose();
+    const Vector3 t = there[h].translation - R * start.translation;
+    for (Eigen::Index n = 0; n < positions.rows(); ++n) {
+      const Vector3 x = before.row(n).transpose();
+      positions.row(n) += hold_share_(n, Eigen::Index(h)) * (R * x + t - x).transpose();
+    }
+  }
+  for (std::size_t h = 0; h < there.size() && holds_strongly(*body_, options_); ++h)
+    for (const int node : held_nodes(*body_, {there[h]}))
+      positions.row(node) = (there[h].rotation * body_->nodes.row(node).transpose() + there[h].translation).transpose();
+  if (fixed_regions_) fixed_regions_->move_to(there);
+}
+
+bool Simulation::find_equilibrium(const VectorX& parameters, State& state, RolloutSummary& summary) {
+  constexpr double smallest = 1.0 / 256.0, largest_turn = 0.4;
+  double turn = 0.0;
+  for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
+  state = {rest_, Points::Zero(rest_.rows(), 3)};
+  const double longest = turn > 0.0 ? std::min(1.0, largest_turn / turn) : 1.0;
+  double done = 0.0, stride = longest;
+  while (done < 1.0) {
+    const double share = std::min(1.0, done + stride);
+    VectorX part = parameters;
+    part.segment<3>(theta::gravity) *= share;
+    Points x = state.x;
+    stepper_.set_parameters(part);
+    move_holds(done, share, x);
+    const SolveSummary solved = stepper_.equilibrium(x);
+    summary.solver_iterations += solved.iterations;
+    ++summary.steps;
+    if (solved.converged) {
+      state.x = x;
+      done = share;
+      stride = std::min(1.5 * stride, longest);
+    } else if ((stride *= 0.4) < smallest) {
+      summary.failure = "no equilibrium was found beyond " + std::to_string(100.0 * done) +
+                        " % of the load: the material may be too soft to hold the object up";
+      return false;
+    }
+  }
+  return true;
+}
+
 bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary& summary) {
   stepper_.set_time_step(plan.dt);
   if (!stepper_.prepare(state)) {
@@ -78,7 +159,8 @@ bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary
   const SolveSummary solved = stepper_.solve(state, delta_);
   summary.solver_iterations += solved.iterations;
   if (!solved.converged) {
-    summary.failure = "the linear solver did not converge at step " + std::to_string(summary.steps);
+    summary.failure = std::string(options_.integrator == Integrator::Newton ? "Newton's method" : "the linear solver") +
+                      " did not converge at step " + std::to_string(summary.steps);
     return false;
   }
   ++summary.steps;
@@ -97,11 +179,23 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   std::vector<State> tangents;
   for (Eigen::Index c = 0; c < directions.cols(); ++c)
     tangents.push_back(initial_tangent(parameters, directions.col(c)));
+  if (options_.is_static) {
+    if (!find_equilibrium(parameters, state, summary)) return summary;
+    for (std::size_t c = 0; c < tangents.size(); ++c)
+      tangents[c] = {stepper_.equilibrium_tangent(state.x, directions.col(Eigen::Index(c))), Points::Zero(rest_.rows(), 3)};
+    for (int frame = 0; frame <= std::min(last_frame, frame_count() - 1); ++frame) {
+      ++summary.frames;
+      if (!on_frame(frame, state, tangents)) break;
+    }
+    return summary.succeeded = true, summary;
+  }
   summary.frames = 1;
   if (!on_frame(0, state, tangents)) return summary.succeeded = true, summary;
   for (const StepPlan& plan : plan_) {
     if (summary.frames > last_frame) break;
     if (!forward_step(plan, state, summary)) return summary;
+    if (!tangents.empty() && options_.integrator == Integrator::Newton && !stepper_.prepare_derivatives(state, delta_))
+      return summary.failure = "a matrix of the tangents cannot be factorised", summary;
     for (std::size_t c = 0; c < tangents.size(); ++c)
       stepper_.tangent(state, delta_, directions.col(Eigen::Index(c)), tangents[c]);
     stepper_.advance(delta_, state);
@@ -125,6 +219,18 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   RolloutSummary summary;
   set_parameters(parameters);
   theta_bar.setZero(theta_size());
+  if (options_.is_static) {
+    State state;
+    if (!find_equilibrium(parameters, state, summary)) return summary;
+    Points x_bar = Points::Zero(rest_.rows(), 3);
+    for (int frame = 0; frame <= std::min(last_frame, frame_count() - 1); ++frame) {
+      ++summary.frames;
+      if (!cost(frame, state)) return summary.failure = "the cost failed", summary;
+      cotangent(frame, state, x_bar);
+    }
+    stepper_.equilibrium_adjoint(state.x, x_bar, theta_bar);
+    return summary.succeeded = true, summary;
+  }
   std::size_t steps = 0;
   while (steps < plan_.size() && (steps == 0 || plan_[steps - 1].frame_after < last_frame)) ++steps;
   if (last_frame == 0) steps = 0;
@@ -167,8 +273,9 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     const State& start = segment.back();
     if (plan_[s].frame_after >= 0) cotangent(plan_[s].frame_after, state, bar.x);
     stepper_.set_time_step(plan_[s].dt);
-    if (!stepper_.prepare(start)) return summary.failure = "a matrix of the reverse sweep is not positive definite", summary;
     delta_ = state.x - start.x;
+    if (!stepper_.prepare_derivatives(start, delta_))
+      return summary.failure = "a matrix of the reverse sweep is not positive definite", summary;
     stepper_.adjoint(start, delta_, bar, theta_bar);
     state = start;
     segment.pop_back();
@@ -180,18 +287,12 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
 }
 
 ContactOptions default_contact(const Body& body, double mass, double gravity) {
-  Box box;
-  for (Eigen::Index n = 0; n < body.grid.nodes.rows(); ++n) box.extend(body.grid.nodes.row(n).transpose());
-  const double size = box.extent().maxCoeff();
+  const double size = body.size();
   double projected = 0.0;  // a convex body's mean projected area is a quarter of its surface
-  for (const SurfacePoint& point : body.grid.surface) projected += 0.25 * point.area;
+  for (const SurfacePoint& point : body.surface) projected += 0.25 * point.area;
   return {mass * gravity / (projected * 1e-4 * size), 1e-3 * size};
 }
 
-double default_time_step(const Body& body, double gravity) {
-  Box box;
-  for (Eigen::Index n = 0; n < body.grid.nodes.rows(); ++n) box.extend(body.grid.nodes.row(n).transpose());
-  return 0.0125 * std::sqrt(box.extent().maxCoeff() / gravity);
-}
+double default_time_step(const Body& body, double gravity) { return 0.0125 * std::sqrt(body.size() / gravity); }
 
 }  // namespace pliant

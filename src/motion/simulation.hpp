@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
+#include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
-#include "motion/lagged_stepper.hpp"
+#include "motion/stepper.hpp"
 #include "motion/plane_contact.hpp"
 
 namespace pliant {
@@ -19,10 +20,15 @@ struct SimulationOptions {
   double newmark_theta = 0.51;
   double contact_weight = 0.6, rotation_prediction = 0.5;  ///< see StepOptions
   SolverOptions solver;
+  Integrator integrator = Integrator::Lagged;
+  NewtonOptions newton;
   ContactOptions contact;
   int planes = 0;              ///< in theta
   std::vector<Hold> holds;     ///< held regions
-  bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method
+  std::vector<HungWeight> weights;  ///< hung from the object
+  bool is_static = false;           ///< every frame sees the same equilibrium; steps, velocities and damping play no part
+  bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
+                               ///< tetrahedra, which follow the shape
   std::size_t memory_budget = std::size_t(256) << 20;  ///< [bytes] for states kept for the adjoint
 };
 
@@ -32,7 +38,7 @@ struct RolloutSummary {
   std::string failure;  ///< why it stopped, in words
 };
 
-/// Runs one body through a scene's frames, with tangents or adjoint. Not for concurrent use; copies are cheap to make
+/// Runs one body through a scene's frames, or to its equilibrium, with tangents or adjoint. Not for concurrent use; copies are cheap to make
 /// with the same body.
 class Simulation {
  public:
@@ -71,13 +77,23 @@ class Simulation {
   State initial_state(const VectorX& theta) const;
   State initial_tangent(const VectorX& theta, const VectorX& d_theta) const;
   void initial_adjoint(const VectorX& theta, const State& bar, VectorX& theta_bar) const;
+  /// The equilibrium of static scenes: at once where Newton's method gets there from rest, else by steps of the load,
+  /// gravity and the holds' displacement together, as large as it follows.
+  bool find_equilibrium(const VectorX& theta, State& state, RolloutSummary& summary);
+  /// Moves the held regions from one part of their way to another, and the whole body's positions along with them: each
+  /// node as the regions move, by inverse square distance from them.
+  void move_holds(double from, double to, Points& positions);
+  void prepare_holds();
   bool forward_step(const StepPlan& plan, State& state, RolloutSummary& summary);
   std::size_t state_bytes() const { return 2 * 3 * sizeof(double) * std::size_t(body_->node_count()); }
   std::size_t segment_length(std::size_t steps) const;
 
   std::shared_ptr<const Body> body_;
   SimulationOptions options_;
-  LaggedStepper stepper_;
+  FixedRegions* fixed_regions_ = nullptr;  // of the stepper's terms, if any
+  std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
+  MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
+  Stepper stepper_;
   std::vector<StepPlan> plan_;
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;

@@ -83,8 +83,21 @@ ConvergenceHistory history_of(const FitOutcome& outcome) {
 
 std::vector<double> six(const Matrix3& m) { return {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(1, 2), m(0, 2)}; }
 
-VtuGrid frame_grid(const Body& body, const VectorX& parameters, const State& state, CorotatedElasticity& elasticity) {
+VtuCell vtu_cell(ElementKind kind) {
+  switch (kind) {
+    case ElementKind::Tetrahedron: return VtuCell::Tetrahedron;
+    case ElementKind::QuadraticTetrahedron: return VtuCell::QuadraticTetrahedron;
+    case ElementKind::Hexahedron: break;
+  }
+  return VtuCell::Hexahedron;
+}
+
+VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& parameters, const State& state, Elasticity& elasticity) {
+  const Body& body = *shared;
   VtuGrid grid;
+  grid.kind = vtu_cell(body.kind);
+  ElementModuli modulus(shared);
+  modulus.set_parameters(parameters);
   grid.points = state.x;
   VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}},
       stress{"stress [Pa]", 6, {}};
@@ -93,12 +106,12 @@ VtuGrid frame_grid(const Body& body, const VectorX& parameters, const State& sta
   velocity.values.assign(state.v.data(), state.v.data() + state.v.size());
   elasticity.linearise(state.x);
   const UnitLame c = unit_lame(parameters[theta::poissons_ratio]);
-  for (int e = 0; e < body.grid.cell_count(); ++e) {
-    const auto cell = vtk_hexahedron(body.grid.cells[e]);
+  for (int e = 0; e < body.element_count(); ++e) {
+    const auto cell = to_vtk_order(grid.kind, body.element(e));
     grid.connectivity.insert(grid.connectivity.end(), cell.begin(), cell.end());
     const Polar& polar = elasticity.rotation(e);
     const Matrix3 in_body = polar.S - Matrix3::Identity();
-    const double E = parameters[theta::youngs_modulus] * body.relative_modulus[e];
+    const double E = modulus[e];
     const Matrix3 in_world = polar.R * in_body * polar.R.transpose();
     const Matrix3 sigma = E * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world);
     for (const double v : six(in_world)) strain.values.push_back(v);
@@ -114,7 +127,7 @@ void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, con
                       const Points& nodes) {
   std::vector<SurfaceObservation> points;
   for (const Vector3& p : seen) points.push_back({p, 1.0});
-  const auto matches = d.constraints->match(points, nodes);
+  const auto matches = d.mismatch.surface->match(points, nodes);
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (matches[i].cell < 0) continue;
     frame.points.push_back(points[i].position);
@@ -144,7 +157,7 @@ Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& obs
   std::vector<int> told;
   for (const int i : spread_frames(0, int(fitted.size()) - 1, 6)) told.push_back(fitted[std::size_t(i)].frame);
   if (told.empty()) return gallery;
-  const Embedding embedding(d.body->grid, capture.surface->vertices);
+  const Embedding embedding(*d.body, capture.surface->vertices);
   const double start = capture.times[std::size_t(capture.start_frame)];
   Simulation simulation(d.body, d.simulation);
   simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
@@ -297,18 +310,21 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   model.frames = capture.frame_count();
   model.frame_rate = (capture.frame_count() - 1) / (capture.times.back() - capture.times.front());
   model.start_frame = capture.start_frame;
-  model.cell_size = d.body->grid.cell_size;
-  model.grid_origin = d.body->grid.origin;
+  model.cell_size = d.body->grid().cell_size;
+  model.grid_origin = d.body->grid().origin;
   model.substeps = std::max(1, int(std::ceil(1.0 / (model.frame_rate * d.simulation.max_dt) - 1e-9)));
   model.theta = d.simulation.newmark_theta;
   model.contact_stiffness = d.simulation.contact.stiffness;
   model.contact_smoothing = d.simulation.contact.smoothing;
   model.volume.nodes = d.body->reference_positions();
-  model.volume.cells = d.body->grid.cells;
-  for (int e = 0; e < d.body->grid.cell_count(); ++e) {
-    model.volume.youngs_modulus.push_back(model.youngs_modulus * d.body->relative_modulus[e]);
+  model.volume.kind = vtu_cell(d.body->kind);
+  model.volume.connectivity = d.body->connectivity;
+  ElementModuli modulus(d.body);
+  modulus.set_parameters(t);
+  for (int e = 0; e < d.body->element_count(); ++e) {
+    model.volume.youngs_modulus.push_back(modulus[e]);
     model.volume.poisson_ratio.push_back(model.poisson_ratio);
-    model.volume.fill.push_back(d.body->grid.quadrature[e].volume_fraction());
+    model.volume.fill.push_back(d.body->grid().quadrature[std::size_t(e)].volume_fraction());
   }
   return model;
 }
@@ -343,13 +359,13 @@ RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Bo
                                 const SimulationOptions& options, const VectorX& parameters,
                                 const std::function<bool(int, int)>& progress) {
   std::vector<PvdEntry> entries;
-  CorotatedElasticity elasticity(body);
-  elasticity.set_parameters(parameters);
+  const auto elasticity = make_elasticity(body);
+  elasticity->set_parameters(parameters);
   Simulation simulation(body, options);
   const RolloutSummary summary = simulation.run(parameters, [&](int frame, const State& state, auto) {
     char name[32];
     std::snprintf(name, sizeof name, "frames/%06d.vtu", frame);
-    write_vtu(folder / name, frame_grid(*body, parameters, state, elasticity), VtuPrecision::Single);
+    write_vtu(folder / name, frame_grid(body, parameters, state, *elasticity), VtuPrecision::Single);
     entries.push_back({options.times[std::size_t(frame)] - options.times.front(), name});
     return !progress || progress(frame + 1, simulation.frame_count());
   });

@@ -296,7 +296,7 @@ TEST(CaptureRules, TellFaultsOfASharedFileOnce) {
   EXPECT_EQ(said.find("markers_rest.csv:2:7"), said.rfind("markers_rest.csv:2:7"));
 }
 
-std::string press_with(std::string from, const std::string& to) {
+std::string press_with(std::string_view from, std::string_view to) {
   std::string text = press;
   return text.replace(text.find(from), from.size(), to);
 }

@@ -12,7 +12,7 @@ TEST(DepthPicture, GivesEachKindAColourOfItsOwn) {
   for (int u = 0; u < 5; ++u) kinds(u, 0) = PixelKind(u);
   auto colours = picture(depth, kinds).pixels;
   std::ranges::sort(colours);
-  EXPECT_EQ(std::ranges::unique(colours).begin(), colours.end());
+  EXPECT_EQ(std::unique(colours.begin(), colours.end()), colours.end());
 }
 
 TEST(DepthPicture, ShowsEveryPointOfACloud) {

@@ -134,7 +134,8 @@ SphereErrors errors_of(HexGrid grid) {
   body->add_mass_product(1.0, X, moment);
   const double volume = 4.0 / 3.0 * pi * std::pow(radius, 3);
   const double inertia = volume * radius * radius / 5.0;  // second moment about a plane through the centre
-  CorotatedElasticity elasticity(body);
+  const auto owned = make_elasticity(body);
+  Elasticity& elasticity = *owned;
   VectorX theta = VectorX::Zero(theta::size(0));
   theta[theta::youngs_modulus] = 1.0;
   theta[theta::poissons_ratio] = nu;
@@ -143,7 +144,7 @@ SphereErrors errors_of(HexGrid grid) {
   Points z = X;
   for (Eigen::Index n = 0; n < X.rows(); ++n) z.row(n) += displacement(X.row(n).transpose()).transpose();
   double area = 0.0;
-  for (const SurfacePoint& p : body->grid.surface) area += p.area;
+  for (const SurfacePoint& p : body->surface) area += p.area;
   return {std::abs(body->volume() / volume - 1.0), body->centre_of_mass().norm() / radius,
           (X.transpose() * moment - inertia * Matrix3::Identity()).norm() / inertia,
           std::abs(elasticity.energy(z) / exact_energy(nu) - 1.0), std::abs(area / (4 * pi * radius * radius) - 1.0)};
@@ -228,7 +229,8 @@ struct Conditioning {
 
 Conditioning conditioning_of(HexGrid grid) {
   const auto body = std::make_shared<Body>(make_body(std::move(grid)));
-  CorotatedElasticity elasticity(body);
+  const auto owned = make_elasticity(body);
+  Elasticity& elasticity = *owned;
   VectorX theta = VectorX::Zero(theta::size(0));
   theta[theta::youngs_modulus] = 1.0;
   theta[theta::poissons_ratio] = 0.3;

@@ -29,7 +29,7 @@ Model full_model() {
   m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
   m.substeps = 4, m.theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;
   m.volume.nodes = Points::Random(12, 3);
-  m.volume.cells = {{0, 1, 2, 3, 4, 5, 6, 7}, {4, 5, 6, 7, 8, 9, 10, 11}};
+  m.volume.connectivity = {0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 8, 9, 10, 11};
   m.volume.youngs_modulus = {500, 680}, m.volume.poisson_ratio = {0.3, 0.4}, m.volume.fill = {1.0, 0.25};
   return m;
 }
@@ -60,7 +60,8 @@ TEST(Model, ComesBackAsItWasSaved) {
   EXPECT_EQ(read.contact_stiffness, 1e6);
   EXPECT_EQ(read.contact_smoothing, 1e-3);
   EXPECT_EQ(read.volume.nodes, m.volume.nodes);
-  EXPECT_EQ(read.volume.cells, m.volume.cells);
+  EXPECT_EQ(read.volume.kind, m.volume.kind);
+  EXPECT_EQ(read.volume.connectivity, m.volume.connectivity);
   EXPECT_EQ(read.volume.youngs_modulus, m.volume.youngs_modulus);
   EXPECT_EQ(read.volume.poisson_ratio, m.volume.poisson_ratio);
   EXPECT_EQ(read.volume.fill, m.volume.fill);
@@ -97,7 +98,7 @@ TEST(Model, MayHaveNoVolumeNoGravityAndNoTiming) {
   const Model read = load_model(folder / "model.toml");
   EXPECT_FALSE(read.gravity);
   EXPECT_EQ(read.frames, 0);
-  EXPECT_TRUE(read.volume.cells.empty());
+  EXPECT_TRUE(read.volume.connectivity.empty());
 }
 
 // What is said about a model.toml in which one text was replaced by another.

@@ -38,7 +38,8 @@ VtuGrid two_hexahedra() {
       for (int i = 0; i < 3; ++i) grid.points.row(i + 3 * j + 6 * k) = Vector3(i, j, k + 0.1);
   for (int cell = 0; cell < 2; ++cell) {
     const int o = cell;
-    for (const int corner : vtk_hexahedron({o, o + 1, o + 3, o + 4, o + 6, o + 7, o + 9, o + 10}))
+    const std::array corners = {o, o + 1, o + 3, o + 4, o + 6, o + 7, o + 9, o + 10};
+    for (const int corner : to_vtk_order(VtuCell::Hexahedron, corners))
       grid.connectivity.push_back(corner);
   }
   grid.point_data = {{"velocity [m/s]", 3, random_values(36)}, {"id", 1, random_values(12)}};
@@ -86,16 +87,28 @@ TEST(Base64, RefusesForeignCharactersAndWrongPadding) {
   EXPECT_EQ(decode_base64(" TW\nFu "), "Man");
 }
 
-TEST(VtkHexahedron, GoesAroundBottomAndTopAndIsItsOwnInverse) {
+TEST(VtkOrder, OfAHexahedronGoesAroundBottomAndTop) {
   const std::array<int, 8> ours{0, 1, 2, 3, 4, 5, 6, 7};
-  const std::array<int, 8> vtk = vtk_hexahedron(ours);
+  const std::vector<int> vtk = to_vtk_order(VtuCell::Hexahedron, ours);
   for (const int start : {0, 4})
     for (int k = 0; k < 4; ++k) {  // neighbours in VTK's order differ in one coordinate
       const int difference = vtk[start + k] ^ vtk[start + (k + 1) % 4];
       EXPECT_TRUE(difference == 1 || difference == 2);
     }
   for (int k = 0; k < 4; ++k) EXPECT_EQ(vtk[k] ^ vtk[k + 4], 4);
-  EXPECT_EQ(vtk_hexahedron(vtk), ours);
+}
+
+TEST(VtkOrder, OfAQuadraticTetrahedronGoesAroundTheBottom) {
+  const std::array<int, 10> ours = {0, 1, 2, 3, 1, 2, 3, 12, 13, 23};  // mid-edges named by their ends
+  EXPECT_EQ(to_vtk_order(VtuCell::QuadraticTetrahedron, ours), (std::vector{0, 1, 2, 3, 1, 12, 2, 3, 13, 23}));
+}
+
+TEST(VtkOrder, IsUndoneByItsInverse) {
+  for (const VtuCell kind : {VtuCell::Tetrahedron, VtuCell::Hexahedron, VtuCell::QuadraticTetrahedron}) {
+    std::vector<int> ours(std::size_t(corner_count(kind)));
+    std::iota(ours.begin(), ours.end(), 5);
+    EXPECT_EQ(from_vtk_order(kind, to_vtk_order(kind, ours)), ours);
+  }
 }
 
 TEST_F(Vtu, HexahedraComeBackBitByBit) {

@@ -27,10 +27,10 @@ struct Beam {
     theta[theta::youngs_modulus] = modulus;
     theta[theta::poissons_ratio] = nu;
     const Hold root{[](const Vector3& p) { return p.x() < near_root; }};
-    CorotatedElasticity elasticity(body);
-    elasticity.set_parameters(theta);
-    elasticity.linearise(body->reference_positions());
-    elasticity.add_matrix(1.0, K);
+    const auto elasticity = make_elasticity(body);
+    elasticity->set_parameters(theta);
+    elasticity->linearise(body->reference_positions());
+    elasticity->add_matrix(1.0, K);
     if (clamp == Clamp::Nitsche) {
       FixedRegions fixed(body, {root});
       fixed.set_parameters(theta);

@@ -21,8 +21,11 @@ std::vector<int> range(int first, int count) {
   return all;
 }
 
+std::shared_ptr<const Body> small_torus() { return test::torus_body(0.1, 0.04, 0.05); }
+
 struct Family {
   std::string name;
+  std::function<std::shared_ptr<const Body>()> body;
   std::function<std::unique_ptr<ForceTerm>(std::shared_ptr<const Body>)> make;
   bool depends_on_lag, depends_on_position;
   std::vector<int> parameters;  ///< of theta that it depends on
@@ -31,8 +34,9 @@ struct Family {
 void PrintTo(const Family& family, std::ostream* out) { *out << family.name; }
 
 struct ForceTerms : ::testing::TestWithParam<Family> {
-  ForceTerms() : body(test::torus_body(0.1, 0.04, 0.05)), term(GetParam().make(body)) {
-    theta.setZero(theta::size(2));
+  ForceTerms() : body(GetParam().body()), term(GetParam().make(body)) {
+    theta.setZero(theta::size(2, body->modulus.controls));
+    theta.tail(body->modulus.controls - 1).setLinSpaced(2000.0, 5000.0);
     theta[theta::youngs_modulus] = 3000.0;
     theta[theta::poissons_ratio] = 0.35;
     theta[theta::mass_damping] = 0.4;
@@ -144,16 +148,57 @@ TEST_P(ForceTerms, AdjointIsTheTransposeOfTheTangent) {
   expect_same(0.5 * z_bar.cwiseProduct(d_z).sum(), tangent(none(), d_z, zero), "z, twice");
 }
 
+/// The lag point's share, as a matrix.
+TEST_P(ForceTerms, LagMatrixIsMinusTheDerivativeByLagPoint) {
+  term->set_parameters(theta);
+  const auto product = [&](const Points& at_lag, const Points& at_z) {
+    term->linearise(at_lag);
+    BlockMatrix K(body->pattern);
+    term->add_lag_matrix(at_z, 3.0, K);
+    VectorX y;
+    K.multiply(flat(d_lag), y);
+    return y;
+  };
+  // Contact gives its share where it is needed, with the lag point at z itself: there is none.
+  const bool is_elastic = GetParam().name.find("Of") != std::string::npos && GetParam().name.find("Contact") == std::string::npos;
+  const Points& at_lag = is_elastic ? lag : z;
+  const VectorX y = product(at_lag, z);
+  term->linearise(at_lag);
+  Points df = none();
+  term->add_force_tangent(z, d_lag, none(), VectorX::Zero(theta.size()), df);
+  EXPECT_EQ(df.norm() > 0.0, is_elastic);
+  EXPECT_LE((y + 3.0 * flat(df)).norm(), tolerance(1e-11) * df.norm());
+}
+
+std::shared_ptr<const Body> with_three_moduli(Body body) {
+  body.modulus.controls = 3;
+  body.modulus.weights = (MatrixX::Random(body.element_count(), 3).array() + 1.5).matrix();
+  for (int e = 0; e < body.element_count(); ++e) body.modulus.weights.row(e) /= body.modulus.weights.row(e).sum();
+  return std::make_shared<Body>(std::move(body));
+}
+
 std::vector<Family> families() {
   std::vector<int> gravity = range(theta::gravity, 3);
   gravity.push_back(theta::density);
-  return {{"CorotatedElasticity", [](auto body) { return std::make_unique<CorotatedElasticity>(body); }, true, true,
-           {theta::youngs_modulus, theta::poissons_ratio}},
-          {"Gravity", [](auto body) { return std::make_unique<Gravity>(*body); }, false, false, gravity},
-          {"PlaneContact",
-           [](auto body) { return std::make_unique<PlaneContact>(body, 1, ContactOptions{2e5, 0.01}); }, true, true,
-           range(theta::plane_point(1), 6)},
-          {"FixedRegions",
+  const auto elastic = [](std::string name, std::function<std::shared_ptr<const Body>()> body, std::vector<int> parameters) {
+    return Family{std::move(name), std::move(body), [](auto of) { return make_elasticity(of); }, true, true, std::move(parameters)};
+  };
+  std::vector<Family> list;
+  for (const test::BodyKind& kind : test::body_kinds())
+    list.push_back(elastic("ElasticityOf" + kind.name, kind.make, {theta::youngs_modulus, theta::poissons_ratio}));
+  for (const test::BodyKind& kind : test::body_kinds())
+    list.push_back(elastic("ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); },
+                           {theta::youngs_modulus, theta::poissons_ratio, theta::size(2), theta::size(2) + 1}));
+  const auto box = [](bool quadratic) {
+    return [quadratic] { return test::tet_body({0.24, 0.1, 0.24}, {3, 2, 3}, quadratic); };
+  };
+  const auto contact = [](auto body) { return std::make_unique<PlaneContact>(body, 1, ContactOptions{2e5, 0.01}); };
+  list.push_back({"PlaneContactOfTetrahedra", box(false), contact, true, true, range(theta::plane_point(1), 6)});
+  list.push_back({"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, range(theta::plane_point(1), 6)});
+  const std::vector<Family> others = {
+          {"Gravity", small_torus, [](auto body) { return std::make_unique<Gravity>(*body); }, false, false, gravity},
+          {"PlaneContact", small_torus, contact, true, true, range(theta::plane_point(1), 6)},
+          {"FixedRegions", small_torus,
            [](auto body) {
              const Matrix3 R = Eigen::AngleAxisd(0.8, Vector3(1, -1, 2).normalized()).toRotationMatrix();
              return std::make_unique<FixedRegions>(
@@ -161,6 +206,8 @@ std::vector<Family> families() {
                                          {[](const Vector3& p) { return p.z() < -0.08; }}});
            },
            false, true, {theta::youngs_modulus, theta::poissons_ratio}}};
+  list.insert(list.end(), others.begin(), others.end());
+  return list;
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ForceTerms, ::testing::ValuesIn(families()),
@@ -187,7 +234,7 @@ TEST(PlaneContact, PushesOutwardsOnBothSidesOfItsSwitch) {
   }
   // Half the torus under the plane: k times the volume of water displaced, over samples of area times depth.
   double depth = 0.0;
-  for (const SurfacePoint& p : body->grid.surface) depth += std::max(0.0, -p.position.y()) * p.area;
+  for (const SurfacePoint& p : body->surface) depth += std::max(0.0, -p.position.y()) * p.area;
   EXPECT_NEAR(last, 2e5 * depth, 0.03 * last);
 }
 

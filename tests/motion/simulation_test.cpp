@@ -12,7 +12,12 @@ using test::tolerance;
 constexpr int last = 4;  // four frames: free flight, impact and rebound
 constexpr double cell_size = 0.04;
 
-test::TorusScene scene_for(int frames = last + 1) { return test::torus_scene(cell_size, frames); }
+test::TorusScene scene_for(int frames = last + 1, Integrator integrator = Integrator::Lagged) {
+  test::TorusScene scene = test::torus_scene(cell_size, frames);
+  scene.options.integrator = integrator;
+  scene.options.newton.tolerance = 1e-13;
+  return scene;
+}
 
 VectorX positions_at(Simulation& simulation, const VectorX& theta, int frame) {
   VectorX out;
@@ -42,12 +47,16 @@ TEST(Simulation, SceneFliesHitsAndReturns) {
   EXPECT_GT(speed[last], -0.3) << "the sensitivities below would not see the contact";
 }
 
-class Sensitivity : public ::testing::TestWithParam<int> {};
+/// A parameter of theta, and the integrator.
+class Sensitivity : public ::testing::TestWithParam<std::tuple<int, Integrator>> {
+ protected:
+  int index() const { return std::get<0>(GetParam()); }
+  test::TorusScene scene = scene_for(last + 1, std::get<1>(GetParam()));
+};
 
 TEST_P(Sensitivity, TangentMatchesCentralDifferences) {
-  test::TorusScene scene = scene_for();
   Simulation simulation(scene.body, scene.options);
-  const VectorX direction = relative_scale(scene.theta, GetParam());
+  const VectorX direction = relative_scale(scene.theta, index());
   VectorX tangent;
   simulation.run(scene.theta, direction, last, [&](int f, const State&, std::span<const State> tangents) {
     if (f == last) tangent = flat(tangents[0].x);
@@ -60,9 +69,8 @@ TEST_P(Sensitivity, TangentMatchesCentralDifferences) {
 }
 
 TEST_P(Sensitivity, AdjointMatchesTangent) {
-  test::TorusScene scene = scene_for();
   Simulation simulation(scene.body, scene.options);
-  const VectorX direction = relative_scale(scene.theta, GetParam());
+  const VectorX direction = relative_scale(scene.theta, index());
   const Points weight = test::deformed(scene.body->reference_positions(), 0.3);
   double by_tangent = 0.0;
   simulation.run(scene.theta, direction, last, [&](int f, const State&, std::span<const State> tangents) {
@@ -82,7 +90,29 @@ TEST_P(Sensitivity, AdjointMatchesTangent) {
   EXPECT_NEAR(gradient.dot(direction), by_tangent, tolerance(1e-9) * std::abs(by_tangent));
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryParameter, Sensitivity, ::testing::Range(0, theta::size(1)));
+INSTANTIATE_TEST_SUITE_P(EveryParameter, Sensitivity,
+                         ::testing::Combine(::testing::Range(0, theta::size(1)),
+                                            ::testing::Values(Integrator::Lagged, Integrator::Newton)));
+
+/// Two schemes of one equation: their difference vanishes with the step, the fully implicit one's own error too.
+TEST(Simulation, BothIntegratorsAgreeAsStepsShrink) {
+  const auto difference = [](double share) {
+    std::array<VectorX, 2> x;
+    for (const Integrator integrator : {Integrator::Lagged, Integrator::Newton}) {
+      test::TorusScene scene = scene_for(3, integrator);
+      scene.theta.segment<3>(theta::plane_point(0)).y() -= 1.0;  // in flight: impacts are not smooth
+      scene.theta.segment<3>(theta::angular_velocity) *= 5.0;
+      scene.options.max_dt *= share;
+      scene.options.newmark_theta = 0.5;
+      Simulation simulation(scene.body, scene.options);
+      x[std::size_t(integrator)] = positions_at(simulation, scene.theta, 2);
+    }
+    return (x[0] - x[1]).norm();
+  };
+  const double coarse = difference(1.0), fine = difference(0.25);
+  ASSERT_GT(coarse, 1e-9);
+  EXPECT_GT(coarse / fine, 9.0) << "second order: sixteen";
+}
 
 TEST(Simulation, CheckpointedAdjointIsTheSame) {
   test::TorusScene scene = scene_for(13);

@@ -24,7 +24,8 @@ VectorX random_vector(Eigen::Index size, unsigned seed) {
 /// Stiffness + mass of a turned, bent torus: what a time step solves with. `share` of the mass term against stiffness.
 BlockMatrix step_matrix(double mass_factor = 2000.0) {
   const auto body = test::torus_body(0.1, 0.04, 0.04);
-  CorotatedElasticity elasticity(body);
+  const auto owned = make_elasticity(body);
+  Elasticity& elasticity = *owned;
   VectorX theta = VectorX::Zero(theta::size(0));
   theta[theta::youngs_modulus] = 1.0;
   theta[theta::poissons_ratio] = 0.4;

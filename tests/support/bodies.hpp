@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <ostream>
+#include <string>
 
 #include "elasticity/body.hpp"
 
@@ -50,6 +53,36 @@ inline std::shared_ptr<const Body> box_body(const Vector3& size, double cell_siz
     return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0) - trace;
   });
   return std::make_shared<Body>(make_body(make_hex_grid(distance, centred_box(half * (1.0 - 1e-9)), cell_size), options));
+}
+
+/// A box around the origin of structured tetrahedra, six a cell, with its inner nodes moved about so that no two elements
+/// are congruent.
+inline std::shared_ptr<const Body> tet_body(const Vector3& size, const Eigen::Vector3i& cells, bool quadratic,
+                                            double distortion = 0.15, const BodyOptions& options = {}) {
+  TetMesh mesh = make_tet_box(centred_box(0.5 * size), cells, false);
+  const Vector3 cell = size.cwiseQuotient(cells.cast<double>());
+  for (Eigen::Index n = 0; n < mesh.nodes.rows(); ++n)
+    for (int d = 0; d < 3; ++d) {
+      if (std::abs(std::abs(mesh.nodes(n, d)) - 0.5 * size[d]) < 1e-9 * size[d]) continue;  // faces stay plane
+      mesh.nodes(n, d) += distortion * cell[d] * std::sin(7.0 * double(n) + 2.0 * d);
+    }
+  mesh = make_tet_mesh(std::move(mesh.nodes), std::move(mesh.tets));
+  return std::make_shared<Body>(make_body(quadratic ? with_mid_nodes(mesh) : mesh, options));
+}
+
+/// One small body of every kind of element.
+struct BodyKind {
+  std::string name;
+  std::function<std::shared_ptr<const Body>()> make;
+  friend void PrintTo(const BodyKind& kind, std::ostream* out) { *out << kind.name; }
+};
+inline std::vector<BodyKind> body_kinds() {
+  const auto torus = [](HexFormulation formulation) {
+    return [formulation] { return torus_body(0.1, 0.04, 0.05, {formulation, MassKind::Consistent}); };
+  };
+  const auto box = [](bool quadratic) { return [quadratic] { return tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, quadratic); }; };
+  return {{"Hexahedra", torus(HexFormulation::IncompatibleModes)}, {"TrilinearHexahedra", torus(HexFormulation::Trilinear)},
+          {"Tetrahedra", box(false)}, {"QuadraticTetrahedra", box(true)}};
 }
 
 /// Generic, but smooth and of moderate size: rotates, stretches, shears and bends.

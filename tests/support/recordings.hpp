@@ -19,7 +19,7 @@ struct Recording {
     ObjectiveOptions options;
     options.outlier_scale = outlier_scale;
     options.last_frame = int(scene.options.times.size()) - 1;
-    return {constraints, scene.body, scene.options, observations, fitted, options};
+    return {{constraints, nullptr}, scene.body, scene.options, observations, fitted, options};
   }
 };
 
@@ -62,8 +62,8 @@ inline Recording torus_recording(double cell_size, int frames, int planes, doubl
   r.parameters = torus_parameters(r.truth, planes);
 
   std::vector<Vector3> samples;
-  for (const SurfacePoint& p : real.body->grid.surface) samples.push_back(p.position);
-  const Embedding surface(real.body->grid, samples);
+  for (const SurfacePoint& p : real.body->surface) samples.push_back(p.position);
+  const Embedding surface(*real.body, samples);
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   Simulation simulation(real.body, real.options);

@@ -1,4 +1,4 @@
-#include "motion/lagged_stepper.hpp"
+#include "motion/stepper.hpp"
 
 #include <numbers>
 
@@ -41,7 +41,7 @@ struct Stepped {
   }
   static std::vector<std::unique_ptr<ForceTerm>> terms(const std::shared_ptr<const Body>& body) {
     std::vector<std::unique_ptr<ForceTerm>> list;
-    list.push_back(std::make_unique<CorotatedElasticity>(body));
+    list.push_back(make_elasticity(body));
     list.push_back(std::make_unique<Gravity>(*body));
     return list;
   }
@@ -52,7 +52,7 @@ struct Stepped {
     stepper.advance(delta, state);
   }
   std::shared_ptr<const Body> body;
-  LaggedStepper stepper;
+  Stepper stepper;
 };
 
 /// Linear and angular momentum about the origin.
@@ -67,7 +67,8 @@ Eigen::Matrix<double, 6, 1> momentum(const Body& body, double density, const Sta
 }
 
 double total_energy(const std::shared_ptr<const Body>& body, const VectorX& theta, const State& state) {
-  CorotatedElasticity elasticity(body);
+  const auto term = make_elasticity(body);
+    Elasticity& elasticity = *term;
   elasticity.set_parameters(theta);
   elasticity.linearise(state.x);
   Points p = Points::Zero(state.v.rows(), 3);
@@ -84,7 +85,7 @@ State spinning(const Body& body, double rate) {
   return state;
 }
 
-TEST(LaggedStepper, FreeFallIsExact) {
+TEST(Stepper, FreeFallIsExact) {
   for (const double blend : {0.5, 0.55, 0.8}) {
     const auto body = test::torus_body(0.1, 0.04, 0.05);
     VectorX theta = soft_material();
@@ -119,7 +120,7 @@ Vector3 angular_drift(double dt, double rotation_prediction) {
   return (after - before).tail<3>() / before.tail<3>().norm();
 }
 
-TEST(LaggedStepper, KeepsLinearMomentumAndAngularMomentumToItsOrder) {
+TEST(Stepper, KeepsLinearMomentumAndAngularMomentumToItsOrder) {
   const std::vector<double> dts = {0.008, 0.004, 0.002};
   // What is left as dt vanishes is the corotated element's: R K (R^T x - X) turns a deformed cell by a torque of second
   // order in its strain, here 0.02.
@@ -138,7 +139,7 @@ TEST(LaggedStepper, KeepsLinearMomentumAndAngularMomentumToItsOrder) {
   EXPECT_GT(test::fitted_order(dts, predicted), 1.6);
 }
 
-TEST(LaggedStepper, EnergyDoesNotGrow) {
+TEST(Stepper, EnergyDoesNotGrow) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
   const VectorX theta = soft_material();
   Stepped scene(body, theta, step_options(1.0 / 240.0, 0.55));
@@ -161,7 +162,8 @@ struct Mode {
   Mode() : body(test::box_body(Vector3(0.3, 0.1, 0.1), 0.1)) {
     theta = soft_material();
     held = held_nodes(*body, {{[](const Vector3& p) { return p.x() < -0.15 + 1e-5; }}});
-    CorotatedElasticity elasticity(body);
+    const auto term = make_elasticity(body);
+    Elasticity& elasticity = *term;
     elasticity.set_parameters(theta);
     elasticity.linearise(body->reference_positions());
     BlockMatrix K(body->pattern), M(body->pattern);
@@ -212,7 +214,7 @@ struct Mode {
   Points shape, dual;
 };
 
-TEST(LaggedStepper, FreeOscillationHasTheModesFrequencyAndOrderTwo) {
+TEST(Stepper, FreeOscillationHasTheModesFrequencyAndOrderTwo) {
   Mode mode;
   for (const auto& [alpha, beta] : {std::pair{0.0, 0.0}, std::pair{1.0, 0.0}, std::pair{0.0, 0.004}, std::pair{1.0, 0.004}}) {
     mode.theta[theta::mass_damping] = alpha;
@@ -222,7 +224,7 @@ TEST(LaggedStepper, FreeOscillationHasTheModesFrequencyAndOrderTwo) {
   }
 }
 
-TEST(LaggedStepper, MassDampingHalvesAtItsRate) {
+TEST(Stepper, MassDampingHalvesAtItsRate) {
   Mode mode;
   mode.theta[theta::mass_damping] = 2.0;
   // exp(-alpha t / 2) is one half; the phase is chosen at a maximum, where it does not matter.
@@ -232,35 +234,35 @@ TEST(LaggedStepper, MassDampingHalvesAtItsRate) {
   EXPECT_NEAR(mode.released(time, period / 400, 0.5), std::exp(-time), tolerance(2e-3));
 }
 
-TEST(LaggedStepper, StiffnessDampingActsWithTheSquareOfTheFrequency) {
+TEST(Stepper, StiffnessDampingActsWithTheSquareOfTheFrequency) {
   Mode mode;
   mode.theta[theta::stiffness_damping] = 0.1 / mode.omega;  // damping ratio 0.05
   const double damped = mode.omega * std::sqrt(1 - 0.05 * 0.05), period = 2.0 * std::numbers::pi / damped;
   EXPECT_NEAR(mode.released(3 * period, period / 400, 0.5), std::exp(-0.05 * mode.omega * 3 * period), tolerance(2e-3));
 }
 
-TEST(LaggedStepper, WithoutDampingThetaOneHalfKeepsTheAmplitude) {
+TEST(Stepper, WithoutDampingThetaOneHalfKeepsTheAmplitude) {
   const Mode mode;
   const double period = 2.0 * std::numbers::pi / mode.omega;
   EXPECT_NEAR(mode.released(10 * period, period / 200, 0.5), 1.0, tolerance(5e-3));
   EXPECT_LT(mode.released(10 * period, period / 200, 0.55), 0.95) << "above one half it damps numerically";
 }
 
-TEST(LaggedStepper, RefusesSenselessOptions) {
+TEST(Stepper, RefusesSenselessOptions) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
-  EXPECT_NO_THROW(LaggedStepper(body, {}, step_options(0.1, 0.5)));
-  EXPECT_THROW(LaggedStepper(body, {}, step_options(0.0, 0.5)), std::invalid_argument);
-  EXPECT_THROW(LaggedStepper(body, {}, step_options(0.1, 0.4)), std::invalid_argument);
-  EXPECT_THROW(LaggedStepper(body, {}, step_options(0.1, 1.0)), std::invalid_argument);
+  EXPECT_NO_THROW(Stepper(body, {}, step_options(0.1, 0.5)));
+  EXPECT_THROW(Stepper(body, {}, step_options(0.0, 0.5)), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, step_options(0.1, 0.4)), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, step_options(0.1, 1.0)), std::invalid_argument);
   StepOptions options = step_options(0.1, 0.5);
   options.contact_weight = 0.5;
-  EXPECT_THROW(LaggedStepper(body, {}, options), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, options), std::invalid_argument);
   options = step_options(0.1, 0.5);
   options.rotation_prediction = 1.1;
-  EXPECT_THROW(LaggedStepper(body, {}, options), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, options), std::invalid_argument);
 }
 
-TEST(LaggedStepper, ReportsAStateThatIsNotFinite) {
+TEST(Stepper, ReportsAStateThatIsNotFinite) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
   Stepped scene(body, soft_material(), step_options(0.01, 0.5));
   State state{body->reference_positions(), Points::Zero(body->node_count(), 3)};
@@ -330,8 +332,8 @@ TEST(PlaneContact, CarriesTheWeightOfABodyAtRest) {
   const double weight = weight_density * body->volume() * 9.81;
   EXPECT_NEAR(force.col(1).sum(), weight, tolerance(0.01) * weight);
   std::vector<Vector3> samples;
-  for (const SurfacePoint& p : body->grid.surface) samples.push_back(p.position);
-  const Points surface = Embedding(body->grid, samples).positions(end.x);
+  for (const SurfacePoint& p : body->surface) samples.push_back(p.position);
+  const Points surface = Embedding(*body, samples).positions(end.x);
   const double penetration = -(radius + 1e-3) - surface.col(1).minCoeff();
   EXPECT_LT(penetration, 0.01 * radius);
   EXPECT_LT(surface.col(1).minCoeff(), -radius * 0.98) << "it lies on the plane, it does not float";

@@ -1,0 +1,34 @@
+#pragma once
+
+#include "elasticity/body.hpp"
+#include "elasticity/parameters.hpp"
+
+namespace pliant {
+
+/// Young's modulus of every element out of theta, with its derivatives (`ModulusField`).
+class ElementModuli {
+ public:
+  explicit ElementModuli(std::shared_ptr<const Body> body) : body_(std::move(body)) {}
+
+  void set_parameters(const VectorX& theta);
+  double operator[](int element) const { return values_[std::size_t(element)]; }  ///< [Pa]
+
+  /// Sets the change of every element's ln E for a change of theta.
+  void set_change(const VectorX& d_theta);
+  double log_change(int element) const { return is_homogeneous() ? uniform_change_ : log_change_[element]; }
+
+  /// Collects cotangents of ln E_e ...
+  void begin_adjoint() { log_bar_.setZero(is_homogeneous() ? 1 : body_->element_count()); }
+  void add_log_adjoint(int element, double bar) { log_bar_[is_homogeneous() ? 0 : element] += bar; }
+  /// ... and hands them on to theta.
+  void end_adjoint(VectorX& theta_bar) const;
+
+ private:
+  bool is_homogeneous() const { return body_->modulus.controls == 1; }
+
+  std::shared_ptr<const Body> body_;
+  VectorX controls_, values_, log_change_, log_bar_;
+  double uniform_change_ = 0.0;
+};
+
+}  // namespace pliant

@@ -1,0 +1,136 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "elasticity/body.hpp"
+#include "elasticity/force_term.hpp"
+#include "solvers/general_solver.hpp"
+#include "solvers/linear_solver.hpp"
+
+namespace pliant {
+
+/// Node positions [m] and velocities [m/s], n x 3 each.
+struct State {
+  Points x, v;
+};
+
+enum class Integrator {
+  Lagged,  ///< rotations and contact predicted from the start: one linear solve a step (Weiss 2020)
+  Newton,  ///< fully implicit with the exact corotational stiffness (Wang 2015)
+};
+
+struct NewtonOptions {
+  double tolerance = 1e-9;  ///< of the residual, relative to the forces that meet in it, (0, 1)
+  int max_iterations = 60;  ///< >= 1
+};
+
+struct StepOptions {
+  double dt = 0.0;             ///< [s], > 0
+  double newmark_theta = 0.5;  ///< [0.5, 1): weight of the step's end; above 0.5 adds numerical damping
+  /// Where in the step contact acts, (0.5, 1]: 1 is backward Euler, which damps an impact by an error of first order;
+  /// near 0.5 the error nearly vanishes, but stiff contact rings.
+  double contact_weight = 0.6;
+  /// Rotations are those of x + this dt v, [0, 1]: 0 takes the start's, as in the paper, an error of first order;
+  /// 1/2 predicts the middle of the step, of second order.
+  double rotation_prediction = 0.5;
+  SolverOptions solver;
+  Integrator integrator = Integrator::Lagged;
+  NewtonOptions newton;
+};
+
+/// One step of the Newmark scheme with lagged rotations (Weiss 2020, eq. 14-15, the sign of the (1 - theta) dt K term
+/// corrected: it is subtracted). With Delta = x' - x and the terms' affine forces,
+///   (1/(theta dt) + alpha) M Delta = M v / theta + dt sum of f(x + s Delta),
+///   v' = Delta / (theta dt) - (1 - theta)/theta v,
+/// s = theta + beta/dt for blended terms (the stiffness damping's share with them), the contact's weight, or 1.
+/// One linear system a step; its tangent and adjoint solve with the same (symmetric) matrix.
+///
+/// The fully implicit scheme is the same equation with lag points that move along: rotations are those of x + theta Delta
+/// (the implicit midpoint for theta = 1/2), contact is that of x + w Delta. It is solved by Newton's method with
+/// backtracking; tangent and adjoint follow from the implicit function theorem with the exact, slightly unsymmetric matrix.
+///
+/// At rest the equation is sum of f(x | x) = 0, without mass and with every force at the unknown position: `equilibrium`.
+class Stepper {
+ public:
+  /// Terms may share data; they belong to this stepper and are used by one thread.
+  Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<ForceTerm>> terms,
+                const StepOptions& options);
+
+  const StepOptions& options() const { return options_; }
+  /// For frames that are not equally far apart.
+  void set_time_step(double dt) { options_.dt = dt; }
+  void set_parameters(const VectorX& theta);
+  /// Nodes that stay where they are (strong Dirichlet elimination).
+  void hold(std::vector<int> nodes) { held_ = std::move(nodes); }
+
+  /// Linearises and factorises about a step's start. False where the matrix is not positive definite or not finite.
+  [[nodiscard]] bool prepare(const State& start);
+  /// Delta of the prepared step; in: a guess (dt v is a good one). Not converged or not finite: `converged` is false.
+  /// `iterations` are those of the linear solver, or Newton's.
+  [[nodiscard]] SolveSummary solve(const State& start, Points& delta);
+  /// start -> end.
+  void advance(const Points& delta, State& state) const;
+
+  /// Makes ready for `tangent` or `adjoint` of a step whose Delta is known. False where a matrix cannot be factorised.
+  [[nodiscard]] bool prepare_derivatives(const State& start, const Points& delta);
+  /// Change of the end for a change of start and theta. `change` goes in as that of the start and comes out as that of
+  /// the end.
+  void tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change);
+  /// Cotangent of the start for one of the end, in place; theta_bar accumulates.
+  void adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar);
+
+  /// Positions without acceleration, from a guess, by Newton's method; held nodes stay where the guess has them. After a
+  /// success the derivatives below refer to it. Not converged: says so, and x is the best found.
+  [[nodiscard]] SolveSummary equilibrium(Points& x);
+  /// Change of the equilibrium for a change of theta and of the held nodes' positions.
+  Points equilibrium_tangent(const Points& x, const VectorX& d_theta);
+  /// theta_bar += the cotangent for one of the equilibrium's positions.
+  void equilibrium_adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar);
+
+  const BlockMatrix& matrix() const { return matrix_; }
+
+ private:
+  /// What a term's points are made of: p = x + lag Delta (+ prediction v), z = x + at Delta.
+  struct Scheme {
+    std::array<double, 3> at;
+    std::array<double, 2> lag, prediction;
+    double dt = 1.0;
+    bool has_mass = true;
+  };
+  Scheme scheme() const;
+  static Scheme static_scheme();
+  /// Sets `points_at_` to the positions x + s Delta at which terms act.
+  void set_points_at(const Scheme& scheme, const Points& x, const Points& delta);
+  double mass_factor() const { return density_ * (1.0 / (options_.newmark_theta * options_.dt) + mass_damping_); }
+  void clear_held(Points& points) const;
+  void set_mass_matrix(const Scheme& scheme, BlockMatrix& matrix) const;
+  /// Linearises every term where its lag point is for this Delta.
+  void linearise(const Scheme& scheme, const Points& x, const Points& delta);
+  /// Residual of the implicit equation at Delta, with terms linearised there; `force_scale` is what met in it.
+  double residual(const Scheme& scheme, const Points& x, const Points& delta, const Points& inertia, double& force_scale);
+  /// The exact matrix about Delta, with terms linearised there, factorised.
+  [[nodiscard]] bool factorise_exact(const Scheme& scheme, const Points& x, const Points& delta);
+  SolveSummary newton(const Scheme& scheme, const Points& x, const Points& inertia, Points& delta);
+  /// A y = b or A^T y = b with the matrix of the derivatives at hand.
+  void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
+  bool is_newton() const { return options_.integrator == Integrator::Newton; }
+  GeneralSolver& general();
+
+  std::shared_ptr<const Body> body_;
+  std::vector<std::unique_ptr<ForceTerm>> terms_;
+  StepOptions options_;
+  std::vector<int> held_;
+  double mass_damping_ = 0.0, stiffness_damping_ = 0.0, density_ = 0.0;
+
+  BlockMatrix matrix_, exact_matrix_;
+  std::unique_ptr<LinearSolver> solver_;
+  std::unique_ptr<GeneralSolver> general_;
+  std::array<Points, 3> points_at_, bar_at_;     // by ForceTerm::At
+  std::array<Points, 2> lag_, d_lag_, lag_bar_;  // by ForceTerm::Lag
+  Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, trial_, step_;
+  VectorX solution_;
+};
+
+}  // namespace pliant

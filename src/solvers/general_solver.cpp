@@ -1,0 +1,96 @@
+#include "solvers/general_solver.hpp"
+
+#include <Eigen/Jacobi>
+#include <cmath>
+
+namespace pliant {
+
+namespace {
+constexpr int most_iterations = 60;
+
+#ifdef PLIANT_WITH_CHOLMOD
+constexpr SolverKind best_direct = SolverKind::Cholmod;
+#else
+constexpr SolverKind best_direct = SolverKind::Simplicial;
+#endif
+}  // namespace
+
+GeneralSolver::GeneralSolver(std::shared_ptr<const BlockPattern> pattern, SolverKind kind)
+    : pattern_(pattern), matrix_(pattern), symmetric_(pattern) {
+  SolverOptions options;
+  options.kind = kind == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct;
+  factor_ = make_linear_solver(pattern, options);
+  for (int row = 0; row < pattern->rows; ++row)
+    for (int b = pattern->row_start[row]; b < pattern->row_start[row + 1]; ++b)
+      transposed_block_.push_back(pattern->find(pattern->column[b], row));
+}
+
+bool GeneralSolver::factorise(const BlockMatrix& matrix, const BlockMatrix& substitute) {
+  matrix_ = matrix;
+  for (int b = 0; b < pattern_->block_count(); ++b) {
+    const Eigen::Map<const Matrix3> block(matrix.block(b)), mirror(matrix.block(transposed_block_[std::size_t(b)]));
+    Eigen::Map<Matrix3>(symmetric_.block(b)) = 0.5 * (block + mirror.transpose());
+  }
+  is_definite_ = factor_->factorise(symmetric_);
+  return is_definite_ || factor_->factorise(substitute);
+}
+
+void GeneralSolver::transpose() {
+  for (int b = 0; b < pattern_->block_count(); ++b) {
+    const int mirror = transposed_block_[std::size_t(b)];
+    if (mirror < b) continue;
+    const Matrix3 one = Eigen::Map<const Matrix3>(matrix_.block(b)), other = Eigen::Map<const Matrix3>(matrix_.block(mirror));
+    Eigen::Map<Matrix3>(matrix_.block(b)) = other.transpose();
+    Eigen::Map<Matrix3>(matrix_.block(mirror)) = one.transpose();
+  }
+}
+
+SolveSummary GeneralSolver::solve(const VectorX& b, VectorX& x, double tolerance, Side side) {
+  const Eigen::Index n = b.size();
+  x.setZero(n);
+  const double scale = b.norm();
+  if (!(scale > 0.0)) return {scale == 0.0, 0, 0.0};
+  if (side == Side::Transposed) transpose();  // for the while
+
+  basis_.resize(n, most_iterations + 1);
+  preconditioned_.resize(n, most_iterations);
+  MatrixX R = MatrixX::Zero(most_iterations + 1, most_iterations);
+  VectorX residual = VectorX::Zero(most_iterations + 1);
+  std::vector<Eigen::JacobiRotation<double>> rotations;
+  basis_.col(0) = b / scale;
+  residual[0] = scale;
+  SolveSummary summary;
+  int k = 0;
+  while (k < most_iterations && std::abs(residual[k]) > tolerance * scale) {
+    factor_->solve(basis_.col(k), guess_);
+    preconditioned_.col(k) = guess_;
+    matrix_.multiply(guess_, product_);
+    for (int pass = 0; pass < 2; ++pass)  // orthogonalised twice: once loses digits
+      for (int i = 0; i <= k; ++i) {
+        const double share = basis_.col(i).dot(product_);
+        R(i, k) += share;
+        product_ -= share * basis_.col(i);
+      }
+    const double left = product_.norm();
+    R(k + 1, k) = left;
+    for (int i = 0; i < k; ++i) R.col(k).applyOnTheLeft(i, i + 1, rotations[std::size_t(i)].adjoint());
+    rotations.emplace_back();
+    rotations.back().makeGivens(R(k, k), R(k + 1, k));
+    R.col(k).applyOnTheLeft(k, k + 1, rotations.back().adjoint());
+    residual.applyOnTheLeft(k, k + 1, rotations.back().adjoint());
+    if (left > 0.0) basis_.col(k + 1) = product_ / left;
+    ++k;
+    if (left == 0.0) break;
+  }
+  if (side == Side::Transposed) transpose();
+  summary.iterations = k;
+  summary.residual = std::abs(residual[k]) / scale;
+  if (k > 0) {
+    const VectorX y = R.topLeftCorner(k, k).triangularView<Eigen::Upper>().solve(residual.head(k));
+    x.noalias() = preconditioned_.leftCols(k) * y;
+  }
+  summary.converged = summary.residual <= tolerance && x.allFinite();
+  return summary;
+}
+
+}  // namespace pliant

@@ -1,0 +1,41 @@
+// Bodies at rest at sizes that take seconds: near incompressibility, and large deflections of a slender strip.
+#include "support/hanging.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using namespace test::hanging;
+using test::tolerance;
+
+/// Poisson's ratio 0.49, four elements through the thickness: no locking.
+TEST(Equilibrium, NearlyIncompressibleBeamDoesNotLock) {
+  for (const auto& body : {quadratic_bar(50, 4), hex_bar(4)}) {
+    Hanging bar(body);
+    bar.theta[theta::poissons_ratio] = 0.49;
+    bar.theta.segment<3>(theta::gravity) *= 1e-3;
+    EXPECT_NEAR(-bar.tip(bar.positions(bar.theta)).z() / bar.slender_deflection(0.49), 1.0, tolerance(0.03));
+  }
+}
+
+/// A clamped strip under a dead load at its end, both large: the elastica with Z = 2 P L^2 / (E I) has its tip at
+/// (x, y) / L that elliptic integrals give (Bisshopp and Drucker 1945): for P L^2 / (E I) = 2, y / L = 0.4935, x / L = 0.8394.
+TEST(Equilibrium, LargeDeflectionFollowsTheElastica) {
+  const double thickness = 0.012;
+  for (const bool quadratic : {true, false}) {
+    const auto body = quadratic ? test::tet_body({length, 0.036, thickness}, {60, 2, 2}, true, 0.0)
+                                : test::box_body({length, 0.036, thickness}, thickness / 2);
+    Hanging bar(body);
+    bar.theta[theta::poissons_ratio] = 0.0;
+    bar.theta[theta::density] = 1e-6;
+    const double EI = bar.theta[theta::youngs_modulus] * 0.036 * std::pow(thickness, 3) / 12.0;
+    bar.options.weights = {{Vector3(0.5 * length, 0, 0), 2.0 * EI / (length * length) / 9.81}};
+    const Points x = bar.positions(bar.theta);
+
+    EXPECT_NEAR(-bar.tip(x).z() / length, 0.4935, tolerance(0.01)) << body->node_count();
+    EXPECT_NEAR(1.0 + bar.tip(x).x() / length, 0.8394, tolerance(0.01));
+  }
+}
+
+}  // namespace
+}  // namespace pliant

@@ -1,0 +1,86 @@
+#include "solvers/general_solver.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <random>
+
+#include "support/dense.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+/// A chain of nodes whose stiffness is symmetric but for this share of noise.
+struct Chain {
+  explicit Chain(double asymmetry, double shift = 0.0) {
+    std::vector<int> nodes;
+    for (int i = 0; i + 1 < 30; ++i) nodes.insert(nodes.end(), {i, i + 1});
+    pattern = std::make_shared<BlockPattern>(BlockPattern::from_elements(30, nodes, 2));
+    matrix = BlockMatrix(pattern), spd = BlockMatrix(pattern);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    for (int row = 0; row < pattern->rows; ++row)
+      for (int b = pattern->row_start[row]; b < pattern->row_start[row + 1]; ++b)
+        for (int k = 0; k < 9; ++k) {
+          const bool diagonal = pattern->column[b] == row;
+          const double symmetric = (k % 4 == 0 ? (diagonal ? 2.5 : -1.0) : 0.0) - (diagonal && k % 4 == 0 ? shift : 0.0);
+          spd.block(b)[k] = symmetric + (diagonal && k % 4 == 0 ? shift : 0.0);
+          matrix.block(b)[k] = symmetric + asymmetry * uniform(random);
+        }
+  }
+  std::shared_ptr<const BlockPattern> pattern;
+  BlockMatrix matrix, spd;
+};
+
+class General : public ::testing::TestWithParam<SolverKind> {};
+
+TEST_P(General, SolvesBothSidesOfAnUnsymmetricMatrix) {
+  for (const double asymmetry : {0.0, 0.02, 0.15}) {
+    const Chain chain(asymmetry);
+    GeneralSolver solver(chain.pattern, GetParam());
+    ASSERT_TRUE(solver.factorise(chain.matrix, chain.spd));
+    EXPECT_TRUE(solver.symmetric_part_is_definite());
+    const MatrixX A = test::dense(chain.matrix);
+    const VectorX b = VectorX::Random(A.rows());
+    VectorX x;
+    const SolveSummary plain = solver.solve(b, x, 1e-12);
+    ASSERT_TRUE(plain.converged) << asymmetry;
+    EXPECT_LT((A * x - b).norm(), tolerance(1e-11) * b.norm());
+    if (asymmetry == 0.0) {
+      EXPECT_EQ(plain.iterations, 1);
+    }
+    ASSERT_TRUE(solver.solve(b, x, 1e-12, GeneralSolver::Side::Transposed).converged);
+    EXPECT_LT((A.transpose() * x - b).norm(), tolerance(1e-11) * b.norm());
+    ASSERT_TRUE(solver.solve(b, x, 1e-12).converged) << "after the transposed solve the matrix is itself again";
+    EXPECT_LT((A * x - b).norm(), tolerance(1e-11) * b.norm());
+  }
+}
+
+TEST_P(General, TakesTheSubstituteWhereTheMatrixIsIndefinite) {
+  const Chain chain(0.0, 1.0);
+  GeneralSolver solver(chain.pattern, GetParam());
+  ASSERT_TRUE(solver.factorise(chain.matrix, chain.spd));
+  EXPECT_FALSE(solver.symmetric_part_is_definite());
+  const MatrixX A = test::dense(chain.matrix);
+  const VectorX b = VectorX::Random(A.rows());
+  VectorX x;
+  ASSERT_TRUE(solver.solve(b, x, 1e-10).converged);
+  EXPECT_LT((A * x - b).norm(), tolerance(1e-9) * b.norm());
+}
+
+TEST_P(General, NothingOnTheRightIsNothing) {
+  const Chain chain(0.1);
+  GeneralSolver solver(chain.pattern, GetParam());
+  ASSERT_TRUE(solver.factorise(chain.matrix, chain.spd));
+  VectorX x;
+  EXPECT_TRUE(solver.solve(VectorX::Zero(90), x, 1e-12).converged);
+  EXPECT_EQ(x.norm(), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, General, ::testing::Values(SolverKind::Automatic, SolverKind::Simplicial));
+
+}  // namespace
+}  // namespace pliant
