@@ -225,6 +225,10 @@ Polyhedron polyhedron_of(const TriangleMesh& surface) {
     }
   Polyhedron polyhedron;
   processing::polygon_soup_to_polygon_mesh(points, triangles, polyhedron);
+  std::size_t number = 0;  // CGAL orders what it visits by these, and without them by addresses
+  for (auto v = polyhedron.vertices_begin(); v != polyhedron.vertices_end(); ++v) v->set_time_stamp(number++);
+  for (auto f = polyhedron.facets_begin(); f != polyhedron.facets_end(); ++f) f->set_time_stamp(number++);
+  for (auto h = polyhedron.halfedges_begin(); h != polyhedron.halfedges_end(); ++h) h->set_time_stamp(number++);
   return polyhedron;
 }
 
@@ -237,7 +241,7 @@ TetMesh mesh_of(const Domain& domain, const Criteria& criteria) {
   CGAL::Mesh_error_code error = CGAL::CGAL_MESH_3_NO_ERROR;
   const std::size_t most_vertices = std::size_t(most_tets / 5.0);
   const auto complex = CGAL::make_mesh_3<Complex<Domain>>(
-      domain, criteria, parameters::manifold(), parameters::perturb(), parameters::exude(),
+      domain, criteria, parameters::perturb(), parameters::no_exude(),
       parameters::mesh_3_options(parameters::maximal_number_of_vertices = most_vertices, parameters::pointer_to_error_code = &error));
   if (error == CGAL::CGAL_MESH_3_MAXIMAL_NUMBER_OF_VERTICES_REACHED)
     refuse("more than " + text_of(most_tets) + " tetrahedra", "fewer", "choose larger cells");

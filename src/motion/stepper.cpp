@@ -153,6 +153,10 @@ bool Stepper::factorise_exact(const Scheme& s, const Points& x, const Points& de
     matrix_.constrain(node);
     exact_matrix_.constrain(node);
   }
+  double squares = 0.0;
+  for (const int diagonal : body_->pattern->diagonal)
+    for (int d = 0; d < 3; ++d) squares += std::pow(exact_matrix_.block(diagonal)[4 * d], 2);
+  rounding_ = std::sqrt(squares) * body_->size() * std::numeric_limits<double>::epsilon();
   return solver.factorise(exact_matrix_, matrix_);
 }
 
@@ -161,13 +165,12 @@ SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& ine
   double force_scale = 0.0;
   linearise(s, x, delta);
   double r = residual(s, x, delta, inertia, force_scale);
-  std::array<double, 4> recent;  // backtracking may rise above the last residual, not above the worst of these
-  recent.fill(r);
+  rounding_ = 0.0;
   const double size = body_->size();
   for (; summary.iterations < options_.newton.max_iterations; ++summary.iterations) {
     if (!std::isfinite(r)) return summary;
     summary.residual = force_scale > 0.0 ? r / force_scale : 0.0;
-    if (summary.residual <= options_.newton.tolerance) {
+    if (summary.residual <= options_.newton.tolerance || r <= rounding_) {
       summary.converged = true;
       return summary;
     }
@@ -183,20 +186,22 @@ SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& ine
       summary.converged = true;
       return summary;
     }
-    const double worst = *std::max_element(recent.begin(), recent.end());
+    // Natural monotonicity (Deuflhard 2004, section 3.3): a share of the step is good where the next step from there, with
+    // the matrix at hand, is shorter. Residuals themselves may rise on the way to the solution, by orders of magnitude for
+    // slender or nearly incompressible bodies.
+    const double length = step_.norm();
     double share = 1.0;
     for (int halving = 0;; ++halving, share *= 0.5) {
       trial_ = delta + share * step_;
       linearise(s, x, trial_);
-      const double next = residual(s, x, trial_, inertia, force_scale);
-      if (next <= worst * (1.0 - 1e-4 * share) || (summary.iterations < 2 && next <= 10.0 * worst)) {
-        r = next;
-        break;
+      r = residual(s, x, trial_, inertia, force_scale);
+      if (std::isfinite(r)) {
+        general_->solve(-flat(residual_), direction, 1e-2);
+        if (direction.norm() <= (1.0 - 0.25 * share) * length) break;
       }
       if (halving == 12) return summary;
     }
     delta = trial_;
-    recent[std::size_t(summary.iterations) % recent.size()] = r;
   }
   return summary;
 }

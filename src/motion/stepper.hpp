@@ -125,6 +125,7 @@ class Stepper {
   double mass_damping_ = 0.0, stiffness_damping_ = 0.0, density_ = 0.0;
 
   BlockMatrix matrix_, exact_matrix_;
+  double rounding_ = 0.0;  // residual that rounded positions alone leave, about the exact matrix at hand
   std::unique_ptr<LinearSolver> solver_;
   std::unique_ptr<GeneralSolver> general_;
   std::array<Points, 3> points_at_, bar_at_;     // by ForceTerm::At
