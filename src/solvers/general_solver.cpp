@@ -2,6 +2,7 @@
 
 #include <Eigen/Jacobi>
 #include <cmath>
+#include <utility>
 
 namespace pliant {
 
@@ -16,13 +17,13 @@ constexpr SolverKind best_direct = SolverKind::Simplicial;
 }  // namespace
 
 GeneralSolver::GeneralSolver(std::shared_ptr<const BlockPattern> pattern, SolverKind kind)
-    : pattern_(pattern), matrix_(pattern), symmetric_(pattern) {
+    : pattern_(std::move(pattern)), matrix_(pattern_), symmetric_(pattern_) {
   SolverOptions options;
   options.kind = kind == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct;
-  factor_ = make_linear_solver(pattern, options);
-  for (int row = 0; row < pattern->rows; ++row)
-    for (int b = pattern->row_start[row]; b < pattern->row_start[row + 1]; ++b)
-      transposed_block_.push_back(pattern->find(pattern->column[b], row));
+  factor_ = make_linear_solver(pattern_, options);
+  for (int row = 0; row < pattern_->rows; ++row)
+    for (int b = pattern_->row_start[row]; b < pattern_->row_start[row + 1]; ++b)
+      transposed_block_.push_back(pattern_->find(pattern_->column[b], row));
 }
 
 bool GeneralSolver::factorise(const BlockMatrix& matrix, const BlockMatrix& substitute) {
