@@ -225,6 +225,23 @@ class Fit {
 
   void set_reference(const VectorX& theta) { parameters_.set_reference(theta); }
 
+  /// At rest every softer body hangs lower and costs more equilibria: from stiff to soft, until it is clear that the valley
+  /// was passed, or that nothing softer can hold itself up.
+  template <class Try>
+  void scan_downwards(int count, Try&& try_value) {
+    double least = std::numeric_limits<double>::infinity();
+    int worse = 0;
+    for (int i = 0; i < count; ++i)
+      state_.scan[std::size_t(i)] = {0.0, std::numeric_limits<double>::infinity()};
+    for (int i = count - 1; i >= 0 && !interrupted(); --i) {
+      try_value(i);
+      const double cost = state_.scan[std::size_t(i)].second;
+      worse = cost > 1.2 * least ? worse + 1 : 0;
+      if (!std::isfinite(cost) || worse == 2) break;
+      least = std::min(least, cost);
+    }
+  }
+
   /// Young's modulus over decades of the stress under the object's own weight.
   void scan() {
     const VectorX theta = parameters_.reference();
@@ -234,22 +251,23 @@ class Fit {
     if (int(state_.scan.size()) != count) {
       state_.scan.assign(std::size_t(count), {});
       std::atomic<int> done = 0;
-      tbb::parallel_for(
-          0, count,
-          [&](int i) {
-            VectorX trial = theta;
-            set_moduli(trial, controls_, stress * std::pow(10.0, double(i) / options_.scan_per_decade));
-            state_.scan[i] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
-            if (interrupted()) return;
-            ParameterSet fixed = parameters_;
-            for (const Parameter& p : parameters_.parameters()) fixed.set_estimated(p.name, false);
-            fixed.set_reference(trial);
-            Objective objective = make_objective(coarse_, fixed, options_.wide_band, last_frame_);
-            const CostEvaluation e = objective.evaluate(VectorX(0));
-            if (e.succeeded) state_.scan[i].second = e.cost;
-            emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
-          },
-          tbb::simple_partitioner());
+      const auto try_value = [&](int i) {
+        VectorX trial = theta;
+        set_moduli(trial, controls_, stress * std::pow(10.0, double(i) / options_.scan_per_decade));
+        state_.scan[std::size_t(i)] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
+        if (interrupted()) return;
+        ParameterSet fixed = parameters_;
+        for (const Parameter& p : parameters_.parameters()) fixed.set_estimated(p.name, false);
+        fixed.set_reference(trial);
+        Objective objective = make_objective(coarse_, fixed, options_.wide_band, last_frame_);
+        const CostEvaluation e = objective.evaluate(VectorX(0));
+        if (e.succeeded) state_.scan[std::size_t(i)].second = e.cost;
+        emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
+      };
+      if (capture_.is_static)
+        scan_downwards(count, try_value);
+      else
+        tbb::parallel_for(0, count, try_value, tbb::simple_partitioner());
       if (interrupted()) {
         state_.scan.clear();
         outcome_.interrupted = true;
@@ -389,6 +407,7 @@ class Fit {
   void finish(ParameterSet& parameters, OptimiserSummary& s) {
     sort_history();
     outcome_.discretisation = fine_;
+    outcome_.cells = options_.cells;
     outcome_.converged = s.converged && !outcome_.interrupted;
     outcome_.reason = outcome_.interrupted ? "interrupted" : s.reason;
     outcome_.theta = parameters.reference();

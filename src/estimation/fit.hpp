@@ -86,6 +86,7 @@ struct FitOutcome {
   double start_cost = 0.0, final_cost = 0.0;
   CostEvaluation evaluation;  ///< at the solution, all points of the fit
   Discretisation discretisation;
+  double cells = 0.0;  ///< elements along the longest axis of the discretisation
   std::vector<FitStart> starts;
   std::vector<FitEvent> history;
   bool converged = false, interrupted = false;

@@ -102,10 +102,20 @@ std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDis
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
                           const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings,
                           const std::vector<Vector3>& tracked) {
+  std::vector<Vector3> control_points;
+  auto body = make_body_of(capture, *distance, resolution, control_points);
+  Discretisation d = discretise(capture, std::move(distance), std::move(body), resolution, parameters, settings, tracked);
+  d.control_points = std::move(control_points);
+  return d;
+}
+
+Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance, std::shared_ptr<const Body> body,
+                          const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings,
+                          const std::vector<Vector3>& tracked) {
   Discretisation d;
   d.distance = std::move(distance);
+  d.body = std::move(body);
   const double size = object_size(capture);
-  d.body = make_body_of(capture, *d.distance, resolution, d.control_points);
   if (!capture.depth.empty() || !capture.clouds.empty())
     d.mismatch.surface = std::make_shared<SurfaceConstraints>(d.body, d.distance, resolution.band * size, size / resolution.cells);
   if (!tracked.empty()) d.mismatch.tracks = std::make_shared<PointTracks>(*d.body, tracked);

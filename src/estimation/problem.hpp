@@ -47,6 +47,11 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
                           const Resolution& resolution, const VectorX& theta, const SimulationOptions& settings = {},
                           const std::vector<Vector3>& tracked = {});
 
+/// The same around a body that is there already.
+Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance, std::shared_ptr<const Body> body,
+                          const Resolution& resolution, const VectorX& theta, const SimulationOptions& settings = {},
+                          const std::vector<Vector3>& tracked = {});
+
 /// All parameters of a capture with their start values, bounds and priors. What the capture leaves unknown is
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
 /// it does not give.

@@ -121,6 +121,7 @@ void Simulation::move_holds(double from, double to, Points& positions) {
 
 bool Simulation::find_equilibrium(const VectorX& parameters, State& state, RolloutSummary& summary) {
   constexpr double smallest = 1.0 / 256.0, largest_turn = 0.4;
+  constexpr int most_iterations = 400;
   double turn = 0.0;
   for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
   state = {rest_, Points::Zero(rest_.rows(), 3)};
@@ -140,7 +141,7 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
       state.x = x;
       done = share;
       stride = std::min(1.5 * stride, longest);
-    } else if ((stride *= 0.4) < smallest) {
+    } else if ((stride *= 0.4) < smallest || summary.solver_iterations > most_iterations) {
       summary.failure = "no equilibrium was found beyond " + std::to_string(100.0 * done) +
                         " % of the load: the material may be too soft to hold the object up";
       return false;

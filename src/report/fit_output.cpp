@@ -127,6 +127,7 @@ void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, con
                       const Points& nodes) {
   std::vector<SurfaceObservation> points;
   for (const Vector3& p : seen) points.push_back({p, 1.0});
+  if (!d.mismatch.surface) return;
   const auto matches = d.mismatch.surface->match(points, nodes);
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (matches[i].cell < 0) continue;
@@ -222,6 +223,8 @@ Capture as_capture(const Model& model) {
   capture.planes = model.planes;
   capture.fixed = model.fixed;
   capture.initial = model.initial;
+  capture.is_static = model.frames == 0;
+  if (capture.is_static) capture.times = {0.0};
   for (int f = 0; f < model.frames; ++f) capture.times.push_back(f / model.frame_rate);
   capture.start_frame = model.start_frame;
   return capture;
@@ -233,14 +236,16 @@ SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
   SurfaceErrors errors;
   double max = 0.0;
   for (const FrameFit& f : evaluation.frames) {
-    errors.error.points += f.points;
+    errors.error.points += f.points + f.tracks;
     max = std::max(max, f.max_distance);
     if (f.points > 0)
       errors.frames.push_back(
           {f.frame, std::sqrt(f.sum_squares / f.points), std::sqrt(f.sum_noise_squares / f.points), f.points});
   }
-  errors.error.surface_rms = evaluation.surface_rms();
-  errors.error.surface_max = max;
+  const bool has_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
+  const bool has_tracks = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.tracks > 0; });
+  if (has_surface) errors.error.surface_rms = evaluation.surface_rms(), errors.error.surface_max = max;
+  if (has_tracks) errors.error.marker_rms = evaluation.track_rms();
   return errors;
 }
 
@@ -289,7 +294,10 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   Model model;
   model.name = capture.name;
   model.surface = *capture.surface;
-  model.youngs_modulus = t[theta::youngs_modulus];
+  ElementModuli modulus(d.body);
+  modulus.set_parameters(t);
+  for (int e = 0; e < d.body->element_count(); ++e)
+    model.youngs_modulus += modulus[e] * d.body->element_volume[std::size_t(e)] / d.body->volume();
   model.poisson_ratio = t[theta::poissons_ratio];
   model.mass_damping = t[theta::mass_damping];
   model.stiffness_damping = t[theta::stiffness_damping];
@@ -307,32 +315,63 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   model.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
   model.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);
   model.initial.known = true;
-  model.frames = capture.frame_count();
-  model.frame_rate = (capture.frame_count() - 1) / (capture.times.back() - capture.times.front());
-  model.start_frame = capture.start_frame;
-  model.cell_size = d.body->grid().cell_size;
-  model.grid_origin = d.body->grid().origin;
-  model.substeps = std::max(1, int(std::ceil(1.0 / (model.frame_rate * d.simulation.max_dt) - 1e-9)));
+  model.cell_size = object_size(capture) / outcome.cells;
+  if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
+    model.cell_size = grid->cell_size;
+    model.grid_origin = grid->origin;
+  }
+  if (!capture.is_static) {
+    model.frames = capture.frame_count();
+    model.frame_rate = (capture.frame_count() - 1) / (capture.times.back() - capture.times.front());
+    model.start_frame = capture.start_frame;
+    model.substeps = std::max(1, int(std::ceil(1.0 / (model.frame_rate * d.simulation.max_dt) - 1e-9)));
+  }
   model.theta = d.simulation.newmark_theta;
   model.contact_stiffness = d.simulation.contact.stiffness;
   model.contact_smoothing = d.simulation.contact.smoothing;
   model.volume.nodes = d.body->reference_positions();
   model.volume.kind = vtu_cell(d.body->kind);
   model.volume.connectivity = d.body->connectivity;
-  ElementModuli modulus(d.body);
-  modulus.set_parameters(t);
   for (int e = 0; e < d.body->element_count(); ++e) {
     model.volume.youngs_modulus.push_back(modulus[e]);
     model.volume.poisson_ratio.push_back(model.poisson_ratio);
-    model.volume.fill.push_back(d.body->grid().quadrature[std::size_t(e)].volume_fraction());
+    const bool is_cell = d.body->kind == ElementKind::Hexahedron;
+    model.volume.fill.push_back(is_cell ? d.body->element_volume[std::size_t(e)] / std::pow(model.cell_size, 3) : 1.0);
   }
   return model;
 }
 
+namespace {
+
+/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's modulus
+/// where the volume mesh has as many elements.
+std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance& distance) {
+  const ModelVolume& volume = model.volume;
+  Body body;
+  if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
+    body = make_body(make_hex_grid(distance, bounding_box(model.surface), model.cell_size));
+  } else {
+    const auto points = std::size_t(corner_count(volume.kind));
+    std::vector<std::array<int, 4>> tets;
+    std::vector<std::array<int, 6>> mid_nodes;
+    for (std::size_t i = 0; i < volume.connectivity.size(); i += points) {
+      std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i), 4, tets.emplace_back().begin());
+      if (points == 10) std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i) + 4, 6, mid_nodes.emplace_back().begin());
+    }
+    body = make_body(make_tet_mesh(volume.nodes, std::move(tets), std::move(mid_nodes)));
+  }
+  if (volume.youngs_modulus.size() == body.modulus.relative.size())
+    for (std::size_t e = 0; e < volume.youngs_modulus.size(); ++e)
+      body.modulus.relative[e] = volume.youngs_modulus[e] / model.youngs_modulus;
+  return std::make_shared<Body>(std::move(body));
+}
+
+}  // namespace
+
 ModelScene make_scene(const Model& model) {
   const CaptureScene scene = make_scene(model, as_capture(model));
   SimulationOptions options = scene.discretisation.simulation;
-  options.max_dt = 1.0 / (model.frame_rate * model.substeps) * (1.0 + 1e-9);
+  if (model.frame_rate > 0.0) options.max_dt = 1.0 / (model.frame_rate * model.substeps) * (1.0 + 1e-9);
   return {scene.discretisation.distance, scene.discretisation.body, options, scene.theta};
 }
 
@@ -348,8 +387,10 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
   settings.newmark_theta = model.theta;
   Resolution resolution;
   resolution.cells = object_size(capture) / model.cell_size;
-  scene.discretisation = discretise(capture, distance, resolution, scene.theta, settings);
-  scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
+  const auto body = body_of(model, *distance);
+  resolution.element = body->kind;
+  scene.discretisation = discretise(capture, distance, body, resolution, scene.theta, settings, tracked_points(capture).rest);
+  if (model.contact_stiffness > 0.0) scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
   const double dt = 1.0 / (model.frame_rate * model.substeps);
   if (model.frame_rate > 0.0) scene.discretisation.simulation.max_dt = dt * (1.0 + 1e-9);
   return scene;
