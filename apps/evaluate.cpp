@@ -24,13 +24,15 @@ int run(const Arguments& arguments) {
   options.max_points_per_frame = 1000;
   const auto observed = observe(capture, options, [](int done, int total) { show_progress("read", done, total); });
   stop_if_interrupted();
-  const auto seen = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed, tracked_points(capture)));
+  const auto seen =
+      std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed, tracked_points(capture)));
   if (seen->empty())
     throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
   const CaptureScene scene = make_scene(model, capture);
   ObjectiveOptions objective_options;
   objective_options.outlier_scale = 0.05 * object_size(capture);
-  objective_options.last_frame = scene.discretisation.simulation.times.empty() ? 0 : int(scene.discretisation.simulation.times.size()) - 1;
+  objective_options.last_frame =
+      scene.discretisation.simulation.times.empty() ? 0 : int(scene.discretisation.simulation.times.size()) - 1;
   Objective objective(scene.discretisation.mismatch, scene.discretisation.body, scene.discretisation.simulation, seen,
                       ParameterSet({}, scene.theta), objective_options);
   const CostEvaluation evaluation = objective.evaluate(VectorX(0));

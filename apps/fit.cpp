@@ -71,21 +71,24 @@ std::string with_prefix(double value, const char* unit) {
   else if (second && size < 0.1)
     std::snprintf(text, sizeof text, "%.3g ms", value * 1e3);
   else
-    std::snprintf(text, sizeof text, "%.4g%s%s", value, *unit && std::string(unit) != "1" ? " " : "", std::string(unit) == "1" ? "" : unit);
+    std::snprintf(text, sizeof text, "%.4g%s%s", value, *unit && std::string(unit) != "1" ? " " : "",
+                  std::string(unit) == "1" ? "" : unit);
   return text;
 }
 
 std::string describe(const FitEvent& event, double seconds) {
   char head[160];
-  std::snprintf(head, sizeof head, "%-15s start %d  iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(), event.start + 1,
-                event.iteration, event.cost, 1e3 * event.surface_rms);
+  std::snprintf(head, sizeof head, "%-15s start %d  iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
+                event.start + 1, event.iteration, event.cost, 1e3 * event.surface_rms);
   std::string text = head;
   text += "  E " + with_prefix(event.theta[theta::youngs_modulus], "Pa");
   text += "  nu " + with_prefix(event.theta[theta::poissons_ratio], "1");
-  text += "  damping " + with_prefix(event.theta[theta::mass_damping], "1/s") + ", " + with_prefix(event.theta[theta::stiffness_damping], "s");
+  text += "  damping " + with_prefix(event.theta[theta::mass_damping], "1/s") + ", " +
+          with_prefix(event.theta[theta::stiffness_damping], "s");
   if (event.fraction_done > 0.02) {
     char left[40];
-    std::snprintf(left, sizeof left, "  about %.0f s left", seconds * (1.0 - event.fraction_done) / event.fraction_done);
+    std::snprintf(left, sizeof left, "  about %.0f s left",
+                  seconds * (1.0 - event.fraction_done) / event.fraction_done);
     text += left;
   }
   return text;
@@ -96,7 +99,8 @@ FitOptions read_options(const Arguments& arguments) {
   if (!arguments.config.empty()) read_fit_options(arguments.config, options);
   for (const std::string& assignment : arguments.settings) set_fit_option(options, assignment);
   if (arguments.seed) options.seed = *arguments.seed;
-  if (const std::string wrong = options.validate(); !wrong.empty()) throw InputError({{arguments.config}, wrong, "", "see `pliant fit --help`"});
+  if (const std::string wrong = options.validate(); !wrong.empty())
+    throw InputError({{arguments.config}, wrong, "", "see `pliant fit --help`"});
   return options;
 }
 
@@ -111,16 +115,17 @@ void print_result(const Result& result, const FitOutcome& outcome, const fs::pat
     } else if (const auto* vector = std::get_if<Vector3>(&p.value)) {
       std::cout << "  " << spoken_name(p.name) << ": " << vector->transpose() << " " << p.unit << "\n";
     } else if (const auto* plane = std::get_if<PlaneValue>(&p.value)) {
-      std::cout << "  " << spoken_name(p.name) << ": through " << plane->point.transpose() << " m, normal " << plane->normal.transpose() << "\n";
+      std::cout << "  " << spoken_name(p.name) << ": through " << plane->point.transpose() << " m, normal "
+                << plane->normal.transpose() << "\n";
     }
   }
   char line[200];
-  std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points; %s after %.0f s\n", 1e3 * result.error.surface_rms.value_or(0.0),
-                result.error.points, outcome.reason.c_str(), seconds);
+  std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points; %s after %.0f s\n",
+                1e3 * result.error.surface_rms.value_or(0.0), result.error.points, outcome.reason.c_str(), seconds);
   std::cout << line;
   for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
-  std::cout << "Look at " << (out / "report.html").string() << "; simulate with: pliant simulate " << (out / "model.toml").string()
-            << " --out DIR\n";
+  std::cout << "Look at " << (out / "report.html").string() << "; simulate with: pliant simulate "
+            << (out / "model.toml").string() << " --out DIR\n";
 }
 
 int run(const Arguments& arguments) {
@@ -132,13 +137,15 @@ int run(const Arguments& arguments) {
   fs::create_directories(out);
 
   std::optional<tbb::global_control> threads;
-  if (arguments.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(arguments.threads));
+  if (arguments.threads > 0)
+    threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(arguments.threads));
 
   Log log;
   log.line("pliant " PLIANT_VERSION " fit " + arguments.capture);
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
-  const auto observed = observe(capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
+  const auto observed =
+      observe(capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
   stop_if_interrupted();
 
   const std::string key = capture.sha256 + "\n" + to_toml(options);
@@ -146,7 +153,10 @@ int run(const Arguments& arguments) {
   FitState state;
   if (arguments.resume) {
     if (!fs::exists(state_file))
-      throw InputError({{state_file}, "there is no interrupted fit to resume", "the state that an interrupted fit leaves", "leave out --resume"});
+      throw InputError({{state_file},
+                        "there is no interrupted fit to resume",
+                        "the state that an interrupted fit leaves",
+                        "leave out --resume"});
     state = read_fit_state(state_file, key);
     log.line("resuming the fit in " + out.string());
   } else {
@@ -173,7 +183,8 @@ int run(const Arguments& arguments) {
   write_file(out / "log.txt", log.text());
   print_result(result, outcome, out, seconds());
   if (outcome.interrupted) {
-    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << arguments.capture << " --out " << out.string() << " --resume\n";
+    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << arguments.capture << " --out "
+              << out.string() << " --resume\n";
     return WasInterrupted;
   }
   fs::remove(state_file);
@@ -190,7 +201,8 @@ std::string key_help() {
   }
   text << parameter_key_help() << "\n\nExamples:\n"
        << "  pliant fit recordings/bear --out out/bear\n"
-       << "  pliant fit recordings/bear --out out/bear --set cells=16 --set poisson_ratio=0.3 --set poisson_ratio.estimate=false\n"
+       << "  pliant fit recordings/bear --out out/bear --set cells=16 --set poisson_ratio=0.3 --set "
+          "poisson_ratio.estimate=false\n"
        << "Ctrl-C leaves the best result so far; --resume goes on from there.";
   return text.str();
 }
@@ -200,11 +212,14 @@ std::string key_help() {
 void add_fit(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("fit", "Estimate stiffness, damping and what else a recording leaves unknown");
-  command->add_option("capture", arguments->capture, "the recording: a folder with capture.toml in it")->required()->type_name("CAPTURE");
+  command->add_option("capture", arguments->capture, "the recording: a folder with capture.toml in it")
+      ->required()
+      ->type_name("CAPTURE");
   command->add_option("--out,-o", arguments->out, "folder for the result")->required()->type_name("DIR");
   command->add_option("--config", arguments->config, "choices (TOML); none is needed")->type_name("FILE");
   command->add_option("--set", arguments->settings, "one choice; may be given many times")->type_name("KEY=VALUE");
-  command->add_option("--threads", arguments->threads, "most threads to use; all processors where left out")->check(CLI::PositiveNumber);
+  command->add_option("--threads", arguments->threads, "most threads to use; all processors where left out")
+      ->check(CLI::PositiveNumber);
   command->add_option("--seed", arguments->seed, "of everything random; the same seed gives the same result");
   command->add_flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
   command->footer(key_help());

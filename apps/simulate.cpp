@@ -37,7 +37,9 @@ void add_simulate(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("simulate", "Simulate a fitted model as its recording was");
   command->add_option("model", arguments->model, "model.toml of a fit")->required()->type_name("MODEL");
-  command->add_option("--out,-o", arguments->out, "folder for trajectory.pvd and its frames")->required()->type_name("DIR");
+  command->add_option("--out,-o", arguments->out, "folder for trajectory.pvd and its frames")
+      ->required()
+      ->type_name("DIR");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

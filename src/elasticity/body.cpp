@@ -126,7 +126,8 @@ Body make_body(TetMesh mesh, const BodyOptions& options) {
   body.kind = quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
   for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
     body.connectivity.insert(body.connectivity.end(), mesh.tets[e].begin(), mesh.tets[e].end());
-    if (quadratic) body.connectivity.insert(body.connectivity.end(), mesh.mid_nodes[e].begin(), mesh.mid_nodes[e].end());
+    if (quadratic)
+      body.connectivity.insert(body.connectivity.end(), mesh.mid_nodes[e].begin(), mesh.mid_nodes[e].end());
   }
   if (quadratic)
     finish_tetrahedra<10>(body);
@@ -140,7 +141,8 @@ template <int N>
 UnitStiffness<N> unit_stiffness(const Body& body, int element, double poissons_ratio) {
   if constexpr (N == 8) {
     const HexGrid& grid = body.grid();
-    const HexStiffness k = hex_stiffness(grid.quadrature[std::size_t(element)], grid.cell_size, poissons_ratio, body.options.formulation);
+    const HexStiffness k =
+        hex_stiffness(grid.quadrature[std::size_t(element)], grid.cell_size, poissons_ratio, body.options.formulation);
     return {k.value, k.d_poissons_ratio};
   } else {
     const auto k = tet_stiffness<N>(rest_nodes<N>(body, element), poissons_ratio);

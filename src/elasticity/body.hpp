@@ -17,8 +17,8 @@ enum class ElementKind : int { Tetrahedron = 4, Hexahedron = 8, QuadraticTetrahe
 
 enum class MassKind {
   Consistent,
-  Lumped,  ///< diagonal, scaled so that the mass is kept (Hinton, Rock, Zienkiewicz 1976): positive in cut cells and for
-           ///< quadratic elements too
+  Lumped,  ///< diagonal, scaled so that the mass is kept (Hinton, Rock, Zienkiewicz 1976): positive in cut cells and
+           ///< for quadratic elements too
 };
 
 struct BodyOptions {
@@ -31,9 +31,9 @@ struct BodyOptions {
 /// One control modulus is a homogeneous object, regions are weights of 0 and 1, control points spread smoothly, and one
 /// control modulus an element is a field that is free everywhere.
 struct ModulusField {
-  int controls = 1;                ///< m >= 1
-  MatrixX weights;                 ///< elements x m; empty where m = 1
-  std::vector<double> relative;    ///< r_e [-], one an element
+  int controls = 1;              ///< m >= 1
+  MatrixX weights;               ///< elements x m; empty where m = 1
+  std::vector<double> relative;  ///< r_e [-], one an element
 };
 
 /// The elastic object, free of load: nodes, elements and what does not change while it moves. Everything beyond this
@@ -61,7 +61,9 @@ struct Body {
   std::span<const int> element(int e) const {
     return {connectivity.data() + std::size_t(e) * std::size_t(nodes_per_element()), std::size_t(nodes_per_element())};
   }
-  auto gradients(int e) const { return mean_gradient.middleRows(Eigen::Index(e) * nodes_per_element(), nodes_per_element()); }
+  auto gradients(int e) const {
+    return mean_gradient.middleRows(Eigen::Index(e) * nodes_per_element(), nodes_per_element());
+  }
   const Points& reference_positions() const { return nodes; }
   double volume() const;
   Vector3 centre_of_mass() const;
@@ -82,9 +84,12 @@ Body make_body(TetMesh mesh, const BodyOptions& options = {});
 template <class Function>
 decltype(auto) with_node_count(const Body& body, Function&& function) {
   switch (body.kind) {
-    case ElementKind::Tetrahedron: return function.template operator()<4>();
-    case ElementKind::QuadraticTetrahedron: return function.template operator()<10>();
-    case ElementKind::Hexahedron: break;
+    case ElementKind::Tetrahedron:
+      return function.template operator()<4>();
+    case ElementKind::QuadraticTetrahedron:
+      return function.template operator()<10>();
+    case ElementKind::Hexahedron:
+      break;
   }
   return function.template operator()<8>();
 }
@@ -121,8 +126,12 @@ class Embedding {
     const double* w = weights_.data() + std::size_t(point) * std::size_t(stride_);
     for (int a = 0; a < stride_; ++a) nodes.row(n[a]) += w[a] * vector.transpose();
   }
-  std::span<const int> nodes(int point) const { return {nodes_.data() + std::size_t(point) * std::size_t(stride_), std::size_t(stride_)}; }
-  std::span<const double> weights(int point) const { return {weights_.data() + std::size_t(point) * std::size_t(stride_), std::size_t(stride_)}; }
+  std::span<const int> nodes(int point) const {
+    return {nodes_.data() + std::size_t(point) * std::size_t(stride_), std::size_t(stride_)};
+  }
+  std::span<const double> weights(int point) const {
+    return {weights_.data() + std::size_t(point) * std::size_t(stride_), std::size_t(stride_)};
+  }
   int element(int point) const { return element_[std::size_t(point)]; }
 
  private:

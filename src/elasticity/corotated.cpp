@@ -37,13 +37,17 @@ class CorotatedElasticity : public Elasticity {
   using Vector = Eigen::Matrix<double, 3 * N, 1>;
   using Matrix = Eigen::Matrix<double, 3 * N, 3 * N>;
   struct Stiffness {
-    Matrix K, dK;                                 ///< for E = 1, and derivative by Poisson's ratio
-    Eigen::Matrix<double, padded_pairs, 9> upper; ///< entry (i, j) in column 3 i + j of the blocks a <= b, padded
+    Matrix K, dK;                                  ///< for E = 1, and derivative by Poisson's ratio
+    Eigen::Matrix<double, padded_pairs, 9> upper;  ///< entry (i, j) in column 3 i + j of the blocks a <= b, padded
   };
   const int* nodes_of(int element) const { return body_->connectivity.data() + std::size_t(element) * N; }
   const int* blocks_of(int element) const { return blocks_.data() + std::size_t(element) * (N * N); }
-  Eigen::Matrix<double, N, 3> gradients(int element) const { return body_->mean_gradient.middleRows<N>(Eigen::Index(element) * N); }
-  const Stiffness& stiffness(int element) const { return stiffness_[std::size_t(body_->element_class[std::size_t(element)])]; }
+  Eigen::Matrix<double, N, 3> gradients(int element) const {
+    return body_->mean_gradient.middleRows<N>(Eigen::Index(element) * N);
+  }
+  const Stiffness& stiffness(int element) const {
+    return stiffness_[std::size_t(body_->element_class[std::size_t(element)])];
+  }
   int count() const { return int(polar_.size()); }
   /// R^T z for the element's nodes, relative to the first.
   Vector unrotated(int element, const Points& z) const;
@@ -177,7 +181,8 @@ void CorotatedElasticity<N>::add_lag_matrix(const Points& z, double scale, Block
     G.noalias() = s.K * Q;
     const Matrix3 R = polar_[e].R;
     for (int a = 0; a < N; ++a)
-      G.template middleRows<3>(3 * a) = (scale * modulus_[e]) * R * (G.template middleRows<3>(3 * a) - cross_matrix(node(y, a)));
+      G.template middleRows<3>(3 * a) =
+          (scale * modulus_[e]) * R * (G.template middleRows<3>(3 * a) - cross_matrix(node(y, a)));
     const auto g = gradients(e);
     const int* blocks = blocks_of(e);
     for (int b = 0; b < N; ++b) {
@@ -249,9 +254,8 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
 }  // namespace
 
 std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body) {
-  return with_node_count(*body, [&]<int N>() -> std::unique_ptr<Elasticity> {
-    return std::make_unique<CorotatedElasticity<N>>(body);
-  });
+  return with_node_count(
+      *body, [&]<int N>() -> std::unique_ptr<Elasticity> { return std::make_unique<CorotatedElasticity<N>>(body); });
 }
 
 }  // namespace pliant

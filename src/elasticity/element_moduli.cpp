@@ -6,7 +6,8 @@ void ElementModuli::set_parameters(const VectorX& parameters) {
   const ModulusField& field = body_->modulus;
   const Eigen::Map<const VectorX> relative(field.relative.data(), Eigen::Index(field.relative.size()));
   controls_.resize(field.controls);
-  for (int k = 0; k < field.controls; ++k) controls_[k] = parameters[theta::modulus(k, field.controls, parameters.size())];
+  for (int k = 0; k < field.controls; ++k)
+    controls_[k] = parameters[theta::modulus(k, field.controls, parameters.size())];
   if (is_homogeneous())
     values_ = controls_[0] * relative;
   else

@@ -33,7 +33,9 @@ class ForceTerm {
   virtual void add_matrix(double scale, BlockMatrix& matrix) = 0;
   /// matrix += scale times -df/dp at z: what K_p leaves out of the exact stiffness of f(z | p) where p moves with z.
   /// Not symmetric in general. Terms whose affine form is exact where z = p add nothing.
-  virtual void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) { (void)z, (void)scale, (void)matrix; }
+  virtual void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
+    (void)z, (void)scale, (void)matrix;
+  }
   /// force += df for changes of p, z and theta
   virtual void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                                  Points& force) = 0;

@@ -68,7 +68,8 @@ HexStiffness hex_stiffness(const CellQuadrature& inside, double cell_size, doubl
   // modes being stationary, dK* = T^T dK T.
   Eigen::Matrix<double, 3 * functions, 24> T;
   T.topRows<24>().setIdentity();
-  T.bottomRows<3 * modes>() = -K.bottomRightCorner<3 * modes, 3 * modes>().ldlt().solve(K.bottomLeftCorner<3 * modes, 24>());
+  T.bottomRows<3 * modes>() =
+      -K.bottomRightCorner<3 * modes, 3 * modes>().ldlt().solve(K.bottomLeftCorner<3 * modes, 24>());
   HexStiffness result;
   result.value = T.transpose() * K * T;
   result.d_poissons_ratio = T.transpose() * dK * T;
@@ -89,8 +90,7 @@ Matrix8 hex_mass(const CellQuadrature& inside, double cell_size) {
 
 Eigen::Matrix<double, 8, 3> hex_mean_gradients(const CellQuadrature& inside, double cell_size) {
   Eigen::Matrix<double, 8, 3> g = Eigen::Matrix<double, 8, 3>::Zero();
-  for (int q = 0; q < CellQuadrature::count; ++q)
-    g += inside.weights[q] * shape_gradients(CellQuadrature::points()[q]);
+  for (int q = 0; q < CellQuadrature::count; ++q) g += inside.weights[q] * shape_gradients(CellQuadrature::points()[q]);
   return g / (inside.volume_fraction() * cell_size);
 }
 

@@ -43,7 +43,8 @@ Eigen::SparseMatrix<double> laplacian(const Body& body) {
     if (body.kind == ElementKind::Tetrahedron) {
       const auto g = body.gradients(e);
       for (int a = 0; a < 4; ++a)
-        for (int b = 0; b < 4; ++b) entries.emplace_back(nodes[a], nodes[b], body.element_volume[std::size_t(e)] * g.row(a).dot(g.row(b)));
+        for (int b = 0; b < 4; ++b)
+          entries.emplace_back(nodes[a], nodes[b], body.element_volume[std::size_t(e)] * g.row(a).dot(g.row(b)));
       continue;
     }
     static constexpr std::array<std::array<int, 2>, 6> edges = {{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
@@ -94,8 +95,11 @@ ControlledField harmonic_field(const Body& body, const std::vector<Vector3>& poi
   for (std::size_t k = 0; k < points.size(); ++k) {
     int& slot = control_of[std::size_t(nearest_node(body, points[k]))];
     if (slot >= 0)
-      throw InputError({{}, "control points " + std::to_string(slot + 1) + " and " + std::to_string(k + 1) + " fall on one node of the mesh",
-                        "points farther apart than the elements are large", "use fewer control points or smaller elements"});
+      throw InputError({{},
+                        "control points " + std::to_string(slot + 1) + " and " + std::to_string(k + 1) +
+                            " fall on one node of the mesh",
+                        "points farther apart than the elements are large",
+                        "use fewer control points or smaller elements"});
     slot = int(k);
   }
   int unknowns = 0;
@@ -134,7 +138,8 @@ ControlledField inverse_distance_field(const Body& body, const std::vector<Vecto
   const double floor = 1e-12 * body.size() * body.size();
   for (int e = 0; e < body.element_count(); ++e) {
     const Vector3 centre = element_centre(body, e);
-    for (std::size_t k = 0; k < points.size(); ++k) weights(e, Eigen::Index(k)) = 1.0 / ((points[k] - centre).squaredNorm() + floor);
+    for (std::size_t k = 0; k < points.size(); ++k)
+      weights(e, Eigen::Index(k)) = 1.0 / ((points[k] - centre).squaredNorm() + floor);
     weights.row(e) /= weights.row(e).sum();
   }
   return with_weights(body, std::move(weights), points);

@@ -24,12 +24,12 @@ ControlledField harmonic_field(const Body& body, const std::vector<Vector3>& poi
 /// Weights by inverse square distance (Shepard 1968) from the elements' centres.
 ControlledField inverse_distance_field(const Body& body, const std::vector<Vector3>& points);
 
-/// One modulus a region and, first, one for what is in none. An element on a border mixes by how many of its sample points
-/// lie on either side; where regions overlap, the later one wins.
+/// One modulus a region and, first, one for what is in none. An element on a border mixes by how many of its sample
+/// points lie on either side; where regions overlap, the later one wins.
 ControlledField region_field(const Body& body, const std::vector<std::function<bool(const Vector3&)>>& regions);
 
-/// Points spread over the body so that each next one is farthest from all before, beginning at the one farthest from the
-/// centre of mass.
+/// Points spread over the body so that each next one is farthest from all before, beginning at the one farthest from
+/// the centre of mass.
 std::vector<Vector3> farthest_points(const Body& body, int count);
 
 /// Mean of an element's nodes at rest [m].

@@ -10,21 +10,23 @@ namespace pliant {
 /// `youngs_modulus`).
 namespace theta {
 enum Index : int {
-  youngs_modulus = 0,    ///< [Pa]
-  poissons_ratio = 1,    ///< [-]
-  mass_damping = 2,      ///< Rayleigh, [1/s]
-  stiffness_damping = 3, ///< Rayleigh, [s]
-  density = 4,           ///< [kg/m^3]
-  gravity = 5,           ///< 3, [m/s^2]
-  linear_velocity = 8,   ///< 3, of the centre of mass at the start [m/s]
-  angular_velocity = 11, ///< 3, about the centre of mass at the start [rad/s]
+  youngs_modulus = 0,     ///< [Pa]
+  poissons_ratio = 1,     ///< [-]
+  mass_damping = 2,       ///< Rayleigh, [1/s]
+  stiffness_damping = 3,  ///< Rayleigh, [s]
+  density = 4,            ///< [kg/m^3]
+  gravity = 5,            ///< 3, [m/s^2]
+  linear_velocity = 8,    ///< 3, of the centre of mass at the start [m/s]
+  angular_velocity = 11,  ///< 3, about the centre of mass at the start [rad/s]
   first_plane = 14,
 };
 inline int plane_point(int plane) { return first_plane + 6 * plane; }       ///< 3, [m]
 inline int plane_normal(int plane) { return first_plane + 6 * plane + 3; }  ///< 3, unit
 inline int size(int planes, int moduli = 1) { return first_plane + 6 * planes + (moduli - 1); }
 /// Where control modulus k of m stands in a theta of this size, [Pa].
-inline int modulus(int k, int moduli, Eigen::Index theta_size) { return k == 0 ? int(youngs_modulus) : int(theta_size) - moduli + k; }
+inline int modulus(int k, int moduli, Eigen::Index theta_size) {
+  return k == 0 ? int(youngs_modulus) : int(theta_size) - moduli + k;
+}
 inline Vector3 vector_at(const VectorX& theta, int index) { return theta.segment<3>(index); }
 }  // namespace theta
 

@@ -49,7 +49,8 @@ void by_svd(const Matrix3& F, double scale, Polar& polar) {
   const double floor = 1e-6 * scale;
   Vector3 sums(s.y() + s.z(), s.x() + s.z(), s.x() + s.y());
   polar.is_degenerate = sums.minCoeff() < floor;
-  const Vector3 inverse = sums.unaryExpr([&](double sum) { return sum / (sum * sum + (sum < floor ? floor * floor : 0.0)); });
+  const Vector3 inverse =
+      sums.unaryExpr([&](double sum) { return sum / (sum * sum + (sum < floor ? floor * floor : 0.0)); });
   polar.rate_inverse = svd.matrixV() * inverse.asDiagonal() * svd.matrixV().transpose();
 }
 

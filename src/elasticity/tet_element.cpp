@@ -25,8 +25,8 @@ bool is_straight(const NodeMatrix<N>& X) {
   return true;
 }
 
-/// Calls visit(volume [m^3], gradients [1/m]) for the points of a rule that is exact where edges are straight, and where
-/// they are not still integrates the gradients exactly: constant stress then gives the exact nodal forces.
+/// Calls visit(volume [m^3], gradients [1/m]) for the points of a rule that is exact where edges are straight, and
+/// where they are not still integrates the gradients exactly: constant stress then gives the exact nodal forces.
 template <int N, class Visit>
 void for_gradients(const NodeMatrix<N>& X, Visit&& visit) {
   const int degree = N == 4 ? 0 : is_straight<N>(X) ? 2 : 5;

@@ -20,8 +20,8 @@ struct ElementStiffness {
 template <int N>
 ElementStiffness<N> tet_stiffness(const Eigen::Matrix<double, N, 3>& X, double poissons_ratio);
 
-/// Consistent mass for unit density [m^3], N x N (the same for x, y and z). Exact for straight edges; total and centre of
-/// mass are exact for curved ones too.
+/// Consistent mass for unit density [m^3], N x N (the same for x, y and z). Exact for straight edges; total and centre
+/// of mass are exact for curved ones too.
 template <int N>
 Eigen::Matrix<double, N, N> tet_mass(const Eigen::Matrix<double, N, 3>& X);
 

@@ -25,7 +25,9 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
   VectorX theta = parameters.reference();
   std::vector<Parameter> list = parameters.parameters();
-  for (const auto& [name, change] : options.parameters) {
+  for (const auto& entry : options.parameters) {
+    const std::string& name = entry.first;
+    const FitOptions::Override& change = entry.second;
     const auto it = std::find_if(list.begin(), list.end(), [&](const Parameter& p) { return p.name == name; });
     if (it == list.end())
       throw InputError({{}, "there is no parameter \"" + name + "\" in this recording", "", "see `pliant fit --help`"});
@@ -144,7 +146,8 @@ class Fit {
     settings.solver.tolerance = options_.solver_tolerance;
     settings.hold_strongly = options_.hold_strongly;
     settings.integrator = options_.integrator;
-    const Resolution resolution{options_.element, {options_.control_points, options_.control_weights}, cells, options_.steps, band};
+    const Resolution resolution{
+        options_.element, {options_.control_points, options_.control_weights}, cells, options_.steps, band};
     return discretise(capture_, distance_, resolution, parameters_.reference(), settings, tracked_.rest);
   }
 
@@ -225,14 +228,13 @@ class Fit {
 
   void set_reference(const VectorX& theta) { parameters_.set_reference(theta); }
 
-  /// At rest every softer body hangs lower and costs more equilibria: from stiff to soft, until it is clear that the valley
-  /// was passed, or that nothing softer can hold itself up.
+  /// At rest every softer body hangs lower and costs more equilibria: from stiff to soft, until it is clear that the
+  /// valley was passed, or that nothing softer can hold itself up.
   template <class Try>
   void scan_downwards(int count, Try&& try_value) {
     double least = std::numeric_limits<double>::infinity();
     int worse = 0;
-    for (int i = 0; i < count; ++i)
-      state_.scan[std::size_t(i)] = {0.0, std::numeric_limits<double>::infinity()};
+    for (int i = 0; i < count; ++i) state_.scan[std::size_t(i)] = {0.0, std::numeric_limits<double>::infinity()};
     for (int i = count - 1; i >= 0 && !interrupted(); --i) {
       try_value(i);
       const double cost = state_.scan[std::size_t(i)].second;

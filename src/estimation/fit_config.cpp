@@ -21,17 +21,19 @@ const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", S
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
-const std::vector<std::pair<std::string, ElementKind>> elements = {{"hexahedra", ElementKind::Hexahedron},
-                                                                   {"tetrahedra", ElementKind::Tetrahedron},
-                                                                   {"quadratic_tetrahedra", ElementKind::QuadraticTetrahedron}};
-const std::vector<std::pair<std::string, Integrator>> integrators = {{"lagged", Integrator::Lagged}, {"newton", Integrator::Newton}};
+const std::vector<std::pair<std::string, ElementKind>> elements = {
+    {"hexahedra", ElementKind::Hexahedron},
+    {"tetrahedra", ElementKind::Tetrahedron},
+    {"quadratic_tetrahedra", ElementKind::QuadraticTetrahedron}};
+const std::vector<std::pair<std::string, Integrator>> integrators = {{"lagged", Integrator::Lagged},
+                                                                     {"newton", Integrator::Newton}};
 const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights = {
     {"linear", FieldOptions::Weights::Linear},
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
-const std::set<std::string> parameter_names = {"youngs_modulus", "poisson_ratio",   "mass_damping",     "stiffness_damping",
-                                               "density",        "gravity",         "linear_velocity",  "angular_velocity",
-                                               "plane",          "plane_2",         "plane_3",          "plane_4"};
+const std::set<std::string> parameter_names = {
+    "youngs_modulus",  "poisson_ratio",    "mass_damping", "stiffness_damping", "density", "gravity",
+    "linear_velocity", "angular_velocity", "plane",        "plane_2",           "plane_3", "plane_4"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -60,7 +62,8 @@ std::optional<double> number(const std::string& text) {
   return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
-Entry real_entry(const char* name, const char* unit, const char* range, const char* sentence, double FitOptions::*member) {
+Entry real_entry(const char* name, const char* unit, const char* range, const char* sentence,
+                 double FitOptions::*member) {
   return {{name, "number", unit, text_of(FitOptions{}.*member), range, sentence},
           [=](const FitOptions& o) { return text_of(o.*member); },
           [=](FitOptions& o, const std::string& text) -> std::optional<std::string> {
@@ -84,7 +87,8 @@ Entry integer_entry(const char* name, const char* range, const char* sentence, I
 }
 
 template <class Kind>
-Entry choice_entry(const char* name, const char* sentence, const std::vector<std::pair<std::string, Kind>>& names, Kind FitOptions::*member) {
+Entry choice_entry(const char* name, const char* sentence, const std::vector<std::pair<std::string, Kind>>& names,
+                   Kind FitOptions::*member) {
   std::string range;
   for (const auto& [text, kind] : names) range += (range.empty() ? "" : ", ") + text;
   return {{name, "name", "", name_of(names, FitOptions{}.*member), range, sentence},
@@ -111,24 +115,36 @@ Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*membe
 
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = {
-      real_entry("cells", "", "4..64", "elements along the object's longest axis; more is finer and slower", &FitOptions::cells),
+      real_entry("cells", "", "4..64", "elements along the object's longest axis; more is finer and slower",
+                 &FitOptions::cells),
       real_entry("steps", "", "0..16", "time steps per default step; 2 halves the step", &FitOptions::steps),
-      integer_entry("points_per_frame", "0, or 10 and more", "observed points used of each frame, evenly spread; 0: all", &FitOptions::points_per_frame),
+      integer_entry("points_per_frame", "0, or 10 and more",
+                    "observed points used of each frame, evenly spread; 0: all", &FitOptions::points_per_frame),
       integer_entry("starts", "1 and more", "best starting points of the scan that are followed", &FitOptions::starts),
       integer_entry("max_iterations", "1 and more", "of each stage of the optimiser", &FitOptions::max_iterations),
-      real_entry("coarse_cells", "", "4..64", "as cells, of the grid on which starts are followed", &FitOptions::coarse_cells),
-      integer_entry("scan_per_decade", "1 and more", "values of Young's modulus tried in each decade", &FitOptions::scan_per_decade),
-      real_entry("wide_band", "object sizes", "0..0.5", "distance at which a point stops counting, in the early stages", &FitOptions::wide_band),
+      real_entry("coarse_cells", "", "4..64", "as cells, of the grid on which starts are followed",
+                 &FitOptions::coarse_cells),
+      integer_entry("scan_per_decade", "1 and more", "values of Young's modulus tried in each decade",
+                    &FitOptions::scan_per_decade),
+      real_entry("wide_band", "object sizes", "0..0.5", "distance at which a point stops counting, in the early stages",
+                 &FitOptions::wide_band),
       real_entry("fine_band", "object sizes", "0..0.5", "the same, in the last stage", &FitOptions::fine_band),
       choice_entry("element", "what the object is divided into", elements, &FitOptions::element),
-      choice_entry("integrator", "how time steps are taken: rotations predicted, or fully implicit", integrators, &FitOptions::integrator),
-      integer_entry("control_points", "1..500", "of Young's modulus over the object, where the capture names no regions", &FitOptions::control_points),
-      choice_entry("control_weights", "how moduli spread between control points", control_weights, &FitOptions::control_weights),
+      choice_entry("integrator", "how time steps are taken: rotations predicted, or fully implicit", integrators,
+                   &FitOptions::integrator),
+      integer_entry("control_points", "1..500",
+                    "of Young's modulus over the object, where the capture names no regions",
+                    &FitOptions::control_points),
+      choice_entry("control_weights", "how moduli spread between control points", control_weights,
+                   &FitOptions::control_weights),
       choice_entry("optimiser", "how the cost is minimised", optimisers, &FitOptions::optimiser),
       choice_entry("solver", "for the linear system of a time step", solvers, &FitOptions::solver),
-      real_entry("solver_tolerance", "", "0..1", "relative residual of the iterative solver", &FitOptions::solver_tolerance),
-      real_entry("newmark_theta", "", "0.5..1", "weight of a time step's end; above 0.5 adds numerical damping", &FitOptions::newmark_theta),
-      flag_entry("hold_strongly", "held regions fix grid nodes instead of using Nitsche's method", &FitOptions::hold_strongly),
+      real_entry("solver_tolerance", "", "0..1", "relative residual of the iterative solver",
+                 &FitOptions::solver_tolerance),
+      real_entry("newmark_theta", "", "0.5..1", "weight of a time step's end; above 0.5 adds numerical damping",
+                 &FitOptions::newmark_theta),
+      flag_entry("hold_strongly", "held regions fix grid nodes instead of using Nitsche's method",
+                 &FitOptions::hold_strongly),
       integer_entry("seed", "", "of everything random", &FitOptions::seed),
   };
   return all;
@@ -144,7 +160,10 @@ const Entry* find_entry(const std::string& name) {
   std::set<std::string> known = parameter_names;
   for (const Entry& e : entries()) known.insert(e.key.name);
   const std::string near = nearest_name(key, known);
-  throw InputError({{}, "unknown key \"" + key + "\"", near.empty() ? "" : '"' + near + '"', "see `pliant fit --help` for all keys"});
+  throw InputError({{},
+                    "unknown key \"" + key + "\"",
+                    near.empty() ? "" : '"' + near + '"',
+                    "see `pliant fit --help` for all keys"});
 }
 
 void set_parameter(FitOptions& options, const std::string& name, const std::string& part, const std::string& value) {
@@ -189,7 +208,8 @@ const std::vector<FitKey>& fit_keys() {
 }
 
 std::string parameter_key_help() {
-  return "Parameters (youngs_modulus, poisson_ratio, mass_damping, stiffness_damping, density, gravity, linear_velocity,\n"
+  return "Parameters (youngs_modulus, poisson_ratio, mass_damping, stiffness_damping, density, gravity, "
+         "linear_velocity,\n"
          "angular_velocity, plane, plane_2 ..) have three keys each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
          "  NAME.estimate=BOOL   estimate it, or keep the start value\n"
@@ -209,7 +229,8 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
   // A region's or control point's modulus has its name after an @, which may hold dots itself.
   std::string name = key, part;
   for (const char* known : {".estimate", ".prior_std", ".start"})
-    if (key.ends_with(known)) name = key.substr(0, key.size() - std::string_view(known).size()), part = std::string(known).substr(1);
+    if (key.ends_with(known))
+      name = key.substr(0, key.size() - std::string_view(known).size()), part = std::string(known).substr(1);
   if (!name.starts_with("youngs_modulus@")) {
     const auto dot = key.find('.');
     name = key.substr(0, dot);

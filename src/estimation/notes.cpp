@@ -16,7 +16,8 @@ std::string spoken(std::string name) {
 void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
   if (!capture.mass && !capture.density)
     outcome.notes.push_back(
-        "Neither mass nor density is known, so nothing anchors pascals: only the ratio of Young's modulus to density is "
+        "Neither mass nor density is known, so nothing anchors pascals: only the ratio of Young's modulus to density "
+        "is "
         "measured. The values hold for the density listed; weigh the object to fix them.");
 }
 
@@ -28,7 +29,8 @@ void say_what_is_inseparable(FitOutcome& outcome) {
       if (std::abs(r) < 0.9) continue;
       char text[64];
       std::snprintf(text, sizeof text, " (correlation %.2f).", r);
-      outcome.notes.push_back("This recording can hardly tell " + spoken(names[j]) + " and " + spoken(names[i]) + " apart" + text);
+      outcome.notes.push_back("This recording can hardly tell " + spoken(names[j]) + " and " + spoken(names[i]) +
+                              " apart" + text);
     }
 }
 
@@ -37,7 +39,8 @@ void say_what_is_assumed(FitOutcome& outcome) {
   for (const Parameter& p : outcome.parameters.parameters()) {
     if (!p.estimated) continue;
     if (std::isfinite(p.prior_std) && outcome.std.segment(at, p.dimension()).maxCoeff() > 0.7 * p.prior_std)
-      outcome.notes.push_back("The recording says little about " + spoken(p.name) + ": its value is close to what was assumed beforehand.");
+      outcome.notes.push_back("The recording says little about " + spoken(p.name) +
+                              ": its value is close to what was assumed beforehand.");
     at += p.dimension();
   }
 }
@@ -52,7 +55,10 @@ void say_if_starts_disagree(FitOutcome& outcome) {
   }
   if (high > 1.25 * low) {
     char text[160];
-    std::snprintf(text, sizeof text, "Starts ended at different stiffness, from %.3g to %.3g Pa; the one with the lowest cost was followed.", low, high);
+    std::snprintf(
+        text, sizeof text,
+        "Starts ended at different stiffness, from %.3g to %.3g Pa; the one with the lowest cost was followed.", low,
+        high);
     outcome.notes.push_back(text);
   }
 }
@@ -67,8 +73,9 @@ void add_notes(FitOutcome& outcome, const Capture& capture) {
   }
   say_if_starts_disagree(outcome);
   if (outcome.evaluation.succeeded && outcome.evaluation.matched_fraction() < 0.9)
-    outcome.notes.push_back("More than a tenth of the observed points lie too far from the simulated object to be matched: "
-                            "check mass, planes, the pose of the scan and the segmentation.");
+    outcome.notes.push_back(
+        "More than a tenth of the observed points lie too far from the simulated object to be matched: "
+        "check mass, planes, the pose of the scan and the segmentation.");
 }
 
 }  // namespace pliant

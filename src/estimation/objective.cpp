@@ -27,8 +27,9 @@ double CostEvaluation::matched_fraction() const {
   return count > 0 ? double(matched) / double(count) : 0.0;
 }
 
-Objective::Objective(Mismatch mismatch, std::shared_ptr<const Body> body, SimulationOptions simulation, std::shared_ptr<const std::vector<FrameObservations>> observations,
-                     ParameterSet parameters, ObjectiveOptions options)
+Objective::Objective(Mismatch mismatch, std::shared_ptr<const Body> body, SimulationOptions simulation,
+                     std::shared_ptr<const std::vector<FrameObservations>> observations, ParameterSet parameters,
+                     ObjectiveOptions options)
     : mismatch_(std::move(mismatch)),
       observations_(std::move(observations)),
       parameters_(std::move(parameters)),
@@ -175,7 +176,8 @@ CostEvaluation Objective::gradient(const VectorX& p) {
           VectorX bar = VectorX::Zero(Eigen::Index(matches.size()));
           for (std::size_t i = 0; i < matches.size(); ++i)
             if (matches[i].cell >= 0)
-              bar[Eigen::Index(i)] = frame_weight(*seen) / std::pow(seen->points[i].noise, 2) * loss.derivative(matches[i].distance);
+              bar[Eigen::Index(i)] =
+                  frame_weight(*seen) / std::pow(seen->points[i].noise, 2) * loss.derivative(matches[i].distance);
           x_bar += mismatch_.surface->adjoint(matches, bar);
         }
         if (!seen->tracks.empty()) {

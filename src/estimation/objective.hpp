@@ -12,7 +12,7 @@ namespace pliant {
 
 /// What was seen in one frame of the simulation.
 struct FrameObservations {
-  int frame = 0;  ///< of the simulation: 0 is when the object is let go
+  int frame = 0;                                ///< of the simulation: 0 is when the object is let go
   std::vector<SurfaceObservation> points = {};  ///< somewhere on the surface
   std::vector<TrackObservation> tracks = {};    ///< known points of the object
 };
@@ -23,10 +23,10 @@ struct FrameFit {
   int points = 0, matched = 0;  ///< of the surface
   int tracks = 0;               ///< followed points
   double cost = 0.0;
-  VectorX gradient;       ///< by p; empty unless asked for
-  MatrixX gauss_newton;   ///< J^T W J
-  double sum_squares = 0.0;  ///< [m^2] of distances to the deformed surface, each at most the loss's scale
-  double max_distance = 0.0; ///< [m] of matched points
+  VectorX gradient;                ///< by p; empty unless asked for
+  MatrixX gauss_newton;            ///< J^T W J
+  double sum_squares = 0.0;        ///< [m^2] of distances to the deformed surface, each at most the loss's scale
+  double max_distance = 0.0;       ///< [m] of matched points
   double sum_noise_squares = 0.0;  ///< [m^2] of the sensor's standard deviations
   double track_sum_squares = 0.0;  ///< [m^2] of the followed points' distances
 };
@@ -58,13 +58,13 @@ struct Mismatch {
 };
 
 /// Maps parameters to the cost of one recording: the sum over frames and points of a robust loss of the pulled-back
-/// distance, or of the distance from where a followed point was seen, over its noise, plus the priors. One instance for one thread; the mismatch of a frame is evaluated beside
-/// the simulation of the next.
+/// distance, or of the distance from where a followed point was seen, over its noise, plus the priors. One instance for
+/// one thread; the mismatch of a frame is evaluated beside the simulation of the next.
 class Objective {
  public:
-  Objective(Mismatch mismatch, std::shared_ptr<const Body> body,
-            SimulationOptions simulation, std::shared_ptr<const std::vector<FrameObservations>> observations,
-            ParameterSet parameters, ObjectiveOptions options);
+  Objective(Mismatch mismatch, std::shared_ptr<const Body> body, SimulationOptions simulation,
+            std::shared_ptr<const std::vector<FrameObservations>> observations, ParameterSet parameters,
+            ObjectiveOptions options);
 
   const ParameterSet& parameters() const { return parameters_; }
   const ObjectiveOptions& options() const { return options_; }
@@ -82,8 +82,10 @@ class Objective {
   FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents) const;
   CostEvaluation run(const VectorX& p, bool with_tangents);
   double frame_weight(const FrameObservations& seen) const;
-  void fit_surface(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents, FrameFit& fit) const;
-  void fit_tracks(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents, FrameFit& fit) const;
+  void fit_surface(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+                   FrameFit& fit) const;
+  void fit_tracks(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+                  FrameFit& fit) const;
 
   Mismatch mismatch_;
   std::shared_ptr<const std::vector<FrameObservations>> observations_;

@@ -25,7 +25,8 @@ ParameterSet::ParameterSet(std::vector<Parameter> parameters, VectorX reference)
     : parameters_(std::move(parameters)), reference_(std::move(reference)) {}
 
 const Parameter* ParameterSet::find(const std::string& name) const {
-  const auto it = std::find_if(parameters_.begin(), parameters_.end(), [&](const Parameter& p) { return p.name == name; });
+  const auto it =
+      std::find_if(parameters_.begin(), parameters_.end(), [&](const Parameter& p) { return p.name == name; });
   return it == parameters_.end() ? nullptr : &*it;
 }
 
@@ -69,9 +70,15 @@ VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
   for_each_estimated([&](const Parameter& q, int at) {
     const int i = q.theta_index;
     switch (q.transform) {
-      case Transform::Logarithm: p[at] = std::log(theta[i]); break;
-      case Transform::LogitHalf: p[at] = logit_half(theta[i]); break;
-      case Transform::Vector: p.segment<3>(at) = theta.segment<3>(i) / q.scale; break;
+      case Transform::Logarithm:
+        p[at] = std::log(theta[i]);
+        break;
+      case Transform::LogitHalf:
+        p[at] = logit_half(theta[i]);
+        break;
+      case Transform::Vector:
+        p.segment<3>(at) = theta.segment<3>(i) / q.scale;
+        break;
       case Transform::PlanePosition: {
         const Vector3 n0 = reference_.segment<3>(i + 3), point = theta.segment<3>(i), n = theta.segment<3>(i + 3);
         p[at] = n0.dot(point - Vector3(reference_.segment<3>(i))) / q.scale;
@@ -88,9 +95,15 @@ VectorX ParameterSet::to_theta(const VectorX& p) const {
   for_each_estimated([&](const Parameter& q, int at) {
     const int i = q.theta_index;
     switch (q.transform) {
-      case Transform::Logarithm: theta[i] = std::exp(p[at]); break;
-      case Transform::LogitHalf: theta[i] = logistic_half(p[at]); break;
-      case Transform::Vector: theta.segment<3>(i) = p.segment<3>(at) * q.scale; break;
+      case Transform::Logarithm:
+        theta[i] = std::exp(p[at]);
+        break;
+      case Transform::LogitHalf:
+        theta[i] = logistic_half(p[at]);
+        break;
+      case Transform::Vector:
+        theta.segment<3>(i) = p.segment<3>(at) * q.scale;
+        break;
       case Transform::PlanePosition: {
         const Vector3 n0 = reference_.segment<3>(i + 3);
         theta.segment<3>(i) += p[at] * q.scale * n0;
@@ -107,13 +120,17 @@ MatrixX ParameterSet::jacobian(const VectorX& p) const {
   for_each_estimated([&](const Parameter& q, int at) {
     const int i = q.theta_index;
     switch (q.transform) {
-      case Transform::Logarithm: J(i, at) = std::exp(p[at]); break;
+      case Transform::Logarithm:
+        J(i, at) = std::exp(p[at]);
+        break;
       case Transform::LogitHalf: {
         const double nu = logistic_half(p[at]);
         J(i, at) = nu * (1.0 - 2.0 * nu);
         break;
       }
-      case Transform::Vector: J.block<3, 3>(i, at) = q.scale * Matrix3::Identity(); break;
+      case Transform::Vector:
+        J.block<3, 3>(i, at) = q.scale * Matrix3::Identity();
+        break;
       case Transform::PlanePosition: {
         const Vector3 n0 = reference_.segment<3>(i + 3);
         const auto T = tangents_of(n0);

@@ -21,9 +21,9 @@ struct Parameter {
   std::string name;  ///< as in result.json
   std::string unit;
   Transform transform = Transform::Logarithm;
-  int theta_index = 0;    ///< of its first number; a plane's point, followed by its normal
-  double scale = 1.0;     ///< [unit] of an unconstrained step of one, for vectors and planes
-  double lower = 0.0;     ///< bounds of a scalar's value
+  int theta_index = 0;  ///< of its first number; a plane's point, followed by its normal
+  double scale = 1.0;   ///< [unit] of an unconstrained step of one, for vectors and planes
+  double lower = 0.0;   ///< bounds of a scalar's value
   double upper = std::numeric_limits<double>::infinity();
   bool estimated = false;
   /// Normal prior in the unconstrained numbers, around `prior_mean`; infinite: none.

@@ -55,16 +55,18 @@ double object_size(const Capture& capture) { return bounding_box(*capture.surfac
 
 std::shared_ptr<const SignedDistance> capture_distance(const Capture& capture, double band) {
   if (!capture.surface)
-    throw InputError({{capture.file}, "there is no scan of the object at rest ([object] surface)",
-                      "a closed triangle mesh", "scan the object and name the mesh in capture.toml"});
+    throw InputError({{capture.file},
+                      "there is no scan of the object at rest ([object] surface)",
+                      "a closed triangle mesh",
+                      "scan the object and name the mesh in capture.toml"});
   const double size = object_size(capture);
   return std::make_shared<SignedDistance>(signed_distance(*capture.surface, size / 80.0, (band + 0.1) * size));
 }
 
 namespace {
 
-std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDistance& distance, const Resolution& resolution,
-                                         std::vector<Vector3>& control_points) {
+std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDistance& distance,
+                                         const Resolution& resolution, std::vector<Vector3>& control_points) {
   const double edge = object_size(capture) / resolution.cells;
   Body body;
   if (resolution.element == ElementKind::Hexahedron) {
@@ -104,20 +106,22 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
                           const std::vector<Vector3>& tracked) {
   std::vector<Vector3> control_points;
   auto body = make_body_of(capture, *distance, resolution, control_points);
-  Discretisation d = discretise(capture, std::move(distance), std::move(body), resolution, parameters, settings, tracked);
+  Discretisation d =
+      discretise(capture, std::move(distance), std::move(body), resolution, parameters, settings, tracked);
   d.control_points = std::move(control_points);
   return d;
 }
 
-Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance, std::shared_ptr<const Body> body,
-                          const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings,
-                          const std::vector<Vector3>& tracked) {
+Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
+                          std::shared_ptr<const Body> body, const Resolution& resolution, const VectorX& parameters,
+                          const SimulationOptions& settings, const std::vector<Vector3>& tracked) {
   Discretisation d;
   d.distance = std::move(distance);
   d.body = std::move(body);
   const double size = object_size(capture);
   if (!capture.depth.empty() || !capture.clouds.empty())
-    d.mismatch.surface = std::make_shared<SurfaceConstraints>(d.body, d.distance, resolution.band * size, size / resolution.cells);
+    d.mismatch.surface =
+        std::make_shared<SurfaceConstraints>(d.body, d.distance, resolution.band * size, size / resolution.cells);
   if (!tracked.empty()) d.mismatch.tracks = std::make_shared<PointTracks>(*d.body, tracked);
   d.simulation = settings;
   d.simulation.is_static = capture.is_static;
@@ -153,11 +157,9 @@ void set_moduli(VectorX& theta, int controls, double youngs_modulus) {
 ParameterSet default_parameters(const Capture& capture, double volume, int controls) {
   const double size = object_size(capture);
   const double gravity = capture.gravity ? capture.gravity->norm() : gravity_guess;
-  const double density = capture.mass      ? *capture.mass / volume
-                         : capture.density ? *capture.density
-                                           : density_guess;
-  const double time = std::sqrt(size / std::max(gravity, 0.1));  // of a fall through the object's own size
-  const double stress = density * std::max(gravity, 0.1) * size; // under its own weight
+  const double density = capture.mass ? *capture.mass / volume : capture.density ? *capture.density : density_guess;
+  const double time = std::sqrt(size / std::max(gravity, 0.1));   // of a fall through the object's own size
+  const double stress = density * std::max(gravity, 0.1) * size;  // under its own weight
 
   VectorX theta = VectorX::Zero(theta::size(int(capture.planes.size()), controls));
   set_moduli(theta, controls, 20.0 * stress);
@@ -173,9 +175,11 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
   // Priors are wide: they say what soft solids are like and only matter where the recording says nothing.
   const std::vector<std::string> names = modulus_names(capture, controls);
   for (int k = 0; k < controls; ++k)
-    add_scalar(p, names[std::size_t(k)].c_str(), "Pa", Transform::Logarithm, theta::modulus(k, controls, theta.size()), 1e-2 * stress,
-               1e8 * stress, std::log(theta[theta::youngs_modulus]), std::numeric_limits<double>::infinity(), true);
-  add_scalar(p, "poisson_ratio", "1", Transform::LogitHalf, theta::poissons_ratio, 0.02, 0.495, std::log(0.35 / 0.15), 0.5, true);
+    add_scalar(p, names[std::size_t(k)].c_str(), "Pa", Transform::Logarithm, theta::modulus(k, controls, theta.size()),
+               1e-2 * stress, 1e8 * stress, std::log(theta[theta::youngs_modulus]),
+               std::numeric_limits<double>::infinity(), true);
+  add_scalar(p, "poisson_ratio", "1", Transform::LogitHalf, theta::poissons_ratio, 0.02, 0.495, std::log(0.35 / 0.15),
+             0.5, true);
   add_scalar(p, "mass_damping", "1/s", Transform::Logarithm, theta::mass_damping, 1e-4 / time, 20.0 / time,
              std::log(theta[theta::mass_damping]), 1.5, !capture.is_static);
   add_scalar(p, "stiffness_damping", "s", Transform::Logarithm, theta::stiffness_damping, 1e-5 * time, 2.0 * time,

@@ -13,17 +13,17 @@ namespace pliant {
 /// How Young's modulus varies over the object where the capture names no regions.
 struct FieldOptions {
   enum class Weights { Linear, Harmonic, InverseDistance };
-  int control_points = 1;               ///< >= 1; 1: homogeneous
-  Weights weights = Weights::Linear;    ///< linear ones stand along the object's longest axis, the others spread over it
+  int control_points = 1;             ///< >= 1; 1: homogeneous
+  Weights weights = Weights::Linear;  ///< linear ones stand along the object's longest axis, the others spread over it
 };
 
 /// How finely the body and its motion are resolved, and by what elements.
 struct Resolution {
   ElementKind element = ElementKind::Hexahedron;
   FieldOptions field;
-  double cells = 12.0;   ///< elements along the object's longest axis
-  double steps = 1.0;    ///< time steps per default step: 2 halves the step
-  double band = 0.15;    ///< of the mismatch, times the object's longest axis
+  double cells = 12.0;  ///< elements along the object's longest axis
+  double steps = 1.0;   ///< time steps per default step: 2 halves the step
+  double band = 0.15;   ///< of the mismatch, times the object's longest axis
 };
 
 /// A recording made ready for simulation at one resolution.
@@ -48,9 +48,9 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
                           const std::vector<Vector3>& tracked = {});
 
 /// The same around a body that is there already.
-Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance, std::shared_ptr<const Body> body,
-                          const Resolution& resolution, const VectorX& theta, const SimulationOptions& settings = {},
-                          const std::vector<Vector3>& tracked = {});
+Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
+                          std::shared_ptr<const Body> body, const Resolution& resolution, const VectorX& theta,
+                          const SimulationOptions& settings = {}, const std::vector<Vector3>& tracked = {});
 
 /// All parameters of a capture with their start values, bounds and priors. What the capture leaves unknown is
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
@@ -68,8 +68,8 @@ void set_moduli(VectorX& theta, int controls, double youngs_modulus);
 
 /// Points of the object that the capture's [[markers]] follow.
 struct TrackedPoints {
-  std::vector<Vector3> rest;                              ///< [m], all blocks' markers one after the other
-  std::map<int, std::vector<TrackObservation>> frames;    ///< by the recording's frame
+  std::vector<Vector3> rest;                            ///< [m], all blocks' markers one after the other
+  std::map<int, std::vector<TrackObservation>> frames;  ///< by the recording's frame
 };
 
 /// Reads them. Where the capture does not say how noisy they are, a thousandth of the object's size stands in.

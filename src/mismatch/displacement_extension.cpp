@@ -129,8 +129,7 @@ Points DisplacementExtension::apply(const Points& u) const {
 Points DisplacementExtension::apply_transpose(const Points& g) const {
   MatrixX free(Eigen::Index(free_band_.size()), 3);
   for (std::size_t f = 0; f < free_band_.size(); ++f) free.row(Eigen::Index(f)) = g.row(free_band_[f]);
-  const MatrixX known =
-      factor_->harmonic_transpose(free) + affine_fit_.transpose() * (affine_rest_.transpose() * free);
+  const MatrixX known = factor_->harmonic_transpose(free) + affine_fit_.transpose() * (affine_rest_.transpose() * free);
   Points u = Points::Zero(body_nodes_, 3);
   for (std::size_t k = 0; k < known_body_.size(); ++k)
     u.row(known_body_[k]) += g.row(known_band_[k]) + known.row(Eigen::Index(k));

@@ -18,9 +18,9 @@ class DisplacementExtension {
   ~DisplacementExtension();
   DisplacementExtension(DisplacementExtension&&) noexcept;
 
-  const Points& rest_positions() const { return rest_; }                     ///< m x 3 [m], of the band's lattice nodes
-  const std::vector<std::array<int, 8>>& cells() const { return cells_; }    ///< of the band, inside ones included
-  const std::vector<Vector3>& cell_corners() const { return cell_corners_; } ///< rest position of local node 0
+  const Points& rest_positions() const { return rest_; }                   ///< m x 3 [m], of the band's lattice nodes
+  const std::vector<std::array<int, 8>>& cells() const { return cells_; }  ///< of the band, inside ones included
+  const std::vector<Vector3>& cell_corners() const { return cell_corners_; }  ///< rest position of local node 0
   double cell_size() const { return cell_size_; }
   double band() const { return band_; }
 
@@ -39,8 +39,8 @@ class DisplacementExtension {
   std::vector<int> known_band_, known_body_;  // band nodes that are body nodes, and which
   std::vector<int> free_band_;                // the others
   std::unique_ptr<Factor> factor_;
-  MatrixX affine_fit_;                        // 4 x n: least-squares affine motion from u
-  MatrixX affine_rest_;                       // free x 4: what Laplace's equation misses of an affine motion
+  MatrixX affine_fit_;   // 4 x n: least-squares affine motion from u
+  MatrixX affine_rest_;  // free x 4: what Laplace's equation misses of an affine motion
 };
 
 }  // namespace pliant

@@ -15,7 +15,8 @@ Points PointTracks::residuals(std::span<const TrackObservation> seen, const Poin
   return r;
 }
 
-void PointTracks::add_adjoint(std::span<const TrackObservation> seen, const Points& residual_bar, Points& positions_bar) const {
+void PointTracks::add_adjoint(std::span<const TrackObservation> seen, const Points& residual_bar,
+                              Points& positions_bar) const {
   for (std::size_t i = 0; i < seen.size(); ++i)
     points_.add_transpose(seen[i].point, residual_bar.row(Eigen::Index(i)).transpose(), positions_bar);
 }

@@ -13,8 +13,8 @@ struct TrackObservation {
   double noise;      ///< standard deviation of each coordinate [m], > 0
 };
 
-/// Points of the object that were followed through time (markers, or nodes of a tracked mesh): the residual is where the
-/// simulation has them less where they were seen (Wang 2015, eq. 6).
+/// Points of the object that were followed through time (markers, or nodes of a tracked mesh): the residual is where
+/// the simulation has them less where they were seen (Wang 2015, eq. 6).
 class PointTracks {
  public:
   /// @param rest  positions on or in the object at rest [m]; those outside every element follow the nearest one

@@ -20,7 +20,8 @@ Tree cell_tree(const std::vector<std::array<int, 8>>& cells, const Points& latti
   for (std::size_t c = 0; c < cells.size(); ++c) {
     Box box;
     for (const int n : cells[c]) box.extend(lattice.row(n).transpose());
-    boxes.emplace_back(TreeBox({box.min.x(), box.min.y(), box.min.z()}, {box.max.x(), box.max.y(), box.max.z()}), int(c));
+    boxes.emplace_back(TreeBox({box.min.x(), box.min.y(), box.min.z()}, {box.max.x(), box.max.y(), box.max.z()}),
+                       int(c));
   }
   return Tree(boxes);  // packed
 }
@@ -51,8 +52,8 @@ double RobustLoss::weight(double r) const {
   return s * s;
 }
 
-SurfaceConstraints::SurfaceConstraints(std::shared_ptr<const Body> body,
-                                       std::shared_ptr<const SignedDistance> distance, double band, double cell_size)
+SurfaceConstraints::SurfaceConstraints(std::shared_ptr<const Body> body, std::shared_ptr<const SignedDistance> distance,
+                                       double band, double cell_size)
     : body_(std::move(body)),
       distance_(std::move(distance)),
       grid_(lattice_of(body_, *distance_, cell_size)),
@@ -145,7 +146,8 @@ Points SurfaceConstraints::adjoint(const std::vector<PointMatch>& matches, const
     const PointMatch& m = matches[i];
     if (m.cell < 0 || distance_bar[Eigen::Index(i)] == 0.0) continue;
     for (int a = 0; a < 8; ++a)
-      g_bar.row(extension_.cells()[m.cell][a]) += distance_bar[Eigen::Index(i)] * m.weights[a] * m.direction.transpose();
+      g_bar.row(extension_.cells()[m.cell][a]) +=
+          distance_bar[Eigen::Index(i)] * m.weights[a] * m.direction.transpose();
   }
   return extended_transpose(g_bar);
 }

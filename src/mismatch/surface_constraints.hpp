@@ -37,7 +37,8 @@ class SurfaceConstraints {
 
   /// Matches points against node positions (n x 3). A point in several cells (self-intersection) takes the smallest
   /// |distance|. Cells are found by a bounding-volume tree over the deformed cells. Safe to call from several threads.
-  [[nodiscard]] std::vector<PointMatch> match(std::span<const SurfaceObservation> points, const Points& positions) const;
+  [[nodiscard]] std::vector<PointMatch> match(std::span<const SurfaceObservation> points,
+                                              const Points& positions) const;
 
   /// Changes of the distances for a change of the node positions (n x 3); 0 for unmatched points.
   [[nodiscard]] VectorX tangent(const std::vector<PointMatch>& matches, const Points& d_positions) const;
@@ -62,10 +63,10 @@ class SurfaceConstraints {
 /// beyond c, twice continuously differentiable in between. Points outside the band cost that constant, so that they can
 /// never lower the cost by leaving.
 struct RobustLoss {
-  double scale;                    ///< c [m]
-  double value(double r) const;    ///< [m^2]
+  double scale;                  ///< c [m]
+  double value(double r) const;  ///< [m^2]
   double derivative(double r) const { return r * weight(r); }
-  double weight(double r) const;   ///< derivative / r
+  double weight(double r) const;  ///< derivative / r
   double outlier() const { return scale * scale / 6.0; }
 };
 

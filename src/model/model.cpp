@@ -38,7 +38,8 @@ std::string model_toml(const Model& m) {
          "format = \"model/1\"\nname = "
       << toml_text(m.name)
       << "\n\n[object]\nsurface = \"surface.ply\"          # free of load, world frame of the recording\n";
-  if (!m.volume.connectivity.empty()) out << "volume_mesh = \"model.vtu\"        # elements with the material of each\n";
+  if (!m.volume.connectivity.empty())
+    out << "volume_mesh = \"model.vtu\"        # elements with the material of each\n";
   line(out, "mass", m.mass, "kg");
   line(out, "density", m.density, "kg/m^3");
   out << "\n[material]                          # isotropic, linear in the rotated frame of each element\n";

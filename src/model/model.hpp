@@ -13,12 +13,12 @@ namespace pliant {
 
 /// The volume mesh of a model, with its material.
 struct ModelVolume {
-  Points nodes;                           ///< [m], n x 3, reference shape
+  Points nodes;  ///< [m], n x 3, reference shape
   VtuCell kind = VtuCell::Hexahedron;
-  std::vector<int> connectivity;          ///< points of each cell, in this program's order (see to_vtk_order)
-  std::vector<double> youngs_modulus;     ///< [Pa], one a cell
-  std::vector<double> poisson_ratio;      ///< one a cell
-  std::vector<double> fill;               ///< part of the cell that the object fills, one a cell
+  std::vector<int> connectivity;       ///< points of each cell, in this program's order (see to_vtk_order)
+  std::vector<double> youngs_modulus;  ///< [Pa], one a cell
+  std::vector<double> poisson_ratio;   ///< one a cell
+  std::vector<double> fill;            ///< part of the cell that the object fills, one a cell
 };
 
 /// A fitted object, ready to be simulated. SI units, the capture's world frame.

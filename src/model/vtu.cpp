@@ -205,7 +205,8 @@ class Reader {
     const VtuArray types = named(node, "types", cells), offsets = named(node, "offsets", cells);
     const int kind = cells > 0 ? int(types.values[0]) : int(VtuCell::Hexahedron);
     if (kind != 5 && kind != 10 && kind != 12 && kind != 24)
-      fail(path_, "cells of VTK type " + std::to_string(kind), "triangles (5), tetrahedra (10 or, quadratic, 24) or hexahedra (12)");
+      fail(path_, "cells of VTK type " + std::to_string(kind),
+           "triangles (5), tetrahedra (10 or, quadratic, 24) or hexahedra (12)");
     grid.kind = VtuCell(kind);
     const int corners = corner_count(grid.kind);
     for (int i = 0; i < cells; ++i)
@@ -232,10 +233,14 @@ const VtuArray* find(const std::vector<VtuArray>& arrays, const std::string& nam
 
 int corner_count(VtuCell kind) {
   switch (kind) {
-    case VtuCell::Triangle: return 3;
-    case VtuCell::Tetrahedron: return 4;
-    case VtuCell::QuadraticTetrahedron: return 10;
-    case VtuCell::Hexahedron: break;
+    case VtuCell::Triangle:
+      return 3;
+    case VtuCell::Tetrahedron:
+      return 4;
+    case VtuCell::QuadraticTetrahedron:
+      return 10;
+    case VtuCell::Hexahedron:
+      break;
   }
   return 8;
 }

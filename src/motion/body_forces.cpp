@@ -41,7 +41,8 @@ void HungWeights::add_force(const Points&, Points& force) {
   for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * gravity_, force);
 }
 
-void HungWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
+void HungWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta,
+                                    Points& force) {
   const Vector3 change = theta::vector_at(d_theta, theta::gravity);
   for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * change, force);
 }

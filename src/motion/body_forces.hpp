@@ -31,7 +31,8 @@ struct HungWeight {
   double mass = 0.0;  ///< [kg]
 };
 
-/// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is left out: they are for bodies at rest.
+/// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is left out: they are for bodies at
+/// rest.
 class HungWeights : public ForceTerm {
  public:
   HungWeights(const Body& body, const std::vector<HungWeight>& weights);

@@ -11,8 +11,8 @@ namespace {
 
 struct HeldSample {
   Vector3 local;
-  Vector3 normal;   // zero for points inside
-  double weight;    // [m^2] on the surface, [m^2] inside (volume / h)
+  Vector3 normal;  // zero for points inside
+  double weight;   // [m^2] on the surface, [m^2] inside (volume / h)
 };
 
 using SamplesOfCell = std::map<std::pair<int, int>, std::vector<HeldSample>>;
@@ -41,7 +41,9 @@ SamplesOfCell collect(const Body& body, const std::vector<Hold>& holds) {
       }
     }
     if (!any)
-      throw InputError({{}, "held region " + std::to_string(h + 1) + " contains nothing of the object", "",
+      throw InputError({{},
+                        "held region " + std::to_string(h + 1) + " contains nothing of the object",
+                        "",
                         "move it onto the object or make it larger"});
   }
   return samples;
@@ -145,9 +147,9 @@ void FixedRegions::add_force_tangent(const Points& z, const Points&, const Point
   for (const HeldCell& held : cells_) {
     const auto cell = body_->element(held.cell);
     const Vector24 u = displacement(held, z);
-    const Vector24 df = -modulus_[held.cell] * (modulus_.log_change(held.cell) * (held.K * u) +
-                                                held.K * rotated_back(held, d_z) +
-                                                d_theta[theta::poissons_ratio] * (held.dK * u));
+    const Vector24 df =
+        -modulus_[held.cell] * (modulus_.log_change(held.cell) * (held.K * u) + held.K * rotated_back(held, d_z) +
+                                d_theta[theta::poissons_ratio] * (held.dK * u));
     for (int a = 0; a < 8; ++a) force.row(cell[a]) += (holds_[held.hold].rotation * df.segment<3>(3 * a)).transpose();
   }
 }

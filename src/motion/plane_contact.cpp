@@ -36,7 +36,8 @@ void PlaneContact::linearise(const Points& lag) {
     const double t = -d / eps;
     const double sigmoid = t > 0.0 ? 1.0 / (1.0 + std::exp(-t)) : std::exp(t) / (1.0 + std::exp(t));
     const double softplus = t > 0.0 ? t + std::log1p(std::exp(-t)) : std::log1p(std::exp(t));
-    active_.push_back({p, position, d, scale * eps * softplus, -scale * sigmoid, scale * sigmoid * (1.0 - sigmoid) / eps});
+    active_.push_back(
+        {p, position, d, scale * eps * softplus, -scale * sigmoid, scale * sigmoid * (1.0 - sigmoid) / eps});
   }
 }
 
@@ -66,9 +67,10 @@ void PlaneContact::add_force_tangent(const Points& z, const Points& d_lag, const
   for (const Active& c : active_) {
     const Vector3 end = embedding_.position(c.point, z);
     const double change = gap(end) - c.gap;
-    const double d_gap_lag = normal_.dot(embedding_.position(c.point, d_lag) - d_point) +
-                             d_normal.dot(c.lag_position - plane_point_);
-    const double d_gap_end = normal_.dot(embedding_.position(c.point, d_z) - d_point) + d_normal.dot(end - plane_point_);
+    const double d_gap_lag =
+        normal_.dot(embedding_.position(c.point, d_lag) - d_point) + d_normal.dot(c.lag_position - plane_point_);
+    const double d_gap_end =
+        normal_.dot(embedding_.position(c.point, d_z) - d_point) + d_normal.dot(end - plane_point_);
     const double d_force = c.curvature * change * d_gap_lag + c.slope * d_gap_end;
     embedding_.add_transpose(c.point, d_force * normal_ + (c.force + c.slope * change) * d_normal, force);
   }

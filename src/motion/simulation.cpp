@@ -1,13 +1,13 @@
 #include "motion/simulation.hpp"
 
-#include <algorithm>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "base/error.hpp"
-#include "motion/body_forces.hpp"
 #include "elasticity/corotated.hpp"
+#include "motion/body_forces.hpp"
 
 namespace pliant {
 
@@ -36,15 +36,18 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 }  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
-    : body_(body),
+    : body_(std::move(body)),
       options_(std::move(options)),
-      stepper_(body, make_terms(body, options_, fixed_regions_), {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight, options_.rotation_prediction,
-                options_.solver, options_.integrator, options_.newton}),
-      rest_(body->reference_positions()) {
+      stepper_(body_, make_terms(body_, options_, fixed_regions_),
+               {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
+                options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
+      rest_(body_->reference_positions()) {
   if (holds_strongly(*body_, options_)) {
     std::vector<int> held = held_nodes(*body_, options_.holds);
     if (held.empty() && !options_.holds.empty())
-      throw InputError({{}, "the held regions contain no node of the object", "regions that hold a part of it",
+      throw InputError({{},
+                        "the held regions contain no node of the object",
+                        "regions that hold a part of it",
                         "move them onto the object, make them larger, or use smaller elements"});
     stepper_.hold(std::move(held));
   }
@@ -153,7 +156,8 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
 bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary& summary) {
   stepper_.set_time_step(plan.dt);
   if (!stepper_.prepare(state)) {
-    summary.failure = "the step's matrix is not positive definite or not finite at step " + std::to_string(summary.steps);
+    summary.failure =
+        "the step's matrix is not positive definite or not finite at step " + std::to_string(summary.steps);
     return false;
   }
   delta_ = plan.dt * state.v;
@@ -183,7 +187,8 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   if (options_.is_static) {
     if (!find_equilibrium(parameters, state, summary)) return summary;
     for (std::size_t c = 0; c < tangents.size(); ++c)
-      tangents[c] = {stepper_.equilibrium_tangent(state.x, directions.col(Eigen::Index(c))), Points::Zero(rest_.rows(), 3)};
+      tangents[c] = {stepper_.equilibrium_tangent(state.x, directions.col(Eigen::Index(c))),
+                     Points::Zero(rest_.rows(), 3)};
     for (int frame = 0; frame <= std::min(last_frame, frame_count() - 1); ++frame) {
       ++summary.frames;
       if (!on_frame(frame, state, tangents)) break;

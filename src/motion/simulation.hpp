@@ -8,8 +8,8 @@
 #include "elasticity/body.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
-#include "motion/stepper.hpp"
 #include "motion/plane_contact.hpp"
+#include "motion/stepper.hpp"
 
 namespace pliant {
 
@@ -23,10 +23,10 @@ struct SimulationOptions {
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
   ContactOptions contact;
-  int planes = 0;              ///< in theta
-  std::vector<Hold> holds;     ///< held regions
+  int planes = 0;                   ///< in theta
+  std::vector<Hold> holds;          ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object
-  bool is_static = false;           ///< every frame sees the same equilibrium; steps, velocities and damping play no part
+  bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
                                ///< tetrahedra, which follow the shape
   std::size_t memory_budget = std::size_t(256) << 20;  ///< [bytes] for states kept for the adjoint
@@ -38,8 +38,8 @@ struct RolloutSummary {
   std::string failure;  ///< why it stopped, in words
 };
 
-/// Runs one body through a scene's frames, or to its equilibrium, with tangents or adjoint. Not for concurrent use; copies are cheap to make
-/// with the same body.
+/// Runs one body through a scene's frames, or to its equilibrium, with tangents or adjoint. Not for concurrent use;
+/// copies are cheap to make with the same body.
 class Simulation {
  public:
   Simulation(std::shared_ptr<const Body> body, SimulationOptions options);
@@ -100,8 +100,8 @@ class Simulation {
 };
 
 /// Stiffness and smoothing of contact that suit an object of this size and weight: its weight on its projected area
-/// presses it in by 1e-4 of its size, and contact sets in over 1e-3 of it: the smallest that steps of the default length
-/// resolve. Softer contact lets the object hover and rebound more than a rigid floor does.
+/// presses it in by 1e-4 of its size, and contact sets in over 1e-3 of it: the smallest that steps of the default
+/// length resolve. Softer contact lets the object hover and rebound more than a rigid floor does.
 ContactOptions default_contact(const Body& body, double mass, double gravity);
 
 /// The longest step that suits an object of this size falling under this gravity.

@@ -8,7 +8,7 @@
 namespace pliant {
 
 Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<ForceTerm>> terms,
-                             const StepOptions& options)
+                 const StepOptions& options)
     : body_(std::move(body)), terms_(std::move(terms)), options_(options), matrix_(body_->pattern) {
   if (!(options.dt > 0.0)) throw std::invalid_argument("the time step must be positive");
   if (!(options.newmark_theta >= 0.5 && options.newmark_theta < 1.0))
@@ -18,7 +18,8 @@ Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<F
     throw std::invalid_argument("the contact's weight must lie in (0.5, 1]");
   if (!(options_.rotation_prediction >= 0.0 && options_.rotation_prediction <= 1.0))
     throw std::invalid_argument("the prediction of rotations must lie in [0, 1]");
-  for (Points* p : {&force_, &d_blended_, &d_force_, &w_, &mass_part_, &residual_, &inertia_}) p->setZero(body_->node_count(), 3);
+  for (Points* p : {&force_, &d_blended_, &d_force_, &w_, &mass_part_, &residual_, &inertia_})
+    p->setZero(body_->node_count(), 3);
   for (auto* points : {&lag_, &d_lag_, &lag_bar_})
     for (Points& p : *points) p.setZero(body_->node_count(), 3);
   for (auto* points : {&points_at_, &bar_at_})
@@ -126,7 +127,8 @@ void Stepper::linearise(const Scheme& s, const Points& x, const Points& delta) {
   for (auto& term : terms_) term->linearise(lag_[std::size_t(term->lag())]);
 }
 
-double Stepper::residual(const Scheme& s, const Points& x, const Points& delta, const Points& inertia, double& force_scale) {
+double Stepper::residual(const Scheme& s, const Points& x, const Points& delta, const Points& inertia,
+                         double& force_scale) {
   set_points_at(s, x, delta);
   residual_ = -inertia;
   force_scale = inertia.norm();
@@ -186,9 +188,9 @@ SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& ine
       summary.converged = true;
       return summary;
     }
-    // Natural monotonicity (Deuflhard 2004, section 3.3): a share of the step is good where the next step from there, with
-    // the matrix at hand, is shorter. Residuals themselves may rise on the way to the solution, by orders of magnitude for
-    // slender or nearly incompressible bodies.
+    // Natural monotonicity (Deuflhard 2004, section 3.3): a share of the step is good where the next step from there,
+    // with the matrix at hand, is shorter. Residuals themselves may rise on the way to the solution, by orders of
+    // magnitude for slender or nearly incompressible bodies.
     const double length = step_.norm();
     double share = 1.0;
     for (int halving = 0;; ++halving, share *= 0.5) {
@@ -233,7 +235,8 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
   d_force_ *= dt;
   mass_part_ = density_ / t * change.v;
   mass_part_ += d_theta[theta::density] / t * start.v;
-  mass_part_ -= (d_theta[theta::density] * (1.0 / (t * dt) + mass_damping_) + density_ * d_theta[theta::mass_damping]) * delta;
+  mass_part_ -=
+      (d_theta[theta::density] * (1.0 / (t * dt) + mass_damping_) + density_ * d_theta[theta::mass_damping]) * delta;
   body_->add_mass_product(1.0, mass_part_, d_force_);
   clear_held(d_force_);
   if (is_newton()) {
@@ -266,7 +269,8 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   body_->add_mass_product(1.0, w_, mass_part_);
   const double w_m_delta = mass_part_.cwiseProduct(delta).sum();
   theta_bar[theta::mass_damping] -= density_ * w_m_delta;
-  theta_bar[theta::density] += mass_part_.cwiseProduct(start.v).sum() / t - (1.0 / (t * dt) + mass_damping_) * w_m_delta;
+  theta_bar[theta::density] +=
+      mass_part_.cwiseProduct(start.v).sum() / t - (1.0 / (t * dt) + mass_damping_) * w_m_delta;
 
   w_ *= dt;
   for (Points& p : lag_bar_) p.setZero();

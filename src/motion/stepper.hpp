@@ -47,16 +47,17 @@ struct StepOptions {
 /// s = theta + beta/dt for blended terms (the stiffness damping's share with them), the contact's weight, or 1.
 /// One linear system a step; its tangent and adjoint solve with the same (symmetric) matrix.
 ///
-/// The fully implicit scheme is the same equation with lag points that move along: rotations are those of x + theta Delta
-/// (the implicit midpoint for theta = 1/2), contact is that of x + w Delta. It is solved by Newton's method with
-/// backtracking; tangent and adjoint follow from the implicit function theorem with the exact, slightly unsymmetric matrix.
+/// The fully implicit scheme is the same equation with lag points that move along: rotations are those of x + theta
+/// Delta (the implicit midpoint for theta = 1/2), contact is that of x + w Delta. It is solved by Newton's method with
+/// backtracking; tangent and adjoint follow from the implicit function theorem with the exact, slightly unsymmetric
+/// matrix.
 ///
-/// At rest the equation is sum of f(x | x) = 0, without mass and with every force at the unknown position: `equilibrium`.
+/// At rest the equation is sum of f(x | x) = 0, without mass and with every force at the unknown position:
+/// `equilibrium`.
 class Stepper {
  public:
   /// Terms may share data; they belong to this stepper and are used by one thread.
-  Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<ForceTerm>> terms,
-                const StepOptions& options);
+  Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<ForceTerm>> terms, const StepOptions& options);
 
   const StepOptions& options() const { return options_; }
   /// For frames that are not equally far apart.
@@ -81,8 +82,8 @@ class Stepper {
   /// Cotangent of the start for one of the end, in place; theta_bar accumulates.
   void adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar);
 
-  /// Positions without acceleration, from a guess, by Newton's method; held nodes stay where the guess has them. After a
-  /// success the derivatives below refer to it. Not converged: says so, and x is the best found.
+  /// Positions without acceleration, from a guess, by Newton's method; held nodes stay where the guess has them. After
+  /// a success the derivatives below refer to it. Not converged: says so, and x is the best found.
   [[nodiscard]] SolveSummary equilibrium(Points& x);
   /// Change of the equilibrium for a change of theta and of the held nodes' positions.
   Points equilibrium_tangent(const Points& x, const VectorX& d_theta);
@@ -109,7 +110,8 @@ class Stepper {
   /// Linearises every term where its lag point is for this Delta.
   void linearise(const Scheme& scheme, const Points& x, const Points& delta);
   /// Residual of the implicit equation at Delta, with terms linearised there; `force_scale` is what met in it.
-  double residual(const Scheme& scheme, const Points& x, const Points& delta, const Points& inertia, double& force_scale);
+  double residual(const Scheme& scheme, const Points& x, const Points& delta, const Points& inertia,
+                  double& force_scale);
   /// The exact matrix about Delta, with terms linearised there, factorised.
   [[nodiscard]] bool factorise_exact(const Scheme& scheme, const Points& x, const Points& delta);
   SolveSummary newton(const Scheme& scheme, const Points& x, const Points& inertia, Points& delta);

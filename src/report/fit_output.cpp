@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <tuple>
 #include <map>
+#include <tuple>
 
 #include "base/files.hpp"
 #include "elasticity/corotated.hpp"
@@ -85,14 +85,18 @@ std::vector<double> six(const Matrix3& m) { return {m(0, 0), m(1, 1), m(2, 2), m
 
 VtuCell vtu_cell(ElementKind kind) {
   switch (kind) {
-    case ElementKind::Tetrahedron: return VtuCell::Tetrahedron;
-    case ElementKind::QuadraticTetrahedron: return VtuCell::QuadraticTetrahedron;
-    case ElementKind::Hexahedron: break;
+    case ElementKind::Tetrahedron:
+      return VtuCell::Tetrahedron;
+    case ElementKind::QuadraticTetrahedron:
+      return VtuCell::QuadraticTetrahedron;
+    case ElementKind::Hexahedron:
+      break;
   }
   return VtuCell::Hexahedron;
 }
 
-VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& parameters, const State& state, Elasticity& elasticity) {
+VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& parameters, const State& state,
+                   Elasticity& elasticity) {
   const Body& body = *shared;
   VtuGrid grid;
   grid.kind = vtu_cell(body.kind);
@@ -343,8 +347,8 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
 
 namespace {
 
-/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's modulus
-/// where the volume mesh has as many elements.
+/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's
+/// modulus where the volume mesh has as many elements.
 std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance& distance) {
   const ModelVolume& volume = model.volume;
   Body body;
@@ -356,7 +360,8 @@ std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance& di
     std::vector<std::array<int, 6>> mid_nodes;
     for (std::size_t i = 0; i < volume.connectivity.size(); i += points) {
       std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i), 4, tets.emplace_back().begin());
-      if (points == 10) std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i) + 4, 6, mid_nodes.emplace_back().begin());
+      if (points == 10)
+        std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i) + 4, 6, mid_nodes.emplace_back().begin());
     }
     body = make_body(make_tet_mesh(volume.nodes, std::move(tets), std::move(mid_nodes)));
   }
@@ -389,8 +394,10 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
   resolution.cells = object_size(capture) / model.cell_size;
   const auto body = body_of(model, *distance);
   resolution.element = body->kind;
-  scene.discretisation = discretise(capture, distance, body, resolution, scene.theta, settings, tracked_points(capture).rest);
-  if (model.contact_stiffness > 0.0) scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
+  scene.discretisation =
+      discretise(capture, distance, body, resolution, scene.theta, settings, tracked_points(capture).rest);
+  if (model.contact_stiffness > 0.0)
+    scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
   const double dt = 1.0 / (model.frame_rate * model.substeps);
   if (model.frame_rate > 0.0) scene.discretisation.simulation.max_dt = dt * (1.0 + 1e-9);
   return scene;

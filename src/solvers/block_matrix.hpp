@@ -10,10 +10,10 @@ namespace pliant {
 
 /// Sparsity of a symmetric matrix of 3 x 3 blocks: compressed rows, columns ascending, both triangles.
 struct BlockPattern {
-  int rows = 0;                  ///< block rows (nodes)
-  std::vector<int> row_start;    ///< rows + 1
-  std::vector<int> column;       ///< one a block
-  std::vector<int> diagonal;     ///< index of each row's diagonal block
+  int rows = 0;                ///< block rows (nodes)
+  std::vector<int> row_start;  ///< rows + 1
+  std::vector<int> column;     ///< one a block
+  std::vector<int> diagonal;   ///< index of each row's diagonal block
   int block_count() const { return int(column.size()); }
 
   /// Index of block (row, col), -1 where it is not in the pattern.

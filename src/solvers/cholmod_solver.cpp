@@ -57,7 +57,8 @@ class CholmodSolver : public LinearSolver {
     rhs.x = const_cast<double*>(b.data());
     rhs.xtype = CHOLMOD_REAL;
     rhs.dtype = CHOLMOD_DOUBLE;
-    const bool done = cholmod_solve2(CHOLMOD_A, factor_, &rhs, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_);
+    const bool done =
+        cholmod_solve2(CHOLMOD_A, factor_, &rhs, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_);
     if (done) x = Eigen::Map<const VectorX>(static_cast<const double*>(solution_->x), b.size());
     return {done, 0, 0.0};
   }
@@ -110,7 +111,8 @@ std::unique_ptr<LinearSolver> make_cholmod_solver(std::shared_ptr<const BlockPat
 #else
 
 std::unique_ptr<LinearSolver> make_cholmod_solver(std::shared_ptr<const BlockPattern>) {
-  throw std::invalid_argument("this build has no CHOLMOD (PLIANT_WITH_CHOLMOD=OFF); choose `iterative` or `simplicial`");
+  throw std::invalid_argument(
+      "this build has no CHOLMOD (PLIANT_WITH_CHOLMOD=OFF); choose `iterative` or `simplicial`");
 }
 
 #endif

@@ -40,7 +40,8 @@ void GeneralSolver::transpose() {
   for (int b = 0; b < pattern_->block_count(); ++b) {
     const int mirror = transposed_block_[std::size_t(b)];
     if (mirror < b) continue;
-    const Matrix3 one = Eigen::Map<const Matrix3>(matrix_.block(b)), other = Eigen::Map<const Matrix3>(matrix_.block(mirror));
+    const Matrix3 one = Eigen::Map<const Matrix3>(matrix_.block(b)),
+                  other = Eigen::Map<const Matrix3>(matrix_.block(mirror));
     Eigen::Map<Matrix3>(matrix_.block(b)) = other.transpose();
     Eigen::Map<Matrix3>(matrix_.block(mirror)) = one.transpose();
   }

@@ -4,9 +4,9 @@
 
 namespace pliant {
 
-/// Solves A x = b and A^T x = b for a matrix that is nearly symmetric: exact stiffnesses with the rotations' derivative,
-/// whose pattern is symmetric though their numbers are not quite. GMRES without restarts, preconditioned by a
-/// factorisation of the symmetric part; where A is symmetric that is one back-substitution.
+/// Solves A x = b and A^T x = b for a matrix that is nearly symmetric: exact stiffnesses with the rotations'
+/// derivative, whose pattern is symmetric though their numbers are not quite. GMRES without restarts, preconditioned by
+/// a factorisation of the symmetric part; where A is symmetric that is one back-substitution.
 class GeneralSolver {
  public:
   /// @param kind  of the factorisation: a direct one; Automatic takes the best that is built in

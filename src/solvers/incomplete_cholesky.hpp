@@ -21,13 +21,13 @@ class IncompleteCholesky {
     int left, right;  // L_ik and L_jk, k < j < i
   };
   int rows_;
-  std::vector<int> row_start_, column_;       // strictly lower blocks
-  std::vector<int> source_, source_diagonal_; // where they are in the matrix
-  std::vector<int> product_start_;            // for each lower block, its products
+  std::vector<int> row_start_, column_;        // strictly lower blocks
+  std::vector<int> source_, source_diagonal_;  // where they are in the matrix
+  std::vector<int> product_start_;             // for each lower block, its products
   std::vector<Product> products_;
-  std::vector<double> lower_;                 // 9 a block, column by column
-  std::vector<float> forward_, backward_;     // the same blocks, column by column and row by row
-  std::vector<double> inverse_diagonal_;      // inverse of each row's lower triangular pivot, column by column
+  std::vector<double> lower_;              // 9 a block, column by column
+  std::vector<float> forward_, backward_;  // the same blocks, column by column and row by row
+  std::vector<double> inverse_diagonal_;   // inverse of each row's lower triangular pivot, column by column
   mutable std::vector<float> work_;
 };
 

@@ -10,8 +10,8 @@ namespace pliant {
 /// What one solve did.
 struct SolveSummary {
   bool converged = false;
-  int iterations = 0;      ///< 0 for direct solvers
-  double residual = 0.0;   ///< |b - A x| / |b|, as the iteration saw it; 0 for direct solvers
+  int iterations = 0;     ///< 0 for direct solvers
+  double residual = 0.0;  ///< |b - A x| / |b|, as the iteration saw it; 0 for direct solvers
 };
 
 /// Solves A x = b for symmetric positive definite A with an unchanging pattern.

@@ -147,7 +147,8 @@ TEST_P(Elastic, ControlModuliMixInTheLogarithm) {
   }
   theta3.tail(2).setConstant(1000.0);
   moduli.set_parameters(theta3);
-  for (int e = 0; e < n; ++e) EXPECT_NEAR(moduli[e], 1000.0, tolerance(1e-9)) << "equal controls are a homogeneous object";
+  for (int e = 0; e < n; ++e)
+    EXPECT_NEAR(moduli[e], 1000.0, tolerance(1e-9)) << "equal controls are a homogeneous object";
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Elastic, ::testing::ValuesIn(test::body_kinds()),

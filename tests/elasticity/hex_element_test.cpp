@@ -42,8 +42,10 @@ TEST_P(HexElement, HasSixRigidModesAndIsOtherwisePositive) {
     const double scale = K.norm();
     EXPECT_LT((K - K.transpose()).norm(), tolerance(1e-14) * scale);
     for (int d = 0; d < 3; ++d) {
-      EXPECT_LT((K * nodal([&](const Vector3&) -> Vector3 { return Vector3::Unit(d); })).norm(), tolerance(1e-13) * scale);
-      EXPECT_LT((K * nodal([&](const Vector3& p) -> Vector3 { return Vector3::Unit(d).cross(p) / h; })).norm(), tolerance(1e-13) * scale);
+      EXPECT_LT((K * nodal([&](const Vector3&) -> Vector3 { return Vector3::Unit(d); })).norm(),
+                tolerance(1e-13) * scale);
+      EXPECT_LT((K * nodal([&](const Vector3& p) -> Vector3 { return Vector3::Unit(d).cross(p) / h; })).norm(),
+                tolerance(1e-13) * scale);
     }
     const Vector24 eigenvalues = Eigen::SelfAdjointEigenSolver<Matrix24>(K).eigenvalues();
     EXPECT_GT(eigenvalues[0], -tolerance(1e-13) * scale);
@@ -77,12 +79,15 @@ TEST_P(HexElement, DerivativeByPoissonsRatioMatchesCentralDifferences) {
     for (const double nu : {0.1, 0.35, 0.48}) {
       const Matrix24 dK = hex_stiffness(q, h, nu, GetParam()).d_poissons_ratio;
       ASSERT_GT(dK.norm(), 0.0);
-      const auto along = [&](double step) -> VectorX { return hex_stiffness(q, h, nu + step, GetParam()).value.reshaped(); };
+      const auto along = [&](double step) -> VectorX {
+        return hex_stiffness(q, h, nu + step, GetParam()).value.reshaped();
+      };
       EXPECT_LT(test::best_relative_error(along, dK.reshaped(), 0.1), tolerance(1e-8));
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formulations, HexElement, ::testing::Values(HexFormulation::IncompatibleModes, HexFormulation::Trilinear));
+INSTANTIATE_TEST_SUITE_P(Formulations, HexElement,
+                         ::testing::Values(HexFormulation::IncompatibleModes, HexFormulation::Trilinear));
 
 /// Energy of pure bending, u_x = x y, u_y = -x^2 / 2 about the cell's middle, over the beam's: 1 where nothing locks.
 double bending_energy_ratio(HexFormulation formulation, double nu) {
@@ -137,7 +142,8 @@ TEST(UnitLame, DerivativesMatchCentralDifferences) {
       return Eigen::Vector2d(d.lambda, d.mu);
     };
     EXPECT_LT(test::best_relative_error(along, Eigen::Vector2d(c.d_lambda, c.d_mu), 0.1), tolerance(1e-9));
-    EXPECT_NEAR(c.mu * (3 * c.lambda + 2 * c.mu) / (c.lambda + c.mu), 1.0, tolerance(1e-12)) << "Young's modulus is one";
+    EXPECT_NEAR(c.mu * (3 * c.lambda + 2 * c.mu) / (c.lambda + c.mu), 1.0, tolerance(1e-12))
+        << "Young's modulus is one";
     EXPECT_NEAR(0.5 * c.lambda / (c.lambda + c.mu), nu, tolerance(1e-12));
   }
 }

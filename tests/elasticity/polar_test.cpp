@@ -27,7 +27,7 @@ Matrix3 with_stretches(const Vector3& s, std::mt19937& random) {
 }
 
 /// Stretches of generic poses: near rest, large, squeezed, nearly inverted, inverted, inverted and large.
-const std::vector<Vector3> stretches = {{1.0, 1.1, 0.9},  {3.0, 1.2, 0.4},   {0.9, 0.5, 0.05},  {1.2, 0.8, 0.001},
+const std::vector<Vector3> stretches = {{1.0, 1.1, 0.9},  {3.0, 1.2, 0.4},  {0.9, 0.5, 0.05},   {1.2, 0.8, 0.001},
                                         {1.3, 0.8, -0.2}, {2.0, 1.5, -0.9}, {0.02, 0.03, 0.01}, {50.0, 30.0, 4.0}};
 
 /// The closest rotation: R^T F symmetric, and tr(S) I - S positive, which no other stationary point has.
@@ -114,7 +114,8 @@ TEST(Polar, RateAdjointIsTheTransposeOfTheRate) {
     const Matrix3 dF = random_matrix(random);
     const Vector3 w_bar = random_matrix(random).col(0), w = rotation_rate(polar, dF);
     ASSERT_GT(w.norm(), 0.0);
-    EXPECT_NEAR(w.dot(w_bar), rotation_rate_adjoint(polar, w_bar).cwiseProduct(dF).sum(), tolerance(1e-13) * w.norm() * w_bar.norm());
+    EXPECT_NEAR(w.dot(w_bar), rotation_rate_adjoint(polar, w_bar).cwiseProduct(dF).sum(),
+                tolerance(1e-13) * w.norm() * w_bar.norm());
   }
 }
 

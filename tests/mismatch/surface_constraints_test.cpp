@@ -43,7 +43,8 @@ Vector3 bent(const Vector3& p, double angle = 1.2) {
   one.row(0) = p.transpose();
   const Matrix3 R = Eigen::AngleAxisd(angle, Vector3(0.3, -0.8, 0.5).normalized()).toRotationMatrix();
   const Vector3 s = p / major;
-  return R * (p + 0.1 * major * Vector3(std::sin(s.y() + 0.5 * s.z()), 0.5 * s.x() * s.z(), std::cos(s.x()))) + Vector3(0.02, 0.1, -0.03);
+  return R * (p + 0.1 * major * Vector3(std::sin(s.y() + 0.5 * s.z()), 0.5 * s.x() * s.z(), std::cos(s.x()))) +
+         Vector3(0.02, 0.1, -0.03);
 }
 Points bent(const Points& X) {
   Points x(X.rows(), 3);
@@ -126,7 +127,7 @@ TEST(SurfaceConstraints, ARigidlyMovedBodyKeepsTrueDistances) {
     for (const PointMatch& m : torus.constraints.match(observed(points), moved)) {
       ASSERT_GE(m.cell, 0);
       EXPECT_NEAR(m.distance, away, tolerance(1e-4));  // spacing^2 / (4 radius), of the distance's own grid
-      EXPECT_NEAR(m.stretch, 1.0, tolerance(0.05));  // spacing / (2 radius)
+      EXPECT_NEAR(m.stretch, 1.0, tolerance(0.05));    // spacing / (2 radius)
     }
   }
 }
@@ -145,7 +146,8 @@ TEST(SurfaceConstraints, PointsBeyondTheBandAreNotMatched) {
   const std::vector<Vector3> far = {Vector3(0.5, 0, 0), Vector3(0, 0.3, 0), Vector3(-1, -1, -1)};
   for (const PointMatch& m : torus.constraints.match(observed(far), torus.X())) EXPECT_EQ(m.cell, -1);
   // Within it every point is.
-  for (const PointMatch& m : torus.constraints.match(observed(torus_points(0.95 * band, 300)), torus.X())) EXPECT_GE(m.cell, 0);
+  for (const PointMatch& m : torus.constraints.match(observed(torus_points(0.95 * band, 300)), torus.X()))
+    EXPECT_GE(m.cell, 0);
   const auto matches = torus.constraints.match(observed(far), torus.X());
   EXPECT_EQ(torus.constraints.tangent(matches, torus.X()).norm(), 0.0);
   EXPECT_EQ(torus.constraints.adjoint(matches, VectorX::Ones(3)).norm(), 0.0);
@@ -186,7 +188,8 @@ TEST(SurfaceConstraints, FindsEveryCellAndTakesTheSmallestDistanceWhereTheBodyMe
   std::mt19937 random(4);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   std::vector<Vector3> points;
-  for (int n = 0; n < 400; ++n) points.emplace_back(0.07 * uniform(random), 0.05 * uniform(random), 0.1 * uniform(random));
+  for (int n = 0; n < 400; ++n)
+    points.emplace_back(0.07 * uniform(random), 0.05 * uniform(random), 0.1 * uniform(random));
   const auto matches = torus.constraints.match(observed(points), folded);
   int several = 0, found = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -195,7 +198,8 @@ TEST(SurfaceConstraints, FindsEveryCellAndTakesTheSmallestDistanceWhereTheBodyMe
     ++found;
     ASSERT_GE(matches[i].cell, 0) << points[i].transpose();
     const auto by_size = [](double a, double b) { return std::abs(a) < std::abs(b); };
-    const double least = *std::min_element(all.begin(), all.end(), by_size), most = *std::max_element(all.begin(), all.end(), by_size);
+    const double least = *std::min_element(all.begin(), all.end(), by_size),
+                 most = *std::max_element(all.begin(), all.end(), by_size);
     several += std::abs(most) > std::abs(least) + 1e-4;
     EXPECT_NEAR(std::abs(matches[i].distance), std::abs(least), tolerance(1e-8));
   }

@@ -80,7 +80,9 @@ struct Beam {
     }
     return std::sqrt(square);
   }
-  double bending() const { return frequency([](double s) { return Vector3(0, s * s, 0); }, 12); }
+  double bending() const {
+    return frequency([](double s) { return Vector3(0, s * s, 0); }, 12);
+  }
   /// Few iterations: bending lies lower, and rounding would lead there in the end.
   double stretching() const {
     return frequency([](double s) { return Vector3(std::sin(0.5 * std::numbers::pi * s), 0, 0); }, 2);
@@ -147,8 +149,10 @@ TEST_P(BeamTheory, ConvergesUnderRefinement) {
     errors.push_back(std::abs(Beam(cell, GetParam(), 0.3).deflection() / reference - 1.0));
     locked.push_back(std::abs(Beam(cell, GetParam(), 0.3, HexFormulation::Trilinear).deflection() / reference - 1.0));
   }
-  RecordProperty("errors", std::to_string(errors[0]) + " " + std::to_string(errors[1]) + " " + std::to_string(errors[2]));
-  RecordProperty("trilinear", std::to_string(locked[0]) + " " + std::to_string(locked[1]) + " " + std::to_string(locked[2]));
+  RecordProperty("errors",
+                 std::to_string(errors[0]) + " " + std::to_string(errors[1]) + " " + std::to_string(errors[2]));
+  RecordProperty("trilinear",
+                 std::to_string(locked[0]) + " " + std::to_string(locked[1]) + " " + std::to_string(locked[2]));
   // Trilinear cells converge from far away; with the modes what is left is the clamp's singular corners.
   EXPECT_GT(test::fitted_order(cells, locked), 1.3);
   for (const double error : errors) EXPECT_LT(error, test::tolerance(0.008));
@@ -162,7 +166,8 @@ TEST(Clamps, AgreeUnderRefinement) {
   const std::vector<double> cells = {edge, edge / 2, edge / 3};
   std::vector<double> differences;
   for (const double cell : cells)
-    differences.push_back(std::abs(Beam(cell, Clamp::Nitsche, 0.3).deflection() / Beam(cell, Clamp::Strong, 0.3).deflection() - 1.0));
+    differences.push_back(
+        std::abs(Beam(cell, Clamp::Nitsche, 0.3).deflection() / Beam(cell, Clamp::Strong, 0.3).deflection() - 1.0));
   RecordProperty("differences", std::to_string(differences[0]) + " " + std::to_string(differences[2]));
   EXPECT_LT(differences[2], 0.5 * differences[0]);
   EXPECT_LT(differences[2], 0.01);

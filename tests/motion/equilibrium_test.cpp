@@ -82,9 +82,9 @@ TEST_P(EquilibriumDerivatives, TangentAndAdjointMatchCentralDifferences) {
   direction[index] = index < theta::first_plane ? std::max(std::abs(theta[index]), 1.0) : 0.01;
   Simulation simulation(bar.body, bar.options);
   VectorX tangent;
-  const RolloutSummary summary = simulation.run(theta, direction, 0, [&](int, const State&, std::span<const State> tangents) {
-    return tangent = flat(tangents[0].x), true;
-  });
+  const RolloutSummary summary = simulation.run(
+      theta, direction, 0,
+      [&](int, const State&, std::span<const State> tangents) { return tangent = flat(tangents[0].x), true; });
   ASSERT_TRUE(summary.succeeded) << summary.failure;
   const auto along = [&](double h) -> VectorX { return flat(bar.positions(theta + h * direction)); };
   ASSERT_GT(tangent.norm(), 1e-9);
@@ -92,15 +92,19 @@ TEST_P(EquilibriumDerivatives, TangentAndAdjointMatchCentralDifferences) {
 
   const Points weight = test::deformed(bar.body->nodes, 0.3);
   VectorX theta_bar;
-  ASSERT_TRUE(simulation.run_adjoint(theta, 0, [](int, const State&) { return true; },
-                                     [&](int, const State&, Points& bar_x) { bar_x += weight; }, theta_bar).succeeded);
+  ASSERT_TRUE(simulation
+                  .run_adjoint(
+                      theta, 0, [](int, const State&) { return true; },
+                      [&](int, const State&, Points& bar_x) { bar_x += weight; }, theta_bar)
+                  .succeeded);
   const double by_tangent = flat(weight).dot(tangent);
   EXPECT_NEAR(theta_bar.dot(direction), by_tangent, tolerance(1e-8) * weight.norm() * tangent.norm());
 }
 
 INSTANTIATE_TEST_SUITE_P(Parameters, EquilibriumDerivatives,
-                         ::testing::Combine(::testing::Values(int(theta::youngs_modulus), int(theta::poissons_ratio), int(theta::density),
-                                                              theta::gravity + 1, theta::gravity + 2, theta::plane_point(0) + 2,
+                         ::testing::Combine(::testing::Values(int(theta::youngs_modulus), int(theta::poissons_ratio),
+                                                              int(theta::density), theta::gravity + 1,
+                                                              theta::gravity + 2, theta::plane_point(0) + 2,
                                                               theta::plane_normal(0)),
                                             ::testing::Bool()));
 

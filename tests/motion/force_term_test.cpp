@@ -160,7 +160,8 @@ TEST_P(ForceTerms, LagMatrixIsMinusTheDerivativeByLagPoint) {
     return y;
   };
   // Contact gives its share where it is needed, with the lag point at z itself: there is none.
-  const bool is_elastic = GetParam().name.find("Of") != std::string::npos && GetParam().name.find("Contact") == std::string::npos;
+  const bool is_elastic =
+      GetParam().name.find("Of") != std::string::npos && GetParam().name.find("Contact") == std::string::npos;
   const Points& at_lag = is_elastic ? lag : z;
   const VectorX y = product(at_lag, z);
   term->linearise(at_lag);
@@ -180,8 +181,10 @@ std::shared_ptr<const Body> with_three_moduli(Body body) {
 std::vector<Family> families() {
   std::vector<int> gravity = range(theta::gravity, 3);
   gravity.push_back(theta::density);
-  const auto elastic = [](std::string name, std::function<std::shared_ptr<const Body>()> body, std::vector<int> parameters) {
-    return Family{std::move(name), std::move(body), [](auto of) { return make_elasticity(of); }, true, true, std::move(parameters)};
+  const auto elastic = [](std::string name, std::function<std::shared_ptr<const Body>()> body,
+                          std::vector<int> parameters) {
+    return Family{std::move(name),      std::move(body), [](auto of) { return make_elasticity(of); }, true, true,
+                  std::move(parameters)};
   };
   std::vector<Family> list;
   for (const test::BodyKind& kind : test::body_kinds())
@@ -194,18 +197,22 @@ std::vector<Family> families() {
   };
   const auto contact = [](auto body) { return std::make_unique<PlaneContact>(body, 1, ContactOptions{2e5, 0.01}); };
   list.push_back({"PlaneContactOfTetrahedra", box(false), contact, true, true, range(theta::plane_point(1), 6)});
-  list.push_back({"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, range(theta::plane_point(1), 6)});
+  list.push_back(
+      {"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, range(theta::plane_point(1), 6)});
   const std::vector<Family> others = {
-          {"Gravity", small_torus, [](auto body) { return std::make_unique<Gravity>(*body); }, false, false, gravity},
-          {"PlaneContact", small_torus, contact, true, true, range(theta::plane_point(1), 6)},
-          {"FixedRegions", small_torus,
-           [](auto body) {
-             const Matrix3 R = Eigen::AngleAxisd(0.8, Vector3(1, -1, 2).normalized()).toRotationMatrix();
-             return std::make_unique<FixedRegions>(
-                 body, std::vector<Hold>{{[](const Vector3& p) { return p.x() > 0.07; }, R, Vector3(0.02, 0.01, -0.03)},
-                                         {[](const Vector3& p) { return p.z() < -0.08; }}});
-           },
-           false, true, {theta::youngs_modulus, theta::poissons_ratio}}};
+      {"Gravity", small_torus, [](auto body) { return std::make_unique<Gravity>(*body); }, false, false, gravity},
+      {"PlaneContact", small_torus, contact, true, true, range(theta::plane_point(1), 6)},
+      {"FixedRegions",
+       small_torus,
+       [](auto body) {
+         const Matrix3 R = Eigen::AngleAxisd(0.8, Vector3(1, -1, 2).normalized()).toRotationMatrix();
+         return std::make_unique<FixedRegions>(
+             body, std::vector<Hold>{{[](const Vector3& p) { return p.x() > 0.07; }, R, Vector3(0.02, 0.01, -0.03)},
+                                     {[](const Vector3& p) { return p.z() < -0.08; }}});
+       },
+       false,
+       true,
+       {theta::youngs_modulus, theta::poissons_ratio}}};
   list.insert(list.end(), others.begin(), others.end());
   return list;
 }

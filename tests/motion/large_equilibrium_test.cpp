@@ -19,7 +19,8 @@ TEST(Equilibrium, NearlyIncompressibleBeamDoesNotLock) {
 }
 
 /// A clamped strip under a dead load at its end, both large: the elastica with Z = 2 P L^2 / (E I) has its tip at
-/// (x, y) / L that elliptic integrals give (Bisshopp and Drucker 1945): for P L^2 / (E I) = 2, y / L = 0.4935, x / L = 0.8394.
+/// (x, y) / L that elliptic integrals give (Bisshopp and Drucker 1945): for P L^2 / (E I) = 2, y / L = 0.4935, x / L =
+/// 0.8394.
 TEST(Equilibrium, LargeDeflectionFollowsTheElastica) {
   const double thickness = 0.012;
   for (const bool quadratic : {true, false}) {

@@ -35,7 +35,7 @@ StepOptions step_options(double dt, double newmark_theta) {
 /// A body with elasticity, gravity and nodes held.
 struct Stepped {
   Stepped(std::shared_ptr<const Body> of, const VectorX& theta, const StepOptions& options, std::vector<int> held = {})
-      : body(of), stepper(of, terms(of), options) {
+      : body(std::move(of)), stepper(body, terms(body), options) {
     stepper.set_parameters(theta);
     stepper.hold(std::move(held));
   }
@@ -68,7 +68,7 @@ Eigen::Matrix<double, 6, 1> momentum(const Body& body, double density, const Sta
 
 double total_energy(const std::shared_ptr<const Body>& body, const VectorX& theta, const State& state) {
   const auto term = make_elasticity(body);
-    Elasticity& elasticity = *term;
+  Elasticity& elasticity = *term;
   elasticity.set_parameters(theta);
   elasticity.linearise(state.x);
   Points p = Points::Zero(state.v.rows(), 3);
@@ -98,7 +98,8 @@ TEST(Stepper, FreeFallIsExact) {
     state.v.rowwise() += v.transpose();
     for (int s = 0; s < steps; ++s) scene.step(state);
     const double t = steps * dt;
-    // Constant acceleration is what the rule integrates exactly for theta = 1/2; beyond, each step adds (theta - 1/2) dt^2 g.
+    // Constant acceleration is what the rule integrates exactly for theta = 1/2; beyond, each step adds (theta - 1/2)
+    // dt^2 g.
     const Vector3 moved = t * v + (0.5 * t * t + (blend - 0.5) * dt * t) * g;
     const Points expected = body->reference_positions().rowwise() + moved.transpose();
     EXPECT_LT((state.x - expected).cwiseAbs().maxCoeff(), tolerance(1e-11)) << blend;
@@ -132,10 +133,13 @@ TEST(Stepper, KeepsLinearMomentumAndAngularMomentumToItsOrder) {
     predicted.push_back((angular_drift(dt, 0.5) - limit).norm());
   }
   RecordProperty("limit", std::to_string(limit.norm() * 1e6) + "e-6");
-  RecordProperty("lagged", std::to_string(lagged.back()) + ", order " + std::to_string(test::fitted_order(dts, lagged)));
-  RecordProperty("predicted", std::to_string(predicted.back()) + ", order " + std::to_string(test::fitted_order(dts, predicted)));
+  RecordProperty("lagged",
+                 std::to_string(lagged.back()) + ", order " + std::to_string(test::fitted_order(dts, lagged)));
+  RecordProperty("predicted",
+                 std::to_string(predicted.back()) + ", order " + std::to_string(test::fitted_order(dts, predicted)));
   EXPECT_GT(test::fitted_order(dts, lagged), 0.8);
-  EXPECT_LT(test::fitted_order(dts, lagged), 1.4) << "rotations of the start are of first order: the test sees the difference";
+  EXPECT_LT(test::fitted_order(dts, lagged), 1.4)
+      << "rotations of the start are of first order: the test sees the difference";
   EXPECT_GT(test::fitted_order(dts, predicted), 1.6);
 }
 
@@ -216,7 +220,8 @@ struct Mode {
 
 TEST(Stepper, FreeOscillationHasTheModesFrequencyAndOrderTwo) {
   Mode mode;
-  for (const auto& [alpha, beta] : {std::pair{0.0, 0.0}, std::pair{1.0, 0.0}, std::pair{0.0, 0.004}, std::pair{1.0, 0.004}}) {
+  for (const auto& [alpha, beta] :
+       {std::pair{0.0, 0.0}, std::pair{1.0, 0.0}, std::pair{0.0, 0.004}, std::pair{1.0, 0.004}}) {
     mode.theta[theta::mass_damping] = alpha;
     mode.theta[theta::stiffness_damping] = beta;
     EXPECT_NEAR(mode.order(0.5, {50, 100, 200, 400}), 2.0, 0.1) << "alpha " << alpha << " beta " << beta;

@@ -26,7 +26,8 @@ struct Chain {
       for (int b = pattern->row_start[row]; b < pattern->row_start[row + 1]; ++b)
         for (int k = 0; k < 9; ++k) {
           const bool diagonal = pattern->column[b] == row;
-          const double symmetric = (k % 4 == 0 ? (diagonal ? 2.5 : -1.0) : 0.0) - (diagonal && k % 4 == 0 ? shift : 0.0);
+          const double symmetric =
+              (k % 4 == 0 ? (diagonal ? 2.5 : -1.0) : 0.0) - (diagonal && k % 4 == 0 ? shift : 0.0);
           spd.block(b)[k] = symmetric + (diagonal && k % 4 == 0 ? shift : 0.0);
           matrix.block(b)[k] = symmetric + asymmetry * uniform(random);
         }

@@ -164,7 +164,8 @@ TEST_P(EverySolver, ReportsNumbersThatAreNone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, EverySolver,
-                         ::testing::Values(SolverKind::Automatic, SolverKind::Iterative, SolverKind::Cholmod, SolverKind::Simplicial));
+                         ::testing::Values(SolverKind::Automatic, SolverKind::Iterative, SolverKind::Cholmod,
+                                           SolverKind::Simplicial));
 
 TEST(LinearSolvers, AreWhatTheirNamesSay) {
   const BlockMatrix A = chain(3);

@@ -20,12 +20,12 @@ inline Box centred_box(const Vector3& half) {
 /// Distance to a torus around the y axis, resampled at `spacing`.
 inline SignedDistance torus_distance(double major, double minor, double spacing, double margin) {
   const Vector3 half(major + minor + margin, minor + margin, major + minor + margin);
-  return SignedDistance(centred_box(half), spacing, [=](const Vector3& p) {
-    return std::hypot(std::hypot(p.x(), p.z()) - major, p.y()) - minor;
-  });
+  return SignedDistance(centred_box(half), spacing,
+                        [=](const Vector3& p) { return std::hypot(std::hypot(p.x(), p.z()) - major, p.y()) - minor; });
 }
 
-inline std::shared_ptr<const Body> torus_body(double major, double minor, double cell_size, const BodyOptions& options = {}) {
+inline std::shared_ptr<const Body> torus_body(double major, double minor, double cell_size,
+                                              const BodyOptions& options = {}) {
   const SignedDistance distance = torus_distance(major, minor, cell_size / 6, 3 * cell_size);
   const Box box = centred_box(Vector3(major + minor, minor, major + minor));
   return std::make_shared<Body>(make_body(make_hex_grid(distance, box, cell_size), options));
@@ -52,11 +52,12 @@ inline std::shared_ptr<const Body> box_body(const Vector3& size, double cell_siz
     const Vector3 q = p.cwiseAbs() - half;
     return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0) - trace;
   });
-  return std::make_shared<Body>(make_body(make_hex_grid(distance, centred_box(half * (1.0 - 1e-9)), cell_size), options));
+  return std::make_shared<Body>(
+      make_body(make_hex_grid(distance, centred_box(half * (1.0 - 1e-9)), cell_size), options));
 }
 
-/// A box around the origin of structured tetrahedra, six a cell, with its inner nodes moved about so that no two elements
-/// are congruent.
+/// A box around the origin of structured tetrahedra, six a cell, with its inner nodes moved about so that no two
+/// elements are congruent.
 inline std::shared_ptr<const Body> tet_body(const Vector3& size, const Eigen::Vector3i& cells, bool quadratic,
                                             double distortion = 0.15, const BodyOptions& options = {}) {
   TetMesh mesh = make_tet_box(centred_box(0.5 * size), cells, false);
@@ -80,9 +81,13 @@ inline std::vector<BodyKind> body_kinds() {
   const auto torus = [](HexFormulation formulation) {
     return [formulation] { return torus_body(0.1, 0.04, 0.05, {formulation, MassKind::Consistent}); };
   };
-  const auto box = [](bool quadratic) { return [quadratic] { return tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, quadratic); }; };
-  return {{"Hexahedra", torus(HexFormulation::IncompatibleModes)}, {"TrilinearHexahedra", torus(HexFormulation::Trilinear)},
-          {"Tetrahedra", box(false)}, {"QuadraticTetrahedra", box(true)}};
+  const auto box = [](bool quadratic) {
+    return [quadratic] { return tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, quadratic); };
+  };
+  return {{"Hexahedra", torus(HexFormulation::IncompatibleModes)},
+          {"TrilinearHexahedra", torus(HexFormulation::Trilinear)},
+          {"Tetrahedra", box(false)},
+          {"QuadraticTetrahedra", box(true)}};
 }
 
 /// Generic, but smooth and of moderate size: rotates, stretches, shears and bends.
@@ -92,7 +97,8 @@ inline Points deformed(const Points& rest, double amount, double rotation_angle 
   Points out(rest.rows(), 3);
   for (Eigen::Index n = 0; n < rest.rows(); ++n) {
     const Vector3 s = rest.row(n).transpose() / size;
-    const Vector3 u(std::sin(3 * s.y()) + s.x() * s.z(), 0.7 * std::cos(2 * s.x() + s.z()) - 0.4 * s.y(), s.x() * s.y() + 0.5 * s.z());
+    const Vector3 u(std::sin(3 * s.y()) + s.x() * s.z(), 0.7 * std::cos(2 * s.x() + s.z()) - 0.4 * s.y(),
+                    s.x() * s.y() + 0.5 * s.z());
     out.row(n) = (size * (R * (s + amount * u)) + Vector3(0.01, -0.02, 0.03) * size).transpose();
   }
   return out;

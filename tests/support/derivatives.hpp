@@ -10,7 +10,8 @@ namespace pliant::test {
 
 /// Central differences of a vector function over a range of steps, judged at the bottom of the V:
 /// the smallest |difference - derivative| / |derivative| over the steps h = scale * 10^-k.
-inline double best_relative_error(const std::function<VectorX(double)>& along, const VectorX& derivative, double scale) {
+inline double best_relative_error(const std::function<VectorX(double)>& along, const VectorX& derivative,
+                                  double scale) {
   double best = std::numeric_limits<double>::infinity();
   const double norm = derivative.norm();
   for (int k = 2; k <= 9; ++k) {

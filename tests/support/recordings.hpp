@@ -38,9 +38,9 @@ inline ParameterSet torus_parameters(const VectorX& theta, int planes) {
 }
 
 /// Every so many of the body's surface samples are seen in each frame, with noise along all three axes.
-inline Recording torus_recording(double cell_size, int frames, int planes, double noise, unsigned seed = 1, int points = 40,
-                                 double true_cell_size = 0.0, double true_step_share = 1.0, double solver_tolerance = 1e-13,
-                                 double spacing = 0.004) {
+inline Recording torus_recording(double cell_size, int frames, int planes, double noise, unsigned seed = 1,
+                                 int points = 40, double true_cell_size = 0.0, double true_step_share = 1.0,
+                                 double solver_tolerance = 1e-13, double spacing = 0.004) {
   const auto make_scene = [&](double cell) {
     TorusScene scene = torus_scene(cell, frames, SolverKind::Iterative, solver_tolerance);
     if (planes == 0) {
@@ -74,7 +74,8 @@ inline Recording torus_recording(double cell_size, int frames, int planes, doubl
     for (int i = 0; i < points; ++i) {
       const Eigen::Index row = (Eigen::Index(i) * x.rows() / points + 7 * frame) % x.rows();
       const double sigma = noise > 0.0 ? noise : 1e-3;
-      seen.points.push_back({Vector3(x.row(row).transpose()) + noise * Vector3(normal(random), normal(random), normal(random)), sigma});
+      seen.points.push_back(
+          {Vector3(x.row(row).transpose()) + noise * Vector3(normal(random), normal(random), normal(random)), sigma});
     }
     r.observations->push_back(std::move(seen));
     return true;
