@@ -47,7 +47,7 @@ class Simulation {
   const Body& body() const { return *body_; }
   const SimulationOptions& options() const { return options_; }
   int frame_count() const { return int(options_.times.size()); }
-  int theta_size() const { return theta::size(options_.planes); }
+  int theta_size() const { return theta::size(options_.planes, body_->modulus.controls); }
 
   /// Called at each frame, also the first, with the state and its tangents; false ends the run there (as a success).
   using OnFrame = std::function<bool(int frame, const State& state, std::span<const State> tangents)>;

@@ -1,4 +1,7 @@
 // Followed points as observations: derivatives through the whole chain, and moduli found from them.
+#include <Eigen/LU>
+#include <random>
+
 #include "elasticity/modulus_field.hpp"
 #include "estimation/objective.hpp"
 #include "estimation/optimiser.hpp"
@@ -127,17 +130,22 @@ INSTANTIATE_TEST_SUITE_P(Motions, FollowedPoints,
                                            Kind{"at_rest", Integrator::Lagged, true}),
                          [](const auto& kind) { return kind.param.name; });
 
-/// One per cent of the bar's length on every point.
-TEST(FollowedPointsWithNoise, LeadCloseToTheModuli) {
+/// One per cent of the bar's length on every point, twice what the fit believes: moduli lie within their deviations,
+/// which grow from the clamp, where all bending is, to the free end, where there is hardly any.
+TEST(FollowedPointsWithNoise, LeadToTheModuliWithinTheirDeviations) {
   const SwingingBar bar(Integrator::Lagged, false, 2e-3);
   Objective objective = bar.objective();
   const OptimiserSummary summary = minimise(objective, bar.start(), {});
   ASSERT_TRUE(summary.succeeded);
+  const MatrixX& H = summary.evaluation.gauss_newton;
+  const VectorX std = 2.0 * H.inverse().diagonal().cwiseSqrt();
   const VectorX found = bar.parameters.to_theta(summary.p);
   for (int k = 0; k < 3; ++k) {
     const int index = theta::modulus(k, 3, found.size());
-    EXPECT_NEAR(found[index] / bar.truth[index], 1.0, tolerance(0.1)) << k;
+    EXPECT_LT(std::abs(std::log(found[index] / bar.truth[index])), tolerance(3.0 * std[k])) << k;
   }
+  EXPECT_LT(std[0], 0.1);
+  EXPECT_GT(std[2], 3.0 * std[0]);
 }
 
 }  // namespace
