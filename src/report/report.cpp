@@ -316,7 +316,7 @@ std::string report_html(const ReportData& data) {
   html += headline(data.result);
   html += section("What this means", words(data));
   html += section("Seen and simulated", pictures(data));
-  html += section("Agreement over time", residual_plot(data.residuals));
+  html += section("Agreement over time", data.residuals.size() > 1 ? residual_plot(data.residuals) : "");
   html += section("How the estimation went", convergence(data));
   html += section("All parameters", parameter_table(data.result));
   html += section("Which parameters go together", correlation_table(data.correlations));
