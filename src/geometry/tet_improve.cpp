@@ -78,7 +78,9 @@ class Improver {
     for (const int t : tets) least = std::min(least, quality(tet(t)));
     return least;
   }
-  static bool is_gain(double before, double after) { return after > 0.0 && after > before + least_gain * std::abs(before); }
+  static bool is_gain(double before, double after) {
+    return after > 0.0 && after > before + least_gain * std::abs(before);
+  }
   static bool holds(const Tet& t, int node) { return std::ranges::find(t, node) != t.end(); }
 
   /// Elements that hold all given nodes.
@@ -168,7 +170,8 @@ class Improver {
         best[std::size_t(i * m + j)] = -perfect;
         for (int k = i + 1; k < j; ++k) {
           const auto [above, below] = pair(i, k, j);
-          const double q = std::min({quality(above), quality(below), best[std::size_t(i * m + k)], best[std::size_t(k * m + j)]});
+          const double q =
+              std::min({quality(above), quality(below), best[std::size_t(i * m + k)], best[std::size_t(k * m + j)]});
           if (q > best[std::size_t(i * m + j)]) best[std::size_t(i * m + j)] = q, apex[std::size_t(i * m + j)] = k;
         }
       }
@@ -201,9 +204,12 @@ class Improver {
   /// True where the boundary faces at edge ab may be exchanged for those at the chord between the ring's ends.
   bool may_exchange(int a, int b, const Ring& open) const {
     const int first = open.nodes.front(), last = open.nodes.back();
-    const auto normal = [&](int i, int j, int k) -> Vector3 { return (at(j) - at(i)).cross(at(k) - at(i)).normalized(); };
+    const auto normal = [&](int i, int j, int k) -> Vector3 {
+      return (at(j) - at(i)).cross(at(k) - at(i)).normalized();
+    };
     // (a, b, first, ...) is positively oriented and `first` is reached first: face a b first looks out of the mesh.
-    const std::array<Vector3, 4> normals = {normal(a, first, b), normal(a, b, last), normal(a, first, last), normal(b, last, first)};
+    const std::array<Vector3, 4> normals = {normal(a, first, b), normal(a, b, last), normal(a, first, last),
+                                            normal(b, last, first)};
     for (const Vector3& n : normals)
       for (const Vector3& other : normals)
         if (!(n.dot(other) > std::cos(flat_deg * std::numbers::pi / 180.0))) return false;
@@ -229,7 +235,8 @@ class Improver {
     if (pair.size() != 2) return false;
     std::array<int, 2> far;
     for (int s = 0; s < 2; ++s)
-      far[std::size_t(s)] = *std::ranges::find_if(tet(pair[std::size_t(s)]), [&](int n) { return std::ranges::find(face, n) == face.end(); });
+      far[std::size_t(s)] = *std::ranges::find_if(tet(pair[std::size_t(s)]),
+                                                  [&](int n) { return std::ranges::find(face, n) == face.end(); });
     if (!around<2>({far[0], far[1]}).empty()) return false;
     std::vector<Tet> by;
     for (int k = 0; k < 3; ++k) {
@@ -246,7 +253,9 @@ class Improver {
     return true;
   }
 
-  double volume(const Tet& t) const { return (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).dot(at(t[3]) - at(t[0])) / 6.0; }
+  double volume(const Tet& t) const {
+    return (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).dot(at(t[3]) - at(t[0])) / 6.0;
+  }
 
   // ---- a node inside: a pattern search for the place where its worst element is best
 

@@ -8,7 +8,7 @@
 namespace pliant {
 
 struct TetImprovement {
-  double least_dihedral_deg = 10.0;  ///< elements with an angle below it, or above 180 degrees less it, are worked on
+  double least_dihedral_deg = 15.0;  ///< elements with an angle below it, or above 180 degrees less it, are worked on
   double surface_tolerance = 0.0;    ///< [m] how far the boundary may move where two of its faces change their diagonal
 };
 

@@ -1,9 +1,5 @@
 #include <cmath>
 #include <cstdio>
-#include <map>
-#include <numbers>
-#include <numeric>
-#include <set>
 
 #include "base/error.hpp"
 #include "geometry/mesh_io.hpp"
@@ -24,17 +20,68 @@
 #include <CGAL/Random.h>
 #include <CGAL/Side_of_triangle_mesh.h>
 #include <CGAL/make_mesh_3.h>
+
+#include <map>
+#include <numeric>
+
+#include "geometry/sharp_edges.hpp"
+#include "geometry/tet_improve.hpp"
 #endif
 
 namespace pliant {
 
 namespace {
 
-constexpr double most_tets = 2e6;
-
 [[noreturn]] void refuse(const std::string& found, const std::string& expected, const std::string& advice) {
   throw InputError({{}, found, expected, advice});
 }
+
+}  // namespace
+
+double default_tet_size(const TriangleMesh& surface, double cells_along_longest) {
+  return bounding_box(surface).extent().maxCoeff() / cells_along_longest;
+}
+
+#ifdef PLIANT_WITH_CGAL
+
+namespace {
+
+constexpr double most_tets = 2e6;
+constexpr double facet_tolerance = 0.1;  // of the cell size: how far faces may lie from the surface that is meshed
+constexpr double first_gap = 0.2;        // of the cell size: between a scan and the surface that encloses it
+
+namespace parameters = CGAL::parameters;
+namespace processing = CGAL::Polygon_mesh_processing;
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Polyhedron = CGAL::Mesh_polyhedron_3<Kernel>::type;
+using ScanTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, CGAL::AABB_face_graph_triangle_primitive<Polyhedron>>>;
+using ScanDomain = CGAL::Polyhedral_mesh_domain_with_features_3<Kernel>;
+using GapDomain = CGAL::Labeled_mesh_domain_3<Kernel>;
+template <class Domain>
+using Complex = CGAL::Mesh_complex_3_in_triangulation_3<typename CGAL::Mesh_triangulation_3<Domain>::type>;
+
+}  // namespace
+
+}  // namespace pliant
+
+namespace CGAL {
+// Before Mesh_3 throws, it writes what it has into the folder that the program happens to run in: not ours.
+template <bool IsStreamable>
+struct Dump_c3t3<pliant::Complex<pliant::ScanDomain>, IsStreamable> {
+  void dump_c3t3(const pliant::Complex<pliant::ScanDomain>&, const std::string&) const {}
+};
+template <bool IsStreamable>
+struct Dump_c3t3<pliant::Complex<pliant::GapDomain>, IsStreamable> {
+  void dump_c3t3(const pliant::Complex<pliant::GapDomain>&, const std::string&) const {}
+};
+}  // namespace CGAL
+
+namespace pliant {
+
+namespace {
+
+Kernel::Point_3 cgal(const Vector3& p) { return {p.x(), p.y(), p.z()}; }
 
 std::string text_of(double value) {
   char text[32];
@@ -61,156 +108,19 @@ void check_surface(const TriangleMesh& surface) {
 void check_size(const TriangleMesh& surface, double cell_size) {
   const double longest = bounding_box(surface).extent().maxCoeff();
   if (cell_size > longest)
-    refuse("tetrahedra of " + text_of(cell_size) + " m in an object of " + text_of(longest) + " m", "smaller ones than the object",
-           "choose smaller cells");
+    refuse("tetrahedra of " + text_of(cell_size) + " m in an object of " + text_of(longest) + " m",
+           "smaller ones than the object", "choose smaller cells");
   const double regular = std::pow(cell_size, 3) / (6.0 * std::sqrt(2.0));
   const double count = enclosed_volume(surface) / regular;
   if (count > most_tets)
-    refuse("tetrahedra of " + text_of(cell_size) + " m would be about " + text_of(count), "at most " + text_of(most_tets),
-           "choose larger cells");
+    refuse("tetrahedra of " + text_of(cell_size) + " m would be about " + text_of(count),
+           "at most " + text_of(most_tets), "choose larger cells");
 }
-
-/// Finds where elements have to keep an edge of the scan. Edges at which the surface folds back onto itself are faults of a
-/// scan, edges that end in the middle of the surface separate nothing, and parts much smaller than an element need no
-/// edges of their own.
-class SharpEdges {
- public:
-  SharpEdges(const TriangleMesh& surface, double angle_deg, double cell_size) : surface_(surface), angle_deg_(angle_deg) {
-    mark();
-    do drop_loose_ends();
-    while (drop_small_patches(0.25 * cell_size * cell_size));
-  }
-
-  /// Lines from corner to corner, or closed: first and last vertex are the same.
-  std::vector<std::vector<int>> lines() const {
-    std::map<int, std::vector<int>> neighbours;
-    for (const auto& [ends, edge] : edges_)
-      if (edge.is_sharp) {
-        neighbours[ends.first].push_back(ends.second);
-        neighbours[ends.second].push_back(ends.first);
-      }
-    std::set<std::pair<int, int>> walked;
-    std::vector<std::vector<int>> all;
-    const auto walk = [&](int from, int to) {
-      if (!walked.insert(std::minmax(from, to)).second) return;
-      all.push_back({from, to});
-      while (to != all.back().front() && !is_corner(to, neighbours.at(to))) {
-        const auto& next = neighbours.at(to);
-        to = next[0] == all.back().end()[-2] ? next[1] : next[0];
-        walked.insert(std::minmax(all.back().back(), to));
-        all.back().push_back(to);
-      }
-    };
-    for (const auto& [vertex, others] : neighbours)
-      if (is_corner(vertex, others))
-        for (const int other : others) walk(vertex, other);
-    for (const auto& [vertex, others] : neighbours) walk(vertex, others.front());  // what is left are closed lines
-    return all;
-  }
-
- private:
-  struct Edge {
-    std::array<int, 2> triangles = {-1, -1};
-    bool is_sharp = false;
-  };
-  static constexpr double fold_deg = 150.0;
-
-  Vector3 area_vector(int t) const {
-    const auto& [a, b, c] = surface_.triangles[std::size_t(t)];
-    const auto& v = surface_.vertices;
-    return 0.5 * (v[std::size_t(b)] - v[std::size_t(a)]).cross(v[std::size_t(c)] - v[std::size_t(a)]);
-  }
-
-  static double angle_deg(const Vector3& a, const Vector3& b) {
-    return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
-  }
-
-  void mark() {
-    for (int t = 0; t < int(surface_.triangles.size()); ++t)
-      for (int k = 0; k < 3; ++k) {
-        const auto& triangle = surface_.triangles[std::size_t(t)];
-        Edge& edge = edges_[std::minmax(triangle[k], triangle[(k + 1) % 3])];
-        edge.triangles[edge.triangles[0] >= 0] = t;
-      }
-    for (auto& [ends, edge] : edges_) {
-      const double angle = angle_deg(area_vector(edge.triangles[0]), area_vector(edge.triangles[1]));
-      edge.is_sharp = angle > angle_deg_ && angle < fold_deg;
-    }
-  }
-
-  void drop_loose_ends() {
-    std::vector<int> degree(surface_.vertices.size(), 0);
-    for (const auto& [ends, edge] : edges_)
-      if (edge.is_sharp) ++degree[std::size_t(ends.first)], ++degree[std::size_t(ends.second)];
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (auto& [ends, edge] : edges_) {
-        if (!edge.is_sharp || (degree[std::size_t(ends.first)] > 1 && degree[std::size_t(ends.second)] > 1)) continue;
-        --degree[std::size_t(ends.first)], --degree[std::size_t(ends.second)];
-        edge.is_sharp = false;
-        changed = true;
-      }
-    }
-  }
-
-  /// Patches are what sharp edges bound. Returns true where something was dropped.
-  bool drop_small_patches(double least_area) {
-    std::vector<int> parent(surface_.triangles.size());
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto root = [&](int t) {
-      while (parent[std::size_t(t)] != t) t = parent[std::size_t(t)] = parent[std::size_t(parent[std::size_t(t)])];
-      return std::size_t(t);
-    };
-    for (const auto& [ends, edge] : edges_)
-      if (!edge.is_sharp) parent[root(edge.triangles[0])] = int(root(edge.triangles[1]));
-    std::vector<double> area(parent.size(), 0.0);
-    for (int t = 0; t < int(parent.size()); ++t) area[root(t)] += area_vector(t).norm();
-    bool dropped = false;
-    for (auto& [ends, edge] : edges_) {
-      if (!edge.is_sharp || std::min(area[root(edge.triangles[0])], area[root(edge.triangles[1])]) >= least_area) continue;
-      edge.is_sharp = false;
-      dropped = true;
-    }
-    return dropped;
-  }
-
-  /// Where lines meet or one turns as sharply as surfaces have to.
-  bool is_corner(int vertex, const std::vector<int>& others) const {
-    if (others.size() != 2) return true;
-    const auto at = [&](int v) -> const Vector3& { return surface_.vertices[std::size_t(v)]; };
-    return angle_deg(at(vertex) - at(others[0]), at(others[1]) - at(vertex)) > angle_deg_;
-  }
-
-  const TriangleMesh& surface_;
-  double angle_deg_;
-  std::map<std::pair<int, int>, Edge> edges_;
-};
-
-}  // namespace
-
-double default_tet_size(const TriangleMesh& surface, double cells_along_longest) {
-  return bounding_box(surface).extent().maxCoeff() / cells_along_longest;
-}
-
-#ifdef PLIANT_WITH_CGAL
-
-namespace {
-
-namespace parameters = CGAL::parameters;
-namespace processing = CGAL::Polygon_mesh_processing;
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Polyhedron = CGAL::Mesh_polyhedron_3<Kernel>::type;
-using ScanDomain = CGAL::Polyhedral_mesh_domain_with_features_3<Kernel>;
-using GapDomain = CGAL::Labeled_mesh_domain_3<Kernel>;
-using Primitive = CGAL::AABB_face_graph_triangle_primitive<Polyhedron>;
-using ScanTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
-
-Kernel::Point_3 cgal(const Vector3& p) { return {p.x(), p.y(), p.z()}; }
 
 Polyhedron polyhedron_of(const TriangleMesh& surface) {
   if (!processing::is_polygon_soup_a_polygon_mesh(surface.triangles))
-    refuse("parts of the surface meet in a single vertex", "a surface that looks like a disc around each vertex", "repair the scan");
+    refuse("parts of the surface meet in a single vertex", "a surface that looks like a disc around each vertex",
+           "repair the scan");
   std::vector<Kernel::Point_3> points;  // of the vertices that a triangle uses
   std::vector<int> point_of_vertex(surface.vertices.size(), -1);
   auto triangles = surface.triangles;
@@ -232,17 +142,40 @@ Polyhedron polyhedron_of(const TriangleMesh& surface) {
   return polyhedron;
 }
 
-template <class Domain>
-using Complex = CGAL::Mesh_complex_3_in_triangulation_3<typename CGAL::Mesh_triangulation_3<Domain>::type>;
+/// One vertex of each connected part of a surface: its shells, outer ones and those of cavities.
+std::vector<Vector3> vertex_of_each_shell(const TriangleMesh& surface) {
+  std::vector<int> parent(surface.vertices.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int v) {
+    while (parent[std::size_t(v)] != v) v = parent[std::size_t(v)] = parent[std::size_t(parent[std::size_t(v)])];
+    return v;
+  };
+  for (const auto& [a, b, c] : surface.triangles) {
+    parent[std::size_t(root(b))] = root(a);
+    parent[std::size_t(root(c))] = root(a);
+  }
+  std::map<int, Vector3> shells;
+  for (const auto& triangle : surface.triangles)
+    shells.try_emplace(root(triangle[0]), surface.vertices[std::size_t(triangle[0])]);
+  std::vector<Vector3> vertices;
+  for (const auto& [shell, vertex] : shells) vertices.push_back(vertex);
+  return vertices;
+}
 
-/// Refines, removes slivers, and takes over the cells inside.
-template <class Domain, class Criteria>
-TetMesh mesh_of(const Domain& domain, const Criteria& criteria) {
+/// Refines, takes over the cells inside and makes the worst of them better. Slivers are perturbed, not exuded: CGAL's
+/// exudation depends on addresses.
+template <class Domain>
+TetMesh mesh_of(const Domain& domain, double h) {
+  const CGAL::Mesh_criteria_3<typename CGAL::Mesh_triangulation_3<Domain>::type> criteria(
+      parameters::edge_size = h, parameters::facet_angle = 25.0, parameters::facet_size = 0.6 * h,
+      parameters::facet_distance = facet_tolerance * h, parameters::cell_radius_edge_ratio = 2.0,
+      parameters::cell_size = 0.75 * h);
   CGAL::Mesh_error_code error = CGAL::CGAL_MESH_3_NO_ERROR;
   const std::size_t most_vertices = std::size_t(most_tets / 5.0);
   const auto complex = CGAL::make_mesh_3<Complex<Domain>>(
-      domain, criteria, parameters::perturb(), parameters::no_exude(),
-      parameters::mesh_3_options(parameters::maximal_number_of_vertices = most_vertices, parameters::pointer_to_error_code = &error));
+      domain, criteria, parameters::no_perturb(), parameters::no_exude(),
+      parameters::mesh_3_options(parameters::maximal_number_of_vertices = most_vertices,
+                                 parameters::pointer_to_error_code = &error));
   if (error == CGAL::CGAL_MESH_3_MAXIMAL_NUMBER_OF_VERTICES_REACHED)
     refuse("more than " + text_of(most_tets) + " tetrahedra", "fewer", "choose larger cells");
 
@@ -259,6 +192,7 @@ TetMesh mesh_of(const Domain& domain, const Criteria& criteria) {
     }
   }
   if (tets.empty()) refuse("no tetrahedron lies inside the object", "", "choose smaller cells");
+  improve(points, tets, {.surface_tolerance = 0.2 * facet_tolerance * h});
   Points nodes(Eigen::Index(points.size()), 3);
   for (std::size_t n = 0; n < points.size(); ++n) nodes.row(Eigen::Index(n)) = points[n].transpose();
   return make_tet_mesh(std::move(nodes), std::move(tets));
@@ -266,19 +200,56 @@ TetMesh mesh_of(const Domain& domain, const Criteria& criteria) {
 
 TetMesh conforming(const TriangleMesh& surface, const Polyhedron& scan, const TetMeshOptions& options) {
   if (processing::does_self_intersect(scan))
-    refuse("the surface intersects itself", "a surface without intersections", "repair the scan, or let the elements enclose it");
-  const double h = options.cell_size;
+    refuse("the surface intersects itself", "a surface without intersections",
+           "repair the scan, or let the elements enclose it");
+  const std::vector<Vector3> shells = vertex_of_each_shell(surface);
   ScanDomain domain(scan);
-  std::vector<std::vector<Kernel::Point_3>> polylines;
-  for (const std::vector<int>& line : SharpEdges(surface, options.feature_angle_deg, h).lines()) {
-    polylines.emplace_back();
-    for (const int v : line) polylines.back().push_back(cgal(surface.vertices[std::size_t(v)]));
+  std::vector<std::vector<Kernel::Point_3>> lines;
+  for (const std::vector<int>& line : sharp_lines(surface, options.feature_angle_deg, options.cell_size)) {
+    lines.emplace_back();
+    for (const int v : line) lines.back().push_back(cgal(surface.vertices[std::size_t(v)]));
   }
-  domain.add_features(polylines.begin(), polylines.end());
-  const CGAL::Mesh_criteria_3<CGAL::Mesh_triangulation_3<ScanDomain>::type> criteria(
-      parameters::edge_size = h, parameters::facet_angle = 25.0, parameters::facet_size = 0.6 * h,
-      parameters::facet_distance = 0.1 * h, parameters::cell_radius_edge_ratio = 2.0, parameters::cell_size = 0.75 * h);
-  return mesh_of(domain, criteria);
+  domain.add_features(lines.begin(), lines.end());
+  if (shells.size() > 1)  // the mesher might find only one of them by itself
+    for (const Vector3& vertex : shells) domain.add_corner(cgal(vertex));
+  TetMesh mesh = mesh_of(domain, options.cell_size);
+  for (const Vector3& vertex : shells) {
+    double nearest = std::numeric_limits<double>::max();
+    for (const SurfacePoint& p : mesh.surface) nearest = std::min(nearest, (p.position - vertex).norm());
+    if (nearest > options.cell_size)
+      refuse("a part of the surface is too small for tetrahedra of " + text_of(options.cell_size) + " m", "",
+             "choose smaller cells");
+  }
+  return mesh;
+}
+
+/// True where no face of the boundary meets the scan and no shell of it lies outside: then none of its points does.
+bool encloses(const TetMesh& mesh, const ScanTree& scan, const std::vector<Vector3>& shells) {
+  const auto corner = [&](int n) { return cgal(mesh.nodes.row(n).transpose()); };
+  for (const auto& [a, b, c] : mesh.boundary)
+    if (scan.do_intersect(Kernel::Triangle_3(corner(a), corner(b), corner(c)))) return false;
+  return std::ranges::all_of(shells, [&](const Vector3& v) { return mesh.locate(v).barycentric.minCoeff() > 0.0; });
+}
+
+TetMesh enclosing(const TriangleMesh& surface, const Polyhedron& scan, const TetMeshOptions& options) {
+  const std::vector<Vector3> shells = vertex_of_each_shell(surface);
+  const ScanTree tree(faces(scan).begin(), faces(scan).end(), scan);
+  const CGAL::Side_of_triangle_mesh<Polyhedron, Kernel> side(tree);
+  const Box box = bounding_box(surface);
+  for (double gap = first_gap * options.cell_size; gap < options.cell_size; gap *= 1.5) {
+    const auto beyond_gap = [&](const Kernel::Point_3& p) {
+      const double outside = std::sqrt(tree.squared_distance(p)) - gap;
+      return outside >= 0.0 && side(p) == CGAL::ON_BOUNDED_SIDE ? -outside : outside;
+    };
+    const double radius = 0.5 * box.extent().norm() + 2.0 * gap;
+    const Kernel::Sphere_3 bound(cgal(0.5 * (box.min + box.max)), 1.1 * radius * radius);
+    const double error = 0.01 * gap / radius;
+    const GapDomain domain =
+        GapDomain::create_implicit_mesh_domain(beyond_gap, bound, parameters::relative_error_bound = error);
+    TetMesh mesh = mesh_of(domain, options.cell_size);
+    if (encloses(mesh, tree, shells)) return mesh;
+  }
+  refuse("tetrahedra of " + text_of(options.cell_size) + " m do not enclose the surface", "", "choose smaller cells");
 }
 
 }  // namespace
@@ -287,10 +258,15 @@ TetMesh make_tet_mesh(const TriangleMesh& surface, const TetMeshOptions& options
   check_options(options);
   check_surface(surface);
   check_size(surface, options.cell_size);
-  CGAL::get_default_random() = CGAL::Random(0);
-  const Polyhedron scan = polyhedron_of(surface);
-  const TetMesh mesh = conforming(surface, scan, options);
-  return options.quadratic ? with_mid_nodes(mesh) : mesh;
+  try {
+    CGAL::get_default_random() = CGAL::Random(0);
+    const Polyhedron scan = polyhedron_of(surface);
+    const TetMesh mesh =
+        options.fit == TetFit::Enclosing ? enclosing(surface, scan, options) : conforming(surface, scan, options);
+    return options.quadratic ? with_mid_nodes(mesh) : mesh;
+  } catch (const std::logic_error& error) {  // of CGAL, and of what it gave
+    refuse(std::string("the mesher failed: ") + error.what(), "", "try another cell size, or repair the scan");
+  }
 }
 
 #else
