@@ -26,7 +26,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 struct Arguments {
-  std::string capture, out, config;
+  std::vector<std::string> captures;
+  std::string out, config, held_out;
   std::vector<std::string> settings;
   int threads = 0;
   std::optional<unsigned> seed;
@@ -123,16 +124,44 @@ void print_result(const Result& result, const FitOutcome& outcome, const fs::pat
   std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points; %s after %.0f s\n",
                 1e3 * result.error.surface_rms.value_or(0.0), result.error.points, outcome.reason.c_str(), seconds);
   std::cout << line;
+  const auto say_error = [](const RecordingResult& r, const char* what) {
+    char text[200];
+    std::snprintf(text, sizeof text, "  %s%s: ", what, r.name.c_str());
+    std::cout << text;
+    if (r.error.surface_rms) std::cout << 1e3 * *r.error.surface_rms << " mm rms of the surface ";
+    if (r.error.marker_rms) std::cout << 1e3 * *r.error.marker_rms << " mm rms of the markers ";
+    std::cout << "\n";
+  };
+  for (const RecordingResult& r : result.recordings) say_error(r, "");
+  if (result.held_out) say_error(*result.held_out, "held out, ");
   for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
   std::cout << "Look at " << (out / "report.html").string() << "; simulate with: pliant simulate "
             << (out / "model.toml").string() << " --out DIR\n";
+}
+
+/// What the fit predicts of a recording that took no part in it.
+RecordingResult score_held_out(const RecordedCapture& held_out, const FitOutcome& outcome, const FitOptions& options,
+                               FitMonitor monitor) {
+  monitor.on_state = {};  // of another fit
+  const FitOutcome scored = score(held_out, outcome, options, monitor);
+  RecordingResult result{held_out.capture.name, held_out.capture.sha256, {}};
+  if (scored.evaluation.succeeded) result.error = surface_errors(scored.evaluation).error;
+  return result;
 }
 
 int run(const Arguments& arguments) {
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const FitOptions options = read_options(arguments);
-  const Capture capture = read_capture(arguments.capture);
+  std::vector<RecordedCapture> recordings;
+  std::optional<RecordedCapture> held_out;
+  std::string words, fingerprint;
+  for (const std::string& path : arguments.captures) {
+    recordings.push_back({read_capture(path), {}});
+    words += (words.empty() ? "" : " ") + path;
+    fingerprint += recordings.back().capture.sha256 + "\n";
+  }
+  if (!arguments.held_out.empty()) held_out = RecordedCapture{read_capture(arguments.held_out), {}};
   const fs::path out = arguments.out;
   fs::create_directories(out);
 
@@ -141,14 +170,18 @@ int run(const Arguments& arguments) {
     threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(arguments.threads));
 
   Log log;
-  log.line("pliant " PLIANT_VERSION " fit " + arguments.capture);
+  log.line("pliant " PLIANT_VERSION " fit " + words);
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
-  const auto observed =
-      observe(capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
-  stop_if_interrupted();
+  const auto read = [&](RecordedCapture& recording) {
+    recording.observed = observe(recording.capture, observe_options,
+                                 [](int done, int total) { show_progress("read", done, total); });
+    stop_if_interrupted();
+  };
+  for (RecordedCapture& recording : recordings) read(recording);
+  if (held_out) read(*held_out);
 
-  const std::string key = capture.sha256 + "\n" + to_toml(options);
+  const std::string key = fingerprint + to_toml(options);
   const fs::path state_file = out / "state.json";
   FitState state;
   if (arguments.resume) {
@@ -168,7 +201,7 @@ int run(const Arguments& arguments) {
   monitor.on_event = [&](const FitEvent& event) { log.live(describe(event, seconds())); };
   monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
   monitor.interrupted = [] { return is_interrupted(); };
-  const FitOutcome outcome = fit(capture, observed, options, monitor, std::move(state));
+  const FitOutcome outcome = fit(recordings, options, monitor, std::move(state));
   log.clear_live();
   if (outcome.interrupted && !fs::exists(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
   if (!outcome.evaluation.succeeded) {
@@ -176,14 +209,17 @@ int run(const Arguments& arguments) {
     write_file(out / "log.txt", log.text());
     return outcome.interrupted ? WasInterrupted : NotConverged;
   }
-  const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, arguments.capture, seconds()};
-  write_fit_output(out, capture, observed, outcome, facts, show_progress);
-  const Result result = make_result(capture, outcome, facts);
+  RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
+  Result result = make_result(recordings, outcome, facts);
+  if (held_out && !outcome.interrupted) result.held_out = score_held_out(*held_out, outcome, options, monitor);
+  result.time.wall_seconds = facts.wall_seconds = seconds();
+  log.clear_live();
+  write_fit_output(out, recordings, outcome, result, facts, show_progress);
   log.line(outcome.reason);
   write_file(out / "log.txt", log.text());
   print_result(result, outcome, out, seconds());
   if (outcome.interrupted) {
-    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << arguments.capture << " --out "
+    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out "
               << out.string() << " --resume\n";
     return WasInterrupted;
   }
@@ -212,8 +248,14 @@ std::string key_help() {
 void add_fit(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("fit", "Estimate stiffness, damping and what else a recording leaves unknown");
-  command->add_option("capture", arguments->capture, "the recording: a folder with capture.toml in it")
+  command
+      ->add_option("captures", arguments->captures,
+                   "recordings of one object: folders with capture.toml in them; they share its material")
       ->required()
+      ->type_name("CAPTURE...");
+  command
+      ->add_option("--hold-out", arguments->held_out,
+                   "a recording that takes no part in the fit; how well it is predicted stands in the result")
       ->type_name("CAPTURE");
   command->add_option("--out,-o", arguments->out, "folder for the result")->required()->type_name("DIR");
   command->add_option("--config", arguments->config, "choices (TOML); none is needed")->type_name("FILE");

@@ -44,6 +44,8 @@ struct Initial {
   Vector3 angular_velocity = Vector3::Zero();  ///< [rad/s], about the centre of mass
   bool known = true;
   bool released = false;
+  /// Of a model or scene whose object is released: what pulls it until then, in the unit of `Pull`.
+  std::vector<Vector3> pulls = {};
 };
 
 /// Paths of one file a frame: a printf pattern like "front/%06d.png", relative to the capture's folder.

@@ -126,6 +126,7 @@ Initial read_initial(TomlTable table) {
   initial.angular_velocity = table.optional<Vector3>("angular_velocity").value_or(Vector3::Zero());
   initial.known = table.optional<bool>("known").value_or(true);
   initial.released = table.optional<bool>("released").value_or(false);
+  initial.pulls = table.optional<std::vector<Vector3>>("pulls").value_or(std::vector<Vector3>{});
   table.finish();
   return initial;
 }
@@ -205,7 +206,13 @@ void write_toml(std::ostream& out, const Initial& initial) {
   out << "[initial]\nlinear_velocity = " << toml_text(initial.linear_velocity)
       << "   # m/s, of the centre of mass\nangular_velocity = " << toml_text(initial.angular_velocity)
       << "   # rad/s\nknown = " << (initial.known ? "true" : "false")
-      << "\nreleased = " << (initial.released ? "true" : "false") << "\n\n";
+      << "\nreleased = " << (initial.released ? "true" : "false") << "\n";
+  if (!initial.pulls.empty()) {
+    out << "pulls = [";
+    for (std::size_t k = 0; k < initial.pulls.size(); ++k) out << (k > 0 ? ", " : "") << toml_text(initial.pulls[k]);
+    out << "]   # what holds the object until it is released, times its size about how far each moves it\n";
+  }
+  out << "\n";
 }
 
 void write_toml(std::ostream& out, const FixedRegion& fixed, const std::string& vertices_file) {

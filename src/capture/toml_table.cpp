@@ -89,6 +89,15 @@ std::optional<Mismatch> convert(const toml::node& node, Vector3& value) {
   return convert_list<3>(node, value, "three numbers [x, y, z]");
 }
 
+std::optional<Mismatch> convert(const toml::node& node, std::vector<Vector3>& values) {
+  const toml::array* list = node.as_array();
+  if (!list) return Mismatch{kind_of(node), "a list of vectors [[x, y, z], ...]", ""};
+  for (const toml::node& item : *list)
+    if (auto mismatch = convert(item, values.emplace_back()))
+      return Mismatch{mismatch->found + " as vector " + std::to_string(values.size()), mismatch->expected, ""};
+  return {};
+}
+
 std::optional<Mismatch> convert(const toml::node& node, RigidMotion& value) {
   const toml::array* rows = node.as_array();
   const char* expected = "a 4 x 4 matrix, row by row: [[..4 numbers..], [..], [..], [0, 0, 0, 1]]";
@@ -192,6 +201,7 @@ PLIANT_INSTANTIATE(int)
 PLIANT_INSTANTIATE(bool)
 PLIANT_INSTANTIATE(std::string)
 PLIANT_INSTANTIATE(Vector3)
+PLIANT_INSTANTIATE(std::vector<Vector3>)
 PLIANT_INSTANTIATE(RigidMotion)
 #undef PLIANT_INSTANTIATE
 

@@ -53,7 +53,8 @@ class TomlTable {
  public:
   TomlTable(const toml::table& table, std::string key, TomlContext& context);
 
-  /// `double` (finite), `int`, `bool`, `std::string`, `Vector3`, `RigidMotion` (4 x 4, row by row).
+  /// `double` (finite), `int`, `bool`, `std::string`, `Vector3`, a list of them, `RigidMotion` (4 x 4, row by
+  /// row).
   template <class T>
   std::optional<T> optional(const std::string& name);
   /// The same; complains where it is missing. @param advice  what to write

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -22,28 +23,40 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+void change_parameter(Parameter& parameter, const FitOptions::Override& change, VectorX& theta) {
+  if (change.start) {
+    const int numbers = parameter.is_scalar() ? 1 : 3;
+    if (change.start->size() != numbers || parameter.transform == Transform::PlanePosition)
+      throw InputError({{},
+                        "the start of " + parameter.name + " has " + std::to_string(change.start->size()) + " numbers",
+                        parameter.transform == Transform::PlanePosition ? "planes to start where the capture has them"
+                                                                        : std::to_string(numbers) + " numbers",
+                        ""});
+    if (parameter.transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
+      throw InputError({{}, "the start of " + parameter.name + " is not positive", "a number above 0", ""});
+    theta.segment(parameter.theta_index, numbers) = *change.start;
+    for (const int other : parameter.also) theta[other] = (*change.start)[0];
+    if (parameter.transform == Transform::Direction) parameter.origin = *change.start;
+  }
+  if (change.estimated) parameter.estimated = *change.estimated;
+  if (change.prior_std) parameter.prior_std = *change.prior_std;
+}
+
 void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
   VectorX theta = parameters.reference();
   std::vector<Parameter> list = parameters.parameters();
-  for (const auto& entry : options.parameters) {
-    const std::string& name = entry.first;
-    const FitOptions::Override& change = entry.second;
-    const auto it = std::find_if(list.begin(), list.end(), [&](const Parameter& p) { return p.name == name; });
-    if (it == list.end())
+  for (const auto& [name, change] : options.parameters) {
+    std::vector<Parameter*> meant;
+    for (Parameter& p : list)
+      if (p.name == name) meant.push_back(&p);
+    // A name alone means those of all sensors, pulls and recordings, but for the modulus of the object's own material.
+    for (Parameter& p : list)
+      if (meant.empty() || name != "youngs_modulus")
+        if (p.name.size() > name.size() && p.name.starts_with(name) && (p.name[name.size()] == '@' || p.name[name.size()] == '['))
+          meant.push_back(&p);
+    if (meant.empty())
       throw InputError({{}, "there is no parameter \"" + name + "\" in this recording", "", "see `pliant fit --help`"});
-    if (change.start) {
-      if (change.start->size() != it->dimension() || it->transform == Transform::PlanePosition)
-        throw InputError({{},
-                          "the start of " + name + " has " + std::to_string(change.start->size()) + " numbers",
-                          it->transform == Transform::PlanePosition ? "planes to start where the capture has them"
-                                                                    : std::to_string(it->dimension()) + " numbers",
-                          ""});
-      theta.segment(it->theta_index, it->dimension()) = *change.start;
-      if (it->transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
-        throw InputError({{}, "the start of " + name + " is not positive", "a number above 0", ""});
-    }
-    if (change.estimated) it->estimated = *change.estimated;
-    if (change.prior_std) it->prior_std = *change.prior_std;
+    for (Parameter* p : meant) change_parameter(*p, change, theta);
   }
   parameters = ParameterSet(std::move(list), std::move(theta));
 }
@@ -75,36 +88,56 @@ void trust_planes_seen(ParameterSet& parameters, const std::vector<int>& planes)
   parameters = ParameterSet(std::move(list), parameters.reference());
 }
 
+/// What all recordings of one object have in common.
+bool is_material(const Parameter& p) {
+  return p.name.starts_with("youngs_modulus") || p.name == "poisson_ratio" || p.name == "mass_damping" ||
+         p.name == "stiffness_damping" || p.name == "density";
+}
+
+/// The recordings' parameters side by side, those of the material once.
+ParameterSet joined(const std::vector<ParameterSet>& sets) {
+  std::vector<Parameter> list;
+  Eigen::Index size = 0;
+  for (const ParameterSet& set : sets) size += set.reference().size();
+  VectorX theta(size);
+  int offset = 0;
+  for (std::size_t r = 0; r < sets.size(); ++r) {
+    theta.segment(offset, sets[r].reference().size()) = sets[r].reference();
+    for (Parameter p : sets[r].parameters()) {
+      p.theta_index += offset;
+      const auto same = std::ranges::find(list, p.name, &Parameter::name);
+      if (is_material(p) && same != list.end()) {
+        same->also.push_back(p.theta_index);
+        if (p.name != "density") theta[p.theta_index] = theta[same->theta_index];
+        continue;
+      }
+      if (r > 0) p.name += "[" + std::to_string(r + 1) + "]";
+      list.push_back(std::move(p));
+    }
+    offset += int(sets[r].reference().size());
+  }
+  return {std::move(list), std::move(theta)};
+}
+
 class Fit {
  public:
-  Fit(const Capture& capture, const std::vector<ObservedFrame>& observed, const FitOptions& options,
-      const FitMonitor& monitor, FitState state)
+  Fit(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, FitState state)
       : options_(options), monitor_(monitor), state_(std::move(state)) {
-    capture_ = capture;
-    require_fittable(capture_);
-    const std::vector<int> planes_seen = take_planes_from_images(capture_);
-    for (const int plane : planes_seen)
-      outcome_.notes.push_back(
-          "Plane " + std::to_string(plane + 1) +
-          " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
-    tracked_ = tracked_points(capture_);
-    observations_ = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture_, observed, tracked_));
-    if (observations_->empty())
-      throw InputError({{capture.file},
-                        "no frame shows any point of the object",
-                        "depth images or clouds that see it",
-                        "run `pliant check` on the capture to see what the cameras saw"});
-    controls_ = capture_.regions.empty() ? options_.control_points : int(capture_.regions.size()) + 1;
-    parameters_ = default_parameters(capture_, enclosed_volume(*capture_.surface), controls_);
-    trust_planes_seen(parameters_, planes_seen);
+    std::vector<ParameterSet> sets;
+    for (RecordedCapture& r : recorded) {
+      recordings_.emplace_back();
+      sets.push_back(make_ready(std::move(r), recordings_.back()));
+    }
+    parameters_ = joined(sets);
     apply_overrides(parameters_, options_);
-    const double band = std::max(options_.wide_band, options_.fine_band) * 1.25;
-    distance_ = capture_distance(capture_, band);
-    size_ = object_size(capture_);
-    coarse_ = make_level(options_.coarse_cells, band);
-    fine_ = make_level(options_.cells, band);
-    last_frame_ = std::min(int(fine_.simulation.times.size()) - 1, observations_->back().frame);
-    horizon_start_ = first_frame_of_interest();
+    int offset = 0;
+    for (std::size_t r = 0; r < sets.size(); ++r) {
+      Recording& recording = recordings_[r];
+      recording.theta_offset = offset;
+      recording.theta_size = int(sets[r].reference().size());
+      offset += recording.theta_size;
+      make_levels(recording);
+    }
   }
 
   FitOutcome run() {
@@ -119,6 +152,27 @@ class Fit {
   }
 
  private:
+  /// One of the recordings, discretised.
+  struct Recording {
+    Capture capture;
+    TrackedPoints tracked;
+    std::shared_ptr<const std::vector<FrameObservations>> observations;
+    std::shared_ptr<const SignedDistance> distance;
+    double size = 0.0;
+    Discretisation coarse, fine;
+    int last_frame = 0;
+    int theta_offset = 0, theta_size = 0;
+
+    VectorX own(const VectorX& theta) const { return theta.segment(theta_offset, theta_size); }
+    bool is_released() const { return fine.simulation.pulls > 0; }
+    /// Part of the recording. A flying object shows no stiffness in its first third; one that swings shows it at once.
+    int horizon(double part) const {
+      if (capture.is_static) return last_frame;
+      const int least = is_released() ? std::min(last_frame, 10) : std::max(1, last_frame / 3);
+      return std::max(least, int(part * last_frame));
+    }
+  };
+
   static void require_fittable(const Capture& capture) {
     const auto refuse = [&](const std::string& found, const std::string& advice) {
       throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
@@ -132,34 +186,116 @@ class Fit {
     if (capture.shape_is == ShapeIs::Static)
       refuse("the scan was taken sagging (shape_is = \"static\")",
              "scan the object free of load; load-free shapes are not estimated in this version");
-    if (capture.initial.released)
-      refuse("the object is released from a held, deformed pose ([initial] released)",
-             "start the recording in the scanned pose");
+    if (capture.initial.released && capture.fixed.empty())
+      refuse("the object is released from a held, deformed pose, and nothing holds it afterwards",
+             "add the [[fixed]] region where it stays held");
     if (!capture.is_static && capture.frame_count() - capture.start_frame < 2)
       refuse("fewer than two frames follow start_frame", "record longer");
   }
 
-  Discretisation make_level(double cells, double band) const {
+  /// Everything of a recording that needs no parameters; returns those.
+  ParameterSet make_ready(RecordedCapture recorded, Recording& recording) {
+    recording.capture = std::move(recorded.capture);
+    Capture& capture = recording.capture;
+    require_fittable(capture);
+    const std::vector<int> planes_seen = take_planes_from_images(capture);
+    for (const int plane : planes_seen)
+      outcome_.notes.push_back(
+          "Plane " + std::to_string(plane + 1) +
+          " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
+    recording.tracked = tracked_points(capture);
+    recording.observations = std::make_shared<std::vector<FrameObservations>>(
+        frame_observations(capture, recorded.observed, recording.tracked));
+    if (recording.observations->empty())
+      throw InputError({{capture.file},
+                        "no frame shows any point of the object",
+                        "depth images or clouds that see it",
+                        "run `pliant check` on the capture to see what the cameras saw"});
+    const int controls = capture.regions.empty() ? options_.control_points : int(capture.regions.size()) + 1;
+    if (recordings_.size() > 1 && controls != controls_)
+      throw InputError({{capture.file},
+                        "the object has " + std::to_string(capture.regions.size()) + " regions",
+                        "those of the first recording, " + std::to_string(controls_ - 1),
+                        "name the same materials in every recording of the object"});
+    controls_ = controls;
+    recording.size = object_size(capture);
+    ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.surface), controls_,
+                                                 pull_count(capture, resolution(0.0)));
+    trust_planes_seen(parameters, planes_seen);
+    return parameters;
+  }
+
+  double band() const { return std::max(options_.wide_band, options_.fine_band) * 1.25; }
+
+  Resolution resolution(double cells) const {
+    Resolution r;
+    r.element = options_.element;
+    r.field = {options_.control_points, options_.control_weights};
+    r.cells = cells;
+    r.steps = options_.steps;
+    r.pulls = options_.pull_points;
+    r.band = band();
+    return r;
+  }
+
+  void make_levels(Recording& recording) const {
+    recording.distance = capture_distance(recording.capture, band());
+    recording.coarse = make_level(recording, options_.coarse_cells);
+    recording.fine = make_level(recording, options_.cells);
+    recording.last_frame =
+        std::min(int(recording.fine.simulation.times.size()) - 1, recording.observations->back().frame);
+  }
+
+  Discretisation make_level(const Recording& recording, double cells) const {
     SimulationOptions settings;
     settings.newmark_theta = options_.newmark_theta;
     settings.solver.kind = options_.solver;
     settings.solver.tolerance = options_.solver_tolerance;
     settings.hold_strongly = options_.hold_strongly;
     settings.integrator = options_.integrator;
-    const Resolution resolution{
-        options_.element, {options_.control_points, options_.control_weights}, cells, options_.steps, band};
-    return discretise(capture_, distance_, resolution, parameters_.reference(), settings, tracked_.rest);
+    return discretise(recording.capture, recording.distance, resolution(cells),
+                      recording.own(parameters_.reference()), settings, recording.tracked.rest);
   }
 
-  /// Before this frame the object only flies or hangs; stiffness shows after it.
-  int first_frame_of_interest() const { return capture_.is_static ? last_frame_ : std::max(1, last_frame_ / 3); }
+  enum class Level { Coarse, Fine };
 
-  Objective make_objective(const Discretisation& level, const ParameterSet& parameters, double band,
-                           int last_frame) const {
-    ObjectiveOptions o;
-    o.outlier_scale = band * size_;
-    o.last_frame = last_frame;
-    return {level.mismatch, level.body, level.simulation, observations_, parameters, o};
+  /// @param last_frame  of each recording
+  template <class LastFrame>
+  Objective make_objective(Level level, const ParameterSet& parameters, double band, LastFrame&& last_frame) const {
+    std::vector<ObservedMotion> motions;
+    for (const Recording& r : recordings_) {
+      ObjectiveOptions o;
+      o.outlier_scale = band * r.size;
+      o.last_frame = std::min(r.last_frame, last_frame(r));
+      const Discretisation& d = level == Level::Coarse ? r.coarse : r.fine;
+      motions.push_back({d.mismatch, d.body, d.simulation, r.observations, o});
+    }
+    return {std::move(motions), parameters};
+  }
+  static int to_the_end(const Recording& recording) { return recording.last_frame; }
+
+  /// Swings out of step are as wrong as any other: the valley about the truth narrows as more of them are seen.
+  bool swings() const {
+    return std::ranges::any_of(recordings_, [](const Recording& r) { return r.is_released(); });
+  }
+  std::vector<double> growing_horizon() const {
+    return swings() ? std::vector{0.12, 0.25, 0.5, 1.0, 1.0} : std::vector{0.6, 1.0, 1.0};
+  }
+  bool is_static() const {
+    return std::ranges::all_of(recordings_, [](const Recording& r) { return r.capture.is_static; });
+  }
+  void set_all_moduli(VectorX& theta, double youngs_modulus) const {
+    for (const Recording& r : recordings_) {
+      VectorX own = r.own(theta);
+      set_moduli(own, controls_, youngs_modulus);
+      theta.segment(r.theta_offset, r.theta_size) = own;
+    }
+  }
+  /// The same parameters at another theta, none estimated.
+  ParameterSet fixed_at(const VectorX& theta) const {
+    std::vector<Parameter> list = parameters_.parameters();
+    for (Parameter& p : list) p.estimated = false;
+    return {std::move(list), theta};
   }
 
   static OptimiserState start_of(const ParameterSet& parameters) {
@@ -198,7 +334,7 @@ class Fit {
     return s;
   }
 
-  /// Velocities and gravity that are unknown, from the first frames, at a middling stiffness.
+  /// How the object moves or is held at the start, from the first frames, at a middling stiffness.
   void estimate_initial_motion() {
     if (state_.motion) {
       set_reference(*state_.motion);
@@ -207,16 +343,20 @@ class Fit {
     ParameterSet motion = parameters_;
     bool any = false;
     for (const Parameter& p : parameters_.parameters()) {
+      constexpr std::array of_the_start = {"pull@", "linear_velocity", "angular_velocity", "gravity"};
       const bool moves =
-          p.estimated && (p.name == "linear_velocity" || p.name == "angular_velocity" || p.name == "gravity");
+          p.estimated && std::ranges::any_of(of_the_start, [&](const char* name) { return p.name.starts_with(name); });
       motion.set_estimated(p.name, moves);
       any = any || moves;
     }
     if (!any) return;
     int counter = 0;
     for (const int part : {8, 4}) {
-      const int horizon = std::max(2, last_frame_ / part);
-      Objective objective = make_objective(coarse_, motion, options_.wide_band, std::min(horizon, last_frame_));
+      // The pose of a released object shows in the frames before, a velocity only after.
+      const auto horizon = [&](const Recording& r) {
+        return r.is_released() ? 0 : std::max(2, r.last_frame / part);
+      };
+      Objective objective = make_objective(Level::Coarse, motion, options_.wide_band, horizon);
       const OptimiserSummary s = optimise(objective, start_of(motion), "motion", 0, 12, counter, 0.0, 0.05);
       if (s.succeeded) motion.set_reference(motion.to_theta(s.p));
       if (interrupted()) return;
@@ -248,25 +388,25 @@ class Fit {
   void scan() {
     const VectorX theta = parameters_.reference();
     const double g = std::max(theta::vector_at(theta, theta::gravity).norm(), 0.1);
-    const double stress = theta[theta::density] * g * size_;
-    const int count = 4 * options_.scan_per_decade + 1;
+    const double stress = theta[theta::density] * g * recordings_.front().size;
+    const int per_decade = options_.scan_per_decade * (swings() ? 2 : 1);
+    const int count = 4 * per_decade + 1;
     if (int(state_.scan.size()) != count) {
       state_.scan.assign(std::size_t(count), {});
       std::atomic<int> done = 0;
       const auto try_value = [&](int i) {
         VectorX trial = theta;
-        set_moduli(trial, controls_, stress * std::pow(10.0, double(i) / options_.scan_per_decade));
+        set_all_moduli(trial, stress * std::pow(10.0, double(i) / per_decade));
         state_.scan[std::size_t(i)] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
         if (interrupted()) return;
-        ParameterSet fixed = parameters_;
-        for (const Parameter& p : parameters_.parameters()) fixed.set_estimated(p.name, false);
-        fixed.set_reference(trial);
-        Objective objective = make_objective(coarse_, fixed, options_.wide_band, last_frame_);
+        Objective objective = make_objective(Level::Coarse, fixed_at(trial), options_.wide_band, [&](const Recording& r) {
+          return swings() ? r.horizon(growing_horizon().front()) : r.last_frame;
+        });
         const CostEvaluation e = objective.evaluate(VectorX(0));
         if (e.succeeded) state_.scan[std::size_t(i)].second = e.cost;
         emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
       };
-      if (capture_.is_static)
+      if (is_static())
         scan_downwards(count, try_value);
       else
         tbb::parallel_for(0, count, try_value, tbb::simple_partitioner());
@@ -299,11 +439,11 @@ class Fit {
     }
     if (start_moduli_.empty())
       throw InputError(
-          {{capture_.file},
+          {{recordings_.front().capture.file},
            "no stiffness between " + std::to_string(stress) + " Pa and ten thousand times that can be simulated",
            "",
            "check mass, gravity and the size of the scan"});
-    set_moduli(outcome_.start_theta, controls_, start_moduli_.front());
+    set_all_moduli(outcome_.start_theta, start_moduli_.front());
   }
 
   void follow_starts() {
@@ -329,18 +469,20 @@ class Fit {
   FitStart follow(int index, double modulus) {
     ParameterSet parameters = parameters_;
     VectorX theta = parameters_.reference();
-    if (scanned_) set_moduli(theta, controls_, modulus);
+    if (scanned_) set_all_moduli(theta, modulus);
     parameters.set_reference(theta);
     // Poisson's ratio is told from the rest only once the fit is close.
     parameters.set_estimated("poisson_ratio", false);
     FitStart start;
     start.start = theta;
     int counter = 0;
-    for (const double part : {0.6, 1.0, 1.0}) {
-      const bool last = part == 1.0 && counter > 0;
+    bool first = true;
+    for (const double part : growing_horizon()) {
+      const bool last = part == 1.0 && !first;
       const double from = 0.15 + 0.3 * (part < 1.0 ? 0.0 : 0.4);
-      Objective objective =
-          make_objective(coarse_, parameters, options_.wide_band, std::max(horizon_start_, int(part * last_frame_)));
+      Objective objective = make_objective(Level::Coarse, parameters, options_.wide_band, [&](const Recording& r) {
+        return r.horizon(part);
+      });
       const OptimiserSummary s =
           optimise(objective, start_of(parameters), "coarse", index, last ? 10 : 5, counter, from, from + 0.15);
       start.iterations += s.iterations;
@@ -351,7 +493,8 @@ class Fit {
         start.final = parameters.reference();
         return start;
       }
-      if (counter == s.iterations) start.start_cost = s.start_cost;
+      if (first) start.start_cost = s.start_cost;
+      first = false;
       start.cost = s.evaluation.cost;
       parameters.set_reference(parameters.to_theta(s.p));
       start.final = parameters.reference();
@@ -382,7 +525,7 @@ class Fit {
                              : last               ? options_.max_iterations
                                                   : std::max(1, options_.max_iterations / 4);
       Objective objective =
-          make_objective(fine_, parameters, last ? options_.fine_band : options_.wide_band, last_frame_);
+          make_objective(Level::Fine, parameters, last ? options_.fine_band : options_.wide_band, to_the_end);
       s = optimise(objective, now.optimiser, last ? "fine" : "fine, wide band", index, iterations, counter,
                    last ? 0.6 : 0.45, last ? 1.0 : 0.6, [&](const OptimiserState& optimiser) {
                      if (outcome_.interrupted) return;  // a last look at what was reached is no state to go on from
@@ -408,7 +551,6 @@ class Fit {
 
   void finish(ParameterSet& parameters, OptimiserSummary& s) {
     sort_history();
-    outcome_.discretisation = fine_;
     outcome_.cells = options_.cells;
     outcome_.converged = s.converged && !outcome_.interrupted;
     outcome_.reason = outcome_.interrupted ? "interrupted" : s.reason;
@@ -417,10 +559,13 @@ class Fit {
     outcome_.final_cost = s.evaluation.cost;
     outcome_.start_cost = start_cost_on_fine();
     if (s.succeeded && s.evaluation.gauss_newton.size() == 0 && parameters.dimension() > 0) {
-      Objective objective = make_objective(fine_, parameters, options_.fine_band, last_frame_);
+      Objective objective = make_objective(Level::Fine, parameters, options_.fine_band, to_the_end);
       s.evaluation = objective.linearise(parameters.to_unconstrained(parameters.reference()));
     }
     outcome_.evaluation = std::move(s.evaluation);
+    for (std::size_t r = 0; r < recordings_.size(); ++r)
+      outcome_.recordings.push_back({recordings_[r].fine, recordings_[r].own(outcome_.theta),
+                                     outcome_.evaluation.of_recording(int(r))});
     if (outcome_.evaluation.succeeded && parameters.dimension() > 0) {
       outcome_.covariance = parameter_covariance(outcome_.evaluation);
       outcome_.std = outcome_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -428,11 +573,14 @@ class Fit {
       outcome_.correlation = inverse.asDiagonal() * outcome_.covariance * inverse.asDiagonal();
     }
     if (outcome_.evaluation.succeeded && !outcome_.interrupted) time_steps(parameters);
-    add_notes(outcome_, capture_);
+    std::vector<const Capture*> captures;
+    for (const Recording& r : recordings_) captures.push_back(&r.capture);
+    add_notes(outcome_, captures);
   }
 
   void time_steps(const ParameterSet& parameters) {
-    Objective objective = make_objective(fine_, parameters, options_.fine_band, std::min(last_frame_, 20));
+    Objective objective =
+        make_objective(Level::Fine, parameters, options_.fine_band, [](const Recording&) { return 20; });
     const VectorX p = parameters.to_unconstrained(parameters.reference());
     auto begin = std::chrono::steady_clock::now();
     const CostEvaluation forward = objective.evaluate(p);
@@ -446,10 +594,8 @@ class Fit {
   }
 
   double start_cost_on_fine() const {
-    ParameterSet fixed = parameters_;
-    for (const Parameter& p : parameters_.parameters()) fixed.set_estimated(p.name, false);
-    fixed.set_reference(outcome_.start_theta);
-    Objective objective = make_objective(fine_, fixed, options_.fine_band, last_frame_);
+    Objective objective =
+        make_objective(Level::Fine, fixed_at(outcome_.start_theta), options_.fine_band, to_the_end);
     return objective.evaluate(VectorX(0)).cost;
   }
 
@@ -457,14 +603,8 @@ class Fit {
   FitMonitor monitor_;
   FitState state_;
   FitOutcome outcome_;
-  Capture capture_;
-  TrackedPoints tracked_;
-  std::shared_ptr<const std::vector<FrameObservations>> observations_;
+  std::vector<Recording> recordings_;
   ParameterSet parameters_;
-  std::shared_ptr<const SignedDistance> distance_;
-  double size_ = 0.0;
-  Discretisation coarse_, fine_;
-  int last_frame_ = 0, horizon_start_ = 1;
   bool scanned_ = false;
   std::vector<double> start_moduli_;
   int controls_ = 1;  // moduli of the object
@@ -480,6 +620,7 @@ std::string FitOptions::validate() const {
   if (!(steps > 0.0 && steps <= 16.0)) return "steps must lie in (0, 16]";
   if (points_per_frame != 0 && points_per_frame < 10) return "points_per_frame must be 0 (all) or at least 10";
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
+  if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
   if (control_points < 1 || control_points > 500) return "control_points must lie in 1..500";
   if (starts < 1) return "starts must be at least 1";
   if (max_iterations < 1) return "max_iterations must be at least 1";
@@ -511,11 +652,26 @@ MatrixX parameter_covariance(const CostEvaluation& evaluation) {
   return sandwich + inverse;
 }
 
-FitOutcome fit(const Capture& capture, const std::vector<ObservedFrame>& observed, const FitOptions& options,
-               const FitMonitor& monitor, FitState resume) {
+FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
+               FitState resume) {
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
-  return Fit(capture, observed, options, monitor, std::move(resume)).run();
+  if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
+  return Fit(std::move(recordings), options, monitor, std::move(resume)).run();
+}
+
+FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
+                 const FitMonitor& monitor) {
+  FitOptions fixed = options;
+  for (const Parameter& p : fitted.parameters.parameters()) {
+    if (!is_material(p)) continue;
+    FitOptions::Override& change = fixed.parameters[p.name];
+    change.estimated = false;
+    if (p.name != "density" || p.estimated) change.start = VectorX::Constant(1, fitted.theta[p.theta_index]);
+  }
+  std::vector<RecordedCapture> one;
+  one.push_back(std::move(held_out));
+  return fit(std::move(one), fixed, monitor);
 }
 
 }  // namespace pliant

@@ -26,6 +26,7 @@ struct FitOptions {
   double newmark_theta = 0.51;  ///< [0.5, 1)
   ElementKind element = ElementKind::Hexahedron;
   Integrator integrator = Integrator::Lagged;
+  int pull_points = 4;     ///< that hold a released object until it is let go, 1..50
   int control_points = 1;  ///< of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous
   FieldOptions::Weights control_weights = FieldOptions::Weights::Linear;
   OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
@@ -78,14 +79,27 @@ struct FitState {
   std::optional<Fine> fine;
 };
 
+/// A recording, and what its sensors saw.
+struct RecordedCapture {
+  Capture capture;
+  std::vector<ObservedFrame> observed;
+};
+
+/// One of the recordings of a fit, at the solution.
+struct RecordingOutcome {
+  Discretisation discretisation;
+  VectorX theta;              ///< its own part
+  CostEvaluation evaluation;  ///< its own frames
+};
+
 struct FitOutcome {
-  ParameterSet parameters;  ///< as used, with the reference at the solution
-  VectorX theta, start_theta;
+  ParameterSet parameters;    ///< as used, with the reference at the solution
+  VectorX theta, start_theta;  ///< of all recordings, one after the other
   VectorX std;  ///< of each unconstrained coordinate
   MatrixX covariance, correlation;
   double start_cost = 0.0, final_cost = 0.0;
   CostEvaluation evaluation;  ///< at the solution, all points of the fit
-  Discretisation discretisation;
+  std::vector<RecordingOutcome> recordings;
   double cells = 0.0;  ///< elements along the longest axis of the discretisation
   std::vector<FitStart> starts;
   std::vector<FitEvent> history;
@@ -103,13 +117,20 @@ struct FitMonitor {
   std::function<bool()> interrupted;
 };
 
-/// Estimates a capture's unknown parameters from its depth images and clouds: initial motion from the first frames
-/// where it is unknown, a scan over decades of Young's modulus on a coarse grid, the best starts followed there in a
-/// wide band and a growing horizon, then the best on the full grid in a narrow band.
-/// @param resume  what an interrupted fit of the same capture and options had done
-/// Throws InputError where the capture cannot be fitted, with the reason.
-FitOutcome fit(const Capture& capture, const std::vector<ObservedFrame>& observed, const FitOptions& options,
-               const FitMonitor& monitor = {}, FitState resume = {});
+/// Estimates the unknown parameters of an object from recordings of it: its pose or motion at the start from the first
+/// frames where that is unknown, a scan over decades of Young's modulus on a coarse grid, the best starts followed there
+/// in a wide band and a growing horizon, then the best on the full grid in a narrow band. Recordings share the object's
+/// material (moduli, Poisson's ratio, dampings and, where it is estimated, density); each has its own start, planes and
+/// sensors, named with "[2]" and so on from the second recording.
+/// @param resume  what an interrupted fit of the same recordings and options had done
+/// Throws InputError where a recording cannot be fitted, with the reason.
+FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor = {},
+               FitState resume = {});
+
+/// How well a fitted material predicts a recording that was kept out: only the recording's own start, planes and sensors
+/// are estimated, from its own observations.
+FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
+                 const FitMonitor& monitor = {});
 
 /// Standard deviations of the estimate from the curvature of the cost and the scatter of the frames' gradients
 /// (sandwich estimate; gradients of neighbouring frames may be correlated, Newey and West 1987), never below what the

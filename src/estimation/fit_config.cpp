@@ -32,8 +32,10 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
 const std::set<std::string> parameter_names = {
-    "youngs_modulus",  "poisson_ratio",    "mass_damping", "stiffness_damping", "density", "gravity",
-    "linear_velocity", "angular_velocity", "plane",        "plane_2",           "plane_3", "plane_4"};
+    "youngs_modulus",  "poisson_ratio",    "mass_damping", "stiffness_damping", "density",
+    "gravity",         "linear_velocity",  "angular_velocity", "plane",         "plane_2",
+    "plane_3",         "plane_4",          "pull",         "range_error",       "sensor_turn",
+    "sensor_shift"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -132,6 +134,8 @@ const std::vector<Entry>& entries() {
       choice_entry("element", "what the object is divided into", elements, &FitOptions::element),
       choice_entry("integrator", "how time steps are taken: rotations predicted, or fully implicit", integrators,
                    &FitOptions::integrator),
+      integer_entry("pull_points", "1..50", "about which a released object is pulled until it is let go",
+                    &FitOptions::pull_points),
       integer_entry("control_points", "1..500",
                     "of Young's modulus over the object, where the capture names no regions",
                     &FitOptions::control_points),
@@ -210,7 +214,8 @@ const std::vector<FitKey>& fit_keys() {
 std::string parameter_key_help() {
   return "Parameters (youngs_modulus, poisson_ratio, mass_damping, stiffness_damping, density, gravity, "
          "linear_velocity,\n"
-         "angular_velocity, plane, plane_2 ..) have three keys each:\n"
+         "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, and for what sensors get wrong range_error@SENSOR,\n"
+         "sensor_turn@SENSOR, sensor_shift@SENSOR; [2] after a name means the second recording's) have three keys each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
          "  NAME.estimate=BOOL   estimate it, or keep the start value\n"
          "  NAME.prior_std=X     width of the prior: of the logarithm for moduli, dampings and density";
@@ -226,17 +231,18 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
       throw InputError({{}, key + " is \"" + value + "\"", *expected, ""});
     return;
   }
-  // A region's or control point's modulus has its name after an @, which may hold dots itself.
+  // The name of a region, control point or sensor stands after an @ and may hold dots itself.
   std::string name = key, part;
   for (const char* known : {".estimate", ".prior_std", ".start"})
     if (key.ends_with(known))
       name = key.substr(0, key.size() - std::string_view(known).size()), part = std::string(known).substr(1);
-  if (!name.starts_with("youngs_modulus@")) {
+  if (name.find('@') == std::string::npos) {
     const auto dot = key.find('.');
     name = key.substr(0, dot);
     part = dot == std::string::npos ? "" : key.substr(dot + 1);
-    if (!parameter_names.contains(name)) reject_unknown(name);
   }
+  if (const std::string base = name.substr(0, name.find_first_of("@[")); !parameter_names.contains(base))
+    reject_unknown(base);
   set_parameter(options, name, part, value);
 }
 

@@ -65,8 +65,8 @@ void say_if_starts_disagree(FitOutcome& outcome) {
 
 }  // namespace
 
-void add_notes(FitOutcome& outcome, const Capture& capture) {
-  say_what_anchors(outcome, capture);
+void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures) {
+  say_what_anchors(outcome, *captures.front());
   if (outcome.correlation.size() > 0) {
     say_what_is_inseparable(outcome);
     say_what_is_assumed(outcome);

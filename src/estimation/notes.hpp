@@ -5,6 +5,6 @@
 namespace pliant {
 
 /// Adds plain sentences about what the estimate can and cannot be trusted for.
-void add_notes(FitOutcome& outcome, const Capture& capture);
+void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures);
 
 }  // namespace pliant

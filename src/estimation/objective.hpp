@@ -5,6 +5,7 @@
 
 #include "estimation/parameter_set.hpp"
 #include "mismatch/point_tracks.hpp"
+#include "mismatch/sensor_correction.hpp"
 #include "mismatch/surface_constraints.hpp"
 #include "motion/simulation.hpp"
 
@@ -19,7 +20,7 @@ struct FrameObservations {
 
 /// How one frame fits.
 struct FrameFit {
-  int frame = 0;
+  int recording = 0, frame = 0;
   int points = 0, matched = 0;  ///< of the surface
   int tracks = 0;               ///< followed points
   double cost = 0.0;
@@ -37,11 +38,13 @@ struct CostEvaluation {
   double cost = 0.0;
   VectorX gradient;
   MatrixX gauss_newton;
-  std::vector<FrameFit> frames;
+  std::vector<FrameFit> frames;  ///< of all recordings, one after the other
   int steps = 0;
   double surface_rms() const;  ///< [m]; 0 where no surface was seen
   double track_rms() const;    ///< [m], of the followed points; 0 where there are none
   double matched_fraction() const;
+  /// The frames of one recording alone, with its cost and without derivatives.
+  [[nodiscard]] CostEvaluation of_recording(int recording) const;
 };
 
 struct ObjectiveOptions {
@@ -55,21 +58,33 @@ struct ObjectiveOptions {
 struct Mismatch {
   std::shared_ptr<const SurfaceConstraints> surface;
   std::shared_ptr<const PointTracks> tracks;
+  Vector3 centre = Vector3::Zero();  ///< about which sensors are corrected
 };
 
-/// Maps parameters to the cost of one recording: the sum over frames and points of a robust loss of the pulled-back
-/// distance, or of the distance from where a followed point was seen, over its noise, plus the priors. One instance for
-/// one thread; the mismatch of a frame is evaluated beside the simulation of the next.
+/// One recording as the objective sees it.
+struct ObservedMotion {
+  Mismatch mismatch;
+  std::shared_ptr<const Body> body;
+  SimulationOptions simulation;
+  std::shared_ptr<const std::vector<FrameObservations>> observations;
+  ObjectiveOptions options;
+};
+
+/// Maps parameters to the cost of recordings: the sum over recordings, frames and points of a robust loss of the
+/// pulled-back distance, or of the distance from where a followed point was seen, over its noise, plus the priors. The
+/// recordings' thetas stand one after the other in that of the parameters. One instance for one thread; recordings are
+/// simulated side by side, and the mismatch of a frame is evaluated beside the simulation of the next.
 class Objective {
  public:
+  Objective(std::vector<ObservedMotion> recordings, ParameterSet parameters);
+  /// Of one recording.
   Objective(Mismatch mismatch, std::shared_ptr<const Body> body, SimulationOptions simulation,
             std::shared_ptr<const std::vector<FrameObservations>> observations, ParameterSet parameters,
             ObjectiveOptions options);
+  ~Objective();
+  Objective(Objective&&) noexcept;
 
   const ParameterSet& parameters() const { return parameters_; }
-  const ObjectiveOptions& options() const { return options_; }
-  ObjectiveOptions& options() { return options_; }
-  Simulation& simulation() { return simulation_; }
 
   /// Cost alone.
   [[nodiscard]] CostEvaluation evaluate(const VectorX& p);
@@ -79,19 +94,13 @@ class Objective {
   [[nodiscard]] CostEvaluation gradient(const VectorX& p);
 
  private:
-  FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents) const;
+  class Part;
   CostEvaluation run(const VectorX& p, bool with_tangents);
-  double frame_weight(const FrameObservations& seen) const;
-  void fit_surface(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
-                   FrameFit& fit) const;
-  void fit_tracks(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
-                  FrameFit& fit) const;
+  /// The priors, and what the parts say, summed in their order.
+  CostEvaluation sum(const VectorX& p, std::vector<CostEvaluation> parts, bool has_gradient, bool has_matrix) const;
 
-  Mismatch mismatch_;
-  std::shared_ptr<const std::vector<FrameObservations>> observations_;
   ParameterSet parameters_;
-  ObjectiveOptions options_;
-  Simulation simulation_;
+  std::vector<std::unique_ptr<Part>> parts_;
 };
 
 }  // namespace pliant

@@ -55,14 +55,21 @@ int ParameterSet::dimension() const {
 std::vector<std::string> ParameterSet::coordinate_names() const {
   std::vector<std::string> names;
   for_each_estimated([&](const Parameter& p, int) {
-    if (p.dimension() == 1)
+    if (p.is_scalar())
       names.push_back(p.name);
+    else if (p.transform == Transform::Direction)
+      for (const char* part : {".tilt_1", ".tilt_2"}) names.push_back(p.name + part);
     else if (p.transform == Transform::Vector)
       for (const char* axis : {".x", ".y", ".z"}) names.push_back(p.name + axis);
     else
       for (const char* part : {".offset", ".tilt_1", ".tilt_2"}) names.push_back(p.name + part);
   });
   return names;
+}
+
+VectorX ParameterSet::origin_of(const Parameter& parameter) const {
+  if (parameter.origin.size() > 0) return parameter.origin;
+  return reference_.segment(parameter.theta_index, parameter.transform == Transform::PlanePosition ? 6 : 3);
 }
 
 VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
@@ -76,12 +83,21 @@ VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
       case Transform::LogitHalf:
         p[at] = logit_half(theta[i]);
         break;
+      case Transform::Shift:
+        p[at] = theta[i] / q.scale;
+        break;
       case Transform::Vector:
         p.segment<3>(at) = theta.segment<3>(i) / q.scale;
         break;
+      case Transform::Direction: {
+        const Vector3 v0 = origin_of(q), v = theta.segment<3>(i);
+        p.segment<2>(at) = tangents_of(v0.normalized()).transpose() * v / v.dot(v0.normalized());
+        break;
+      }
       case Transform::PlanePosition: {
-        const Vector3 n0 = reference_.segment<3>(i + 3), point = theta.segment<3>(i), n = theta.segment<3>(i + 3);
-        p[at] = n0.dot(point - Vector3(reference_.segment<3>(i))) / q.scale;
+        const VectorX origin = origin_of(q);
+        const Vector3 n0 = origin.tail<3>(), point = theta.segment<3>(i), n = theta.segment<3>(i + 3);
+        p[at] = n0.dot(point - Vector3(origin.head<3>())) / q.scale;
         p.segment<2>(at + 1) = tangents_of(n0).transpose() * n / n.dot(n0);
         break;
       }
@@ -101,16 +117,26 @@ VectorX ParameterSet::to_theta(const VectorX& p) const {
       case Transform::LogitHalf:
         theta[i] = logistic_half(p[at]);
         break;
+      case Transform::Shift:
+        theta[i] = p[at] * q.scale;
+        break;
+      case Transform::Direction: {
+        const Vector3 v0 = origin_of(q), n0 = v0.normalized();
+        theta.segment<3>(i) = v0.norm() * (n0 + tangents_of(n0) * p.segment<2>(at)).normalized();
+        break;
+      }
       case Transform::Vector:
         theta.segment<3>(i) = p.segment<3>(at) * q.scale;
         break;
       case Transform::PlanePosition: {
-        const Vector3 n0 = reference_.segment<3>(i + 3);
-        theta.segment<3>(i) += p[at] * q.scale * n0;
+        const VectorX origin = origin_of(q);
+        const Vector3 n0 = origin.tail<3>();
+        theta.segment<3>(i) = origin.head<3>() + p[at] * q.scale * n0;
         theta.segment<3>(i + 3) = (n0 + tangents_of(n0) * p.segment<2>(at + 1)).normalized();
         break;
       }
     }
+    for (const int other : q.also) theta[other] = theta[i];
   });
   return theta;
 }
@@ -128,11 +154,22 @@ MatrixX ParameterSet::jacobian(const VectorX& p) const {
         J(i, at) = nu * (1.0 - 2.0 * nu);
         break;
       }
+      case Transform::Shift:
+        J(i, at) = q.scale;
+        break;
+      case Transform::Direction: {
+        const Vector3 v0 = origin_of(q), n0 = v0.normalized();
+        const auto T = tangents_of(n0);
+        const Vector3 m = n0 + T * p.segment<2>(at);
+        const Vector3 n = m.normalized();
+        J.block<3, 2>(i, at) = v0.norm() * (Matrix3::Identity() - n * n.transpose()) * T / m.norm();
+        break;
+      }
       case Transform::Vector:
         J.block<3, 3>(i, at) = q.scale * Matrix3::Identity();
         break;
       case Transform::PlanePosition: {
-        const Vector3 n0 = reference_.segment<3>(i + 3);
+        const Vector3 n0 = origin_of(q).tail<3>();
         const auto T = tangents_of(n0);
         J.block<3, 1>(i, at) = q.scale * n0;
         const Vector3 m = n0 + T * p.segment<2>(at + 1);
@@ -141,6 +178,7 @@ MatrixX ParameterSet::jacobian(const VectorX& p) const {
         break;
       }
     }
+    for (const int other : q.also) J(other, at) = J(i, at);
   });
   return J;
 }

@@ -12,11 +12,13 @@ namespace pliant {
 enum class Transform {
   Logarithm,      ///< positive scalars: p = ln(value)
   LogitHalf,      ///< Poisson's ratio in (0, 1/2): p = ln(nu / (1/2 - nu))
+  Shift,          ///< a scalar of any sign: p = value / scale
   Vector,         ///< three numbers: p = value / scale
-  PlanePosition,  ///< three numbers: shift along the start's normal / scale, then two tilts of the normal [rad]
+  Direction,      ///< three numbers whose length is known: p are two tilts about the origin's direction [rad]
+  PlanePosition,  ///< three numbers: shift along the origin's normal / scale, then two tilts of the normal [rad]
 };
 
-/// One estimable quantity of the scene, a scalar, a vector or a plane.
+/// One estimable quantity of the scenes, a scalar, a vector or a plane.
 struct Parameter {
   std::string name;  ///< as in result.json
   std::string unit;
@@ -29,15 +31,21 @@ struct Parameter {
   /// Normal prior in the unconstrained numbers, around `prior_mean`; infinite: none.
   double prior_std = std::numeric_limits<double>::infinity();
   VectorX prior_mean = {};
+  /// About what a plane (point, normal) or a direction moves; empty: the set's reference.
+  VectorX origin = {};
+  /// Where else in theta a scalar stands: recordings of one object share its material.
+  std::vector<int> also = {};
 
-  int dimension() const { return transform == Transform::Logarithm || transform == Transform::LogitHalf ? 1 : 3; }
+  bool is_scalar() const { return transform < Transform::Vector; }
+  int dimension() const { return is_scalar() ? 1 : transform == Transform::Direction ? 2 : 3; }
 };
 
-/// The estimated parameters of a scene as one unconstrained vector p, with its map to theta.
+/// The estimated parameters of a scene, or of several side by side in theta, as one unconstrained vector p, with its map
+/// to theta.
 class ParameterSet {
  public:
   ParameterSet() = default;
-  /// @param reference  theta of everything that is not estimated, and about which planes tilt
+  /// @param reference  theta of everything that is not estimated
   ParameterSet(std::vector<Parameter> parameters, VectorX reference);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
@@ -62,6 +70,8 @@ class ParameterSet {
   double prior(const VectorX& p, VectorX* gradient = nullptr, VectorX* curvature = nullptr) const;
 
  private:
+  /// Point and normal of a plane's origin, or a direction's vector.
+  VectorX origin_of(const Parameter& parameter) const;
   template <class Function>
   void for_each_estimated(Function&& function) const;
 

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: only ratios follow then
 constexpr double gravity_guess = 9.81;
+constexpr double range_error_std = 0.02;  // [m], of light that enters a translucent material
 
 std::function<bool(const Vector3&)> region_test(const Capture& capture, const Region& region) {
   const auto* vertices = std::get_if<RegionVertices>(&region);
@@ -33,8 +34,8 @@ std::function<bool(const Vector3&)> region_test(const Capture& capture, const Re
 }
 
 void add_scalar(std::vector<Parameter>& parameters, const char* name, const char* unit, Transform transform, int index,
-                double lower, double upper, double prior_mean, double prior_std, bool estimated) {
-  Parameter p{name, unit, transform, index, 1.0, lower, upper, estimated};
+                double lower, double upper, double prior_mean, double prior_std, bool estimated, double scale = 1.0) {
+  Parameter p{name, unit, transform, index, scale, lower, upper, estimated};
   p.prior_std = prior_std;
   p.prior_mean = VectorX::Constant(1, prior_mean);
   parameters.push_back(std::move(p));
@@ -47,6 +48,11 @@ void add_vector(std::vector<Parameter>& parameters, const std::string& name, con
   p.prior_std = prior_std;
   p.prior_mean = prior_mean;
   parameters.push_back(std::move(p));
+}
+
+Vector3 centre_of(const TriangleMesh& surface) {
+  const Box box = bounding_box(surface);
+  return 0.5 * (box.min + box.max);
 }
 
 }  // namespace
@@ -129,12 +135,28 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   const double gravity = std::max(theta::vector_at(parameters, theta::gravity).norm(), 0.1);
   d.simulation.max_dt = default_time_step(*d.body, gravity) / resolution.steps;
   d.simulation.planes = int(capture.planes.size());
+  d.simulation.pulls = pull_count(capture, resolution);
+  d.simulation.sensors = int(sensor_names(capture).size());
+  d.mismatch.centre = centre_of(*capture.surface);
   d.simulation.contact = default_contact(*d.body, parameters[theta::density] * d.body->volume(), gravity);
   for (const FixedRegion& fixed : capture.fixed) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
     d.simulation.holds.push_back({region_test(capture, fixed.region), motion.rotation, motion.translation});
   }
   return d;
+}
+
+std::vector<std::string> sensor_names(const Capture& capture) {
+  std::vector<std::string> names;
+  for (const DepthCamera& camera : capture.depth) names.push_back(camera.name);
+  if (!capture.clouds.empty()) names.emplace_back("clouds");
+  if (!capture.markers.empty()) names.emplace_back("markers");
+  return names;
+}
+
+int pull_count(const Capture& capture, const Resolution& resolution) {
+  if (!capture.initial.released) return 0;
+  return capture.initial.pulls.empty() ? resolution.pulls : int(capture.initial.pulls.size());
 }
 
 std::vector<std::string> modulus_names(const Capture& capture, int controls) {
@@ -154,14 +176,16 @@ void set_moduli(VectorX& theta, int controls, double youngs_modulus) {
   for (int k = 0; k < controls; ++k) theta[theta::modulus(k, controls, theta.size())] = youngs_modulus;
 }
 
-ParameterSet default_parameters(const Capture& capture, double volume, int controls) {
+ParameterSet default_parameters(const Capture& capture, double volume, int controls, int pulls) {
   const double size = object_size(capture);
   const double gravity = capture.gravity ? capture.gravity->norm() : gravity_guess;
   const double density = capture.mass ? *capture.mass / volume : capture.density ? *capture.density : density_guess;
   const double time = std::sqrt(size / std::max(gravity, 0.1));   // of a fall through the object's own size
   const double stress = density * std::max(gravity, 0.1) * size;  // under its own weight
 
-  VectorX theta = VectorX::Zero(theta::size(int(capture.planes.size()), controls));
+  const int planes = int(capture.planes.size());
+  const std::vector<std::string> sensors = sensor_names(capture);
+  VectorX theta = VectorX::Zero(theta::size(planes, controls, pulls, int(sensors.size())));
   set_moduli(theta, controls, 20.0 * stress);
   theta[theta::poissons_ratio] = 0.35;
   theta[theta::mass_damping] = 0.05 / time;
@@ -185,8 +209,16 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
   add_scalar(p, "stiffness_damping", "s", Transform::Logarithm, theta::stiffness_damping, 1e-5 * time, 2.0 * time,
              std::log(theta[theta::stiffness_damping]), 1.5, !capture.is_static);
   add_scalar(p, "density", "kg/m^3", Transform::Logarithm, theta::density, 0.1, 3e4, std::log(density), 0.5, false);
-  add_vector(p, "gravity", "m/s^2", Transform::Vector, theta::gravity, 1.0, theta.segment<3>(theta::gravity),
-             capture.gravity ? 0.2 : 10.0, !capture.gravity);
+  if (capture.gravity) {  // its length is known better than how the world's axes stand
+    Parameter direction{"gravity", "m/s^2", Transform::Direction, theta::gravity};
+    direction.prior_std = 0.05;
+    direction.prior_mean = VectorX::Zero(2);
+    direction.origin = *capture.gravity;
+    p.push_back(std::move(direction));
+  } else {
+    add_vector(p, "gravity", "m/s^2", Transform::Vector, theta::gravity, 1.0, theta.segment<3>(theta::gravity), 10.0,
+               true);
+  }
   const double speed = std::sqrt(gravity * size);
   const bool moves = !capture.initial.known && !capture.is_static;
   add_vector(p, "linear_velocity", "m/s", Transform::Vector, theta::linear_velocity, speed,
@@ -201,7 +233,22 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
     plane.estimated = !capture.planes[i].known;
     plane.prior_std = 0.2;
     plane.prior_mean = VectorX::Zero(3);
+    plane.origin = theta.segment<6>(theta::plane_point(i));
     p.push_back(std::move(plane));
+  }
+  for (int k = 0; k < std::min(pulls, int(capture.initial.pulls.size())); ++k)
+    theta.segment<3>(theta::pull(k, planes)) = capture.initial.pulls[std::size_t(k)];
+  for (int k = 0; k < pulls; ++k)
+    add_vector(p, "pull@" + std::to_string(k + 1), "1", Transform::Vector, theta::pull(k, planes), 1.0, Vector3::Zero(),
+               0.5, true);
+  for (int k = 0; k < int(sensors.size()); ++k) {
+    const int at = theta::sensor(k, planes, pulls);
+    const std::string& sensor = sensors[std::size_t(k)];
+    if (k < int(capture.depth.size()))
+      add_scalar(p, ("range_error@" + sensor).c_str(), "m", Transform::Shift, at, -0.2, 0.2, 0.0, range_error_std / size,
+                 false, size);
+    add_vector(p, "sensor_turn@" + sensor, "rad", Transform::Vector, at + 1, 1.0, Vector3::Zero(), 0.05, false);
+    add_vector(p, "sensor_shift@" + sensor, "m", Transform::Vector, at + 4, size, Vector3::Zero(), 0.05, false);
   }
   return {std::move(p), std::move(theta)};
 }
@@ -211,27 +258,42 @@ TrackedPoints tracked_points(const Capture& capture) {
   const double noise = capture.surface ? 1e-3 * object_size(capture) : 1e-3;
   for (const MarkerTrack& block : capture.markers) {
     const MarkerSet set = read_markers(block, capture.frame_count());
+    const int sensor = int(sensor_names(capture).size()) - 1;
     const int first = int(tracked.rest.size());
     for (int m = 0; m < set.marker_count(); ++m) tracked.rest.push_back(set.rest.row(m).transpose());
     for (int frame = 0; frame < int(set.frames.size()); ++frame)
       for (int m = 0; m < set.marker_count(); ++m)
         if (set.is_seen(frame, m))
-          tracked.frames[frame].push_back({first + m, set.frames[std::size_t(frame)].row(m).transpose(), noise});
+          tracked.frames[frame].push_back(
+              {first + m, set.frames[std::size_t(frame)].row(m).transpose(), noise, sensor});
   }
   return tracked;
 }
 
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
                                                   const TrackedPoints& tracked) {
+  const auto frame_of = [&](int recorded) {
+    const int frame = recorded - capture.start_frame;
+    return capture.initial.released ? std::max(frame, 0) : frame;
+  };
+  const int cameras = int(capture.depth.size());
   std::map<int, FrameObservations> frames;
-  for (const ObservedFrame& seen : observed)
-    for (std::size_t i = 0; i < seen.points.size(); ++i)
-      frames[seen.frame].points.push_back({seen.points[i], double(seen.noise[i])});
-  for (const auto& [frame, points] : tracked.frames) frames[frame].tracks = points;
+  for (const ObservedFrame& seen : observed) {
+    std::vector<SurfaceObservation>& points = frames[frame_of(seen.frame)].points;
+    for (std::size_t i = 0; i < seen.points.size(); ++i) {
+      const int camera = i < seen.camera.size() ? seen.camera[i] : -1;
+      points.push_back({seen.points[i], double(seen.noise[i]), camera < 0 ? cameras : camera,
+                        i < seen.view.size() ? seen.view[i] : Vector3::Zero()});
+    }
+  }
+  for (const auto& [frame, points] : tracked.frames) {
+    auto& tracks = frames[frame_of(frame)].tracks;
+    tracks.insert(tracks.end(), points.begin(), points.end());
+  }
   std::vector<FrameObservations> from_start;
   for (auto& [frame, seen] : frames) {
-    if (frame < capture.start_frame || frame >= capture.frame_count()) continue;
-    seen.frame = frame - capture.start_frame;
+    if (frame < 0 || frame >= capture.frame_count() - capture.start_frame) continue;
+    seen.frame = frame;
     from_start.push_back(std::move(seen));
   }
   return from_start;

@@ -23,6 +23,7 @@ struct Resolution {
   FieldOptions field;
   double cells = 12.0;  ///< elements along the object's longest axis
   double steps = 1.0;   ///< time steps per default step: 2 halves the step
+  int pulls = 4;        ///< that hold a released object until it is let go
   double band = 0.15;   ///< of the mismatch, times the object's longest axis
 };
 
@@ -56,8 +57,16 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
 /// it does not give.
 /// @param volume    of the object [m^3], for the density that belongs to a mass
+/// Corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") are there and not estimated.
 /// @param controls  control moduli of the body: `modulus_names` tells what they are called
-ParameterSet default_parameters(const Capture& capture, double volume, int controls = 1);
+/// @param pulls     that hold a released object: "pull@1", ... (see `Pull`)
+ParameterSet default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0);
+
+/// What corrections of sensors apply to: each depth camera by its name, "clouds" and "markers".
+std::vector<std::string> sensor_names(const Capture& capture);
+
+/// The pulls of a capture's motion: none where it is not released.
+int pull_count(const Capture& capture, const Resolution& resolution);
 
 /// "youngs_modulus" alone; with regions followed by "youngs_modulus@name" of each; with control points
 /// "youngs_modulus@1", "youngs_modulus@2", ...
@@ -75,7 +84,8 @@ struct TrackedPoints {
 /// Reads them. Where the capture does not say how noisy they are, a thousandth of the object's size stands in.
 TrackedPoints tracked_points(const Capture& capture);
 
-/// Observations of the frames from the start on, numbered from it.
+/// Observations of the frames from the start on, numbered from it. Frames before a release show the pose from which the
+/// object is released, and count as looks at its first frame.
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
                                                   const TrackedPoints& tracked = {});
 

@@ -11,6 +11,7 @@ struct TrackObservation {
   int point = 0;     ///< which of the tracks
   Vector3 position;  ///< [m], world
   double noise;      ///< standard deviation of each coordinate [m], > 0
+  int sensor = 0;    ///< whose correction applies
 };
 
 /// Points of the object that were followed through time (markers, or nodes of a tracked mesh): the residual is where

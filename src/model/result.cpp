@@ -81,6 +81,10 @@ Json list(const Items& items, const Write& write) {
   return json;
 }
 
+Json recording_json(const RecordingResult& recording) {
+  return {{"name", recording.name}, {"sha256", recording.sha256}, {"error", error_json(recording.error)}};
+}
+
 Json static_json(const StaticError& error) {
   return {{"name", error.name},
           {"role", error.role},
@@ -193,6 +197,10 @@ ErrorResult read_error(const Member& member) {
           optional_number(member, "marker_rms"), member.has("points") ? member["points"].count() : 0};
 }
 
+RecordingResult read_recording(const Member& member) {
+  return {optional_string(member, "name"), optional_string(member, "sha256"), read_error(member["error"])};
+}
+
 CorrelationResult read_correlation(const Member& member) {
   std::vector<std::string> names;
   member["parameters"].each_item([&](const Member& item) { names.push_back(item.string()); });
@@ -244,6 +252,9 @@ Result read_all(const Member& top) {
     top["fields"].each_key(
         [&](const std::string& name, const Member& m) { result.fields.push_back(read_field(name, m)); });
   result.error = read_error(top["error"]);
+  if (top.has("recordings"))
+    top["recordings"].each_item([&](const Member& m) { result.recordings.push_back(read_recording(m)); });
+  if (top.has("held_out")) result.held_out = read_recording(top["held_out"]);
   result.cost = {optional_number(top["cost"], "start").value_or(NAN),
                  optional_number(top["cost"], "final").value_or(NAN)};
   if (top.has("identifiability"))
@@ -287,6 +298,8 @@ std::string to_json(const Result& result) {
   json["fields"] = Json::object();
   for (const FieldResult& field : result.fields) json["fields"][field.name] = field_json(field);
   json["error"] = error_json(result.error);
+  if (!result.recordings.empty()) json["recordings"] = list(result.recordings, recording_json);
+  if (result.held_out) json["held_out"] = recording_json(*result.held_out);
   json["cost"] = {{"start", number(result.cost.start)}, {"final", number(result.cost.final)}};
   json["identifiability"] = list(result.identifiability, [](const CorrelationResult& c) {
     return Json{{"parameters", {c.parameters.first, c.parameters.second}}, {"correlation", number(c.correlation)}};

@@ -52,6 +52,12 @@ struct ErrorResult {
   long long points = 0;
 };
 
+/// One of several recordings of a fit, or one that was kept out of it.
+struct RecordingResult {
+  std::string name, sha256;
+  ErrorResult error;
+};
+
 struct CostResult {
   double start = 0.0, final = 0.0;
 };
@@ -86,6 +92,8 @@ struct Result {
   std::vector<ParameterResult> parameters;
   std::vector<FieldResult> fields;
   ErrorResult error;
+  std::vector<RecordingResult> recordings;   ///< where there are several: the errors of each
+  std::optional<RecordingResult> held_out;   ///< predicted, with its own start, planes and sensors alone estimated
   CostResult cost;
   std::vector<CorrelationResult> identifiability;
   std::vector<StartResult> starts;

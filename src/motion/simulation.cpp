@@ -18,7 +18,8 @@ bool holds_strongly(const Body& body, const SimulationOptions& options) {
 }
 
 std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const Body>& body,
-                                                   const SimulationOptions& options, FixedRegions*& fixed) {
+                                                   const SimulationOptions& options, FixedRegions*& fixed,
+                                                   Pull*& pull) {
   std::vector<std::unique_ptr<ForceTerm>> terms;
   terms.push_back(make_elasticity(body));
   terms.push_back(std::make_unique<Gravity>(*body));
@@ -30,6 +31,14 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
     fixed = regions.get();
     terms.push_back(std::move(regions));
   }
+  if (options.pulls > 0) {
+    const std::vector<int> held = held_nodes(*body, options.holds);
+    auto pulling = std::make_unique<Pull>(body, pull_nodes(*body, held, options.pulls), held,
+                                          theta::pull(0, options.planes));
+    pull = pulling.get();
+    pull->set_active(false);
+    terms.push_back(std::move(pulling));
+  }
   return terms;
 }
 
@@ -38,7 +47,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(std::move(body)),
       options_(std::move(options)),
-      stepper_(body_, make_terms(body_, options_, fixed_regions_),
+      stepper_(body_, make_terms(body_, options_, fixed_regions_, pull_),
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
                 options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
       rest_(body_->reference_positions()) {
@@ -63,26 +72,47 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
 
 void Simulation::set_parameters(const VectorX& parameters) { stepper_.set_parameters(parameters); }
 
-State Simulation::initial_state(const VectorX& parameters) const {
-  State state{rest_, Points(rest_.rows(), 3)};
+Points Simulation::velocities(const VectorX& parameters) const {
   const Vector3 linear = theta::vector_at(parameters, theta::linear_velocity);
   const Matrix3 spin = cross_matrix(theta::vector_at(parameters, theta::angular_velocity));
-  state.v = (lever_ * spin.transpose()).rowwise() + linear.transpose();
-  return state;
+  return (lever_ * spin.transpose()).rowwise() + linear.transpose();
 }
 
-State Simulation::initial_tangent(const VectorX&, const VectorX& d_theta) const {
-  State state = initial_state(d_theta);  // velocities are linear in theta, positions do not depend on it
-  state.x.setZero();
-  return state;
+bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& summary) {
+  state = {rest_, velocities(parameters)};
+  if (!pull_) return true;
+  pull_->set_active(true);
+  RolloutSummary search;
+  const bool found = find_equilibrium(parameters, state, search);
+  pull_->set_active(false);
+  summary.solver_iterations += search.solver_iterations;
+  summary.failure = search.failure;
+  state.v = velocities(parameters);
+  return found;
 }
 
-void Simulation::initial_adjoint(const VectorX&, const State& bar, VectorX& theta_bar) const {
+std::vector<State> Simulation::start_tangents(const State& start, const MatrixX& directions) {
+  std::vector<State> tangents;
+  if (pull_) pull_->set_active(true);
+  for (Eigen::Index c = 0; c < directions.cols(); ++c) {
+    const VectorX direction = directions.col(c);
+    tangents.push_back({Points::Zero(rest_.rows(), 3), velocities(direction)});  // velocities are linear in theta
+    if (pull_) tangents.back().x = stepper_.equilibrium_tangent(start.x, direction);
+  }
+  if (pull_) pull_->set_active(false);
+  return tangents;
+}
+
+void Simulation::start_adjoint(const State& start, const State& bar, VectorX& theta_bar) {
   theta_bar.segment<3>(theta::linear_velocity) += bar.v.colwise().sum().transpose();
   for (Eigen::Index n = 0; n < bar.v.rows(); ++n) {
     const Vector3 lever = lever_.row(n), v_bar = bar.v.row(n);
     theta_bar.segment<3>(theta::angular_velocity) += lever.cross(v_bar);
   }
+  if (!pull_) return;
+  pull_->set_active(true);
+  if (stepper_.prepare_equilibrium_derivatives(start.x)) stepper_.equilibrium_adjoint(start.x, bar.x, theta_bar);
+  pull_->set_active(false);
 }
 
 void Simulation::prepare_holds() {
@@ -127,13 +157,14 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
   constexpr int most_iterations = 400;
   double turn = 0.0;
   for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
-  state = {rest_, Points::Zero(rest_.rows(), 3)};
+  state = {body_->reference_positions(), Points::Zero(rest_.rows(), 3)};
   const double longest = turn > 0.0 ? std::min(1.0, largest_turn / turn) : 1.0;
   double done = 0.0, stride = longest;
   while (done < 1.0) {
     const double share = std::min(1.0, done + stride);
     VectorX part = parameters;
     part.segment<3>(theta::gravity) *= share;
+    part.segment(theta::pull(0, options_.planes), 3 * options_.pulls) *= share;
     Points x = state.x;
     stepper_.set_parameters(part);
     move_holds(done, share, x);
@@ -180,21 +211,20 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
                                const OnFrame& on_frame) {
   RolloutSummary summary;
   set_parameters(parameters);
-  State state = initial_state(parameters);
+  State state;
   std::vector<State> tangents;
-  for (Eigen::Index c = 0; c < directions.cols(); ++c)
-    tangents.push_back(initial_tangent(parameters, directions.col(c)));
   if (options_.is_static) {
     if (!find_equilibrium(parameters, state, summary)) return summary;
-    for (std::size_t c = 0; c < tangents.size(); ++c)
-      tangents[c] = {stepper_.equilibrium_tangent(state.x, directions.col(Eigen::Index(c))),
-                     Points::Zero(rest_.rows(), 3)};
+    for (Eigen::Index c = 0; c < directions.cols(); ++c)
+      tangents.push_back({stepper_.equilibrium_tangent(state.x, directions.col(c)), Points::Zero(rest_.rows(), 3)});
     for (int frame = 0; frame <= std::min(last_frame, frame_count() - 1); ++frame) {
       ++summary.frames;
       if (!on_frame(frame, state, tangents)) break;
     }
     return summary.succeeded = true, summary;
   }
+  if (!start(parameters, state, summary)) return summary;
+  tangents = start_tangents(state, directions);
   summary.frames = 1;
   if (!on_frame(0, state, tangents)) return summary.succeeded = true, summary;
   for (const StepPlan& plan : plan_) {
@@ -243,7 +273,9 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   const std::size_t length = segment_length(steps);
 
   std::vector<State> checkpoints;
-  State state = initial_state(parameters);
+  State state;
+  if (!start(parameters, state, summary)) return summary;
+  const State released = state;
   summary.frames = 1;
   if (!cost(0, state)) return summary.failure = "the cost failed", summary;
   std::vector<State> segment;
@@ -287,7 +319,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     segment.pop_back();
   }
   cotangent(0, state, bar.x);
-  initial_adjoint(parameters, bar, theta_bar);
+  start_adjoint(released, bar, theta_bar);
   summary.succeeded = true;
   return summary;
 }

@@ -9,6 +9,7 @@
 #include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
 #include "motion/plane_contact.hpp"
+#include "motion/pull.hpp"
 #include "motion/stepper.hpp"
 
 namespace pliant {
@@ -23,7 +24,10 @@ struct SimulationOptions {
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
   ContactOptions contact;
-  int planes = 0;                   ///< in theta
+  int planes = 0;   ///< in theta
+  int pulls = 0;    ///< in theta: the motion starts at rest in the equilibrium under these (see `Pull`); 0: in the
+                    ///< reference pose
+  int sensors = 0;  ///< in theta; they play no part in the motion
   std::vector<Hold> holds;          ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object
   bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
@@ -47,7 +51,9 @@ class Simulation {
   const Body& body() const { return *body_; }
   const SimulationOptions& options() const { return options_; }
   int frame_count() const { return int(options_.times.size()); }
-  int theta_size() const { return theta::size(options_.planes, body_->modulus.controls); }
+  int theta_size() const { 
+    return theta::size(options_.planes, body_->modulus.controls, options_.pulls, options_.sensors);
+  }
 
   /// Called at each frame, also the first, with the state and its tangents; false ends the run there (as a success).
   using OnFrame = std::function<bool(int frame, const State& state, std::span<const State> tangents)>;
@@ -74,11 +80,16 @@ class Simulation {
     int frame_after;  ///< frame reached by this step, -1: none
   };
   void set_parameters(const VectorX& theta);
-  State initial_state(const VectorX& theta) const;
-  State initial_tangent(const VectorX& theta, const VectorX& d_theta) const;
-  void initial_adjoint(const VectorX& theta, const State& bar, VectorX& theta_bar) const;
-  /// The equilibrium of static scenes: at once where Newton's method gets there from rest, else by steps of the load,
-  /// gravity and the holds' displacement together, as large as it follows.
+  /// Where and how fast the object is when it is let go; for a pulled one also the derivatives' matrix. False where
+  /// there is no such equilibrium: the summary says so.
+  bool start(const VectorX& theta, State& state, RolloutSummary& summary);
+  /// Tangents of the start that was found last.
+  std::vector<State> start_tangents(const State& start, const MatrixX& directions);
+  /// Adds to theta_bar. Any steps may have been taken since the start was found.
+  void start_adjoint(const State& start, const State& bar, VectorX& theta_bar);
+  Points velocities(const VectorX& theta) const;
+  /// The equilibrium of static scenes and of pulled objects: at once where Newton's method gets there from rest, else
+  /// by steps of the load, gravity, pulls and the holds' displacement together, as large as it follows.
   bool find_equilibrium(const VectorX& theta, State& state, RolloutSummary& summary);
   /// Moves the held regions from one part of their way to another, and the whole body's positions along with them: each
   /// node as the regions move, by inverse square distance from them.
@@ -91,6 +102,7 @@ class Simulation {
   std::shared_ptr<const Body> body_;
   SimulationOptions options_;
   FixedRegions* fixed_regions_ = nullptr;  // of the stepper's terms, if any
+  Pull* pull_ = nullptr;                   // likewise
   std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;

@@ -294,12 +294,14 @@ SolveSummary Stepper::equilibrium(Points& x) {
   Points delta = Points::Zero(x.rows(), 3);
   SolveSummary summary = newton(s, x, inertia_, delta);
   x += delta;
-  const Points none = Points::Zero(x.rows(), 3);
-  if (summary.converged) {
-    linearise(s, x, none);
-    summary.converged = factorise_exact(s, x, none);
-  }
+  if (summary.converged) summary.converged = prepare_equilibrium_derivatives(x);
   return summary;
+}
+
+bool Stepper::prepare_equilibrium_derivatives(const Points& x) {
+  const Points none = Points::Zero(x.rows(), 3);
+  linearise(static_scheme(), x, none);
+  return factorise_exact(static_scheme(), x, none);
 }
 
 Points Stepper::equilibrium_tangent(const Points& x, const VectorX& d_theta) {

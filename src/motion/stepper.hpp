@@ -85,6 +85,8 @@ class Stepper {
   /// Positions without acceleration, from a guess, by Newton's method; held nodes stay where the guess has them. After
   /// a success the derivatives below refer to it. Not converged: says so, and x is the best found.
   [[nodiscard]] SolveSummary equilibrium(Points& x);
+  /// Makes ready for them again after steps were taken. False where the matrix cannot be factorised.
+  [[nodiscard]] bool prepare_equilibrium_derivatives(const Points& x);
   /// Change of the equilibrium for a change of theta and of the held nodes' positions.
   Points equilibrium_tangent(const Points& x, const VectorX& d_theta);
   /// theta_bar += the cotangent for one of the equilibrium's positions.

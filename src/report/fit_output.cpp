@@ -21,25 +21,25 @@ namespace fs = std::filesystem;
 ParameterValue value_of(const Parameter& p, const VectorX& theta) {
   if (p.transform == Transform::PlanePosition)
     return PlaneValue{theta.segment<3>(p.theta_index), theta.segment<3>(p.theta_index + 3)};
-  if (p.transform == Transform::Vector) return Vector3(theta.segment<3>(p.theta_index));
+  if (!p.is_scalar()) return Vector3(theta.segment<3>(p.theta_index));
   return theta[p.theta_index];
 }
 
 /// Standard deviation of a value from that of its unconstrained numbers, by the transform's derivative.
 ParameterValue std_of(const Parameter& p, const VectorX& std, const MatrixX& jacobian, int at) {
-  if (p.dimension() == 1) return std::abs(jacobian(p.theta_index, at)) * std[at];
-  const MatrixX spread = jacobian.middleCols(at, 3) * std.segment<3>(at).asDiagonal();
+  if (p.is_scalar()) return std::abs(jacobian(p.theta_index, at)) * std[at];
+  const MatrixX spread = jacobian.middleCols(at, p.dimension()) * std.segment(at, p.dimension()).asDiagonal();
   const auto row_norm = [&](int row) {
     return Vector3(spread.row(row).norm(), spread.row(row + 1).norm(), spread.row(row + 2).norm());
   };
-  if (p.transform == Transform::Vector) return row_norm(p.theta_index);
+  if (p.transform != Transform::PlanePosition) return row_norm(p.theta_index);
   return PlaneValue{row_norm(p.theta_index), row_norm(p.theta_index + 3)};
 }
 
 std::map<std::string, double> scalars_of(const ParameterSet& parameters, const VectorX& theta) {
   std::map<std::string, double> values;
   for (const Parameter& p : parameters.parameters()) {
-    if (p.dimension() == 1) {
+    if (p.is_scalar()) {
       values[p.name] = theta[p.theta_index];
     } else {
       for (int d = 0; d < 3; ++d) values[p.name + "." + "xyz"[d]] = theta[p.theta_index + d];
@@ -64,7 +64,7 @@ ConvergenceHistory history_of(const FitOutcome& outcome) {
   ConvergenceHistory history;
   std::vector<const Parameter*> shown;
   for (const Parameter& p : outcome.parameters.parameters())
-    if (p.dimension() == 1 && (p.estimated || p.name == "youngs_modulus")) shown.push_back(&p);
+    if (p.is_scalar() && (p.estimated || p.name == "youngs_modulus")) shown.push_back(&p);
   for (const Parameter* p : shown) history.parameters.push_back(p->name), history.units.push_back(p->unit);
   for (const FitEvent& e : outcome.history) {
     ConvergenceRow row{e.start, e.iteration, e.stage, e.cost, e.damping, {}};
@@ -149,8 +149,21 @@ std::vector<Plane> planes_of(const Capture& capture, const VectorX& theta) {
   return planes;
 }
 
+/// A frame's points where the estimate has them.
+std::vector<Vector3> corrected_points(const ObservedFrame& seen, const Capture& capture, const Discretisation& d,
+                                      const VectorX& theta) {
+  std::vector<Vector3> points = seen.points;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const int sensor = seen.camera[i] < 0 ? int(capture.depth.size()) : seen.camera[i];
+    const int at = theta::sensor(sensor, d.simulation.planes, d.simulation.pulls);
+    points[i] = SensorCorrection(d.mismatch.centre, theta.segment<SensorCorrection::size>(at)).apply(points[i], seen.view[i]);
+  }
+  return points;
+}
+
 /// A few of the fitted frames that tell the story, simulated with the estimate and drawn over what was observed.
-Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& observed, const FitOutcome& outcome) {
+Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutcome& outcome) {
+  const Capture& capture = recorded_capture.capture;
   const Discretisation& d = outcome.discretisation;
   Gallery gallery;
   gallery.triangles = capture.surface->triangles;
@@ -169,8 +182,9 @@ Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& obs
     if (!std::ranges::binary_search(told, frame)) return true;
     const int recorded = frame + capture.start_frame;
     GalleryFrame drawn{recorded, capture.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
-    const auto seen = std::ranges::find(observed, recorded, &ObservedFrame::frame);
-    if (seen != observed.end()) add_observations(drawn, seen->points, d, state.x);
+    const auto seen = std::ranges::find(recorded_capture.observed, recorded, &ObservedFrame::frame);
+    if (seen != recorded_capture.observed.end())
+      add_observations(drawn, corrected_points(*seen, capture, d, outcome.theta), d, state.x);
     gallery.frames.push_back(std::move(drawn));
     return frame < told.back();
   });
@@ -200,8 +214,10 @@ ConvergenceHistory drawn_history(ConvergenceHistory history) {
   return history;
 }
 
-VectorX model_theta(const Model& model, const Vector3& gravity) {
-  VectorX theta = VectorX::Zero(theta::size(int(model.planes.size())));
+VectorX model_theta(const Model& model, const Vector3& gravity, int sensors) {
+  const int planes = int(model.planes.size()), pulls = int(model.initial.pulls.size());
+  VectorX theta = VectorX::Zero(theta::size(planes, 1, pulls, sensors));
+  for (int k = 0; k < pulls; ++k) theta.segment<3>(theta::pull(k, planes)) = model.initial.pulls[std::size_t(k)];
   theta[theta::youngs_modulus] = model.youngs_modulus;
   theta[theta::poissons_ratio] = model.poisson_ratio;
   theta[theta::mass_damping] = model.mass_damping;
@@ -253,7 +269,8 @@ SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
   return errors;
 }
 
-Result make_result(const Capture& capture, const FitOutcome& outcome, const RunFacts& facts) {
+Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome, const RunFacts& facts) {
+  const Capture& capture = recordings.front().capture;
   Result result;
   result.software.version = facts.version;
   result.software.commit = facts.commit;
@@ -272,6 +289,9 @@ Result make_result(const Capture& capture, const FitOutcome& outcome, const RunF
     result.parameters.push_back(std::move(r));
   }
   result.error = surface_errors(outcome.evaluation).error;
+  for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
+    result.recordings.push_back({recordings[r].capture.name, recordings[r].capture.sha256,
+                                 surface_errors(outcome.recordings[r].evaluation).error});
   result.cost = {outcome.start_cost, outcome.final_cost};
   add_correlations(result, outcome);
   for (const FitStart& s : outcome.starts) {
@@ -293,8 +313,8 @@ Result make_result(const Capture& capture, const FitOutcome& outcome, const RunF
 }
 
 Model make_model(const Capture& capture, const FitOutcome& outcome) {
-  const Discretisation& d = outcome.discretisation;
-  const VectorX& t = outcome.theta;
+  const Discretisation& d = outcome.recordings.front().discretisation;
+  const VectorX& t = outcome.recordings.front().theta;
   Model model;
   model.name = capture.name;
   model.surface = *capture.surface;
@@ -319,6 +339,8 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   model.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
   model.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);
   model.initial.known = true;
+  for (int k = 0; k < d.simulation.pulls; ++k)
+    model.initial.pulls.push_back(theta::vector_at(t, theta::pull(k, d.simulation.planes)));
   model.cell_size = object_size(capture) / outcome.cells;
   if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
     model.cell_size = grid->cell_size;
@@ -387,7 +409,7 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
   situated.planes = capture.planes;
   situated.initial = capture.initial;
   const Vector3 gravity = capture.gravity.value_or(model.gravity.value_or(-9.81 * capture.up));
-  scene.theta = model_theta(situated, gravity);
+  scene.theta = model_theta(situated, gravity, int(sensor_names(capture).size()));
   SimulationOptions settings;
   settings.newmark_theta = model.theta;
   Resolution resolution;
@@ -421,31 +443,33 @@ RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Bo
   return summary;
 }
 
-void write_fit_output(const fs::path& folder, const Capture& capture, const std::vector<ObservedFrame>& observed,
-                      const FitOutcome& outcome, const RunFacts& facts,
+void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings,
+                      const FitOutcome& outcome, const Result& result, const RunFacts& facts,
                       const std::function<void(const char*, int, int)>& progress) {
   const auto tell = [&](const char* what, int done, int total) {
     if (progress) progress(what, done, total);
   };
+  const Capture& capture = recordings.front().capture;
+  const RecordingOutcome& first = outcome.recordings.front();
   ReportData report;
   report.title = capture.name;
-  report.result = make_result(capture, outcome, facts);
+  report.result = result;
   const ConvergenceHistory history = history_of(outcome);
   report.convergence = drawn_history(history);
   write_result(folder / "result.json", report.result);
   write_convergence(folder / "convergence.csv", history);
   save_model(folder, make_model(capture, outcome));
-  write_trajectory(folder, outcome.discretisation.body, outcome.discretisation.simulation, outcome.theta,
+  write_trajectory(folder, first.discretisation.body, first.discretisation.simulation, first.theta,
                    [&](int done, int total) { return tell("trajectory", done, total), true; });
   report.capture_path = facts.capture_path;
-  for (const auto& f : surface_errors(outcome.evaluation).frames) {
+  for (const auto& f : surface_errors(first.evaluation).frames) {
     const int frame = f.frame + capture.start_frame;
     report.residuals.push_back({frame, capture.times[std::size_t(frame)], f.rms, f.points, f.noise});
   }
   if (outcome.correlation.size() > 0)
     report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   tell("pictures", 0, 1);
-  add_pictures(report, gallery_of(capture, observed, outcome));
+  add_pictures(report, gallery_of(recordings.front(), first));
   tell("pictures", 1, 1);
   write_report(folder / "report.html", report);
 }

@@ -18,9 +18,10 @@ struct RunFacts {
 };
 
 /// The estimate as `result.json` tells it.
-Result make_result(const Capture& capture, const FitOutcome& outcome, const RunFacts& facts);
+/// @param recordings  of the fit, in its order
+Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome, const RunFacts& facts);
 
-/// The simulation-ready model of an estimate.
+/// The simulation-ready model of an estimate, in the scene of its first recording.
 Model make_model(const Capture& capture, const FitOutcome& outcome);
 
 /// Body, scene and parameters that a model describes.
@@ -60,8 +61,9 @@ struct SurfaceErrors {
 SurfaceErrors surface_errors(const CostEvaluation& evaluation);
 
 /// Writes the whole output folder of a fit (docs/formats.md, section 2) but for its log.
-void write_fit_output(const std::filesystem::path& folder, const Capture& capture,
-                      const std::vector<ObservedFrame>& observed, const FitOutcome& outcome, const RunFacts& facts,
+/// @param result  of `make_result`, with what else is known
+void write_fit_output(const std::filesystem::path& folder, const std::vector<RecordedCapture>& recordings,
+                      const FitOutcome& outcome, const Result& result, const RunFacts& facts,
                       const std::function<void(const char*, int, int)>& progress = {});
 
 }  // namespace pliant

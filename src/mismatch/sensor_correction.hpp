@@ -1,0 +1,30 @@
+#pragma once
+
+#include "elasticity/parameters.hpp"
+
+namespace pliant {
+
+/// What is wrong with where a sensor puts its points: a constant error of its range (light that enters the material comes
+/// back late) and a small rigid motion, that of its own pose or of the scan:
+///   p' = o + exp(turn) (p - range_error d - o) + shift,
+/// with d the direction from the sensor to the point and o a fixed centre near the object.
+class SensorCorrection {
+ public:
+  static constexpr int size = 7;  ///< range error [m], turn [rad], shift [m]
+  using Values = Eigen::Matrix<double, size, 1>;
+  using Jacobian = Eigen::Matrix<double, 3, size>;
+
+  SensorCorrection(const Vector3& centre, const Values& values);
+  /// @param point [m]
+  /// @param view  unit direction from the sensor; zero where there is none
+  Vector3 apply(const Vector3& point, const Vector3& view) const;
+  /// Derivative of the corrected point by the values.
+  Jacobian jacobian(const Vector3& point, const Vector3& view) const;
+
+ private:
+  Vector3 centre_, turn_, shift_;
+  double range_error_;
+  Matrix3 rotation_;
+};
+
+}  // namespace pliant

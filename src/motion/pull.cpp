@@ -1,0 +1,130 @@
+#include "motion/pull.hpp"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "base/error.hpp"
+#include "elasticity/corotated.hpp"
+#include "solvers/linear_solver.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double width = 0.15;  // of the Gaussians, times the object's size
+
+VectorX volume_of_nodes(const Body& body) {
+  const Points ones = Points::Ones(body.node_count(), 3);
+  Points sum = Points::Zero(body.node_count(), 3);
+  body.add_mass_product(1.0, ones, sum);
+  return sum.col(0);
+}
+
+/// Greatest displacement for each column of forces of a body of unit Young's modulus, by linear elasticity from rest.
+VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const std::vector<int>& held,
+                               const std::vector<Points>& forces) {
+  VectorX theta = VectorX::Zero(theta::size(0, body->modulus.controls));
+  for (int k = 0; k < body->modulus.controls; ++k)
+    theta[theta::modulus(k, body->modulus.controls, theta.size())] = 1.0;
+  theta[theta::poissons_ratio] = 0.3;
+  const auto elasticity = make_elasticity(body);
+  elasticity->set_parameters(theta);
+  elasticity->linearise(body->reference_positions());
+  BlockMatrix matrix(body->pattern);
+  matrix.set_zero();
+  elasticity->add_matrix(1.0, matrix);
+  for (const int node : held) matrix.constrain(node);
+  const auto solver = make_linear_solver(body->pattern);
+  if (held.size() < 3 || !solver->factorise(matrix))
+    throw InputError({{},
+                      "nothing holds the object while it is pulled",
+                      "a [[fixed]] region that contains a part of the object",
+                      "say in capture.toml where the object is held before and after it is released"});
+  VectorX greatest(Eigen::Index(forces.size()));
+  for (std::size_t i = 0; i < forces.size(); ++i) {
+    Points force = forces[i];
+    for (const int node : held) force.row(node).setZero();
+    VectorX u = VectorX::Zero(force.size());
+    (void)solver->solve(flat(force), u);
+    greatest[Eigen::Index(i)] = as_points(std::as_const(u)).rowwise().norm().maxCoeff();
+  }
+  return greatest;
+}
+
+}  // namespace
+
+Pull::Pull(const std::shared_ptr<const Body>& body, const std::vector<int>& about, const std::vector<int>& held,
+           int first_index)
+    : moduli_(body->modulus.controls), first_index_(first_index) {
+  const VectorX volume = volume_of_nodes(*body);
+  const double reach = width * body->size();
+  const auto n = Eigen::Index(about.size());
+  spread_.resize(body->node_count(), n);
+  std::vector<Points> forces;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const VectorX r2 = (body->nodes.rowwise() - body->nodes.row(about[std::size_t(k)])).rowwise().squaredNorm();
+    spread_.col(k) = volume.cwiseProduct((-0.5 * r2.array() / (reach * reach)).exp().matrix());
+    for (int d = 0; d < 3; ++d) {
+      forces.emplace_back(Points::Zero(body->node_count(), 3));
+      forces.back().col(d) = spread_.col(k);
+    }
+  }
+  const VectorX greatest = greatest_displacements(body, held, forces);
+  strength_.resize(n, 3);
+  for (Eigen::Index k = 0; k < n; ++k)
+    for (int d = 0; d < 3; ++d) strength_(k, d) = body->size() / greatest[3 * k + d];
+  pulls_ = Points::Zero(n, 3);
+  moduli_at_.setOnes(moduli_);
+}
+
+void Pull::set_parameters(const VectorX& parameters) {
+  for (int k = 0; k < moduli_; ++k) moduli_at_[k] = parameters[theta::modulus(k, moduli_, parameters.size())];
+  mean_ = std::exp(moduli_at_.array().log().mean());
+  for (Eigen::Index k = 0; k < count(); ++k)
+    pulls_.row(k) =
+        strength_.row(k).cwiseProduct(parameters.segment<3>(first_index_ + 3 * k).transpose());
+}
+
+void Pull::add_force(const Points&, Points& force) {
+  if (is_active_) force.noalias() += mean_ * (spread_ * pulls_);
+}
+
+void Pull::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
+  if (!is_active_) return;
+  double d_log_mean = 0.0;
+  for (int k = 0; k < moduli_; ++k)
+    d_log_mean += d_theta[theta::modulus(k, moduli_, d_theta.size())] / (moduli_ * moduli_at_[k]);
+  Points change = d_log_mean * pulls_;
+  for (Eigen::Index k = 0; k < count(); ++k)
+    change.row(k) += strength_.row(k).cwiseProduct(d_theta.segment<3>(first_index_ + 3 * k).transpose());
+  force.noalias() += mean_ * (spread_ * change);
+}
+
+void Pull::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
+  if (!is_active_) return;
+  const Points bar = mean_ * (spread_.transpose() * w);
+  const double log_mean_bar = bar.cwiseProduct(pulls_).sum();
+  for (int k = 0; k < moduli_; ++k)
+    theta_bar[theta::modulus(k, moduli_, theta_bar.size())] += log_mean_bar / (moduli_ * moduli_at_[k]);
+  for (Eigen::Index k = 0; k < count(); ++k)
+    theta_bar.segment<3>(first_index_ + 3 * k) += bar.row(k).cwiseProduct(strength_.row(k)).transpose();
+}
+
+std::vector<int> pull_nodes(const Body& body, const std::vector<int>& held, int count) {
+  VectorX nearest = VectorX::Constant(body.node_count(), std::numeric_limits<double>::infinity());
+  const auto leave = [&](int node) {
+    nearest = nearest.cwiseMin(VectorX((body.nodes.rowwise() - body.nodes.row(node)).rowwise().squaredNorm()));
+  };
+  for (const int node : held) leave(node);
+  std::vector<int> nodes;
+  for (int k = 0; k < count; ++k) {
+    Eigen::Index farthest = 0;
+    nearest.maxCoeff(&farthest);
+    nodes.push_back(int(farthest));
+    leave(nodes.back());
+  }
+  return nodes;
+}
+
+}  // namespace pliant
