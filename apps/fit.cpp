@@ -174,8 +174,8 @@ int run(const Arguments& arguments) {
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
   const auto read = [&](RecordedCapture& recording) {
-    recording.observed = observe(recording.capture, observe_options,
-                                 [](int done, int total) { show_progress("read", done, total); });
+    recording.observed =
+        observe(recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
     stop_if_interrupted();
   };
   for (RecordedCapture& recording : recordings) read(recording);
@@ -219,8 +219,8 @@ int run(const Arguments& arguments) {
   write_file(out / "log.txt", log.text());
   print_result(result, outcome, out, seconds());
   if (outcome.interrupted) {
-    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out "
-              << out.string() << " --resume\n";
+    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out.string()
+              << " --resume\n";
     return WasInterrupted;
   }
   fs::remove(state_file);

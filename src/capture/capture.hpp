@@ -15,10 +15,19 @@
 namespace pliant {
 
 /// A region of space at rest: where a point of the object is held, or of another material.
-struct RegionBox { Vector3 min, max; };
-struct RegionSphere { Vector3 centre; double radius; };
-struct RegionHalfSpace { Vector3 point, normal; };    ///< the normal points into the region
-struct RegionVertices { std::vector<int> indices; };  ///< vertices of the object's surface
+struct RegionBox {
+  Vector3 min, max;
+};
+struct RegionSphere {
+  Vector3 centre;
+  double radius;
+};
+struct RegionHalfSpace {
+  Vector3 point, normal;
+};  ///< the normal points into the region
+struct RegionVertices {
+  std::vector<int> indices;
+};  ///< vertices of the object's surface
 using Region = std::variant<RegionBox, RegionSphere, RegionHalfSpace, RegionVertices>;
 
 struct FixedRegion {
@@ -91,8 +100,8 @@ struct Press {
 };
 
 struct Load {
-  double mass = 0.0;             ///< [kg]
-  Vector3 at = Vector3::Zero();  ///< on the undeformed surface
+  double mass = 0.0;                                                  ///< [kg]
+  Vector3 at = Vector3::Zero();                                       ///< on the undeformed surface
   std::optional<std::filesystem::path> cloud, markers, markers_rest;  ///< absolute
   std::map<std::string, std::filesystem::path> images, masks;         ///< absolute, by the depth camera's name
   std::string role = "fit";                                           ///< "fit" or "test"

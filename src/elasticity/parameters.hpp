@@ -6,9 +6,9 @@ namespace pliant {
 
 /// Everything that one scene depends on, as one vector theta, so that tangents and adjoints with respect to any of it
 /// are products with one matrix. After the numbers that every scene has there follow, per plane, its point and its
-/// normal; the pulls that hold a released object until it is let go; corrections of what sensors saw, which play no part
-/// in the motion; and at the very end the control moduli of an object of several (all but the first, which stands at
-/// `youngs_modulus`).
+/// normal; the pulls that hold a released object until it is let go; corrections of what sensors saw, which play no
+/// part in the motion; and at the very end the control moduli of an object of several (all but the first, which stands
+/// at `youngs_modulus`).
 namespace theta {
 enum Index : int {
   youngs_modulus = 0,     ///< [Pa]

@@ -52,7 +52,8 @@ void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
     // A name alone means those of all sensors, pulls and recordings, but for the modulus of the object's own material.
     for (Parameter& p : list)
       if (meant.empty() || name != "youngs_modulus")
-        if (p.name.size() > name.size() && p.name.starts_with(name) && (p.name[name.size()] == '@' || p.name[name.size()] == '['))
+        if (p.name.size() > name.size() && p.name.starts_with(name) &&
+            (p.name[name.size()] == '@' || p.name[name.size()] == '['))
           meant.push_back(&p);
     if (meant.empty())
       throw InputError({{}, "there is no parameter \"" + name + "\" in this recording", "", "see `pliant fit --help`"});
@@ -219,8 +220,8 @@ class Fit {
                         "name the same materials in every recording of the object"});
     controls_ = controls;
     recording.size = object_size(capture);
-    ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.surface), controls_,
-                                                 pull_count(capture, resolution(0.0)));
+    ParameterSet parameters =
+        default_parameters(capture, enclosed_volume(*capture.surface), controls_, pull_count(capture, resolution(0.0)));
     trust_planes_seen(parameters, planes_seen);
     return parameters;
   }
@@ -253,8 +254,8 @@ class Fit {
     settings.solver.tolerance = options_.solver_tolerance;
     settings.hold_strongly = options_.hold_strongly;
     settings.integrator = options_.integrator;
-    return discretise(recording.capture, recording.distance, resolution(cells),
-                      recording.own(parameters_.reference()), settings, recording.tracked.rest);
+    return discretise(recording.capture, recording.distance, resolution(cells), recording.own(parameters_.reference()),
+                      settings, recording.tracked.rest);
   }
 
   enum class Level { Coarse, Fine };
@@ -353,9 +354,7 @@ class Fit {
     int counter = 0;
     for (const int part : {8, 4}) {
       // The pose of a released object shows in the frames before, a velocity only after.
-      const auto horizon = [&](const Recording& r) {
-        return r.is_released() ? 0 : std::max(2, r.last_frame / part);
-      };
+      const auto horizon = [&](const Recording& r) { return r.is_released() ? 0 : std::max(2, r.last_frame / part); };
       Objective objective = make_objective(Level::Coarse, motion, options_.wide_band, horizon);
       const OptimiserSummary s = optimise(objective, start_of(motion), "motion", 0, 12, counter, 0.0, 0.05);
       if (s.succeeded) motion.set_reference(motion.to_theta(s.p));
@@ -399,9 +398,9 @@ class Fit {
         set_all_moduli(trial, stress * std::pow(10.0, double(i) / per_decade));
         state_.scan[std::size_t(i)] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
         if (interrupted()) return;
-        Objective objective = make_objective(Level::Coarse, fixed_at(trial), options_.wide_band, [&](const Recording& r) {
-          return swings() ? r.horizon(growing_horizon().front()) : r.last_frame;
-        });
+        Objective objective = make_objective(
+            Level::Coarse, fixed_at(trial), options_.wide_band,
+            [&](const Recording& r) { return swings() ? r.horizon(growing_horizon().front()) : r.last_frame; });
         const CostEvaluation e = objective.evaluate(VectorX(0));
         if (e.succeeded) state_.scan[std::size_t(i)].second = e.cost;
         emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
@@ -480,9 +479,8 @@ class Fit {
     for (const double part : growing_horizon()) {
       const bool last = part == 1.0 && !first;
       const double from = 0.15 + 0.3 * (part < 1.0 ? 0.0 : 0.4);
-      Objective objective = make_objective(Level::Coarse, parameters, options_.wide_band, [&](const Recording& r) {
-        return r.horizon(part);
-      });
+      Objective objective = make_objective(Level::Coarse, parameters, options_.wide_band,
+                                           [&](const Recording& r) { return r.horizon(part); });
       const OptimiserSummary s =
           optimise(objective, start_of(parameters), "coarse", index, last ? 10 : 5, counter, from, from + 0.15);
       start.iterations += s.iterations;
@@ -564,8 +562,8 @@ class Fit {
     }
     outcome_.evaluation = std::move(s.evaluation);
     for (std::size_t r = 0; r < recordings_.size(); ++r)
-      outcome_.recordings.push_back({recordings_[r].fine, recordings_[r].own(outcome_.theta),
-                                     outcome_.evaluation.of_recording(int(r))});
+      outcome_.recordings.push_back(
+          {recordings_[r].fine, recordings_[r].own(outcome_.theta), outcome_.evaluation.of_recording(int(r))});
     if (outcome_.evaluation.succeeded && parameters.dimension() > 0) {
       outcome_.covariance = parameter_covariance(outcome_.evaluation);
       outcome_.std = outcome_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -594,8 +592,7 @@ class Fit {
   }
 
   double start_cost_on_fine() const {
-    Objective objective =
-        make_objective(Level::Fine, fixed_at(outcome_.start_theta), options_.fine_band, to_the_end);
+    Objective objective = make_objective(Level::Fine, fixed_at(outcome_.start_theta), options_.fine_band, to_the_end);
     return objective.evaluate(VectorX(0)).cost;
   }
 

@@ -93,9 +93,9 @@ struct RecordingOutcome {
 };
 
 struct FitOutcome {
-  ParameterSet parameters;    ///< as used, with the reference at the solution
+  ParameterSet parameters;     ///< as used, with the reference at the solution
   VectorX theta, start_theta;  ///< of all recordings, one after the other
-  VectorX std;  ///< of each unconstrained coordinate
+  VectorX std;                 ///< of each unconstrained coordinate
   MatrixX covariance, correlation;
   double start_cost = 0.0, final_cost = 0.0;
   CostEvaluation evaluation;  ///< at the solution, all points of the fit
@@ -118,17 +118,17 @@ struct FitMonitor {
 };
 
 /// Estimates the unknown parameters of an object from recordings of it: its pose or motion at the start from the first
-/// frames where that is unknown, a scan over decades of Young's modulus on a coarse grid, the best starts followed there
-/// in a wide band and a growing horizon, then the best on the full grid in a narrow band. Recordings share the object's
-/// material (moduli, Poisson's ratio, dampings and, where it is estimated, density); each has its own start, planes and
-/// sensors, named with "[2]" and so on from the second recording.
+/// frames where that is unknown, a scan over decades of Young's modulus on a coarse grid, the best starts followed
+/// there in a wide band and a growing horizon, then the best on the full grid in a narrow band. Recordings share the
+/// object's material (moduli, Poisson's ratio, dampings and, where it is estimated, density); each has its own start,
+/// planes and sensors, named with "[2]" and so on from the second recording.
 /// @param resume  what an interrupted fit of the same recordings and options had done
 /// Throws InputError where a recording cannot be fitted, with the reason.
 FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor = {},
                FitState resume = {});
 
-/// How well a fitted material predicts a recording that was kept out: only the recording's own start, planes and sensors
-/// are estimated, from its own observations.
+/// How well a fitted material predicts a recording that was kept out: only the recording's own start, planes and
+/// sensors are estimated, from its own observations.
 FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
                  const FitMonitor& monitor = {});
 

@@ -32,10 +32,9 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
 const std::set<std::string> parameter_names = {
-    "youngs_modulus",  "poisson_ratio",    "mass_damping", "stiffness_damping", "density",
-    "gravity",         "linear_velocity",  "angular_velocity", "plane",         "plane_2",
-    "plane_3",         "plane_4",          "pull",         "range_error",       "sensor_turn",
-    "sensor_shift"};
+    "youngs_modulus",   "poisson_ratio", "mass_damping", "stiffness_damping", "density", "gravity", "linear_velocity",
+    "angular_velocity", "plane",         "plane_2",      "plane_3",           "plane_4", "pull",    "range_error",
+    "sensor_turn",      "sensor_shift"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -214,8 +213,10 @@ const std::vector<FitKey>& fit_keys() {
 std::string parameter_key_help() {
   return "Parameters (youngs_modulus, poisson_ratio, mass_damping, stiffness_damping, density, gravity, "
          "linear_velocity,\n"
-         "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, and for what sensors get wrong range_error@SENSOR,\n"
-         "sensor_turn@SENSOR, sensor_shift@SENSOR; [2] after a name means the second recording's) have three keys each:\n"
+         "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, and for what sensors get wrong "
+         "range_error@SENSOR,\n"
+         "sensor_turn@SENSOR, sensor_shift@SENSOR; [2] after a name means the second recording's) have three keys "
+         "each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
          "  NAME.estimate=BOOL   estimate it, or keep the start value\n"
          "  NAME.prior_std=X     width of the prior: of the logarithm for moduli, dampings and density";

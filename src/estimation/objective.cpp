@@ -66,7 +66,9 @@ class Objective::Part {
   std::vector<SurfaceObservation> corrected(const std::vector<SurfaceObservation>& points) const;
   std::vector<TrackObservation> corrected(const std::vector<TrackObservation>& tracks) const;
   bool is_corrected(int sensor) const { return sensor < int(sensors_.corrections.size()); }
-  int sensor_index(int sensor) const { return theta::sensor(sensor, motion_.simulation.planes, motion_.simulation.pulls); }
+  int sensor_index(int sensor) const {
+    return theta::sensor(sensor, motion_.simulation.planes, motion_.simulation.pulls);
+  }
 
   FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents) const;
   void fit_surface(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
@@ -172,8 +174,8 @@ void Objective::Part::fit_tracks(const FrameObservations& seen, const Points& po
   for (int i = 0; i < fit.tracks && sensors_.change; ++i) {
     const TrackObservation& o = seen.tracks[std::size_t(i)];
     if (is_corrected(o.sensor))
-      J.middleRows<3>(3 * i) -=
-          sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, Vector3::Zero()) * sensors_.changes[std::size_t(o.sensor)];
+      J.middleRows<3>(3 * i) -= sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, Vector3::Zero()) *
+                                sensors_.changes[std::size_t(o.sensor)];
   }
   fit.gradient += J.transpose() * weight.cwiseProduct(flat(r));
   fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;

@@ -40,8 +40,8 @@ struct Parameter {
   int dimension() const { return is_scalar() ? 1 : transform == Transform::Direction ? 2 : 3; }
 };
 
-/// The estimated parameters of a scene, or of several side by side in theta, as one unconstrained vector p, with its map
-/// to theta.
+/// The estimated parameters of a scene, or of several side by side in theta, as one unconstrained vector p, with its
+/// map to theta.
 class ParameterSet {
  public:
   ParameterSet() = default;

@@ -245,8 +245,8 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
     const int at = theta::sensor(k, planes, pulls);
     const std::string& sensor = sensors[std::size_t(k)];
     if (k < int(capture.depth.size()))
-      add_scalar(p, ("range_error@" + sensor).c_str(), "m", Transform::Shift, at, -0.2, 0.2, 0.0, range_error_std / size,
-                 false, size);
+      add_scalar(p, ("range_error@" + sensor).c_str(), "m", Transform::Shift, at, -0.2, 0.2, 0.0,
+                 range_error_std / size, false, size);
     add_vector(p, "sensor_turn@" + sensor, "rad", Transform::Vector, at + 1, 1.0, Vector3::Zero(), 0.05, false);
     add_vector(p, "sensor_shift@" + sensor, "m", Transform::Vector, at + 4, size, Vector3::Zero(), 0.05, false);
   }

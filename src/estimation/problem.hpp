@@ -57,7 +57,8 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
 /// it does not give.
 /// @param volume    of the object [m^3], for the density that belongs to a mass
-/// Corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") are there and not estimated.
+/// Corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") are there and not
+/// estimated.
 /// @param controls  control moduli of the body: `modulus_names` tells what they are called
 /// @param pulls     that hold a released object: "pull@1", ... (see `Pull`)
 ParameterSet default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0);

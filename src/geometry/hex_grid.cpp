@@ -22,7 +22,8 @@ Eigen::Matrix<double, 8, 3> shape_gradients(const Vector3& p) {
   Eigen::Matrix<double, 8, 3> g;
   for (int a = 0; a < 8; ++a) {
     const double sx = a & 1 ? 1 : -1, sy = a >> 1 & 1 ? 1 : -1, sz = a >> 2 & 1 ? 1 : -1;
-    const double fx = a & 1 ? p.x() : 1 - p.x(), fy = a >> 1 & 1 ? p.y() : 1 - p.y(), fz = a >> 2 & 1 ? p.z() : 1 - p.z();
+    const double fx = a & 1 ? p.x() : 1 - p.x(), fy = a >> 1 & 1 ? p.y() : 1 - p.y(),
+                 fz = a >> 2 & 1 ? p.z() : 1 - p.z();
     g.row(a) << sx * fy * fz, fx * sy * fz, fx * fy * sz;
   }
   return g;
@@ -56,8 +57,7 @@ class CellCutter {
       : n_(subdivisions), values_(std::size_t(std::pow(subdivisions + 1, 3))) {
     for (int k = 0; k <= n_; ++k)
       for (int j = 0; j <= n_; ++j)
-        for (int i = 0; i <= n_; ++i)
-          value(i, j, k) = distance.value(corner + cell_size / n_ * Vector3(i, j, k));
+        for (int i = 0; i <= n_; ++i) value(i, j, k) = distance.value(corner + cell_size / n_ * Vector3(i, j, k));
   }
 
   /// Returns false where no sample lies inside.
@@ -302,7 +302,8 @@ HexGrid make_hex_grid(const SignedDistance& distance, const Box& object, double 
     }
   }
   if (grid.surface.empty())
-    throw InputError({{}, "no cell of " + std::to_string(cell_size) + " m lies inside the object", "", "use smaller cells"});
+    throw InputError(
+        {{}, "no cell of " + std::to_string(cell_size) + " m lies inside the object", "", "use smaller cells"});
 
   for (int l = 0; l < grid.lattice_count(); ++l) {
     if (stands_for[l] < 0 || cells[l].fraction >= options.merge_below) continue;

@@ -40,11 +40,11 @@ struct HexGrid {
   Vector3 origin;          ///< lattice point (0,0,0) [m]
   Eigen::Vector3i size;    ///< lattice points along each axis
 
-  Points nodes;                            ///< n x 3, rest positions [m] of the nodes of active cells
-  std::vector<std::array<int, 8>> cells;   ///< nodes of each active cell
-  std::vector<Eigen::Vector3i> cell_index; ///< lattice index of each active cell's lowest corner
-  std::vector<CellQuadrature> quadrature;  ///< of each active cell, in units of h^3
-  std::vector<SurfacePoint> surface;       ///< samples of the surface, about four a cut cell face
+  Points nodes;                             ///< n x 3, rest positions [m] of the nodes of active cells
+  std::vector<std::array<int, 8>> cells;    ///< nodes of each active cell
+  std::vector<Eigen::Vector3i> cell_index;  ///< lattice index of each active cell's lowest corner
+  std::vector<CellQuadrature> quadrature;   ///< of each active cell, in units of h^3
+  std::vector<SurfacePoint> surface;        ///< samples of the surface, about four a cut cell face
 
   std::vector<int> node_of_lattice;  ///< active node of a lattice point, -1: none
   std::vector<int> cell_of_lattice;  ///< active cell that stands for a lattice cell (itself or merged into), -1: none

@@ -41,8 +41,8 @@ SignedDistance::Sample SignedDistance::sample(const Vector3& point) const {
   const double c0 = c00 + y * (c10 - c00), c1 = c01 + y * (c11 - c01);
   Sample s;
   s.value = c0 + z * (c1 - c0);
-  s.gradient.x() = ((1 - z) * ((1 - y) * (c100 - c000) + y * (c110 - c010)) +
-                    z * ((1 - y) * (c101 - c001) + y * (c111 - c011)));
+  s.gradient.x() =
+      ((1 - z) * ((1 - y) * (c100 - c000) + y * (c110 - c010)) + z * ((1 - y) * (c101 - c001) + y * (c111 - c011)));
   s.gradient.y() = (1 - z) * (c10 - c00) + z * (c11 - c01);
   s.gradient.z() = c1 - c0;
   s.gradient /= spacing_;
@@ -93,8 +93,10 @@ SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double 
         distance.at(i, j, k) = value * float(spacing);
       }
   if (!encloses)
-    throw InputError({{}, "the surface encloses no volume at a resolution of " + std::to_string(spacing) + " m",
-                      "a closed surface, oriented outwards", "check the mesh or raise the resolution"});
+    throw InputError({{},
+                      "the surface encloses no volume at a resolution of " + std::to_string(spacing) + " m",
+                      "a closed surface, oriented outwards",
+                      "check the mesh or raise the resolution"});
   return distance;
 }
 

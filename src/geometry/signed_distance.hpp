@@ -8,7 +8,8 @@
 namespace pliant {
 
 /// Signed distance to a closed surface on a regular grid [m], negative inside, interpolated trilinearly.
-/// Beyond the grid the value of the nearest grid point plus the distance to the grid is given, so that it keeps growing.
+/// Beyond the grid the value of the nearest grid point plus the distance to the grid is given, so that it keeps
+/// growing.
 class SignedDistance {
  public:
   struct Sample {
@@ -43,7 +44,8 @@ class SignedDistance {
 
 /// Signed distance of a closed, outward oriented mesh, by OpenVDB.
 /// @param spacing  of the distance grid [m]
-/// @param margin   how far outside the mesh's box the grid reaches [m]; distances are cut off a little beyond it, inside
+/// @param margin   how far outside the mesh's box the grid reaches [m]; distances are cut off a little beyond it,
+/// inside
 ///                 and outside, which keeps the work in a band around the surface
 /// Throws InputError where the mesh encloses no grid point.
 SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double margin);
@@ -53,8 +55,7 @@ SignedDistance::SignedDistance(const Box& box, double spacing, Function&& functi
   allocate(box, spacing);
   for (int k = 0; k < size_.z(); ++k)
     for (int j = 0; j < size_.y(); ++j)
-      for (int i = 0; i < size_.x(); ++i)
-        at(i, j, k) = float(function(Vector3(origin_ + spacing_ * Vector3(i, j, k))));
+      for (int i = 0; i < size_.x(); ++i) at(i, j, k) = float(function(Vector3(origin_ + spacing_ * Vector3(i, j, k))));
 }
 
 }  // namespace pliant

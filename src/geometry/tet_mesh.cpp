@@ -119,7 +119,8 @@ void check_nodes(const TetMesh& mesh) {
   std::vector<bool> used(std::size_t(mesh.node_count()), false);
   const auto visit = [&](int node, std::size_t e) {
     if (node < 0 || node >= mesh.node_count())
-      refuse("element " + std::to_string(e) + " names node " + std::to_string(node) + " of " + std::to_string(mesh.node_count()));
+      refuse("element " + std::to_string(e) + " names node " + std::to_string(node) + " of " +
+             std::to_string(mesh.node_count()));
     used[std::size_t(node)] = true;
   };
   for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
@@ -157,7 +158,9 @@ std::vector<Face> boundary_faces(const TetMesh& mesh) {
   for (std::size_t i = 0; i < faces.size();) {
     std::size_t next = i + 1;
     while (next < faces.size() && faces[next].sorted == faces[i].sorted) ++next;
-    if (next - i > 2) refuse("a face of element " + std::to_string(faces[i].tet) + " belongs to " + std::to_string(next - i) + " elements");
+    if (next - i > 2)
+      refuse("a face of element " + std::to_string(faces[i].tet) + " belongs to " + std::to_string(next - i) +
+             " elements");
     if (next - i == 1) boundary.push_back(faces[i]);
     i = next;
   }
@@ -173,7 +176,9 @@ void add_samples(const Eigen::Matrix<double, N, 3>& X, int face, std::vector<Sur
     for (int c = 0; c < 3; ++c) at[tet_faces[face][c]] = c == k ? 2.0 / 3.0 : 1.0 / 6.0;
     const auto shape = tet_shape_functions<N>(at);
     const Matrix3 J = X.transpose() * tet_shape_derivatives<N>(at);  // dx / d(b1, b2, b3)
-    const auto towards = [&](int corner) -> Vector3 { return corner == 0 ? Vector3::Zero() : Vector3(J.col(corner - 1)); };
+    const auto towards = [&](int corner) -> Vector3 {
+      return corner == 0 ? Vector3::Zero() : Vector3(J.col(corner - 1));
+    };
     const auto& [i, j, l] = tet_faces[face];
     const Vector3 normal = 0.5 * (towards(j) - towards(i)).cross(towards(l) - towards(i));
     Vector3 position = Vector3::Zero();
@@ -216,7 +221,8 @@ TetMesh make_tet_mesh(Points nodes, std::vector<std::array<int, 4>> tets, std::v
   mesh.mid_nodes = std::move(mid_nodes);
   if (mesh.tets.empty()) refuse("there are no elements");
   if (mesh.is_quadratic() && mesh.mid_nodes.size() != mesh.tets.size())
-    refuse("mid nodes of " + std::to_string(mesh.mid_nodes.size()) + " elements of " + std::to_string(mesh.tets.size()));
+    refuse("mid nodes of " + std::to_string(mesh.mid_nodes.size()) + " elements of " +
+           std::to_string(mesh.tets.size()));
   check_nodes(mesh);
   check_volumes(mesh);
   for (const Face& face : boundary_faces(mesh)) {
@@ -264,7 +270,8 @@ TetMesh make_tet_box(const Box& box, const Eigen::Vector3i& cells, bool quadrati
         const Vector3 share = Vector3(i, j, k).cwiseQuotient(cells.cast<double>());
         nodes.row(node(i, j, k)) = (box.min + share.cwiseProduct(box.extent())).transpose();
         if (i == cells.x() || j == cells.y() || k == cells.z()) continue;
-        // Kuhn's six around the diagonal from the lowest to the highest corner: neighbouring cells agree on shared faces.
+        // Kuhn's six around the diagonal from the lowest to the highest corner: neighbouring cells agree on shared
+        // faces.
         const auto corner = [&](int a) { return node(i + (a & 1), j + (a >> 1 & 1), k + (a >> 2 & 1)); };
         static constexpr int paths[6][2] = {{1, 3}, {3, 2}, {2, 6}, {6, 4}, {4, 5}, {5, 1}};
         for (const auto& [p, q] : paths) tets.push_back({corner(0), corner(p), corner(q), corner(7)});

@@ -19,16 +19,17 @@ struct TetPoint {
   Barycentric barycentric = Barycentric::Zero();
 };
 
-/// A volume of linear or quadratic tetrahedra. Comes from the functions below and is not changed afterwards: `boundary`,
-/// `surface` and `tree` follow from nodes and elements. Reading from several threads is safe.
+/// A volume of linear or quadratic tetrahedra. Comes from the functions below and is not changed afterwards:
+/// `boundary`, `surface` and `tree` follow from nodes and elements. Reading from several threads is safe.
 struct TetMesh {
   Points nodes;                               ///< n x 3, rest positions [m]
   std::vector<std::array<int, 4>> tets;       ///< corners of each element, positively oriented
   std::vector<std::array<int, 6>> mid_nodes;  ///< of each element's edges 01 02 03 12 13 23; empty: linear elements
 
-  std::vector<std::array<int, 3>> boundary;  ///< corners of the faces of one element only, counter-clockwise from outside
-  std::vector<SurfacePoint> surface;         ///< three a boundary face, exact there for quadratic polynomials
-  std::shared_ptr<const TetTree> tree;       ///< bounding volumes, for `locate`
+  std::vector<std::array<int, 3>>
+      boundary;                         ///< corners of the faces of one element only, counter-clockwise from outside
+  std::vector<SurfacePoint> surface;    ///< three a boundary face, exact there for quadratic polynomials
+  std::shared_ptr<const TetTree> tree;  ///< bounding volumes, for `locate`
 
   int node_count() const { return int(nodes.rows()); }
   int tet_count() const { return int(tets.size()); }
@@ -50,8 +51,8 @@ TetMesh make_tet_mesh(Points nodes, std::vector<std::array<int, 4>> tets,
 /// quadratic already comes back as it is.
 TetMesh with_mid_nodes(const TetMesh& mesh);
 
-/// A box of nx x ny x nz cells of six tetrahedra each. Throws std::invalid_argument where the box is empty or a count is
-/// below one.
+/// A box of nx x ny x nz cells of six tetrahedra each. Throws std::invalid_argument where the box is empty or a count
+/// is below one.
 TetMesh make_tet_box(const Box& box, const Eigen::Vector3i& cells, bool quadratic);
 
 /// How the boundary of a mesh relates to the scan that it is made from.
@@ -76,9 +77,9 @@ double default_tet_size(const TriangleMesh& surface, double cells_along_longest)
 
 /// How well shaped the elements are, taken as straight ones over their corners.
 struct TetQuality {
-  double least_dihedral_deg = 0.0, greatest_dihedral_deg = 0.0;           ///< a regular tetrahedron has 70.5
-  double least_volume = 0.0, mean_volume = 0.0, greatest_volume = 0.0;    ///< [m^3]
-  int below_5_deg = 0, below_10_deg = 0;                                  ///< elements with a smaller dihedral angle
+  double least_dihedral_deg = 0.0, greatest_dihedral_deg = 0.0;         ///< a regular tetrahedron has 70.5
+  double least_volume = 0.0, mean_volume = 0.0, greatest_volume = 0.0;  ///< [m^3]
+  int below_5_deg = 0, below_10_deg = 0;                                ///< elements with a smaller dihedral angle
   double least_radius_ratio = 0.0;  ///< 3 x in- over circumradius: 1 for a regular tetrahedron, 0 for a flat one
 };
 TetQuality quality(const TetMesh& mesh);

@@ -40,7 +40,8 @@ std::span<const TetQuadraturePoint> tet_quadrature(int degree) {
     add_edge_orbit(rule, 0.045503704125649649492, 0.042546020777081466438);
     return rule;
   }();
-  if (degree < 0 || degree > 5) throw std::invalid_argument("tet_quadrature: no rule of degree " + std::to_string(degree));
+  if (degree < 0 || degree > 5)
+    throw std::invalid_argument("tet_quadrature: no rule of degree " + std::to_string(degree));
   if (degree <= 1) return one;
   return degree == 2 ? std::span<const TetQuadraturePoint>(four) : fourteen;
 }

@@ -4,8 +4,8 @@
 
 namespace pliant {
 
-/// What is wrong with where a sensor puts its points: a constant error of its range (light that enters the material comes
-/// back late) and a small rigid motion, that of its own pose or of the scan:
+/// What is wrong with where a sensor puts its points: a constant error of its range (light that enters the material
+/// comes back late) and a small rigid motion, that of its own pose or of the scan:
 ///   p' = o + exp(turn) (p - range_error d - o) + shift,
 /// with d the direction from the sensor to the point and o a fixed centre near the object.
 class SensorCorrection {

@@ -92,8 +92,8 @@ struct Result {
   std::vector<ParameterResult> parameters;
   std::vector<FieldResult> fields;
   ErrorResult error;
-  std::vector<RecordingResult> recordings;   ///< where there are several: the errors of each
-  std::optional<RecordingResult> held_out;   ///< predicted, with its own start, planes and sensors alone estimated
+  std::vector<RecordingResult> recordings;  ///< where there are several: the errors of each
+  std::optional<RecordingResult> held_out;  ///< predicted, with its own start, planes and sensors alone estimated
   CostResult cost;
   std::vector<CorrelationResult> identifiability;
   std::vector<StartResult> starts;

@@ -25,8 +25,7 @@ VectorX volume_of_nodes(const Body& body) {
 VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const std::vector<int>& held,
                                const std::vector<Points>& forces) {
   VectorX theta = VectorX::Zero(theta::size(0, body->modulus.controls));
-  for (int k = 0; k < body->modulus.controls; ++k)
-    theta[theta::modulus(k, body->modulus.controls, theta.size())] = 1.0;
+  for (int k = 0; k < body->modulus.controls; ++k) theta[theta::modulus(k, body->modulus.controls, theta.size())] = 1.0;
   theta[theta::poissons_ratio] = 0.3;
   const auto elasticity = make_elasticity(body);
   elasticity->set_parameters(theta);
@@ -82,8 +81,7 @@ void Pull::set_parameters(const VectorX& parameters) {
   for (int k = 0; k < moduli_; ++k) moduli_at_[k] = parameters[theta::modulus(k, moduli_, parameters.size())];
   mean_ = std::exp(moduli_at_.array().log().mean());
   for (Eigen::Index k = 0; k < count(); ++k)
-    pulls_.row(k) =
-        strength_.row(k).cwiseProduct(parameters.segment<3>(first_index_ + 3 * k).transpose());
+    pulls_.row(k) = strength_.row(k).cwiseProduct(parameters.segment<3>(first_index_ + 3 * k).transpose());
 }
 
 void Pull::add_force(const Points&, Points& force) {

@@ -11,8 +11,8 @@ namespace pliant {
 /// What holds an object in the pose from which it is released: forces spread smoothly about a few nodes,
 ///   f_n = E_0 sum_k w_k(X_n) V_n c_k / s_k,
 /// with w_k a Gaussian about node k, V_n the node's volume, and s_k (of each axis) such that a unit c_k would move the
-/// object by its size, by linear elasticity from rest. E_0 is the geometric mean of the control moduli, so that the pose
-/// hardly depends on how stiff the object is thought to be.
+/// object by its size, by linear elasticity from rest. E_0 is the geometric mean of the control moduli, so that the
+/// pose hardly depends on how stiff the object is thought to be.
 class Pull : public ForceTerm {
  public:
   /// @param about        nodes, see `pull_nodes`
@@ -39,11 +39,11 @@ class Pull : public ForceTerm {
   Eigen::Index count() const { return spread_.cols(); }
   int moduli_, first_index_;
   bool is_active_ = true;
-  MatrixX spread_;    // n x k: w_k(X_n) V_n [m^3]
-  Points strength_;   // k x 3: 1 / s_k [1/m]
-  Points pulls_;      // k x 3: c_k / s_k
-  VectorX moduli_at_; // [Pa]
-  double mean_ = 0.0; // of the moduli
+  MatrixX spread_;     // n x k: w_k(X_n) V_n [m^3]
+  Points strength_;    // k x 3: 1 / s_k [1/m]
+  Points pulls_;       // k x 3: c_k / s_k
+  VectorX moduli_at_;  // [Pa]
+  double mean_ = 0.0;  // of the moduli
 };
 
 /// Nodes about which a released object is pulled: far from what is held and from each other.

@@ -33,8 +33,8 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   }
   if (options.pulls > 0) {
     const std::vector<int> held = held_nodes(*body, options.holds);
-    auto pulling = std::make_unique<Pull>(body, pull_nodes(*body, held, options.pulls), held,
-                                          theta::pull(0, options.planes));
+    auto pulling =
+        std::make_unique<Pull>(body, pull_nodes(*body, held, options.pulls), held, theta::pull(0, options.planes));
     pull = pulling.get();
     pull->set_active(false);
     terms.push_back(std::move(pulling));

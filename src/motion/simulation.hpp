@@ -51,7 +51,7 @@ class Simulation {
   const Body& body() const { return *body_; }
   const SimulationOptions& options() const { return options_; }
   int frame_count() const { return int(options_.times.size()); }
-  int theta_size() const { 
+  int theta_size() const {
     return theta::size(options_.planes, body_->modulus.controls, options_.pulls, options_.sensors);
   }
 

@@ -156,7 +156,8 @@ std::vector<Vector3> corrected_points(const ObservedFrame& seen, const Capture& 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const int sensor = seen.camera[i] < 0 ? int(capture.depth.size()) : seen.camera[i];
     const int at = theta::sensor(sensor, d.simulation.planes, d.simulation.pulls);
-    points[i] = SensorCorrection(d.mismatch.centre, theta.segment<SensorCorrection::size>(at)).apply(points[i], seen.view[i]);
+    points[i] =
+        SensorCorrection(d.mismatch.centre, theta.segment<SensorCorrection::size>(at)).apply(points[i], seen.view[i]);
   }
   return points;
 }
@@ -443,8 +444,8 @@ RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Bo
   return summary;
 }
 
-void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings,
-                      const FitOutcome& outcome, const Result& result, const RunFacts& facts,
+void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
+                      const Result& result, const RunFacts& facts,
                       const std::function<void(const char*, int, int)>& progress) {
   const auto tell = [&](const char* what, int done, int total) {
     if (progress) progress(what, done, total);

@@ -28,7 +28,8 @@ TEST(Usage, VersionIsOneLineOnStdout) {
 TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
-  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "130"}) EXPECT_THAT(run.out, HasSubstr(word));
+  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "130"})
+    EXPECT_THAT(run.out, HasSubstr(word));
 }
 
 class CommandHelp : public testing::TestWithParam<const char*> {};
@@ -88,7 +89,8 @@ TEST(Usage, ABrokenCaptureIsToldWithItsPlace) {
 
 TEST(Usage, AnUnknownChoiceSuggestsTheNearest) {
   const TemporaryFolder folder;
-  const std::vector<std::string> fit = {"fit", folder.path().string(), "--out", (folder.path() / "out").string(), "--set"};
+  const std::vector<std::string> fit = {"fit", folder.path().string(), "--out", (folder.path() / "out").string(),
+                                        "--set"};
   const auto with = [&](const char* assignment) {
     std::vector<std::string> arguments = fit;
     arguments.push_back(assignment);

@@ -103,5 +103,46 @@ TEST(ParameterSet, PriorsAreNormal) {
   }
 }
 
+TEST(ParameterSet, DirectionsKeepTheirLengthAndTheirOrigin) {
+  Parameter direction{"gravity", "m/s^2", Transform::Direction, theta::gravity};
+  direction.estimated = true;
+  VectorX reference = VectorX::Zero(theta::size(0));
+  reference.segment<3>(theta::gravity) = Vector3(0.5, -9.7, 0.3);
+  direction.origin = reference.segment(theta::gravity, 3);
+  ParameterSet set({direction}, reference);
+  ASSERT_EQ(set.dimension(), 2);
+  EXPECT_LT(set.to_unconstrained(reference).norm(), tolerance(1e-15));
+  VectorX p(2);
+  p << 0.1, -0.2;
+  const VectorX theta = set.to_theta(p);
+  EXPECT_NEAR(theta.segment<3>(theta::gravity).norm(), direction.origin.norm(), tolerance(1e-13));
+  EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-13));
+  const Vector3 turned = theta.segment<3>(theta::gravity), before = direction.origin;
+  EXPECT_NEAR(std::acos(turned.dot(before) / before.squaredNorm()), std::atan(p.norm()), tolerance(1e-12));
+  const MatrixX J = set.jacobian(p);
+  for (int i = 0; i < 2; ++i) {
+    const auto along = [&](double h) -> VectorX { return set.to_theta(p + h * VectorX::Unit(2, i)); };
+    EXPECT_LT(test::best_relative_error(along, J.col(i), 1.0), tolerance(1e-8));
+  }
+  set.set_reference(theta);  // a later stage starts elsewhere: the prior stays where it was
+  EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-13));
+}
+
+TEST(ParameterSet, AScalarMayStandInSeveralPlaces) {
+  Parameter modulus{"youngs_modulus", "Pa", Transform::Logarithm, 0};
+  modulus.also = {2, 3};
+  Parameter shift{"range_error", "m", Transform::Shift, 1, 0.1};
+  modulus.estimated = shift.estimated = true;
+  const ParameterSet set({modulus, shift}, VectorX::Constant(4, 2.0));
+  VectorX p(2);
+  p << 1.0, -0.5;
+  const VectorX theta = set.to_theta(p);
+  EXPECT_EQ(theta, (VectorX(4) << std::exp(1.0), -0.05, std::exp(1.0), std::exp(1.0)).finished());
+  EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-15));
+  const MatrixX J = set.jacobian(p);
+  EXPECT_EQ(J.col(0), (VectorX(4) << std::exp(1.0), 0.0, std::exp(1.0), std::exp(1.0)).finished());
+  EXPECT_EQ(J.col(1), (VectorX(4) << 0.0, 0.1, 0.0, 0.0).finished());
+}
+
 }  // namespace
 }  // namespace pliant

@@ -32,9 +32,13 @@ double box_moment(const Vector3& low, const Vector3& high, int i, int j, int k) 
 
 /// The quadrature of a box inside a cell: Gauss points of five an axis, exact far beyond what the cell's rule keeps.
 CellQuadrature quadrature_of(const Vector3& low, const Vector3& high) {
-  const double x[] = {0.0, std::sqrt(5.0 - 2.0 * std::sqrt(10.0 / 7.0)) / 3.0, std::sqrt(5.0 + 2.0 * std::sqrt(10.0 / 7.0)) / 3.0};
-  const double w[] = {128.0 / 225.0, (322.0 + 13.0 * std::sqrt(70.0)) / 900.0, (322.0 - 13.0 * std::sqrt(70.0)) / 900.0};
-  const auto node = [&](int n) { return std::pair(0.5 + 0.5 * (n < 3 ? x[n] : -x[n - 2]), 0.5 * w[n < 3 ? n : n - 2]); };
+  const double x[] = {0.0, std::sqrt(5.0 - 2.0 * std::sqrt(10.0 / 7.0)) / 3.0,
+                      std::sqrt(5.0 + 2.0 * std::sqrt(10.0 / 7.0)) / 3.0};
+  const double w[] = {128.0 / 225.0, (322.0 + 13.0 * std::sqrt(70.0)) / 900.0,
+                      (322.0 - 13.0 * std::sqrt(70.0)) / 900.0};
+  const auto node = [&](int n) {
+    return std::pair(0.5 + 0.5 * (n < 3 ? x[n] : -x[n - 2]), 0.5 * w[n < 3 ? n : n - 2]);
+  };
   CellQuadrature q;
   for (int a = 0; a < 5; ++a)
     for (int b = 0; b < 5; ++b)
@@ -118,7 +122,8 @@ double exact_energy(double nu) {
     for (int b = 0; b < n; ++b)
       for (int c = 0; c < n; ++c) {
         const double r = (a + 0.5) / n, z = -1.0 + 2.0 * (b + 0.5) / n, phi = 2 * pi * (c + 0.5) / n;
-        const Vector3 p = radius * r * Vector3(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
+        const Vector3 p =
+            radius * r * Vector3(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
         sum += energy_density(displacement_gradient(p), nu) * r * r * 4 * pi / (double(n) * n * n);
       }
   return sum * std::pow(radius, 3);
@@ -182,9 +187,11 @@ double order_of(const std::vector<SphereErrors>& errors, double SphereErrors::*m
 constexpr double order_low = 1.6, order_high = 2.8;
 
 TEST(HexGrid, SphereConvergesWithSecondOrder) {
-  const auto errors = refinement([](double h, const Vector3& shift) { return test::sphere_grid(radius, h, {}, shift, h / 8); });
-  for (const auto& [name, member] : {std::pair{"volume", &SphereErrors::volume}, std::pair{"inertia", &SphereErrors::inertia},
-                                     std::pair{"energy", &SphereErrors::energy}, std::pair{"area", &SphereErrors::area}}) {
+  const auto errors =
+      refinement([](double h, const Vector3& shift) { return test::sphere_grid(radius, h, {}, shift, h / 8); });
+  for (const auto& [name, member] :
+       {std::pair{"volume", &SphereErrors::volume}, std::pair{"inertia", &SphereErrors::inertia},
+        std::pair{"energy", &SphereErrors::energy}, std::pair{"area", &SphereErrors::area}}) {
     const double order = order_of(errors, member);
     RecordProperty(name, std::to_string(order));
     EXPECT_GT(order, order_low) << name << " " << errors.front().*member << " .. " << errors.back().*member;
@@ -260,7 +267,8 @@ struct Spread {
 Spread slide(double merge_below) {
   HexGridOptions options;
   options.merge_below = merge_below;
-  std::vector<Vector3> shifts = {Vector3::Zero(), Vector3(0.5, 0.5, 0.5), Vector3(0.02, 0.02, 0.02), Vector3(0.49, 0.0, 0.98)};
+  std::vector<Vector3> shifts = {Vector3::Zero(), Vector3(0.5, 0.5, 0.5), Vector3(0.02, 0.02, 0.02),
+                                 Vector3(0.49, 0.0, 0.98)};
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   for (int n = 0; n < 6; ++n) shifts.emplace_back(uniform(random), uniform(random), uniform(random));
@@ -268,8 +276,10 @@ Spread slide(double merge_below) {
   for (const Vector3& shift : shifts) {
     const Conditioning c = conditioning_of(test::sphere_grid(radius, radius / 2.5, options, shift));
     s.volume_low = std::min(s.volume_low, c.volume), s.volume_high = std::max(s.volume_high, c.volume);
-    s.condition_low = std::min(s.condition_low, c.condition), s.condition_high = std::max(s.condition_high, c.condition);
-    s.iterations_low = std::min(s.iterations_low, c.iterations), s.iterations_high = std::max(s.iterations_high, c.iterations);
+    s.condition_low = std::min(s.condition_low, c.condition),
+    s.condition_high = std::max(s.condition_high, c.condition);
+    s.iterations_low = std::min(s.iterations_low, c.iterations),
+    s.iterations_high = std::max(s.iterations_high, c.iterations);
   }
   return s;
 }

@@ -66,7 +66,8 @@ TEST(SignedDistance, GradientMatchesCentralDifferencesInsideAndBeyondTheGrid) {
     (p.cwiseAbs().maxCoeff() > 0.14 ? beyond : within) += 1;
     const Vector3 gradient = distance.sample(p).gradient;
     for (int d = 0; d < 3; ++d) {
-      const double difference = (distance.value(p + h * Vector3::Unit(d)) - distance.value(p - h * Vector3::Unit(d))) / (2 * h);
+      const double difference =
+          (distance.value(p + h * Vector3::Unit(d)) - distance.value(p - h * Vector3::Unit(d))) / (2 * h);
       EXPECT_NEAR(gradient[d], difference, tolerance(1e-6)) << p.transpose();
     }
   }

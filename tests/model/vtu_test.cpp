@@ -39,8 +39,7 @@ VtuGrid two_hexahedra() {
   for (int cell = 0; cell < 2; ++cell) {
     const int o = cell;
     const std::array corners = {o, o + 1, o + 3, o + 4, o + 6, o + 7, o + 9, o + 10};
-    for (const int corner : to_vtk_order(VtuCell::Hexahedron, corners))
-      grid.connectivity.push_back(corner);
+    for (const int corner : to_vtk_order(VtuCell::Hexahedron, corners)) grid.connectivity.push_back(corner);
   }
   grid.point_data = {{"velocity [m/s]", 3, random_values(36)}, {"id", 1, random_values(12)}};
   grid.cell_data = {{"stress <Pa> & more", 6, random_values(12)}, {"F", 9, random_values(18)}};

@@ -5,6 +5,7 @@
 #include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
 #include "motion/plane_contact.hpp"
+#include "motion/pull.hpp"
 #include "support/bodies.hpp"
 #include "support/dense.hpp"
 #include "support/derivatives.hpp"
@@ -21,6 +22,9 @@ std::vector<int> range(int first, int count) {
   return all;
 }
 
+constexpr int pulls = 2;
+const int first_of_more_moduli = theta::pull(pulls, 2);
+
 std::shared_ptr<const Body> small_torus() { return test::torus_body(0.1, 0.04, 0.05); }
 
 struct Family {
@@ -35,7 +39,8 @@ void PrintTo(const Family& family, std::ostream* out) { *out << family.name; }
 
 struct ForceTerms : ::testing::TestWithParam<Family> {
   ForceTerms() : body(GetParam().body()), term(GetParam().make(body)) {
-    theta.setZero(theta::size(2, body->modulus.controls));
+    theta.setZero(theta::size(2, body->modulus.controls, pulls));
+    theta.segment<6>(theta::pull(0, 2)) << 0.1, -0.2, 0.05, 0.02, 0.15, -0.1;
     theta.tail(body->modulus.controls - 1).setLinSpaced(2000.0, 5000.0);
     theta[theta::youngs_modulus] = 3000.0;
     theta[theta::poissons_ratio] = 0.35;
@@ -160,8 +165,7 @@ TEST_P(ForceTerms, LagMatrixIsMinusTheDerivativeByLagPoint) {
     return y;
   };
   // Contact gives its share where it is needed, with the lag point at z itself: there is none.
-  const bool is_elastic =
-      GetParam().name.find("Of") != std::string::npos && GetParam().name.find("Contact") == std::string::npos;
+  const bool is_elastic = GetParam().name.starts_with("ElasticityOf") || GetParam().name.starts_with("ThreeModuliOf");
   const Points& at_lag = is_elastic ? lag : z;
   const VectorX y = product(at_lag, z);
   term->linearise(at_lag);
@@ -190,8 +194,9 @@ std::vector<Family> families() {
   for (const test::BodyKind& kind : test::body_kinds())
     list.push_back(elastic("ElasticityOf" + kind.name, kind.make, {theta::youngs_modulus, theta::poissons_ratio}));
   for (const test::BodyKind& kind : test::body_kinds())
-    list.push_back(elastic("ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); },
-                           {theta::youngs_modulus, theta::poissons_ratio, theta::size(2), theta::size(2) + 1}));
+    list.push_back(
+        elastic("ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); },
+                {theta::youngs_modulus, theta::poissons_ratio, first_of_more_moduli, first_of_more_moduli + 1}));
   const auto box = [](bool quadratic) {
     return [quadratic] { return test::tet_body({0.24, 0.1, 0.24}, {3, 2, 3}, quadratic); };
   };
@@ -199,6 +204,21 @@ std::vector<Family> families() {
   list.push_back({"PlaneContactOfTetrahedra", box(false), contact, true, true, range(theta::plane_point(1), 6)});
   list.push_back(
       {"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, range(theta::plane_point(1), 6)});
+  const auto pull = [](auto body) {
+    std::vector<int> held;
+    for (int n = 0; n < body->node_count(); ++n)
+      if (body->nodes(n, 0) < body->nodes.col(0).minCoeff() + 0.03) held.push_back(n);
+    return std::make_unique<Pull>(body, pull_nodes(*body, held, pulls), held, theta::pull(0, 2));
+  };
+  list.push_back({"Pull", box(true), pull, false, false, [] {
+                    std::vector<int> all = range(theta::pull(0, 2), 3 * pulls);
+                    return all.push_back(theta::youngs_modulus), all;
+                  }()});
+  list.push_back({"PullOfThreeModuli", [] { return with_three_moduli(*small_torus()); }, pull, false, false,
+                  [] {
+                    std::vector<int> all = range(theta::pull(0, 2), 3 * pulls + 2);
+                    return all.push_back(theta::youngs_modulus), all;
+                  }()});
   const std::vector<Family> others = {
       {"Gravity", small_torus, [](auto body) { return std::make_unique<Gravity>(*body); }, false, false, gravity},
       {"PlaneContact", small_torus, contact, true, true, range(theta::plane_point(1), 6)},

@@ -1,0 +1,54 @@
+#include "mismatch/sensor_correction.hpp"
+
+#include <gtest/gtest.h>
+
+#include "support/derivatives.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+const Vector3 centre(0.1, -0.2, 0.3), point(0.4, 0.1, -0.2), view = Vector3(1, 2, -2).normalized();
+
+SensorCorrection::Values somewhere(double turn = 1.0) {
+  SensorCorrection::Values values;
+  values << 0.03, 0.2 * turn, -0.1 * turn, 0.3 * turn, 0.01, -0.02, 0.015;
+  return values;
+}
+
+TEST(SensorCorrection, NothingToCorrectChangesNothing) {
+  const SensorCorrection none(centre, SensorCorrection::Values::Zero());
+  EXPECT_LT((none.apply(point, view) - point).norm(), tolerance(1e-16));
+}
+
+TEST(SensorCorrection, ShortensTheRangeAndMovesRigidly) {
+  SensorCorrection::Values range = SensorCorrection::Values::Zero();
+  range[0] = 0.02;
+  EXPECT_LT((SensorCorrection(centre, range).apply(point, view) - (point - 0.02 * view)).norm(), tolerance(1e-15));
+  SensorCorrection::Values rigid = somewhere();
+  rigid[0] = 0.0;
+  const SensorCorrection moved(centre, rigid);
+  EXPECT_NEAR((moved.apply(point, view) - moved.apply(centre, view)).norm(), (point - centre).norm(), tolerance(1e-14));
+  EXPECT_LT((moved.apply(centre, view) - centre - rigid.tail<3>()).norm(), tolerance(1e-15))
+      << "it turns about the centre";
+}
+
+class AtTurn : public ::testing::TestWithParam<double> {};
+
+TEST_P(AtTurn, JacobianMatchesCentralDifferences) {
+  const SensorCorrection::Values at = somewhere(GetParam());
+  const SensorCorrection::Jacobian J = SensorCorrection(centre, at).jacobian(point, view);
+  for (int i = 0; i < SensorCorrection::size; ++i) {
+    const auto along = [&](double h) -> VectorX {
+      return SensorCorrection(centre, at + h * SensorCorrection::Values::Unit(i)).apply(point, view);
+    };
+    EXPECT_LT(test::best_relative_error(along, VectorX(J.col(i)), 0.1), tolerance(1e-8)) << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(FromNoneToALot, AtTurn, ::testing::Values(0.0, 1e-5, 1e-3, 1.0, 5.0));
+
+}  // namespace
+}  // namespace pliant

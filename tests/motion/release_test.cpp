@@ -1,0 +1,139 @@
+// Objects that are held in a deformed pose and let go.
+#include "base/error.hpp"
+#include "support/derivatives.hpp"
+#include "support/hanging.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+using test::hanging::Hanging;
+
+constexpr int last = 2, pulls = 2;
+
+/// A soft hanging bar, pulled aside and let go.
+struct Released : Hanging {
+  Released(std::shared_ptr<const Body> of, Integrator integrator) : Hanging(std::move(of)) {
+    options.is_static = false;
+    options.times.clear();
+    for (int f = 0; f <= last; ++f) options.times.push_back(0.02 * f);
+    options.max_dt = 0.01;
+    options.integrator = integrator;
+    options.newton.tolerance = 1e-13;
+    options.solver.tolerance = 1e-13;
+    options.pulls = pulls;
+    theta.conservativeResize(theta::size(0, 1, pulls));
+    theta[theta::youngs_modulus] = 3e5;
+    theta[theta::mass_damping] = 0.5;
+    theta[theta::stiffness_damping] = 0.004;
+    theta.segment<6>(theta::pull(0, 0)) << 0.01, 0.1, 0.05, 0.0, -0.03, 0.02;
+  }
+  VectorX positions_at(const VectorX& at, int frame) const {
+    Simulation simulation(body, options);
+    VectorX out;
+    const RolloutSummary summary = simulation.run(at, [&](int f, const State& state, auto) {
+      if (f == frame) out = flat(state.x);
+      return f < frame;
+    });
+    EXPECT_TRUE(summary.succeeded) << summary.failure;
+    return out;
+  }
+};
+
+std::shared_ptr<const Body> bar(ElementKind kind) {
+  using namespace test::hanging;
+  if (kind == ElementKind::Hexahedron) return hex_bar(1);
+  return test::tet_body({length, edge, edge}, {6, 1, 1}, kind == ElementKind::QuadraticTetrahedron, 0.0);
+}
+
+/// A parameter of theta, the elements, and the integrator.
+class Release : public ::testing::TestWithParam<std::tuple<int, ElementKind, Integrator>> {
+ protected:
+  int index() const { return std::get<0>(GetParam()); }
+  Released scene{bar(std::get<1>(GetParam())), std::get<2>(GetParam())};
+  VectorX direction() const {
+    const double size = std::abs(scene.theta[index()]);
+    return VectorX::Unit(scene.theta.size(), index()) * (size > 0.0 ? size : 0.1);
+  }
+};
+
+TEST_P(Release, TangentMatchesCentralDifferences) {
+  Simulation simulation(scene.body, scene.options);
+  std::vector<VectorX> tangents;
+  simulation.run(scene.theta, direction(), last, [&](int, const State&, std::span<const State> t) {
+    tangents.push_back(flat(t[0].x));
+    return true;
+  });
+  ASSERT_EQ(int(tangents.size()), last + 1);
+  for (const int frame : {0, last}) {
+    const VectorX& tangent = tangents[std::size_t(frame)];
+    if (tangent.norm() == 0.0) continue;  // dampings and velocities do not act on the pose
+    const auto along = [&](double h) { return scene.positions_at(scene.theta + h * direction(), frame); };
+    EXPECT_LT(test::best_relative_error(along, tangent, 0.3), tolerance(1e-6)) << "frame " << frame;
+  }
+  EXPECT_GT(tangents[last].norm(), 1e-9) << "the parameter has no effect: the test would prove nothing";
+}
+
+TEST_P(Release, AdjointMatchesTangent) {
+  Simulation simulation(scene.body, scene.options);
+  const Points weight = test::deformed(scene.body->reference_positions(), 0.3);
+  double by_tangent = 0.0;
+  simulation.run(scene.theta, direction(), last, [&](int f, const State&, std::span<const State> t) {
+    if (f % 2 == 0) by_tangent += weight.cwiseProduct(t[0].x).sum();
+    return true;
+  });
+  VectorX gradient;
+  const auto summary = simulation.run_adjoint(
+      scene.theta, last, [](int, const State&) { return true; },
+      [&](int f, const State&, Points& bar) {
+        if (f % 2 == 0) bar += weight;
+      },
+      gradient);
+  ASSERT_TRUE(summary.succeeded) << summary.failure;
+  // What lies between the two are the tolerances of the linear solvers, 1e-12, over several steps.
+  EXPECT_NEAR(gradient.dot(direction()), by_tangent, tolerance(1e-8) * std::abs(by_tangent));
+}
+
+const auto parameters_that_act = ::testing::Values(
+    int(theta::youngs_modulus), int(theta::poissons_ratio), int(theta::stiffness_damping), int(theta::density),
+    int(theta::gravity) + 1, int(theta::linear_velocity) + 2, theta::pull(0, 0) + 1, theta::pull(1, 0) + 2);
+
+INSTANTIATE_TEST_SUITE_P(Hexahedra, Release,
+                         ::testing::Combine(parameters_that_act, ::testing::Values(ElementKind::Hexahedron),
+                                            ::testing::Values(Integrator::Lagged)));
+INSTANTIATE_TEST_SUITE_P(Tetrahedra, Release,
+                         ::testing::Combine(parameters_that_act,
+                                            ::testing::Values(ElementKind::Tetrahedron,
+                                                              ElementKind::QuadraticTetrahedron),
+                                            ::testing::Values(Integrator::Newton)));
+
+TEST(Releases, WithoutAPullTheObjectStaysWhereItSags) {
+  Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);
+  scene.theta.segment<6>(theta::pull(0, 0)).setZero();
+  const VectorX start = scene.positions_at(scene.theta, 0), end = scene.positions_at(scene.theta, last);
+  EXPECT_GT((start - flat(scene.body->nodes)).cwiseAbs().maxCoeff(), 0.02) << "it sags";
+  EXPECT_LT((end - start).cwiseAbs().maxCoeff(), tolerance(1e-8));
+}
+
+TEST(Releases, TheUnitOfAPullIsTheObjectsSize) {
+  Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);
+  scene.theta.segment<3>(theta::gravity).setZero();
+  scene.theta[theta::poissons_ratio] = 0.3;
+  for (const double modulus : {1e3, 1e7}) {
+    scene.theta[theta::youngs_modulus] = modulus;
+    scene.theta.segment<6>(theta::pull(0, 0)) << 0, 1e-4, 0, 0, 0, 0;
+    const VectorX moved = scene.positions_at(scene.theta, 0) - flat(scene.body->nodes);
+    const double farthest = as_points(moved).rowwise().norm().maxCoeff();
+    EXPECT_NEAR(farthest, 1e-4 * scene.body->size(), tolerance(1e-3) * 1e-4 * scene.body->size()) << modulus << " Pa";
+  }
+}
+
+TEST(Releases, AFreeObjectCannotBePulled) {
+  Released scene(bar(ElementKind::Tetrahedron), Integrator::Newton);
+  scene.options.holds.clear();
+  EXPECT_THROW(Simulation(scene.body, scene.options), InputError);
+}
+
+}  // namespace
+}  // namespace pliant
