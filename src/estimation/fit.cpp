@@ -282,6 +282,10 @@ class Fit {
   std::vector<double> growing_horizon() const {
     return swings() ? std::vector{0.12, 0.25, 0.5, 1.0, 1.0} : std::vector{0.6, 1.0, 1.0};
   }
+  /// Of the stages on the full grid; the last one is in the narrow band.
+  std::vector<double> fine_horizons() const {
+    return swings() ? std::vector{0.25, 0.5, 1.0, 1.0} : std::vector{1.0, 1.0};
+  }
   bool is_static() const {
     return std::ranges::all_of(recordings_, [](const Recording& r) { return r.capture.is_static; });
   }
@@ -514,20 +518,30 @@ class Fit {
     OptimiserSummary s;
     FitState::Fine now{0, theta, {}};
     if (state_.fine) now = *state_.fine;
-    for (; now.band < 2; ++now.band, now.optimiser = {}) {
-      const bool last = now.band == 1;
+    const std::vector<double> horizons = fine_horizons();
+    const int stages = int(horizons.size());
+    for (; now.stage < stages; ++now.stage, now.optimiser = {}) {
+      const bool last = now.stage + 1 == stages;
       if (was_interrupted && !last) continue;
+      // Where swings may still be out of step, Poisson's ratio would make up for what others lack.
+      if (swings() && !last)
+        parameters.set_estimated("poisson_ratio", false);
+      else
+        parameters = parameters_;
       parameters.set_reference(now.reference);
       if (now.optimiser.p.size() == 0) now.optimiser = start_of(parameters);
       const int iterations = outcome_.interrupted ? 1
                              : last               ? options_.max_iterations
                                                   : std::max(1, options_.max_iterations / 4);
       Objective objective =
-          make_objective(Level::Fine, parameters, last ? options_.fine_band : options_.wide_band, to_the_end);
+          make_objective(Level::Fine, parameters, last ? options_.fine_band : options_.wide_band,
+                         [&](const Recording& r) { return r.horizon(horizons[std::size_t(now.stage)]); });
+      const double from = 0.45 + 0.15 * now.stage / std::max(1, stages - 1);
       s = optimise(objective, now.optimiser, last ? "fine" : "fine, wide band", index, iterations, counter,
-                   last ? 0.6 : 0.45, last ? 1.0 : 0.6, [&](const OptimiserState& optimiser) {
+                   last ? 0.6 : from, last ? 1.0 : from + 0.15 / std::max(1, stages - 1),
+                   [&](const OptimiserState& optimiser) {
                      if (outcome_.interrupted) return;  // a last look at what was reached is no state to go on from
-                     state_.fine = {now.band, now.reference, optimiser};
+                     state_.fine = {now.stage, now.reference, optimiser};
                      save_state();
                    });
       if (!s.succeeded) break;

@@ -72,7 +72,7 @@ struct FitState {
   std::vector<FitStart> starts;                 ///< those that are done
   /// The stage on the full grid that was under way.
   struct Fine {
-    int band = 0;              ///< 0: wide, 1: fine
+    int stage = 0;             ///< of those on the full grid
     VectorX reference;         ///< theta at the beginning of the stage
     OptimiserState optimiser;  ///< p is empty before the first iteration
   };

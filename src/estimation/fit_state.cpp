@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/2";
+constexpr const char* format = "fit-state/3";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -39,7 +39,7 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
                               {"reason", s.reason}});
   if (state.motion) json["motion"] = from_vector(*state.motion);
   if (const auto& fine = state.fine)
-    json["fine"] = {{"band", fine->band},
+    json["fine"] = {{"stage", fine->stage},
                     {"reference", from_vector(fine->reference)},
                     {"iterations", fine->optimiser.iterations},
                     {"p", from_vector(fine->optimiser.p)},
@@ -65,7 +65,7 @@ FitState read_fit_state(const std::filesystem::path& path, const std::string& ke
     if (json.contains("motion")) state.motion = to_vector(json["motion"]);
     if (json.contains("fine")) {
       const Json& fine = json["fine"];
-      state.fine = {fine.at("band").get<int>(),
+      state.fine = {fine.at("stage").get<int>(),
                     to_vector(fine.at("reference")),
                     {fine.at("iterations").get<int>(), to_vector(fine.at("p")), to_vector(fine.at("memory"))}};
     }
