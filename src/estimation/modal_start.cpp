@@ -23,8 +23,9 @@ constexpr double several_moduli_reach = 0.8;
 constexpr double least_amplitude = 5e-3;  // over the strongest mode's: below, it is what a linear projection leaves
 constexpr double least_spread = 0.2;      // of ln omega: below, decays do not tell the two dampings apart
 constexpr double pull_deviation = 3.0;    // of ln E_k from their mean: ratios of twenty are not surprising
-constexpr int most_rounds = 8, most_iterations = 30;
-constexpr double settled = 1e-3;  // of ln E_k between rounds
+constexpr double start_contrast = 1.8;    // of ln E: one control six times as stiff as the others
+constexpr int most_rounds = 6, most_iterations = 30;
+constexpr double settled = 3e-3;  // of ln E_k between rounds
 
 struct MatchedTone {
   int mode;
@@ -135,8 +136,8 @@ class ToneSearch {
     }
     return found;
   }
-  /// Of a mode that `run` left out.
-  const std::string& doubts_about(int mode) const { return doubts_[std::size_t(mode)]; }
+  /// Of each mode that `run` left out, why.
+  const std::vector<std::string>& doubts_found() const { return doubts_; }
 
  private:
   static MatchedTone matched(int mode, const Tone& tone) {
@@ -219,6 +220,11 @@ struct Bounds {
   VectorX clamped(const VectorX& q) const { return q.cwiseMax(least).cwiseMin(most); }
 };
 
+/// Curvature of the pull towards equal moduli.
+MatrixX pull_towards_equal(Eigen::Index m) {
+  return (MatrixX::Identity(m, m) - MatrixX::Constant(m, m, 1.0 / double(m))) / (pull_deviation * pull_deviation);
+}
+
 /// Levenberg and Marquardt's damped steps from ln E = q. False where modes cannot be found.
 bool match_frequencies(FrequencyMatch& match, const Bounds& bounds, VectorX& q) {
   const Eigen::Index m = q.size();
@@ -228,8 +234,7 @@ bool match_frequencies(FrequencyMatch& match, const Bounds& bounds, VectorX& q) 
   if (r.size() == 0) return false;
   q = bounds.clamped(q.array() - 2.0 * w.dot(r) / w.sum());
   if (m == 1) return true;
-  const MatrixX pull =
-      (MatrixX::Identity(m, m) - MatrixX::Constant(m, m, 1.0 / double(m))) / (pull_deviation * pull_deviation);
+  const MatrixX pull = pull_towards_equal(m);
   const auto cost = [&](const VectorX& at, const VectorX& residuals) {
     return w.dot(residuals.cwiseAbs2()) + at.dot(pull * at);
   };
@@ -281,8 +286,8 @@ void find_dampings(const std::vector<MatchedTone>& tones, ModalStart& start) {
   start.dampings_are_told_apart = true;
 }
 
-void describe_modes(const std::vector<MatchedTone>& tones, const ToneSearch& search, const FrequencyMatch& match,
-                    const Vibrations& vibrations, ModalStart& start) {
+void describe_modes(const std::vector<MatchedTone>& tones, const std::vector<std::string>& doubts,
+                    const FrequencyMatch& match, const Vibrations& vibrations, ModalStart& start) {
   double energy = 0.0, weight = 0.0;
   const auto energy_of = [](const Tone& tone) { return 0.5 * std::pow(tone.natural() * tone.amplitude, 2); };
   for (const MatchedTone& m : tones) energy += energy_of(m.tone), weight += m.weight;
@@ -299,10 +304,60 @@ void describe_modes(const std::vector<MatchedTone>& tones, const ToneSearch& sea
       seen.energy = energy_of(found->tone) / energy;
       seen.weight = found->weight / weight;
     } else {
-      seen.reason = search.doubts_about(j);
+      seen.reason = doubts[std::size_t(j)];
     }
     start.modes.push_back(std::move(seen));
   }
+}
+
+/// What one round of projection and match comes to.
+struct Round {
+  VectorX log_moduli;
+  ModeCoordinates coordinates;
+  std::vector<MatchedTone> tones;
+  std::vector<std::string> doubts;  // of each mode
+  std::vector<Points> shapes;       // which the coordinates and the tones belong to
+  double score =
+      std::numeric_limits<double>::infinity();  // of rounds with equally many tones the closest match is best
+};
+
+/// From the shapes that belong to ln E = q. `score` stays infinite where nothing swings or modes cannot be found.
+Round run_round(Vibrations& vibrations, const TrackedMotion& motion, ModeProjection projection, const Bounds& bounds,
+                const VectorX& q) {
+  Round round;
+  round.log_moduli = q;
+  if (!vibrations.solve(q)) return round;
+  round.coordinates = vibrations.project(motion, projection);
+  ToneSearch search(round.coordinates, vibrations);
+  round.tones = search.run();
+  round.doubts = search.doubts_found();
+  round.shapes = vibrations.shapes();
+  if (round.tones.empty()) return round;
+  FrequencyMatch match(vibrations, round.tones, round.shapes);
+  if (!match_frequencies(match, bounds, round.log_moduli)) return round;
+  const VectorX residuals = match.residuals(round.log_moduli);
+  if (residuals.size() > 0)
+    round.score = (1.0 + match.weights().dot(residuals.cwiseAbs2())) / double(round.tones.size());
+  return round;
+}
+
+/// Rounds from each of the starts until the moduli stay; the best of all.
+Round best_round(Vibrations& vibrations, const TrackedMotion& motion, ModeProjection projection, const Bounds& bounds) {
+  const int m = vibrations.controls();
+  Round best;
+  for (int stiffer = -1; stiffer < (m > 1 ? m : 0); ++stiffer) {
+    VectorX q = VectorX::Constant(m, 0.5 * (bounds.least + bounds.most));
+    if (stiffer >= 0) q[stiffer] += start_contrast;
+    for (int i = 0; i < most_rounds; ++i) {
+      Round round = run_round(vibrations, motion, projection, bounds, q);
+      const bool has_settled = (round.log_moduli - q).cwiseAbs().maxCoeff() < settled;
+      const bool is_over = has_settled || m == 1 || !std::isfinite(round.score);
+      q = round.log_moduli;
+      if (round.score < best.score || best.log_moduli.size() == 0) best = std::move(round);
+      if (is_over) break;
+    }
+  }
+  return best;
 }
 
 void draw_curves(FrequencyMatch& match, const Bounds& bounds, int samples, const VectorX& q, ModalStart& start) {
@@ -362,32 +417,28 @@ ModalStart modal_start(std::shared_ptr<const Body> body, const VectorX& paramete
                           " instants; an oscillation takes at least " + std::to_string(fewest_instants),
            start;
 
-  VectorX q = VectorX::Constant(vibrations.controls(), 0.5 * (bounds.least + bounds.most));
-  const std::string no_modes = "the body's modes cannot be found";
-  for (int round = 0; round < most_rounds; ++round) {
-    if (!vibrations.solve(q)) return start.reason = no_modes, start;
-    start.coordinates = vibrations.project(motion, options.projection);
-    ToneSearch search(start.coordinates, vibrations);
-    const std::vector<MatchedTone> tones = search.run();
-    if (tones.empty())
-      return start.reason = "no vibration of the body is seen; of the lowest one: " + search.doubts_about(0), start;
-    FrequencyMatch match(vibrations, tones, vibrations.shapes());
-    const VectorX before = q;
-    if (!match_frequencies(match, bounds, q)) return start.reason = no_modes, start;
-    const bool is_last = q.size() == 1 || (q - before).cwiseAbs().maxCoeff() < settled || round + 1 == most_rounds;
-    if (!is_last) continue;
-    start.mismatch = mismatch_of(match.weights(), match.residuals(q));
-    start.moduli = q.array().exp();
-    describe_modes(tones, search, match, vibrations, start);
-    find_dampings(tones, start);
-    draw_curves(match, bounds, options.curve_samples, q, start);
-    if (q.minCoeff() <= bounds.least || q.maxCoeff() >= bounds.most)
-      start.reason = "a modulus lies at the end of the range in which it was sought";
-    else if (int(tones.size()) < vibrations.controls())
-      start.reason = std::to_string(tones.size()) + " vibrations for " + std::to_string(vibrations.controls()) +
-                     " moduli: what they leave open is as if the object were even";
-    break;
-  }
+  const Round best = best_round(vibrations, motion, options.projection, bounds);
+  start.coordinates = best.coordinates;
+  if (best.doubts.empty()) return start.reason = "the body's modes cannot be found", start;
+  if (best.tones.empty())
+    return start.reason = "no vibration of the body is seen; of the lowest one: " + best.doubts.front(), start;
+  const VectorX& q = best.log_moduli;
+  FrequencyMatch match(vibrations, best.tones, best.shapes);
+  const VectorX residuals = match.residuals(q);
+  if (residuals.size() == 0) return start.reason = "the body's modes cannot be found", start;
+  start.mismatch = mismatch_of(match.weights(), residuals);
+  start.moduli = q.array().exp();
+  const MatrixX J = match.jacobian();
+  const MatrixX H = J.transpose() * match.weights().asDiagonal() * J + pull_towards_equal(q.size());
+  start.log_deviations = H.inverse().diagonal().cwiseSqrt();
+  describe_modes(best.tones, best.doubts, match, vibrations, start);
+  find_dampings(best.tones, start);
+  draw_curves(match, bounds, options.curve_samples, q, start);
+  if (q.minCoeff() <= bounds.least || q.maxCoeff() >= bounds.most)
+    start.reason = "a modulus lies at the end of the range in which it was sought";
+  else if (int(best.tones.size()) < vibrations.controls())
+    start.reason = std::to_string(best.tones.size()) + " vibrations for " + std::to_string(vibrations.controls()) +
+                   " moduli: what they leave open is as if the object were even";
   start.found = true;
   return start;
 }

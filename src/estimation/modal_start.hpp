@@ -37,9 +37,12 @@ struct MatchCurve {
 /// Where a fit of stiffness may begin.
 struct ModalStart {
   bool found = false;
-  std::string reason;     ///< why nothing was found; else what is uncertain about it, or empty
-  VectorX moduli;         ///< control moduli [Pa]
-  double mismatch = 0.0;  ///< as in `MatchCurve`
+  std::string reason;  ///< why nothing was found; else what is uncertain about it, or empty
+  VectorX moduli;      ///< control moduli [Pa]
+  /// Standard deviations of ln moduli: by the frequencies' and the model's errors, and the pull towards equal ones. A
+  /// modulus that hardly shows in the frequencies has one near two.
+  VectorX log_deviations;
+  double mismatch = 0.0;                               ///< as in `MatchCurve`
   double mass_damping = 0.0, stiffness_damping = 0.0;  ///< Rayleigh's [1/s], [s], >= 0
   bool dampings_are_told_apart = false;  ///< by two modes' decays; else each has half of the strongest mode's
   std::vector<ObservedMode> modes;
@@ -54,10 +57,10 @@ struct ModalStart {
 /// The points' motion is projected on the body's vibrations about rest (`TrackedMotion`). In each coordinate the
 /// strongest oscillation is looked for where the strongest one of all leads to expect it, with what it takes up of
 /// stronger modes' oscillations fitted along. For one modulus lambda is proportional to E and the match is closed form;
-/// for several it is Gauss and Newton's method in all ln E_k at once with the eigenvalues' derivatives, from equal
-/// moduli, where the paper goes through them one after the other. Shapes depend on the moduli's ratios, so projection
-/// and match are repeated until the moduli stay. Where there are fewer oscillations than moduli, a weak pull towards
-/// equal ones decides.
+/// for several it is Gauss and Newton's method in all ln E_k at once with the eigenvalues' derivatives, where the paper
+/// goes through them one after the other. Shapes depend on the moduli's ratios, so projection and match are repeated
+/// until the moduli stay: from equal ones, and from each in turn stiffer than the rest. The best match with the most
+/// vibrations counts. Where there are fewer oscillations than moduli, a weak pull towards equal ones decides.
 ///
 /// Modes count by how well their frequency is known (its deviation beside the tone, which falls with the square root of
 /// the energy) and by a model error of 2 %, so that no strong mode drowns out all others.
