@@ -49,7 +49,6 @@ class Vibrations {
   }
   int controls() const { return analysis_.body().modulus.controls; }
   int count() const { return count_; }
-  bool is_free() const { return skipped_ > 0; }
 
   /// False where the modes cannot be found.
   bool solve(const VectorX& log_moduli) {
@@ -74,7 +73,8 @@ class Vibrations {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const Points momentum = analysis_.mass_product(theta_, shapes[i]);
       for (int j = 0; j < solved_; ++j)
-        likeness(Eigen::Index(i), j) = std::abs(flat(momentum).dot(flat(all_.shapes[std::size_t(skipped_ + j)])));
+        likeness(Eigen::Index(i), j) =
+            std::abs(flat(momentum).dot(flat(all_.shapes[std::size_t(skipped_) + std::size_t(j)])));
     }
     std::vector<int> found(shapes.size(), 0);
     for (std::size_t taken = 0; taken < shapes.size(); ++taken) {
@@ -407,8 +407,8 @@ ModalStart modal_start(std::shared_ptr<const Body> body, const VectorX& paramete
                        const TrackedPoints& tracked, const std::vector<double>& times,
                        const ModalStartOptions& options) {
   validate(options);
-  Vibrations vibrations(body, parameters, held, options.modes);
-  const TrackedMotion motion = make_motion(*body, tracked, times, options.first_frame, vibrations.is_free());
+  const TrackedMotion motion = make_motion(*body, tracked, times, options.first_frame, held.empty());
+  Vibrations vibrations(std::move(body), parameters, held, options.modes);
   const Bounds bounds{std::log(options.least_modulus), std::log(options.most_modulus)};
   ModalStart start;
   start.largest_rotation = motion.largest_rotation();

@@ -152,7 +152,7 @@ TEST(ModalStartOf, ABarIsThatOfAnotherMesh) {
   o.is_of_hexahedra = true;
   const Swing swing(o);
   const auto body = test::tet_body({length, edge, 0.75 * edge}, {6, 2, 2}, true, 0.1);
-  const std::vector<int> held = held_nodes(*body, {swing.root()});
+  const std::vector<int> held = held_nodes(*body, {Swing::root()});
   const ModalStart start = modal_start(body, swing.truth, held, swing.tracked, swing.times);
   ASSERT_TRUE(start.found) << start.reason;
   EXPECT_LT(log_error(start, swing), tolerance(0.1));
