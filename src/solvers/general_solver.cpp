@@ -8,18 +8,12 @@ namespace pliant {
 
 namespace {
 constexpr int most_iterations = 60;
-
-#ifdef PLIANT_WITH_CHOLMOD
-constexpr SolverKind best_direct = SolverKind::Cholmod;
-#else
-constexpr SolverKind best_direct = SolverKind::Simplicial;
-#endif
 }  // namespace
 
 GeneralSolver::GeneralSolver(std::shared_ptr<const BlockPattern> pattern, SolverKind kind)
     : pattern_(std::move(pattern)), matrix_(pattern_), symmetric_(pattern_) {
   SolverOptions options;
-  options.kind = kind == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct;
+  options.kind = kind == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct_kind();
   factor_ = make_linear_solver(pattern_, options);
   for (int row = 0; row < pattern_->rows; ++row)
     for (int b = pattern_->row_start[row]; b < pattern_->row_start[row + 1]; ++b)

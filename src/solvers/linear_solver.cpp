@@ -45,6 +45,14 @@ class SimplicialSolver : public LinearSolver {
 
 }  // namespace
 
+SolverKind best_direct_kind() {
+#ifdef PLIANT_WITH_CHOLMOD
+  return SolverKind::Cholmod;
+#else
+  return SolverKind::Simplicial;
+#endif
+}
+
 std::unique_ptr<LinearSolver> make_linear_solver(std::shared_ptr<const BlockPattern> pattern,
                                                  const SolverOptions& options) {
   switch (options.kind) {

@@ -35,6 +35,9 @@ enum class SolverKind {
   Simplicial,  ///< Eigen's sparse Cholesky
 };
 
+/// The fastest factorisation that is built in.
+SolverKind best_direct_kind();
+
 struct SolverOptions {
   SolverKind kind = SolverKind::Automatic;
   double tolerance = 1e-8;   ///< relative residual of the iterative solver, (0, 1)
