@@ -7,6 +7,7 @@
 #include "capture/capture.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/hash.hpp"
+#include "capture/toml_facts.hpp"
 #include "capture/toml_table.hpp"
 #include "geometry/mesh_io.hpp"
 
@@ -45,6 +46,7 @@ class Reader {
     read_blocks(root, "cloud", [&](TomlTable& block) { capture_.clouds.push_back(read_cloud(block)); });
     read_blocks(root, "markers", [&](TomlTable& block) { capture_.markers.push_back(read_markers_block(block)); });
     read_blocks(root, "press", [&](TomlTable& block) { capture_.presses.push_back(read_press(block)); });
+    for (TomlTable& block : root.blocks("weight")) capture_.weights.push_back(read_weight(block));
     read_blocks(root, "load", [&](TomlTable& block) { capture_.loads.push_back(read_load(block)); });
     root.finish();
     return std::move(capture_);
