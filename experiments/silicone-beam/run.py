@@ -43,16 +43,16 @@ class Experiment:
         folder = self.work / f"{name}{'-rest' if static else ''}{f'-{1e3 * extra:g}g' if extra else ''}-{1e4 * released_at:.0f}"
         return beam.write_capture(folder, recording, weight or None, WINDOW, released_at, REST if static else None)
 
-    def fit(self, label, name, static=False, extra=None, **options):
+    def fit(self, label, name, static=False, extra=None, released_at=0.0, **options):
         chosen = choices(**options)
         if static:
             chosen = {key: value for key, value in chosen.items() if "damping" not in key}
         out = self.work / ("fit-" + label)
-        figures = common.fit(self.program, self.capture(name, static, extra), out, chosen)
+        figures = common.fit(self.program, self.capture(name, static, extra, released_at), out, chosen)
         p = figures["result"]["parameters"]
         value = lambda key: None if static and "damping" in key else common.number(p[key]["value"])
         row = {"label": label, "recording": name, "at_rest": static, "cells": chosen["cells"], "steps": chosen["steps"],
-               "poisson_ratio": chosen["poisson_ratio"], "extra_mass": extra, "youngs_modulus": value("youngs_modulus"),
+               "poisson_ratio": chosen["poisson_ratio"], "extra_mass": extra, "released_at": released_at, "youngs_modulus": value("youngs_modulus"),
                "std": common.number(p["youngs_modulus"]["std"], 2), "mass_damping": value("mass_damping"),
                "stiffness_damping": value("stiffness_damping"), "marker_rms": common.number(figures["result"]["error"]["marker_rms"], 4),
                "converged": figures["exit_code"] == 0, "wall_seconds": figures["wall_seconds"]}
@@ -106,7 +106,8 @@ def main():
             e.fit("rest-b", b, True, cells=fine), e.fit("rest-markers", a, True, MARKERS_MASS, cells=fine)]
     rest += [e.fit(f"rest-nu-{nu}", a, True, cells=fine, nu=nu) for nu in (0.45, 0.47, 0.495, 0.499)]
     release = [e.fit("release-coarse", a), e.fit("release", a, cells=fine), e.fit("release-b", b),
-               e.fit("release-half-step", a, steps=1), e.fit("release-markers", a, extra=MARKERS_MASS)]
+               e.fit("release-half-step", a, steps=1), e.fit("release-markers", a, extra=MARKERS_MASS),
+               e.fit("release-later", a, released_at=0.005)]
     at_rest = [e.predict_rest("rest", name) for name in RECORDINGS] + [e.predict_rest("release", name) for name in RECORDINGS]
     swings = [e.predict_release("release", name) for name in RECORDINGS]
     # Not predictions: what the model can do where the loaded releases themselves are fitted.
