@@ -187,8 +187,8 @@ def silicone_beam():
             "What is assumed: the end face is held, all of it; the beam is free of load where it is held straight, so that markers "
             "are at rest where they were before the release, in a frame fitted to all six markers (0.8 to 1.0 mm rms are left of the "
             "nominal places); simulation begins at the last frame before the tip moves; density 1070 kg/m^3, Poisson's ratio 0.49. "
-            f"Gravity stands {figures['recordings']['gravity_V2_a']['tilt']:.1f} degrees off the beam's normal by that frame. The weight is a mass of 52 g at the "
-            "middle of the top edge that moves along with it. A fit of a release sees one second.\n\n")
+            f"Gravity stands {figures['recordings']['gravity_V2_a']['tilt']:.1f} degrees off the beam's normal by that frame. The weight is a mass of 52 g "
+            "spread along the top edge, and moves along with it. A fit of a release sees one second.\n\n")
     rows = [[BEAM_FITS[key], f["cells"], f"{f['youngs_modulus'] / 1e3:.1f} ± {f['std'] / 1e3:.1f}",
              "" if f["at_rest"] else f"{f['mass_damping']:.2f}", "" if f["at_rest"] else f"{1e3 * f['stiffness_damping']:.2f}",
              f"{1e3 * f['marker_rms']:.2f}"] for key in BEAM_FITS if (f := fits.get(key))]
@@ -217,6 +217,11 @@ def silicone_beam():
                     f"{p['swing']['frequency']:.3f} ({p['measured_swing']['frequency']:.3f})", percent(p["frequency_error"]),
                     f"{p['swing']['damping_ratio']:.3f} ({p['measured_swing']['damping_ratio']:.3f})", f"{1e3 * p['rms']:.2f}",
                     f"{1e3 * p['rms_second_half']:.2f}", f"{1e3 * p['rms_without_mean']:.2f}"] for p in figures["release_predictions"]])
+    both = lambda rows, key: " and ".join(percent(p[key]) for p in rows)
+    text += ("\nHung from the middle of the edge alone, the weight dents the edge beside a marker, the more the finer the mesh: the drops at rest would be "
+             + both([p for p in figures["point_rest_predictions"] if p["model"] == "rest"], "error") + " off by the model fitted at rest, "
+             + both([p for p in figures["point_rest_predictions"] if p["model"] == "release"], "error") + " by the other, and the frequencies "
+             + both(figures["point_release_predictions"], "frequency_error") + ".\n")
     return text + beam_misses(figures, fits) + f"\nMeasured on {machine(figures)}.\n"
 
 

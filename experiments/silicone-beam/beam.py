@@ -16,7 +16,8 @@ RATE = 100.0
 GRAVITY = 9.81
 DENSITY = 1070.0
 WEIGHT = 0.51012 / GRAVITY                # kg
-HUNG_AT = (0.0, 0.015, 0.030)             # middle of the top edge of the free end
+EDGE = [(0.0, 0.030 * (k + 0.5) / 7, 0.030) for k in range(7)]  # along the top edge of the free end
+MIDDLE = [(0.0, 0.015, 0.030)]
 FOLDER = "silicone-beam-mocap"
 
 
@@ -120,9 +121,10 @@ def numbers(values):
     return "[" + ", ".join(f"{v:.9g}" for v in values) + "]"
 
 
-def write_capture(folder, recording, weight=None, window=None, released_at=0.0, static=None, density=DENSITY):
+def write_capture(folder, recording, weight=None, hung_at=EDGE, window=None, released_at=0.0, static=None, density=DENSITY):
     """A capture of the release, its frames from the last one held to `window` seconds later; or, where `static` is a
     pair of times after the release, of the mean between them as one frame at rest.
+    @param weight  hung from the points `hung_at` in equal parts [kg]
     @param released_at  of the release after the last frame held [s]: simulation begins there"""
     folder.mkdir(parents=True, exist_ok=True)
     write_surface(folder / "beam.obj")
@@ -136,7 +138,7 @@ def write_capture(folder, recording, weight=None, window=None, released_at=0.0, 
         times = [released_at] + [k / RATE for k in range(1, len(frames))]
         (folder / "times.txt").write_text("".join(f"{t:.6f}\n" for t in times))
         timing = f"timestamps = \"times.txt\"\nframe_count = {len(frames)}\nstart_frame = 0\n"
-    hung = f"\n[[weight]]\nmass = {weight:.9g}\nat = {numbers(HUNG_AT)}\n" if weight else ""
+    hung = "".join(f"\n[[weight]]\nmass = {weight / len(hung_at):.9g}\nat = {numbers(p)}\n" for p in hung_at) if weight else ""
     (folder / "capture.toml").write_text(f"""format = "capture/1"
 name = "silicone beam, {recording.name}"
 

@@ -37,11 +37,12 @@ class Experiment:
         self.program, self.work = program, work
         self.recordings = {name: beam.Recording(name) for name in RECORDINGS}
 
-    def capture(self, name, static=False, extra=None, released_at=0.0):
+    def capture(self, name, static=False, extra=None, released_at=0.0, point=False):
         recording = self.recordings[name]
         weight = (beam.WEIGHT if name.startswith("load") else 0.0) + (extra or 0.0)
-        folder = self.work / f"{name}{'-rest' if static else ''}{f'-{1e3 * extra:g}g' if extra else ''}-{1e4 * released_at:.0f}"
-        return beam.write_capture(folder, recording, weight or None, WINDOW, released_at, REST if static else None)
+        folder = self.work / f"{name}{'-rest' if static else ''}{f'-{1e3 * extra:g}g' if extra else ''}-{1e4 * released_at:.0f}{'-point' if point else ''}"
+        at = beam.MIDDLE if point else beam.EDGE
+        return beam.write_capture(folder, recording, weight or None, at, WINDOW, released_at, REST if static else None)
 
     def fit(self, label, name, static=False, extra=None, released_at=0.0, **options):
         chosen = choices(**options)
@@ -60,24 +61,25 @@ class Experiment:
               f"{row['wall_seconds']} s", flush=True)
         return row
 
-    def track(self, label, name, static=False):
+    def track(self, label, name, static=False, point=False):
         """Positions of the tip's markers that a fitted model predicts in a recording."""
-        path = self.work / f"track-{label}-{name}{'-rest' if static else ''}.csv"
+        path = self.work / f"track-{label}-{name}{'-rest' if static else ''}{'-point' if point else ''}.csv"
         if not path.exists():
-            common.run(self.program, "evaluate", self.work / f"fit-{label}" / "model.toml", self.capture(name, static),
+            common.run(self.program, "evaluate", self.work / f"fit-{label}" / "model.toml",
+                       self.capture(name, static, point=point),
                        "--markers", path)
         return beam.read_track(path)
 
-    def predict_rest(self, label, name):
+    def predict_rest(self, label, name, point=False):
         recording = self.recordings[name]
-        predicted = recording.drop(self.track(label, name, True)[0])
+        predicted = recording.drop(self.track(label, name, True, point)[0])
         measured = recording.drop(recording.settled(*REST))
         return {"model": label, "recording": name, "drop": common.number(predicted, 4), "measured": common.number(measured, 4),
                 "error": common.number(predicted / measured - 1, 3)}
 
-    def predict_release(self, label, name):
+    def predict_release(self, label, name, point=False):
         recording = self.recordings[name]
-        frames = self.track(label, name)
+        frames = self.track(label, name, point=point)
         seen = recording.frames[recording.start:recording.start + len(frames)]
         times = [k / beam.RATE for k in range(len(frames))]
         drops, measured = [recording.drop(f) for f in frames], [recording.drop(f) for f in seen]
@@ -110,6 +112,11 @@ def main():
                e.fit("release-later", a, released_at=0.005)]
     at_rest = [e.predict_rest("rest", name) for name in RECORDINGS] + [e.predict_rest("release", name) for name in RECORDINGS]
     swings = [e.predict_release("release", name) for name in RECORDINGS]
+    # A point load dents the edge, the more the finer the mesh: what it does to the figures.
+    point_rest = [e.predict_rest(model, name, True) for model in ("rest", "release") for name in loads]
+    point_swings = [e.predict_release("release", name, True) for name in loads]
+    for p in point_swings:
+        del p["drops"], p["measured_drops"]
     # Not predictions: what the model can do where the loaded releases themselves are fitted.
     release += [e.fit("release-" + name, name) for name in loads]
     recordings = {name: {"start_frame": r.start, "frame_rms": common.number(r.frame_rms, 3),
@@ -119,7 +126,8 @@ def main():
                   for name, r in e.recordings.items()}
     common.write_results(__file__, {"authors_modulus": AUTHORS_MODULUS, "window": WINDOW, "rest": REST, "recordings": recordings,
                                     "rest_fits": rest, "release_fits": release, "rest_predictions": at_rest,
-                                    "release_predictions": swings})
+                                    "release_predictions": swings, "point_rest_predictions": point_rest,
+                                    "point_release_predictions": point_swings})
 
 
 if __name__ == "__main__":
