@@ -246,7 +246,7 @@ def beam_misses(figures, fits):
 
 def write_beam_plot(figures):
     """Two panels: the tip's drop under its own weight and under the hung one."""
-    chosen = [p for p in figures["release_predictions"] if p["recording"] in ("gravity_V2_a", "load52_V2_b")]
+    chosen = [p for p in figures["release_predictions"] if p["recording"] in ("gravity_V2_a", "load52_V2_a")]
     width, height, left, top, gap = 640, 200, 60, 16, 36
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {2 * height + gap + 60}" font-family="sans-serif" font-size="12">',
              '<rect width="100%" height="100%" fill="#fff"/>']
@@ -262,7 +262,7 @@ def write_beam_plot(figures):
         parts.append(f'<polyline points="{points}" fill="none" stroke="#1f5fa8" stroke-width="2"/>')
         for k, y in enumerate(p["measured_drops"]):
             parts.append(f'<circle cx="{sx(k):.1f}" cy="{sy(y):.1f}" r="2" fill="#b5401f"/>')
-        label = {"gravity_V2_a": "own weight: fitted", "load52_V2_b": "with 52 g hung from the tip: predicted"}[p["recording"]]
+        label = {"gravity_V2_a": "own weight: fitted", "load52_V2_a": "with 52 g hung from the tip: predicted"}[p["recording"]]
         parts.append(f'<text x="{width - 28}" y="{offset + 18}" text-anchor="end">{label}</text>')
     bottom = top + 2 * height + gap
     for tenth in range(0, 11, 2):
