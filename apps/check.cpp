@@ -85,7 +85,8 @@ void describe_world(const Capture& capture) {
   if (!capture.weights.empty()) {
     double mass = 0.0;
     for (const Weight& weight : capture.weights) mass += weight.mass;
-    say("hung", formatted("%.4g kg at %zu point%s", mass, capture.weights.size(), capture.weights.size() == 1 ? "" : "s"));
+    say("hung",
+        formatted("%.4g kg at %zu point%s", mass, capture.weights.size(), capture.weights.size() == 1 ? "" : "s"));
   }
   if (capture.initial.released) say("start", "released from a held, deformed pose");
 }
