@@ -219,11 +219,14 @@ def silicone_beam():
                     f"{p['swing']['frequency']:.3f} ({p['measured_swing']['frequency']:.3f})", percent(p["frequency_error"]),
                     f"{p['swing']['damping_ratio']:.3f} ({p['measured_swing']['damping_ratio']:.3f})", f"{1e3 * p['rms']:.2f}",
                     f"{1e3 * p['rms_second_half']:.2f}", f"{1e3 * p['rms_without_mean']:.2f}"] for p in figures["release_predictions"]])
+    of_meshes = lambda at: sorted((p for p in figures["weight_meshes"] if p["at"] == at), key=lambda p: p["cells"])
     both = lambda rows, key: " and ".join(percent(p[key]) for p in rows)
-    text += ("\nHung from the middle of the edge alone, the weight dents the edge beside a marker, the more the finer the mesh: the drops at rest would be "
+    text += ("\nHung from the middle of the edge alone, the weight dents the edge beside a marker by as much as the mesh lets it: the drops at rest would be "
              + both([p for p in figures["point_rest_predictions"] if p["model"] == "rest"], "error") + " off by the model fitted at rest, "
              + both([p for p in figures["point_rest_predictions"] if p["model"] == "release"], "error") + " by the other, and the frequencies "
-             + both(figures["point_release_predictions"], "frequency_error") + ".\n")
+             + both(figures["point_release_predictions"], "frequency_error") + ". On " + ", ".join(str(p["cells"]) for p in of_meshes("edge")) +
+             " cells the first drop, of the model fitted at rest on the same mesh, is " + ", ".join(percent(p["error"]) for p in of_meshes("edge")) + " off with the weight spread and "
+             + ", ".join(percent(p["error"]) for p in of_meshes("one point")) + " with it at one point, so it is spread.\n")
     return text + beam_misses(figures, fits) + f"\nMeasured on {machine(figures)}.\n"
 
 
