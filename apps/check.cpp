@@ -82,6 +82,12 @@ void describe_world(const Capture& capture) {
                             capture.is_static ? ", all of one equilibrium (static)" : ""));
   if (!capture.fixed.empty())
     say("held", formatted("%zu region%s", capture.fixed.size(), capture.fixed.size() == 1 ? "" : "s"));
+  if (!capture.weights.empty()) {
+    double mass = 0.0;
+    for (const Weight& weight : capture.weights) mass += weight.mass;
+    say("hung",
+        formatted("%.4g kg at %zu point%s", mass, capture.weights.size(), capture.weights.size() == 1 ? "" : "s"));
+  }
   if (capture.initial.released) say("start", "released from a held, deformed pose");
 }
 

@@ -1,34 +1,27 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <string>
 
 #include "base/error.hpp"
+#include "capture/markers.hpp"
 #include "commands.hpp"
 #include "report/fit_output.hpp"
+#include "report/prediction.hpp"
 
 namespace pliant::apps {
 
 namespace {
 
 struct Arguments {
-  std::string model, capture, out;
+  std::string model, capture, out, markers;
 };
 
-int run(const Arguments& arguments) {
-  const Model model = load_model(arguments.model);
-  const Capture capture = read_capture(arguments.capture);
-  if (!capture.presses.empty() || !capture.loads.empty())
-    std::cerr << "pliant: presses and loads of this capture are passed over: models of moving objects predict motion\n";
-  ObserveOptions options;
-  options.max_points_per_frame = 1000;
-  const auto observed = observe(capture, options, [](int done, int total) { show_progress("read", done, total); });
-  stop_if_interrupted();
-  const auto seen =
-      std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed, tracked_points(capture)));
-  if (seen->empty())
-    throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
-  const CaptureScene scene = make_scene(model, capture);
+using Observations = std::shared_ptr<std::vector<FrameObservations>>;
+
+/// Compares the motion with what was seen. False where it cannot be simulated.
+bool evaluate_frames(const Capture& capture, const CaptureScene& scene, const Observations& seen, Evaluation& result) {
   ObjectiveOptions objective_options;
   objective_options.outlier_scale = 0.05 * object_size(capture);
   objective_options.last_frame =
@@ -38,12 +31,35 @@ int run(const Arguments& arguments) {
   const CostEvaluation evaluation = objective.evaluate(VectorX(0));
   if (!evaluation.succeeded) {
     std::cerr << "pliant: the simulation stopped: " << evaluation.failure << "\n";
-    return NotConverged;
+    return false;
   }
-  Evaluation result;
   result.error = surface_errors(evaluation).error;
+  return true;
+}
+
+int run(const Arguments& arguments) {
+  const Model model = load_model(arguments.model);
+  const Capture capture = read_capture(arguments.capture);
+  if (!capture.presses.empty()) std::cerr << "pliant: presses of this capture are passed over\n";
+  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.markers.has_value(); });
+  ObserveOptions options;
+  options.max_points_per_frame = 1000;
+  const auto observed = observe(capture, options, [](int done, int total) { show_progress("read", done, total); });
+  stop_if_interrupted();
+  const auto seen =
+      std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed, tracked_points(capture)));
+  if (seen->empty() && !has_loads)
+    throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
+  const CaptureScene scene = make_scene(model, capture);
+  Evaluation result;
+  if (!seen->empty() && !evaluate_frames(capture, scene, seen, result)) return NotConverged;
+  result.loads = predict_loads(capture, scene);
   std::cout << to_json(result) << "\n";
   if (!arguments.out.empty()) write_evaluation(arguments.out, result);
+  if (!arguments.markers.empty()) {
+    const MarkerPrediction prediction = predict_markers(capture, scene);
+    write_marker_track(arguments.markers, prediction.ids, prediction.frames);
+  }
   return Fine;
 }
 
@@ -55,6 +71,8 @@ void add_evaluate(CLI::App& app, int& exit_code) {
   command->add_option("model", arguments->model, "model.toml of a fit")->required()->type_name("MODEL");
   command->add_option("capture", arguments->capture, "recording of the same object")->required()->type_name("CAPTURE");
   command->add_option("-o,--out", arguments->out, "file for the figures (JSON)")->type_name("FILE");
+  command->add_option("--markers", arguments->markers, "file for the predicted tracks of the capture's markers (CSV)")
+      ->type_name("FILE");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -107,6 +107,12 @@ struct Load {
   std::string role = "fit";                                           ///< "fit" or "test"
 };
 
+/// A small heavy thing that hangs at a point of the object in every frame, and moves along with it.
+struct Weight {
+  double mass = 0.0;             ///< [kg]
+  Vector3 at = Vector3::Zero();  ///< on the undeformed surface
+};
+
 /// Facts read from a `capture.toml`, valid as a whole (see docs/formats.md). SI units, world coordinates.
 struct Capture {
   std::filesystem::path folder;  ///< absolute; patterns of the capture are relative to it
@@ -130,6 +136,7 @@ struct Capture {
   std::vector<FixedRegion> fixed;
   std::vector<MaterialRegion> regions;
   std::vector<Plane> planes;
+  std::vector<Weight> weights;
   Initial initial;
 
   std::vector<DepthCamera> depth;

@@ -39,6 +39,7 @@ void check_every(RuleContext&);
 void check_noise(RuleContext&);
 void check_has_observations(RuleContext&);
 void check_presses(RuleContext&);
+void check_weights(RuleContext&);
 void check_loads(RuleContext&);
 /// @}
 

@@ -338,15 +338,27 @@ void check_presses(RuleContext& context) {
   }
 }
 
+void complain_of_mass(RuleContext& context, const std::string& key, double mass) {
+  const double limit = greatest_load * context.capture.total_mass().value_or(largest_object);
+  if (mass <= 0 || mass > limit)
+    context.toml.complain(key, "a hung mass of " + text_of(mass, "kg"), "above 0 and at most " + text_of(limit, "kg"),
+                          "masses are in kilograms");
+}
+
+void check_weights(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.weights.size(); ++i) {
+    if (!context.toml.is_sound(item("weight", i))) continue;
+    complain_of_mass(context, item("weight", i, "mass"), context.capture.weights[i].mass);
+    complain_off_surface(context, item("weight", i, "at"), context.capture.weights[i].at);
+  }
+}
+
 void check_loads(RuleContext& context) {
   const Capture& capture = context.capture;
   for (std::size_t i = 0; i < capture.loads.size(); ++i) {
     const Load& load = capture.loads[i];
     if (!context.toml.is_sound(item("load", i))) continue;
-    const double limit = greatest_load * capture.total_mass().value_or(largest_object);
-    if (load.mass <= 0 || load.mass > limit)
-      context.toml.complain(item("load", i, "mass"), "a hung mass of " + text_of(load.mass, "kg"),
-                            "above 0 and at most " + text_of(limit, "kg"), "masses are in kilograms");
+    complain_of_mass(context, item("load", i, "mass"), load.mass);
     complain_off_surface(context, item("load", i, "at"), load.at);
     if (!load.cloud && !load.markers && load.images.empty())
       context.toml.complain(item("load", i), "a load without observation", "`cloud`, `markers` or `images`");

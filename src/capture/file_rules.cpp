@@ -168,6 +168,7 @@ std::vector<Rule> make_rules() {
           check_noise,
           check_has_observations,
           check_presses,
+          check_weights,
           check_loads,
           check_depth_files,
           check_clouds,

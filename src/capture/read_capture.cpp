@@ -45,6 +45,7 @@ class Reader {
     read_blocks(root, "cloud", [&](TomlTable& block) { capture_.clouds.push_back(read_cloud(block)); });
     read_blocks(root, "markers", [&](TomlTable& block) { capture_.markers.push_back(read_markers_block(block)); });
     read_blocks(root, "press", [&](TomlTable& block) { capture_.presses.push_back(read_press(block)); });
+    read_blocks(root, "weight", [&](TomlTable& block) { capture_.weights.push_back(read_weight(block)); });
     read_blocks(root, "load", [&](TomlTable& block) { capture_.loads.push_back(read_load(block)); });
     root.finish();
     return std::move(capture_);
@@ -380,6 +381,13 @@ class Reader {
     else if (normal)
       context_.reject(table.key_of("normal"), "a normal without length", "a direction into the object");
     return plane;
+  }
+
+  static Weight read_weight(TomlTable& block) {
+    Weight weight;
+    weight.mass = block.required<double>("mass", "the hung mass in kilograms").value_or(0.0);
+    weight.at = block.required<Vector3>("at", "where it hangs, on the rest surface").value_or(Vector3::Zero());
+    return weight;
   }
 
   Load read_load(TomlTable& block) {

@@ -120,6 +120,14 @@ Plane read_plane(TomlTable block) {
   return plane;
 }
 
+Weight read_weight(TomlTable block) {
+  Weight weight;
+  weight.mass = block.required<double>("mass", "the hung mass in kilograms").value_or(0.0);
+  weight.at = block.required<Vector3>("at", "where it hangs, on the rest surface").value_or(Vector3::Zero());
+  block.finish();
+  return weight;
+}
+
 Initial read_initial(TomlTable table) {
   Initial initial;
   initial.linear_velocity = table.optional<Vector3>("linear_velocity").value_or(Vector3::Zero());
@@ -200,6 +208,11 @@ std::string toml_text(const RigidMotion& motion) {
 void write_toml(std::ostream& out, const Plane& plane) {
   out << "[[plane]]\npoint = " << toml_text(plane.point) << "   # m\nnormal = " << toml_text(plane.normal)
       << "   # to the side where the object may be\nknown = " << (plane.known ? "true" : "false") << "\n\n";
+}
+
+void write_toml(std::ostream& out, const Weight& weight) {
+  out << "[[weight]]\nmass = " << toml_text(weight.mass) << "   # kg, hung\nat = " << toml_text(weight.at)
+      << "   # m, on the rest surface\n\n";
 }
 
 void write_toml(std::ostream& out, const Initial& initial) {

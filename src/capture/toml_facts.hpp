@@ -15,9 +15,10 @@ namespace pliant {
 /// Nothing, with a complaint in the table's context, where there is none or it makes no sense.
 std::optional<Region> read_region(TomlTable& table, const std::filesystem::path& folder);
 
-/// A [[fixed]] block, a [[plane]] block, the table [initial]; each finishes its table.
+/// A [[fixed]] block, a [[plane]] block, a [[weight]] block, the table [initial]; each finishes its table.
 FixedRegion read_fixed(TomlTable block, const std::filesystem::path& folder);
 Plane read_plane(TomlTable block);
+Weight read_weight(TomlTable block);
 Initial read_initial(TomlTable table);
 
 /// A number with a range. Complains, and answers `fallback`, where it is missing (unless optional) or outside.
@@ -44,6 +45,7 @@ std::string toml_text(const RigidMotion& motion);
 
 /// The same blocks as text. @param vertices_file  for a region of vertices: the file that lists them
 void write_toml(std::ostream& out, const Plane& plane);
+void write_toml(std::ostream& out, const Weight& weight);
 void write_toml(std::ostream& out, const Initial& initial);
 void write_toml(std::ostream& out, const FixedRegion& fixed, const std::string& vertices_file);
 

@@ -7,6 +7,9 @@ namespace pliant {
 
 namespace {
 
+/// Not of interest to a user: forces that stand for whoever held the object.
+bool is_auxiliary(const std::string& name) { return name.starts_with("pull@"); }
+
 std::string spoken(std::string name) {
   for (char& c : name)
     if (c == '_') c = ' ';
@@ -25,6 +28,7 @@ void say_what_is_inseparable(FitOutcome& outcome) {
   const auto names = outcome.parameters.coordinate_names();
   for (std::size_t i = 0; i < names.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
+      if (is_auxiliary(names[i]) || is_auxiliary(names[j])) continue;
       const double r = outcome.correlation(Eigen::Index(i), Eigen::Index(j));
       if (std::abs(r) < 0.9) continue;
       char text[64];
@@ -38,7 +42,8 @@ void say_what_is_assumed(FitOutcome& outcome) {
   int at = 0;
   for (const Parameter& p : outcome.parameters.parameters()) {
     if (!p.estimated) continue;
-    if (std::isfinite(p.prior_std) && outcome.std.segment(at, p.dimension()).maxCoeff() > 0.7 * p.prior_std)
+    if (!is_auxiliary(p.name) && std::isfinite(p.prior_std) &&
+        outcome.std.segment(at, p.dimension()).maxCoeff() > 0.7 * p.prior_std)
       outcome.notes.push_back("The recording says little about " + spoken(p.name) +
                               ": its value is close to what was assumed beforehand.");
     at += p.dimension();

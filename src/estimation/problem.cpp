@@ -139,6 +139,7 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.simulation.sensors = int(sensor_names(capture).size());
   d.mismatch.centre = centre_of(*capture.surface);
   d.simulation.contact = default_contact(*d.body, parameters[theta::density] * d.body->volume(), gravity);
+  for (const Weight& weight : capture.weights) d.simulation.weights.push_back({weight.at, weight.mass});
   for (const FixedRegion& fixed : capture.fixed) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
     d.simulation.holds.push_back({region_test(capture, fixed.region), motion.rotation, motion.translation});

@@ -66,6 +66,7 @@ std::string model_toml(const Model& m) {
   write_toml(out, m.initial);
   for (const Plane& plane : m.planes) write_toml(out, plane);
   for (size_t i = 0; i < m.fixed.size(); ++i) write_toml(out, m.fixed[i], vertices_file(i));
+  for (const Weight& weight : m.weights) write_toml(out, weight);
   return std::move(out).str();
 }
 
@@ -109,6 +110,7 @@ class Reader {
     if (auto initial = root.table("initial")) model_.initial = read_initial(*initial);
     for (TomlTable& block : root.blocks("plane")) model_.planes.push_back(read_plane(block));
     for (TomlTable& block : root.blocks("fixed")) model_.fixed.push_back(read_fixed(block, folder_));
+    for (TomlTable& block : root.blocks("weight")) model_.weights.push_back(read_weight(block));
     root.finish();
     return std::move(model_);
   }

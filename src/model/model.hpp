@@ -36,6 +36,7 @@ struct Model {
   std::optional<Vector3> gravity;  ///< [m/s^2]
   std::vector<Plane> planes;
   std::vector<FixedRegion> fixed;
+  std::vector<Weight> weights;
   Initial initial;
 
   int frames = 0;           ///< of the recording; 0: static

@@ -31,11 +31,12 @@ struct HungWeight {
   double mass = 0.0;  ///< [kg]
 };
 
-/// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is left out: they are for bodies at
-/// rest.
+/// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is the stepper's (`Stepper::carry`).
 class HungWeights : public ForceTerm {
  public:
   HungWeights(const Body& body, const std::vector<HungWeight>& weights);
+  const Embedding& points() const { return points_; }
+  const std::vector<double>& masses() const { return mass_; }
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
   void set_parameters(const VectorX& theta) override { gravity_ = theta::vector_at(theta, theta::gravity); }

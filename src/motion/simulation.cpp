@@ -60,6 +60,10 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
                         "move them onto the object, make them larger, or use smaller elements"});
     stepper_.hold(std::move(held));
   }
+  if (!options_.weights.empty()) {
+    const HungWeights hung(*body_, options_.weights);
+    stepper_.carry(hung.points(), hung.masses());
+  }
   prepare_holds();
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->reference_positions().rowwise() - body_->centre_of_mass().transpose();

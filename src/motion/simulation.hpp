@@ -29,7 +29,7 @@ struct SimulationOptions {
                     ///< reference pose
   int sensors = 0;  ///< in theta; they play no part in the motion
   std::vector<Hold> holds;          ///< held regions
-  std::vector<HungWeight> weights;  ///< hung from the object
+  std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
                                ///< tetrahedra, which follow the shape

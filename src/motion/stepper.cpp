@@ -63,6 +63,22 @@ void Stepper::clear_held(Points& points) const {
   for (const int node : held_) points.row(node).setZero();
 }
 
+void Stepper::carry(Embedding points, std::vector<double> masses) {
+  if (points.point_count() != int(masses.size())) throw std::invalid_argument("one mass a point is expected");
+  carried_ = std::move(points);
+  carried_mass_ = std::move(masses);
+}
+
+void Stepper::add_carried(double scale, const Points& v, Points& out) const {
+  for (int i = 0; i < carried_.point_count(); ++i)
+    carried_.add_transpose(i, scale * carried_mass_[std::size_t(i)] * carried_.position(i, v), out);
+}
+
+void Stepper::add_inertia(double scale, const Points& v, Points& out) const {
+  body_->add_mass_product(scale * density_, v, out);
+  add_carried(scale, v, out);
+}
+
 void Stepper::set_mass_matrix(const Scheme& s, BlockMatrix& matrix) const {
   matrix.set_zero();
   if (!s.has_mass) return;
@@ -70,6 +86,16 @@ void Stepper::set_mass_matrix(const Scheme& s, BlockMatrix& matrix) const {
   for (std::size_t b = 0; b < body_->mass.size(); ++b) {
     double* block = matrix.block(int(b));
     block[0] = block[4] = block[8] = m * body_->mass[b];
+  }
+  for (int i = 0; i < carried_.point_count(); ++i) {
+    const double scale = carried_mass_[std::size_t(i)] / (options_.newmark_theta * s.dt);
+    const auto nodes = carried_.nodes(i);
+    const auto weights = carried_.weights(i);
+    for (std::size_t a = 0; a < nodes.size(); ++a)
+      for (std::size_t b = 0; b < nodes.size(); ++b) {
+        double* block = matrix.block(body_->pattern->find(nodes[a], nodes[b]));  // nodes of one element always meet
+        for (const int d : {0, 4, 8}) block[d] += scale * weights[a] * weights[b];
+      }
   }
 }
 
@@ -90,14 +116,14 @@ bool Stepper::prepare(const State& start) {
 SolveSummary Stepper::solve(const State& start, Points& delta) {
   if (is_newton()) {
     inertia_.setZero();
-    body_->add_mass_product(density_ / options_.newmark_theta, start.v, inertia_);
+    add_inertia(1.0 / options_.newmark_theta, start.v, inertia_);
     clear_held(delta);
     return newton(scheme(), start.x, inertia_, delta);
   }
   force_.setZero();
   for (auto& term : terms_) term->add_force(start.x, force_);
   force_ *= options_.dt;
-  body_->add_mass_product(density_ / options_.newmark_theta, start.v, force_);
+  add_inertia(1.0 / options_.newmark_theta, start.v, force_);
   clear_held(force_);
   clear_held(delta);
   solution_ = flat(delta);
@@ -132,7 +158,10 @@ double Stepper::residual(const Scheme& s, const Points& x, const Points& delta, 
   set_points_at(s, x, delta);
   residual_ = -inertia;
   force_scale = inertia.norm();
-  if (s.has_mass) body_->add_mass_product(mass_factor(), delta, residual_);
+  if (s.has_mass) {
+    body_->add_mass_product(mass_factor(), delta, residual_);
+    add_carried(1.0 / (options_.newmark_theta * s.dt), delta, residual_);
+  }
   for (auto& term : terms_) {
     force_.setZero();
     term->add_force(points_at_[std::size_t(term->at())], force_);
@@ -238,6 +267,7 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
   mass_part_ -=
       (d_theta[theta::density] * (1.0 / (t * dt) + mass_damping_) + density_ * d_theta[theta::mass_damping]) * delta;
   body_->add_mass_product(1.0, mass_part_, d_force_);
+  add_carried(1.0 / t, change.v, d_force_);
   clear_held(d_force_);
   if (is_newton()) {
     solve_derivative(d_force_, w_, GeneralSolver::Side::Plain);
@@ -272,6 +302,8 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   theta_bar[theta::density] +=
       mass_part_.cwiseProduct(start.v).sum() / t - (1.0 / (t * dt) + mass_damping_) * w_m_delta;
 
+  bar.v = -(1.0 - t) / t * bar.v + density_ / t * mass_part_;
+  add_carried(1.0 / t, w_, bar.v);
   w_ *= dt;
   for (Points& p : lag_bar_) p.setZero();
   for (Points& p : bar_at_) p.setZero();
@@ -280,7 +312,6 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
     term->add_force_adjoint(points_at_[at], w_, lag_bar_[std::size_t(term->lag())], bar_at_[at], theta_bar);
   }
   theta_bar[theta::stiffness_damping] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
-  bar.v = -(1.0 - t) / t * bar.v + density_ / t * mass_part_;
   for (const Points& p : bar_at_) bar.x += p;
   for (const auto lag : all_lags) {
     bar.x += lag_bar_[std::size_t(lag)];

@@ -65,6 +65,9 @@ class Stepper {
   void set_parameters(const VectorX& theta);
   /// Nodes that stay where they are (strong Dirichlet elimination).
   void hold(std::vector<int> nodes) { held_ = std::move(nodes); }
+  /// Point masses that move along with points of the body: they add the inertia sum_i m_i w_i w_i^T, w_i the points'
+  /// weights, to the body's, and neither weight nor damping. One mass [kg] a point.
+  void carry(Embedding points, std::vector<double> masses);
 
   /// Linearises and factorises about a step's start. False where the matrix is not positive definite or not finite.
   [[nodiscard]] bool prepare(const State& start);
@@ -108,6 +111,10 @@ class Stepper {
   void set_points_at(const Scheme& scheme, const Points& x, const Points& delta);
   double mass_factor() const { return density_ * (1.0 / (options_.newmark_theta * options_.dt) + mass_damping_); }
   void clear_held(Points& points) const;
+  /// out += scale (density M + the carried masses) v
+  void add_inertia(double scale, const Points& v, Points& out) const;
+  /// out += scale times the carried masses times v
+  void add_carried(double scale, const Points& v, Points& out) const;
   void set_mass_matrix(const Scheme& scheme, BlockMatrix& matrix) const;
   /// Linearises every term where its lag point is for this Delta.
   void linearise(const Scheme& scheme, const Points& x, const Points& delta);
@@ -126,6 +133,8 @@ class Stepper {
   std::vector<std::unique_ptr<ForceTerm>> terms_;
   StepOptions options_;
   std::vector<int> held_;
+  Embedding carried_;
+  std::vector<double> carried_mass_;
   double mass_damping_ = 0.0, stiffness_damping_ = 0.0, density_ = 0.0;
 
   BlockMatrix matrix_, exact_matrix_;

@@ -243,6 +243,7 @@ Capture as_capture(const Model& model) {
   capture.gravity = model.gravity;
   capture.planes = model.planes;
   capture.fixed = model.fixed;
+  capture.weights = model.weights;
   capture.initial = model.initial;
   capture.is_static = model.frames == 0;
   if (capture.is_static) capture.times = {0.0};
@@ -336,6 +337,7 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
     model.planes[i].known = true;
   }
   model.fixed = capture.fixed;
+  model.weights = capture.weights;
   model.initial = capture.initial;
   model.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
   model.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);

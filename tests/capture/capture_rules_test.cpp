@@ -330,6 +330,23 @@ TEST(CaptureRules, CheckLoads) {
               HasSubstr("no depth camera \"back\""));
 }
 
+TEST(CaptureRules, CheckWeights) {
+  const auto said = [](const std::string& block) {
+    return complaint_of([&] { (void)SmallCapture().append("\n[[weight]]\n" + block).read(); });
+  };
+  EXPECT_EQ(said("mass = 0.1\nat = [0, 0.1, 0]"), "");
+  EXPECT_THAT(said("mass = 0\nat = [0, 0.1, 0]"), HasSubstr("a hung mass of 0 kg"));
+  EXPECT_THAT(said("mass = 100\nat = [0, 0.1, 0]"), HasSubstr("masses are in kilograms"));
+  EXPECT_THAT(said("mass = 0.1\nat = [0, 0.5, 0]"), HasSubstr("off the rest surface"));
+  EXPECT_THAT(said("mass = 0.1"), HasSubstr("at"));
+  EXPECT_THAT(said("mass = 0.1\nat = [0, 0.1, 0]\nforce = 3"), HasSubstr("unknown key `force`"));
+  SmallCapture small;
+  const Capture capture = small.append("\n[[weight]]\nmass = 0.1\nat = [0, 0.1, 0]\n").read();
+  ASSERT_EQ(capture.weights.size(), 1u);
+  EXPECT_EQ(capture.weights[0].mass, 0.1);
+  EXPECT_EQ(capture.weights[0].at, Vector3(0, 0.1, 0));
+}
+
 TEST(CaptureRules, CheckClouds) {
   SmallCapture small;
   small.append("\n[[cloud]]\npoints = \"clouds/%d.ply\"\nevery = 3\n");

@@ -24,6 +24,7 @@ Model full_model() {
               RigidMotion{Eigen::AngleAxisd(0.3, Vector3::UnitX()).toRotationMatrix(), {1, 2, 3}}},
              {RegionHalfSpace{{0, 0, 0}, {1, 0, 0}}, std::nullopt},
              {RegionVertices{{3, 1, 4}}, std::nullopt}};
+  m.weights = {{0.05, {0.01, -0.06, 0.15}}};
   m.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true};
   m.frames = 80, m.frame_rate = 60.0, m.start_frame = 4;
   m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
@@ -76,6 +77,9 @@ TEST(Model, PlanesRegionsAndVelocitiesComeBack) {
   EXPECT_LT((read.planes[0].normal - m.planes[0].normal).norm(), 1e-15);
   EXPECT_FALSE(read.planes[0].known);
   EXPECT_TRUE(read.planes[1].known);
+  ASSERT_EQ(read.weights.size(), 1u);
+  EXPECT_EQ(read.weights[0].mass, 0.05);
+  EXPECT_EQ(read.weights[0].at, m.weights[0].at);
   ASSERT_EQ(read.fixed.size(), 4u);
   EXPECT_EQ(std::get<RegionBox>(read.fixed[0].region).max, Vector3(0.01, 1, 1));
   EXPECT_EQ(std::get<RegionSphere>(read.fixed[1].region).radius, 0.02);

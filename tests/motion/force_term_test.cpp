@@ -221,6 +221,12 @@ std::vector<Family> families() {
                   }()});
   const std::vector<Family> others = {
       {"Gravity", small_torus, [](auto body) { return std::make_unique<Gravity>(*body); }, false, false, gravity},
+      {"HungWeights", small_torus,
+       [](auto body) {
+         return std::make_unique<HungWeights>(
+             *body, std::vector<HungWeight>{{Vector3(0.1, 0.0, 0.01), 0.2}, {Vector3(-0.12, 0.01, 0.0), 0.05}});
+       },
+       false, false, range(theta::gravity, 3)},
       {"PlaneContact", small_torus, contact, true, true, range(theta::plane_point(1), 6)},
       {"FixedRegions",
        small_torus,
