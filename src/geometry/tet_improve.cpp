@@ -110,7 +110,13 @@ class Improver {
       if (remove_edge(nodes[i], nodes[j])) return true;
     for (const auto& [i, j, k] : tet_faces)
       if (remove_face({nodes[i], nodes[j], nodes[k]})) return true;
-    return std::ranges::any_of(nodes, [&](int n) { return move(n); });
+    if (std::ranges::any_of(nodes, [&](int n) { return move(n); })) return true;
+    for (int m = 0; m < 3; ++m) {
+      const auto& [i, j] = tet_edges[std::size_t(m)];
+      const auto& [k, l] = tet_edges[std::size_t(5 - m)];
+      if (join_edges({nodes[i], nodes[j]}, {nodes[k], nodes[l]})) return true;
+    }
+    return false;
   }
 
   // ---- an edge: its elements are replaced by a triangulation of the ring around it, with either end
@@ -255,6 +261,49 @@ class Improver {
 
   double volume(const Tet& t) const {
     return (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).dot(at(t[3]) - at(t[0])) / 6.0;
+  }
+
+  // ---- opposite edges of a flat element that cross: one node between them divides both, and the element is gone
+
+  bool join_edges(const std::array<int, 2>& one, const std::array<int, 2>& other) {
+    if (is_boundary_edge(one[0], one[1]) || is_boundary_edge(other[0], other[1])) return false;
+    const std::optional<Vector3> crossing = between(one, other);
+    if (!crossing) return false;
+    const int middle = int(nodes_.size());
+    std::vector<int> old;
+    std::vector<Tet> by;
+    nodes_.push_back(*crossing);
+    for (const auto& edge : {one, other})
+      for (const int t : around<2>(edge)) {
+        if (std::ranges::find(old, t) == old.end()) old.push_back(t);
+        if (holds(tet(t), one[0]) && holds(tet(t), one[1]) && holds(tet(t), other[0]) && holds(tet(t), other[1]))
+          continue;
+        for (const int end : edge) {
+          by.push_back(tet(t));
+          std::ranges::replace(by.back(), end, middle);
+        }
+      }
+    double before = 0.0, after = 0.0;
+    for (const int t : old) before += volume(tet(t));
+    for (const Tet& t : by) after += volume(t);
+    if (std::abs(after - before) > 1e-9 * after || !is_gain(worst(old), worst(by))) {
+      nodes_.pop_back();
+      return false;
+    }
+    star_.emplace_back();
+    replace(old, by);
+    move(middle);
+    return true;
+  }
+
+  /// The middle of the two edges' closest points, where both lie well within the edges.
+  std::optional<Vector3> between(const std::array<int, 2>& one, const std::array<int, 2>& other) const {
+    const Vector3 u = at(one[1]) - at(one[0]), v = at(other[1]) - at(other[0]), w = at(other[0]) - at(one[0]);
+    const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v), determinant = uu * vv - uv * uv;
+    if (!(determinant > 1e-6 * uu * vv)) return std::nullopt;
+    const double s = (w.dot(u) * vv - w.dot(v) * uv) / determinant, t = (w.dot(u) * uv - w.dot(v) * uu) / determinant;
+    if (!(std::min({s, t, 1.0 - s, 1.0 - t}) > 0.05)) return std::nullopt;
+    return 0.5 * (at(one[0]) + s * u + at(other[0]) + t * v);
   }
 
   // ---- a node inside: a pattern search for the place where its worst element is best

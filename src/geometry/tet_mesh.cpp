@@ -134,9 +134,12 @@ void check_nodes(const TetMesh& mesh) {
 }
 
 void check_volumes(const TetMesh& mesh) {
-  for (std::size_t e = 0; e < mesh.tets.size(); ++e)
-    if (!(edge_matrix(corners_of(mesh.nodes, mesh.tets[e])).determinant() > 0.0))
+  for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
+    const Matrix3 edges = edge_matrix(corners_of(mesh.nodes, mesh.tets[e]));
+    constexpr double flat = 1e-9;  // of the longest edge cubed: rounding would decide on the element's forces
+    if (!(edges.determinant() > flat * std::pow(edges.colwise().norm().maxCoeff(), 3)))
       refuse("element " + std::to_string(e) + " has no positive volume");
+  }
 }
 
 struct Face {
