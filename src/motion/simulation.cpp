@@ -59,6 +59,8 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
                         "regions that hold a part of it",
                         "move them onto the object, make them larger, or use smaller elements"});
     stepper_.hold(std::move(held));
+  } else {
+    stepper_.anchor(held_nodes(*body_, options_.holds));
   }
   if (!options_.weights.empty()) {
     const HungWeights hung(*body_, options_.weights);

@@ -191,6 +191,27 @@ bool Stepper::factorise_exact(const Scheme& s, const Points& x, const Points& de
   return solver.factorise(exact_matrix_, matrix_);
 }
 
+double Stepper::prepare_move(const Scheme& s, const Points& x, const Points& delta) {
+  constexpr double hardly = 1e-3, farthest = 1.0;  // [rad]
+  turns_ = false;
+  if (s.has_mass) return 1.0;
+  if (!turning_) turning_ = std::make_unique<TurningStep>(body_, options_.solver.kind);
+  if (!turning_->fix(held_.empty() ? anchors_ : held_)) return 1.0;
+  const double angle = turning_->prepare(x + delta, step_);
+  // A straight step is as good for small angles, and free of rounding.
+  turns_ = angle > hardly;
+  return std::min(1.0, farthest / angle);
+}
+
+void Stepper::move(const Points& x, const Points& delta, double share) {
+  if (!turns_) {
+    trial_ = delta + share * step_;
+    return;
+  }
+  turning_->move(share, trial_);
+  trial_ -= x;
+}
+
 SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& inertia, Points& delta) {
   SolveSummary summary;
   double force_scale = 0.0;
@@ -221,9 +242,9 @@ SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& ine
     // with the matrix at hand, is shorter. Residuals themselves may rise on the way to the solution, by orders of
     // magnitude for slender or nearly incompressible bodies.
     const double length = step_.norm();
-    double share = 1.0;
+    double share = prepare_move(s, x, delta);
     for (int halving = 0;; ++halving, share *= 0.5) {
-      trial_ = delta + share * step_;
+      move(x, delta, share);
       linearise(s, x, trial_);
       r = residual(s, x, trial_, inertia, force_scale);
       if (std::isfinite(r)) {

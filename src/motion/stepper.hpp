@@ -6,6 +6,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "motion/turning_step.hpp"
 #include "solvers/general_solver.hpp"
 #include "solvers/linear_solver.hpp"
 
@@ -65,6 +66,8 @@ class Stepper {
   void set_parameters(const VectorX& theta);
   /// Nodes that stay where they are (strong Dirichlet elimination).
   void hold(std::vector<int> nodes) { held_ = std::move(nodes); }
+  /// Nodes that hardly move though nothing eliminates them: on the way to an equilibrium parts turn about them.
+  void anchor(std::vector<int> nodes) { anchors_ = std::move(nodes); }
   /// Point masses that move along with points of the body: they add the inertia sum_i m_i w_i w_i^T, w_i the points'
   /// weights, to the body's, and neither weight nor damping. One mass [kg] a point.
   void carry(Embedding points, std::vector<double> masses);
@@ -123,6 +126,11 @@ class Stepper {
                   double& force_scale);
   /// The exact matrix about Delta, with terms linearised there, factorised.
   [[nodiscard]] bool factorise_exact(const Scheme& scheme, const Points& x, const Points& delta);
+  /// Chooses how Newton's step_ is taken: with parts of the body turned on the way to an equilibrium, else straight.
+  /// Returns the largest share of it that makes sense.
+  double prepare_move(const Scheme& scheme, const Points& x, const Points& delta);
+  /// trial_ = that share of step_ beyond Delta.
+  void move(const Points& x, const Points& delta, double share);
   SolveSummary newton(const Scheme& scheme, const Points& x, const Points& inertia, Points& delta);
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
   void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
@@ -132,7 +140,9 @@ class Stepper {
   std::shared_ptr<const Body> body_;
   std::vector<std::unique_ptr<ForceTerm>> terms_;
   StepOptions options_;
-  std::vector<int> held_;
+  std::vector<int> held_, anchors_;
+  std::unique_ptr<TurningStep> turning_;
+  bool turns_ = false;
   Embedding carried_;
   std::vector<double> carried_mass_;
   double mass_damping_ = 0.0, stiffness_damping_ = 0.0, density_ = 0.0;
