@@ -227,8 +227,17 @@ SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& ine
       return summary;
     }
     if (!factorise_exact(s, x, delta)) return summary;
+    // Where the exact matrix is indefinite, Newton's step leads to whatever point has no force, or nowhere. The
+    // matrix with rotations kept leads downhill.
+    const bool is_exact = s.has_mass || general_->symmetric_part_is_definite();
+    const auto solve_for = [&](double tolerance, VectorX& y) {
+      if (is_exact)
+        general_->solve(-flat(residual_), y, tolerance);
+      else
+        general_->precondition(-flat(residual_), y);
+    };
     VectorX direction;
-    general_->solve(-flat(residual_), direction, 1e-4);
+    solve_for(1e-4, direction);
     step_ = as_points(std::as_const(direction));
     if (!step_.allFinite()) return summary;
     // Newton's next step after so small a one would be below rounding, which may leave more force than the tolerance:
@@ -248,7 +257,7 @@ SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& ine
       linearise(s, x, trial_);
       r = residual(s, x, trial_, inertia, force_scale);
       if (std::isfinite(r)) {
-        general_->solve(-flat(residual_), direction, 1e-2);
+        solve_for(1e-2, direction);
         if (direction.norm() <= (1.0 - 0.25 * share) * length) break;
       }
       if (halving == 12) return summary;

@@ -41,6 +41,11 @@ void GeneralSolver::transpose() {
   }
 }
 
+void GeneralSolver::precondition(const VectorX& b, VectorX& x) const {
+  x.setZero(b.size());
+  factor_->solve(b, x);
+}
+
 SolveSummary GeneralSolver::solve(const VectorX& b, VectorX& x, double tolerance, Side side) {
   const Eigen::Index n = b.size();
   x.setZero(n);

@@ -17,6 +17,9 @@ class GeneralSolver {
   [[nodiscard]] bool factorise(const BlockMatrix& matrix, const BlockMatrix& substitute);
   bool symmetric_part_is_definite() const { return is_definite_; }
 
+  /// x = P^-1 b with what was factorised: the matrix' symmetric part, or the substitute.
+  void precondition(const VectorX& b, VectorX& x) const;
+
   enum class Side { Plain, Transposed };
   /// @param tolerance  of |b - A x| / |b|
   /// @param x          out; 3 n
