@@ -38,49 +38,39 @@ SignedDistance teddy_distance(Box& box, double spacing) {
   });
 }
 
-/// A stepper in the middle of a motion, and a cotangent that has come back to it from a few steps later.
+/// A few successive steps in the middle of a motion.
 struct Motion {
+  static constexpr int before = 4, steps = 8;
+
   std::shared_ptr<const Body> body;
   std::unique_ptr<Stepper> stepper;
-  State start;
-  Points delta;
-  State bar;
-  Eigen::Index theta_size = 0;
+  VectorX theta;
+  std::vector<State> states;   // at the start of each step, and at the end of the last
+  std::vector<Points> deltas;  // of each step
 
-  Motion(std::shared_ptr<const Body> of, std::vector<std::unique_ptr<ForceTerm>> terms, const VectorX& theta,
+  Motion(std::shared_ptr<const Body> of, std::vector<std::unique_ptr<ForceTerm>> terms, VectorX parameters,
          const StepOptions& options, const std::vector<int>& held, const Vector3& velocity)
-      : body(std::move(of)), theta_size(theta.size()) {
+      : body(std::move(of)), theta(std::move(parameters)) {
     stepper = std::make_unique<Stepper>(body, std::move(terms), options);
     stepper->set_parameters(theta);
     stepper->hold(held);
-    std::vector<State> states = {{body->reference_positions(), Points::Zero(body->node_count(), 3)}};
-    states.front().v.rowwise() += velocity.transpose();
-    for (const int node : held) states.front().v.row(node).setZero();
-    std::vector<Points> deltas;
-    for (int s = 0; s < before + after; ++s) {
-      State next = states.back();
-      deltas.push_back(options.dt * next.v);
-      if (!stepper->prepare(next)) std::abort();
-      if (!stepper->solve(next, deltas.back()).converged) std::abort();
-      stepper->advance(deltas.back(), next);
-      states.push_back(std::move(next));
+    State state = {body->reference_positions(), Points::Zero(body->node_count(), 3)};
+    state.v.rowwise() += velocity.transpose();
+    for (const int node : held) state.v.row(node).setZero();
+    for (int s = 0; s < before + steps; ++s) {
+      if (s >= before) states.push_back(state);
+      Points delta = options.dt * state.v;
+      if (!stepper->prepare(state)) std::abort();
+      if (!stepper->solve(state, delta).converged) std::abort();
+      stepper->advance(delta, state);
+      if (s >= before) deltas.push_back(delta);
     }
-    bar = {states.back().x - body->reference_positions(), Points::Zero(body->node_count(), 3)};
-    VectorX theta_bar = VectorX::Zero(theta_size);
-    for (int s = before + after - 1; s > before; --s) {
-      if (!stepper->prepare_derivatives(states[std::size_t(s)], deltas[std::size_t(s)])) std::abort();
-      stepper->adjoint(states[std::size_t(s)], deltas[std::size_t(s)], bar, theta_bar);
-    }
-    start = states[before];
-    delta = deltas[before];
+    states.push_back(state);
   }
   void label(benchmark::State& state) const {
     state.counters["elements"] = body->element_count();
     state.counters["nodes"] = body->node_count();
   }
-
- private:
-  static constexpr int before = 4, after = 6;
 };
 
 SolverOptions iterative(double tolerance) { return {SolverKind::Iterative, tolerance, 500}; }
@@ -145,25 +135,35 @@ void forward(benchmark::State& state, MakeMotion make, Integrator integrator) {
   Motion motion = make(integrator);
   Points delta;
   int iterations = 0;
-  for (auto _ : state) {
-    delta = motion.stepper->options().dt * motion.start.v;
-    benchmark::DoNotOptimize(motion.stepper->prepare(motion.start));
-    iterations = motion.stepper->solve(motion.start, delta).iterations;
+  while (state.KeepRunningBatch(Motion::steps)) {
+    iterations = 0;
+    for (int s = 0; s < Motion::steps; ++s) {
+      const State& start = motion.states[std::size_t(s)];
+      delta = motion.stepper->options().dt * start.v;
+      benchmark::DoNotOptimize(motion.stepper->prepare(start));
+      iterations += motion.stepper->solve(start, delta).iterations;
+    }
   }
-  state.counters[integrator == Integrator::Newton ? "newton_iterations" : "iterations"] = iterations;
+  state.counters[integrator == Integrator::Newton ? "newton_iterations" : "iterations"] =
+      double(iterations) / Motion::steps;
   motion.label(state);
 }
 void forward_step(benchmark::State& state, MakeMotion make) { forward(state, make, Integrator::Lagged); }
 void newton_forward_step(benchmark::State& state, MakeMotion make) { forward(state, make, Integrator::Newton); }
 
+/// Back over the steps, for a cotangent of the positions at their end.
 void adjoint(benchmark::State& state, MakeMotion make, Integrator integrator) {
   Motion motion = make(integrator);
-  VectorX theta_bar = VectorX::Zero(motion.theta_size);
-  for (auto _ : state) {
-    State in = motion.bar;
-    benchmark::DoNotOptimize(motion.stepper->prepare_derivatives(motion.start, motion.delta));
-    motion.stepper->adjoint(motion.start, motion.delta, in, theta_bar);
-    benchmark::DoNotOptimize(in.x.data());
+  VectorX theta_bar = VectorX::Zero(motion.theta.size());
+  while (state.KeepRunningBatch(Motion::steps)) {
+    motion.stepper->set_parameters(motion.theta);
+    State bar = {motion.states.back().x - motion.body->reference_positions(),
+                 Points::Zero(motion.body->node_count(), 3)};
+    for (std::size_t s = Motion::steps; s-- > 0;) {
+      benchmark::DoNotOptimize(motion.stepper->prepare_derivatives(motion.states[s], motion.deltas[s]));
+      motion.stepper->adjoint(motion.states[s], motion.deltas[s], bar, theta_bar);
+    }
+    benchmark::DoNotOptimize(bar.x.data());
   }
   motion.label(state);
 }
@@ -179,9 +179,9 @@ void linear_solve(benchmark::State& state, MakeMotion make, SolverOptions option
   } catch (const std::invalid_argument& error) {
     return state.SkipWithError(error.what());
   }
-  if (!motion.stepper->prepare(motion.start)) std::abort();
-  VectorX b, x = VectorX::Zero(motion.delta.size());
-  motion.stepper->matrix().multiply(flat(motion.delta), b);
+  if (!motion.stepper->prepare(motion.states.front())) std::abort();
+  VectorX b, x = VectorX::Zero(motion.deltas.front().size());
+  motion.stepper->matrix().multiply(flat(motion.deltas.front()), b);
   int iterations = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(solver->factorise(motion.stepper->matrix()));
@@ -196,14 +196,14 @@ void linear_solve(benchmark::State& state, MakeMotion make, SolverOptions option
 void assembly(benchmark::State& state, MakeMotion make) {
   const Motion motion = make(Integrator::Lagged);
   const auto elasticity = make_elasticity(motion.body);
-  VectorX theta = VectorX::Zero(motion.theta_size);
+  VectorX theta = VectorX::Zero(motion.theta.size());
   theta[theta::youngs_modulus] = 1e5;
   theta[theta::poissons_ratio] = 0.35;
   elasticity->set_parameters(theta);
   BlockMatrix matrix(motion.body->pattern);
   for (auto _ : state) {
     matrix.set_zero();
-    elasticity->linearise(motion.start.x);
+    elasticity->linearise(motion.states.front().x);
     elasticity->add_matrix(1.0, matrix);
   }
   motion.label(state);

@@ -48,7 +48,8 @@ class CorotatedElasticity : public Elasticity {
   ElementModuli modulus_;
   double poissons_ratio_ = -2.0;
   LocalStiffness<N> stiffness_;
-  std::vector<Vector> reference_;  // X of the element's nodes, relative to the first
+  std::vector<Matrix3> gradients_;  // of the lag point
+  std::vector<Vector> reference_;   // X of the element's nodes, relative to the first
   std::vector<int> blocks_;
 };
 
@@ -56,6 +57,7 @@ template <int N>
 CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body)
     : body_(std::move(body)), modulus_(body_), stiffness_(body_), blocks_(element_blocks(*body_)) {
   polar_.resize(std::size_t(body_->element_count()));
+  gradients_.resize(polar_.size());
   reference_.resize(polar_.size());
   for (int e = 0; e < count(); ++e)
     for (int a = 0; a < N; ++a)
@@ -80,8 +82,9 @@ void CorotatedElasticity<N>::linearise(const Points& lag) {
     const auto g = gradients(e);
     Matrix3 F = Matrix3::Zero();
     for (int a = 0; a < N; ++a) F.noalias() += lag.row(nodes[a]).transpose() * g.row(a);
-    polar_[e] = polar_decomposition(F, polar_[e].quaternion);
+    gradients_[e] = F;
   }
+  polar_decompositions(gradients_, polar_);
 }
 
 template <int N>
