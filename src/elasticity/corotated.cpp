@@ -195,7 +195,7 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
       lag_bar.row(nodes[a]).noalias() += (F_bar * g.row(a).transpose()).transpose();
     }
     modulus_.add_log_adjoint(e, -E * c.dot(y));
-    theta_bar[theta::poissons_ratio] -= E * c.dot(stiffness_.derivative_times(e, d));
+    theta_bar[theta::poissons_ratio] -= E * stiffness_.derivative_product(e, c, d);
   }
   modulus_.end_adjoint(theta_bar);
 }

@@ -22,6 +22,10 @@ class LocalStiffness {
   Vector times(int element, const Vector& d) const { return of(element).K.lazyProduct(d); }
   /// (dK / d nu) d.
   Vector derivative_times(int element, const Vector& d) const { return of(element).dK.lazyProduct(d); }
+  /// c . (dK / d nu) d.
+  double derivative_product(int element, const Vector& c, const Vector& d) const {
+    return c.dot(derivative_times(element, d));
+  }
   /// Adds factor R K_ab R^T to the matrix's blocks.
   /// @param blocks  N x N numbers: where block (a, b) goes
   void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const;
@@ -96,6 +100,11 @@ class LocalStiffness<4> {
 
   Vector times(int element, const Vector& d) const { return times(element, d, lame_.lambda, lame_.mu); }
   Vector derivative_times(int element, const Vector& d) const { return times(element, d, lame_.d_lambda, lame_.d_mu); }
+  double derivative_product(int element, const Vector& c, const Vector& d) const {
+    const Matrix3 C = gradient(element, c), D = gradient(element, d);
+    return body_->element_volume[std::size_t(element)] *
+           (lame_.d_lambda * C.trace() * D.trace() + lame_.d_mu * C.cwiseProduct(D + D.transpose()).sum());
+  }
 
   void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const {
     const Matrix3x4 h = R * gradients(element);
@@ -124,9 +133,13 @@ class LocalStiffness<4> {
   Eigen::Map<const Matrix3x4> gradients(int element) const {
     return Eigen::Map<const Matrix3x4>(body_->mean_gradient.data() + 12 * std::size_t(element));
   }
-  Vector times(int element, const Vector& d, double lambda, double mu) const {
+  /// H = sum_b d_b g_b^T.
+  [[gnu::always_inline]] Matrix3 gradient(int element, const Vector& d) const {
+    return Eigen::Map<const Matrix3x4>(d.data()).lazyProduct(gradients(element).transpose());
+  }
+  [[gnu::always_inline]] Vector times(int element, const Vector& d, double lambda, double mu) const {
     const auto g = gradients(element);
-    const Matrix3 H = Eigen::Map<const Matrix3x4>(d.data()).lazyProduct(g.transpose());
+    const Matrix3 H = gradient(element, d);
     const double volume = body_->element_volume[std::size_t(element)];
     Matrix3 stress = (volume * mu) * (H + H.transpose());
     stress.diagonal().array() += volume * lambda * H.trace();
