@@ -11,7 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "model/base64.hpp"
+#include "base/base64.hpp"
 
 namespace pliant {
 

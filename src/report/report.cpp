@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "base/files.hpp"
-#include "model/base64.hpp"
+#include "base/base64.hpp"
 #include "report/image.hpp"
 #include "report/page_style.hpp"
 #include "report/plot.hpp"
