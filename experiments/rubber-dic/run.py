@@ -13,7 +13,9 @@ FOLDER = "rubber-3d-dic"
 THICKNESS = 0.002     # [m], not recorded: what is assumed for the body
 MODULUS, DENSITY = 1e6, 1000.0  # of no effect: nothing but displacements is given
 FITTED = [3, 6]       # frames
-END = 0.15            # share of the length at each end that is held where it was seen
+END = 0.12            # share of the length at each end that is held as it was seen
+EDGE = 0.002          # [m] next to where the body is free: there the held ends are where they were seen, though not stretched
+CLEAR = 0.005         # [m] from the held ends, about the strip's width: held, they do not contract as the strip does there
 
 
 def dot(a, b):
@@ -132,14 +134,17 @@ def write_capture(folder, frames, k):
                                      "".join("f " + " ".join(str(n + 1) for n in t) + "\n" for t in triangles))
     least, most = min(v[0] for v in vertices), max(v[0] for v in vertices)
     ends = [lambda p: p[0] < least + END * (most - least), lambda p: p[0] > most - END * (most - least)]
-    seen = [n for n in used if n in now and not any(end(rest[n]) for end in ends)]
+    inner = (least + END * (most - least), most - END * (most - least))
+    seen = [n for n in used if n in now and inner[0] + CLEAR < rest[n][0] < inner[1] - CLEAR]
     row = lambda n, p: f"{n}," + ",".join(f"{c:.9g}" for c in p)
     (folder / "rest.csv").write_text("id,x,y,z\n" + "".join(row(n, rest[n]) + "\n" for n in seen))
     (folder / "track.csv").write_text("frame,id,x,y,z\n" + "".join(f"0,{row(n, now[n])}\n" for n in seen))
     held = ""
-    for end, x, normal in zip(ends, (least + END * (most - least), most - END * (most - least)), (-1.0, 1.0)):
+    for end, x, normal in zip(ends, inner, (-1.0, 1.0)):
         names = [n for n in used if n in now and end(rest[n])]
         R, t = rigid_fit([rest[n] for n in names], [now[n] for n in names])
+        edge = [n for n in names if abs(rest[n][0] - x) < EDGE]
+        t = [dot([1.0 / len(edge)] * len(edge), [now[n][d] - dot(R[d], rest[n]) for n in edge]) for d in range(3)]
         matrix = [R[i] + [t[i]] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
         held += f"\n[[fixed]]\nhalf_space = {{ point = [{x!r}, 0.0, 0.0], normal = [{normal}, 0.0, 0.0] }}\ndisplaced_to = {matrix}\n"
     (folder / "capture.toml").write_text(f"""format = "capture/1"
