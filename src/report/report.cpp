@@ -8,8 +8,8 @@
 #include <map>
 #include <stdexcept>
 
-#include "base/files.hpp"
 #include "base/base64.hpp"
+#include "base/files.hpp"
 #include "report/image.hpp"
 #include "report/page_style.hpp"
 #include "report/plot.hpp"
