@@ -11,6 +11,7 @@
 #include "base/types.hpp"
 #include "geometry/camera.hpp"
 #include "geometry/triangle_mesh.hpp"
+#include "geometry/volume_mesh.hpp"
 
 namespace pliant {
 
@@ -121,9 +122,10 @@ struct Capture {
   std::string sha256;  ///< of capture.toml and the surface file, hexadecimal
 
   std::optional<TriangleMesh> surface;  ///< nothing: no rest scan, nothing can be fitted
-  std::filesystem::path surface_file;
-  std::optional<double> mass;     ///< [kg]
-  std::optional<double> density;  ///< [kg/m^3]
+  std::optional<VolumeMesh> volume;     ///< tetrahedra made elsewhere, whose boundary `surface` then is
+  std::filesystem::path surface_file;   ///< or the volume's
+  std::optional<double> mass;           ///< [kg]
+  std::optional<double> density;        ///< [kg/m^3]
   ShapeIs shape_is = ShapeIs::Reference;
 
   std::optional<Vector3> gravity;  ///< [m/s^2]; nothing: to be estimated

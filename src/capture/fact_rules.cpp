@@ -74,6 +74,9 @@ void complain_off_surface(RuleContext& context, const std::string& key, const Ve
                           "a point on the undeformed surface", "give it in metres, in world coordinates, at rest");
 }
 
+/// Where the shape comes from.
+const char* surface_key(const Capture& capture) { return capture.volume ? "object.volume_mesh" : "object.surface"; }
+
 }  // namespace
 
 void check_surface_is_solid(RuleContext& context) {
@@ -82,15 +85,17 @@ void check_surface_is_solid(RuleContext& context) {
   if (report.is_closed_solid) return;
   std::string wrong;
   for (const std::string& complaint : report.complaints) wrong += (wrong.empty() ? "" : "; ") + complaint;
-  context.toml.complain("object.surface", "`surface` is no solid: " + wrong, "a closed surface that faces outwards",
-                        "close holes and make orientations agree in a mesh editor");
+  context.toml.complain(
+      surface_key(context.capture),
+      (context.capture.volume ? "the boundary of `volume_mesh`" : "`surface`") + std::string(" is no solid: ") + wrong,
+      "a closed surface that faces outwards", "close holes and make orientations agree in a mesh editor");
 }
 
 void check_object_size(RuleContext& context) {
   if (!context.capture.surface) return;
   const double size = size_of(*context.capture.surface);
   if (size >= smallest_object && size <= largest_object) return;
-  context.toml.complain("object.surface", "the object is " + text_of(size, "m") + " long", "1 mm to 10 m",
+  context.toml.complain(surface_key(context.capture), "the object is " + text_of(size, "m") + " long", "1 mm to 10 m",
                         size > largest_object ? "meshes are in metres: divide by 1000 if this one is in millimetres"
                                               : "meshes are in metres: check the unit of this one");
 }

@@ -9,6 +9,7 @@
 #include "capture/hash.hpp"
 #include "capture/toml_table.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/volume_mesh.hpp"
 
 namespace pliant {
 
@@ -115,7 +116,17 @@ class Reader {
   }
 
   void read_object(TomlTable& object) {
-    if (const auto surface = optional_path(object, "surface")) read_surface(*surface);
+    const auto surface = optional_path(object, "surface"), volume = optional_path(object, "volume_mesh");
+    if (object.has("surface") && object.has("volume_mesh"))
+      context_.reject("object.volume_mesh", "both `surface` and `volume_mesh`", "one of the two",
+                      "leave out `surface`: the volume's boundary takes its place");
+    else if (surface)
+      read_file_into(*surface, "object.surface", [&] { capture_.surface = read_mesh(*surface); });
+    else if (volume)
+      read_file_into(*volume, "object.volume_mesh", [&] {
+        capture_.volume = read_volume_mesh(*volume);
+        capture_.surface = boundary_surface(*capture_.volume);
+      });
     capture_.mass = object.optional<double>("mass");
     capture_.density = object.optional<double>("density");
     const auto shape_is = object.optional<std::string>("shape_is");
@@ -126,13 +137,14 @@ class Reader {
     object.finish();
   }
 
-  void read_surface(const fs::path& path) {
+  template <class Read>
+  void read_file_into(const fs::path& path, const char* key, const Read& read) {
     capture_.surface_file = path;
     try {
-      capture_.surface = read_mesh(path);
+      read();
     } catch (const InputError& error) {
       for (const Problem& problem : error.problems()) context_.problems.push_back(problem);
-      context_.broken.insert({"object", "object.surface"});
+      context_.broken.insert({"object", key});
     }
   }
 

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "elasticity/local_stiffness.hpp"
+
 namespace pliant {
 
 namespace {
@@ -32,21 +34,11 @@ class CorotatedElasticity : public Elasticity {
   double energy(const Points& z) const override;
 
  private:
-  static constexpr int pairs = N * (N + 1) / 2;
-  static constexpr int padded_pairs = (pairs + 7) / 8 * 8;
   using Vector = Eigen::Matrix<double, 3 * N, 1>;
-  using Matrix = Eigen::Matrix<double, 3 * N, 3 * N>;
-  struct Stiffness {
-    Matrix K, dK;                                  ///< for E = 1, and derivative by Poisson's ratio
-    Eigen::Matrix<double, padded_pairs, 9> upper;  ///< entry (i, j) in column 3 i + j of the blocks a <= b, padded
-  };
   const int* nodes_of(int element) const { return body_->connectivity.data() + std::size_t(element) * N; }
   const int* blocks_of(int element) const { return blocks_.data() + std::size_t(element) * (N * N); }
   Eigen::Matrix<double, N, 3> gradients(int element) const {
     return body_->mean_gradient.middleRows<N>(Eigen::Index(element) * N);
-  }
-  const Stiffness& stiffness(int element) const {
-    return stiffness_[std::size_t(body_->element_class[std::size_t(element)])];
   }
   int count() const { return int(polar_.size()); }
   /// R^T z for the element's nodes, relative to the first.
@@ -55,16 +47,17 @@ class CorotatedElasticity : public Elasticity {
   std::shared_ptr<const Body> body_;
   ElementModuli modulus_;
   double poissons_ratio_ = -2.0;
-  std::vector<Stiffness> stiffness_;
-  std::vector<Vector> reference_;  // X of the element's nodes, relative to the first
+  LocalStiffness<N> stiffness_;
+  std::vector<Matrix3> gradients_;  // of the lag point
+  std::vector<Vector> reference_;   // X of the element's nodes, relative to the first
   std::vector<int> blocks_;
 };
 
 template <int N>
 CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body)
-    : body_(std::move(body)), modulus_(body_), blocks_(element_blocks(*body_)) {
+    : body_(std::move(body)), modulus_(body_), stiffness_(body_), blocks_(element_blocks(*body_)) {
   polar_.resize(std::size_t(body_->element_count()));
-  stiffness_.resize(body_->class_representative.size());
+  gradients_.resize(polar_.size());
   reference_.resize(polar_.size());
   for (int e = 0; e < count(); ++e)
     for (int a = 0; a < N; ++a)
@@ -79,18 +72,7 @@ void CorotatedElasticity<N>::set_parameters(const VectorX& parameters) {
   const double nu = parameters[theta::poissons_ratio];
   if (nu == poissons_ratio_) return;
   poissons_ratio_ = nu;
-  for (std::size_t c = 0; c < stiffness_.size(); ++c) {
-    const UnitStiffness<N> unit = unit_stiffness<N>(*body_, body_->class_representative[c], nu);
-    Stiffness& s = stiffness_[c];
-    s.K = unit.value;
-    s.dK = unit.d_poissons_ratio;
-    s.upper.setZero();
-    int block = 0;
-    for (int a = 0; a < N; ++a)
-      for (int b = a; b < N; ++b, ++block)
-        for (int i = 0; i < 3; ++i)
-          for (int j = 0; j < 3; ++j) s.upper(block, 3 * i + j) = s.K(3 * a + i, 3 * b + j);
-  }
+  stiffness_.set_poissons_ratio(nu);
 }
 
 template <int N>
@@ -100,8 +82,9 @@ void CorotatedElasticity<N>::linearise(const Points& lag) {
     const auto g = gradients(e);
     Matrix3 F = Matrix3::Zero();
     for (int a = 0; a < N; ++a) F.noalias() += lag.row(nodes[a]).transpose() * g.row(a);
-    polar_[e] = polar_decomposition(F, polar_[e].quaternion);
+    gradients_[e] = F;
   }
+  polar_decompositions(gradients_, polar_);
 }
 
 template <int N>
@@ -119,8 +102,7 @@ void CorotatedElasticity<N>::add_force(const Points& z, Points& force) {
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
     const Vector d = unrotated(e, z) - reference_[e];
-    Vector y;
-    y.noalias() = stiffness(e).K * d;
+    const Vector y = stiffness_.times(e, d);
     const Matrix3 R = modulus_[e] * polar_[e].R;
     for (int a = 0; a < N; ++a) force.row(nodes[a]).noalias() -= (R * node(y, a)).transpose();
   }
@@ -131,40 +113,14 @@ double CorotatedElasticity<N>::energy(const Points& z) const {
   double sum = 0.0;
   for (int e = 0; e < count(); ++e) {
     const Vector d = unrotated(e, z) - reference_[e];
-    sum += 0.5 * modulus_[e] * d.dot(stiffness(e).K * d);
+    sum += 0.5 * modulus_[e] * d.dot(stiffness_.times(e, d));
   }
   return sum;
 }
 
 template <int N>
 void CorotatedElasticity<N>::add_matrix(double scale, BlockMatrix& matrix) {
-  using Column = Eigen::Matrix<double, padded_pairs, 1>;
-  Eigen::Matrix<double, padded_pairs, 9> half, full;
-  for (int e = 0; e < count(); ++e) {
-    const Matrix3& R = polar_[e].R;
-    const Stiffness& s = stiffness(e);
-    const double factor = scale * modulus_[e];
-    for (int i = 0; i < 3; ++i)  // R K
-      for (int l = 0; l < 3; ++l)
-        half.col(3 * i + l) =
-            Column(R(i, 0) * s.upper.col(l) + R(i, 1) * s.upper.col(3 + l) + R(i, 2) * s.upper.col(6 + l)) * factor;
-    for (int i = 0; i < 3; ++i)  // (R K) R^T
-      for (int j = 0; j < 3; ++j)
-        full.col(3 * i + j) = R(j, 0) * half.col(3 * i) + R(j, 1) * half.col(3 * i + 1) + R(j, 2) * half.col(3 * i + 2);
-    const int* blocks = blocks_of(e);
-    int block = 0;
-    for (int a = 0; a < N; ++a) {
-      for (int b = a; b < N; ++b, ++block) {
-        double* upper = matrix.block(blocks[N * a + b]);
-        for (int j = 0; j < 3; ++j)
-          for (int i = 0; i < 3; ++i) upper[3 * j + i] += full(block, 3 * i + j);
-        if (a == b) continue;
-        double* lower = matrix.block(blocks[N * b + a]);
-        for (int j = 0; j < 3; ++j)
-          for (int i = 0; i < 3; ++i) lower[3 * j + i] += full(block, 3 * j + i);
-      }
-    }
-  }
+  for (int e = 0; e < count(); ++e) stiffness_.add_rotated(e, polar_[e].R, scale * modulus_[e], blocks_of(e), matrix);
 }
 
 /// A change dp turns the element by w = sum_b W_b dp_b, W_b = (tr(S) I - S)^-1 [g_b]x R^T, and the force changes by
@@ -172,13 +128,11 @@ void CorotatedElasticity<N>::add_matrix(double scale, BlockMatrix& matrix) {
 template <int N>
 void CorotatedElasticity<N>::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
   for (int e = 0; e < count(); ++e) {
-    const Stiffness& s = stiffness(e);
     const Vector q = unrotated(e, z);
-    Vector y;
-    y.noalias() = s.K * (q - reference_[e]);
+    const Vector y = stiffness_.times(e, q - reference_[e]);
     Eigen::Matrix<double, 3 * N, 3> Q, G;
     for (int a = 0; a < N; ++a) Q.template middleRows<3>(3 * a) = cross_matrix(node(q, a));
-    G.noalias() = s.K * Q;
+    for (int d = 0; d < 3; ++d) G.col(d) = stiffness_.times(e, Q.col(d));
     const Matrix3 R = polar_[e].R;
     for (int a = 0; a < N; ++a)
       G.template middleRows<3>(3 * a) =
@@ -200,7 +154,6 @@ void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_
   const double d_nu = d_theta[theta::poissons_ratio];
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
-    const Stiffness& s = stiffness(e);
     const auto g = gradients(e);
     Matrix3 dF = Matrix3::Zero();
     for (int a = 0; a < N; ++a) dF.noalias() += d_lag.row(nodes[a]).transpose() * g.row(a);
@@ -209,11 +162,10 @@ void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_
     const Vector d = q - reference_[e];
     Vector dd = unrotated(e, d_z);
     for (int a = 0; a < N; ++a) node(dd, a) -= w.cross(Vector3(node(q, a)));
-    Vector y, dy;
-    y.noalias() = s.K * d;
-    dy.noalias() = s.K * dd;
+    const Vector y = stiffness_.times(e, d);
+    Vector dy = stiffness_.times(e, dd);
     dy += modulus_.log_change(e) * y;
-    if (d_nu != 0.0) dy.noalias() += d_nu * (s.dK * d);
+    if (d_nu != 0.0) dy += d_nu * stiffness_.derivative_times(e, d);
     const Matrix3 R = modulus_[e] * polar_[e].R;
     for (int a = 0; a < N; ++a)
       force.row(nodes[a]).noalias() -= (R * (w.cross(Vector3(node(y, a))) + node(dy, a))).transpose();
@@ -226,16 +178,13 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
   modulus_.begin_adjoint();
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
-    const Stiffness& s = stiffness(e);
     const Matrix3& R = polar_[e].R;
     const double E = modulus_[e];
     const Vector q = unrotated(e, z);
     const Vector d = q - reference_[e];
     Vector c;
     for (int a = 0; a < N; ++a) node(c, a).noalias() = R.transpose() * w.row(nodes[a]).transpose();
-    Vector y, k;
-    y.noalias() = s.K * d;
-    k.noalias() = s.K * c;
+    const Vector y = stiffness_.times(e, d), k = stiffness_.times(e, c);
     Vector3 rate_bar = Vector3::Zero();
     for (int a = 0; a < N; ++a)
       rate_bar += Vector3(node(q, a)).cross(Vector3(node(k, a))) - Vector3(node(y, a)).cross(Vector3(node(c, a)));
@@ -246,7 +195,7 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
       lag_bar.row(nodes[a]).noalias() += (F_bar * g.row(a).transpose()).transpose();
     }
     modulus_.add_log_adjoint(e, -E * c.dot(y));
-    theta_bar[theta::poissons_ratio] -= E * c.dot(s.dK * d);
+    theta_bar[theta::poissons_ratio] -= E * stiffness_.derivative_product(e, c, d);
   }
   modulus_.end_adjoint(theta_bar);
 }

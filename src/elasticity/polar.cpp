@@ -2,6 +2,7 @@
 
 #include <Eigen/SVD>
 #include <cmath>
+#include <cstdint>
 
 namespace pliant {
 
@@ -54,6 +55,63 @@ void by_svd(const Matrix3& F, double scale, Polar& polar) {
   polar.rate_inverse = svd.matrixV() * inverse.asDiagonal() * svd.matrixV().transpose();
 }
 
+// ---- several at once
+
+constexpr std::size_t lanes = 8;
+typedef double Pack __attribute__((vector_size(lanes * sizeof(double))));
+typedef std::int64_t Mask __attribute__((vector_size(lanes * sizeof(double))));
+
+bool all(const Mask& mask) {
+  std::int64_t every = -1;
+  for (std::size_t l = 0; l < lanes; ++l) every &= mask[l];
+  return every != 0;
+}
+
+/// One number of each lane; matrices row by row, symmetric ones as 00 01 02 11 12 22.
+struct PackedPolar {
+  Pack w, x, y, z;  // quaternion, of length about one
+  Pack R[9], S[6], rate_inverse[6];
+  Mask converged = {};
+
+  /// The same iteration as for one, but for Cayley's map in place of the exponential, which it meets as steps shrink.
+  void newton(const Pack (&F)[9]) {
+    Pack squares = {};
+    for (const Pack& f : F) squares += f * f;
+    Mask in_basin = squares > 0.0;
+    for (int iteration = 0; iteration < 12; ++iteration) {
+      const Pack two = 2.0 / (w * w + x * x + y * y + z * z);
+      R[0] = 1.0 - two * (y * y + z * z), R[1] = two * (x * y - w * z), R[2] = two * (x * z + w * y);
+      R[3] = two * (x * y + w * z), R[4] = 1.0 - two * (x * x + z * z), R[5] = two * (y * z - w * x);
+      R[6] = two * (x * z - w * y), R[7] = two * (y * z + w * x), R[8] = 1.0 - two * (x * x + y * y);
+      const auto product = [&](int i, int j) { return R[i] * F[j] + R[3 + i] * F[3 + j] + R[6 + i] * F[6 + j]; };
+      const Pack s01 = product(0, 1), s10 = product(1, 0), s02 = product(0, 2), s20 = product(2, 0),
+                 s12 = product(1, 2), s21 = product(2, 1);
+      S[0] = product(0, 0), S[3] = product(1, 1), S[5] = product(2, 2);
+      S[1] = 0.5 * (s01 + s10), S[2] = 0.5 * (s02 + s20), S[4] = 0.5 * (s12 + s21);
+      const Pack a = S[3] + S[5], b = S[0] + S[5], c = S[0] + S[3];  // diagonal of tr(S) I - S
+      const Pack c00 = b * c - S[4] * S[4], c01 = S[2] * S[4] + S[1] * c, c02 = S[1] * S[4] + S[2] * b,
+                 c11 = a * c - S[2] * S[2], c12 = S[1] * S[2] + a * S[4], c22 = a * b - S[1] * S[1];
+      const Pack det = a * c00 - S[1] * c01 - S[2] * c02;
+      // det > 1e-9 |F|^3, without the root.
+      in_basin &= (a > 0.0) & (c22 > 0.0) & (det > 0.0) & (det * det > 1e-18 * squares * squares * squares);
+      const Pack inverse = 1.0 / det;
+      rate_inverse[0] = c00 * inverse, rate_inverse[1] = c01 * inverse, rate_inverse[2] = c02 * inverse;
+      rate_inverse[3] = c11 * inverse, rate_inverse[4] = c12 * inverse, rate_inverse[5] = c22 * inverse;
+      const Pack u = s21 - s12, v = s02 - s20, t = s10 - s01;
+      const Pack p = 0.5 * (rate_inverse[0] * u + rate_inverse[1] * v + rate_inverse[2] * t),
+                 q = 0.5 * (rate_inverse[1] * u + rate_inverse[3] * v + rate_inverse[4] * t),
+                 r = 0.5 * (rate_inverse[2] * u + rate_inverse[4] * v + rate_inverse[5] * t);
+      const Pack turned = p * p + q * q + r * r;  // a quarter of the square of the angle
+      converged = in_basin & (turned < 0.25e-30);
+      if (all(converged | ~in_basin)) return;
+      const Pack w1 = w - x * p - y * q - z * r, x1 = x + w * p + y * r - z * q, y1 = y + w * q + z * p - x * r,
+                 z1 = z + w * r + x * q - y * p;
+      const Pack shorten = 1.0 / (1.0 + 0.5 * turned);  // to a length of about one; R divides by what it is
+      w = w1 * shorten, x = x1 * shorten, y = y1 * shorten, z = z1 * shorten;
+    }
+  }
+};
+
 }  // namespace
 
 Polar polar_decomposition(const Matrix3& F, const Eigen::Quaterniond& guess) {
@@ -68,6 +126,40 @@ Polar polar_decomposition(const Matrix3& F, const Eigen::Quaterniond& guess) {
   if (!newton(F, scale, polar)) by_svd(F, scale, polar);
   polar.S = 0.5 * (polar.S + polar.S.transpose().eval());
   return polar;
+}
+
+void polar_decompositions(std::span<const Matrix3> gradients, std::span<Polar> polars) {
+  std::size_t first = 0;
+  for (; first + lanes <= polars.size(); first += lanes) {
+    PackedPolar packed;
+    Pack F[9];
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const Matrix3& gradient = gradients[first + l];
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) F[3 * i + j][l] = gradient(i, j);
+      const Eigen::Quaterniond& guess = polars[first + l].quaternion;
+      packed.w[l] = guess.w(), packed.x[l] = guess.x(), packed.y[l] = guess.y(), packed.z[l] = guess.z();
+    }
+    packed.newton(F);
+    for (std::size_t l = 0; l < lanes; ++l) {
+      Polar& polar = polars[first + l];
+      if (!packed.converged[l]) {
+        polar = polar_decomposition(gradients[first + l], polar.quaternion);
+        continue;
+      }
+      polar.quaternion = Eigen::Quaterniond(packed.w[l], packed.x[l], packed.y[l], packed.z[l]).normalized();
+      polar.is_degenerate = false;
+      static constexpr int symmetric[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+          polar.R(i, j) = packed.R[3 * i + j][l];
+          polar.S(i, j) = packed.S[symmetric[3 * i + j]][l];
+          polar.rate_inverse(i, j) = packed.rate_inverse[symmetric[3 * i + j]][l];
+        }
+    }
+  }
+  for (; first < polars.size(); ++first)
+    polars[first] = polar_decomposition(gradients[first], polars[first].quaternion);
 }
 
 Vector3 rotation_rate(const Polar& polar, const Matrix3& dF) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <span>
 
 #include "base/types.hpp"
 
@@ -21,6 +22,10 @@ struct Polar {
 /// Never throws. A non-finite F gives the identity, marked degenerate.
 [[nodiscard]] Polar polar_decomposition(const Matrix3& F,
                                         const Eigen::Quaterniond& guess = Eigen::Quaterniond::Identity());
+
+/// Those of many gradients, each from the rotation in its `polars[i].quaternion`: several at once in the processor's
+/// wide registers. Differs from the above by rounding only. Both spans have the same length.
+void polar_decompositions(std::span<const Matrix3> gradients, std::span<Polar> polars);
 
 /// w with dR = R [w]x for a change dF:  (tr(S) I - S) w = vee(R^T dF - dF^T R).
 /// Where the system is singular it is damped (`polar.is_degenerate`).

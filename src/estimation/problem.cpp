@@ -75,7 +75,11 @@ std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDis
                                          const Resolution& resolution, std::vector<Vector3>& control_points) {
   const double edge = object_size(capture) / resolution.cells;
   Body body;
-  if (resolution.element == ElementKind::Hexahedron) {
+  if (capture.volume) {
+    const VolumeMesh& volume = *capture.volume;
+    const TetMesh mesh = make_tet_mesh(volume.nodes, volume.tets, volume.mid_nodes);
+    body = make_body(resolution.element == ElementKind::QuadraticTetrahedron ? with_mid_nodes(mesh) : mesh);
+  } else if (resolution.element == ElementKind::Hexahedron) {
     body = make_body(make_hex_grid(distance, bounding_box(*capture.surface), edge));
   } else {
     TetMeshOptions options;

@@ -8,6 +8,7 @@
 #include "base/files.hpp"
 #include "capture/toml_facts.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
 
 namespace pliant {
@@ -112,6 +113,11 @@ class Reader {
     for (TomlTable& block : root.blocks("fixed")) model_.fixed.push_back(read_fixed(block, folder_));
     for (TomlTable& block : root.blocks("weight")) model_.weights.push_back(read_weight(block));
     root.finish();
+    ModelVolume& volume = model_.volume;
+    if (volume.youngs_modulus.empty()) {  // of one material
+      volume.youngs_modulus.assign(volume.fill.size(), model_.youngs_modulus);
+      volume.poisson_ratio.assign(volume.fill.size(), model_.poisson_ratio);
+    }
     return std::move(model_);
   }
 
@@ -137,7 +143,8 @@ class Reader {
   }
 
   void read_object(TomlTable& object) {
-    with_file(read_path(object, "surface", folder_), [&](const fs::path& path) { model_.surface = read_mesh(path); });
+    if (object.has("surface") || !object.has("volume_mesh"))
+      with_file(read_path(object, "surface", folder_), [&](const fs::path& path) { model_.surface = read_mesh(path); });
     if (object.has("volume_mesh"))
       with_file(read_path(object, "volume_mesh", folder_), [&](const fs::path& path) { read_volume(path); });
     model_.mass = read_number(object, "mass", {.low = 0.0, .low_allowed = false, .meaning = "the mass in kilograms"});
@@ -184,8 +191,26 @@ class Reader {
     return array->values;
   }
 
+  /// Tetrahedra that another program made, or `pliant mesh`: of one material.
+  void read_plain_volume(const fs::path& path) {
+    const VolumeMesh mesh = read_volume_mesh(path);
+    ModelVolume& volume = model_.volume;
+    volume.nodes = mesh.nodes;
+    volume.kind = mesh.mid_nodes.empty() ? VtuCell::Tetrahedron : VtuCell::QuadraticTetrahedron;
+    for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
+      volume.connectivity.insert(volume.connectivity.end(), mesh.tets[e].begin(), mesh.tets[e].end());
+      if (!mesh.mid_nodes.empty())
+        volume.connectivity.insert(volume.connectivity.end(), mesh.mid_nodes[e].begin(), mesh.mid_nodes[e].end());
+    }
+    volume.fill.assign(mesh.tets.size(), 1.0);
+    if (model_.surface.triangles.empty()) model_.surface = boundary_surface(mesh);
+  }
+
   void read_volume(const fs::path& path) {
+    if (path.extension() != ".vtu") return read_plain_volume(path);
     const VtuGrid grid = read_vtu(path);
+    const bool is_solid = grid.kind == VtuCell::Tetrahedron || grid.kind == VtuCell::QuadraticTetrahedron;
+    if (is_solid && grid.cell_data.empty()) return read_plain_volume(path);
     if (grid.kind == VtuCell::Triangle)
       throw InputError({{path}, "triangles", "hexahedra or tetrahedra", "save the model again"});
     ModelVolume& volume = model_.volume;

@@ -9,9 +9,9 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "base/base64.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "model/base64.hpp"
 
 namespace pliant {
 

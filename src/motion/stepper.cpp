@@ -31,6 +31,7 @@ void Stepper::set_parameters(const VectorX& parameters) {
   mass_damping_ = parameters[theta::mass_damping];
   stiffness_damping_ = parameters[theta::stiffness_damping];
   density_ = parameters[theta::density];
+  adjoint_solutions_ = 0;
   for (auto& term : terms_) term->set_parameters(parameters);
 }
 
@@ -319,8 +320,16 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   if (is_newton()) {
     solve_derivative(force_, w_, GeneralSolver::Side::Transposed);
   } else {
-    solution_.setZero();
+    // Successive steps' solutions lie on a smooth curve, but for what frames between them add.
+    if (adjoint_solutions_ == 0)
+      solution_.setZero();
+    else
+      solution_ = adjoint_solution_[0];
+    if (adjoint_solutions_ > 1) solution_ += adjoint_solution_[0] - adjoint_solution_[1];
     solver_->solve(flat(force_), solution_);
+    adjoint_solution_[1].swap(adjoint_solution_[0]);
+    adjoint_solution_[0] = solution_;
+    ++adjoint_solutions_;
     w_ = as_points(std::as_const(solution_));
   }
   clear_held(w_);

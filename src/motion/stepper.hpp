@@ -155,6 +155,8 @@ class Stepper {
   std::array<Points, 2> lag_, d_lag_, lag_bar_;  // by ForceTerm::Lag
   Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, trial_, step_;
   VectorX solution_;
+  std::array<VectorX, 2> adjoint_solution_;  // of the last adjoint steps with these parameters: guesses of the next
+  int adjoint_solutions_ = 0;
 };
 
 }  // namespace pliant

@@ -8,8 +8,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "base/base64.hpp"
 #include "base/files.hpp"
-#include "model/base64.hpp"
 #include "report/image.hpp"
 #include "report/page_style.hpp"
 #include "report/plot.hpp"

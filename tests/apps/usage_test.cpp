@@ -28,7 +28,7 @@ TEST(Usage, VersionIsOneLineOnStdout) {
 TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
-  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "130"})
+  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -42,7 +42,7 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
   EXPECT_THAT(run.err, IsEmpty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp, testing::Values("check", "fit", "simulate", "evaluate", "synth"),
+INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp, testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {
@@ -106,6 +106,31 @@ TEST(Usage, AnUnknownChoiceSuggestsTheNearest) {
   EXPECT_EQ(with("cells=1").exit_code, bad_input);
   EXPECT_EQ(with("cells=many").exit_code, bad_input);
   EXPECT_EQ(with("cells").exit_code, bad_input);
+}
+
+/// What it writes is read again, in metres.
+TEST(Mesh, TellsTheQualityAndBringsItIntoMetres) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("one.msh",
+                                 "$NOD\n5\n1 0 0 0\n2 10 0 0\n3 0 10 0\n4 0 0 10\n5 9 9 9\n$ENDNOD\n"
+                                 "$ELM\n1\n1 4 1 1 4 2 1 3 4\n$ENDELM\n");
+  const ProgramRun run = run_pliant({"mesh", file, "--unit", "0.001", "--quadratic", "--out", folder / "out"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  for (const char* part : {"1 quadratic tetrahedra, 10 nodes", "0.01 x 0.01 x 0.01 m", "54.7 to 90.0 degrees",
+                           "1 elements were inside out", "1 nodes belong to no tetrahedron"})
+    EXPECT_THAT(run.out, HasSubstr(part));
+  const ProgramRun again = run_pliant({"mesh", folder / "out/mesh.vtu"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("1 quadratic tetrahedra, 10 nodes"));
+  EXPECT_THAT(again.out, Not(HasSubstr("inside out")));
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/surface.ply"));
+}
+
+TEST(Mesh, RefusesWithThePlace) {
+  const TemporaryFolder folder;
+  const ProgramRun run = run_pliant({"mesh", folder.write("bad.msh", "$NOD\n1\n1 0 x 0\n$ENDNOD\n")});
+  EXPECT_EQ(run.exit_code, bad_input);
+  EXPECT_THAT(run.err, HasSubstr("bad.msh:3:5: \"x\"; expected a coordinate"));
 }
 
 }  // namespace

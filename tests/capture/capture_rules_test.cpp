@@ -156,6 +156,55 @@ TEST(CaptureRules, RefuseASurfaceThatIsOpen) {
               AllOf(HasSubstr("`surface` is no solid"), HasSubstr("has holes")));
 }
 
+/// A box of +-half, cut into six tetrahedra; `cells` of them.
+std::string box_of_tetrahedra(const std::string& half, int cells = 6) {
+  std::string text = "# vtk DataFile Version 2.0\nbox\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n";
+  for (int n = 0; n < 8; ++n)
+    for (int d = 0; d < 3; ++d) text += std::string(n >> d & 1 ? "" : "-") + half + (d < 2 ? " " : "\n");
+  text += "CELLS " + std::to_string(cells) + " " + std::to_string(5 * cells) + "\n";
+  const char* list[] = {"4 0 1 3 7\n", "4 0 3 2 7\n", "4 0 2 6 7\n", "4 0 6 4 7\n", "4 0 4 5 7\n", "4 0 5 1 7\n"};
+  for (int c = 0; c < cells; ++c) text += list[c];
+  text += "CELL_TYPES " + std::to_string(cells) + "\n";
+  for (int c = 0; c < cells; ++c) text += "10\n";
+  return text;
+}
+
+TEST(CaptureRules, TakeTetrahedraInPlaceOfASurface) {
+  SmallCapture small;
+  small.folder.write("rest.vtk", box_of_tetrahedra("0.1"));
+  small.edit("surface = \"rest.ply\"", "volume_mesh = \"rest.vtk\"");
+  const Capture capture = small.read();
+  ASSERT_TRUE(capture.volume && capture.surface);
+  EXPECT_EQ(capture.volume->tets.size(), 6u);
+  EXPECT_EQ(capture.surface->triangles.size(), 12u);
+  EXPECT_NEAR(enclosed_volume(*capture.surface), 0.008, 1e-9);  // the file has single precision
+  EXPECT_NE(capture.sha256, SmallCapture().read().sha256);
+}
+
+TEST(CaptureRules, RefuseTetrahedraThatAreNoSolid) {
+  SmallCapture small;
+  small.edit("surface = \"rest.ply\"", "volume_mesh = \"rest.vtk\"");
+  const auto complaint = [&](const std::string& content) {
+    small.folder.write("rest.vtk", content);
+    return complaint_of([&] { (void)small.read(); });
+  };
+  EXPECT_THAT(complaint(box_of_tetrahedra("100")), AllOf(HasSubstr("capture.toml:5"), HasSubstr("divide by 1000")));
+  std::string broken = box_of_tetrahedra("0.1");
+  broken.replace(broken.find("4 0 1 3 7"), 9, "4 0 1 3 8");
+  EXPECT_THAT(complaint(broken), AllOf(HasSubstr("rest.vtk:15"), HasSubstr("names point 8")));
+  // Two elements that touch along one edge.
+  std::string touching = box_of_tetrahedra("0.1", 2);
+  touching.replace(touching.find("4 0 3 2 7"), 9, "4 0 6 4 7");
+  EXPECT_THAT(complaint(touching), HasSubstr("the boundary of `volume_mesh` is no solid"));
+}
+
+TEST(CaptureRules, RefuseASurfaceBesideTetrahedra) {
+  SmallCapture small;
+  small.folder.write("rest.vtk", box_of_tetrahedra("0.1"));
+  small.edit("surface = \"rest.ply\"", "surface = \"rest.ply\"\nvolume_mesh = \"rest.vtk\"");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("both `surface` and `volume_mesh`"));
+}
+
 TEST(CaptureRules, RefuseASurfaceInMillimetres) {
   SmallCapture small;
   write_mesh(small.folder / "rest.ply", test::box_mesh(Vector3::Constant(-100), Vector3::Constant(100)));

@@ -1,5 +1,6 @@
 #include "elasticity/polar.hpp"
 
+#include <algorithm>
 #include <random>
 
 #include "support/derivatives.hpp"
@@ -65,6 +66,37 @@ TEST(Polar, DoesNotDependOnTheGuess) {
     for (int trial = 0; trial < 10; ++trial)
       EXPECT_LT((polar_decomposition(F, random_rotation(random)).R - first.R).norm(), tolerance(1e-12));
     EXPECT_LT((polar_decomposition(F, first.quaternion).R - first.R).norm(), tolerance(1e-13));
+  }
+}
+
+/// Groups of several and what is left over, with every kind of pose beside every other.
+TEST(Polar, ManyAreAsEachAlone) {
+  std::mt19937 random(8);
+  std::vector<Matrix3> gradients;
+  for (int trial = 0; trial < 5; ++trial)
+    for (const Vector3& s : stretches) gradients.push_back(with_stretches(s, random));
+  gradients.push_back(Matrix3::Zero());
+  gradients.push_back(Matrix3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  gradients.push_back(Vector3(1.0, 1.0, -1.0).asDiagonal());  // no unique rotation
+  std::ranges::shuffle(gradients, random);
+  for (const double distance : {0.0, 0.01, 0.5, 3.0}) {  // of the guess
+    std::vector<Polar> polars(gradients.size());
+    std::vector<Polar> alone;
+    for (std::size_t i = 0; i < gradients.size(); ++i) {
+      const Polar exact = polar_decomposition(gradients[i]);
+      polars[i].quaternion = exact.quaternion * Eigen::AngleAxisd(distance, Vector3(1, -2, 2).normalized());
+      alone.push_back(polar_decomposition(gradients[i], polars[i].quaternion));
+    }
+    polar_decompositions(gradients, polars);
+    for (std::size_t i = 0; i < gradients.size(); ++i) {
+      EXPECT_EQ(polars[i].is_degenerate, alone[i].is_degenerate) << gradients[i];
+      if (!gradients[i].allFinite() || alone[i].is_degenerate) continue;
+      expect_closest_rotation(gradients[i], polars[i]);
+      EXPECT_LT((polars[i].R - alone[i].R).norm(), tolerance(1e-12));
+      EXPECT_LT((polars[i].S - alone[i].S).norm(), tolerance(1e-13) * gradients[i].norm());
+      EXPECT_LT((polars[i].rate_inverse - alone[i].rate_inverse).norm(),
+                tolerance(1e-10) * alone[i].rate_inverse.norm());
+    }
   }
 }
 

@@ -68,6 +68,26 @@ TEST(Model, ComesBackAsItWasSaved) {
   EXPECT_EQ(read.volume.fill, m.volume.fill);
 }
 
+TEST(Model, TakesTetrahedraMadeElsewhereAsOfOneMaterial) {
+  const TemporaryFolder folder;
+  save_model(folder.path(), full_model());
+  std::string text = read_file(folder / "model.toml");
+  for (const auto& [from, to] :
+       {std::pair<std::string, std::string>{"surface = \"surface.ply\"", ""}, {"\"model.vtu\"", "\"made.msh\""}}) {
+    ASSERT_NE(text.find(from), std::string::npos) << from;
+    text.replace(text.find(from), from.size(), to);
+  }
+  folder.write("model.toml", text);
+  folder.write("made.msh",
+               "$NOD\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$ENDNOD\n$ELM\n1\n1 4 1 1 4 2 1 3 4\n$ENDELM\n");
+  const Model read = load_model(folder / "model.toml");
+  EXPECT_EQ(read.volume.kind, VtuCell::Tetrahedron);
+  EXPECT_EQ(read.volume.connectivity, (std::vector<int>{0, 1, 2, 3})) << "turned";
+  EXPECT_EQ(read.volume.youngs_modulus, std::vector<double>{read.youngs_modulus});
+  EXPECT_EQ(read.volume.poisson_ratio, std::vector<double>{read.poisson_ratio});
+  EXPECT_EQ(read.surface.triangles.size(), 4u);
+}
+
 TEST(Model, PlanesRegionsAndVelocitiesComeBack) {
   const TemporaryFolder folder;
   const Model m = full_model();

@@ -7,7 +7,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "model/base64.hpp"
+#include "base/base64.hpp"
 
 namespace pliant {
 namespace {

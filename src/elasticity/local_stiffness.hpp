@@ -1,0 +1,155 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "elasticity/body.hpp"
+#include "solvers/wide.hpp"
+
+namespace pliant {
+
+/// Stiffness of a body's elements of N nodes in their own, unrotated frame, for E = 1 Pa: products, and blocks turned
+/// into the world. All elements pass through here in every step, so it is kept to what they need.
+template <int N>
+class LocalStiffness {
+ public:
+  using Vector = Eigen::Matrix<double, 3 * N, 1>;
+
+  explicit LocalStiffness(std::shared_ptr<const Body> body) : body_(std::move(body)) {}
+  void set_poissons_ratio(double poissons_ratio);
+
+  /// K d, 3 N [m^2].
+  Vector times(int element, const Vector& d) const { return of(element).K.lazyProduct(d); }
+  /// (dK / d nu) d.
+  Vector derivative_times(int element, const Vector& d) const { return of(element).dK.lazyProduct(d); }
+  /// c . (dK / d nu) d.
+  double derivative_product(int element, const Vector& c, const Vector& d) const {
+    return c.dot(derivative_times(element, d));
+  }
+  /// Adds factor R K_ab R^T to the matrix's blocks.
+  /// @param blocks  N x N numbers: where block (a, b) goes
+  void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const;
+
+ private:
+  static constexpr int pairs = N * (N + 1) / 2;
+  static constexpr int padded_pairs = (pairs + 7) / 8 * 8;
+  struct Stiffness {
+    Eigen::Matrix<double, 3 * N, 3 * N> K, dK;     ///< and derivative by Poisson's ratio
+    Eigen::Matrix<double, padded_pairs, 9> upper;  ///< entry (i, j) in column 3 i + j of the blocks a <= b, padded
+  };
+  const Stiffness& of(int element) const { return classes_[std::size_t(body_->element_class[std::size_t(element)])]; }
+
+  std::shared_ptr<const Body> body_;
+  std::vector<Stiffness> classes_;
+};
+
+template <int N>
+void LocalStiffness<N>::set_poissons_ratio(double poissons_ratio) {
+  classes_.resize(body_->class_representative.size());
+  for (std::size_t c = 0; c < classes_.size(); ++c) {
+    const UnitStiffness<N> unit = unit_stiffness<N>(*body_, body_->class_representative[c], poissons_ratio);
+    Stiffness& s = classes_[c];
+    s.K = unit.value;
+    s.dK = unit.d_poissons_ratio;
+    s.upper.setZero();
+    int block = 0;
+    for (int a = 0; a < N; ++a)
+      for (int b = a; b < N; ++b, ++block)
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j) s.upper(block, 3 * i + j) = s.K(3 * a + i, 3 * b + j);
+  }
+}
+
+template <int N>
+void LocalStiffness<N>::add_rotated(int element, const Matrix3& R, double factor, const int* blocks,
+                                    BlockMatrix& matrix) const {
+  using Column = Eigen::Matrix<double, padded_pairs, 1>;
+  Eigen::Matrix<double, padded_pairs, 9> half, full;
+  const auto& upper = of(element).upper;
+  for (int i = 0; i < 3; ++i)  // R K
+    for (int l = 0; l < 3; ++l)
+      half.col(3 * i + l) =
+          Column(R(i, 0) * upper.col(l) + R(i, 1) * upper.col(3 + l) + R(i, 2) * upper.col(6 + l)) * factor;
+  for (int i = 0; i < 3; ++i)  // (R K) R^T
+    for (int j = 0; j < 3; ++j)
+      full.col(3 * i + j) = R(j, 0) * half.col(3 * i) + R(j, 1) * half.col(3 * i + 1) + R(j, 2) * half.col(3 * i + 2);
+  int block = 0;
+  for (int a = 0; a < N; ++a) {
+    for (int b = a; b < N; ++b, ++block) {
+      double* above = matrix.block(blocks[N * a + b]);
+      for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 3; ++i) above[3 * j + i] += full(block, 3 * i + j);
+      if (a == b) continue;
+      double* below = matrix.block(blocks[N * b + a]);
+      for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 3; ++i) below[3 * j + i] += full(block, 3 * j + i);
+    }
+  }
+}
+
+/// Linear tetrahedra have one strain each, so that K follows from the volume and the gradients,
+///   K_ab = V (lambda g_a g_b^T + mu g_b g_a^T + mu (g_a . g_b) I),  K d = V (lambda tr(H) I + mu (H + H^T)) g
+/// with H = sum_b d_b g_b^T: a tenth of the memory of K itself, which would have to come from beyond the cache.
+template <>
+class LocalStiffness<4> {
+ public:
+  using Vector = Eigen::Matrix<double, 12, 1>;
+
+  explicit LocalStiffness(std::shared_ptr<const Body> body) : body_(std::move(body)) {}
+  void set_poissons_ratio(double poissons_ratio) { lame_ = unit_lame(poissons_ratio); }
+
+  Vector times(int element, const Vector& d) const { return times(element, d, lame_.lambda, lame_.mu); }
+  Vector derivative_times(int element, const Vector& d) const { return times(element, d, lame_.d_lambda, lame_.d_mu); }
+  double derivative_product(int element, const Vector& c, const Vector& d) const {
+    const Matrix3 C = gradient(element, c), D = gradient(element, d);
+    return body_->element_volume[std::size_t(element)] *
+           (lame_.d_lambda * C.trace() * D.trace() + lame_.d_mu * C.cwiseProduct(D + D.transpose()).sum());
+  }
+
+  void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const {
+    const Matrix3x4 h = R * gradients(element);
+    const double volume = factor * body_->element_volume[std::size_t(element)];
+    const double lambda = volume * lame_.lambda, mu = volume * lame_.mu;
+    Wide<double> wide[4];
+    for (int a = 0; a < 4; ++a) wide[a] = Wide<double>{h(0, a), h(1, a), h(2, a), 0.0};
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b) {
+        const double diagonal = mu * h.col(a).dot(h.col(b));
+        const Wide<double> by_lambda = lambda * wide[a], by_mu = mu * wide[b];
+        double* block = matrix.block(blocks[4 * a + b]);
+        // The fourth lane is the next column's first entry, which stays what it is: load all before storing any.
+        const Wide<double> c0 = load_wide(block) + by_lambda * h(0, b) + by_mu * h(0, a),
+                           c1 = load_wide(block + 3) + by_lambda * h(1, b) + by_mu * h(1, a),
+                           c2 = load_wide(block + 6) + by_lambda * h(2, b) + by_mu * h(2, a);
+        store_wide(block, c0 + Wide<double>{diagonal, 0.0, 0.0, 0.0});
+        store_wide(block + 3, c1 + Wide<double>{0.0, diagonal, 0.0, 0.0});
+        store_wide(block + 6, c2 + Wide<double>{0.0, 0.0, diagonal, 0.0});
+      }
+  }
+
+ private:
+  using Matrix3x4 = Eigen::Matrix<double, 3, 4>;
+  /// g_a in column a.
+  Eigen::Map<const Matrix3x4> gradients(int element) const {
+    return Eigen::Map<const Matrix3x4>(body_->mean_gradient.data() + 12 * std::size_t(element));
+  }
+  /// H = sum_b d_b g_b^T.
+  [[gnu::always_inline]] Matrix3 gradient(int element, const Vector& d) const {
+    return Eigen::Map<const Matrix3x4>(d.data()).lazyProduct(gradients(element).transpose());
+  }
+  [[gnu::always_inline]] Vector times(int element, const Vector& d, double lambda, double mu) const {
+    const auto g = gradients(element);
+    const Matrix3 H = gradient(element, d);
+    const double volume = body_->element_volume[std::size_t(element)];
+    Matrix3 stress = (volume * mu) * (H + H.transpose());
+    stress.diagonal().array() += volume * lambda * H.trace();
+    Vector force;
+    Eigen::Map<Matrix3x4>(force.data()).noalias() = stress.lazyProduct(g);
+    return force;
+  }
+
+  std::shared_ptr<const Body> body_;
+  UnitLame lame_;
+};
+
+}  // namespace pliant

@@ -1,0 +1,347 @@
+// VTK's unstructured grids: legacy files, text or binary, and XML files with inline arrays.
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <pugixml.hpp>
+
+#include "base/base64.hpp"
+#include "base/files.hpp"
+#include "geometry/raw_cells.hpp"
+#include "geometry/text_tokens.hpp"
+
+namespace pliant {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+static_assert(std::endian::native == std::endian::little);
+
+/// Numbers of a type by VTK's names, legacy or XML, widened to double. Nothing where the type is unknown.
+std::optional<std::size_t> size_of_type(const std::string& type) {
+  static const std::map<std::string, std::size_t> sizes = {{"Float64", 8}, {"Float32", 4}, {"Int64", 8}, {"UInt64", 8},
+                                                           {"Int32", 4},   {"UInt32", 4},  {"Int16", 2}, {"UInt16", 2},
+                                                           {"Int8", 1},    {"UInt8", 1}};
+  const auto found = sizes.find(type);
+  return found == sizes.end() ? std::nullopt : std::optional(found->second);
+}
+
+template <class T>
+double value_at(const char* bytes, bool big_endian) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, bytes, sizeof(T));
+  if (big_endian) std::reverse(raw, raw + sizeof(T));
+  T value;
+  std::memcpy(&value, raw, sizeof(T));
+  return double(value);
+}
+
+std::vector<double> values_of(std::string_view bytes, const std::string& type, bool big_endian) {
+  static const std::map<std::string, double (*)(const char*, bool)> readers = {
+      {"Float64", value_at<double>},       {"Float32", value_at<float>},        {"Int64", value_at<std::int64_t>},
+      {"UInt64", value_at<std::uint64_t>}, {"Int32", value_at<std::int32_t>},   {"UInt32", value_at<std::uint32_t>},
+      {"Int16", value_at<std::int16_t>},   {"UInt16", value_at<std::uint16_t>}, {"Int8", value_at<std::int8_t>},
+      {"UInt8", value_at<std::uint8_t>}};
+  const auto read = readers.at(type);
+  const std::size_t size = *size_of_type(type);
+  std::vector<double> values;
+  for (std::size_t i = 0; i + size <= bytes.size(); i += size) values.push_back(read(bytes.data() + i, big_endian));
+  return values;
+}
+
+/// Values with the line that each came from; 0 where there are no lines.
+struct Values {
+  std::vector<double> of;
+  std::vector<int> lines;
+  int line(std::size_t i) const { return lines.empty() ? 0 : lines[i]; }
+};
+
+/// Points and cells from what both formats give: the cells' ends in the connectivity, and their types.
+class Assembler {
+ public:
+  explicit Assembler(fs::path path) : path_(std::move(path)) {}
+
+  RawCells cells;
+
+  void add_points(const Values& values) {
+    for (std::size_t i = 0; i + 2 < values.of.size(); i += 3) {
+      cells.nodes.emplace_back(values.of[i], values.of[i + 1], values.of[i + 2]);
+      cells.node_lines.push_back(values.line(i));
+      if (!cells.nodes.back().allFinite())
+        throw InputError({{path_, values.line(i), 0},
+                          "point " + std::to_string(i / 3) + " is not finite",
+                          "three finite numbers",
+                          "export the mesh again"});
+    }
+  }
+  void add_cell(std::size_t number, double type, const Values& connectivity, std::size_t begin, std::size_t end) {
+    const Place place{path_, begin < end ? connectivity.line(begin) : 0, 0};
+    const VtkKind kind = vtk_kind(type == std::floor(type) ? int(type) : -1, place);
+    const std::string label = "cell " + std::to_string(number);
+    if (kind.nodes > 0 && end - begin != std::size_t(kind.nodes))
+      throw InputError({place, label + ", a " + kind.name + ", has " + std::to_string(end - begin) + " points",
+                        std::to_string(kind.nodes), "export the mesh again"});
+    RawCells::Cell cell{kind.kind, kind.name, place.line, {}};
+    for (std::size_t i = begin; i < end; ++i) {
+      const double point = connectivity.of[i];
+      if (!(point >= 0.0 && point < double(cells.nodes.size()) && point == std::floor(point)))
+        throw InputError({{path_, connectivity.line(i), 0},
+                          label + " names point " + std::to_string((long long)(point)),
+                          "0 to " + std::to_string((long long)(cells.nodes.size()) - 1),
+                          "export the mesh again"});
+      cell.nodes.push_back(int(point));
+    }
+    reorder_from_vtk(cell);
+    cells.cells.push_back(std::move(cell));
+  }
+
+ private:
+  fs::path path_;
+};
+
+class LegacyReader {
+ public:
+  LegacyReader(const std::string& content, const fs::path& path) : text_(content, path), path_(path), result_(path) {}
+
+  RawCells read() {
+    const std::string heading(text_.rest_of_line());
+    if (!heading.starts_with("# vtk DataFile Version "))
+      throw InputError({{path_, 1, 1},
+                        "\"" + heading.substr(0, 40) + "\"",
+                        "\"# vtk DataFile Version ...\"",
+                        "check that this is a legacy VTK file"});
+    has_offsets_ = heading.size() > 23 && heading[23] >= '5';
+    text_.rest_of_line();  // a title
+    const std::string coding(text_.word("ASCII or BINARY"));
+    if (coding != "ASCII" && coding != "BINARY") text_.fail_word(coding, "ASCII or BINARY");
+    is_binary_ = coding == "BINARY";
+    if (const auto word = text_.word("DATASET"); word != "DATASET") text_.fail_word(word, "DATASET");
+    if (const auto word = text_.word("UNSTRUCTURED_GRID"); word != "UNSTRUCTURED_GRID")
+      text_.fail_word(word, "UNSTRUCTURED_GRID: the cells of a volume");
+    while (types_.empty() || ends_.empty()) read_part();
+    if (types_.size() != ends_.size())
+      throw InputError({{path_},
+                        std::to_string(types_.size()) + " cell types of " + std::to_string(ends_.size()) + " cells",
+                        "one a cell",
+                        "export the mesh again"});
+    for (std::size_t c = 0; c < ends_.size(); ++c)
+      result_.add_cell(c, types_[c], connectivity_, ends_[c].first, ends_[c].second);
+    return std::move(result_.cells);
+  }
+
+ private:
+  void read_part() {
+    const std::string part(text_.word("POINTS, CELLS and CELL_TYPES"));
+    if (part == "METADATA") {  // as far as the next empty line
+      text_.rest_of_line();
+      while (text_.rest_of_line().find_first_not_of(" \r\t") != std::string_view::npos) {
+      }
+    } else if (part == "POINTS") {
+      const std::size_t count = text_.count("the number of points");
+      const std::string type = xml_type(std::string(text_.word("the points' type")));
+      result_.add_points(values(3 * count, type, "the points"));
+    } else if (part == "CELLS") {
+      const std::size_t count = text_.count("the number of cells"), size = text_.count("the size of the list of cells");
+      has_offsets_ ? read_offsets(count, size) : read_cells(count, size);
+      if (ends_.empty()) text_.fail_at("no cells", "tetrahedra");
+    } else if (part == "CELL_TYPES") {
+      types_ = values(text_.count("the number of cells"), "Int32", "the cells' types").of;
+      if (types_.empty()) text_.fail_at("no cells", "tetrahedra");
+    } else {
+      text_.fail_word(part, "POINTS, CELLS or CELL_TYPES");
+    }
+  }
+  void read_cells(std::size_t count, std::size_t size) {
+    connectivity_ = values(size, "Int32", "the cells");
+    std::size_t at = 0;
+    for (std::size_t c = 0; c < count; ++c) {
+      if (at >= size || !(connectivity_.of[at] >= 0.0 && double(at) + connectivity_.of[at] < double(size)))
+        throw InputError({{path_, connectivity_.line(std::min(at, size - 1)), 0},
+                          "cell " + std::to_string(c) + " runs over the end of the list of cells",
+                          "a list of " + std::to_string(size) + " numbers for " + std::to_string(count) + " cells",
+                          "export the mesh again"});
+      const auto nodes = std::size_t(connectivity_.of[at]);
+      ends_.emplace_back(at + 1, at + 1 + nodes);
+      at += 1 + nodes;
+    }
+  }
+  /// Version 5: one more offset than cells.
+  void read_offsets(std::size_t count, std::size_t size) {
+    const auto list = [&](const char* name, std::size_t length) {
+      if (const auto word = text_.word(name); word != name) text_.fail_word(word, name);
+      const std::string type = xml_type(std::string(text_.word("the numbers' type")));
+      return values(length, type, name);
+    };
+    const Values offsets = list("OFFSETS", count);
+    connectivity_ = list("CONNECTIVITY", size);
+    for (std::size_t c = 0; c + 1 < offsets.of.size(); ++c) {
+      if (!(offsets.of[c] >= 0.0 && offsets.of[c] <= offsets.of[c + 1] && offsets.of[c + 1] <= double(size)))
+        throw InputError({{path_, offsets.line(c), 0},
+                          "offsets of cell " + std::to_string(c) + " that do not ascend",
+                          "offsets from 0 to " + std::to_string(size),
+                          "export the mesh again"});
+      ends_.emplace_back(std::size_t(offsets.of[c]), std::size_t(offsets.of[c + 1]));
+    }
+  }
+  std::string xml_type(const std::string& legacy) {
+    static const std::map<std::string, std::string> names = {
+        {"double", "Float64"}, {"float", "Float32"},        {"int", "Int32"},          {"unsigned_int", "UInt32"},
+        {"long", "Int64"},     {"unsigned_long", "UInt64"}, {"vtktypeint64", "Int64"}, {"vtktypeint32", "Int32"}};
+    const auto found = names.find(legacy);
+    if (found == names.end()) text_.fail_word(legacy, "a type like float or double");
+    return found->second;
+  }
+  Values values(std::size_t count, const std::string& type, const char* what) {
+    Values values;
+    if (is_binary_) {
+      text_.rest_of_line();
+      values.of = values_of(text_.bytes(count * *size_of_type(type), what), type, true);
+      return values;
+    }
+    const std::string expected = "a number of " + std::string(what);
+    for (std::size_t i = 0; i < count; ++i) {
+      values.of.push_back(text_.number<double>(expected.c_str()));
+      values.lines.push_back(text_.place().line);
+    }
+    return values;
+  }
+
+  TextTokens text_;
+  fs::path path_;
+  bool is_binary_ = false, has_offsets_ = false;
+  Assembler result_;
+  Values connectivity_;
+  std::vector<std::pair<std::size_t, std::size_t>> ends_;  // of each cell in the connectivity
+  std::vector<double> types_;
+};
+
+class XmlReader {
+ public:
+  XmlReader(const std::string& content, const fs::path& path) : content_(content), path_(path), result_(path) {}
+
+  RawCells read() {
+    pugi::xml_document document;
+    const pugi::xml_parse_result parsed = document.load_buffer(content_.data(), content_.size());
+    if (!parsed) fail(line_at(parsed.offset), std::string("broken XML (") + parsed.description() + ")", "a whole file");
+    const pugi::xml_node root = document.child("VTKFile");
+    if (std::string(root.attribute("type").value()) != "UnstructuredGrid")
+      fail(1, "no VTK file of type UnstructuredGrid", "the cells of a volume");
+    if (root.attribute("compressor")) fail(line_of(root), "compressed arrays", "arrays without compression");
+    big_endian_ = std::string(root.attribute("byte_order").value()) == "BigEndian";
+    wide_header_ = std::string(root.attribute("header_type").value()) == "UInt64";
+    const pugi::xml_node grid = root.child("UnstructuredGrid"), piece = grid.child("Piece");
+    if (!piece || piece.next_sibling("Piece")) fail(line_of(grid), "no piece, or several", "one <Piece>");
+
+    const std::size_t points = count(piece, "NumberOfPoints"), cells = count(piece, "NumberOfCells");
+    result_.add_points(array(piece.child("Points").child("DataArray"), 3 * points, "points"));
+    const Values offsets = cell_array(piece, "offsets", cells), types = cell_array(piece, "types", cells);
+    double last = 0.0;
+    for (std::size_t c = 0; c < cells; ++c) {
+      if (!(offsets.of[c] >= last && offsets.of[c] < 2e9))
+        fail(offsets.line(c), "the offset of cell " + std::to_string(c) + " is below the one before", "ascending ones");
+      last = offsets.of[c];
+    }
+    const Values connectivity = cell_array(piece, "connectivity", std::size_t(last));
+    for (std::size_t c = 0; c < cells; ++c)
+      result_.add_cell(c, types.of[c], connectivity, c == 0 ? 0 : std::size_t(offsets.of[c - 1]),
+                       std::size_t(offsets.of[c]));
+    return std::move(result_.cells);
+  }
+
+ private:
+  int line_at(std::ptrdiff_t offset) const {
+    const auto end = content_.begin() + std::clamp<std::ptrdiff_t>(offset, 0, std::ptrdiff_t(content_.size()));
+    return 1 + int(std::count(content_.begin(), end, '\n'));
+  }
+  int line_of(pugi::xml_node node) const { return line_at(node.offset_debug()); }
+  [[noreturn]] void fail(int line, const std::string& found, const std::string& expected) const {
+    throw InputError({{path_, line, 0}, found, expected, "export the mesh again, in ASCII or inline binary"});
+  }
+  std::size_t count(pugi::xml_node piece, const char* name) const {
+    const long long value = piece.attribute(name).as_llong(-1);
+    if (value < 0 || std::size_t(value) > content_.size())
+      fail(line_of(piece), std::string("no sensible ") + name, "a count that the file can hold");
+    return std::size_t(value);
+  }
+  Values cell_array(pugi::xml_node piece, const char* name, std::size_t length) const {
+    return array(piece.child("Cells").find_child_by_attribute("DataArray", "Name", name), length, name);
+  }
+  Values array(pugi::xml_node node, std::size_t length, const std::string& name) const {
+    if (!node) fail(0, "there is no array of " + name, "points, connectivity, offsets and types");
+    const std::string format = node.attribute("format").value(), type = node.attribute("type").value();
+    const int line = line_of(node);
+    if (!size_of_type(type)) fail(line, "an array of type \"" + type + "\"", "numbers");
+    Values values;
+    if (format == "ascii") {
+      const pugi::xml_node text = node.first_child();
+      TextTokens tokens(text.value(), path_, line_of(text ? text : node));
+      while (!tokens.at_end()) {
+        values.of.push_back(tokens.number<double>(("a number of " + name).c_str()));
+        values.lines.push_back(tokens.place().line);
+      }
+    } else if (format == "binary") {
+      const std::optional<std::string> bytes = decode_base64(node.text().get());
+      const std::size_t header = wide_header_ ? 8 : 4;
+      if (!bytes || bytes->size() < header) fail(line, "an array of " + name + " that is not base64", "base64");
+      values.of = values_of(std::string_view(*bytes).substr(header), type, big_endian_);
+    } else {
+      fail(line, "an array in the encoding \"" + format + "\"", "\"ascii\" or \"binary\"");
+    }
+    if (values.of.size() != length)
+      fail(line, std::to_string(values.of.size()) + " numbers in the array of " + name, std::to_string(length));
+    return values;
+  }
+
+  const std::string& content_;
+  fs::path path_;
+  bool big_endian_ = false, wide_header_ = false;
+  Assembler result_;
+};
+
+}  // namespace
+
+VtkKind vtk_kind(int type, const Place& place) {
+  static const std::map<int, VtkKind> kinds = {{1, {RawCell::Flat, 1, "vertex"}},
+                                               {2, {RawCell::Flat, 0, "poly-vertex"}},
+                                               {3, {RawCell::Flat, 2, "line"}},
+                                               {4, {RawCell::Flat, 0, "poly-line"}},
+                                               {5, {RawCell::Flat, 3, "triangle"}},
+                                               {6, {RawCell::Flat, 0, "triangle strip"}},
+                                               {7, {RawCell::Flat, 0, "polygon"}},
+                                               {8, {RawCell::Flat, 4, "pixel"}},
+                                               {9, {RawCell::Flat, 4, "quadrangle"}},
+                                               {10, {RawCell::Tetrahedron, 4, "tetrahedron"}},
+                                               {11, {RawCell::OtherSolid, 8, "voxel"}},
+                                               {12, {RawCell::OtherSolid, 8, "hexahedron"}},
+                                               {13, {RawCell::OtherSolid, 6, "wedge"}},
+                                               {14, {RawCell::OtherSolid, 5, "pyramid"}},
+                                               {21, {RawCell::Flat, 3, "quadratic edge"}},
+                                               {22, {RawCell::Flat, 6, "quadratic triangle"}},
+                                               {23, {RawCell::Flat, 8, "quadratic quadrangle"}},
+                                               {24, {RawCell::QuadraticTetrahedron, 10, "quadratic tetrahedron"}}};
+  const auto found = kinds.find(type);
+  if (found == kinds.end())
+    throw InputError({place, "a cell of VTK's type " + std::to_string(type), "tetrahedra (10 or, quadratic, 24)",
+                      "export the mesh as tetrahedra"});
+  return found->second;
+}
+
+void reorder_from_vtk(RawCells::Cell& cell) {
+  if (cell.kind != RawCell::QuadraticTetrahedron) return;
+  const int m12 = cell.nodes[5], m02 = cell.nodes[6], m03 = cell.nodes[7];
+  cell.nodes[5] = m02, cell.nodes[6] = m03, cell.nodes[7] = m12;
+}
+
+RawCells read_legacy_vtk(const fs::path& path) {
+  const std::string content = read_file(path);
+  return LegacyReader(content, path).read();
+}
+
+RawCells read_xml_vtk(const fs::path& path) {
+  const std::string content = read_file(path);
+  return XmlReader(content, path).read();
+}
+
+}  // namespace pliant
