@@ -7,17 +7,26 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <mutex>
 #include <numeric>
 #include <tuple>
 
 #include "base/error.hpp"
 #include "capture/find_plane.hpp"
+#include "estimation/modal_start.hpp"
 #include "estimation/notes.hpp"
+#include "estimation/swing.hpp"
 
 namespace pliant {
 
 namespace {
+
+std::string text_of(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -129,6 +138,7 @@ class Fit {
       recordings_.emplace_back();
       sets.push_back(make_ready(std::move(r), recordings_.back()));
     }
+    relative_moduli_.setOnes(controls_);
     parameters_ = joined(sets);
     apply_overrides(parameters_, options_);
     int offset = 0;
@@ -146,7 +156,7 @@ class Fit {
     if (!options_.parameters.contains("youngs_modulus") || !options_.parameters.at("youngs_modulus").start)
       scanned_ = true;
     estimate_initial_motion();
-    if (scanned_) scan();
+    if (scanned_ && !start_from_swing()) scan();
     follow_starts();
     refine();
     return std::move(outcome_);
@@ -292,7 +302,8 @@ class Fit {
   void set_all_moduli(VectorX& theta, double youngs_modulus) const {
     for (const Recording& r : recordings_) {
       VectorX own = r.own(theta);
-      set_moduli(own, controls_, youngs_modulus);
+      for (int k = 0; k < controls_; ++k)
+        own[theta::modulus(k, controls_, own.size())] = youngs_modulus * relative_moduli_[k];
       theta.segment(r.theta_offset, r.theta_size) = own;
     }
   }
@@ -387,6 +398,84 @@ class Fit {
     }
   }
 
+  /// The modulus whose vibrations are as fast as those that were seen (Wang 2015, section 6.3), if some were: by points
+  /// that were followed, else by the middle of those that were not. False where the scan has to look for it.
+  bool start_from_swing() {
+    if (state_.scan.empty()) {
+      if (interrupted() || !find_swing()) return false;
+      // The pose before a release was found for another stiffness, which sags otherwise: look for it anew.
+      VectorX theta = parameters_.reference();
+      for (const Parameter& p : parameters_.parameters())
+        if (p.estimated && p.name.starts_with("pull@")) theta.segment<3>(p.theta_index) = p.scale * p.prior_mean;
+      set_reference(theta);
+      state_.motion.reset();
+      estimate_initial_motion();
+      if (interrupted()) return false;
+      state_.scan = {{parameters_.reference()[theta::youngs_modulus], 0.0}};
+      state_.motion = parameters_.reference();
+      save_state();
+    }
+    if (state_.scan.size() != 1) return false;
+    const VectorX own = recordings_.front().own(parameters_.reference());
+    for (int k = 0; k < controls_; ++k)
+      relative_moduli_[k] = own[theta::modulus(k, controls_, own.size())] / own[theta::youngs_modulus];
+    start_moduli_ = {own[theta::youngs_modulus]};
+    set_all_moduli(outcome_.start_theta, start_moduli_.front());
+    return true;
+  }
+
+  /// Takes over moduli and, where they show, dampings.
+  bool find_swing() {
+    for (const Recording& r : recordings_) {
+      if (r.capture.is_static || r.capture.fixed.empty()) continue;
+      const Discretisation& d = r.coarse;
+      const std::vector<int> held = held_nodes(*d.body, d.simulation.holds);
+      if (held.size() < 3) continue;
+      VectorX theta = parameters_.reference();
+      const auto say = [&](const char* what, double modulus) {
+        outcome_.notes.push_back(std::string(what) + text_of(modulus) + " Pa; the fit started there.");
+      };
+      if (!r.tracked.rest.empty()) {
+        ModalStartOptions o;
+        o.first_frame = r.capture.start_frame;
+        o.curve_samples = 0;
+        const ModalStart start = modal_start(d.body, r.own(theta), held, r.tracked, r.capture.times, o);
+        if (!start.found) continue;
+        take_dampings(start);
+        relative_moduli_ = start.moduli / start.moduli[0];
+        theta = parameters_.reference();
+        set_all_moduli(theta, start.moduli[0]);
+        set_reference(theta);
+        say("The vibrations of the followed points are those of a Young's modulus of about ", start.moduli[0]);
+        return true;
+      }
+      Simulation simulation(d.body, d.simulation);
+      const auto start = swing_start(simulation, r.own(theta), controls_, *r.observations);
+      if (!start) continue;
+      set_all_moduli(theta, start->youngs_modulus);
+      set_reference(theta);
+      say(("The object swings at " + text_of(start->frequency) + " Hz, as with a Young's modulus of about ").c_str(),
+          start->youngs_modulus);
+      return true;
+    }
+    return false;
+  }
+
+  /// Dampings that the user has not given begin where the decay of the vibrations has them.
+  void take_dampings(const ModalStart& start) {
+    VectorX theta = parameters_.reference();
+    const auto take = [&](const char* name, double value) {
+      const auto change = options_.parameters.find(name);
+      const Parameter* p = parameters_.find(name);
+      if (value <= 0.0 || !p->estimated || (change != options_.parameters.end() && change->second.start)) return;
+      theta[p->theta_index] = std::clamp(value, p->lower, p->upper);
+      for (const int other : p->also) theta[other] = theta[p->theta_index];
+    };
+    take("mass_damping", start.mass_damping);
+    take("stiffness_damping", start.stiffness_damping);
+    set_reference(theta);
+  }
+
   /// Young's modulus over decades of the stress under the object's own weight.
   void scan() {
     const VectorX theta = parameters_.reference();
@@ -441,11 +530,10 @@ class Fit {
       start_moduli_.push_back(state_.scan[std::size_t(i)].first);
     }
     if (start_moduli_.empty())
-      throw InputError(
-          {{recordings_.front().capture.file},
-           "no stiffness between " + std::to_string(stress) + " Pa and ten thousand times that can be simulated",
-           "",
-           "check mass, gravity and the size of the scan"});
+      throw InputError({{recordings_.front().capture.file},
+                        "no stiffness between " + text_of(stress) + " Pa and ten thousand times that can be simulated",
+                        "",
+                        "check mass, gravity and the size of the scan"});
     set_all_moduli(outcome_.start_theta, start_moduli_.front());
   }
 
@@ -618,7 +706,8 @@ class Fit {
   ParameterSet parameters_;
   bool scanned_ = false;
   std::vector<double> start_moduli_;
-  int controls_ = 1;  // moduli of the object
+  int controls_ = 1;         // moduli of the object
+  VectorX relative_moduli_;  // of the scan and the starts, the first one's being one
   std::mutex mutex_;
 };
 

@@ -67,9 +67,10 @@ struct FitStart {
 
 /// Where a fit stands, to go on after an interruption.
 struct FitState {
-  std::vector<std::pair<double, double>> scan;  ///< Young's modulus and cost; infinite where it cannot be simulated
-  std::optional<VectorX> motion;                ///< theta after the first stage
-  std::vector<FitStart> starts;                 ///< those that are done
+  /// Young's modulus and cost; infinite where it cannot be simulated. One alone: that of the swing that was seen.
+  std::vector<std::pair<double, double>> scan;
+  std::optional<VectorX> motion;  ///< theta after the first stage
+  std::vector<FitStart> starts;   ///< those that are done
   /// The stage on the full grid that was under way.
   struct Fine {
     int stage = 0;             ///< of those on the full grid

@@ -155,7 +155,7 @@ TEST(FitState, RoundTripsToTheLastBit) {
   EXPECT_EQ(read.scan, written.scan);
   EXPECT_EQ(*read.motion, *written.motion);
   ASSERT_TRUE(read.fine.has_value());
-  EXPECT_EQ(read.fine->band, 1);
+  EXPECT_EQ(read.fine->stage, 1);
   EXPECT_EQ(read.fine->reference, written.fine->reference);
   EXPECT_EQ(read.fine->optimiser.iterations, 4);
   EXPECT_EQ(read.fine->optimiser.p, written.fine->optimiser.p);

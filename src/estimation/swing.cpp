@@ -1,0 +1,103 @@
+#include "estimation/swing.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimation/tone.hpp"
+
+namespace pliant {
+
+namespace {
+
+/// Coordinate by coordinate the median: outliers hardly move it.
+Vector3 middle(const Points& points) {
+  Vector3 m;
+  std::vector<double> values(std::size_t(points.rows()));
+  for (int d = 0; d < 3; ++d) {
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = points(Eigen::Index(i), d);
+    const auto half = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), half, values.end());
+    m[d] = *half;
+  }
+  return m;
+}
+
+/// A point's path.
+struct Path {
+  std::vector<double> times;  // [s]
+  std::vector<Vector3> points;
+
+  VectorX along(const Vector3& direction) const {
+    VectorX signal(Eigen::Index(points.size()));
+    for (std::size_t i = 0; i < points.size(); ++i) signal[Eigen::Index(i)] = points[i].dot(direction);
+    return signal;
+  }
+  /// Along which it goes farthest.
+  Vector3 direction() const {
+    Points centred(Eigen::Index(points.size()), 3);
+    for (std::size_t i = 0; i < points.size(); ++i) centred.row(Eigen::Index(i)) = points[i].transpose();
+    centred.rowwise() -= centred.colwise().mean().eval();
+    const Matrix3 spread = centred.transpose() * centred;
+    return Eigen::SelfAdjointEigenSolver<Matrix3>(spread).eigenvectors().col(2);
+  }
+};
+
+std::optional<double> swing_of(const Path& path, const Vector3& direction) {
+  if (path.times.size() < 8) return std::nullopt;
+  const auto tone = strongest_tone(path.times, path.along(direction), resolvable_band(path.times));
+  if (!tone || !doubts(*tone, path.times.size()).empty()) return std::nullopt;
+  return tone->natural();
+}
+
+Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<double>& times) {
+  constexpr std::size_t fewest = 10;
+  Path path;
+  for (const FrameObservations& frame : seen) {
+    if (frame.points.size() < fewest) continue;
+    Points points(Eigen::Index(frame.points.size()), 3);
+    for (std::size_t i = 0; i < frame.points.size(); ++i)
+      points.row(Eigen::Index(i)) = frame.points[i].position.transpose();
+    path.times.push_back(times[std::size_t(frame.frame)]);
+    path.points.push_back(middle(points));
+  }
+  return path;
+}
+
+Path simulated_path(Simulation& simulation, const VectorX& theta) {
+  std::vector<Vector3> samples;
+  for (const SurfacePoint& p : simulation.body().surface) samples.push_back(p.position);
+  const Embedding surface(simulation.body(), samples);
+  Path path;
+  simulation.run(theta, [&](int frame, const State& state, auto) {
+    path.times.push_back(simulation.options().times[std::size_t(frame)]);
+    path.points.push_back(middle(surface.positions(state.x)));
+    return true;
+  });
+  return path;
+}
+
+}  // namespace
+
+std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters, int controls,
+                                      const std::vector<FrameObservations>& seen) {
+  const Path path = seen_path(seen, simulation.options().times);
+  if (path.points.empty()) return std::nullopt;
+  const Vector3 direction = path.direction();
+  const auto observed = swing_of(path, direction);
+  if (!observed) return std::nullopt;
+  constexpr int most_rounds = 6;
+  constexpr double near_enough = 1.05;
+  for (int round = 0; round < most_rounds; ++round) {
+    const auto simulated = swing_of(simulated_path(simulation, parameters), direction);
+    // Too slow or too fast to show in these frames: try a body that is stiffer, then one that is softer.
+    const double ratio = simulated ? std::pow(*observed / *simulated, 2) : round == 0 ? 10.0 : 0.1;
+    for (int k = 0; k < controls; ++k) parameters[theta::modulus(k, controls, parameters.size())] *= ratio;
+    if (simulated && std::abs(std::log(ratio)) < std::log(near_enough))
+      return SwingStart{parameters[theta::youngs_modulus], *observed / (2.0 * std::numbers::pi)};
+  }
+  return std::nullopt;
+}
+
+}  // namespace pliant

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+
+#include "estimation/objective.hpp"
+
+namespace pliant {
+
+/// Young's modulus with which a body swings as fast as what was seen of its surface does.
+struct SwingStart {
+  double youngs_modulus = 0.0;  ///< [Pa], of the first control; the others keep their ratio to it
+  double frequency = 0.0;       ///< observed [Hz]
+};
+
+/// The warm start of `modal_start` for points that nobody followed: the middle of each frame's points swings, and so
+/// does that of the simulated surface; frequencies go with the square root of the modulus. Two or three simulations
+/// take in what modes about rest leave out: far swings, sag, and how the body is held.
+/// @param theta       where the simulation begins; moduli within a factor of a few hundred of the truth
+/// @param controls    moduli in theta
+/// Nothing where no oscillation is beyond doubt, in what was seen or in the simulation.
+std::optional<SwingStart> swing_start(Simulation& simulation, VectorX theta, int controls,
+                                      const std::vector<FrameObservations>& seen);
+
+}  // namespace pliant
