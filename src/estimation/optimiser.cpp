@@ -16,6 +16,17 @@ namespace {
 
 enum class Derivatives { None, Adjoint, Tangents };
 
+Derivatives needed_by(OptimiserKind kind) {
+  switch (kind) {
+    case OptimiserKind::LevenbergMarquardt:
+      return Derivatives::Tangents;
+    case OptimiserKind::NelderMead:
+      return Derivatives::None;
+    default:
+      return Derivatives::Adjoint;
+  }
+}
+
 /// What the optimisers share: bookkeeping of the best point and the end.
 class Run {
  public:
@@ -245,10 +256,7 @@ void nelder_mead(Run& run, const OptimiserOptions&, const VectorX&) {
 OptimiserSummary minimise(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration) {
   Run run(objective, options, on_iteration);
-  const Derivatives derivatives = options.kind == OptimiserKind::LevenbergMarquardt ? Derivatives::Tangents
-                                  : options.kind == OptimiserKind::NelderMead       ? Derivatives::None
-                                                                                    : Derivatives::Adjoint;
-  if (!run.begin(state, derivatives)) return run.summary;
+  if (!run.begin(state, needed_by(options.kind))) return run.summary;
   if (run.summary.p.size() == 0) {
     run.end(true, "nothing is estimated");
     return run.summary;
