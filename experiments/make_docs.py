@@ -170,6 +170,10 @@ def small(value):
     return "< 0.001 %" if percents < 1e-3 else f"{100 * value:+.2g} %"
 
 
+def unsigned(value):
+    return small(value).lstrip("+")
+
+
 WHAT = {"clean": "no noise", "noise": "noise", "finer_truth": "no noise, truth with half the step", "homogeneous": "no noise, truth even",
         "nelder_mead": "no noise, Nelder-Mead"}
 
@@ -208,11 +212,16 @@ def from_landscape(figures, path):
 def bar_plots(figures):
     runs = figures["runs"]
     panel = plots.Panel(80, 20, 540, 300, (0.0, 2.3), (-10.0, 1.5))
-    for number, (name, label) in enumerate((f"{kind}-{count}", f"{title}, {count} moduli") for count in (1, 2, 8) for kind, title in
-                                           (("clean", "Levenberg-Marquardt"), ("nelder_mead", "Nelder-Mead"))):
-        if name in runs:
-            panel.line([(1 + i, max(worst, 1e-10)) for i, _, _, worst in runs[name]["history"]], plots.COLOURS[number // 2], label.replace("1 moduli", "1 modulus"), number,
-                       dashed="nelder" in name)
+    number = 0
+    for count, colour in zip((1, 2, 8), plots.COLOURS):
+        for kind, title in (("clean", "Levenberg-Marquardt"), ("nelder_mead", "Nelder-Mead")):
+            row = runs.get(f"{kind}-{count}")
+            if not row:
+                continue
+            points = [(1 + i, max(worst, 1e-10)) for i, _, _, worst in row["history"]]
+            panel.line([(1, abs(start_error(row)))] + points, colour, f"{title}, {count} {'modulus' if count == 1 else 'moduli'}", number,
+                       dashed=kind == "nelder_mead")
+            number += 1
     panel.axes("evaluations of the cost", "worst relative error of a modulus")
     plots.write(IMAGES / "bar.svg", 660, 380, panel.parts)
     from_landscape(figures, IMAGES / "bar-landscape.svg")
@@ -235,21 +244,23 @@ def judged(good):
     return "met" if good else "missed"
 
 
-def bar_targets(runs):
-    """The targets, and whether the runs at hand meet them."""
+def bar_targets(runs, part):
+    """The targets, and whether the runs at hand meet them.
+
+    part: frames that were compared of those that the target for the time speaks of"""
     def worst(kind, key):
         return max(abs(r["errors"][key]) for name, r in runs.items() if name.startswith(kind + "-"))
 
     rows = []
     if "clean-8" in runs:
         dampings = max(worst("clean", "mass_damping"), worst("clean", "stiffness_damping"))
-        rows += [["without noise, every E within 1 %", small(worst("clean", "worst_modulus")), judged(worst("clean", "worst_modulus") < 0.01)],
-                 ["without noise, alpha and beta within 2 %", small(dampings), judged(dampings < 0.02)],
-                 ["eight moduli in at most 3 min", f"{runs['clean-8']['wall_seconds']:.0f} s", judged(runs["clean-8"]["wall_seconds"] <= 180)]]
+        rows += [["without noise, every E within 1 %", unsigned(worst("clean", "worst_modulus")), judged(worst("clean", "worst_modulus") < 0.01)],
+                 ["without noise, alpha and beta within 2 %", unsigned(dampings), judged(dampings < 0.02)],
+                 ["eight moduli in at most 3 min", f"{runs['clean-8']['wall_seconds']:.0f} s, with {part} of the frames", "not shown"]]
     if "homogeneous-8" in runs:
-        rows.append(["eight moduli of an even bar within 2 %", small(worst("homogeneous", "worst_modulus")), judged(worst("homogeneous", "worst_modulus") < 0.02)])
+        rows.append(["eight moduli of an even bar within 2 %", unsigned(worst("homogeneous", "worst_modulus")), judged(worst("homogeneous", "worst_modulus") < 0.02)])
     if any(name.startswith("noise-") for name in runs):
-        rows.append(["with noise, every E within 5 %", small(worst("noise", "worst_modulus")), judged(worst("noise", "worst_modulus") < 0.05)])
+        rows.append(["with noise, every E within 5 %", unsigned(worst("noise", "worst_modulus")), judged(worst("noise", "worst_modulus") < 0.05)])
     return table(["target", "worst", ""], rows)
 
 
@@ -263,18 +274,22 @@ def bar():
     eight, simplex = runs["clean-8"], runs["nelder_mead-8"]
     text = table(["", "Wang 2015", "here"], [
         ["nodes / tetrahedra", "756 / 3000", f"{some['nodes']} / {some['elements']}"],
-        ["motions x frames", "3 x 250", f"3 x {some['motions'][0]['frames']}"],
+        ["frames that are compared", "3 x 250", f"3 x {figures['horizon']}"],
         ["eight moduli, worst E", "0 to 20 %, one 37 %", small(eight["errors"]["worst_modulus"])],
         ["even bar, eight moduli, worst E", "7 %", small(runs["homogeneous-8"]["errors"]["worst_modulus"])],
         ["beta, worst", "60 %", small(max((r["errors"]["stiffness_damping"] for n, r in runs.items() if n.startswith("clean")), key=abs))],
         ["fit of eight moduli", "1.5 h, 8 cores", f"{eight['wall_seconds']:.0f} s, 2 shared cores ({eight['processor_seconds']:.0f} s of processor)"],
         ["optimiser", "Nelder-Mead", "Levenberg-Marquardt"],
         ["forward / adjoint step", "", f"{eight['costs']['ms_per_forward_step']:.1f} / {eight['costs']['ms_per_adjoint_step']:.1f} ms"]])
-    text += (f"\nThe frames, 60 a second, are fewer than the paper's: {some['motions'][0]['frames']} of each motion. The paper lets the bar go from bent, twisted and stretched shapes; here it sets out "
+    text += (f"\nFits compare the first {figures['horizon']} frames, at 60 a second, of each motion, fewer than the paper's, to keep the experiment short; where they begin comes from "
+             f"the frequencies in {figures['frames']} frames of the bend (of eight moduli without noise: in the compared frames alone). The paper lets the bar go from bent, twisted and stretched shapes; here it sets out "
              "straight with a velocity. Control points mix in the logarithm, in the paper linearly.\n\n"
              "**Without noise this is an inverse crime**: the truth is made by the very model that fits it, so the errors show that the optimiser finds the minimum, "
              "not how well a real bar would be measured. The row whose truth was simulated with half the step shows what another discretisation of time alone does.\n\n")
-    text += bar_targets(runs) + "\n" + track_rows(runs)
+    text += bar_targets(runs, f"{figures['horizon']} of {figures['frames']}") + "\n" + track_rows(runs)
+    noisy = runs["noise-8"]["parameters"][:8]
+    text += ("\nWith noise, moduli from the held end to the free one: " + ", ".join(small(p["relative_error"]) for p in noisy) +
+             ". The free end hardly deforms, so its modulus hardly shows.\n")
     text += (f"\nNoise is {100 * figures['noise']:g} % of the bar's length on each coordinate of each node. Nelder-Mead begins where the others begin, by the modes' frequencies, ends where "
              f"its simplex is as small as the last step of the others, or after {figures['nelder_mead_budget_seconds']} s. With eight moduli it then stood at {small(simplex['errors']['worst_modulus'])} after "
              f"{simplex['evaluations']} evaluations (start: {small(start_error(simplex))}).\n"
@@ -299,7 +314,7 @@ def dinosaur():
     places = ["head", "tail", "left hand", "right hand", "left foot", "right foot", "belly"]
     text = table(["", "Wang 2015", "here"], [
         ["nodes / tetrahedra", "4867 / 16270", f"{r['nodes']} / {r['elements']}"],
-        ["frames", "523", r["motions"][0]["frames"]],
+        ["frames that are compared", "523", r["settings"]["horizon"]],
         ["worst E", "5 %", small(r["errors"]["worst_modulus"])],
         ["beta", "60 %", small(r["errors"]["stiffness_damping"])],
         ["time", "", f"{r['wall_seconds']:.0f} s, 2 shared cores ({r['processor_seconds']:.0f} s of processor)"],

@@ -7,6 +7,7 @@
 // noise=S               of each coordinate, times the object's size
 // truth_steps=N         of the truth to one of the fit
 // frames=N, rate=R      of each motion, and [1/s]
+// horizon=N             frames that a fit compares, from the first; the start is found from all of them
 // steps=N               of the fit to a frame
 // solver=automatic|simplicial|cholmod, newmark_theta=T
 // optimiser=levenberg_marquardt|nelder_mead
@@ -57,6 +58,7 @@ Choices read_choices(int argc, char** argv) {
                      {"truth_steps", "1"},
                      {"frames", "250"},
                      {"rate", "60"},
+                     {"horizon", "50"},
                      {"steps", "4"},
                      {"solver", "cholmod"},
                      {"newmark_theta", "0.51"},
@@ -162,6 +164,7 @@ class Experiment {
 
  private:
   double real(const char* name) const { return std::stod(choices_.at(name)); }
+  int last_compared() const { return std::min(integer("horizon"), integer("frames")) - 1; }
   int integer(const char* name) const { return std::stoi(choices_.at(name)); }
 
   /// What is seen of the motions. Without noise residuals still need a scale, a thousandth of the size.
@@ -171,12 +174,15 @@ class Experiment {
     SimulationOptions options = options_;
     options.max_dt /= integer("truth_steps");
     std::mt19937 random(7);
-    for (const StartingMotion& motion : object_.motions) {
+    for (std::size_t m = 0; m < object_.motions.size(); ++m) {
+      const StartingMotion& motion = object_.motions[m];
+      const int last = m == observed_motion_for_modes() ? integer("frames") - 1 : last_compared();
       auto frames = std::make_shared<std::vector<FrameObservations>>();
       double farthest = 0.0;
       Simulation simulation(truth.body, options);
+      const VectorX theta = make_theta(motion, truth_, alpha, beta);
       const RolloutSummary summary =
-          simulation.run(make_theta(motion, truth_, alpha, beta), [&](int frame, const State& state, auto) {
+          simulation.run(theta, MatrixX(theta.size(), 0), last, [&](int frame, const State& state, auto) {
             farthest = std::max(farthest, (state.x - body_->nodes).rowwise().norm().maxCoeff());
             frames->push_back({frame, {}, followed(state.x, random)});
             return true;
@@ -204,7 +210,7 @@ class Experiment {
   json time_steps() const {
     Simulation simulation(body_, options_);
     const VectorX theta = make_theta(object_.motions.back(), mean_modulus() * VectorX::Ones(controls_), alpha, beta);
-    const int last = std::min(60, integer("frames") - 1);
+    const int last = std::min(15, integer("frames") - 1);
     double begin = wall_seconds();
     const RolloutSummary summary =
         simulation.run(theta, MatrixX(theta.size(), 0), last, [](int, const State&, auto) { return true; });
@@ -328,7 +334,7 @@ class Experiment {
       const VectorX theta = make_theta(object_.motions[r], moduli_, mass_damping_, stiffness_damping_);
       ObservedMotion motion{{nullptr, tracks}, body_, options_, observations_[r], {}};
       motion.options.outlier_scale = 10.0 * object_.size;  // squares, as in the paper
-      motion.options.last_frame = int(options_.times.size()) - 1;
+      motion.options.last_frame = last_compared();
       recordings.push_back(std::move(motion));
       start.conservativeResize(start.size() + theta.size());
       start.tail(theta.size()) = theta;

@@ -12,7 +12,7 @@ import tracks
 
 # Head, tail, hands, feet, belly. The values are the paper's; which of its control points had which, its table does not say.
 MODULI = [1e5, 1e4, 1e5, 1e6, 1e6, 1e6, 1e6]
-CHOICES = {"object": "dinosaur", "cell_size": 0.025, "controls": 7, "moduli": tracks.moduli(MODULI), "rate": 30, "frames": 25, "steps": 4}
+CHOICES = {"object": "dinosaur", "cell_size": 0.0255, "controls": 7, "moduli": tracks.moduli(MODULI), "rate": 30, "frames": 60, "horizon": 16, "steps": 4}
 
 
 def main():
