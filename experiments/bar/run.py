@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Moduli and dampings of a synthetic bar (Wang 2015, figures 6, 7 and 9 and table 1), by Levenberg-Marquardt and by Nelder-Mead.
 
-Runs whose output is in the work folder already are not run again. About 25 minutes on two cores."""
+Runs whose output is in the work folder already are not run again. About 15 minutes on two shared cores."""
 import pathlib
 import sys
 
