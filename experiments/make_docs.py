@@ -167,7 +167,9 @@ def memory():
 def small(value):
     """A relative error in percent, without digits that say nothing."""
     percents = 100 * abs(value)
-    return "< 0.001 %" if percents < 1e-3 else f"{100 * value:+.2g} %"
+    if percents < 1e-3:
+        return "< 0.001 %"
+    return f"{100 * value:+.0f} %" if percents >= 10 else f"{100 * value:+.2g} %"
 
 
 def unsigned(value):
@@ -290,12 +292,13 @@ def bar():
     noisy = runs["noise-8"]["parameters"][:8]
     text += ("\nWith noise, moduli from the held end to the free one: " + ", ".join(small(p["relative_error"]) for p in noisy) +
              ". The free end hardly deforms, so its modulus hardly shows.\n")
-    text += (f"\nNoise is {100 * figures['noise']:g} % of the bar's length on each coordinate of each node. Nelder-Mead begins where the others begin, by the modes' frequencies, ends where "
+    text += (f"\nNoise is {100 * figures['noise']:g} % of the bar's length on each coordinate of each node. Nelder-Mead begins at what the modes' frequencies in the whole bend give (the fit of eight moduli without noise above at what the compared frames "
+             "alone give, another start of the same kind), ends where "
              f"its simplex is as small as the last step of the others, or after {figures['nelder_mead_budget_seconds']} s. With eight moduli it then stood at {small(simplex['errors']['worst_modulus'])} after "
              f"{simplex['evaluations']} evaluations (start: {small(start_error(simplex))}).\n"
              "\n![Worst error of a modulus over evaluations](images/bar.svg)\n"
              "\nThe cost over the two moduli of the bar with two control points (the paper's figure 6), first "
-             f"{figures['landscape_frames']} frames; grey: cannot be simulated; cross: truth.\n\n![Cost over two moduli](images/bar-landscape.svg)\n"
+             f"{figures['landscape_frames']} frames; grey: cannot be simulated; cross: truth. It is a narrow curved valley, along which a softer held end and a stiffer free end make up for each other.\n\n![Cost over two moduli](images/bar-landscape.svg)\n"
              "\nHow well the body's frequencies match those seen in its bend, over each modulus with the others as found (figure 7). Its minimum is where the fits begin.\n"
              "\n![Frequency mismatch over Young's modulus](images/bar-frequency-match.svg)\n")
     return text + f"\nMeasured on {machine(figures)}.\n"
