@@ -11,7 +11,7 @@ import common
 import tracks
 
 MODULI = {1: [6.8e5], 2: [3e5, 1e6], 8: [5e5, 2e5, 8e5, 3e5, 1e6, 1.5e5, 6e5, 2.5e5]}
-FRAMES, HORIZON, NOISE, BUDGET = 250, 50, 0.01, 60
+FRAMES, HORIZON, NOISE, BUDGET = 250, 50, 0.01, 180
 SIMPLEX = {"optimiser": "nelder_mead", "budget": BUDGET, "solver": "automatic"}
 LANDSCAPE = {"task": "landscape", "controls": 2, "frames": 15, "samples": 11, "from": 1e4, "to": 1e7, "solver": "automatic"}
 
