@@ -16,7 +16,8 @@ namespace {
 const std::vector<std::pair<std::string, OptimiserKind>> optimisers = {
     {"levenberg_marquardt", OptimiserKind::LevenbergMarquardt},
     {"rprop", OptimiserKind::Rprop},
-    {"gradient_descent", OptimiserKind::GradientDescent}};
+    {"gradient_descent", OptimiserKind::GradientDescent},
+    {"nelder_mead", OptimiserKind::NelderMead}};
 const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", SolverKind::Automatic},
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},

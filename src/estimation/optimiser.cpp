@@ -3,10 +3,29 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <limits>
+#include <vector>
+#ifdef PLIANT_WITH_NLOPT
+#include <nlopt.hpp>
+#endif
 
 namespace pliant {
 
 namespace {
+
+enum class Derivatives { None, Adjoint, Tangents };
+
+Derivatives needed_by(OptimiserKind kind) {
+  switch (kind) {
+    case OptimiserKind::LevenbergMarquardt:
+      return Derivatives::Tangents;
+    case OptimiserKind::NelderMead:
+      return Derivatives::None;
+    default:
+      return Derivatives::Adjoint;
+  }
+}
 
 /// What the optimisers share: bookkeeping of the best point and the end.
 class Run {
@@ -14,16 +33,18 @@ class Run {
   Run(Objective& objective, const OptimiserOptions& options, const std::function<bool(const Iteration&)>& on_iteration)
       : objective_(objective), options_(options), on_iteration_(on_iteration) {}
 
-  CostEvaluation evaluate(const VectorX& p, bool by_adjoint) {
-    CostEvaluation e = by_adjoint ? objective_.gradient(p) : objective_.linearise(p);
+  CostEvaluation evaluate(const VectorX& p, Derivatives by) {
+    CostEvaluation e = by == Derivatives::None      ? objective_.evaluate(p)
+                       : by == Derivatives::Adjoint ? objective_.gradient(p)
+                                                    : objective_.linearise(p);
     ++summary.evaluations;
     summary.steps += e.steps;
     return e;
   }
-  bool begin(const OptimiserState& state, bool by_adjoint) {
+  bool begin(const OptimiserState& state, Derivatives by) {
     summary.p = objective_.parameters().clamp(state.p);
     summary.iterations = state.iterations;
-    summary.evaluation = evaluate(summary.p, by_adjoint);
+    summary.evaluation = evaluate(summary.p, by);
     summary.succeeded = summary.evaluation.succeeded;
     summary.start_cost = summary.evaluation.cost;
     if (!summary.succeeded) summary.reason = "the start cannot be simulated: " + summary.evaluation.failure;
@@ -79,7 +100,7 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
       return;
     }
     const double predicted = -(g.dot(trial - s.p) + 0.5 * (trial - s.p).dot(H * (trial - s.p)));
-    CostEvaluation e = run.evaluate(trial, false);
+    CostEvaluation e = run.evaluate(trial, Derivatives::Tangents);
     const double gain = s.evaluation.cost - e.cost;
     const bool accepted = e.succeeded && gain > 0.0;
     if (accepted) {
@@ -105,7 +126,7 @@ void rprop(Run& run, const OptimiserOptions& options, const VectorX& memory) {
   VectorX p = s.p, gradient = s.evaluation.gradient, last = VectorX::Zero(n), length = VectorX::Constant(n, 0.1);
   if (memory.size() > 0) {
     p = memory.head(n), last = memory.segment(n, n), length = memory.tail(n);
-    if (p != s.p) gradient = run.evaluate(p, true).gradient;
+    if (p != s.p) gradient = run.evaluate(p, Derivatives::Adjoint).gradient;
   }
   for (;;) {
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -116,7 +137,7 @@ void rprop(Run& run, const OptimiserOptions& options, const VectorX& memory) {
     }
     last = gradient;
     p = run.clamp(p);
-    CostEvaluation e = run.evaluate(p, true);
+    CostEvaluation e = run.evaluate(p, Derivatives::Adjoint);
     const bool better = e.succeeded && e.cost < s.evaluation.cost;
     if (e.succeeded) {
       gradient = e.gradient;
@@ -137,7 +158,7 @@ void gradient_descent(Run& run, const OptimiserOptions& options, const VectorX& 
   for (;;) {
     const VectorX direction = -s.evaluation.gradient / std::max(s.evaluation.gradient.cwiseAbs().maxCoeff(), 1e-300);
     const VectorX trial = run.clamp(s.p + length * direction);
-    CostEvaluation e = run.evaluate(trial, true);
+    CostEvaluation e = run.evaluate(trial, Derivatives::Adjoint);
     const bool better = e.succeeded && e.cost < s.evaluation.cost;
     if (better) s.p = trial, s.evaluation = std::move(e);
     length = better ? std::min(1.5 * length, options.max_step) : 0.4 * length;
@@ -146,13 +167,96 @@ void gradient_descent(Run& run, const OptimiserOptions& options, const VectorX& 
   }
 }
 
+#ifdef PLIANT_WITH_NLOPT
+
+/// An iteration is one evaluation. NLopt keeps its simplex to itself; but its path follows from the start and the
+/// costs it was told, so these are the memory: going on tells them again.
+class NelderMeadRun {
+ public:
+  NelderMeadRun(Run& run, const VectorX& memory) : run_(run), n_(run.summary.p.size()) {
+    if (memory.size() > n_) {
+      start_ = memory.head(n_);
+      costs_.assign(memory.data() + n_, memory.data() + memory.size());
+    } else {  // NLopt asks for the start's cost first
+      start_ = run.summary.p;
+      costs_.push_back(run.summary.evaluation.cost);
+    }
+  }
+
+  void minimise(const OptimiserOptions& options) {
+    nlopt::opt simplex(nlopt::LN_NELDERMEAD, unsigned(n_));
+    simplex.set_min_objective(&NelderMeadRun::cost_at, this);
+    simplex.set_initial_step(0.5 * options.max_step);
+    simplex.set_xtol_abs(options.step_tolerance);
+    std::vector<double> x(start_.data(), start_.data() + n_);
+    double least = 0.0;
+    try {
+      simplex.optimize(x, least);
+      run_.end(true, "the simplex became small");
+    } catch (const nlopt::forced_stop&) {  // the run has said why
+      if (thrown_) std::rethrow_exception(thrown_);
+    } catch (const nlopt::roundoff_limited&) {
+      run_.end(true, "the simplex is as small as rounding allows");
+    }
+  }
+
+ private:
+  static double cost_at(const std::vector<double>& x, std::vector<double>&, void* self) {
+    return static_cast<NelderMeadRun*>(self)->cost(Eigen::Map<const VectorX>(x.data(), Eigen::Index(x.size())));
+  }
+
+  double cost(const VectorX& p) {
+    if (asked_ == costs_.size()) {
+      bool is_over = true;
+      try {  // NLopt would turn an exception into one of its own
+        is_over = evaluate(run_.clamp(p));
+      } catch (...) {
+        thrown_ = std::current_exception();
+      }
+      if (is_over) throw nlopt::forced_stop();
+    }
+    return costs_[asked_++];
+  }
+
+  bool evaluate(const VectorX& trial) {
+    OptimiserSummary& s = run_.summary;
+    const double distance = (trial - s.p).cwiseAbs().maxCoeff();
+    CostEvaluation e = run_.evaluate(trial, Derivatives::None);
+    costs_.push_back(e.succeeded ? e.cost : std::numeric_limits<double>::max());
+    const bool better = e.succeeded && e.cost < s.evaluation.cost;
+    if (better) s.p = trial, s.evaluation = std::move(e);
+    VectorX memory(n_ + Eigen::Index(costs_.size()));
+    memory << start_, Eigen::Map<const VectorX>(costs_.data(), Eigen::Index(costs_.size()));
+    return run_.report(distance, better, std::move(memory));
+  }
+
+  Run& run_;
+  Eigen::Index n_;
+  VectorX start_;
+  std::vector<double> costs_;  // of all points that NLopt asked for, the start first
+  std::size_t asked_ = 0;
+  std::exception_ptr thrown_;
+};
+
+void nelder_mead(Run& run, const OptimiserOptions& options, const VectorX& memory) {
+  NelderMeadRun(run, memory).minimise(options);
+}
+
+#else
+
+void nelder_mead(Run& run, const OptimiserOptions&, const VectorX&) {
+  run.summary.succeeded = false;
+  run.end(false, "this program was built without Nelder and Mead's method: build it with -DPLIANT_WITH_NLOPT=ON");
+}
+
+#endif
+
 }  // namespace
 
 OptimiserSummary minimise(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration) {
   Run run(objective, options, on_iteration);
-  const bool by_adjoint = options.kind != OptimiserKind::LevenbergMarquardt;
-  if (!run.begin(state, by_adjoint)) return run.summary;
+  if (!run.begin(state, needed_by(options.kind))) return run.summary;
   if (run.summary.p.size() == 0) {
     run.end(true, "nothing is estimated");
     return run.summary;
@@ -167,6 +271,9 @@ OptimiserSummary minimise(Objective& objective, const OptimiserState& state, con
       break;
     case OptimiserKind::GradientDescent:
       gradient_descent(run, options, state.memory);
+      break;
+    case OptimiserKind::NelderMead:
+      nelder_mead(run, options, state.memory);
       break;
   }
   return run.summary;

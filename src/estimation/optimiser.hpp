@@ -11,21 +11,24 @@ enum class OptimiserKind {
   LevenbergMarquardt,  ///< Gauss-Newton on the residuals, by tangents: the default
   Rprop,               ///< sign of the adjoint gradient (Riedmiller and Braun 1993), the choice of Weiss 2020
   GradientDescent,     ///< adjoint gradient with an adaptive step
+  NelderMead,          ///< downhill simplex on the cost alone, by NLopt: the choice of Wang 2015
 };
 
 struct OptimiserOptions {
   OptimiserKind kind = OptimiserKind::LevenbergMarquardt;
-  int max_iterations = 25;       ///< >= 1
+  int max_iterations = 25;       ///< >= 1; of Nelder-Mead, which needs many more, each evaluation is one
   double step_tolerance = 1e-3;  ///< stop when no unconstrained number moves more than this, > 0
-  double cost_tolerance = 2e-4;  ///< or the cost falls by less than this fraction, > 0
-  double max_step = 0.7;         ///< most that any unconstrained number moves in one iteration (a factor of two), > 0
+  double cost_tolerance = 2e-4;  ///< or the cost falls by less than this fraction, > 0; not Nelder-Mead's
+  /// Most that any unconstrained number moves in one iteration (a factor of two), > 0; Nelder-Mead's first simplex has
+  /// edges of half of it.
+  double max_step = 0.7;
 };
 
 /// Where a run stands between two iterations: going on from here takes the path that an undisturbed run takes.
 struct OptimiserState {
   int iterations = 0;  ///< done
   VectorX p;           ///< the best point
-  VectorX memory;      ///< the optimiser's own: damping, step lengths, the last trial and signs
+  VectorX memory;      ///< the optimiser's own: damping, step lengths, the last trial and signs, or all costs so far
 };
 
 /// One accepted or rejected iteration, as it happens.
@@ -52,7 +55,7 @@ struct OptimiserSummary {
 };
 
 /// Minimises from p. A failed or non-finite evaluation is a step back, not an end; only a start that cannot be
-/// evaluated fails.
+/// evaluated fails, and Nelder-Mead in a program built without NLopt.
 /// @param on_iteration  called after each; false stops ("interrupted")
 OptimiserSummary minimise(Objective& objective, const VectorX& p, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration = {});

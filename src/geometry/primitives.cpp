@@ -1,11 +1,14 @@
 #include "geometry/primitives.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace pliant {
 
@@ -86,6 +89,99 @@ TriangleMesh split_in_four(const TriangleMesh& coarse) {
   return fine;
 }
 
+using Corners = std::array<int, 4>;  // of a tetrahedron, positively oriented
+
+bool is_odd(const Corners& order) {
+  int inversions = 0;
+  for (int i = 0; i < 4; ++i)
+    for (int j = i + 1; j < 4; ++j) inversions += order[i] > order[j];
+  return inversions % 2 == 1;
+}
+
+// Values at the points of a lattice, and the surface between them.
+class MarchingTetrahedra {
+ public:
+  MarchingTetrahedra(const std::function<double(const Vector3&)>& function, const Box& box, double spacing)
+      : origin_(box.min), spacing_(spacing) {
+    for (int k = 0; k < 3; ++k) size_[k] = int(std::ceil(box.extent()[k] / spacing)) + 1;
+    values_.resize(std::size_t(size_.prod()));
+    for (int n = 0; n < int(values_.size()); ++n) {
+      values_[n] = function(point(n));
+      require(std::isfinite(values_[n]), "make_level_surface: the function is not finite");
+      require(!is_inside(n) || !is_at_border(n), "make_level_surface: the inside reaches the border of the box");
+    }
+  }
+
+  TriangleMesh run() {
+    for (int k = 0; k + 1 < size_.z(); ++k)
+      for (int j = 0; j + 1 < size_.y(); ++j)
+        for (int i = 0; i + 1 < size_.x(); ++i) add_cube({i, j, k});
+    return std::move(mesh_);
+  }
+
+ private:
+  int number(const Eigen::Vector3i& at) const { return (at.z() * size_.y() + at.y()) * size_.x() + at.x(); }
+  Eigen::Vector3i lattice(int n) const {
+    return {n % size_.x(), n / size_.x() % size_.y(), n / (size_.x() * size_.y())};
+  }
+  Vector3 point(int n) const { return origin_ + spacing_ * lattice(n).cast<double>(); }
+  bool is_inside(int n) const { return values_[std::size_t(n)] < 0.0; }
+  bool is_at_border(int n) const {
+    const Eigen::Vector3i at = lattice(n);
+    return (at.array() == 0).any() || (at.array() == size_.array() - 1).any();
+  }
+
+  // Each order of the axes is a way along edges from the first corner to the last: a tetrahedron.
+  void add_cube(const Eigen::Vector3i& first) {
+    std::array<int, 3> axes{0, 1, 2};
+    do {
+      Corners corners{number(first), 0, 0, 0};
+      Eigen::Vector3i at = first;
+      for (int k = 0; k < 3; ++k) ++at[axes[k]], corners[k + 1] = number(at);
+      if (is_odd({axes[0], axes[1], axes[2], 3})) std::swap(corners[2], corners[3]);
+      add_tetrahedron(corners);
+    } while (std::ranges::next_permutation(axes).found);
+  }
+
+  // The corners on one side come first: one of them, cut off by a triangle, or two, by a quadrilateral.
+  void add_tetrahedron(const Corners& corners) {
+    Corners order{0, 1, 2, 3};
+    const auto inside = [&](int i) { return is_inside(corners[std::size_t(i)]); };
+    const auto count = std::ranges::count_if(order, inside);
+    if (count == 0 || count == 4) return;
+    const bool outside_first = count == 3;
+    std::ranges::stable_partition(order, [&](int i) { return inside(i) != outside_first; });
+    if (is_odd(order)) std::swap(order[2], order[3]);
+    const auto cut = [&](int i, int j) { return vertex(corners[order[i]], corners[order[j]]); };
+    if (count == 2) {
+      mesh_.triangles.push_back({cut(0, 2), cut(0, 3), cut(1, 3)});
+      mesh_.triangles.push_back({cut(0, 2), cut(1, 3), cut(1, 2)});
+    } else if (outside_first) {
+      mesh_.triangles.push_back({cut(0, 1), cut(0, 3), cut(0, 2)});
+    } else {
+      mesh_.triangles.push_back({cut(0, 1), cut(0, 2), cut(0, 3)});
+    }
+  }
+
+  int vertex(int a, int b) {
+    const auto [entry, is_new] = vertices_.try_emplace(std::minmax(a, b), int(mesh_.vertices.size()));
+    if (is_new) {
+      constexpr double least = 0.05;
+      const double from = values_[std::size_t(a)], to = values_[std::size_t(b)];
+      const double share = std::clamp(from / (from - to), least, 1.0 - least);
+      mesh_.vertices.push_back((1.0 - share) * point(a) + share * point(b));
+    }
+    return entry->second;
+  }
+
+  Vector3 origin_;
+  double spacing_;
+  Eigen::Vector3i size_;
+  std::vector<double> values_;
+  std::map<std::pair<int, int>, int> vertices_;  // by the lattice points between which they lie
+  TriangleMesh mesh_;
+};
+
 }  // namespace
 
 TriangleMesh make_box(const Vector3& size, double facet) {
@@ -131,6 +227,15 @@ TriangleMesh make_torus(double ring_radius, double tube_radius, int ring_segment
       mesh.triangles.push_back({a, c, d});
     }
   return mesh;
+}
+
+TriangleMesh make_level_surface(const std::function<double(const Vector3&)>& function, const Box& box, double spacing) {
+  require(is_length(spacing), "make_level_surface: the spacing must be positive");
+  const Vector3 extent = box.extent();
+  require(is_length(extent.x()) && is_length(extent.y()) && is_length(extent.z()),
+          "make_level_surface: the box must have a volume");
+  require((extent / spacing).prod() < 1e9, "make_level_surface: more than 1e9 points of the lattice");
+  return MarchingTetrahedra(function, box, spacing).run();
 }
 
 }  // namespace pliant

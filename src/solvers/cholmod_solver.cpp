@@ -5,6 +5,8 @@
 #ifdef PLIANT_WITH_CHOLMOD
 #include <cholmod.h>
 #include <dlfcn.h>
+
+#include <mutex>
 #endif
 
 namespace pliant {
@@ -19,6 +21,13 @@ void keep_cholmod_serial() {
   using Setter = void (*)(int);
   static const auto set = reinterpret_cast<Setter>(::dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
   if (set) set(0);
+}
+
+/// Recordings are simulated side by side, and not every BLAS that CHOLMOD calls may be called by two threads at once:
+/// OpenBLAS in its build without threads then now and then finds a good matrix indefinite.
+std::mutex& blas() {
+  static std::mutex mutex;
+  return mutex;
 }
 
 class CholmodSolver : public LinearSolver {
@@ -46,6 +55,7 @@ class CholmodSolver : public LinearSolver {
     keep_cholmod_serial();
     auto* values = static_cast<double*>(matrix_->x);
     for (std::size_t k = 0; k < source_.size(); ++k) values[k] = matrix.block(0)[source_[k]];
+    const std::lock_guard lock(blas());
     return cholmod_factorize(matrix_, factor_, &common_) && common_.status == CHOLMOD_OK;
   }
 
@@ -57,6 +67,7 @@ class CholmodSolver : public LinearSolver {
     rhs.x = const_cast<double*>(b.data());
     rhs.xtype = CHOLMOD_REAL;
     rhs.dtype = CHOLMOD_DOUBLE;
+    const std::lock_guard lock(blas());
     const bool done =
         cholmod_solve2(CHOLMOD_A, factor_, &rhs, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_);
     if (done) x = Eigen::Map<const VectorX>(static_cast<const double*>(solution_->x), b.size());

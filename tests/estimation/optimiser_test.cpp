@@ -90,9 +90,16 @@ TEST_P(BaselineOptimiser, LowersTheCostAndComesClose) {
   EXPECT_FALSE(summary.reason.empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, BaselineOptimiser,
-                         ::testing::Values(OptimiserKind::Rprop, OptimiserKind::GradientDescent,
-                                           OptimiserKind::LevenbergMarquardt));
+std::vector<OptimiserKind> kinds_built() {
+  std::vector<OptimiserKind> kinds = {OptimiserKind::Rprop, OptimiserKind::GradientDescent,
+                                      OptimiserKind::LevenbergMarquardt};
+#ifdef PLIANT_WITH_NLOPT
+  kinds.push_back(OptimiserKind::NelderMead);
+#endif
+  return kinds;
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, BaselineOptimiser, ::testing::ValuesIn(kinds_built()));
 
 TEST_P(BaselineOptimiser, AStartThatIsNoNumberFailsWithAReason) {
   const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
@@ -177,6 +184,43 @@ TEST_P(BaselineOptimiser, GoesOnFromAnyIterationAlongTheSamePath) {
     EXPECT_EQ(rest.reason, whole.reason);
   }
 }
+
+#ifdef PLIANT_WITH_NLOPT
+
+TEST(NelderMead, FindsTheMinimumThatLevenbergAndMarquardtFind) {
+  const test::Recording recording = test::torus_recording(cell_size, 6, 1, 1e-3, 1, 40, 0.0, 1.0, 1e-10);
+  const ParameterSet set =
+      estimating(recording, {"youngs_modulus", "stiffness_damping"}, with_modulus(recording.truth, 1.8));
+  OptimiserOptions options;
+  options.max_iterations = 200;
+  options.cost_tolerance = 1e-10;
+  VectorX found[2];
+  long long evaluations[2];
+  for (const OptimiserKind kind : {OptimiserKind::LevenbergMarquardt, OptimiserKind::NelderMead}) {
+    options.kind = kind;
+    Objective objective = recording.objective(set, 0.033);
+    const OptimiserSummary summary = minimise(objective, set.to_unconstrained(set.reference()), options);
+    ASSERT_TRUE(summary.converged) << summary.reason;
+    EXPECT_EQ(summary.evaluation.cost, objective.evaluate(summary.p).cost);
+    const int i = kind == OptimiserKind::NelderMead ? 1 : 0;
+    found[i] = summary.p, evaluations[i] = summary.evaluations;
+  }
+  EXPECT_LT((found[1] - found[0]).cwiseAbs().maxCoeff(), tolerance(5.0 * options.step_tolerance));
+  EXPECT_GT(evaluations[1], evaluations[0]) << "costs alone";
+}
+
+TEST(NelderMead, LetsAnExceptionThrough) {
+  const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
+  const ParameterSet set = estimating(recording, {"youngs_modulus"}, recording.truth);
+  Objective objective = recording.objective(set);
+  OptimiserOptions options;
+  options.kind = OptimiserKind::NelderMead;
+  EXPECT_THROW((void)minimise(objective, set.to_unconstrained(set.reference()), options,
+                              [](const Iteration&) -> bool { throw std::out_of_range("the log is full"); }),
+               std::out_of_range);
+}
+
+#endif
 
 TEST(Minimise, NothingToEstimateIsDoneAtOnce) {
   const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);

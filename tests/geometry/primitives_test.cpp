@@ -56,6 +56,50 @@ TEST(Primitives, TorusVolumeConvergesWithSecondOrder) {
   for (const int n : {8, 16, 32}) EXPECT_NEAR(order(error(n), error(2 * n)), 2.0, 0.1);
 }
 
+Box cube(double half) {
+  Box box;
+  box.extend(Vector3::Constant(-half));
+  box.extend(Vector3::Constant(half));
+  return box;
+}
+
+TEST(LevelSurface, OfABallConvergesWithSecondOrder) {
+  const Vector3 centre(0.011, -0.007, 0.003);
+  const auto ball = [&](const Vector3& p) { return (p - centre).norm() - 0.3; };
+  const double ideal = 4.0 / 3.0 * std::numbers::pi * std::pow(0.3, 3);
+  const auto error = [&](double spacing) {
+    const TriangleMesh mesh = make_level_surface(ball, cube(0.4), spacing);
+    EXPECT_TRUE(is_closed_and_oriented(mesh));
+    EXPECT_LT((enclosed_centroid(mesh) - centre).norm(), spacing * spacing);
+    return ideal - enclosed_volume(mesh);
+  };
+  // Over a factor of four, in which how the lattice happens to lie counts less.
+  EXPECT_NEAR(0.5 * order(error(0.08), error(0.02)), 2.0, 0.2);
+}
+
+TEST(LevelSurface, IsManifoldWhereTheFunctionIsZeroAtPointsOfTheLattice) {
+  // A ring, and its faces, edges and points where they fall on the lattice.
+  const auto ring = [](const Vector3& p) {
+    const double from_axis = std::max(std::abs(p.x()), std::abs(p.y()));
+    return std::max({from_axis - 0.3, 0.1 - from_axis, std::abs(p.z()) - 0.1});
+  };
+  const TriangleMesh mesh = make_level_surface(ring, cube(0.5), 0.1);
+  EXPECT_TRUE(is_closed_and_oriented(mesh));
+  EXPECT_EQ(int(mesh.vertices.size()) - int(mesh.triangles.size()) / 2, 0);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3 &A = mesh.vertices[a], &B = mesh.vertices[b], &C = mesh.vertices[c];
+    EXPECT_GT((B - A).cross(C - A).norm(), 1e-6);
+  }
+}
+
+TEST(LevelSurface, RefusesWhatItCannotClose) {
+  const auto ball = [](const Vector3& p) { return p.norm() - 0.3; };
+  EXPECT_THROW(make_level_surface(ball, cube(0.25), 0.05), std::invalid_argument);
+  EXPECT_THROW(make_level_surface(ball, cube(0.4), 0.0), std::invalid_argument);
+  EXPECT_THROW(make_level_surface(ball, Box(), 0.05), std::invalid_argument);
+  EXPECT_THROW(make_level_surface([](const Vector3&) { return std::nan(""); }, cube(0.4), 0.1), std::invalid_argument);
+}
+
 TEST(Primitives, RefuseSenselessSizes) {
   EXPECT_THROW(make_box({0.1, -0.1, 0.1}, 0.1), std::invalid_argument);
   EXPECT_THROW(make_box({0.1, 0.1, std::nan("")}, 0.1), std::invalid_argument);

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "elasticity/body.hpp"
+#include "motion/fixed_regions.hpp"
+
+namespace pliant {
+
+/// How an object is let go: straight from rest, with a velocity.
+struct StartingMotion {
+  std::string name;
+  Vector3 linear, angular;  ///< of and about the centre of mass [m/s], [rad/s]
+};
+
+/// An object all of whose nodes are followed.
+struct TrackedObject {
+  std::shared_ptr<const Body> body;  ///< with its control points
+  Hold held;
+  std::vector<StartingMotion> motions;  ///< one a recording
+  double size = 0.0;                    ///< [m], of which noise is a part
+};
+
+/// A bar of 756 nodes and 3000 tetrahedra, 1 m x 0.25 m x 0.25 m, held at one end, which twists, bends and stretches
+/// (Wang 2015, figure 9). Its control points are spread evenly along it.
+TrackedObject make_bar(int controls);
+
+/// A dinosaur on two legs, held at the feet, which swings (Wang 2015, figure 5b). Its control points stand at the
+/// extremities, the first of: head, tail, hands, feet, and belly; weights are harmonic. About 1.1 m long.
+/// @param controls  1..7
+/// @param cell_size of the tetrahedra [m]
+TrackedObject make_dinosaur(int controls, double cell_size);
+
+}  // namespace pliant
