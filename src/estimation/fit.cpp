@@ -14,6 +14,7 @@
 
 #include "base/error.hpp"
 #include "capture/find_plane.hpp"
+#include "estimation/fit_config.hpp"
 #include "estimation/modal_start.hpp"
 #include "estimation/notes.hpp"
 #include "estimation/swing.hpp"
@@ -30,45 +31,6 @@ std::string text_of(double value) {
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-void change_parameter(Parameter& parameter, const FitOptions::Override& change, VectorX& theta) {
-  if (change.start) {
-    const int numbers = parameter.is_scalar() ? 1 : 3;
-    if (change.start->size() != numbers || parameter.transform == Transform::PlanePosition)
-      throw InputError({{},
-                        "the start of " + parameter.name + " has " + std::to_string(change.start->size()) + " numbers",
-                        parameter.transform == Transform::PlanePosition ? "planes to start where the capture has them"
-                                                                        : std::to_string(numbers) + " numbers",
-                        ""});
-    if (parameter.transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
-      throw InputError({{}, "the start of " + parameter.name + " is not positive", "a number above 0", ""});
-    theta.segment(parameter.theta_index, numbers) = *change.start;
-    for (const int other : parameter.also) theta[other] = (*change.start)[0];
-    if (parameter.transform == Transform::Direction) parameter.origin = *change.start;
-  }
-  if (change.estimated) parameter.estimated = *change.estimated;
-  if (change.prior_std) parameter.prior_std = *change.prior_std;
-}
-
-void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
-  VectorX theta = parameters.reference();
-  std::vector<Parameter> list = parameters.parameters();
-  for (const auto& [name, change] : options.parameters) {
-    std::vector<Parameter*> meant;
-    for (Parameter& p : list)
-      if (p.name == name) meant.push_back(&p);
-    // A name alone means those of all sensors, pulls and recordings, but for the modulus of the object's own material.
-    for (Parameter& p : list)
-      if (meant.empty() || name != "youngs_modulus")
-        if (p.name.size() > name.size() && p.name.starts_with(name) &&
-            (p.name[name.size()] == '@' || p.name[name.size()] == '['))
-          meant.push_back(&p);
-    if (meant.empty())
-      throw InputError({{}, "there is no parameter \"" + name + "\" in this recording", "", "see `pliant fit --help`"});
-    for (Parameter* p : meant) change_parameter(*p, change, theta);
-  }
-  parameters = ParameterSet(std::move(list), std::move(theta));
 }
 
 /// Puts planes that are only roughly known where the depth images show them. Returns the numbers of those found.

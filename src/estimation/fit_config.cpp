@@ -220,7 +220,8 @@ std::string parameter_key_help() {
          "each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
          "  NAME.estimate=BOOL   estimate it, or keep the start value\n"
-         "  NAME.prior_std=X     width of the prior: of the logarithm for moduli, dampings and density";
+         "  NAME.prior_std=X     width of the prior: of the logarithm for moduli, dampings and density;\n"
+         "                       it lies about VALUE where both are given";
 }
 
 void set_fit_option(FitOptions& options, const std::string& assignment) {
@@ -315,6 +316,54 @@ std::string to_toml(const FitOptions& options) {
     if (change.prior_std) out << "prior_std = " << text_of(*change.prior_std) << "\n";
   }
   return out.str();
+}
+
+namespace {
+
+void change_parameter(Parameter& parameter, const FitOptions::Override& change, VectorX& theta) {
+  if (change.start) {
+    const int numbers = parameter.is_scalar() ? 1 : 3;
+    if (change.start->size() != numbers || parameter.transform == Transform::PlanePosition)
+      throw InputError({{},
+                        "the start of " + parameter.name + " has " + std::to_string(change.start->size()) + " numbers",
+                        parameter.transform == Transform::PlanePosition ? "planes to start where the capture has them"
+                                                                        : std::to_string(numbers) + " numbers",
+                        ""});
+    if (parameter.transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
+      throw InputError({{}, "the start of " + parameter.name + " is not positive", "a number above 0", ""});
+    theta.segment(parameter.theta_index, numbers) = *change.start;
+    for (const int other : parameter.also) theta[other] = (*change.start)[0];
+    if (parameter.transform == Transform::Direction) parameter.origin = *change.start;
+  }
+  if (change.estimated) parameter.estimated = *change.estimated;
+  if (!change.prior_std) return;
+  parameter.prior_std = *change.prior_std;
+  if (!change.start) return;
+  Parameter alone = parameter;
+  alone.estimated = true;
+  parameter.prior_mean = ParameterSet({std::move(alone)}, theta).to_unconstrained(theta);
+}
+
+}  // namespace
+
+void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
+  VectorX theta = parameters.reference();
+  std::vector<Parameter> list = parameters.parameters();
+  for (const auto& [name, change] : options.parameters) {
+    std::vector<Parameter*> meant;
+    for (Parameter& p : list)
+      if (p.name == name) meant.push_back(&p);
+    // A name alone means those of all sensors, pulls and recordings, but for the modulus of the object's own material.
+    for (Parameter& p : list)
+      if (meant.empty() || name != "youngs_modulus")
+        if (p.name.size() > name.size() && p.name.starts_with(name) &&
+            (p.name[name.size()] == '@' || p.name[name.size()] == '['))
+          meant.push_back(&p);
+    if (meant.empty())
+      throw InputError({{}, "there is no parameter \"" + name + "\" in this recording", "", "see `pliant fit --help`"});
+    for (Parameter* p : meant) change_parameter(*p, change, theta);
+  }
+  parameters = ParameterSet(std::move(list), std::move(theta));
 }
 
 }  // namespace pliant

@@ -22,6 +22,11 @@ std::string parameter_key_help();
 /// Throws InputError for an unknown key (with the nearest known one) or a value of another type.
 void set_fit_option(FitOptions& options, const std::string& assignment);
 
+/// Applies the options' choices of parameters. "range_error" stands for those of all sensors, and so do names without
+/// the "[2]" of a recording. A start with the width of a prior moves the prior there.
+/// Throws InputError for a parameter that is not there, and for a start that does not suit it.
+void apply_overrides(ParameterSet& parameters, const FitOptions& options);
+
 /// Reads a configuration (TOML) over the options. Throws InputError with every problem found and its place.
 void read_fit_options(const std::filesystem::path& path, FitOptions& options);
 

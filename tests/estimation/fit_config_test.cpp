@@ -129,6 +129,47 @@ TEST(FitOptions, ValidateNamesWhatIsOutOfRange) {
   EXPECT_THAT(complaint([](FitOptions& o) { o.solver_tolerance = 1.0; }), HasSubstr("solver_tolerance"));
 }
 
+/// Young's modulus and the range errors of two sensors.
+ParameterSet three_parameters() {
+  std::vector<Parameter> list;
+  list.push_back({"youngs_modulus", "Pa", Transform::Logarithm, theta::youngs_modulus, 1.0, 1.0, 1e9, true});
+  list.push_back({"range_error@left", "m", Transform::Shift, theta::density, 0.01});
+  list.push_back({"range_error@right", "m", Transform::Shift, theta::mass_damping, 0.01});
+  for (Parameter& p : list) p.prior_mean = VectorX::Constant(1, 0.5);
+  return {std::move(list), VectorX::Ones(theta::size(0, 1))};
+}
+
+ParameterSet overridden(const std::vector<std::string>& assignments) {
+  FitOptions options;
+  for (const std::string& assignment : assignments) set_fit_option(options, assignment);
+  ParameterSet parameters = three_parameters();
+  apply_overrides(parameters, options);
+  return parameters;
+}
+
+TEST(Overrides, AStartWithTheWidthOfAPriorMovesThePriorThere) {
+  const ParameterSet p = overridden({"youngs_modulus=5000", "youngs_modulus.prior_std=0.1"});
+  EXPECT_EQ(p.reference()[theta::youngs_modulus], 5000.0);
+  EXPECT_EQ(p.parameters()[0].prior_std, 0.1);
+  EXPECT_DOUBLE_EQ(p.parameters()[0].prior_mean[0], std::log(5000.0));
+}
+
+TEST(Overrides, AStartAloneAndAWidthAloneLeaveThePriorWhereItIs) {
+  for (const char* assignment : {"youngs_modulus=5000", "youngs_modulus.prior_std=0.1"})
+    EXPECT_EQ(overridden({assignment}).parameters()[0].prior_mean[0], 0.5) << assignment;
+}
+
+TEST(Overrides, ANameAloneMeansThatOfEverySensor) {
+  const ParameterSet p = overridden({"range_error.estimate=true", "range_error=0.02", "range_error.prior_std=2"});
+  for (const std::size_t i : {1u, 2u}) {
+    EXPECT_TRUE(p.parameters()[i].estimated);
+    EXPECT_DOUBLE_EQ(p.parameters()[i].prior_mean[0], 2.0);
+  }
+  EXPECT_FALSE(overridden({"range_error@left.estimate=true"}).parameters()[2].estimated);
+}
+
+TEST(Overrides, RefusesWhatIsNotThere) { EXPECT_THROW(overridden({"range_error@middle=0.02"}), InputError); }
+
 FitState some_state() {
   FitState state;
   state.scan = {{100.0, 2.5}, {1000.0, std::numeric_limits<double>::infinity()}, {1.0 / 3.0, 1e-300}};
