@@ -114,9 +114,9 @@ class Fit {
   }
 
   FitOutcome run() {
+    scanned_ = !given_start("youngs_modulus");
+    spread_start();
     outcome_.start_theta = parameters_.reference();
-    if (!options_.parameters.contains("youngs_modulus") || !options_.parameters.at("youngs_modulus").start)
-      scanned_ = true;
     estimate_initial_motion();
     if (scanned_ && !start_from_swing()) scan();
     follow_starts();
@@ -358,6 +358,23 @@ class Fit {
       if (!std::isfinite(cost) || worse == 2) break;
       least = std::min(least, cost);
     }
+  }
+
+  std::optional<double> given_start(const std::string& name) const {
+    const auto change = options_.parameters.find(name);
+    if (change == options_.parameters.end() || !change->second.start) return std::nullopt;
+    return (*change->second.start)[0];
+  }
+
+  /// Moduli of regions and control points begin where the object's own does, but for those that the user has given.
+  void spread_start() {
+    VectorX theta = parameters_.reference();
+    const double own = theta[theta::youngs_modulus];
+    const std::vector<std::string> names = modulus_names(recordings_.front().capture, controls_);
+    for (int k = 0; k < controls_; ++k)
+      relative_moduli_[k] = given_start(names[std::size_t(k)]).value_or(own) / own;
+    set_all_moduli(theta, own);
+    set_reference(theta);
   }
 
   /// The modulus whose vibrations are as fast as those that were seen (Wang 2015, section 6.3), if some were: by points
