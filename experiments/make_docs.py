@@ -275,6 +275,52 @@ def write_beam_plot(figures):
     parts.append(f'<text x="{(left + width - 20) / 2:.0f}" y="{bottom + 34}" text-anchor="middle">time after the release [s]; drop of the tip [mm], '
                  'downwards; dots: recorded, line: simulated</text></svg>')
     BEAM_PLOT.write_text("\n".join(parts) + "\n")
+SILICONE_NAMES = {"silicone-h_e_c": "bar, Ecoflex 00-50", "silicone-h_e_s": "spine, Ecoflex 00-50", "silicone-t_em_c": "twisted bar, Ecoflex 00-50 and Mold Star 15",
+                  "silicone-h_e_c-raw": "bar, range as recorded"}
+
+
+def silicone_ratio(fit):
+    """Of the two moduli of the twisted bar, and its relative deviation."""
+    soft, hard = (fit["parameters"][key] for key in ("youngs_modulus", "youngs_modulus@mold star 15"))
+    deviations = [p["std"] / p["value"] for p in (soft, hard)]
+    known = [c["correlation"] for c in fit["correlations"] if set(c["parameters"]) == {"youngs_modulus", "youngs_modulus@mold star 15"}]
+    variance = sum(d * d for d in deviations) - 2.0 * (known[0] if known else 0.0) * deviations[0] * deviations[1]
+    return hard["value"] / soft["value"], math.sqrt(variance)
+
+
+def silicone():
+    figures = results("silicone")
+    if not figures:
+        return "Not run yet.\n"
+    fits = figures["fits"]
+    rows = []
+    for name, f in fits.items():
+        E, error = f["parameters"]["youngs_modulus"], f["parameters"].get("range_error@lidar")
+        ratio = ""
+        if f["recording"] == "silicone-t_em_c":
+            value, deviation = silicone_ratio(f)
+            ratio = f"{value:.2f} ± {value * deviation:.2f}"
+        rows.append([SILICONE_NAMES[f["recording"]], f"{f['cells']} {'quadratic tetrahedra' if f['element'].startswith('quad') else 'cells'}",
+                     "estimated" if f["pose_is_estimated"] else "as given", f"{E['value'] / 1e3:.0f} ± {E['std'] / 1e3:.0f}", ratio,
+                     f"{1e3 * error['value']:.0f} ± {1e3 * error['std']:.0f}" if error else "", f"{1e3 * f['surface_rms']:.1f}", f"{f['wall_seconds']:.0f}"])
+    E = lambda name: fits[name]["parameters"]["youngs_modulus"]["value"]
+    text = table(["recording", "along its length", "camera's pose", "E [kPa]", "ratio of moduli", "range error [mm]", "points' rms [mm]", "time [s]"], rows)
+    return text + (
+        f"\nPoisson's ratio is taken as {figures['poisson_ratio']:g} and the density as in the recordings. One silicone in two shapes, fitted apart: "
+        f"{E('bar') / 1e3:.0f} and {E('spine') / 1e3:.0f} kPa with the camera's pose estimated, the spine {percent(E('spine') / E('bar') - 1)} of the bar "
+        f"({percent(E('spine-finer') / E('bar-finer') - 1)} on the finer meshes), and the intervals overlap. The published fits of these images have 65 and 162 kPa; "
+        "compression tests of the silicone 153 ± 5 kPa (see the recordings' notes). The camera's pose was found with another model of the bar, so a few degrees of it are left to the fit; "
+        "with the pose as given, stated deviations are too small for what the pose leaves open.\n\n"
+        f"**Meshes**: the bar changes by {percent(E('bar-finer') / E('bar') - 1)} from 20 to 28 cells, and by {percent(E('bar-quadratic') / E('bar') - 1)} with quadratic tetrahedra. The spine, whose necks are "
+        f"7 mm long and 7 mm wide, still changes by {percent(E('spine-finer') / E('spine') - 1)} from 54 to 64 cells and by {percent(E('spine') / E('spine-coarse') - 1)} from 44 to 54: it is not converged. With quadratic tetrahedra of "
+        "less than 19 mm its equilibrium is not found: at the corners of the necks the strain exceeds one, beyond what the corotational law can describe.\n\n"
+        f"**Range**: as recorded, the sensor sees 42 mm into the bar. Begun at 30 mm, the fit finds {1e3 * fits['bar-raw']['parameters']['range_error@lidar']['value']:.0f} mm and {E('bar-raw') / 1e3:.0f} kPa; begun at zero it takes the points for the bar's "
+        "far side and stays in a wrong valley, which its residuals show.\n\n"
+        "**The twisted bar** shows the ratio of the two moduli alone; the softer one is held at 155 kPa ± 10 %. The notes of the recording have a ratio of 2.4 to 2.8. On 32 cells the fit agrees; on 24 it is above, with wider error bars; on 40 cells "
+        "it ends in a wrong valley, which its residuals show.\n"
+        f"\nMeasured on {machine(figures)}.\n")
+
+
 def rest_meshes():
     figures = results("rest-meshes")
     if not figures:
@@ -511,6 +557,8 @@ SECTIONS = [
     ("A silicone beam let go", "silicone-beam",
      "A real cantilever of Dragon Skin 10 (30 x 30 x 100 mm, Dubied et al.), held straight, released, and followed by motion capture at 100 Hz; twice under its own "
      "weight and twice with 0.51 N hung from its tip. Fitted under its own weight; what the weight does is predicted.", silicone_beam),
+    ("Silicone bars at rest", "silicone",
+     "Real: one depth image each, by a lidar camera, of bars that hang from a clamp or are twisted by half a turn (recordings of Arnavaz et al. 2023).", silicone),
     ("The bouncing torus", "torus",
      "Weiss et al. 2020, figure 8: one camera of 50 x 50 pixels, 40 frames, Young's modulus unknown and all else known. Starts are "
      "log-uniform between a tenth and ten times the truth of 5000 Pa.", torus),
