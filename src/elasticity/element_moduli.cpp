@@ -1,5 +1,8 @@
 #include "elasticity/element_moduli.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace pliant {
 
 void ElementModuli::set_parameters(const VectorX& parameters) {
@@ -30,6 +33,29 @@ void ElementModuli::end_adjoint(VectorX& theta_bar) const {
   }
   const VectorX bar = body_->modulus.weights.transpose() * log_bar_;
   for (int k = 0; k < m; ++k) theta_bar[theta::modulus(k, m, theta_bar.size())] += bar[k] / controls_[k];
+}
+
+ModulusStatistics modulus_statistics(const std::shared_ptr<const Body>& body, const VectorX& theta,
+                                     const MatrixX& log_covariance) {
+  ElementModuli moduli(body);
+  moduli.set_parameters(theta);
+  const int elements = body->element_count(), controls = body->modulus.controls;
+  ModulusStatistics s;
+  s.value.resize(elements);
+  s.std = VectorX::Zero(elements);
+  VectorX by_log = VectorX::Zero(controls);  // of the mean
+  const double total = body->volume();
+  for (int e = 0; e < elements; ++e) {
+    s.value[e] = moduli[e];
+    const VectorX weights = controls == 1 ? VectorX::Ones(1) : VectorX(body->modulus.weights.row(e).transpose());
+    const double share = body->element_volume[std::size_t(e)] / total;
+    s.mean += share * s.value[e];
+    by_log += share * s.value[e] * weights;
+    if (log_covariance.size() > 0)
+      s.std[e] = s.value[e] * std::sqrt(std::max(0.0, weights.dot(log_covariance * weights)));
+  }
+  if (log_covariance.size() > 0) s.mean_std = std::sqrt(std::max(0.0, by_log.dot(log_covariance * by_log)));
+  return s;
 }
 
 }  // namespace pliant

@@ -31,4 +31,14 @@ class ElementModuli {
   double uniform_change_ = 0.0;
 };
 
+/// Young's modulus over a body and how sure it is, to first order in the deviations.
+struct ModulusStatistics {
+  VectorX value, std;                 ///< of each element [Pa]
+  double mean = 0.0, mean_std = 0.0;  ///< weighted by volume [Pa]
+};
+
+/// @param log_covariance  of ln E_k of the control moduli; m x m, or empty: nothing is known, deviations are zero
+ModulusStatistics modulus_statistics(const std::shared_ptr<const Body>& body, const VectorX& theta,
+                                     const MatrixX& log_covariance);
+
 }  // namespace pliant

@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* modulus_field = "youngs_modulus [Pa]";
+constexpr const char* modulus_std_field = "youngs_modulus_std [Pa]";
 constexpr const char* ratio_field = "poisson_ratio";
 constexpr const char* fill_field = "fill";
 
@@ -81,6 +82,7 @@ void write_volume(const fs::path& path, const ModelVolume& volume) {
       grid.connectivity.push_back(point);
   grid.cell_data = {
       {modulus_field, 1, volume.youngs_modulus}, {ratio_field, 1, volume.poisson_ratio}, {fill_field, 1, volume.fill}};
+  if (!volume.youngs_modulus_std.empty()) grid.cell_data.push_back({modulus_std_field, 1, volume.youngs_modulus_std});
   write_vtu(path, grid);
 }
 
@@ -221,6 +223,8 @@ class Reader {
       for (const int point : from_vtk_order(grid.kind, std::span(grid.connectivity).subspan(i, points)))
         volume.connectivity.push_back(point);
     volume.youngs_modulus = field(path, grid, modulus_field);
+    if (std::ranges::any_of(grid.cell_data, [](const auto& data) { return data.name == modulus_std_field; }))
+      volume.youngs_modulus_std = field(path, grid, modulus_std_field);
     volume.poisson_ratio = field(path, grid, ratio_field);
     volume.fill = field(path, grid, fill_field);
   }

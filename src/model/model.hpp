@@ -15,10 +15,11 @@ namespace pliant {
 struct ModelVolume {
   Points nodes;  ///< [m], n x 3, reference shape
   VtuCell kind = VtuCell::Hexahedron;
-  std::vector<int> connectivity;       ///< points of each cell, in this program's order (see to_vtk_order)
-  std::vector<double> youngs_modulus;  ///< [Pa], one a cell
-  std::vector<double> poisson_ratio;   ///< one a cell
-  std::vector<double> fill;            ///< part of the cell that the object fills, one a cell
+  std::vector<int> connectivity;           ///< points of each cell, in this program's order (see to_vtk_order)
+  std::vector<double> youngs_modulus;      ///< [Pa], one a cell
+  std::vector<double> youngs_modulus_std;  ///< one standard deviation [Pa], one a cell; empty: not known
+  std::vector<double> poisson_ratio;       ///< one a cell
+  std::vector<double> fill;                ///< part of the cell that the object fills, one a cell
 };
 
 /// A fitted object, ready to be simulated. SI units, the capture's world frame.

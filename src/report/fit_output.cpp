@@ -8,6 +8,7 @@
 
 #include "base/files.hpp"
 #include "elasticity/corotated.hpp"
+#include "elasticity/element_moduli.hpp"
 #include "model/vtu.hpp"
 #include "report/gallery.hpp"
 #include "report/report.hpp"
@@ -252,6 +253,54 @@ Capture as_capture(const Model& model) {
   return capture;
 }
 
+/// Of ln E of the first recording's control moduli; zero where one is not estimated, empty where nothing is known.
+MatrixX log_modulus_covariance(const FitOutcome& outcome) {
+  if (outcome.covariance.size() == 0) return {};
+  const int controls = outcome.recordings.front().discretisation.body->modulus.controls;
+  const Eigen::Index size = outcome.recordings.front().theta.size();
+  std::vector<int> coordinate(std::size_t(controls), -1);
+  int at = 0;
+  for (const Parameter& p : outcome.parameters.parameters()) {
+    if (!p.estimated) continue;
+    for (int k = 0; k < controls; ++k)
+      if (p.theta_index == theta::modulus(k, controls, size)) coordinate[std::size_t(k)] = at;
+    at += p.dimension();
+  }
+  MatrixX covariance = MatrixX::Zero(controls, controls);
+  for (int i = 0; i < controls; ++i)
+    for (int j = 0; j < controls; ++j)
+      if (const int a = coordinate[std::size_t(i)], b = coordinate[std::size_t(j)]; a >= 0 && b >= 0)
+        covariance(i, j) = outcome.covariance(a, b);
+  return covariance;
+}
+
+ModulusStatistics modulus_statistics(const FitOutcome& outcome) {
+  const RecordingOutcome& first = outcome.recordings.front();
+  return modulus_statistics(first.discretisation.body, first.theta, log_modulus_covariance(outcome));
+}
+
+/// The field over the object, and its mean where the control points' parameters leave that out.
+void add_modulus_field(Result& result, const FitOutcome& outcome) {
+  const RecordingOutcome& first = outcome.recordings.front();
+  const int controls = first.discretisation.body->modulus.controls;
+  if (controls == 1) return;
+  const MatrixX covariance = log_modulus_covariance(outcome);
+  FieldResult field{"youngs_modulus", {}, "model.vtu"};
+  const std::vector<Vector3>& points = first.discretisation.control_points;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double value = first.theta[theta::modulus(int(k), controls, first.theta.size())];
+    ControlPoint point{points[k], value, {}};
+    if (covariance.size() > 0) point.std = value * std::sqrt(covariance(Eigen::Index(k), Eigen::Index(k)));
+    field.control_points.push_back(point);
+  }
+  result.fields.push_back(std::move(field));
+  if (result.find("youngs_modulus")) return;
+  const ModulusStatistics statistics = modulus_statistics(outcome);
+  ParameterResult mean{"youngs_modulus", statistics.mean, "Pa", {}, {}, true};
+  if (covariance.size() > 0) mean.std = statistics.mean_std;
+  result.parameters.insert(result.parameters.begin(), std::move(mean));
+}
+
 }  // namespace
 
 SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
@@ -290,6 +339,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
     }
     result.parameters.push_back(std::move(r));
   }
+  add_modulus_field(result, outcome);
   result.error = surface_errors(outcome.evaluation).error;
   for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
     result.recordings.push_back({recordings[r].capture.name, recordings[r].capture.sha256,
@@ -320,10 +370,8 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   Model model;
   model.name = capture.name;
   model.surface = *capture.surface;
-  ElementModuli modulus(d.body);
-  modulus.set_parameters(t);
-  for (int e = 0; e < d.body->element_count(); ++e)
-    model.youngs_modulus += modulus[e] * d.body->element_volume[std::size_t(e)] / d.body->volume();
+  const ModulusStatistics modulus = modulus_statistics(outcome);
+  model.youngs_modulus = modulus.mean;
   model.poisson_ratio = t[theta::poissons_ratio];
   model.mass_damping = t[theta::mass_damping];
   model.stiffness_damping = t[theta::stiffness_damping];
@@ -362,7 +410,8 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   model.volume.kind = vtu_cell(d.body->kind);
   model.volume.connectivity = d.body->connectivity;
   for (int e = 0; e < d.body->element_count(); ++e) {
-    model.volume.youngs_modulus.push_back(modulus[e]);
+    model.volume.youngs_modulus.push_back(modulus.value[e]);
+    if (outcome.covariance.size() > 0) model.volume.youngs_modulus_std.push_back(modulus.std[e]);
     model.volume.poisson_ratio.push_back(model.poisson_ratio);
     const bool is_cell = d.body->kind == ElementKind::Hexahedron;
     model.volume.fill.push_back(is_cell ? d.body->element_volume[std::size_t(e)] / std::pow(model.cell_size, 3) : 1.0);

@@ -32,6 +32,7 @@ Model full_model() {
   m.volume.nodes = Points::Random(12, 3);
   m.volume.connectivity = {0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 8, 9, 10, 11};
   m.volume.youngs_modulus = {500, 680}, m.volume.poisson_ratio = {0.3, 0.4}, m.volume.fill = {1.0, 0.25};
+  m.volume.youngs_modulus_std = {20, 35};
   return m;
 }
 
@@ -64,6 +65,7 @@ TEST(Model, ComesBackAsItWasSaved) {
   EXPECT_EQ(read.volume.kind, m.volume.kind);
   EXPECT_EQ(read.volume.connectivity, m.volume.connectivity);
   EXPECT_EQ(read.volume.youngs_modulus, m.volume.youngs_modulus);
+  EXPECT_EQ(read.volume.youngs_modulus_std, m.volume.youngs_modulus_std);
   EXPECT_EQ(read.volume.poisson_ratio, m.volume.poisson_ratio);
   EXPECT_EQ(read.volume.fill, m.volume.fill);
 }

@@ -1,0 +1,69 @@
+#include "elasticity/element_moduli.hpp"
+
+#include <gtest/gtest.h>
+
+#include "elasticity/modulus_field.hpp"
+#include "support/bodies.hpp"
+
+namespace pliant {
+namespace {
+
+struct TwoControls {
+  std::shared_ptr<const Body> body;
+  VectorX theta = VectorX::Zero(theta::size(0, 2));
+  MatrixX covariance = MatrixX::Zero(2, 2);
+
+  TwoControls() {
+    Box box;
+    box.extend(Vector3(0, 0, 0));
+    box.extend(Vector3(1.0, 0.2, 0.2));
+    Body of = make_body(make_tet_box(box, {8, 1, 1}, false));
+    of.modulus = linear_field(of, Vector3::UnitX(), 2).field;
+    body = std::make_shared<Body>(std::move(of));
+    set(0, 2e4), set(1, 5e5);
+    covariance << 0.04, -0.01, -0.01, 0.09;
+  }
+  void set(int control, double modulus) { theta[theta::modulus(control, 2, theta.size())] = modulus; }
+  ModulusStatistics statistics() const { return modulus_statistics(body, theta, covariance); }
+};
+
+TEST(ModulusStatistics, DeviationsFollowTheFieldsDerivatives) {
+  TwoControls scene;
+  const ModulusStatistics s = scene.statistics();
+  constexpr double step = 1e-5;
+  MatrixX by_log(scene.body->element_count() + 1, 2);
+  for (int k = 0; k < 2; ++k) {
+    const double modulus = scene.theta[theta::modulus(k, 2, scene.theta.size())];
+    scene.set(k, modulus * std::exp(step));
+    const ModulusStatistics above = scene.statistics();
+    scene.set(k, modulus * std::exp(-step));
+    const ModulusStatistics below = scene.statistics();
+    scene.set(k, modulus);
+    by_log.col(k) << (above.value - below.value) / (2 * step), (above.mean - below.mean) / (2 * step);
+  }
+  const VectorX variance = (by_log * scene.covariance * by_log.transpose()).diagonal();
+  for (int e = 0; e < scene.body->element_count(); ++e)
+    EXPECT_NEAR(s.std[e], std::sqrt(variance[e]), 1e-6 * s.value[e]) << e;
+  EXPECT_NEAR(s.mean_std, std::sqrt(variance[scene.body->element_count()]), 1e-6 * s.mean);
+  EXPECT_GT(s.mean, s.value.minCoeff());
+  EXPECT_LT(s.mean, s.value.maxCoeff());
+}
+
+TEST(ModulusStatistics, OneModulusIsItsOwnMean) {
+  const auto body = test::box_body(Vector3(0.3, 0.2, 0.2), 0.1);
+  VectorX theta = VectorX::Zero(theta::size(0, 1));
+  theta[theta::youngs_modulus] = 3e4;
+  const ModulusStatistics s = modulus_statistics(body, theta, MatrixX::Constant(1, 1, 0.01));
+  EXPECT_NEAR(s.mean, 3e4, 1e-8);
+  EXPECT_NEAR(s.mean_std, 3e3, 1e-8);
+  EXPECT_NEAR(s.std.minCoeff(), 3e3, 1e-8);
+}
+
+TEST(ModulusStatistics, WithoutACovarianceNothingIsSaidOfDeviations) {
+  TwoControls scene;
+  scene.covariance.resize(0, 0);
+  EXPECT_EQ(scene.statistics().std.maxCoeff(), 0.0);
+}
+
+}  // namespace
+}  // namespace pliant
