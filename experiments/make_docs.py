@@ -306,7 +306,7 @@ def silicone():
     E = lambda name: fits[name]["parameters"]["youngs_modulus"]["value"]
     text = table(["recording", "along its length", "camera's pose", "E [kPa]", "ratio of moduli", "range error [mm]", "points' rms [mm]", "time [s]"], rows)
     return text + (
-        f"\nPoisson's ratio is taken as {figures['poisson_ratio']:g} and the density as in the recordings. One silicone in two shapes, fitted apart: "
+        f"\nA point's distance counts as at most 5 % of the object's length in its rms. Poisson's ratio is taken as {figures['poisson_ratio']:g} and the density as in the recordings. One silicone in two shapes, fitted apart: "
         f"{E('bar') / 1e3:.0f} and {E('spine') / 1e3:.0f} kPa with the camera's pose estimated, the spine {percent(E('spine') / E('bar') - 1)} of the bar "
         f"({percent(E('spine-finer') / E('bar-finer') - 1)} on the finer meshes), and the intervals overlap. The published fits of these images have 65 and 162 kPa; "
         "compression tests of the silicone 153 ± 5 kPa (see the recordings' notes). The camera's pose was found with another model of the bar, so a few degrees of it are left to the fit; "

@@ -47,7 +47,7 @@ class Panel:
                           f'<text transform="translate({self.left - 46} {middle:.0f}) rotate(-90)" text-anchor="middle">{y_label}</text>')
 
     def line(self, points, colour, label, number, dashed=False):
-        """A curve, and its name in the upper right corner; points that are not positive end a stretch of it."""
+        """A curve, and its name in the lower right corner; points that are not positive end a stretch of it."""
         stretches, dash = [[]], ' stroke-dasharray="6 4"' if dashed else ""
         for x, y in points:
             if y is None or y <= 0:
@@ -57,7 +57,7 @@ class Panel:
                 stretches[-1].append(f"{self.x(x):.1f},{self.y(at_floor):.1f}")
         for stretch in filter(None, stretches):
             self.parts.append(f'<polyline points="{" ".join(stretch)}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>')
-        x, y = self.left + self.width - 215, self.top + 16 + 17 * number
+        x, y = self.left + self.width - 215, self.top + self.height - 12 - 17 * number
         self.parts.append(f'<line x1="{x}" x2="{x + 26}" y1="{y - 4}" y2="{y - 4}" stroke="{colour}" stroke-width="2"{dash}/>'
                           f'<text x="{x + 32}" y="{y}">{label}</text>')
 

@@ -19,6 +19,7 @@ h2{font-size:1.15rem;margin:2.4rem 0 .7rem;font-weight:650}
 .card{background:var(--card);border:1px solid var(--grid);border-radius:10px;padding:14px 16px}
 .card .name{color:var(--muted);font-size:.85rem}
 .card .value{font-size:1.06rem;white-space:nowrap;font-weight:620;margin:.15rem 0 .5rem;font-variant-numeric:tabular-nums}
+.card .value.vector{font-size:.92rem;white-space:normal}
 .card .from{color:var(--muted);font-size:.8rem}
 .card svg{display:block;width:100%;height:16px;margin-bottom:.35rem}
 ul.words{margin:.2rem 0 0;padding-left:1.15rem}ul.words li{margin:.3rem 0}

@@ -62,8 +62,9 @@ std::string error_bar(double value, double std) {
 
 std::string card(const ParameterResult& p) {
   std::string html = "<div class=\"card\"><div class=\"name\">" + escape_html(spoken_name(p.name)) + "</div>";
-  html += "<div class=\"value\">" + escape_html(value_text(p.value, p.std, p.unit)) + "</div>";
   const auto value = scalar(p.value), std = scalar(p.std);
+  html += std::string("<div class=\"value") + (value ? "" : " vector") + "\">" +
+          escape_html(value_text(p.value, p.std, p.unit)) + "</div>";
   if (value && std) html += error_bar(*value, *std);
   std::string from;
   if (value && std && *value != 0.0) from = "± " + readable(100.0 * *std / std::abs(*value), 2) + " %";
