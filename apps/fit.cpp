@@ -29,7 +29,7 @@ struct Arguments {
   std::vector<std::string> captures;
   std::string out, config, held_out;
   std::vector<std::string> settings;
-  int threads = 0;
+  int threads = 0, refine = 0;
   std::optional<unsigned> seed;
   bool resume = false;
 };
@@ -99,6 +99,7 @@ FitOptions read_options(const Arguments& arguments) {
   FitOptions options;
   if (!arguments.config.empty()) read_fit_options(arguments.config, options);
   for (const std::string& assignment : arguments.settings) set_fit_option(options, assignment);
+  if (arguments.refine > 0) options.refine = arguments.refine;
   if (arguments.seed) options.seed = *arguments.seed;
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{arguments.config}, wrong, "", "see `pliant fit --help`"});
@@ -112,7 +113,9 @@ void print_result(const Result& result, const FitOutcome& outcome, const fs::pat
     if (const auto* value = std::get_if<double>(&p.value)) {
       std::optional<double> std;
       if (p.std) std = std::get<double>(*p.std);
-      std::cout << "  " << spoken_name(p.name) << ": " << value_with_uncertainty(*value, std, p.unit) << "\n";
+      std::cout << "  " << spoken_name(p.name) << ": " << value_with_uncertainty(*value, std, p.unit);
+      if (p.extrapolated) std::cout << "; " << discretisation_words(p);
+      std::cout << "\n";
     } else if (const auto* vector = std::get_if<Vector3>(&p.value)) {
       std::cout << "  " << spoken_name(p.name) << ": " << vector->transpose() << " " << p.unit << "\n";
     } else if (const auto* plane = std::get_if<PlaneValue>(&p.value)) {
@@ -259,7 +262,15 @@ void add_fit(CLI::App& app, int& exit_code) {
       ->type_name("CAPTURE");
   command->add_option("--out,-o", arguments->out, "folder for the result")->required()->type_name("DIR");
   command->add_option("--config", arguments->config, "choices (TOML); none is needed")->type_name("FILE");
-  command->add_option("--set", arguments->settings, "one choice; may be given many times")->type_name("KEY=VALUE");
+  command->add_option("--set", arguments->settings, "one choice; may be given many times")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--refine", arguments->refine,
+                   "make the estimate at so many resolutions of mesh and time step (2, or 3: several times the work), "
+                   "take it to the limit, and state what error is left")
+      ->check(CLI::Range(1, 3))
+      ->type_name("N");
   command->add_option("--threads", arguments->threads, "most threads to use; all processors where left out")
       ->check(CLI::PositiveNumber);
   command->add_option("--seed", arguments->seed, "of everything random; the same seed gives the same result");

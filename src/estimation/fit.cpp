@@ -13,10 +13,9 @@
 #include <tuple>
 
 #include "base/error.hpp"
-#include "capture/find_plane.hpp"
-#include "estimation/fit_config.hpp"
 #include "estimation/modal_start.hpp"
 #include "estimation/notes.hpp"
+#include "estimation/recordings.hpp"
 #include "estimation/swing.hpp"
 
 namespace pliant {
@@ -33,85 +32,18 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Puts planes that are only roughly known where the depth images show them. Returns the numbers of those found.
-std::vector<int> take_planes_from_images(Capture& capture) {
-  std::vector<int> found;
-  for (int i = 0; i < int(capture.planes.size()); ++i) {
-    Plane& plane = capture.planes[std::size_t(i)];
-    if (plane.known) continue;
-    const auto seen = find_plane(capture, plane);
-    if (!seen) continue;
-    plane.point = seen->point;
-    plane.normal = seen->normal;
-    found.push_back(i);
-  }
-  return found;
-}
-
-/// Thousands of readings fix a visible plane; what is left is the sensor's bias and the softness of contact, about this
-/// part of the object's size, and as many radians.
-constexpr double seen_plane_std = 0.003;
-
-void trust_planes_seen(ParameterSet& parameters, const std::vector<int>& planes) {
-  std::vector<Parameter> list = parameters.parameters();
-  for (Parameter& p : list)
-    for (const int plane : planes)
-      if (p.theta_index == theta::plane_point(plane)) p.prior_std = seen_plane_std;
-  parameters = ParameterSet(std::move(list), parameters.reference());
-}
-
-/// What all recordings of one object have in common.
-bool is_material(const Parameter& p) {
-  return p.name.starts_with("youngs_modulus") || p.name == "poisson_ratio" || p.name == "mass_damping" ||
-         p.name == "stiffness_damping" || p.name == "density";
-}
-
-/// The recordings' parameters side by side, those of the material once.
-ParameterSet joined(const std::vector<ParameterSet>& sets) {
-  std::vector<Parameter> list;
-  Eigen::Index size = 0;
-  for (const ParameterSet& set : sets) size += set.reference().size();
-  VectorX theta(size);
-  int offset = 0;
-  for (std::size_t r = 0; r < sets.size(); ++r) {
-    theta.segment(offset, sets[r].reference().size()) = sets[r].reference();
-    for (Parameter p : sets[r].parameters()) {
-      p.theta_index += offset;
-      const auto same = std::ranges::find(list, p.name, &Parameter::name);
-      if (is_material(p) && same != list.end()) {
-        same->also.push_back(p.theta_index);
-        if (p.name != "density") theta[p.theta_index] = theta[same->theta_index];
-        continue;
-      }
-      if (r > 0) p.name += "[" + std::to_string(r + 1) + "]";
-      list.push_back(std::move(p));
-    }
-    offset += int(sets[r].reference().size());
-  }
-  return {std::move(list), std::move(theta)};
-}
-
 class Fit {
  public:
   Fit(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, FitState state)
-      : options_(options), monitor_(monitor), state_(std::move(state)) {
-    std::vector<ParameterSet> sets;
-    for (RecordedCapture& r : recorded) {
-      recordings_.emplace_back();
-      sets.push_back(make_ready(std::move(r), recordings_.back()));
-    }
-    relative_moduli_.setOnes(controls_);
-    parameters_ = joined(sets);
-    apply_overrides(parameters_, options_);
-    int offset = 0;
-    for (std::size_t r = 0; r < sets.size(); ++r) {
-      Recording& recording = recordings_[r];
-      recording.theta_offset = offset;
-      recording.theta_size = int(sets[r].reference().size());
-      offset += recording.theta_size;
-      make_levels(recording);
-    }
-  }
+      : options_(options),
+        monitor_(monitor),
+        state_(std::move(state)),
+        recordings_(std::move(recorded), options_, outcome_.notes),
+        parameters_(recordings_.parameters()),
+        controls_(recordings_.controls()),
+        relative_moduli_(VectorX::Ones(controls_)),
+        coarse_(recordings_.grid(options_.coarse_cells, options_.steps)),
+        fine_(recordings_.grid(options_.cells, options_.steps)) {}
 
   FitOutcome run() {
     scanned_ = !given_start("youngs_modulus");
@@ -120,137 +52,15 @@ class Fit {
     estimate_initial_motion();
     if (scanned_ && !start_from_swing()) scan();
     follow_starts();
-    refine();
+    estimate();
     return std::move(outcome_);
   }
 
  private:
-  /// One of the recordings, discretised.
-  struct Recording {
-    Capture capture;
-    TrackedPoints tracked;
-    std::shared_ptr<const std::vector<FrameObservations>> observations;
-    std::shared_ptr<const SignedDistance> distance;
-    double size = 0.0;
-    Discretisation coarse, fine;
-    int last_frame = 0;
-    int theta_offset = 0, theta_size = 0;
-
-    VectorX own(const VectorX& theta) const { return theta.segment(theta_offset, theta_size); }
-    bool is_released() const { return fine.simulation.pulls > 0; }
-    /// Part of the recording. A flying object shows no stiffness in its first third; one that swings shows it at once.
-    int horizon(double part) const {
-      if (capture.is_static) return last_frame;
-      const int least = is_released() ? std::min(last_frame, 10) : std::max(1, last_frame / 3);
-      return std::max(least, int(part * last_frame));
-    }
-  };
-
-  static void require_fittable(const Capture& capture) {
-    const auto refuse = [&](const std::string& found, const std::string& advice) {
-      throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
-    };
-    if (!capture.surface) refuse("there is no scan of the object at rest", "add [object] surface");
-    if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty())
-      refuse("there are no depth cameras, no clouds and no markers", "");
-    if (capture.is_static && capture.fixed.empty() && capture.planes.empty())
-      refuse("the recording is static, but nothing holds the object",
-             "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
-    if (capture.shape_is == ShapeIs::Static)
-      refuse("the scan was taken sagging (shape_is = \"static\")",
-             "scan the object free of load; load-free shapes are not estimated in this version");
-    if (capture.initial.released && capture.fixed.empty())
-      refuse("the object is released from a held, deformed pose, and nothing holds it afterwards",
-             "add the [[fixed]] region where it stays held");
-    if (!capture.is_static && capture.frame_count() - capture.start_frame < 2)
-      refuse("fewer than two frames follow start_frame", "record longer");
-  }
-
-  /// Everything of a recording that needs no parameters; returns those.
-  ParameterSet make_ready(RecordedCapture recorded, Recording& recording) {
-    recording.capture = std::move(recorded.capture);
-    Capture& capture = recording.capture;
-    require_fittable(capture);
-    const std::vector<int> planes_seen = take_planes_from_images(capture);
-    for (const int plane : planes_seen)
-      outcome_.notes.push_back(
-          "Plane " + std::to_string(plane + 1) +
-          " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
-    recording.tracked = tracked_points(capture);
-    recording.observations = std::make_shared<std::vector<FrameObservations>>(
-        frame_observations(capture, recorded.observed, recording.tracked));
-    if (recording.observations->empty())
-      throw InputError({{capture.file},
-                        "no frame shows any point of the object",
-                        "depth images or clouds that see it",
-                        "run `pliant check` on the capture to see what the cameras saw"});
-    const int controls = capture.regions.empty() ? options_.control_points : int(capture.regions.size()) + 1;
-    if (recordings_.size() > 1 && controls != controls_)
-      throw InputError({{capture.file},
-                        "the object has " + std::to_string(capture.regions.size()) + " regions",
-                        "those of the first recording, " + std::to_string(controls_ - 1),
-                        "name the same materials in every recording of the object"});
-    controls_ = controls;
-    recording.size = object_size(capture);
-    ParameterSet parameters =
-        default_parameters(capture, enclosed_volume(*capture.surface), controls_, pull_count(capture, resolution(0.0)));
-    trust_planes_seen(parameters, planes_seen);
-    return parameters;
-  }
-
-  double band() const { return std::max(options_.wide_band, options_.fine_band) * 1.25; }
-
-  Resolution resolution(double cells) const {
-    Resolution r;
-    r.element = options_.element;
-    r.field = {options_.control_points, options_.control_weights};
-    r.cells = cells;
-    r.steps = options_.steps;
-    r.pulls = options_.pull_points;
-    r.band = band();
-    return r;
-  }
-
-  void make_levels(Recording& recording) const {
-    recording.distance = capture_distance(recording.capture, band());
-    recording.coarse = make_level(recording, options_.coarse_cells);
-    recording.fine = make_level(recording, options_.cells);
-    recording.last_frame =
-        std::min(int(recording.fine.simulation.times.size()) - 1, recording.observations->back().frame);
-  }
-
-  Discretisation make_level(const Recording& recording, double cells) const {
-    SimulationOptions settings;
-    settings.newmark_theta = options_.newmark_theta;
-    settings.solver.kind = options_.solver;
-    settings.solver.tolerance = options_.solver_tolerance;
-    settings.hold_strongly = options_.hold_strongly;
-    settings.integrator = options_.integrator;
-    return discretise(recording.capture, recording.distance, resolution(cells), recording.own(parameters_.reference()),
-                      settings, recording.tracked.rest);
-  }
-
-  enum class Level { Coarse, Fine };
-
-  /// @param last_frame  of each recording
-  template <class LastFrame>
-  Objective make_objective(Level level, const ParameterSet& parameters, double band, LastFrame&& last_frame) const {
-    std::vector<ObservedMotion> motions;
-    for (const Recording& r : recordings_) {
-      ObjectiveOptions o;
-      o.outlier_scale = band * r.size;
-      o.last_frame = std::min(r.last_frame, last_frame(r));
-      const Discretisation& d = level == Level::Coarse ? r.coarse : r.fine;
-      motions.push_back({d.mismatch, d.body, d.simulation, r.observations, o});
-    }
-    return {std::move(motions), parameters};
-  }
   static int to_the_end(const Recording& recording) { return recording.last_frame; }
 
   /// Swings out of step are as wrong as any other: the valley about the truth narrows as more of them are seen.
-  bool swings() const {
-    return std::ranges::any_of(recordings_, [](const Recording& r) { return r.is_released(); });
-  }
+  bool swings() const { return recordings_.any_released(); }
   std::vector<double> growing_horizon() const {
     return swings() ? std::vector{0.12, 0.25, 0.5, 1.0, 1.0} : std::vector{0.6, 1.0, 1.0};
   }
@@ -258,16 +68,8 @@ class Fit {
   std::vector<double> fine_horizons() const {
     return swings() ? std::vector{0.25, 0.5, 1.0, 1.0} : std::vector{1.0, 1.0};
   }
-  bool is_static() const {
-    return std::ranges::all_of(recordings_, [](const Recording& r) { return r.capture.is_static; });
-  }
   void set_all_moduli(VectorX& theta, double youngs_modulus) const {
-    for (const Recording& r : recordings_) {
-      VectorX own = r.own(theta);
-      for (int k = 0; k < controls_; ++k)
-        own[theta::modulus(k, controls_, own.size())] = youngs_modulus * relative_moduli_[k];
-      theta.segment(r.theta_offset, r.theta_size) = own;
-    }
+    recordings_.set_moduli(theta, youngs_modulus * relative_moduli_);
   }
   /// The same parameters at another theta, none estimated.
   ParameterSet fixed_at(const VectorX& theta) const {
@@ -283,6 +85,7 @@ class Fit {
   bool interrupted() const { return monitor_.interrupted && monitor_.interrupted(); }
 
   void emit(FitEvent event) {
+    event.fraction_done /= all_work();
     const std::lock_guard lock(mutex_);
     if (monitor_.on_event) monitor_.on_event(event);
     outcome_.history.push_back(std::move(event));
@@ -332,7 +135,7 @@ class Fit {
     for (const int part : {8, 4}) {
       // The pose of a released object shows in the frames before, a velocity only after.
       const auto horizon = [&](const Recording& r) { return r.is_released() ? 0 : std::max(2, r.last_frame / part); };
-      Objective objective = make_objective(Level::Coarse, motion, options_.wide_band, horizon);
+      Objective objective = recordings_.objective(coarse_, motion, options_.wide_band, horizon);
       const OptimiserSummary s = optimise(objective, start_of(motion), "motion", 0, 12, counter, 0.0, 0.05);
       if (s.succeeded) motion.set_reference(motion.to_theta(s.p));
       if (interrupted()) return;
@@ -371,8 +174,7 @@ class Fit {
     VectorX theta = parameters_.reference();
     const double own = theta[theta::youngs_modulus];
     const std::vector<std::string> names = modulus_names(recordings_.front().capture, controls_);
-    for (int k = 0; k < controls_; ++k)
-      relative_moduli_[k] = given_start(names[std::size_t(k)]).value_or(own) / own;
+    for (int k = 0; k < controls_; ++k) relative_moduli_[k] = given_start(names[std::size_t(k)]).value_or(own) / own;
     set_all_moduli(theta, own);
     set_reference(theta);
   }
@@ -405,9 +207,10 @@ class Fit {
 
   /// Takes over moduli and, where they show, dampings.
   bool find_swing() {
-    for (const Recording& r : recordings_) {
+    for (std::size_t i = 0; i < recordings_.all().size(); ++i) {
+      const Recording& r = recordings_.all()[i];
       if (r.capture.is_static || r.capture.fixed.empty()) continue;
-      const Discretisation& d = r.coarse;
+      const Discretisation& d = coarse_.recording[i];
       const std::vector<int> held = held_nodes(*d.body, d.simulation.holds);
       if (held.size() < 3) continue;
       VectorX theta = parameters_.reference();
@@ -470,14 +273,14 @@ class Fit {
         set_all_moduli(trial, stress * std::pow(10.0, double(i) / per_decade));
         state_.scan[std::size_t(i)] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
         if (interrupted()) return;
-        Objective objective = make_objective(
-            Level::Coarse, fixed_at(trial), options_.wide_band,
+        Objective objective = recordings_.objective(
+            coarse_, fixed_at(trial), options_.wide_band,
             [&](const Recording& r) { return swings() ? r.horizon(growing_horizon().front()) : r.last_frame; });
         const CostEvaluation e = objective.evaluate(VectorX(0));
         if (e.succeeded) state_.scan[std::size_t(i)].second = e.cost;
         emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
       };
-      if (is_static())
+      if (recordings_.all_static())
         scan_downwards(count, try_value);
       else
         tbb::parallel_for(0, count, try_value, tbb::simple_partitioner());
@@ -550,8 +353,8 @@ class Fit {
     for (const double part : growing_horizon()) {
       const bool last = part == 1.0 && !first;
       const double from = 0.15 + 0.3 * (part < 1.0 ? 0.0 : 0.4);
-      Objective objective = make_objective(Level::Coarse, parameters, options_.wide_band,
-                                           [&](const Recording& r) { return r.horizon(part); });
+      Objective objective = recordings_.objective(coarse_, parameters, options_.wide_band,
+                                                  [&](const Recording& r) { return r.horizon(part); });
       const OptimiserSummary s =
           optimise(objective, start_of(parameters), "coarse", index, last ? 10 : 5, counter, from, from + 0.15);
       start.iterations += s.iterations;
@@ -573,40 +376,56 @@ class Fit {
     return start;
   }
 
-  void refine() {
-    VectorX theta = parameters_.reference();
-    const auto best = std::min_element(outcome_.starts.begin(), outcome_.starts.end(),
-                                       [](const FitStart& a, const FitStart& b) { return a.cost < b.cost; });
-    const int index = best == outcome_.starts.end() ? 0 : int(best - outcome_.starts.begin());
-    if (best != outcome_.starts.end() && std::isfinite(best->cost)) theta = best->final;
+  /// One of the stages on the full grid.
+  struct Stage {
+    const char* name = "";
+    double horizon = 1.0, band = 0.0;
+    int iterations = 0;
+    double from = 0.0, to = 1.0;  // of what is done
+  };
+
+  std::vector<Stage> fine_stages() const {
+    std::vector<Stage> stages;
+    const std::vector<double> horizons = fine_horizons();
+    const double share = 0.15 / double(horizons.size() - 1);
+    for (std::size_t i = 0; i + 1 < horizons.size(); ++i) {
+      const double from = 0.45 + share * double(i);
+      stages.push_back({"fine, wide band", horizons[i], options_.wide_band, std::max(1, options_.max_iterations / 4),
+                        from, from + share});
+    }
+    stages.push_back({"fine", horizons.back(), options_.fine_band, options_.max_iterations, 0.6, 1.0});
+    return stages;
+  }
+
+  /// The start that fits best, and its number.
+  std::pair<VectorX, int> best_start() const {
+    const auto best = std::ranges::min_element(outcome_.starts, {}, &FitStart::cost);
+    if (best == outcome_.starts.end()) return {parameters_.reference(), 0};
+    return {std::isfinite(best->cost) ? best->final : parameters_.reference(), int(best - outcome_.starts.begin())};
+  }
+
+  void estimate() {
+    const auto [start, index] = best_start();
     const bool was_interrupted = outcome_.interrupted;
     ParameterSet parameters = parameters_;
-    int counter = 0;
     OptimiserSummary s;
-    FitState::Fine now{0, theta, {}};
+    int counter = 0;
+    FitState::Fine now{0, start, {}};
     if (state_.fine) now = *state_.fine;
-    const std::vector<double> horizons = fine_horizons();
-    const int stages = int(horizons.size());
-    for (; now.stage < stages; ++now.stage, now.optimiser = {}) {
-      const bool last = now.stage + 1 == stages;
+    const std::vector<Stage> stages = fine_stages();
+    for (; now.stage < int(stages.size()) && state_.refined.empty(); ++now.stage, now.optimiser = {}) {
+      const Stage& stage = stages[std::size_t(now.stage)];
+      const bool last = now.stage + 1 == int(stages.size());
       if (was_interrupted && !last) continue;
+      parameters = parameters_;
       // Where swings may still be out of step, Poisson's ratio would make up for what others lack.
-      if (swings() && !last)
-        parameters.set_estimated("poisson_ratio", false);
-      else
-        parameters = parameters_;
+      if (swings() && !last) parameters.set_estimated("poisson_ratio", false);
       parameters.set_reference(now.reference);
       if (now.optimiser.p.size() == 0) now.optimiser = start_of(parameters);
-      const int iterations = outcome_.interrupted ? 1
-                             : last               ? options_.max_iterations
-                                                  : std::max(1, options_.max_iterations / 4);
-      Objective objective =
-          make_objective(Level::Fine, parameters, last ? options_.fine_band : options_.wide_band,
-                         [&](const Recording& r) { return r.horizon(horizons[std::size_t(now.stage)]); });
-      const double from = 0.45 + 0.15 * now.stage / std::max(1, stages - 1);
-      s = optimise(objective, now.optimiser, last ? "fine" : "fine, wide band", index, iterations, counter,
-                   last ? 0.6 : from, last ? 1.0 : from + 0.15 / std::max(1, stages - 1),
-                   [&](const OptimiserState& optimiser) {
+      Objective objective = recordings_.objective(fine_, parameters, stage.band,
+                                                  [&](const Recording& r) { return r.horizon(stage.horizon); });
+      s = optimise(objective, now.optimiser, stage.name, index, outcome_.interrupted ? 1 : stage.iterations, counter,
+                   stage.from, stage.to, [&](const OptimiserState& optimiser) {
                      if (outcome_.interrupted) return;  // a last look at what was reached is no state to go on from
                      state_.fine = {now.stage, now.reference, optimiser};
                      save_state();
@@ -616,7 +435,66 @@ class Fit {
       if (s.interrupted) outcome_.interrupted = true;
     }
     parameters.set_reference(now.reference);
+    if (options_.refine > 1 && !outcome_.interrupted && (s.succeeded || !state_.refined.empty()))
+      repeat_finer(parameters, s, int(stages.size()), index, counter);
     finish(parameters, s);
+  }
+
+  RefinedEstimate as_estimate(const Grid& grid, const VectorX& theta, const OptimiserSummary& s) const {
+    return {grid.cells,  grid.steps, grid.recording.front().body->element_count(), theta, s.evaluation.cost,
+            s.converged, s.reason};
+  }
+
+  std::vector<Spacing> repetitions() const {
+    return refined_spacings({options_.cells, options_.steps}, options_.refine, recordings_.any_meshed_here(),
+                            !recordings_.all_static());
+  }
+  /// Of a repetition, in units of the first estimate's: a warm start needs few iterations.
+  double work(const Spacing& s) const { return 0.3 * s.steps / options_.steps * std::pow(s.cells / options_.cells, 3); }
+  double all_work() const {
+    double all = 1.0;
+    for (const Spacing& s : repetitions()) all += work(s);
+    return all;
+  }
+
+  /// The estimate again with finer steps and on finer meshes, each from where the one before ended. That of the finest
+  /// mesh becomes the result.
+  void repeat_finer(ParameterSet& parameters, OptimiserSummary& s, int first_stage, int index, int& counter) {
+    std::vector<RefinedEstimate>& done = state_.refined;
+    if (done.empty()) done.push_back(as_estimate(fine_, parameters.reference(), s));
+    const std::vector<Spacing> spacings = repetitions();
+    double from = 1.0;
+    for (std::size_t i = 0; i < spacings.size(); from += work(spacings[i]), ++i) {
+      if (i + 1 < done.size()) continue;  // before an interruption
+      const Spacing& spacing = spacings[i];
+      const int stage = first_stage + int(i);
+      parameters.set_reference(done.back().theta);
+      Grid grid = recordings_.grid(spacing.cells, spacing.steps);
+      Objective objective = recordings_.objective(grid, parameters, options_.fine_band, to_the_end);
+      const bool goes_on = state_.fine && state_.fine->stage == stage;
+      const std::string name =
+          spacing.cells == options_.cells ? text_of(spacing.steps) + " x steps" : text_of(spacing.cells) + " cells";
+      OptimiserSummary repeated =
+          optimise(objective, goes_on ? state_.fine->optimiser : start_of(parameters), name, index,
+                   options_.max_iterations, counter, from, from + work(spacing), [&](const OptimiserState& optimiser) {
+                     state_.fine = {stage, parameters.reference(), optimiser};
+                     save_state();
+                   });
+      if (repeated.interrupted) outcome_.interrupted = true;
+      if (!repeated.succeeded)
+        outcome_.notes.push_back("The estimate could not be repeated at " + name + ": " + repeated.reason + ".");
+      if (repeated.interrupted || !repeated.succeeded) break;
+      done.push_back(as_estimate(grid, parameters.to_theta(repeated.p), repeated));
+      save_state();
+      if (spacing.steps == options_.steps) fine_ = std::move(grid), s = std::move(repeated);
+    }
+    outcome_.refinement = extrapolate(done, parameters_);
+    const RefinedEstimate& finest = done[std::size_t(outcome_.refinement.finest)];
+    parameters.set_reference(finest.theta);
+    if (s.succeeded && fine_.cells == finest.cells) return;
+    fine_ = recordings_.grid(finest.cells, finest.steps);  // done before an interruption
+    s = {};
+    s.succeeded = true, s.converged = finest.converged, s.reason = finest.reason, s.evaluation.cost = finest.cost;
   }
 
   /// Starts run side by side; their history is told in an order that does not depend on who was faster.
@@ -630,7 +508,7 @@ class Fit {
 
   void finish(ParameterSet& parameters, OptimiserSummary& s) {
     sort_history();
-    outcome_.cells = options_.cells;
+    outcome_.cells = fine_.cells;
     outcome_.converged = s.converged && !outcome_.interrupted;
     outcome_.reason = outcome_.interrupted ? "interrupted" : s.reason;
     outcome_.theta = parameters.reference();
@@ -638,13 +516,13 @@ class Fit {
     outcome_.final_cost = s.evaluation.cost;
     outcome_.start_cost = start_cost_on_fine();
     if (s.succeeded && s.evaluation.gauss_newton.size() == 0 && parameters.dimension() > 0) {
-      Objective objective = make_objective(Level::Fine, parameters, options_.fine_band, to_the_end);
+      Objective objective = recordings_.objective(fine_, parameters, options_.fine_band, to_the_end);
       s.evaluation = objective.linearise(parameters.to_unconstrained(parameters.reference()));
     }
     outcome_.evaluation = std::move(s.evaluation);
-    for (std::size_t r = 0; r < recordings_.size(); ++r)
+    for (std::size_t r = 0; r < recordings_.all().size(); ++r)
       outcome_.recordings.push_back(
-          {recordings_[r].fine, recordings_[r].own(outcome_.theta), outcome_.evaluation.of_recording(int(r))});
+          {fine_.recording[r], recordings_.all()[r].own(outcome_.theta), outcome_.evaluation.of_recording(int(r))});
     if (outcome_.evaluation.succeeded && parameters.dimension() > 0) {
       outcome_.covariance = parameter_covariance(outcome_.evaluation);
       outcome_.std = outcome_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -653,13 +531,13 @@ class Fit {
     }
     if (outcome_.evaluation.succeeded && !outcome_.interrupted) time_steps(parameters);
     std::vector<const Capture*> captures;
-    for (const Recording& r : recordings_) captures.push_back(&r.capture);
+    for (const Recording& r : recordings_.all()) captures.push_back(&r.capture);
     add_notes(outcome_, captures);
   }
 
   void time_steps(const ParameterSet& parameters) {
     Objective objective =
-        make_objective(Level::Fine, parameters, options_.fine_band, [](const Recording&) { return 20; });
+        recordings_.objective(fine_, parameters, options_.fine_band, [](const Recording&) { return 20; });
     const VectorX p = parameters.to_unconstrained(parameters.reference());
     auto begin = std::chrono::steady_clock::now();
     const CostEvaluation forward = objective.evaluate(p);
@@ -673,7 +551,7 @@ class Fit {
   }
 
   double start_cost_on_fine() const {
-    Objective objective = make_objective(Level::Fine, fixed_at(outcome_.start_theta), options_.fine_band, to_the_end);
+    Objective objective = recordings_.objective(fine_, fixed_at(outcome_.start_theta), options_.fine_band, to_the_end);
     return objective.evaluate(VectorX(0)).cost;
   }
 
@@ -681,12 +559,13 @@ class Fit {
   FitMonitor monitor_;
   FitState state_;
   FitOutcome outcome_;
-  std::vector<Recording> recordings_;
+  Recordings recordings_;
   ParameterSet parameters_;
+  int controls_;             // moduli of the object
+  VectorX relative_moduli_;  // of the scan and the starts, the first one's being one
+  Grid coarse_, fine_;
   bool scanned_ = false;
   std::vector<double> start_moduli_;
-  int controls_ = 1;         // moduli of the object
-  VectorX relative_moduli_;  // of the scan and the starts, the first one's being one
   std::mutex mutex_;
 };
 
@@ -701,6 +580,9 @@ std::string FitOptions::validate() const {
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
   if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
   if (control_points < 1 || control_points > 500) return "control_points must lie in 1..500";
+  if (refine < 1 || refine > 3) return "refine must lie in 1..3";
+  if (const double finest = cells * std::pow(Refinement::mesh_ratio, refine - 1); finest > 64.0)
+    return "refine takes " + text_of(cells) + " cells to " + text_of(finest) + ", more than 64: begin with fewer";
   if (starts < 1) return "starts must be at least 1";
   if (max_iterations < 1) return "max_iterations must be at least 1";
   if (!(wide_band > 0.0 && wide_band < 0.5) || !(fine_band > 0.0 && fine_band < 0.5))
@@ -742,6 +624,7 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
 FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
                  const FitMonitor& monitor) {
   FitOptions fixed = options;
+  fixed.cells = fitted.cells, fixed.refine = 1;
   for (const Parameter& p : fitted.parameters.parameters()) {
     if (!is_material(p)) continue;
     FitOptions::Override& change = fixed.parameters[p.name];

@@ -9,6 +9,7 @@
 
 #include "estimation/optimiser.hpp"
 #include "estimation/problem.hpp"
+#include "estimation/refinement.hpp"
 
 namespace pliant {
 
@@ -17,6 +18,7 @@ struct FitOptions {
   double cells = 12.0;          ///< elements along the object's longest axis, [4, 64]
   double coarse_cells = 8.0;    ///< of the grid that finds the neighbourhood, [4, 64]
   double steps = 1.0;           ///< time steps per default step, (0, 16]
+  int refine = 1;               ///< resolutions at which the estimate is made, 1..3
   int points_per_frame = 1000;  ///< >= 10: an even subset of the pixels; 0: all
   int scan_per_decade = 3;      ///< values of Young's modulus tried in each decade, >= 1
   int starts = 3;               ///< best ones of the scan that are followed, >= 1
@@ -48,7 +50,7 @@ struct FitOptions {
 
 /// A step of the fit, for progress and convergence.csv.
 struct FitEvent {
-  std::string stage;  ///< "motion", "scan", "coarse", "fine"
+  std::string stage;  ///< "motion", "scan", "coarse", "fine", "18 cells"
   int start = 0;      ///< which start
   int iteration = 0;
   double cost = 0.0, damping = 0.0, surface_rms = 0.0;
@@ -73,11 +75,12 @@ struct FitState {
   std::vector<FitStart> starts;   ///< those that are done
   /// The stage on the full grid that was under way.
   struct Fine {
-    int stage = 0;             ///< of those on the full grid
+    int stage = 0;             ///< of those on the full grid, then of the repetitions
     VectorX reference;         ///< theta at the beginning of the stage
     OptimiserState optimiser;  ///< p is empty before the first iteration
   };
   std::optional<Fine> fine;
+  std::vector<RefinedEstimate> refined;  ///< repetitions that are done, after the first estimate
 };
 
 /// A recording, and what its sensors saw.
@@ -101,7 +104,8 @@ struct FitOutcome {
   double start_cost = 0.0, final_cost = 0.0;
   CostEvaluation evaluation;  ///< at the solution, all points of the fit
   std::vector<RecordingOutcome> recordings;
-  double cells = 0.0;  ///< elements along the longest axis of the discretisation
+  double cells = 0.0;     ///< elements along the longest axis of the discretisation
+  Refinement refinement;  ///< empty unless the estimate was repeated
   std::vector<FitStart> starts;
   std::vector<FitEvent> history;
   bool converged = false, interrupted = false;
@@ -120,7 +124,8 @@ struct FitMonitor {
 
 /// Estimates the unknown parameters of an object from recordings of it: its pose or motion at the start from the first
 /// frames where that is unknown, a scan over decades of Young's modulus on a coarse grid, the best starts followed
-/// there in a wide band and a growing horizon, then the best on the full grid in a narrow band. Recordings share the
+/// there in a wide band and a growing horizon, then the best on the full grid in a narrow band and, where asked,
+/// again at finer resolutions. Recordings share the
 /// object's material (moduli, Poisson's ratio, dampings and, where it is estimated, density); each has its own start,
 /// planes and sensors, named with "[2]" and so on from the second recording.
 /// @param resume  what an interrupted fit of the same recordings and options had done

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/3";
+constexpr const char* format = "fit-state/4";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -44,6 +44,15 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
                     {"iterations", fine->optimiser.iterations},
                     {"p", from_vector(fine->optimiser.p)},
                     {"memory", from_vector(fine->optimiser.memory)}};
+  json["refined"] = Json::array();
+  for (const RefinedEstimate& e : state.refined)
+    json["refined"].push_back({{"cells", e.cells},
+                               {"steps", e.steps},
+                               {"elements", e.elements},
+                               {"theta", from_vector(e.theta)},
+                               {"cost", from_cost(e.cost)},
+                               {"converged", e.converged},
+                               {"reason", e.reason}});
   write_file(path, json.dump(1));
 }
 
@@ -69,6 +78,10 @@ FitState read_fit_state(const std::filesystem::path& path, const std::string& ke
                     to_vector(fine.at("reference")),
                     {fine.at("iterations").get<int>(), to_vector(fine.at("p")), to_vector(fine.at("memory"))}};
     }
+    for (const Json& e : json.at("refined"))
+      state.refined.push_back({e.at("cells").get<double>(), e.at("steps").get<double>(), e.at("elements").get<int>(),
+                               to_vector(e.at("theta")), to_cost(e.at("cost")), e.at("converged").get<bool>(),
+                               e.at("reason").get<std::string>()});
   } catch (const InputError&) {
     throw;
   } catch (const std::exception& error) {

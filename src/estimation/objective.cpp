@@ -16,6 +16,15 @@ double CostEvaluation::surface_rms() const {
   return count > 0 ? std::sqrt(sum / double(count)) : 0.0;
 }
 
+double CostEvaluation::surface_median() const {
+  std::vector<float> all;
+  for (const FrameFit& f : frames) all.insert(all.end(), f.distances.begin(), f.distances.end());
+  if (all.empty()) return 0.0;
+  const auto middle = all.begin() + std::ptrdiff_t(all.size() / 2);
+  std::nth_element(all.begin(), middle, all.end());
+  return double(*middle);
+}
+
 double CostEvaluation::track_rms() const {
   double sum = 0.0;
   long long count = 0;
@@ -124,6 +133,7 @@ void Objective::Part::fit_surface(const FrameObservations& seen, const Points& p
   MatrixX J(fit.points, Eigen::Index(tangents.size()));
   for (std::size_t c = 0; c < tangents.size(); ++c) J.col(Eigen::Index(c)) = surface.tangent(matches, tangents[c]);
   VectorX weight(fit.points), weighted(fit.points);
+  fit.distances.assign(std::size_t(fit.points), float(outlier_scale));
   for (int i = 0; i < fit.points; ++i) {
     const SurfaceObservation& o = seen.points[std::size_t(i)];
     const double noise = o.noise, w = share / (noise * noise);
@@ -138,6 +148,7 @@ void Objective::Part::fit_surface(const FrameObservations& seen, const Points& p
     ++fit.matched;
     fit.cost += w * loss.value(m.distance);
     const double true_distance = std::abs(m.distance) / m.stretch;
+    fit.distances[std::size_t(i)] = float(std::min(true_distance, outlier_scale));
     fit.sum_squares += std::pow(std::min(true_distance, outlier_scale), 2);
     fit.max_distance = std::max(fit.max_distance, true_distance);
     weight[i] = w * loss.weight(m.distance);

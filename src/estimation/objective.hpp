@@ -26,7 +26,8 @@ struct FrameFit {
   double cost = 0.0;
   VectorX gradient;                ///< by p; empty unless asked for
   MatrixX gauss_newton;            ///< J^T W J
-  double sum_squares = 0.0;        ///< [m^2] of distances to the deformed surface, each at most the loss's scale
+  std::vector<float> distances;    ///< [m] of each point to the deformed surface, each at most the loss's scale
+  double sum_squares = 0.0;        ///< [m^2] of them
   double max_distance = 0.0;       ///< [m] of matched points
   double sum_noise_squares = 0.0;  ///< [m^2] of the sensor's standard deviations
   double track_sum_squares = 0.0;  ///< [m^2] of the followed points' distances
@@ -40,8 +41,9 @@ struct CostEvaluation {
   MatrixX gauss_newton;
   std::vector<FrameFit> frames;  ///< of all recordings, one after the other
   int steps = 0;
-  double surface_rms() const;  ///< [m]; 0 where no surface was seen
-  double track_rms() const;    ///< [m], of the followed points; 0 where there are none
+  double surface_rms() const;     ///< [m]; 0 where no surface was seen
+  double surface_median() const;  ///< [m], likewise
+  double track_rms() const;       ///< [m], of the followed points; 0 where there are none
   double matched_fraction() const;
   /// The frames of one recording alone, with its cost and without derivatives.
   [[nodiscard]] CostEvaluation of_recording(int recording) const;

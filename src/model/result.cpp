@@ -33,6 +33,9 @@ Json parameter_json(const ParameterResult& parameter) {
   json["value"] = value_json(parameter.value);
   if (!parameter.unit.empty()) json["unit"] = parameter.unit;
   if (parameter.std) json["std"] = value_json(*parameter.std);
+  if (parameter.mesh_error) json["mesh_error"] = value_json(*parameter.mesh_error);
+  if (parameter.step_error) json["step_error"] = value_json(*parameter.step_error);
+  if (parameter.extrapolated) json["extrapolated"] = value_json(*parameter.extrapolated);
   if (parameter.start) json["start"] = value_json(*parameter.start);
   json["estimated"] = parameter.estimated;
   return json;
@@ -50,6 +53,7 @@ Json field_json(const FieldResult& field) {
 
 Json error_json(const ErrorResult& error) {
   return {{"surface_rms", number(error.surface_rms)},
+          {"surface_median", number(error.surface_median)},
           {"surface_max", number(error.surface_max)},
           {"marker_rms", number(error.marker_rms)},
           {"unit", "m"},
@@ -65,6 +69,13 @@ Json values_json(const std::map<std::string, double>& values) {
 Json start_json(const StartResult& start) {
   return {{"start", values_json(start.start)}, {"final", values_json(start.final)}, {"cost", number(start.cost)},
           {"iterations", start.iterations},    {"converged", start.converged},      {"reason", start.reason}};
+}
+
+Json resolution_json(const ResolutionResult& resolution) {
+  return {{"cells", number(resolution.cells)}, {"steps", number(resolution.steps)},
+          {"elements", resolution.elements},   {"values", values_json(resolution.values)},
+          {"cost", number(resolution.cost)},   {"converged", resolution.converged},
+          {"reason", resolution.reason}};
 }
 
 Json time_json(const TimeResult& time) {
@@ -170,7 +181,10 @@ ParameterResult read_parameter(const std::string& name, const Member& member) {
           optional_string(member, "unit"),
           optional_value(member, "std"),
           optional_value(member, "start"),
-          member["estimated"].boolean()};
+          member["estimated"].boolean(),
+          optional_value(member, "mesh_error"),
+          optional_value(member, "step_error"),
+          optional_value(member, "extrapolated")};
 }
 
 ControlPoint read_control_point(const Member& member) {
@@ -193,8 +207,9 @@ FieldResult read_field(const std::string& name, const Member& member) {
 }
 
 ErrorResult read_error(const Member& member) {
-  return {optional_number(member, "surface_rms"), optional_number(member, "surface_max"),
-          optional_number(member, "marker_rms"), member.has("points") ? member["points"].count() : 0};
+  return {optional_number(member, "surface_rms"), optional_number(member, "surface_median"),
+          optional_number(member, "surface_max"), optional_number(member, "marker_rms"),
+          member.has("points") ? member["points"].count() : 0};
 }
 
 RecordingResult read_recording(const Member& member) {
@@ -219,6 +234,12 @@ std::map<std::string, double> read_values(const Member& parent, const char* key)
 StartResult read_start(const Member& member) {
   return {read_values(member, "start"),      read_values(member, "final"),  optional_number(member, "cost"),
           int(member["iterations"].count()), member["converged"].boolean(), optional_string(member, "reason")};
+}
+
+ResolutionResult read_resolution(const Member& member) {
+  return {member["cells"].number(),         member["steps"].number(),        member["elements"].count(),
+          read_values(member, "values"),    optional_number(member, "cost"), member["converged"].boolean(),
+          optional_string(member, "reason")};
 }
 
 TimeResult read_time(const Member& member) {
@@ -260,6 +281,8 @@ Result read_all(const Member& top) {
   if (top.has("identifiability"))
     top["identifiability"].each_item([&](const Member& m) { result.identifiability.push_back(read_correlation(m)); });
   if (top.has("starts")) top["starts"].each_item([&](const Member& m) { result.starts.push_back(read_start(m)); });
+  if (top.has("resolutions"))
+    top["resolutions"].each_item([&](const Member& m) { result.resolutions.push_back(read_resolution(m)); });
   if (top.has("time")) result.time = read_time(top["time"]);
   if (top.has("notes")) top["notes"].each_item([&](const Member& m) { result.notes.push_back(m.string()); });
   return result;
@@ -305,6 +328,7 @@ std::string to_json(const Result& result) {
     return Json{{"parameters", {c.parameters.first, c.parameters.second}}, {"correlation", number(c.correlation)}};
   });
   json["starts"] = list(result.starts, start_json);
+  if (!result.resolutions.empty()) json["resolutions"] = list(result.resolutions, resolution_json);
   json["time"] = time_json(result.time);
   if (!result.notes.empty()) json["notes"] = result.notes;
   return text(json);

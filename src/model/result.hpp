@@ -31,6 +31,9 @@ struct ParameterResult {
   std::optional<ParameterValue> std;    ///< one standard deviation, of the value's kind
   std::optional<ParameterValue> start;  ///< where the estimation began
   bool estimated = false;
+  /// Where the estimate was repeated at other resolutions: how far mesh and time steps may have put the value off, and
+  /// where it goes as both become infinitely fine.
+  std::optional<ParameterValue> mesh_error = {}, step_error = {}, extrapolated = {};
 };
 
 /// A control point of a field of values.
@@ -48,7 +51,7 @@ struct FieldResult {
 
 /// Distances between what was seen and what was simulated [m].
 struct ErrorResult {
-  std::optional<double> surface_rms, surface_max, marker_rms;
+  std::optional<double> surface_rms, surface_median, surface_max, marker_rms;
   long long points = 0;
 };
 
@@ -76,6 +79,17 @@ struct StartResult {
   std::string reason;  ///< why it stopped
 };
 
+/// The estimate at one of several resolutions.
+struct ResolutionResult {
+  double cells = 0.0;  ///< elements along the object's longest axis
+  double steps = 0.0;  ///< time steps per default step
+  long long elements = 0;
+  std::map<std::string, double> values;  ///< of what was estimated, by parameter name
+  std::optional<double> cost;
+  bool converged = false;
+  std::string reason;  ///< why the optimiser stopped
+};
+
 struct TimeResult {
   double wall_seconds = 0.0;
   long long forward_steps = 0;
@@ -97,6 +111,7 @@ struct Result {
   CostResult cost;
   std::vector<CorrelationResult> identifiability;
   std::vector<StartResult> starts;
+  std::vector<ResolutionResult> resolutions;  ///< where there are several, in the order in which they were used
   TimeResult time;
   std::vector<std::string> notes;  ///< plain sentences for the user
 

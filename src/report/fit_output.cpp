@@ -51,6 +51,24 @@ std::map<std::string, double> scalars_of(const ParameterSet& parameters, const V
   return values;
 }
 
+/// Of what was estimated.
+std::map<std::string, double> estimates_of(const ParameterSet& parameters, const VectorX& theta) {
+  std::map<std::string, double> values = scalars_of(parameters, theta);
+  for (const Parameter& p : parameters.parameters())
+    if (!p.estimated)
+      std::erase_if(values, [&](const auto& v) { return v.first.substr(0, v.first.find('.')) == p.name; });
+  return values;
+}
+
+void add_resolutions(Result& result, const FitOutcome& outcome) {
+  for (const RefinedEstimate& e : outcome.refinement.estimates) {
+    ResolutionResult r{e.cells, e.steps,     e.elements, estimates_of(outcome.parameters, e.theta),
+                       {},      e.converged, e.reason};
+    if (std::isfinite(e.cost)) r.cost = e.cost;
+    result.resolutions.push_back(std::move(r));
+  }
+}
+
 void add_correlations(Result& result, const FitOutcome& outcome) {
   if (outcome.correlation.size() == 0) return;
   const auto names = outcome.parameters.coordinate_names();
@@ -315,7 +333,11 @@ SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
   }
   const bool has_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
   const bool has_tracks = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.tracks > 0; });
-  if (has_surface) errors.error.surface_rms = evaluation.surface_rms(), errors.error.surface_max = max;
+  if (has_surface) {
+    errors.error.surface_rms = evaluation.surface_rms();
+    errors.error.surface_median = evaluation.surface_median();
+    errors.error.surface_max = max;
+  }
   if (has_tracks) errors.error.marker_rms = evaluation.track_rms();
   return errors;
 }
@@ -327,14 +349,19 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   result.software.commit = facts.commit;
   result.capture = {capture.name, capture.sha256};
   const bool has_std = outcome.std.size() > 0;
+  const Refinement& refinement = outcome.refinement;
+  const bool repeated = refinement.estimates.size() > 1;
   const MatrixX jacobian =
-      has_std ? outcome.parameters.jacobian(outcome.parameters.to_unconstrained(outcome.theta)) : MatrixX();
+      has_std || repeated ? outcome.parameters.jacobian(outcome.parameters.to_unconstrained(outcome.theta)) : MatrixX();
   int at = 0;
   for (const Parameter& p : outcome.parameters.parameters()) {
     ParameterResult r{p.name, value_of(p, outcome.theta), p.unit, {}, {}, p.estimated};
     if (p.estimated) {
       r.start = value_of(p, outcome.start_theta);
       if (has_std) r.std = std_of(p, outcome.std, jacobian, at);
+      if (refinement.mesh_error.size() > 0) r.mesh_error = std_of(p, refinement.mesh_error, jacobian, at);
+      if (refinement.step_error.size() > 0) r.step_error = std_of(p, refinement.step_error, jacobian, at);
+      if (repeated) r.extrapolated = value_of(p, outcome.parameters.to_theta(refinement.extrapolated));
       at += p.dimension();
     }
     result.parameters.push_back(std::move(r));
@@ -356,6 +383,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
     if (std::isfinite(s.cost)) r.cost = s.cost;
     result.starts.push_back(std::move(r));
   }
+  add_resolutions(result, outcome);
   result.time.wall_seconds = facts.wall_seconds;
   result.time.forward_steps = outcome.forward_steps;
   if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;

@@ -68,6 +68,12 @@ std::string agreement_sentence(const ReportData& data) {
          "Part of the motion is not explained by this model: look where in the pictures and when in the plot below.";
 }
 
+// A number in the unit in which the parameter's value is shown.
+std::string in_unit(double number, int digits, const ParameterResult& p) {
+  const Scaled scaled = scaled_unit(std::get<double>(p.value), p.unit);
+  return with_unit(readable(number * scaled.factor, digits), scaled.unit);
+}
+
 // How well a scalar is known, in words; empty where nothing can be said.
 std::string trust_sentence(const ParameterResult& p) {
   const auto* value = std::get_if<double>(&p.value);
@@ -79,6 +85,18 @@ std::string trust_sentence(const ParameterResult& p) {
   if (relative < 0.3) return "";
   return fmt::format("{} is known poorly (± {} %): the recording depends little on it.", spoken_name(p.name),
                      readable(100.0 * relative, 2));
+}
+
+// Where the limit lies outside the interval that the data give, the interval alone would mislead.
+std::string discretisation_sentence(const ParameterResult& p) {
+  const auto *value = std::get_if<double>(&p.value),
+             *limit = p.extrapolated ? std::get_if<double>(&*p.extrapolated) : nullptr;
+  if (!value || !limit || !p.std || std::abs(*limit - *value) < 2.0 * std::get<double>(*p.std)) return "";
+  return fmt::format(
+      "{} still depends on the mesh or the time step: {}. Its value here suits simulations as fine as the model; "
+      "compare "
+      "the limit with other measurements.",
+      spoken_name(p.name), discretisation_words(p));
 }
 
 std::string correlation_sentence(const CorrelationResult& c) {
@@ -137,9 +155,21 @@ std::string value_with_uncertainty(double value, std::optional<double> std, cons
   return with_unit(readable(shown, digits) + " ± " + readable(spread, 2), scaled.unit);
 }
 
+std::string discretisation_words(const ParameterResult& p) {
+  if (!p.extrapolated || !std::holds_alternative<double>(*p.extrapolated)) return "";
+  std::string words;
+  const auto say = [&](const char* what, const std::optional<ParameterValue>& error) {
+    if (error) words += fmt::format("{} ± {}, ", what, in_unit(std::get<double>(*error), 2, p));
+  };
+  say("mesh", p.mesh_error);
+  say("time step", p.step_error);
+  return words + "limit " + in_unit(std::get<double>(*p.extrapolated), 4, p);
+}
+
 std::vector<std::string> plain_sentences(const ReportData& data) {
   std::vector<std::string> sentences{agreement_sentence(data)};
   for (const ParameterResult& p : data.result.parameters) sentences.push_back(trust_sentence(p));
+  for (const ParameterResult& p : data.result.parameters) sentences.push_back(discretisation_sentence(p));
   for (const CorrelationResult& c : data.result.identifiability) sentences.push_back(correlation_sentence(c));
   sentences.push_back(starts_sentence(data.result));
   sentences.push_back(given_sentence(data.result));

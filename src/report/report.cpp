@@ -69,6 +69,7 @@ std::string card(const ParameterResult& p) {
   std::string from;
   if (value && std && *value != 0.0) from = "± " + readable(100.0 * *std / std::abs(*value), 2) + " %";
   if (p.start) from += (from.empty() ? "" : ", ") + ("began at " + value_text(*p.start, std::nullopt, p.unit));
+  if (const std::string words = discretisation_words(p); !words.empty()) from += (from.empty() ? "" : "; ") + words;
   return html + "<div class=\"from\">" + escape_html(from) + "</div></div>\n";
 }
 
@@ -282,6 +283,34 @@ std::string starts_table(const Result& result) {
   return table("<th>start</th><th>cost</th><th>iterations</th><th>why it stopped</th><th>ended at</th>", body);
 }
 
+// Scalars, a row for each resolution and one for their limit.
+std::string resolutions_table(const Result& result) {
+  if (result.resolutions.size() < 2) return "";
+  std::vector<const ParameterResult*> shown;
+  for (const ParameterResult& p : result.parameters)
+    if (p.extrapolated && scalar(p.value)) shown.push_back(&p);
+  std::string head = "<th>cells</th><th>time steps</th><th>elements</th>", body;
+  for (const ParameterResult* p : shown) head += "<th>" + escape_html(spoken_name(p->name)) + "</th>";
+  for (const ResolutionResult& r : result.resolutions) {
+    body +=
+        fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td>", readable(r.cells, 3), readable(r.steps, 3), r.elements);
+    for (const ParameterResult* p : shown) {
+      const auto value = r.values.find(p->name);
+      const std::string text =
+          value == r.values.end() ? "" : escape_html(value_text(value->second, std::nullopt, p->unit));
+      body += "<td>" + text + "</td>";
+    }
+    body += "</tr>\n";
+  }
+  body += "<tr><td colspan=\"3\">limit</td>";
+  for (const ParameterResult* p : shown)
+    body += "<td>" + escape_html(value_text(*p->extrapolated, std::nullopt, p->unit)) + "</td>";
+  return table(head, body + "</tr>\n") +
+         "<p class=\"given\">Cells are elements along the object's longest axis, time steps those to one default step. "
+         "The limit is Richardson's extrapolation; the errors stated for mesh and time step follow Roache's grid "
+         "convergence index.</p>\n";
+}
+
 std::string usage(const ReportData& data) {
   const std::string capture = data.capture_path.empty() ? "CAPTURE" : data.capture_path;
   const std::string model = escape_html(data.model_file);
@@ -320,6 +349,7 @@ std::string report_html(const ReportData& data) {
   html += section("Agreement over time", data.residuals.size() > 1 ? residual_plot(data.residuals) : "");
   html += section("How the estimation went", convergence(data));
   html += section("All parameters", parameter_table(data.result));
+  html += section("Mesh and time step", resolutions_table(data.result));
   html += section("Which parameters go together", correlation_table(data.correlations));
   html += section("Starting points", starts_table(data.result));
   html += section("Using the model", usage(data));

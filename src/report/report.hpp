@@ -58,6 +58,10 @@ std::string spoken_name(const std::string& name);
 /// first two digits of the uncertainty decide; four digits where the uncertainty is unknown.
 std::string value_with_uncertainty(double value, std::optional<double> std, const std::string& unit);
 
+/// What mesh and time step may have put a scalar off, and its limit: "mesh ± 12 Pa, time step ± 3 Pa, limit 585 Pa".
+/// Empty where the estimate was not repeated.
+std::string discretisation_words(const ParameterResult& parameter);
+
 /// What the figures mean, one plain sentence each: agreement against noise, trust in each parameter, pairs that the
 /// recording can hardly tell apart, parameters that were given, starts that ended elsewhere.
 std::vector<std::string> plain_sentences(const ReportData& data);

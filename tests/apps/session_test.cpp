@@ -62,6 +62,11 @@ class Session : public testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_pliant(arguments, interrupt_at);
   }
+  /// The same at two resolutions, for the first who asks.
+  static const ProgramRun& refined_fit() {
+    static const ProgramRun run = run_fit("refined", {"--refine", "2"});
+    return run;
+  }
   static json result(const std::string& name = "fit") { return read_json(at(name) + "/result.json"); }
 
   static inline fs::path folder_;
@@ -184,6 +189,62 @@ TEST_F(Session, TooFewIterationsAreNotConverged) {
   EXPECT_EQ(run.exit_code, not_converged) << run.err;
   EXPECT_TRUE(fs::is_regular_file(at("short") + "/result.json"));
   EXPECT_TRUE(fs::is_regular_file(at("short") + "/report.html"));
+}
+
+TEST_F(Session, RefiningRepeatsTheEstimateAndStatesWhatIsLeft) {
+  const ProgramRun& run = refined_fit();
+  ASSERT_EQ(run.exit_code, fine) << run.err;
+  const json refined = result("refined"), plain = result();
+  const json& resolutions = refined["resolutions"];
+  ASSERT_EQ(resolutions.size(), 3U);
+  EXPECT_EQ(resolutions[0]["values"]["youngs_modulus"], plain["parameters"]["youngs_modulus"]["value"])
+      << "the first one is the fit that is not repeated";
+  EXPECT_EQ(resolutions[1]["steps"].get<double>() / resolutions[0]["steps"].get<double>(), 2.0);
+  EXPECT_GT(resolutions[2]["elements"], resolutions[1]["elements"]);
+  const json& modulus = refined["parameters"]["youngs_modulus"];
+  EXPECT_EQ(modulus["value"], resolutions[2]["values"]["youngs_modulus"]) << "the finest mesh's";
+  for (const char* error : {"mesh_error", "step_error"}) EXPECT_GT(modulus[error].get<double>(), 0.0) << error;
+  const double change = modulus["extrapolated"].get<double>() - modulus["value"].get<double>();
+  EXPECT_LE(std::abs(change), modulus["mesh_error"].get<double>() + modulus["step_error"].get<double>());
+  EXPECT_FALSE(refined["parameters"]["density"].contains("mesh_error")) << "given, not estimated";
+  EXPECT_THAT(run.out, HasSubstr("limit"));
+  EXPECT_THAT(read_file(at("refined") + "/report.html"), HasSubstr("Mesh and time step"));
+}
+
+class InterruptedRefinement : public Session, public testing::WithParamInterface<const char*> {};
+
+TEST_P(InterruptedRefinement, KeepsWhatIsDoneAndIsResumed) {
+  const std::string name = std::string("refinement at ") + GetParam();
+  const ProgramRun stopped = run_fit(name, {"--refine", "2"}, std::string("\n") + GetParam());
+  EXPECT_EQ(stopped.exit_code, was_interrupted) << stopped.err;
+  EXPECT_EQ(value(result(name), "youngs_modulus"), value(result(), "youngs_modulus")) << "the first estimate stands";
+  const ProgramRun resumed = run_fit(name, {"--refine", "2", "--resume"});
+  ASSERT_EQ(resumed.exit_code, fine) << resumed.err;
+  ASSERT_EQ(refined_fit().exit_code, fine);
+  EXPECT_EQ(without_times(result(name)), without_times(result("refined")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Stages, InterruptedRefinement, testing::Values("0.8 x steps", "9 cells"),
+                         [](const auto& choice) { return choice.param[0] == '9' ? "mesh" : "time_step"; });
+
+TEST_F(Session, TwoRecordingsAreFittedTogetherAndAThirdIsPredicted) {
+  for (const char* seed : {"11", "12"}) {
+    const ProgramRun synth = run_pliant({"synth", PLIANT_TEST_SCENE, "--out", at(seed), "--seed", seed});
+    ASSERT_EQ(synth.exit_code, fine) << synth.err;
+  }
+  ASSERT_NE(read_file(at("11") + "/capture.toml"), "");
+  const ProgramRun run = run_fit("two", {at("11"), "--hold-out", at("12")});
+  ASSERT_EQ(run.exit_code, fine) << run.err;
+  const json two = result("two"), one = result();
+  ASSERT_EQ(two["recordings"].size(), 2U);
+  EXPECT_EQ(two["recordings"][0]["sha256"], one["capture"]["sha256"]);
+  EXPECT_NE(two["recordings"][1]["sha256"], one["capture"]["sha256"]);
+  EXPECT_TRUE(two["parameters"].contains("linear_velocity[2]"));
+  EXPECT_FALSE(two["parameters"].contains("youngs_modulus[2]")) << "one material";
+  const auto spread = [](const json& found) { return found["parameters"]["youngs_modulus"]["std"].get<double>(); };
+  EXPECT_LT(spread(two), spread(one)) << "twice the data";
+  const double fitted = two["error"]["surface_rms"], predicted = two["held_out"]["error"]["surface_rms"];
+  EXPECT_NEAR(predicted / fitted, 1.0, 0.2) << "the same object, scene and noise";
 }
 
 class InterruptedSession : public Session, public testing::WithParamInterface<const char*> {};

@@ -19,16 +19,18 @@ Result full_result() {
   r.software = {"pliant", "0.1.0", "abc"};
   r.capture = {"a \"soft\" ring", "00ff"};
   r.parameters = {
-      {"youngs_modulus", 590.0, "Pa", 21.0, 5000.0, true},
+      {"youngs_modulus", 590.0, "Pa", 21.0, 5000.0, true, 12.0, 3.0, 575.0},
       {"youngs_modulus@red half", 900.0, "Pa", std::nullopt, std::nullopt, false},
       {"gravity", Vector3(0, -9.81, 0), "m/s^2", Vector3(0.1, 0.2, 0.3), Vector3(0, -9, 0), true},
       {"plane", PlaneValue{{0, 0.1, 0}, {0, 1, 0}}, "", PlaneValue{{0, 0.01, 0}, {0, 0, 0}}, std::nullopt, true}};
   r.fields = {{"youngs_modulus", {{{1, 2, 3}, 4.5, 0.5}, {{1, 2, 4}, 5.5, std::nullopt}}, "model.vtu"}};
-  r.error = {0.0021, 0.009, std::nullopt, 48211};
+  r.error = {0.0021, 0.0014, 0.009, std::nullopt, 48211};
   r.cost = {143.9, 8.46};
   r.identifiability = {{{"youngs_modulus", "stiffness_damping"}, -0.93}};
   r.starts = {{{{"youngs_modulus", 5000.0}}, {{"youngs_modulus", 590.0}}, 8.46, 12, true, "cost settled"},
               {{{"youngs_modulus", 1e7}}, {}, std::nullopt, 3, false, "no finite cost"}};
+  r.resolutions = {{12.0, 1.0, 800, {{"youngs_modulus", 590.0}}, 8.46, true, "cost settled"},
+                   {18.0, 1.0, 2600, {{"youngs_modulus", 580.0}}, std::nullopt, false, "interrupted"}};
   r.time = {41.0, 9600, 2.1, std::nullopt};
   r.notes = {"The floor was taken as known."};
   return r;
@@ -54,8 +56,17 @@ TEST(Result, ComesBackAsItWasWritten) {
 TEST(Result, HasTheNamesAndKindsOfTheFormat) {
   const auto json = nlohmann::json::parse(to_json(full_result()));
   EXPECT_EQ(json["format"], "result/1");
-  EXPECT_EQ(json["parameters"]["youngs_modulus"],
-            nlohmann::json({{"value", 590.0}, {"unit", "Pa"}, {"std", 21.0}, {"start", 5000.0}, {"estimated", true}}));
+  EXPECT_EQ(json["parameters"]["youngs_modulus"], nlohmann::json({{"value", 590.0},
+                                                                  {"unit", "Pa"},
+                                                                  {"std", 21.0},
+                                                                  {"mesh_error", 12.0},
+                                                                  {"step_error", 3.0},
+                                                                  {"extrapolated", 575.0},
+                                                                  {"start", 5000.0},
+                                                                  {"estimated", true}}));
+  EXPECT_FALSE(json["parameters"]["gravity"].contains("extrapolated"));
+  EXPECT_EQ(json["resolutions"][1]["elements"], 2600);
+  EXPECT_TRUE(json["resolutions"][1]["cost"].is_null());
   EXPECT_EQ(json["parameters"]["plane"]["value"]["normal"], nlohmann::json({0.0, 1.0, 0.0}));
   EXPECT_FALSE(json["parameters"]["plane"].contains("unit"));
   EXPECT_EQ(json["fields"]["youngs_modulus"]["control_points"][0], nlohmann::json({1.0, 2.0, 3.0, 4.5, 0.5}));
