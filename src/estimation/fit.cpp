@@ -13,6 +13,7 @@
 #include <tuple>
 
 #include "base/error.hpp"
+#include "estimation/corrections.hpp"
 #include "estimation/modal_start.hpp"
 #include "estimation/notes.hpp"
 #include "estimation/recordings.hpp"
@@ -393,7 +394,9 @@ class Fit {
       stages.push_back({"fine, wide band", horizons[i], options_.wide_band, std::max(1, options_.max_iterations / 4),
                         from, from + share});
     }
-    stages.push_back({"fine", horizons.back(), options_.fine_band, options_.max_iterations, 0.6, 1.0});
+    stages.push_back({"fine", horizons.back(), options_.fine_band, options_.max_iterations, 0.6, 0.9});
+    if (state_.corrected && !state_.corrected->parameters.empty())
+      stages.push_back({"corrected", 1.0, options_.fine_band, options_.max_iterations, 0.9, 1.0});
     return stages;
   }
 
@@ -412,7 +415,8 @@ class Fit {
     int counter = 0;
     FitState::Fine now{0, start, {}};
     if (state_.fine) now = *state_.fine;
-    const std::vector<Stage> stages = fine_stages();
+    use_corrections();
+    std::vector<Stage> stages = fine_stages();
     for (; now.stage < int(stages.size()) && state_.refined.empty(); ++now.stage, now.optimiser = {}) {
       const Stage& stage = stages[std::size_t(now.stage)];
       const bool last = now.stage + 1 == int(stages.size());
@@ -433,11 +437,52 @@ class Fit {
       if (!s.succeeded) break;
       now.reference = parameters.to_theta(s.p);
       if (s.interrupted) outcome_.interrupted = true;
+      if (!last || state_.corrected || outcome_.interrupted || !options_.correct) continue;
+      find_corrections(now.reference, s.evaluation.cost);
+      use_corrections();
+      stages = fine_stages();
     }
     parameters.set_reference(now.reference);
+    say_corrections(s);
     if (options_.refine > 1 && !outcome_.interrupted && (s.succeeded || !state_.refined.empty()))
       repeat_finer(parameters, s, int(stages.size()), index, counter);
     finish(parameters, s);
+  }
+
+  /// What was not estimated and spoils the recordings, as their residuals at the estimate show.
+  void find_corrections(const VectorX& theta, double cost) {
+    state_.corrected = {{}, "", cost, theta[theta::youngs_modulus]};
+    std::vector<std::string> chosen;
+    for (const auto& [name, change] : options_.parameters) chosen.push_back(name);
+    const std::vector<Correction> possible = possible_corrections(parameters_, chosen);
+    ParameterSet with_all = parameters_;
+    for (const Correction& c : possible)
+      for (const std::string& name : c.parameters) with_all.set_estimated(name, true);
+    with_all.set_reference(theta);
+    Objective objective = recordings_.objective(fine_, with_all, options_.fine_band, to_the_end);
+    const CostEvaluation e = objective.linearise(with_all.to_unconstrained(theta));
+    if (!e.succeeded) return;
+    for (const NeededCorrection& needed : needed_corrections(e, with_all, possible, e.independent_observations())) {
+      state_.corrected->what += (state_.corrected->what.empty() ? "" : " and ") + needed.correction.what;
+      for (const std::string& name : needed.correction.parameters) state_.corrected->parameters.push_back(name);
+    }
+    save_state();
+  }
+
+  void use_corrections() {
+    if (!state_.corrected) return;
+    for (const std::string& name : state_.corrected->parameters) parameters_.set_estimated(name, true);
+  }
+
+  void say_corrections(const OptimiserSummary& s) {
+    if (!state_.corrected || state_.corrected->parameters.empty() || !s.succeeded) return;
+    const FitState::Corrected& c = *state_.corrected;
+    outcome_.notes.push_back("The residuals showed that " + c.what +
+                             " needed correction, which was estimated along with the "
+                             "material: the cost fell from " +
+                             text_of(c.cost) + " to " + text_of(s.evaluation.cost) +
+                             ". Without it Young's modulus was " + text_of(c.youngs_modulus) +
+                             " Pa; correct = false leaves it so.");
   }
 
   RefinedEstimate as_estimate(const Grid& grid, const VectorX& theta, const OptimiserSummary& s) const {

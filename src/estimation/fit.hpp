@@ -34,6 +34,8 @@ struct FitOptions {
   OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
   SolverKind solver = SolverKind::Automatic;
   double solver_tolerance = 1e-8;
+  /// Whether a correction of sensors or of gravity's direction is estimated where the residuals ask for it.
+  bool correct = true;
   bool hold_strongly = false;  ///< eliminate nodes in held regions instead of Nitsche's method
   unsigned seed = 0;
   /// By parameter name: a start value (a number, or three), and whether it is estimated.
@@ -80,6 +82,13 @@ struct FitState {
     OptimiserState optimiser;  ///< p is empty before the first iteration
   };
   std::optional<Fine> fine;
+  /// What the residuals asked to be corrected; no parameters: nothing.
+  struct Corrected {
+    std::vector<std::string> parameters;
+    std::string what;             ///< for people
+    double cost, youngs_modulus;  ///< before, [Pa]
+  };
+  std::optional<Corrected> corrected;
   std::vector<RefinedEstimate> refined;  ///< repetitions that are done, after the first estimate
 };
 

@@ -150,6 +150,10 @@ const std::vector<Entry>& entries() {
                  &FitOptions::solver_tolerance),
       real_entry("newmark_theta", "", "0.5..1", "weight of a time step's end; above 0.5 adds numerical damping",
                  &FitOptions::newmark_theta),
+      flag_entry(
+          "correct",
+          "estimate what spoils a recording (a sensor's range or pose, gravity's direction) where residuals show it",
+          &FitOptions::correct),
       flag_entry("hold_strongly", "held regions fix grid nodes instead of using Nitsche's method",
                  &FitOptions::hold_strongly),
       integer_entry("seed", "", "of everything random", &FitOptions::seed),

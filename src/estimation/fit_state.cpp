@@ -44,6 +44,11 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
                     {"iterations", fine->optimiser.iterations},
                     {"p", from_vector(fine->optimiser.p)},
                     {"memory", from_vector(fine->optimiser.memory)}};
+  if (const auto& c = state.corrected)
+    json["corrected"] = {{"parameters", c->parameters},
+                         {"what", c->what},
+                         {"cost", from_cost(c->cost)},
+                         {"youngs_modulus", c->youngs_modulus}};
   json["refined"] = Json::array();
   for (const RefinedEstimate& e : state.refined)
     json["refined"].push_back({{"cells", e.cells},
@@ -77,6 +82,11 @@ FitState read_fit_state(const std::filesystem::path& path, const std::string& ke
       state.fine = {fine.at("stage").get<int>(),
                     to_vector(fine.at("reference")),
                     {fine.at("iterations").get<int>(), to_vector(fine.at("p")), to_vector(fine.at("memory"))}};
+    }
+    if (json.contains("corrected")) {
+      const Json& c = json["corrected"];
+      state.corrected = {c.at("parameters").get<std::vector<std::string>>(), c.at("what").get<std::string>(),
+                         to_cost(c.at("cost")), c.at("youngs_modulus").get<double>()};
     }
     for (const Json& e : json.at("refined"))
       state.refined.push_back({e.at("cells").get<double>(), e.at("steps").get<double>(), e.at("elements").get<int>(),

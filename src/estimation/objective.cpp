@@ -38,6 +38,12 @@ double CostEvaluation::matched_fraction() const {
   return count > 0 ? double(matched) / double(count) : 0.0;
 }
 
+double CostEvaluation::independent_observations() const {
+  double count = 0.0;
+  for (const FrameFit& f : frames) count += f.independent;
+  return count;
+}
+
 CostEvaluation CostEvaluation::of_recording(int recording) const {
   CostEvaluation one;
   one.succeeded = succeeded, one.failure = failure;
@@ -127,6 +133,7 @@ void Objective::Part::fit_surface(const FrameObservations& seen, const Points& p
   const SurfaceConstraints& surface = *motion_.mismatch.surface;
   const double outlier_scale = motion_.options.outlier_scale;
   fit.points = int(seen.points.size());
+  fit.independent += std::min(double(fit.points), motion_.options.independent_points);
   const auto matches = surface.match(corrected(seen.points), positions);
   const RobustLoss loss{outlier_scale};
   const double share = frame_weight(seen);
@@ -169,6 +176,7 @@ void Objective::Part::fit_tracks(const FrameObservations& seen, const Points& po
   const PointTracks& tracks = *motion_.mismatch.tracks;
   const double outlier_scale = motion_.options.outlier_scale;
   fit.tracks = int(seen.tracks.size());
+  fit.independent += 3.0 * fit.tracks;
   const Points r = tracks.residuals(corrected(seen.tracks), positions);
   const RobustLoss loss{outlier_scale};
   VectorX weight(3 * r.rows());

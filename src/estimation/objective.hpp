@@ -23,6 +23,7 @@ struct FrameFit {
   int recording = 0, frame = 0;
   int points = 0, matched = 0;  ///< of the surface
   int tracks = 0;               ///< followed points
+  double independent = 0.0;     ///< observations behind the cost
   double cost = 0.0;
   VectorX gradient;                ///< by p; empty unless asked for
   MatrixX gauss_newton;            ///< J^T W J
@@ -45,6 +46,7 @@ struct CostEvaluation {
   double surface_median() const;  ///< [m], likewise
   double track_rms() const;       ///< [m], of the followed points; 0 where there are none
   double matched_fraction() const;
+  double independent_observations() const;  ///< behind the cost, as `ObjectiveOptions` counts them
   /// The frames of one recording alone, with its cost and without derivatives.
   [[nodiscard]] CostEvaluation of_recording(int recording) const;
 };

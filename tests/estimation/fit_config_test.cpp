@@ -185,6 +185,7 @@ FitState some_state() {
   state.starts = {start, start};
   state.fine = {
       1, VectorX::Constant(20, 2.0 / 7.0), {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
+  state.corrected = {{"sensor_turn@front", "sensor_shift@front"}, "the pose of front", 12.5, 1e4 / 3.0};
   state.refined = {{12.0, 1.0, 800, VectorX::Constant(3, 1.0 / 3.0), 8.5, true, "cost settled"},
                    {12.0, 2.0, 800, VectorX::Constant(3, 2.0 / 3.0), 8.25, false, "too many iterations"}};
   return state;
@@ -211,6 +212,11 @@ TEST(FitState, RoundTripsToTheLastBit) {
   EXPECT_EQ(read.starts[1].iterations, 7);
   EXPECT_TRUE(read.starts[1].converged);
   EXPECT_EQ(read.starts[1].reason, written.starts[1].reason);
+  ASSERT_TRUE(read.corrected.has_value());
+  EXPECT_EQ(read.corrected->parameters, written.corrected->parameters);
+  EXPECT_EQ(read.corrected->what, "the pose of front");
+  EXPECT_EQ(read.corrected->cost, 12.5);
+  EXPECT_EQ(read.corrected->youngs_modulus, 1e4 / 3.0);
   ASSERT_EQ(read.refined.size(), 2u);
   EXPECT_EQ(read.refined[1].theta, written.refined[1].theta);
   EXPECT_EQ(read.refined[1].steps, 2.0);

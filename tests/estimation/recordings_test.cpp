@@ -1,6 +1,8 @@
 // Several recordings in one objective, and sensors that need correction.
 #include "support/recordings.hpp"
 
+#include "estimation/corrections.hpp"
+#include "estimation/optimiser.hpp"
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
@@ -118,6 +120,72 @@ TEST(Sensors, ACorrectionUndoesTheSensorsError) {
   theta.segment<SensorCorrection::size>(theta::sensor(0, 0, 0)) = values;
   EXPECT_NEAR(Objective({scene.motions[0]}, ParameterSet({}, theta)).evaluate(VectorX(0)).cost, before,
               tolerance(1e-9) * before);
+}
+
+/// What a correction would gain is what minimising the quadratic model with it gains over minimising it without.
+TEST(Corrections, TheScoreTestPredictsTheFallOfAQuadraticCost) {
+  MatrixX A(3, 3);
+  A << 4.0, 1.0, 0.5, 1.0, 3.0, -0.7, 0.5, -0.7, 2.0;
+  CostEvaluation e;
+  e.cost = 1.0;
+  e.gauss_newton = A;
+  e.gradient.resize(3);
+  e.gradient << 0.0, 5.0, 1.0;
+  const auto parameter = [](const char* name, int index) {
+    return Parameter{name, "m", Transform::Shift, index, 1.0, -1.0, 1.0, true};
+  };
+  const ParameterSet parameters(
+      {parameter("youngs_modulus", 0), parameter("range_error@left", 1), parameter("range_error@right", 2)},
+      VectorX::Zero(3));
+  const std::vector<Correction> both = {{"left", {"range_error@left"}}, {"right", {"range_error@right"}}};
+  const auto needed = needed_corrections(e, parameters, both, 100.0);
+  ASSERT_EQ(needed.size(), 1u) << "beside the first, the second gains too little";
+  EXPECT_EQ(needed[0].correction.what, "left");
+  const Eigen::Vector2d g(0.0, 5.0);
+  EXPECT_NEAR(needed[0].gain, 0.5 * g.dot(A.topLeftCorner<2, 2>().ldlt().solve(g)), 1e-12);
+  EXPECT_NEAR(needed[0].least, 0.5 * std::log(100.0), 1e-12);
+  e.cost = 1000.0;  // residuals twenty times as large as the noise explains: the same gain means nothing
+  EXPECT_TRUE(needed_corrections(e, parameters, both, 100.0).empty());
+}
+
+TEST(Corrections, WhatTheUserDecidedAboutIsLeftAlone) {
+  const TwoFlights scene;
+  std::vector<Parameter> list = scene.list;
+  for (Parameter& p : list) p.estimated = p.name == "youngs_modulus";
+  const ParameterSet none(list, scene.parameters.reference());
+  EXPECT_EQ(possible_corrections(none, {}).size(), 4u) << "range and pose of two sensors";
+  EXPECT_EQ(possible_corrections(none, {"range_error"}).size(), 2u);
+  EXPECT_EQ(possible_corrections(none, {"sensor_turn@front[2]"}).size(), 3u);
+  EXPECT_TRUE(possible_corrections(scene.parameters, {}).empty()) << "they are estimated already";
+}
+
+/// A sensor that stands elsewhere than stated is found out, and no other.
+TEST(Corrections, OnlyTheSensorThatStandsElsewhereNeedsCorrection) {
+  TwoFlights scene;
+  std::vector<Parameter> list = scene.list;
+  for (Parameter& p : list) p.estimated = p.name == "youngs_modulus";
+  ParameterSet without(list, scene.parameters.reference());
+  const auto look = [&](const std::vector<ObservedMotion>& motions) {
+    Objective objective(motions, without);
+    const OptimiserSummary s = minimise(objective, without.to_unconstrained(without.reference()), {});
+    ParameterSet with_all = without;
+    const auto possible = possible_corrections(without, {});
+    for (const Correction& c : possible)
+      for (const std::string& name : c.parameters) with_all.set_estimated(name, true);
+    with_all.set_reference(without.to_theta(s.p));
+    Objective all(motions, with_all);
+    const CostEvaluation e = all.linearise(with_all.to_unconstrained(with_all.reference()));
+    std::vector<std::string> what;
+    for (const NeededCorrection& n : needed_corrections(e, with_all, possible, e.independent_observations()))
+      what.push_back(n.correction.what);
+    return what;
+  };
+  EXPECT_TRUE(look(scene.motions).empty());
+  auto moved = std::make_shared<std::vector<FrameObservations>>(*scene.motions[1].observations);
+  for (FrameObservations& frame : *moved)
+    for (SurfaceObservation& o : frame.points) o.position += Vector3(4e-3, -2e-3, 1e-3);
+  scene.motions[1].observations = moved;
+  EXPECT_EQ(look(scene.motions), std::vector<std::string>{"the pose of front[2]"});
 }
 
 }  // namespace

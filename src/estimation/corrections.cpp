@@ -1,0 +1,88 @@
+#include "estimation/corrections.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace pliant {
+
+namespace {
+
+/// Rows of the unconstrained vector that belong to parameters of these names.
+std::vector<Eigen::Index> rows_of(const ParameterSet& parameters, const std::vector<std::string>& names) {
+  std::vector<Eigen::Index> rows;
+  Eigen::Index at = 0;
+  for (const Parameter& p : parameters.parameters()) {
+    if (!p.estimated) continue;
+    for (int d = 0; d < p.dimension(); ++d, ++at)
+      if (std::ranges::find(names, p.name) != names.end()) rows.push_back(at);
+  }
+  return rows;
+}
+
+/// How far the cost falls in one Newton step of the rows `moved`, the rows `following` moving along.
+double gain_of(const CostEvaluation& e, const std::vector<Eigen::Index>& following,
+               const std::vector<Eigen::Index>& moved) {
+  const auto fall = [&](const std::vector<Eigen::Index>& rows) {
+    if (rows.empty()) return 0.0;
+    const VectorX g = e.gradient(rows);
+    const MatrixX H = e.gauss_newton(rows, rows);
+    return 0.5 * g.dot(H.ldlt().solve(g));
+  };
+  std::vector<Eigen::Index> together = following;
+  together.insert(together.end(), moved.begin(), moved.end());
+  return fall(together) - fall(following);
+}
+
+}  // namespace
+
+std::vector<Correction> possible_corrections(const ParameterSet& parameters, const std::vector<std::string>& chosen) {
+  std::vector<Correction> corrections;
+  const auto is_free = [&](const Parameter& p) {
+    const std::string base = p.name.substr(0, p.name.find_first_of("@["));
+    return !p.estimated && std::ranges::find(chosen, p.name) == chosen.end() &&
+           std::ranges::find(chosen, base) == chosen.end();
+  };
+  for (const Parameter& p : parameters.parameters()) {
+    if (!is_free(p)) continue;
+    const std::string sensor = p.name.substr(p.name.find('@') + 1);
+    if (p.name.starts_with("range_error@"))
+      corrections.push_back({"the range of " + sensor, {p.name}});
+    else if (p.name.starts_with("sensor_turn@"))
+      corrections.push_back({"the pose of " + sensor, {p.name, "sensor_shift@" + sensor}});
+    else if (p.transform == Transform::Direction)
+      corrections.push_back({"the direction of " + p.name, {p.name}});
+  }
+  return corrections;
+}
+
+std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluation, const ParameterSet& parameters,
+                                                 const std::vector<Correction>& corrections, double observations) {
+  std::vector<std::string> candidates;
+  for (const Correction& c : corrections) candidates.insert(candidates.end(), c.parameters.begin(), c.parameters.end());
+  const std::vector<Eigen::Index> all = rows_of(parameters, candidates);
+  std::vector<Eigen::Index> following;
+  for (Eigen::Index i = 0; i < evaluation.gradient.size(); ++i)
+    if (std::ranges::find(all, i) == all.end()) following.push_back(i);
+  const double noise_scale = std::max(1.0, 2.0 * evaluation.cost / observations);
+  std::vector<Correction> left = corrections;
+  std::vector<NeededCorrection> needed;
+  while (!left.empty()) {
+    NeededCorrection best;
+    for (const Correction& c : left) {
+      const std::vector<Eigen::Index> rows = rows_of(parameters, c.parameters);
+      const double gain = gain_of(evaluation, following, rows);
+      const double least = 0.5 * double(rows.size()) * std::log(observations) * noise_scale;
+      if (gain - least > best.gain - best.least) best = {c, gain, least};
+    }
+    if (best.gain <= best.least) break;
+    const std::vector<Eigen::Index> rows = rows_of(parameters, best.correction.parameters);
+    following.insert(following.end(), rows.begin(), rows.end());
+    std::erase_if(left, [&](const Correction& c) { return c.what == best.correction.what; });
+    needed.push_back(std::move(best));
+  }
+  return needed;
+}
+
+}  // namespace pliant

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimation/objective.hpp"
+
+namespace pliant {
+
+/// Something that spoils recordings and can be corrected: a sensor's range, its pose, the direction of gravity.
+struct Correction {
+  std::string what;                     ///< for people: "the pose of front"
+  std::vector<std::string> parameters;  ///< that are estimated together
+};
+
+/// Those of all parameters that are neither estimated nor in `chosen`, what the user has decided about.
+std::vector<Correction> possible_corrections(const ParameterSet& parameters, const std::vector<std::string>& chosen);
+
+/// A correction that the residuals ask for.
+struct NeededCorrection {
+  Correction correction;
+  double gain = 0.0;   ///< by which the cost would fall, to first order
+  double least = 0.0;  ///< that is worth the correction's parameters
+};
+
+/// Rao's score test (1948) of each correction at an estimate that lacks it: one step of Gauss and Newton with it, all
+/// that was estimated following along. It is needed where it lowers the cost by more than Schwarz's criterion (1978)
+/// asks, scaled by how much worse the residuals are than the noise. The one that gains most comes first, then those
+/// still needed beside it.
+/// @param evaluation  with derivatives by all of `parameters`: what was estimated, and the corrections
+/// @param parameters  that set, with the corrections estimated
+/// @param observations  independent ones behind the cost
+std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluation, const ParameterSet& parameters,
+                                                 const std::vector<Correction>& corrections, double observations);
+
+}  // namespace pliant
