@@ -65,15 +65,17 @@ std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluatio
   std::vector<Eigen::Index> following;
   for (Eigen::Index i = 0; i < evaluation.gradient.size(); ++i)
     if (std::ranges::find(all, i) == all.end()) following.push_back(i);
-  const double noise_scale = std::max(1.0, 2.0 * evaluation.cost / observations);
+  const double explained = 0.5 * observations;  // the cost of residuals that are noise
+  const double noise_scale = std::max(1.0, evaluation.cost / explained);
   std::vector<Correction> left = corrections;
   std::vector<NeededCorrection> needed;
-  while (!left.empty()) {
+  for (double excess = evaluation.cost - explained; excess > 0.0 && !left.empty(); excess -= needed.back().gain) {
     NeededCorrection best;
     for (const Correction& c : left) {
       const std::vector<Eigen::Index> rows = rows_of(parameters, c.parameters);
       const double gain = gain_of(evaluation, following, rows);
-      const double least = 0.5 * double(rows.size()) * std::log(observations) * noise_scale;
+      const double worth = 0.5 * double(rows.size()) * std::log(observations) * noise_scale;
+      const double least = std::max(worth, 0.5 * excess);
       if (gain - least > best.gain - best.least) best = {c, gain, least};
     }
     if (best.gain <= best.least) break;

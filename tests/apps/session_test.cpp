@@ -247,6 +247,28 @@ TEST_F(Session, TwoRecordingsAreFittedTogetherAndAThirdIsPredicted) {
   EXPECT_NEAR(predicted / fitted, 1.0, 0.2) << "the same object, scene and noise";
 }
 
+/// The elements of one fit are the volume mesh of another recording.
+TEST_F(Session, AVolumeMeshMadeElsewhereIsFitted) {
+  const std::vector<std::string> tetrahedra = {"--set", "element=tetrahedra"};
+  ASSERT_EQ(run_fit("tetrahedra", tetrahedra).exit_code, fine);
+  const fs::path meshed = at("meshed");
+  fs::copy(capture(), meshed, fs::copy_options::recursive);
+  fs::copy_file(at("tetrahedra") + "/model.vtu", meshed / "body.vtu");
+  std::string facts = read_file(meshed / "capture.toml");
+  const std::size_t surface = facts.find("surface = ");
+  ASSERT_NE(surface, std::string::npos);
+  facts.replace(surface, facts.find('\n', surface) - surface, "volume_mesh = \"body.vtu\"");
+  write_file(meshed / "capture.toml", facts);
+  const ProgramRun run = run_pliant({"fit", meshed, "--out", at("on the mesh"), "--set", "element=tetrahedra", "--set",
+                                     "points_per_frame=100", "--set", "scan_per_decade=1", "--set", "starts=1", "--set",
+                                     "steps=0.4", "--refine", "2"});
+  ASSERT_EQ(run.exit_code, fine) << run.err;
+  const json found = result("on the mesh"), before = result("tetrahedra");
+  EXPECT_NEAR(value(found, "youngs_modulus") / value(before, "youngs_modulus"), 1.0, 0.05) << "the same elements";
+  EXPECT_EQ(found["resolutions"].size(), 2U) << "finer steps, but no other mesh than the one given";
+  EXPECT_FALSE(found["parameters"]["youngs_modulus"].contains("mesh_error"));
+}
+
 class InterruptedSession : public Session, public testing::WithParamInterface<const char*> {};
 
 TEST_P(InterruptedSession, LeavesAResultAndIsResumed) {

@@ -127,7 +127,7 @@ TEST(Corrections, TheScoreTestPredictsTheFallOfAQuadraticCost) {
   MatrixX A(3, 3);
   A << 4.0, 1.0, 0.5, 1.0, 3.0, -0.7, 0.5, -0.7, 2.0;
   CostEvaluation e;
-  e.cost = 1.0;
+  e.cost = 53.0;
   e.gauss_newton = A;
   e.gradient.resize(3);
   e.gradient << 0.0, 5.0, 1.0;
@@ -143,8 +143,10 @@ TEST(Corrections, TheScoreTestPredictsTheFallOfAQuadraticCost) {
   EXPECT_EQ(needed[0].correction.what, "left");
   const Eigen::Vector2d g(0.0, 5.0);
   EXPECT_NEAR(needed[0].gain, 0.5 * g.dot(A.topLeftCorner<2, 2>().ldlt().solve(g)), 1e-12);
-  EXPECT_NEAR(needed[0].least, 0.5 * std::log(100.0), 1e-12);
-  e.cost = 1000.0;  // residuals twenty times as large as the noise explains: the same gain means nothing
+  EXPECT_NEAR(needed[0].least, 0.5 * std::log(100.0) * 53.0 / 50.0, 1e-12);
+  e.cost = 49.0;  // no more than noise costs
+  EXPECT_TRUE(needed_corrections(e, parameters, both, 100.0).empty());
+  e.cost = 60.0;  // it explains less than half of what is wrong
   EXPECT_TRUE(needed_corrections(e, parameters, both, 100.0).empty());
 }
 
