@@ -1,6 +1,8 @@
 #include "elasticity/body.hpp"
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "elasticity/tet_element.hpp"
 
@@ -74,6 +76,10 @@ void finish_tetrahedra(Body& body) {
 
 }  // namespace
 
+const Points& Body::scanned_positions() const {
+  return std::visit([](const auto& m) -> const Points& { return m.nodes; }, mesh);
+}
+
 double Body::volume() const {
   double sum = 0.0;
   for (const double v : element_volume) sum += v;
@@ -135,6 +141,35 @@ Body make_body(TetMesh mesh, const BodyOptions& options) {
     finish_tetrahedra<4>(body);
   body.mesh = std::move(mesh);
   return body;
+}
+
+namespace {
+
+template <int N>
+void follow_reference(Body& body) {
+  for (int e = 0; e < body.element_count(); ++e) {
+    const auto X = rest_nodes<N>(body, e);
+    body.element_volume[std::size_t(e)] = tet_mass<N>(X).sum();
+    if (!(body.element_volume[std::size_t(e)] > 0.0))
+      throw std::invalid_argument("with_reference: element " + std::to_string(e) + " has no positive volume");
+    body.mean_gradient.middleRows<N>(Eigen::Index(e) * N) = tet_mean_gradients<N>(X);
+  }
+}
+
+}  // namespace
+
+Body with_reference(const Body& body, Points reference) {
+  if (body.kind == ElementKind::Hexahedron)
+    throw std::invalid_argument("with_reference: hexahedra are regular where they are free of load");
+  if (reference.rows() != body.nodes.rows())
+    throw std::invalid_argument("with_reference: one position a node is needed");
+  Body moved = body;
+  moved.nodes = std::move(reference);
+  if (moved.kind == ElementKind::Tetrahedron)
+    follow_reference<4>(moved);
+  else
+    follow_reference<10>(moved);
+  return moved;
 }
 
 template <int N>

@@ -65,6 +65,8 @@ struct Body {
     return mean_gradient.middleRows(Eigen::Index(e) * nodes_per_element(), nodes_per_element());
   }
   const Points& reference_positions() const { return nodes; }
+  /// Where the nodes were in the scan [m], n x 3: the same, unless it was taken under load (`with_reference`).
+  const Points& scanned_positions() const;
   double volume() const;
   Vector3 centre_of_mass() const;
   /// Longest edge of the nodes' box [m].
@@ -78,6 +80,12 @@ struct Body {
 
 Body make_body(HexGrid grid, const BodyOptions& options = {});
 Body make_body(TetMesh mesh, const BodyOptions& options = {});
+
+/// The same body, free of load where `reference` has its nodes [m]. Its mass, its surface, and where points of the scan
+/// lie in it stay as they are.
+/// Throws std::invalid_argument for hexahedra, whose grid is regular when it is free of load, and where an element has
+/// no positive volume.
+Body with_reference(const Body& body, Points reference);
 
 /// Calls function.template operator()<N>() with the body's nodes per element as a constant, so that element loops are
 /// unrolled for each kind.

@@ -1,0 +1,34 @@
+#pragma once
+
+#include "elasticity/element_moduli.hpp"
+#include "elasticity/polar.hpp"
+
+namespace pliant {
+
+/// Corotational forces of tetrahedra as a function of where their nodes are free of load, the deformed positions x
+/// being known (Wang 2015, eq. 1 and appendix):
+///   f_a = -E_e R integral of C : (R^T F - I) g_a,   F = sum_b x_b g_b^T,  R the rotation of F's mean,
+/// where volumes, gradients g and rotations all follow from X. Hexahedra do not take part: their grid is regular when
+/// it is free of load. Positions and forces are n x 3 [m], [N].
+class ReferenceForces {
+ public:
+  /// Throws std::invalid_argument for a body of hexahedra.
+  static std::unique_ptr<ReferenceForces> make(std::shared_ptr<const Body> body);
+  virtual ~ReferenceForces() = default;
+
+  virtual void set_parameters(const VectorX& theta) = 0;
+  /// Fixes X and x; the calls below refer to them. False where an element of X has no positive volume somewhere.
+  [[nodiscard]] virtual bool linearise(const Points& X, const Points& x) = 0;
+  /// force += f
+  virtual void add_force(Points& force) const = 0;
+  /// matrix += scale df/dX, which is not symmetric.
+  virtual void add_matrix(double scale, BlockMatrix& matrix) const = 0;
+  /// force += df for a change of X
+  virtual void add_tangent(const Points& d_reference, Points& force) const = 0;
+  /// The cotangent of X for the cotangent `w` of f is added.
+  virtual void add_adjoint(const Points& w, Points& reference_bar) const = 0;
+  /// Smallest ratio of a volume at a quadrature point to that in the body as it was given.
+  virtual double least_volume_ratio() const = 0;
+};
+
+}  // namespace pliant
