@@ -107,6 +107,21 @@ def write_results(script, figures):
     print(path)
 
 
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+def mean(points):
+    """The middle of points, a tuple."""
+    return tuple(sum(p[d] for p in points) / len(points) for d in range(len(points[0])))
+
+
+def read_markers(path, names):
+    """Frame by frame {marker: (x, y, z) [m]} of a CSV file with the columns MARKER_x_m, MARKER_y_m, MARKER_z_m."""
+    with open(path, newline="") as file:
+        return [{m: tuple(float(row[f"{m}_{c}_m"]) for c in "xyz") for m in names} for row in csv.DictReader(file)]
+
+
 def relative_error(estimate, truth):
     return estimate / truth - 1.0
 

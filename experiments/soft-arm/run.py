@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """A silicone arm whose chamber was inflated and vented: the swing that is left after venting gives the stiffness in bending of
 a solid arm of its outer shape. The chambers' shape and the pressure over time were not recorded. Standard library only."""
-import csv
 import math
 import pathlib
 import struct
@@ -9,8 +8,10 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import common
+from common import mean
 
 FOLDER = "soft-arm-mocap"
+TIPS = ["tip1", "tip2", "tip3"]
 STEPS = [100, 150, 200, 250, 300]     # mbar; after higher ones the arm swings less than it creeps
 LENGTH, RADIUS, DENSITY, RATE = 0.1, 0.0222, 1070.0, 100.0
 POISSON = 0.49
@@ -18,14 +19,9 @@ AUTHORS = 263824.0     # Young's modulus [Pa] that the recording's authors state
 FRAMES = 26
 
 
-def mean(points):
-    return [sum(p[d] for p in points) / len(points) for d in range(3)]
-
-
 def read_tip(pressure):
     """Mean of the three markers at the tip [m], a frame at a time, about where it comes to rest."""
-    with open(common.shared_data() / FOLDER / f"step_{pressure}mbar.csv", newline="") as file:
-        tip = [mean([[float(row[f"tip{i}_{c}_m"]) for c in "xyz"] for i in (1, 2, 3)]) for row in csv.DictReader(file)]
+    tip = [mean(list(frame.values())) for frame in common.read_markers(common.shared_data() / FOLDER / f"step_{pressure}mbar.csv", TIPS)]
     end = mean(tip[-30:])
     return [[a - b for a, b in zip(p, end)] for p in tip]
 
