@@ -35,6 +35,8 @@ FITS = {
     "twisted-coarse": ("silicone-t_em_c", {"cells": 24, "coarse_cells": 10, **ANCHOR}),
     "twisted": ("silicone-t_em_c", {"cells": 32, "coarse_cells": 10, **ANCHOR}),
     "twisted-finer": ("silicone-t_em_c", {"cells": 40, "coarse_cells": 10, **ANCHOR}),
+    "twisted-pose": ("silicone-t_em_c", {"cells": 24, "coarse_cells": 10, **ANCHOR, **POSE}),
+    "twisted-pose-finer": ("silicone-t_em_c", {"cells": 32, "coarse_cells": 10, **ANCHOR, **POSE}),
 }
 
 
