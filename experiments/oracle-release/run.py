@@ -3,15 +3,15 @@
 depth sensors fused to clouds).
 
 The even bar is fitted with no choice of ours. Nobody tells the program where the second bar's materials meet: its Young's modulus is
-a field over 1, 2, 3, 4 or 6 control points; and once more as two regions, as one who knows the place would write. What a user can
+a field over 1 to 6 control points; and once more as two regions, as one who knows the place would write. What a user can
 judge a number of control points by (cost, and how frames that took no part are predicted) stands beside what the truth says.
 truth.json is read for judging only. Standard library only."""
-import base64
+import ast
 import math
 import pathlib
 import struct
 import sys
-import xml.etree.ElementTree
+import zipfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
@@ -19,6 +19,7 @@ import common
 
 EVEN, ZONES = "oracle-release", "oracle-release-zones"
 NAMES = ["youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]
+START = 5              # the frame of the release
 SHORT = 60             # frames of the shortened recording; those after it are predicted
 INDEPENDENT = 50       # points a frame counts as, in the cost
 LOWER = """
@@ -32,14 +33,13 @@ GIVEN_POISSON = {"poisson_ratio.estimate": False}  # it stays at the program's o
 FITS = {
     "even": ("even", {}),
     "regions": ("regions", {}),
-    **{f"points-{n}": ("zones", {"control_points": n}) for n in (1, 2, 3, 4, 6)},
     "regions-given-poisson": ("regions", GIVEN_POISSON),
-    **{f"points-{n}-given-poisson": ("zones", {"control_points": n, **GIVEN_POISSON}) for n in (2, 3, 4, 6)},
     "regions-finer": ("regions", {"cells": 20}),
-    **{f"short-{n}": ("short", {"control_points": n}) for n in (1, 2, 3, 4, 6)},
+    "regions-quadratic": ("regions", {"element": "quadratic_tetrahedra"}),
+    **{f"points-{n}": ("zones", {"control_points": n}) for n in (1, 2, 3, 4, 6)},
+    **{f"points-{n}-given-poisson": ("zones", {"control_points": n, **GIVEN_POISSON}) for n in (2, 3, 4)},
+    **{f"short-{n}": ("short", {"control_points": n}) for n in (1, 2, 3)},
     "short-regions": ("short-regions", {}),
-    "even-finer": ("even", {"cells": 20}),
-    "points-4-finer": ("zones", {"control_points": 4, "cells": 20}),
 }
 
 
@@ -61,46 +61,64 @@ def captures(work):
     return work / "captures"
 
 
-def arrays_of(vtu):
-    """Arrays of a VTK file (ascii or inline base64, not compressed) by name, flat."""
-    root = xml.etree.ElementTree.parse(vtu).getroot()
-    formats = {"Float64": "d", "Float32": "f", "Int64": "q", "Int32": "i", "UInt8": "B", "UInt64": "Q", "UInt32": "I"}
-    width = 8 if root.get("header_type") == "UInt64" else 4
-    found = {}
-    for array in root.iter("DataArray"):
-        text = (array.text or "").strip()
-        if array.get("format") == "ascii":
-            values = [float(word) for word in text.split()]
-        else:
-            data = base64.b64decode(text)[width:]
-            code = formats[array.get("type")]
-            values = list(struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data))
-        found[array.get("Name")] = values
-    return found
-
-
 def elements_of(model):
-    """(height of its middle [m], volume of its part inside the object [m^3], Young's modulus [Pa]) of each cell of a model."""
-    a = arrays_of(model)
+    """(lower and upper end [m], volume of its part inside the object [m^3], Young's modulus [Pa]) of each cell of a model."""
+    a = common.read_vtu(model)
     points, nodes, ends = a["points"], a["connectivity"], a["offsets"]
     elements, begin = [], 0
     for end, modulus, fill in zip(ends, a["youngs_modulus [Pa]"], a["fill"]):
         corners = [points[3 * int(n):3 * int(n) + 3] for n in nodes[begin:int(end)]]
         begin = int(end)
-        volume = fill * math.prod(max(c[d] for c in corners) - min(c[d] for c in corners) for d in range(3))
-        elements.append((sum(c[1] for c in corners) / len(corners), volume, modulus))
+        low, high = ([pick(c[d] for c in corners) for d in range(3)] for pick in (min, max))
+        elements.append((low[1], high[1], fill * math.prod(h - l for l, h in zip(low, high)), modulus))
     return elements
 
 
 def zones_of(model, zones):
-    """Mean of Young's modulus over each zone's elements, weighted by volume, and beside it the zone's truth."""
+    """Mean of Young's modulus over each zone's elements, weighted by their volume in it, and beside it the zone's truth."""
     out = []
     elements = elements_of(model)
     for zone in zones:
-        inside = [(volume, modulus) for y, volume, modulus in elements if zone["y_min"] <= y <= zone["y_max"]]
+        inside = [(volume * max(0.0, min(high, zone["y_max"]) - max(low, zone["y_min"])) / (high - low), modulus)
+                  for low, high, volume, modulus in elements]
         mean = sum(v * E for v, E in inside) / sum(v for v, _ in inside)
         out.append({"from": zone["y_min"], "to": zone["y_max"], "mean": common.number(mean), "truth": zone["value"]})
     return out
+
+
+def read_array(archive, name):
+    """Shape and flat values of an array in an .npz file."""
+    data = archive.read(name + ".npy")
+    size = struct.unpack_from("<H", data, 8)[0]
+    header = ast.literal_eval(data[10:10 + size].decode())
+    codes = {"<i2": "h", "<i4": "i", "<f4": "f", "<f8": "d"}
+    count = math.prod(header["shape"])
+    return header["shape"], struct.unpack_from(f"<{count}{codes[header['descr']]}", data, 10 + size)
+
+
+def swing_errors(fit, source, first):
+    """How far the free end of a fit's motion is off the true one, rms of each coordinate [m] over the frames."""
+    data = common.shared_data() / source / "truth"
+    with zipfile.ZipFile(data / "trajectory.npz") as archive:
+        (frames, count, _), q = read_array(archive, "q")
+        scale = read_array(archive, "scale")[1][0]
+    ply = (data / "reference.ply").read_bytes()
+    rest = struct.unpack_from(f"<{3 * count}d", ply, ply.index(b"end_header\n") + 11)
+    files = sorted((fit / "frames").glob("*.vtu"))
+    squares, end = [0.0] * 3, None
+    for k in range(min(len(files), frames - first)):
+        frame = common.read_vtu(files[k])
+        moved, there = frame["displacement [m]"], frame["points"]
+        if end is None:  # nodes about 30 mm from the end, and the true surface's vertices at their height
+            heights = [there[3 * n + 1] - moved[3 * n + 1] for n in range(len(there) // 3)]
+            end = [n for n, y in enumerate(heights) if abs(y + 0.33) < 0.02]
+            height = sum(heights[n] for n in end) / len(end)
+            true_end = [n for n in range(count) if abs(rest[3 * n + 1] - height) < 0.012]
+        for d in range(3):
+            simulated = sum(moved[3 * n + d] for n in end) / len(end)
+            true = sum(scale * q[3 * (count * (k + first) + n) + d] - rest[3 * n + d] for n in true_end) / len(true_end)
+            squares[d] += (simulated - true) ** 2 / min(len(files), frames - first)
+    return [common.number(math.sqrt(v), 3) for v in squares]
 
 
 def rms_by_frame_range(program, model, captures, short, whole, work):
@@ -112,13 +130,15 @@ def rms_by_frame_range(program, model, captures, short, whole, work):
 
 
 def main():
-    arguments = common.arguments(__doc__)
+    arguments = common.arguments(__doc__, gather={"action": "store_true", "help": "no new fits: gather those that are in --work"})
     folder = captures(arguments.work)
     truth = {name: common.read(common.shared_data() / name / "truth.json")["parameters"] for name in (EVEN, ZONES)}
     fits = {}
     for name, (capture, choices) in FITS.items():
         if not (folder / capture).exists():
             print(f"{name}: its recording is not there, left out")
+            continue
+        if arguments.gather and not (arguments.work / name / "figures.json").exists():
             continue
         figures = common.fit(arguments.program, folder / capture, arguments.work / name, choices)
         result = figures.pop("result")
@@ -130,7 +150,7 @@ def main():
                 parameters[key] = {"value": common.number(p["value"]), "std": common.number(p.get("std"), 2), "unit": p["unit"],
                                    "truth": value if isinstance(value, (int, float)) else None}
         model = arguments.work / name / "model.toml"
-        fits[name] = {"capture": capture, "cells": choices.get("cells", 12), "control_points": choices.get("control_points", 1),
+        fits[name] = {"capture": capture, "cells": choices.get("cells", 12), "element": choices.get("element", "hexahedra"), "control_points": choices.get("control_points", 1),
                       "poisson_is_estimated": choices.get("poisson_ratio.estimate", True), "parameters": parameters,
                       "field": [{"y": common.number(c[1], 4), "value": common.number(c[3]), "std": common.number(c[4], 2)}
                                 for c in result.get("fields", {}).get("youngs_modulus", {}).get("control_points", [])],
@@ -138,6 +158,7 @@ def main():
                       "cost": common.number(result["cost"]["final"]), "estimated": sum(
                           (3 if isinstance(p["value"], list) else 1) for p in result["parameters"].values() if p["estimated"]),
                       "converged": figures["exit_code"] == 0, **figures}
+        fits[name]["swing_errors"] = swing_errors(arguments.work / name, EVEN if capture == "even" else ZONES, START)
         if capture != "even":
             fits[name]["zones"] = zones_of(model.with_suffix(".vtu"), own["youngs_modulus"]["value"]["zones"])
         if capture.startswith("short"):

@@ -93,7 +93,8 @@ track = "track.csv"
 
 
 def main():
-    arguments = common.arguments(__doc__, fit={"action": "store_true", "help": "also fit the first release, which takes long"})
+    arguments = common.arguments(__doc__, fit={"action": "store_true", "help": "also fit the first release, which takes long"},
+                                 limit={"type": float, "default": 900.0, "help": "seconds after which that fit ends with what it has"})
     recordings, fits = [], []
     for pressure in STEPS:
         tip = read_tip(pressure)
@@ -110,11 +111,14 @@ def main():
             continue
         choices = {"element": "quadratic_tetrahedra", "cells": 5, "coarse_cells": 4, "poisson_ratio.start": POISSON,
                    "poisson_ratio.estimate": False, "starts": 1}
-        figures = common.fit(arguments.program, arguments.work / str(pressure), arguments.work / f"fit-{pressure}", choices)
+        figures = common.fit(arguments.program, arguments.work / str(pressure), arguments.work / f"fit-{pressure}", choices,
+                             limit=arguments.limit)
         E = figures["result"]["parameters"]["youngs_modulus"]
         fits.append({"pressure_mbar": pressure, "youngs_modulus": common.number(E["value"], 4), "std": common.number(E.get("std"), 2),
                      "marker_rms_mm": common.number(1e3 * (figures["result"]["error"].get("marker_rms") or 0.0), 3),
-                     "wall_seconds": figures["wall_seconds"], "converged": figures["exit_code"] == 0})
+                     "wall_seconds": figures["wall_seconds"], "stiffness_damping": common.number(figures["result"]["parameters"]["stiffness_damping"]["value"], 3),
+                     "mass_damping": common.number(figures["result"]["parameters"]["mass_damping"]["value"], 3),
+                     "converged": figures["exit_code"] == 0, "limit": arguments.limit if figures["exit_code"] == common.INTERRUPTED else None})
     common.write_results(__file__, {"authors": AUTHORS, "poisson_ratio": POISSON, "recordings": recordings, "fits": fits})
 
 
