@@ -80,6 +80,12 @@ def release_name(name, fit):
     return text + (f", {fit['cells']} cells" if fit["cells"] != 12 else "")
 
 
+def control_values(fit):
+    """From the free end to the held one, in kPa, with their deviations."""
+    found = fit["field"] or [q for key, q in reversed(fit["parameters"].items()) if key.startswith("youngs_modulus")]
+    return ", ".join(f"{1e-3 * c['value']:.4g} ± {1e-3 * c['std']:.2g}" for c in found)
+
+
 def independent_numbers(fit, independent):
     """What the cost weighs: of each frame that many points."""
     return fit["points"] / 1000 * independent
@@ -103,13 +109,8 @@ def release():
         off = [z["mean"] / z["truth"] - 1 for z in f["zones"]]
         if max(abs(o) for o in off) > 0.15:
             misses.append(release_name(name, f) + ("" if f["poisson_is_estimated"] else " with Poisson's ratio given"))
-        controls = [f"{1e-3 * c['value']:.3g} ± {1e-3 * c['std']:.2g}" for c in f["field"]]
-        if f["capture"] == "regions":
-            controls = [f"{1e-3 * q['value']:.4g} ± {1e-3 * q['std']:.2g}" for key, q in reversed(f["parameters"].items()) if key.startswith("youngs_modulus")]
-        if not controls:
-            controls = [f"{1e-3 * f['parameters']['youngs_modulus']['value']:.4g} ± {1e-3 * f['parameters']['youngs_modulus']['std']:.2g}"]
         nu = f["parameters"]["poisson_ratio"]
-        rows.append([release_name(name, f), f"{nu['value']:.3f}" + (f" ± {nu['std']:.2g}" if nu["std"] else " (given)"), ", ".join(controls),
+        rows.append([release_name(name, f), f"{nu['value']:.3f}" + (f" ± {nu['std']:.2g}" if nu["std"] else " (given)"), control_values(f),
                      f"{1e-3 * lower['mean']:.0f} ({percent(off[1])})", f"{1e-3 * upper['mean']:.0f} ({percent(off[0])})", f"{f['cost']:.0f}",
                      f"{bic:.0f}" if f["cells"] == 12 and f["element"] == "hexahedra" else "", f"{1e3 * f['surface_rms']:.2f}", f"{f['wall_seconds']:.0f}"])
     upper, lower = fits["regions"]["zones"]
@@ -120,10 +121,10 @@ def release():
     text += "\nZones within 15 %: " + ("all fits." if not misses else f"all fits but {'; '.join(misses)}.") + "\n"
     short = {name: f for name, f in fits.items() if f["capture"].startswith("short")}
     if short:
-        text += f"\nFitted to the first {figures['short']} frames alone, the rest predicted:\n\n" + table(
-            ["Young's modulus is", "Poisson's ratio", "lower zone [kPa]", "upper zone [kPa]", "rms of what was fitted [mm]", "of what was predicted [mm]"],
-            [[release_name(name, f), f"{f['parameters']['poisson_ratio']['value']:.3f}", *[f"{1e-3 * z['mean']:.0f} ({percent(z['mean'] / z['truth'] - 1)})" for z in reversed(f["zones"])],
-              f"{1e3 * f['fitted_rms']:.3f}", f"{1e3 * f['predicted_rms']:.3f}"] for name, f in short.items()])
+        text += f"\nFitted to the first {figures['short']} frames alone:\n\n" + table(
+            ["Young's modulus is", "Poisson's ratio", "control values [kPa]", "lower zone [kPa]", "upper zone [kPa]", "surface rms [mm]"],
+            [[release_name(name, f), f"{f['parameters']['poisson_ratio']['value']:.3f}", control_values(f),
+              *[f"{1e-3 * z['mean']:.0f} ({percent(z['mean'] / z['truth'] - 1)})" for z in reversed(f["zones"])], f"{1e3 * f['surface_rms']:.2f}"] for name, f in short.items()])
     return text + release_text(fits, whole) + f"\nMeasured on {machine(figures)}.\n"
 
 

@@ -4,7 +4,7 @@ depth sensors fused to clouds).
 
 The even bar is fitted with no choice of ours. Nobody tells the program where the second bar's materials meet: its Young's modulus is
 a field over 1 to 6 control points; and once more as two regions, as one who knows the place would write. What a user can
-judge a number of control points by (cost, and how frames that took no part are predicted) stands beside what the truth says.
+judge a number of control points by (cost, deviations, and what a part of the frames gives) stands beside what the truth says.
 truth.json is read for judging only. Standard library only."""
 import ast
 import math
@@ -20,7 +20,7 @@ import common
 EVEN, ZONES = "oracle-release", "oracle-release-zones"
 NAMES = ["youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]
 START = 5              # the frame of the release
-SHORT = 60             # frames of the shortened recording; those after it are predicted
+SHORT = 60             # frames of the shortened recording
 INDEPENDENT = 50       # points a frame counts as, in the cost
 LOWER = """
 [[region]]
@@ -121,14 +121,6 @@ def swing_errors(fit, source, first):
     return [common.number(math.sqrt(v), 3) for v in squares]
 
 
-def rms_by_frame_range(program, model, captures, short, whole, work):
-    """Of a model fitted to the first frames: rms over those, and over those after [m]."""
-    names = (short, whole)
-    errors = [common.evaluate(program, model, captures / name, work / f"{model.parent.name}-on-{name}.json")["error"] for name in names]
-    counts, squares = [e["points"] for e in errors], [e["points"] * e["surface_rms"] ** 2 for e in errors]
-    return math.sqrt(squares[0] / counts[0]), math.sqrt((squares[1] - squares[0]) / (counts[1] - counts[0]))
-
-
 def main():
     arguments = common.arguments(__doc__, gather={"action": "store_true", "help": "no new fits: gather those that are in --work"})
     folder = captures(arguments.work)
@@ -161,10 +153,6 @@ def main():
         fits[name]["swing_errors"] = swing_errors(arguments.work / name, EVEN if capture == "even" else ZONES, START)
         if capture != "even":
             fits[name]["zones"] = zones_of(model.with_suffix(".vtu"), own["youngs_modulus"]["value"]["zones"])
-        if capture.startswith("short"):
-            fitted, predicted = rms_by_frame_range(arguments.program, model, folder, capture, capture.replace("short-regions", "regions").replace("short", "zones"),
-                                                   arguments.work)
-            fits[name].update(fitted_rms=common.number(fitted, 5), predicted_rms=common.number(predicted, 5))
         zones = ", ".join(f"{z['mean'] / 1e3:.0f} ({z['truth'] / 1e3:.0f})" for z in fits[name].get("zones", []))
         print(f"{name}: E {parameters['youngs_modulus']['value']}, zones [kPa] {zones}, nu {parameters['poisson_ratio']['value']}, "
               f"cost {fits[name]['cost']}, {figures['wall_seconds']} s", flush=True)
