@@ -96,10 +96,13 @@ def release():
     if not figures:
         return "Not run yet.\n"
     fits = figures["fits"]
-    p = fits["even"]["parameters"]
-    text = table(["recording", "E [kPa] (truth)", "error", "nu (truth)", "mass damping [1/s] (truth)", "stiffness damping [ms] (truth)", "surface rms [mm]", "time [s]"],
-                 [["even bar", with_truth(p["youngs_modulus"], 1e-3), percent(p["youngs_modulus"]["value"] / p["youngs_modulus"]["truth"] - 1), with_truth(p["poisson_ratio"]),
-                   with_truth(p["mass_damping"]), with_truth(p["stiffness_damping"], 1e3), f"{1e3 * fits['even']['surface_rms']:.2f}", f"{fits['even']['wall_seconds']:.0f}"]])
+    evens = [(name, f) for name, f in fits.items() if f["capture"] == "even"]
+    text = table(["even bar", "program", "E [kPa] (truth)", "error", "nu (truth)", "mass damping [1/s] (truth)", "stiffness damping [ms] (truth)", "surface rms [mm]", "time [s]"],
+                 [["no choices" if name == "even" else "starts followed on the mesh of the fit; band that moves along", f["commit"][:7], with_truth(f["parameters"]["youngs_modulus"], 1e-3),
+                   percent(f["parameters"]["youngs_modulus"]["value"] / f["parameters"]["youngs_modulus"]["truth"] - 1), with_truth(f["parameters"]["poisson_ratio"]),
+                   with_truth(f["parameters"]["mass_damping"]), with_truth(f["parameters"]["stiffness_damping"], 1e3), f"{1e3 * f['surface_rms']:.2f}", f"{f['wall_seconds']:.0f}"] for name, f in evens])
+    text += ("\nWhat pulls a bar aside before its release acts about nodes of the mesh, and another mesh has others: handed from the coarse mesh to that of the fit, the pose is off by about 33 mm. From there the fit with no choices came back; "
+             "with the band that moves along (later programs) it stuck on the way, 13 mm rms off. On one mesh (`--set coarse_cells=12`) nothing is handed over.\n")
     whole = {name: f for name, f in fits.items() if f["capture"] in ("zones", "regions")}
     least = min(2 * f["cost"] + f["estimated"] * math.log(independent_numbers(f, figures["independent"])) for f in whole.values() if f["cells"] == 12 and f["element"] == "hexahedra")
     rows, misses = [], []
@@ -125,7 +128,7 @@ def release():
             ["Young's modulus is", "Poisson's ratio", "control values [kPa]", "lower zone [kPa]", "upper zone [kPa]", "surface rms [mm]"],
             [[release_name(name, f), f"{f['parameters']['poisson_ratio']['value']:.3f}", control_values(f),
               *[f"{1e-3 * z['mean']:.0f} ({percent(z['mean'] / z['truth'] - 1)})" for z in reversed(f["zones"])], f"{1e3 * f['surface_rms']:.2f}"] for name, f in short.items()])
-    return text + release_text(fits, whole) + f"\nMeasured on {machine(figures)}.\n"
+    return text + release_text(fits, whole) + (f"\nMeasured on {machine(figures)}; programs {', '.join(sorted({f['commit'][:7] for f in fits.values()}))}.\n")
 
 
 def release_text(fits, whole):

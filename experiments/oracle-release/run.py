@@ -32,6 +32,7 @@ GIVEN_POISSON = {"poisson_ratio.estimate": False}  # it stays at the program's o
 # name: (capture, choices)
 FITS = {
     "even": ("even", {}),
+    "even-one-mesh": ("even", {"coarse_cells": 12}),
     "regions": ("regions", {}),
     "regions-given-poisson": ("regions", GIVEN_POISSON),
     "regions-finer": ("regions", {"cells": 20}),
@@ -149,7 +150,7 @@ def main():
                       "surface_rms": common.number(result["error"]["surface_rms"], 4), "points": result["error"]["points"],
                       "cost": common.number(result["cost"]["final"]), "estimated": sum(
                           (3 if isinstance(p["value"], list) else 1) for p in result["parameters"].values() if p["estimated"]),
-                      "converged": figures["exit_code"] == 0, **figures}
+                      "converged": figures["exit_code"] == 0, "commit": result["software"]["commit"], **figures}
         fits[name]["swing_errors"] = swing_errors(arguments.work / name, EVEN if capture == "even" else ZONES, START)
         if capture != "even":
             fits[name]["zones"] = zones_of(model.with_suffix(".vtu"), own["youngs_modulus"]["value"]["zones"])
