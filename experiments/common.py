@@ -1,17 +1,23 @@
 """What every experiment needs: run the program, time it, and keep figures as JSON. Standard library only."""
 import argparse
+import base64
 import csv
 import json
 import math
 import os
 import pathlib
 import platform
+import signal
+import struct
 import subprocess
 import tempfile
+import threading
 import time
+import xml.etree.ElementTree
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DEFAULT_PROGRAM = ROOT / "build/release/apps/pliant"
+INTERRUPTED = 130  # exit code of a command that was asked to stop
 
 
 def arguments(description, **more):
@@ -33,11 +39,19 @@ def shared_data():
     return pathlib.Path(os.environ.get("PLIANT_SHARED_DATA", ROOT.parent / "shared/data"))
 
 
-def run(program, *words, allowed=(0,)):
-    """Runs a command of the program. Returns its wall time [s], processor time [s] and peak memory [MiB]."""
+def run(program, *words, allowed=(0,), limit=None):
+    """Runs a command of the program. Returns its wall time [s], processor time [s] and peak memory [MiB].
+
+    After `limit` seconds it is asked to stop with the best that it has."""
     begin = time.monotonic()
-    child = subprocess.Popen([str(program), *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    # In the background of a shell interrupts are ignored, and children inherit that.
+    child = subprocess.Popen([str(program), *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+    timer = threading.Timer(limit or 1e6, lambda: child.send_signal(signal.SIGINT))
+    timer.daemon = True
+    timer.start()
     output = child.stdout.read()
+    timer.cancel()
     _, status, usage = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
     if child.returncode not in allowed:
@@ -53,8 +67,8 @@ def settings(choices):
     return words
 
 
-def fit(program, capture, out, choices=None, threads=None):
-    """Fits a capture. Returns the run's figures, the result, and the iterations by stage.
+def fit(program, capture, out, choices=None, threads=None, limit=None):
+    """Fits a capture, for at most about `limit` seconds. Returns the run's figures, the result, and the iterations by stage.
 
     A fit whose figures are in its folder already is not run again: an experiment that was stopped goes on."""
     words = ["fit", capture, "--out", out, *settings(choices or {})]
@@ -64,7 +78,7 @@ def fit(program, capture, out, choices=None, threads=None):
     if (out / "figures.json").exists():
         figures = read(out / "figures.json")
     else:
-        figures = run(program, *words, allowed=(0, 3))
+        figures = run(program, *words, allowed=(0, 3) if limit is None else (0, 3, INTERRUPTED), limit=limit)
         (out / "figures.json").write_text(json.dumps(figures))
     figures["result"] = read(out / "result.json")
     with open(out / "convergence.csv", newline="") as file:
@@ -105,6 +119,32 @@ def write_results(script, figures):
     path = pathlib.Path(script).resolve().parent / "results.json"
     path.write_text(json.dumps({"machine": machine(), **figures}, indent=1, allow_nan=False) + "\n")
     print(path)
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+def mean(points):
+    """The middle of points, a tuple."""
+    return tuple(sum(p[d] for p in points) / len(points) for d in range(len(points[0])))
+
+
+def read_markers(path, names):
+    """Frame by frame {marker: (x, y, z) [m]} of a CSV file with the columns MARKER_x_m, MARKER_y_m, MARKER_z_m."""
+    with open(path, newline="") as file:
+        return [{m: tuple(float(row[f"{m}_{c}_m"]) for c in "xyz") for m in names} for row in csv.DictReader(file)]
+
+
+def read_vtu(path):
+    """Arrays of a VTK file as the program writes it (base64, not compressed) by name, flat."""
+    root = xml.etree.ElementTree.parse(path).getroot()
+    codes = {"Float64": "d", "Float32": "f", "Int64": "q", "UInt8": "B"}
+    found = {}
+    for array in root.iter("DataArray"):
+        data, code = base64.b64decode(array.text.strip())[8:], codes[array.get("type")]
+        found[array.get("Name")] = struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data)
+    return found
 
 
 def relative_error(estimate, truth):

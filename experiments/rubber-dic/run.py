@@ -8,22 +8,23 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import common
+from common import dot, mean
 
 FOLDER = "rubber-3d-dic"
 THICKNESS = 0.002     # [m], not recorded: what is assumed for the body
-MODULUS, DENSITY = 1e6, 1000.0  # of no effect: nothing but displacements is given
-FITTED = [3, 6]       # frames
-END = 0.12            # share of the length at each end that is held as it was seen
-EDGE = 0.002          # [m] next to where the body is free: there the held ends are where they were seen, though not stretched
-CLEAR = 0.005         # [m] from the held ends, about the strip's width: held, they do not contract as the strip does there
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b))
-
-
-def mean(points):
-    return [sum(p[d] for p in points) / len(points) for d in range(len(points[0]))]
+MODULUS, DENSITY = 1e9, 1000.0  # of no effect: nothing but displacements is given, and a body as stiff as this does not sag
+FITTED = [(3, 48), (3, 64), (6, 48), (6, 64), (10, 48), (10, 64)]  # frame, cells along the strip
+# What the ends and the body do to the result: frame 3, one thing changed at a time. Name: (choices, of the capture)
+VARIANTS = {
+    "ends turned as all that was seen of them": ({}, {"whole_end": True}),
+    "points on the outer side": ({}, {"middle": False}),
+    "a body of 1 MPa, which sags": ({"youngs_modulus.start": 1e6}, {}),
+    "16 quadratic tetrahedra": ({"element": "quadratic_tetrahedra", "cells": 16}, {}),
+    "all of these": ({"youngs_modulus.start": 1e6, "element": "quadratic_tetrahedra", "cells": 16}, {"whole_end": True, "middle": False}),
+}
+END = 0.12            # share of the length at each end that is held
+EDGE = 0.003          # [m] about where an end begins: it is held where, and turned as, the strip was seen there, though not stretched
+CLEAR = 0.006         # [m] from the held ends, more than the strip's width: held, they do not contract as the strip does there
 
 
 def cross(a, b):
@@ -90,27 +91,31 @@ def stretches(rest, now, within):
     return math.sqrt(half + root), math.sqrt(half - root), math.sqrt(squares / len(names)), len(names)
 
 
-def rigid_fit(a, b):
-    """R, t of b = R a + t: Horn's quaternion, by power iteration."""
-    ca, cb = mean(a), mean(b)
-    S = [[sum((p[i] - ca[i]) * (q[j] - cb[j]) for p, q in zip(a, b)) for j in range(3)] for i in range(3)]
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = S
-    N = [[xx + yy + zz, yz - zy, zx - xz, xy - yx], [yz - zy, xx - yy - zz, xy + yx, zx + xz],
-         [zx - xz, xy + yx, yy - xx - zz, yz + zy], [xy - yx, zx + xz, yz + zy, zz - xx - yy]]
-    shift = sum(abs(v) for row in N for v in row)
-    q = [1.0, 0.3, 0.2, 0.1]
-    for _ in range(20000):
-        q = unit([dot(row, q) + shift * v for row, v in zip(N, q)])
-    w, x, y, z = q
-    R = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
-    return R, [cb[d] - dot(R[d], ca) for d in range(3)]
+def affine(rest, now, x, low, high):
+    """Of the points in between: value at (x, 0), change along and change across, of each coordinate, by least squares."""
+    names = [n for n in rest if n in now and low < rest[n][0] < high]
+    design = [[1.0, rest[n][0] - x, rest[n][1]] for n in names]
+    normal = [[sum(r[i] * r[j] for r in design) for j in range(3)] for i in range(3)]
+    return [solve3(normal, [sum(r[i] * now[n][d] for r, n in zip(design, names)) for i in range(3)]) for d in range(3)]
 
 
-def slab(rest):
-    """The seen side and a copy THICKNESS behind it, joined along the border: vertices, triangles. Points that were not seen at
-    rest are left out with their triangles."""
+def pose_at(rest, now, x, turned_by):
+    """R, t of the strip's cross-section at x: where it was seen, and the rotation without the stretch of the affine map of the points
+    in `turned_by`, an interval."""
+    at = [m[0] for m in affine(rest, now, x, x - EDGE, x + EDGE)]
+    maps = affine(rest, now, x, *turned_by)
+    along, across = unit([m[1] for m in maps]), unit([m[2] for m in maps])
+    # What the shear takes from the right angle between them, each gives half of.
+    both, either = unit([a + b for a, b in zip(along, across)]), unit([a - b for a, b in zip(along, across)])
+    along, across = unit([a + b for a, b in zip(both, either)]), unit([a - b for a, b in zip(both, either)])
+    R = [list(row) for row in zip(along, across, cross(along, across))]
+    return R, [at[d] - R[d][0] * x for d in range(3)]
+
+
+def slab(rest, middle):
+    """A plate whose middle (else: outer side) the seen points are, joined along the border: vertices, triangles. They were seen on one
+    side; but ends that are held do not grow thinner, and that side would sink between them as it did not. Points that were not
+    seen at rest are left out with their triangles."""
     lines = (common.shared_data() / FOLDER / "rest_surface.obj").read_text().split("\n")
     faces = [[int(w.split("/")[0]) - 1 for w in l.split()[1:4]] for l in lines if l.startswith("f ")]
     faces = [f for f in faces if all(n in rest for n in f)]
@@ -118,7 +123,7 @@ def slab(rest):
         faces = [f[::-1] for f in faces]
     used = sorted({n for f in faces for n in f})
     number = {n: i for i, n in enumerate(used)}
-    vertices = [rest[n] for n in used] + [[rest[n][0], rest[n][1], rest[n][2] - THICKNESS] for n in used]
+    vertices = [[rest[n][0], rest[n][1], rest[n][2] + side * THICKNESS] for side in ((0.5, -0.5) if middle else (0.0, -1.0)) for n in used]
     half = len(used)
     top = [[number[n] for n in f] for f in faces]
     edges = {(f[i], f[(i + 1) % 3]) for f in top for i in range(3)}
@@ -126,25 +131,21 @@ def slab(rest):
     return vertices, top + [[n + half for n in f[::-1]] for f in top] + side, used
 
 
-def write_capture(folder, frames, k):
+def write_capture(folder, frames, k, middle=True, whole_end=False):
     folder.mkdir(parents=True, exist_ok=True)
     rest, now = frames[0], frames[k]
-    vertices, triangles, used = slab(rest)
+    vertices, triangles, used = slab(rest, middle)
     (folder / "rest.obj").write_text("".join("v " + " ".join(f"{c:.9g}" for c in v) + "\n" for v in vertices) +
                                      "".join("f " + " ".join(str(n + 1) for n in t) + "\n" for t in triangles))
     least, most = min(v[0] for v in vertices), max(v[0] for v in vertices)
-    ends = [lambda p: p[0] < least + END * (most - least), lambda p: p[0] > most - END * (most - least)]
     inner = (least + END * (most - least), most - END * (most - least))
     seen = [n for n in used if n in now and inner[0] + CLEAR < rest[n][0] < inner[1] - CLEAR]
     row = lambda n, p: f"{n}," + ",".join(f"{c:.9g}" for c in p)
     (folder / "rest.csv").write_text("id,x,y,z\n" + "".join(row(n, rest[n]) + "\n" for n in seen))
     (folder / "track.csv").write_text("frame,id,x,y,z\n" + "".join(f"0,{row(n, now[n])}\n" for n in seen))
     held = ""
-    for end, x, normal in zip(ends, inner, (-1.0, 1.0)):
-        names = [n for n in used if n in now and end(rest[n])]
-        R, t = rigid_fit([rest[n] for n in names], [now[n] for n in names])
-        edge = [n for n in names if abs(rest[n][0] - x) < EDGE]
-        t = [dot([1.0 / len(edge)] * len(edge), [now[n][d] - dot(R[d], rest[n]) for n in edge]) for d in range(3)]
+    for x, normal in zip(inner, (-1.0, 1.0)):
+        R, t = pose_at(rest, now, x, ((x, math.inf) if normal > 0 else (-math.inf, x)) if whole_end else (x - EDGE, x + EDGE))
         matrix = [R[i] + [t[i]] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
         held += f"\n[[fixed]]\nhalf_space = {{ point = [{x!r}, 0.0, 0.0], normal = [{normal}, 0.0, 0.0] }}\ndisplaced_to = {matrix}\n"
     (folder / "capture.toml").write_text(f"""format = "capture/1"
@@ -177,20 +178,27 @@ def main():
         along, across, rms, points = stretches(frames[0], frames[k], 0.3 * half)
         strains.append({"frame": k, "points": points, "along": common.number(along), "across": common.number(across),
                         "rms_mm": common.number(1e3 * rms, 3), "ratio_of_logarithms": common.number(-math.log(across) / math.log(along), 4)})
+    pieces = []
+    for x in range(-20, 21, 4):
+        rest_of, now_of = affine(frames[0], frames[0], 1e-3 * x, 1e-3 * (x - 2), 1e-3 * (x + 2)), affine(frames[0], frames[3], 1e-3 * x, 1e-3 * (x - 2), 1e-3 * (x + 2))
+        pieces.append({"x_mm": x, "along": common.number(now_of[0][1], 4), "slope_sideways": common.number(now_of[1][1] - rest_of[1][1], 3),
+                       "twist": common.number(now_of[2][2] - rest_of[2][2], 3)})
     fits = []
-    for k in FITTED:
-        write_capture(arguments.work / f"frame-{k}", frames, k)
-        choices = {"youngs_modulus.start": MODULUS, "youngs_modulus.estimate": False, "poisson_ratio.prior_std": 5.0,
-                   "element": "quadratic_tetrahedra", "cells": 16}
-        figures = common.fit(arguments.program, arguments.work / f"frame-{k}", arguments.work / f"fit-{k}", choices)
+    plans = [("", k, {"cells": cells}, {}) for k, cells in FITTED]
+    plans += [(name, 3, {"cells": 48, **choices}, change) for name, (choices, change) in VARIANTS.items()]
+    for i, (variant, k, choices, change) in enumerate(plans):
+        write_capture(arguments.work / f"capture-{i}", frames, k, **change)
+        choices = {"youngs_modulus.start": MODULUS, "youngs_modulus.estimate": False, "poisson_ratio.prior_std": 5.0, "coarse_cells": 12, **choices}
+        figures = common.fit(arguments.program, arguments.work / f"capture-{i}", arguments.work / f"fit-{i}", choices)
         result = figures["result"]
         nu = result["parameters"]["poisson_ratio"]
-        fits.append({"frame": k, "poisson_ratio": common.number(nu["value"], 4), "std": common.number(nu.get("std"), 2),
+        fits.append({"variant": variant, "frame": k, "cells": choices["cells"], "poisson_ratio": common.number(nu["value"], 4),
+                     "std": common.number(nu.get("std"), 2),
                      "marker_rms_mm": common.number(1e3 * (result["error"].get("marker_rms") or 0.0), 3),
                      "points": result["error"].get("points"), "wall_seconds": figures["wall_seconds"],
                      "converged": figures["exit_code"] == 0})
     common.write_results(__file__, {"points": len(frames[0]), "frames": len(frames), "missing": missing, "thickness": THICKNESS,
-                                    "strains": strains, "fits": fits})
+                                    "strains": strains, "pieces": pieces, "fits": fits})
 
 
 if __name__ == "__main__":

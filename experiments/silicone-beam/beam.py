@@ -9,6 +9,7 @@ import pathlib
 import struct
 
 import common
+from common import dot, mean
 
 TIPS = ["tip1", "tip2", "tip3"]
 MARKERS = TIPS + ["base1", "base2", "base3"]
@@ -21,20 +22,12 @@ MIDDLE = [(0.0, 0.015, 0.030)]
 FOLDER = "silicone-beam-mocap"
 
 
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b))
-
-
 def turn(R, v):
     return tuple(dot(row, v) for row in R)
 
 
 def transpose(R):
     return [list(column) for column in zip(*R)]
-
-
-def mean(points):
-    return tuple(sum(p[d] for p in points) / len(points) for d in range(3))
 
 
 def rigid_fit(origin, target):
@@ -68,8 +61,7 @@ class Recording:
     def __init__(self, name):
         data = common.shared_data() / FOLDER
         self.name = name
-        with open(data / f"beam_{name}.csv", newline="") as file:
-            frames = [{m: tuple(float(row[f"{m}_{c}_m"]) for c in "xyz") for m in MARKERS} for row in csv.DictReader(file)]
+        frames = common.read_markers(data / f"beam_{name}.csv", MARKERS)
         with open(data / "marker_rest_positions_beam_frame.csv", newline="") as file:
             nominal = {row["marker"]: tuple(float(row[f"{c}_m"]) for c in "xyz") for row in csv.DictReader(file)}
         # Released: the mean of the tip's markers has dropped by 0.2 mm since ten frames before.

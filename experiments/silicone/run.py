@@ -1,8 +1,12 @@
 #!/usr/bin/env python3
 """One depth image each of silicone bars at rest: two shapes of one silicone that hang from a clamp, and a bar of two silicones
 that is twisted by half a turn. Standard library only; under five minutes."""
+import math
 import pathlib
+import struct
 import sys
+import tomllib
+import zlib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import common
@@ -35,6 +39,8 @@ FITS = {
     "twisted-coarse": ("silicone-t_em_c", {"cells": 24, "coarse_cells": 10, **ANCHOR}),
     "twisted": ("silicone-t_em_c", {"cells": 32, "coarse_cells": 10, **ANCHOR}),
     "twisted-finer": ("silicone-t_em_c", {"cells": 40, "coarse_cells": 10, **ANCHOR}),
+    "twisted-pose": ("silicone-t_em_c", {"cells": 24, "coarse_cells": 10, **ANCHOR, **POSE}),
+    "twisted-pose-finer": ("silicone-t_em_c", {"cells": 32, "coarse_cells": 10, **ANCHOR, **POSE}),
 }
 
 
@@ -59,6 +65,103 @@ def captures(work):
     return work / "captures"
 
 
+def read_png(path):
+    """Rows of a grey PNG of 8 or 16 bits."""
+    data, at, packed = path.read_bytes(), 8, b""
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at:at + 8])
+        if kind == b"IHDR":
+            width, height, bits = struct.unpack(">IIB", data[at + 8:at + 17])
+        if kind == b"IDAT":
+            packed += data[at + 8:at + 8 + size]
+        at += 12 + size
+    raw, step, rows = zlib.decompress(packed), bits // 8, []
+    stride = width * step
+    above = [0] * stride
+    for r in range(height):
+        kind, line = raw[r * (stride + 1)], list(raw[r * (stride + 1) + 1:(r + 1) * (stride + 1)])
+        if kind == 2:
+            line = [(v + u) & 255 for v, u in zip(line, above)]
+        elif kind:
+            for i in range(stride):
+                left, up, corner = (line[i - step], above[i], above[i - step]) if i >= step else (0, above[i], 0)
+                off = [abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)]
+                paeth = left if off[0] <= min(off[1:]) else up if off[1] <= off[2] else corner
+                line[i] = (line[i] + {1: left, 3: (left + up) // 2, 4: paeth}[kind]) & 255
+        above = line
+        rows.append(line if step == 1 else [256 * a + b for a, b in zip(line[::2], line[1::2])])
+    return rows
+
+
+def observed_points(capture, most=400):
+    """Points of the object's pixels in the world [m], evenly taken."""
+    camera = tomllib.loads((capture / "capture.toml").read_text())["depth"][0]
+    depth, mask = (read_png(capture / (camera[key] % 0)) for key in ("images", "masks"))
+    pixels = [(u, v) for v, row in enumerate(depth) for u, d in enumerate(row) if d and mask[v][u]]
+    points = []
+    for u, v in pixels[::max(1, len(pixels) // most)]:
+        z = depth[v][u] / camera["depth_scale"]
+        local = ((u - camera["cx"]) / camera["fx"] * z, (v - camera["cy"]) / camera["fy"] * z, z, 1.0)
+        points.append(tuple(common.dot(row, local) for row in camera["camera_to_world"][:3]))
+    return points
+
+
+def deformed_surface(fit):
+    """Triangles of the fitted surface at rest under load, out of a body of hexahedra."""
+    frame = common.read_vtu(fit / "frames/000000.vtu")
+    moved, there, cells = frame["displacement [m]"], frame["points"], frame["connectivity"]
+    rest = [tuple(there[3 * n + d] - moved[3 * n + d] for d in range(3)) for n in range(len(there) // 3)]
+    boxes = []
+    for begin in range(0, len(cells), 8):
+        nodes = [int(n) for n in cells[begin:begin + 8]]
+        boxes.append(([min(rest[n][d] for n in nodes) for d in range(3)], max(rest[n][0] for n in nodes) - min(rest[n][0] for n in nodes), nodes))
+    data = (fit / "surface.ply").read_bytes()
+    at = data.index(b"end_header\n") + 11
+    counts = {w[1]: int(w[2]) for w in (line.split() for line in data[:at].decode().split("\n")) if w[:1] == ["element"]}
+    vertices = []
+    for k in range(counts["vertex"]):
+        p = struct.unpack_from("<3d", data, at + 24 * k)
+        low, size, nodes = min(boxes, key=lambda box: sum(max(l - c, c - l - box[1], 0.0) for l, c in zip(box[0], p)))
+        share = lambda n: math.prod(x if rest[n][d] > low[d] + 0.5 * size else 1.0 - x for d, x in enumerate((c - l) / size for c, l in zip(p, low)))
+        weights = [(n, share(n)) for n in nodes]
+        vertices.append(tuple(p[d] + sum(w * moved[3 * n + d] for n, w in weights) for d in range(3)))
+    at += 24 * counts["vertex"]
+    return [[vertices[n] for n in struct.unpack_from("<3i", data, at + 13 * k + 1)] for k in range(counts["face"])]
+
+
+def distance_to(triangle, p):
+    """Of a point to a triangle."""
+    a, b, c = triangle
+    ab, ac, ap = ([y - x for x, y in zip(a, q)] for q in (b, c, p))
+    aa, am, mm, da, dm = common.dot(ab, ab), common.dot(ab, ac), common.dot(ac, ac), common.dot(ap, ab), common.dot(ap, ac)
+    area = aa * mm - am * am
+    if area > 0.0:
+        s, t = (mm * da - am * dm) / area, (aa * dm - am * da) / area
+        if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
+            return math.dist(ap, [s * x + t * y for x, y in zip(ab, ac)])
+    nearest = math.inf
+    for begin, end in ((a, b), (a, c), (b, c)):
+        along = [y - x for x, y in zip(begin, end)]
+        share = min(1.0, max(0.0, common.dot([y - x for x, y in zip(begin, p)], along) / max(common.dot(along, along), 1e-30)))
+        nearest = min(nearest, math.dist(p, [x + share * y for x, y in zip(begin, along)]))
+    return nearest
+
+
+def median_distance(points, triangles):
+    """Of the points to the surface [m]: to the nearest place of it, not along anything that was matched."""
+    middles = [(common.mean(t), t) for t in triangles]
+    middles = [(m, max(math.dist(m, corner) for corner in t), t) for m, t in middles]
+    distances = []
+    for p in points:
+        nearest = math.inf
+        for far, radius, triangle in sorted(((math.dist(p, m), radius, t) for m, radius, t in middles), key=lambda item: item[0] - item[1]):
+            if far - radius >= nearest:
+                break
+            nearest = min(nearest, distance_to(triangle, p))
+        distances.append(nearest)
+    return common.median(distances)
+
+
 def main():
     arguments = common.arguments(__doc__)
     folder = captures(arguments.work)
@@ -66,7 +169,10 @@ def main():
     for name, (recording, choices) in FITS.items():
         figures = common.fit(arguments.program, folder / recording, arguments.work / name, {**NEARLY_INCOMPRESSIBLE, **choices})
         result = figures["result"]
-        fits[name] = {"recording": recording, "cells": choices["cells"], "element": choices.get("element", "hexahedra"),
+        # Where the camera's pose or range is estimated, the points are not where the file has them.
+        as_given = not any(key.endswith(".estimate") for key in choices) and "element" not in choices
+        median = median_distance(observed_points(folder / recording), deformed_surface(arguments.work / name)) if as_given else None
+        fits[name] = {"median_distance": common.number(median, 3), "recording": recording, "cells": choices["cells"], "element": choices.get("element", "hexahedra"),
                       "pose_is_estimated": "sensor_turn.estimate" in choices, "wall_seconds": figures["wall_seconds"],
                       "surface_rms": result["error"]["surface_rms"],
                       "parameters": {key: {"value": p["value"], "std": p["std"]} for key, p in result["parameters"].items() if p.get("std") is not None},

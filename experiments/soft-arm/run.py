@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """A silicone arm whose chamber was inflated and vented: the swing that is left after venting gives the stiffness in bending of
 a solid arm of its outer shape. The chambers' shape and the pressure over time were not recorded. Standard library only."""
-import csv
 import math
 import pathlib
 import struct
@@ -9,8 +8,10 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import common
+from common import mean
 
 FOLDER = "soft-arm-mocap"
+TIPS = ["tip1", "tip2", "tip3"]
 STEPS = [100, 150, 200, 250, 300]     # mbar; after higher ones the arm swings less than it creeps
 LENGTH, RADIUS, DENSITY, RATE = 0.1, 0.0222, 1070.0, 100.0
 POISSON = 0.49
@@ -18,14 +19,9 @@ AUTHORS = 263824.0     # Young's modulus [Pa] that the recording's authors state
 FRAMES = 26
 
 
-def mean(points):
-    return [sum(p[d] for p in points) / len(points) for d in range(3)]
-
-
 def read_tip(pressure):
     """Mean of the three markers at the tip [m], a frame at a time, about where it comes to rest."""
-    with open(common.shared_data() / FOLDER / f"step_{pressure}mbar.csv", newline="") as file:
-        tip = [mean([[float(row[f"tip{i}_{c}_m"]) for c in "xyz"] for i in (1, 2, 3)]) for row in csv.DictReader(file)]
+    tip = [mean(list(frame.values())) for frame in common.read_markers(common.shared_data() / FOLDER / f"step_{pressure}mbar.csv", TIPS)]
     end = mean(tip[-30:])
     return [[a - b for a, b in zip(p, end)] for p in tip]
 
@@ -97,7 +93,8 @@ track = "track.csv"
 
 
 def main():
-    arguments = common.arguments(__doc__, fit={"action": "store_true", "help": "also fit the first release, which takes long"})
+    arguments = common.arguments(__doc__, fit={"action": "store_true", "help": "also fit the first release, which takes long"},
+                                 limit={"type": float, "default": 900.0, "help": "seconds after which that fit ends with what it has"})
     recordings, fits = [], []
     for pressure in STEPS:
         tip = read_tip(pressure)
@@ -114,11 +111,14 @@ def main():
             continue
         choices = {"element": "quadratic_tetrahedra", "cells": 5, "coarse_cells": 4, "poisson_ratio.start": POISSON,
                    "poisson_ratio.estimate": False, "starts": 1}
-        figures = common.fit(arguments.program, arguments.work / str(pressure), arguments.work / f"fit-{pressure}", choices)
+        figures = common.fit(arguments.program, arguments.work / str(pressure), arguments.work / f"fit-{pressure}", choices,
+                             limit=arguments.limit)
         E = figures["result"]["parameters"]["youngs_modulus"]
         fits.append({"pressure_mbar": pressure, "youngs_modulus": common.number(E["value"], 4), "std": common.number(E.get("std"), 2),
                      "marker_rms_mm": common.number(1e3 * (figures["result"]["error"].get("marker_rms") or 0.0), 3),
-                     "wall_seconds": figures["wall_seconds"], "converged": figures["exit_code"] == 0})
+                     "wall_seconds": figures["wall_seconds"], "stiffness_damping": common.number(figures["result"]["parameters"]["stiffness_damping"]["value"], 3),
+                     "mass_damping": common.number(figures["result"]["parameters"]["mass_damping"]["value"], 3),
+                     "converged": figures["exit_code"] == 0, "limit": arguments.limit if figures["exit_code"] == common.INTERRUPTED else None})
     common.write_results(__file__, {"authors": AUTHORS, "poisson_ratio": POISSON, "recordings": recordings, "fits": fits})
 
 

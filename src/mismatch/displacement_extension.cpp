@@ -1,15 +1,31 @@
 #include "mismatch/displacement_extension.hpp"
 
-#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
 #include <cmath>
+#include <limits>
 
 namespace pliant {
 
-struct DisplacementExtension::Factor {
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> laplacian;  // free x free
-  Eigen::SparseMatrix<double> coupling;                          // free x known
-  MatrixX harmonic(const MatrixX& known) const { return laplacian.solve(coupling * known); }
-  MatrixX harmonic_transpose(const MatrixX& free) const { return coupling.transpose() * laplacian.solve(free); }
+/// A free node q takes from the known nodes k about it, with weights w_k that sum to one, where each would carry it:
+///   g(q) = sum_k w_k (u_k + grad u_k . (q - X_k)).
+struct DisplacementExtension::Operators {
+  Eigen::SparseMatrix<double, Eigen::RowMajor> value;                    // free x known: w_k
+  std::array<Eigen::SparseMatrix<double, Eigen::RowMajor>, 3> lever;     // free x known: w_k (q - X_k), an axis each
+  std::array<Eigen::SparseMatrix<double, Eigen::RowMajor>, 3> gradient;  // known x known: du/dX, an axis each
+
+  MatrixX carried(const MatrixX& known) const {
+    MatrixX free = value * known;
+    for (std::size_t d = 0; d < 3; ++d) free += lever[d] * (gradient[d] * known).eval();
+    return free;
+  }
+  MatrixX carried_transpose(const MatrixX& free) const {
+    MatrixX known = value.transpose() * free;
+    for (std::size_t d = 0; d < 3; ++d) known += gradient[d].transpose() * (lever[d].transpose() * free).eval();
+    return known;
+  }
 };
 
 DisplacementExtension::~DisplacementExtension() = default;
@@ -17,17 +33,36 @@ DisplacementExtension::DisplacementExtension(DisplacementExtension&&) noexcept =
 
 namespace {
 
-MatrixX affine_basis(const Points& positions, const std::vector<int>& nodes, const Vector3& centre, double scale) {
-  MatrixX basis(Eigen::Index(nodes.size()), 4);
-  for (std::size_t i = 0; i < nodes.size(); ++i)
-    basis.row(Eigen::Index(i)) << 1.0, (positions.row(nodes[i]) - centre.transpose()) / scale;
-  return basis;
+namespace bg = boost::geometry;
+using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
+using Tree = bg::index::rtree<std::pair<TreePoint, int>, bg::index::quadratic<8>>;
+using Triplets = std::vector<Eigen::Triplet<double>>;
+
+TreePoint tree_point(const Vector3& x) { return {x.x(), x.y(), x.z()}; }
+
+/// Known nodes that share a cell of the band with each, itself included.
+std::vector<std::vector<int>> neighbours(const std::vector<std::array<int, 8>>& cells, const std::vector<int>& known_of,
+                                         int known) {
+  std::vector<std::vector<int>> around(static_cast<std::size_t>(known));
+  for (const auto& cell : cells)
+    for (const int a : cell)
+      for (const int b : cell)
+        if (known_of[std::size_t(a)] >= 0 && known_of[std::size_t(b)] >= 0)
+          around[std::size_t(known_of[std::size_t(a)])].push_back(known_of[std::size_t(b)]);
+  for (auto& list : around) {
+    std::ranges::sort(list);
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
+  return around;
 }
 
 }  // namespace
 
 DisplacementExtension::DisplacementExtension(const HexGrid& grid, const SignedDistance& distance, double band)
-    : cell_size_(grid.cell_size), band_(band), body_nodes_(grid.node_count()), factor_(std::make_unique<Factor>()) {
+    : cell_size_(grid.cell_size),
+      band_(band),
+      body_nodes_(grid.node_count()),
+      operators_(std::make_unique<Operators>()) {
   const int margin = int(std::ceil(band / grid.cell_size)) + 1;
   const Eigen::Vector3i size = grid.size.array() + 2 * margin;
   const auto lattice = [&](const Eigen::Vector3i& i) { return (i.z() * size.y() + i.y()) * size.x() + i.x(); };
@@ -58,7 +93,6 @@ DisplacementExtension::DisplacementExtension(const HexGrid& grid, const SignedDi
 
   int count = 0;
   std::vector<Eigen::Vector3i> index;
-  std::vector<int> role;  // position among the known or the free
   for (int z = 0; z < size.z(); ++z)
     for (int y = 0; y < size.y(); ++y)
       for (int x = 0; x < size.x(); ++x) {
@@ -69,11 +103,9 @@ DisplacementExtension::DisplacementExtension(const HexGrid& grid, const SignedDi
         const int g = in_grid(i);
         const int body_node = g >= 0 ? grid.node_of_lattice[g] : -1;
         if (body_node >= 0) {
-          role.push_back(int(known_band_.size()));
           known_band_.push_back(count);
           known_body_.push_back(body_node);
         } else {
-          role.push_back(-1 - int(free_band_.size()));
           free_band_.push_back(count);
         }
         ++count;
@@ -83,43 +115,68 @@ DisplacementExtension::DisplacementExtension(const HexGrid& grid, const SignedDi
   rest_.resize(count, 3);
   for (int n = 0; n < count; ++n) rest_.row(n) = position(index[n]).transpose();
 
-  std::vector<Eigen::Triplet<double>> laplacian, coupling;
-  for (std::size_t f = 0; f < free_band_.size(); ++f) {
-    const Eigen::Vector3i at = index[free_band_[f]];
-    double degree = 0.0;
-    for (int side = 0; side < 6; ++side) {
-      Eigen::Vector3i next = at;
-      next[side / 2] += side % 2 ? 1 : -1;
-      if ((next.array() < 0).any() || (next.array() >= size.array()).any()) continue;
-      const int n = node[lattice(next)];
-      if (n < 0) continue;
-      degree += 1.0;
-      if (role[n] >= 0)
-        coupling.emplace_back(int(f), role[n], 1.0);
-      else
-        laplacian.emplace_back(int(f), -1 - role[n], -1.0);
-    }
-    laplacian.emplace_back(int(f), int(f), degree);
-  }
-  const auto frees = Eigen::Index(free_band_.size()), knowns = Eigen::Index(known_band_.size());
-  Eigen::SparseMatrix<double> L(frees, frees);
-  L.setFromTriplets(laplacian.begin(), laplacian.end());
-  factor_->coupling.resize(frees, knowns);
-  factor_->coupling.setFromTriplets(coupling.begin(), coupling.end());
-  factor_->laplacian.compute(L);
+  std::vector<int> known_of(std::size_t(count), -1);
+  for (std::size_t k = 0; k < known_band_.size(); ++k) known_of[std::size_t(known_band_[k])] = int(k);
+  const auto knowns = Eigen::Index(known_band_.size()), frees = Eigen::Index(free_band_.size());
+  const auto at = [&](int known) -> Vector3 { return rest_.row(known_band_[std::size_t(known)]).transpose(); };
 
-  const Vector3 centre = grid.nodes.colwise().mean().transpose();
-  const double scale = std::sqrt((grid.nodes.rowwise() - centre.transpose()).squaredNorm() / double(body_nodes_));
-  const MatrixX inside = affine_basis(rest_, known_band_, centre, scale);
-  const MatrixX outside = affine_basis(rest_, free_band_, centre, scale);
-  affine_fit_ = (inside.transpose() * inside).inverse() * inside.transpose();
-  affine_rest_ = outside - factor_->harmonic(inside);
+  // The gradient at a known node is that of the affine motion which fits it and those about it best.
+  std::array<Triplets, 3> gradient, lever;
+  Triplets value;
+  const auto around = neighbours(cells_, known_of, int(knowns));
+  for (int k = 0; k < int(knowns); ++k) {
+    const auto& near = around[std::size_t(k)];
+    Vector3 middle = Vector3::Zero();
+    for (const int n : near) middle += at(n) / double(near.size());
+    Matrix3 spread = Matrix3::Zero();
+    for (const int n : near) spread += (at(n) - middle) * (at(n) - middle).transpose();
+    const Matrix3 inverse = spread.inverse();
+    for (const int n : near) {
+      const Vector3 share = inverse * (at(n) - middle);
+      for (std::size_t d = 0; d < 3; ++d) gradient[d].emplace_back(k, n, share[Eigen::Index(d)]);
+    }
+  }
+
+  // Those that are hardly farther than the nearest count; far out more of them, so that sides that face each other
+  // blend.
+  constexpr unsigned most = 24;
+  std::vector<std::pair<TreePoint, int>> places;
+  for (int k = 0; k < int(knowns); ++k) places.emplace_back(tree_point(at(k)), k);
+  const Tree tree(places);
+  for (int f = 0; f < int(frees); ++f) {
+    const Vector3 q = rest_.row(free_band_[std::size_t(f)]).transpose();
+    std::vector<int> near;
+    for (auto it = tree.qbegin(bg::index::nearest(tree_point(q), most)); it != tree.qend(); ++it)
+      near.push_back(it->second);
+    std::ranges::sort(near);
+    double nearest = std::numeric_limits<double>::infinity(), sum = 0.0;
+    for (const int k : near) nearest = std::min(nearest, (at(k) - q).squaredNorm());
+    const double width = grid.cell_size + 0.2 * std::sqrt(nearest);
+    std::vector<double> weights;
+    for (const int k : near)
+      sum += weights.emplace_back(std::exp(-0.5 * ((at(k) - q).squaredNorm() - nearest) / (width * width)));
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      const double w = weights[i] / sum;
+      const Vector3 arm = q - at(near[i]);
+      value.emplace_back(f, near[i], w);
+      for (std::size_t d = 0; d < 3; ++d) lever[d].emplace_back(f, near[i], w * arm[Eigen::Index(d)]);
+    }
+  }
+  const auto fill = [](auto& matrix, Eigen::Index rows, Eigen::Index cols, const Triplets& entries) {
+    matrix.resize(rows, cols);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+  };
+  fill(operators_->value, frees, knowns, value);
+  for (std::size_t d = 0; d < 3; ++d) {
+    fill(operators_->lever[d], frees, knowns, lever[d]);
+    fill(operators_->gradient[d], knowns, knowns, gradient[d]);
+  }
 }
 
 Points DisplacementExtension::apply(const Points& u) const {
   MatrixX known(Eigen::Index(known_body_.size()), 3);
   for (std::size_t k = 0; k < known_body_.size(); ++k) known.row(Eigen::Index(k)) = u.row(known_body_[k]);
-  const MatrixX free = factor_->harmonic(known) + affine_rest_ * (affine_fit_ * known);
+  const MatrixX free = operators_->carried(known);
   Points g(rest_.rows(), 3);
   for (std::size_t k = 0; k < known_band_.size(); ++k) g.row(known_band_[k]) = known.row(Eigen::Index(k));
   for (std::size_t f = 0; f < free_band_.size(); ++f) g.row(free_band_[f]) = free.row(Eigen::Index(f));
@@ -129,7 +186,7 @@ Points DisplacementExtension::apply(const Points& u) const {
 Points DisplacementExtension::apply_transpose(const Points& g) const {
   MatrixX free(Eigen::Index(free_band_.size()), 3);
   for (std::size_t f = 0; f < free_band_.size(); ++f) free.row(Eigen::Index(f)) = g.row(free_band_[f]);
-  const MatrixX known = factor_->harmonic_transpose(free) + affine_fit_.transpose() * (affine_rest_.transpose() * free);
+  const MatrixX known = operators_->carried_transpose(free);
   Points u = Points::Zero(body_nodes_, 3);
   for (std::size_t k = 0; k < known_body_.size(); ++k)
     u.row(known_body_[k]) += g.row(known_band_[k]) + known.row(Eigen::Index(k));

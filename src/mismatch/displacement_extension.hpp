@@ -8,9 +8,10 @@
 namespace pliant {
 
 /// Carries the displacement of the body's nodes out into a band around it (Weiss 2020, section 4.3): g = E u, E linear,
-/// fixed and built once. Inside it is the nodes' own; outside it solves Laplace's equation on the lattice. Departing
-/// from the paper, the best affine motion of the body is continued exactly and only the rest diffuses: a body that has
-/// turned keeps true distances in its band.
+/// fixed and built once. Inside it is the nodes' own. Departing from the paper, which solves Laplace's equation
+/// outside, each place there moves along with the affine motion of the body next to it: a part that has turned keeps
+/// true distances in its band. Displacements that die out would fold the band into a part that has turned against the
+/// rest by more than about a quarter, and points seen a little outside of it would lie nowhere.
 class DisplacementExtension {
  public:
   /// @param band  how far from the surface the extension reaches [m], > 0
@@ -30,7 +31,7 @@ class DisplacementExtension {
   [[nodiscard]] Points apply_transpose(const Points& g) const;
 
  private:
-  struct Factor;
+  struct Operators;
   double cell_size_, band_;
   int body_nodes_;
   Points rest_;
@@ -38,9 +39,7 @@ class DisplacementExtension {
   std::vector<Vector3> cell_corners_;
   std::vector<int> known_band_, known_body_;  // band nodes that are body nodes, and which
   std::vector<int> free_band_;                // the others
-  std::unique_ptr<Factor> factor_;
-  MatrixX affine_fit_;   // 4 x n: least-squares affine motion from u
-  MatrixX affine_rest_;  // free x 4: what Laplace's equation misses of an affine motion
+  std::unique_ptr<Operators> operators_;
 };
 
 }  // namespace pliant

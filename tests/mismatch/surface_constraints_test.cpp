@@ -1,5 +1,6 @@
 #include "mismatch/surface_constraints.hpp"
 
+#include <numbers>
 #include <random>
 
 #include "support/bodies.hpp"
@@ -128,6 +129,35 @@ TEST(SurfaceConstraints, ARigidlyMovedBodyKeepsTrueDistances) {
       ASSERT_GE(m.cell, 0);
       EXPECT_NEAR(m.distance, away, tolerance(1e-4));  // spacing^2 / (4 radius), of the distance's own grid
       EXPECT_NEAR(m.stretch, 1.0, tolerance(0.05));    // spacing / (2 radius)
+    }
+  }
+}
+
+/// Where parts of a body are turned against each other by far, each carries the band beside it along: were
+/// displacements to die out in the band, it would fold into the body, and points a little outside would lie in no cell.
+TEST(SurfaceConstraints, ATwistedBarKeepsItsBand) {
+  const double length = 0.14, half = 0.01, cell = 0.005, reach = 0.015;
+  const auto body = test::box_body({length, 2 * half, 2 * half}, cell);
+  const auto distance = std::make_shared<SignedDistance>(
+      test::centred_box({0.5 * length + 0.03, half + 0.03, half + 0.03}), 0.001, [=](const Vector3& p) {
+        const Vector3 q = p.cwiseAbs() - Vector3(0.5 * length, half, half);
+        return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
+      });
+  const SurfaceConstraints constraints(body, distance, reach);
+  const auto twisted = [&](const Vector3& p) -> Vector3 {
+    return Eigen::AngleAxisd(std::numbers::pi * p.x() / length, Vector3::UnitX()) * p;
+  };
+  Points positions = body->reference_positions();
+  for (Eigen::Index n = 0; n < positions.rows(); ++n)
+    positions.row(n) = twisted(positions.row(n).transpose()).transpose();
+  for (const double away : {-0.003, 0.0005, 0.002, 0.008}) {
+    std::vector<Vector3> points;
+    for (double x = -0.45 * length; x < 0.45 * length; x += 0.0031)
+      for (const double side : {-0.6, 0.1, 0.5}) points.push_back(twisted({x, side * half, half + away}));
+    for (const PointMatch& m : constraints.match(observed(points), positions)) {
+      ASSERT_GE(m.cell, 0) << away;
+      // A cell turns by 6.4 degrees from end to end; far out, places so far apart are blended.
+      EXPECT_NEAR(m.distance, away, tolerance(2e-4 + 0.05 * std::abs(away)));
     }
   }
 }
