@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "base/error.hpp"
 #include "capture/markers.hpp"
@@ -122,6 +123,21 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   return d;
 }
 
+namespace {
+
+/// Of the scan, far from what is held; none where the regions hold no vertex of it.
+PullPoints pull_points(const Capture& capture, int count) {
+  std::vector<Vector3> held;
+  for (const FixedRegion& fixed : capture.fixed) {
+    const auto contains = region_test(capture, fixed.region);
+    std::ranges::copy_if(capture.surface->vertices, std::back_inserter(held), contains);
+  }
+  if (count == 0 || held.empty()) return {};
+  return {far_points(capture.surface->vertices, held, count), object_size(capture)};
+}
+
+}  // namespace
+
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
                           std::shared_ptr<const Body> body, const Resolution& resolution, const VectorX& parameters,
                           const SimulationOptions& settings, const std::vector<Vector3>& tracked) {
@@ -144,6 +160,7 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.mismatch.centre = centre_of(*capture.surface);
   d.simulation.contact = default_contact(*d.body, parameters[theta::density] * d.body->volume(), gravity);
   for (const Weight& weight : capture.weights) d.simulation.weights.push_back({weight.at, weight.mass});
+  d.simulation.pull_points = pull_points(capture, d.simulation.pulls);
   for (const FixedRegion& fixed : capture.fixed) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
     d.simulation.holds.push_back({region_test(capture, fixed.region), motion.rotation, motion.translation});

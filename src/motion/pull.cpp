@@ -1,7 +1,9 @@
 #include "motion/pull.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "base/error.hpp"
@@ -53,16 +55,16 @@ VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const st
 
 }  // namespace
 
-Pull::Pull(const std::shared_ptr<const Body>& body, const std::vector<int>& about, const std::vector<int>& held,
+Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, const std::vector<int>& held,
            int first_index)
     : moduli_(body->modulus.controls), first_index_(first_index) {
   const VectorX volume = volume_of_nodes(*body);
-  const double reach = width * body->size();
-  const auto n = Eigen::Index(about.size());
+  const double reach = width * points.size;
+  const auto n = Eigen::Index(points.at.size());
   spread_.resize(body->node_count(), n);
   std::vector<Points> forces;
   for (Eigen::Index k = 0; k < n; ++k) {
-    const VectorX r2 = (body->nodes.rowwise() - body->nodes.row(about[std::size_t(k)])).rowwise().squaredNorm();
+    const VectorX r2 = (body->nodes.rowwise() - points.at[std::size_t(k)].transpose()).rowwise().squaredNorm();
     spread_.col(k) = volume.cwiseProduct((-0.5 * r2.array() / (reach * reach)).exp().matrix());
     for (int d = 0; d < 3; ++d) {
       forces.emplace_back(Points::Zero(body->node_count(), 3));
@@ -72,7 +74,7 @@ Pull::Pull(const std::shared_ptr<const Body>& body, const std::vector<int>& abou
   const VectorX greatest = greatest_displacements(body, held, forces);
   strength_.resize(n, 3);
   for (Eigen::Index k = 0; k < n; ++k)
-    for (int d = 0; d < 3; ++d) strength_(k, d) = body->size() / greatest[3 * k + d];
+    for (int d = 0; d < 3; ++d) strength_(k, d) = points.size / greatest[3 * k + d];
   pulls_ = Points::Zero(n, 3);
   moduli_at_.setOnes(moduli_);
 }
@@ -109,20 +111,20 @@ void Pull::add_force_adjoint(const Points&, const Points& w, Points&, Points&, V
     theta_bar.segment<3>(first_index_ + 3 * k) += bar.row(k).cwiseProduct(strength_.row(k)).transpose();
 }
 
-std::vector<int> pull_nodes(const Body& body, const std::vector<int>& held, int count) {
-  VectorX nearest = VectorX::Constant(body.node_count(), std::numeric_limits<double>::infinity());
-  const auto leave = [&](int node) {
-    nearest = nearest.cwiseMin(VectorX((body.nodes.rowwise() - body.nodes.row(node)).rowwise().squaredNorm()));
+std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const std::vector<Vector3>& held, int count) {
+  if (candidates.empty() || held.empty()) throw std::invalid_argument("far_points: far from what, and which?");
+  std::vector<double> nearest(candidates.size(), std::numeric_limits<double>::infinity());
+  const auto leave = [&](const Vector3& point) {
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      nearest[i] = std::min(nearest[i], (candidates[i] - point).squaredNorm());
   };
-  for (const int node : held) leave(node);
-  std::vector<int> nodes;
+  for (const Vector3& point : held) leave(point);
+  std::vector<Vector3> points;
   for (int k = 0; k < count; ++k) {
-    Eigen::Index farthest = 0;
-    nearest.maxCoeff(&farthest);
-    nodes.push_back(int(farthest));
-    leave(nodes.back());
+    points.push_back(candidates[std::size_t(std::ranges::max_element(nearest) - nearest.begin())]);
+    leave(points.back());
   }
-  return nodes;
+  return points;
 }
 
 }  // namespace pliant

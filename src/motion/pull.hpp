@@ -8,18 +8,29 @@
 
 namespace pliant {
 
-/// What holds an object in the pose from which it is released: forces spread smoothly about a few nodes,
+/// Where an object is pulled. Points of the scan rather than nodes, so that the same pulls hold about the same pose on
+/// every mesh.
+struct PullPoints {
+  std::vector<Vector3> at;  ///< in the scan [m]
+  double size = 0.0;        ///< of the object [m]
+};
+
+/// As many points out of `candidates` as wanted, far from what is held and from each other.
+/// Throws std::invalid_argument where there are no candidates or nothing is held.
+std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const std::vector<Vector3>& held, int count);
+
+/// What holds an object in the pose from which it is released: forces spread smoothly about a few points,
 ///   f_n = E_0 sum_k w_k(X_n) V_n c_k / s_k,
-/// with w_k a Gaussian about node k, V_n the node's volume, and s_k (of each axis) such that a unit c_k would move the
+/// with w_k a Gaussian about point k, V_n the node's volume, and s_k (of each axis) such that a unit c_k would move the
 /// object by its size, by linear elasticity from rest. E_0 is the geometric mean of the control moduli, so that the
 /// pose hardly depends on how stiff the object is thought to be.
 class Pull : public ForceTerm {
  public:
-  /// @param about        nodes, see `pull_nodes`
+  /// @param points       see `far_points`
   /// @param held         nodes that stay where they are
   /// @param first_index  of the pulls c_k in theta, three each
   /// Throws InputError where the held nodes do not hold the object.
-  Pull(const std::shared_ptr<const Body>& body, const std::vector<int>& about, const std::vector<int>& held,
+  Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, const std::vector<int>& held,
        int first_index);
 
   /// Nothing pulls while it is not active.
@@ -45,8 +56,5 @@ class Pull : public ForceTerm {
   VectorX moduli_at_;  // [Pa]
   double mean_ = 0.0;  // of the moduli
 };
-
-/// Nodes about which a released object is pulled: far from what is held and from each other.
-std::vector<int> pull_nodes(const Body& body, const std::vector<int>& held, int count);
 
 }  // namespace pliant

@@ -17,6 +17,13 @@ bool holds_strongly(const Body& body, const SimulationOptions& options) {
   return options.hold_strongly || body.kind != ElementKind::Hexahedron;
 }
 
+PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) {
+  std::vector<Vector3> all, there;
+  for (Eigen::Index n = 0; n < body.nodes.rows(); ++n) all.push_back(body.nodes.row(n).transpose());
+  for (const int node : held) there.push_back(all[std::size_t(node)]);
+  return {there.empty() ? all : far_points(all, there, count), body.size()};
+}
+
 std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const Body>& body,
                                                    const SimulationOptions& options, FixedRegions*& fixed,
                                                    Pull*& pull) {
@@ -33,8 +40,9 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   }
   if (options.pulls > 0) {
     const std::vector<int> held = held_nodes(*body, options.holds);
-    auto pulling =
-        std::make_unique<Pull>(body, pull_nodes(*body, held, options.pulls), held, theta::pull(0, options.planes));
+    PullPoints points = options.pull_points;
+    if (points.at.empty()) points = far_nodes(*body, held, options.pulls);
+    auto pulling = std::make_unique<Pull>(body, points, held, theta::pull(0, options.planes));
     pull = pulling.get();
     pull->set_active(false);
     terms.push_back(std::move(pulling));

@@ -24,10 +24,11 @@ struct SimulationOptions {
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
   ContactOptions contact;
-  int planes = 0;   ///< in theta
-  int pulls = 0;    ///< in theta: the motion starts at rest in the equilibrium under these (see `Pull`); 0: in the
-                    ///< reference pose
-  int sensors = 0;  ///< in theta; they play no part in the motion
+  int planes = 0;  ///< in theta
+  int pulls = 0;   ///< in theta: the motion starts at rest in the equilibrium under these (see `Pull`); 0: in the
+                   ///< reference pose
+  PullPoints pull_points;           ///< as many as pulls; none: nodes of the body far from what is held
+  int sensors = 0;                  ///< in theta; they play no part in the motion
   std::vector<Hold> holds;          ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part

@@ -206,9 +206,15 @@ std::vector<Family> families() {
       {"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, range(theta::plane_point(1), 6)});
   const auto pull = [](auto body) {
     std::vector<int> held;
-    for (int n = 0; n < body->node_count(); ++n)
-      if (body->nodes(n, 0) < body->nodes.col(0).minCoeff() + 0.03) held.push_back(n);
-    return std::make_unique<Pull>(body, pull_nodes(*body, held, pulls), held, theta::pull(0, 2));
+    std::vector<Vector3> all, there;
+    for (int n = 0; n < body->node_count(); ++n) {
+      all.push_back(body->nodes.row(n).transpose());
+      if (body->nodes(n, 0) > body->nodes.col(0).minCoeff() + 0.03) continue;
+      held.push_back(n);
+      there.push_back(all.back());
+    }
+    return std::make_unique<Pull>(body, PullPoints{far_points(all, there, pulls), body->size()}, held,
+                                  theta::pull(0, 2));
   };
   list.push_back({"Pull", box(true), pull, false, false, [] {
                     std::vector<int> all = range(theta::pull(0, 2), 3 * pulls);

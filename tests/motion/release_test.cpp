@@ -135,5 +135,35 @@ TEST(Releases, AFreeObjectCannotBePulled) {
   EXPECT_THROW(Simulation(scene.body, scene.options), InputError);
 }
 
+/// Pulls at points of the scan hold the same object in about the same pose on every mesh.
+TEST(PullPoints, ThePoseHardlyDependsOnTheMesh) {
+  const auto tip = [](int cells) {
+    Released scene(test::hanging::hex_bar(cells), Integrator::Lagged);
+    scene.options.pull_points = {{Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)}, test::hanging::length};
+    const Points& nodes = scene.body->nodes;
+    Eigen::Index lowest = 0, highest = 0;
+    nodes.col(0).minCoeff(&lowest), nodes.col(0).maxCoeff(&highest);
+    const std::vector<Vector3> ends = {Vector3(nodes(lowest, 0), 0.0, 0.0), Vector3(nodes(highest, 0), 0.0, 0.0)};
+    const int held = held_nodes(*scene.body, scene.options.holds).front();
+    const bool low = std::abs(nodes(held, 0) - ends[0].x()) < std::abs(nodes(held, 0) - ends[1].x());
+    const Vector3 end = low ? ends[1] : ends[0];
+    scene.options.pull_points.at = {end, 0.5 * (ends[0] + ends[1])};
+    const Points x = as_points(scene.positions_at(scene.theta, 0));
+    const Embedding at(*scene.body, {end});
+    return Vector3(at.position(0, x) - at.position(0, nodes));
+  };
+  const Vector3 coarse = tip(1), fine = tip(2);
+  ASSERT_GT(fine.norm(), 0.05 * test::hanging::length) << "a pull worth holding";
+  EXPECT_LT((coarse - fine).norm(), 0.05 * fine.norm());
+}
+
+TEST(PullPoints, LieFarFromWhatIsHeldAndFromEachOther) {
+  const std::vector<Vector3> line = {Vector3(0, 0, 0), Vector3(1, 0, 0), Vector3(2, 0, 0), Vector3(3, 0, 0)};
+  const auto points = far_points(line, {line[0]}, 2);
+  EXPECT_EQ(points[0], line[3]);
+  EXPECT_EQ(points[1], line[1]);  // the first of those that are as far
+  EXPECT_THROW((void)far_points(line, {}, 1), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace pliant
