@@ -1,7 +1,7 @@
 // Moduli and dampings of an object from the motion of all its nodes (Wang 2015), as JSON on stdout.
 //   pliant_tracks [NAME=VALUE]...
 // object=bar|dinosaur   see tracked_objects.hpp; cell_size=L of the dinosaur [m]
-// task=fit|landscape
+// task=fit|landscape|deviations
 // moduli=E,E,...        of the truth, one for all or one a control point [Pa]
 // controls=N            that are fitted
 // noise=S               of each coordinate, times the object's size
@@ -155,6 +155,10 @@ class Experiment {
     report["motions"] = record();
     if (choices_.at("task") == "landscape") {
       report["landscape"] = landscape();
+      return report;
+    }
+    if (choices_.at("task") == "deviations") {
+      report["deviations"] = deviations();
       return report;
     }
     report["costs"] = time_steps();
@@ -332,6 +336,22 @@ class Experiment {
       std::fprintf(stderr, "%zu of %d rows\n", rows.size(), samples);
     }
     return {{"moduli", list(logs.array().exp())}, {"truth", list(true_values().head(2))}, {"costs", rows}};
+  }
+
+  /// Standard deviations of ln E, ln alpha and ln beta that the noise leaves, to first order about the truth, for each
+  /// number of frames: no unbiased estimate has smaller ones.
+  json deviations() {
+    moduli_ = true_values().head(controls_), mass_damping_ = alpha, stiffness_damping_ = beta;
+    json out = json::array();
+    for (const int last_frame : horizons()) {
+      VectorX theta;
+      Objective cost = objective(last_frame, theta);
+      const CostEvaluation e = cost.linearise(cost.parameters().to_unconstrained(theta));
+      if (!e.succeeded) throw std::runtime_error("the truth cannot be simulated: " + e.failure);
+      const VectorX variances = e.gauss_newton.inverse().diagonal();
+      out.push_back({{"frames", last_frame + 1}, {"log_deviations", list(variances.cwiseSqrt())}});
+    }
+    return out;
   }
 
   Objective objective(int last_frame, VectorX& start) const {
