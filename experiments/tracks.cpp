@@ -1,19 +1,18 @@
 // Moduli and dampings of an object from the motion of all its nodes (Wang 2015), as JSON on stdout.
 //   pliant_tracks [NAME=VALUE]...
 // object=bar|dinosaur   see tracked_objects.hpp; cell_size=L of the dinosaur [m]
-// task=fit|landscape
+// task=fit|landscape|deviations
 // moduli=E,E,...        of the truth, one for all or one a control point [Pa]
 // controls=N            that are fitted
 // noise=S               of each coordinate, times the object's size
 // truth_steps=N         of the truth to one of the fit
 // frames=N, rate=R      of each motion, and [1/s]
-// horizon=N             frames that a fit compares, from the first; the start is found from all of them
-// steps=N               of the fit to a frame
-// solver=automatic|simplicial|cholmod, newmark_theta=T
+// horizon=N,N,...       frames that a fit compares, from the first, one stage after another; the start is found from
+// all steps=N               of the fit to a frame solver=automatic|simplicial|cholmod, newmark_theta=T
 // optimiser=levenberg_marquardt|nelder_mead
 // start=modal|off       off: ten times the truth's mean modulus and dampings
 // curve_samples=N       of the start's frequency match over each modulus
-// tolerance=T           of ln E, ln alpha and ln beta, at which an optimiser stops
+// tolerance=T           of ln E, ln alpha and ln beta, at which an optimiser stops; stages but the last: ten times that
 // budget=S              wall time [s] after which it is stopped; evaluations=N likewise
 // samples=N, from=E, to=E   of the landscape: the cost at N x N pairs of the first two moduli [Pa], all else true
 //
@@ -150,10 +149,16 @@ class Experiment {
   json run() {
     json report;
     for (const auto& [name, value] : choices_) report["choices"][name] = value;
+    double load = 0.0;
+    if (getloadavg(&load, 1) == 1) report["load_at_start"] = load;
     report["nodes"] = body_->node_count(), report["elements"] = body_->element_count();
     report["motions"] = record();
     if (choices_.at("task") == "landscape") {
       report["landscape"] = landscape();
+      return report;
+    }
+    if (choices_.at("task") == "deviations") {
+      report["deviations"] = deviations();
       return report;
     }
     report["costs"] = time_steps();
@@ -164,7 +169,13 @@ class Experiment {
 
  private:
   double real(const char* name) const { return std::stod(choices_.at(name)); }
-  int last_compared() const { return std::min(integer("horizon"), integer("frames")) - 1; }
+  /// Last frames that the stages of a fit compare.
+  std::vector<int> horizons() const {
+    std::vector<int> last;
+    for (const double count : numbers(choices_.at("horizon")))
+      last.push_back(std::min(int(count), integer("frames")) - 1);
+    return last;
+  }
   int integer(const char* name) const { return std::stoi(choices_.at(name)); }
 
   /// What is seen of the motions. Without noise residuals still need a scale, a thousandth of the size.
@@ -176,7 +187,7 @@ class Experiment {
     std::mt19937 random(7);
     for (std::size_t m = 0; m < object_.motions.size(); ++m) {
       const StartingMotion& motion = object_.motions[m];
-      const int last = m == observed_motion_for_modes() ? integer("frames") - 1 : last_compared();
+      const int last = m == observed_motion_for_modes() ? integer("frames") - 1 : horizons().back();
       auto frames = std::make_shared<std::vector<FrameObservations>>();
       double farthest = 0.0;
       Simulation simulation(truth.body, options);
@@ -309,7 +320,7 @@ class Experiment {
     if (controls_ < 2) throw std::invalid_argument("a landscape needs two controls");
     moduli_ = true_values().head(controls_), mass_damping_ = alpha, stiffness_damping_ = beta;
     VectorX theta;
-    Objective cost = objective(theta);
+    Objective cost = objective(horizons().back(), theta);
     VectorX p = cost.parameters().to_unconstrained(theta);  // logarithms, the moduli first
     const int samples = integer("samples");
     const VectorX logs = VectorX::LinSpaced(samples, std::log(real("from")), std::log(real("to")));
@@ -327,14 +338,30 @@ class Experiment {
     return {{"moduli", list(logs.array().exp())}, {"truth", list(true_values().head(2))}, {"costs", rows}};
   }
 
-  Objective objective(VectorX& start) const {
+  /// Standard deviations of ln E, ln alpha and ln beta that the noise leaves, to first order about the truth, for each
+  /// number of frames: no unbiased estimate has smaller ones.
+  json deviations() {
+    moduli_ = true_values().head(controls_), mass_damping_ = alpha, stiffness_damping_ = beta;
+    json out = json::array();
+    for (const int last_frame : horizons()) {
+      VectorX theta;
+      Objective cost = objective(last_frame, theta);
+      const CostEvaluation e = cost.linearise(cost.parameters().to_unconstrained(theta));
+      if (!e.succeeded) throw std::runtime_error("the truth cannot be simulated: " + e.failure);
+      const VectorX variances = e.gauss_newton.inverse().diagonal();
+      out.push_back({{"frames", last_frame + 1}, {"log_deviations", list(variances.cwiseSqrt())}});
+    }
+    return out;
+  }
+
+  Objective objective(int last_frame, VectorX& start) const {
     std::vector<ObservedMotion> recordings;
     const auto tracks = std::make_shared<PointTracks>(*body_, rest_);
     for (std::size_t r = 0; r < object_.motions.size(); ++r) {
       const VectorX theta = make_theta(object_.motions[r], moduli_, mass_damping_, stiffness_damping_);
       ObservedMotion motion{{nullptr, tracks}, body_, options_, observations_[r], {}};
       motion.options.outlier_scale = 10.0 * object_.size;  // squares, as in the paper
-      motion.options.last_frame = last_compared();
+      motion.options.last_frame = last_frame;
       recordings.push_back(std::move(motion));
       start.conservativeResize(start.size() + theta.size());
       start.tail(theta.size()) = theta;
@@ -352,37 +379,55 @@ class Experiment {
     return {std::move(recordings), ParameterSet(std::move(list), start)};
   }
 
+  /// From few frames to all: where simulation and truth have not yet drifted apart by half a swing, valleys are wide.
   json fit() const {
-    VectorX start;
-    Objective cost = objective(start);
     OptimiserOptions options;
     options.kind = kind_named<OptimiserKind>(
         {{"levenberg_marquardt", OptimiserKind::LevenbergMarquardt}, {"nelder_mead", OptimiserKind::NelderMead}},
         choices_.at("optimiser"));
     options.max_iterations = integer("evaluations");
-    options.step_tolerance = real("tolerance");
     options.cost_tolerance = 1e-12;  // moduli and dampings say when it is over
+    const std::vector<int> last_frames = horizons();
     const double begin = wall_seconds(), busy = processor_seconds(), budget = real("budget");
-    json history = json::array();
-    const OptimiserSummary summary =
-        minimise(cost, cost.parameters().to_unconstrained(start), options, [&](const Iteration& i) {
-          std::fprintf(stderr, "%4d %12.6g %8.2g %c %6.1f s\n", i.number, i.cost, i.damping, i.accepted ? '+' : '-',
-                       wall_seconds() - begin);
-          history.push_back({i.number, i.cost, wall_seconds() - begin, worst_error(cost.parameters(), i.p)});
-          return wall_seconds() - begin < budget;
-        });
-    return {{"wall_seconds", wall_seconds() - begin},
-            {"processor_seconds", processor_seconds() - busy},
-            {"iterations", summary.iterations},
-            {"evaluations", summary.evaluations},
-            {"forward_steps", summary.steps},
-            {"converged", summary.converged},
-            {"reason", summary.reason},
-            {"start_cost", summary.start_cost},
-            {"cost", summary.evaluation.cost},
-            {"track_rms", summary.evaluation.track_rms()},
-            {"history", history},
-            {"parameters", compare(cost.parameters(), summary.p)}};
+    json report, history = json::array(), stages = json::array();
+    int evaluations = 0;
+    long long steps = 0;
+    VectorX p;
+    for (std::size_t stage = 0; stage < last_frames.size(); ++stage) {
+      const bool is_last = stage + 1 == last_frames.size();
+      VectorX start;
+      Objective cost = objective(last_frames[stage], start);
+      if (stage == 0) p = cost.parameters().to_unconstrained(start);
+      options.step_tolerance = (is_last ? 1.0 : 10.0) * real("tolerance");
+      const OptimiserSummary summary = minimise(cost, p, options, [&](const Iteration& i) {
+        std::fprintf(stderr, "%4d %4d %12.6g %8.2g %c %6.1f s\n", last_frames[stage] + 1, i.number, i.cost, i.damping,
+                     i.accepted ? '+' : '-', wall_seconds() - begin);
+        history.push_back({history.size() + 1, i.cost, wall_seconds() - begin, worst_error(cost.parameters(), i.p)});
+        return wall_seconds() - begin < budget;
+      });
+      p = summary.p;
+      evaluations += summary.evaluations, steps += summary.steps;
+      stages.push_back({{"frames", last_frames[stage] + 1},
+                        {"evaluations", summary.evaluations},
+                        {"start_cost", summary.start_cost},
+                        {"cost", summary.evaluation.cost},
+                        {"wall_seconds", wall_seconds() - begin},
+                        {"processor_seconds", processor_seconds() - busy},
+                        {"reason", summary.reason},
+                        {"parameters", compare(cost.parameters(), p)}});
+      report = {{"converged", summary.converged && is_last},
+                {"reason", summary.reason},
+                {"cost", summary.evaluation.cost},
+                {"track_rms", summary.evaluation.track_rms()},
+                {"parameters", stages.back()["parameters"]}};
+      if (summary.interrupted || !summary.succeeded) break;
+    }
+    report["start_cost"] = stages.front()["start_cost"];
+    report["wall_seconds"] = wall_seconds() - begin, report["processor_seconds"] = processor_seconds() - busy;
+    report["evaluations"] = evaluations, report["forward_steps"] = steps;
+    report["iterations"] = history.size();
+    report["history"] = std::move(history), report["stages"] = std::move(stages);
+    return report;
   }
 
   json compare(const ParameterSet& parameters, const VectorX& p) const {

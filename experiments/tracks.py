@@ -1,11 +1,10 @@
 """What the experiments with followed nodes share: runs of pliant_tracks, and what is kept of them."""
-import os
 import subprocess
 
 import common
 
 KEPT = ("nodes", "elements", "start", "parameters", "wall_seconds", "processor_seconds", "iterations", "evaluations", "forward_steps",
-        "converged", "reason", "start_cost", "cost", "track_rms", "costs", "history")
+        "converged", "reason", "start_cost", "cost", "track_rms", "costs", "history", "stages", "load_at_start")
 
 
 def run(program, out, choices):
@@ -37,9 +36,7 @@ def errors(figures):
 
 def fit(arguments, name, choices):
     """A row of results.json: a fit's figures, judged."""
-    load = os.getloadavg()[0]
     figures = run(program(arguments), arguments.work / f"{name}.json", choices)
-    row = {"choices": choices, "errors": errors(figures), "load_at_start": round(load, 1),
-           "motions": figures["motions"], "settings": figures["choices"], **{key: figures[key] for key in KEPT}}
+    row = {"choices": choices, "errors": errors(figures), "motions": figures["motions"], "settings": figures["choices"], **{key: figures[key] for key in KEPT if key in figures}}
     print(name, row["errors"], round(figures["wall_seconds"]), "s", figures["reason"], flush=True)
     return row

@@ -184,18 +184,18 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
     const Vector d = q - reference_[e];
     Vector c;
     for (int a = 0; a < N; ++a) node(c, a).noalias() = R.transpose() * w.row(nodes[a]).transpose();
-    const Vector y = stiffness_.times(e, d), k = stiffness_.times(e, c);
-    Vector3 rate_bar = Vector3::Zero();
-    for (int a = 0; a < N; ++a)
-      rate_bar += Vector3(node(q, a)).cross(Vector3(node(k, a))) - Vector3(node(y, a)).cross(Vector3(node(c, a)));
-    const Matrix3 F_bar = rotation_rate_adjoint(polar_[e], E * rate_bar);
+    const ReverseProducts<N> products = stiffness_.reverse(e, q, d, c);
+    // rotation_rate_adjoint(polar, E turn) g_a = E R (v x g_a)
+    const Vector3 v = polar_[e].rate_inverse.transpose() * products.turn;
+    const Matrix3 ER = E * R;
     const auto g = gradients(e);
     for (int a = 0; a < N; ++a) {
-      z_bar.row(nodes[a]).noalias() -= E * (R * node(k, a)).transpose();
-      lag_bar.row(nodes[a]).noalias() += (F_bar * g.row(a).transpose()).transpose();
+      const Vector3 g_a = g.row(a);
+      z_bar.row(nodes[a]).noalias() -= (ER * node(products.k, a)).transpose();
+      lag_bar.row(nodes[a]).noalias() += (ER * v.cross(g_a)).transpose();
     }
-    modulus_.add_log_adjoint(e, -E * c.dot(y));
-    theta_bar[theta::poissons_ratio] -= E * stiffness_.derivative_product(e, c, d);
+    modulus_.add_log_adjoint(e, -E * products.work);
+    theta_bar[theta::poissons_ratio] -= E * products.d_work;
   }
   modulus_.end_adjoint(theta_bar);
 }

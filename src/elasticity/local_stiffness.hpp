@@ -8,6 +8,15 @@
 
 namespace pliant {
 
+/// What the reverse sweep needs of an element's force y = K d and its cotangent c, with d = q - X.
+template <int N>
+struct ReverseProducts {
+  Eigen::Matrix<double, 3 * N, 1> k;  ///< K c [m^2]
+  Vector3 turn;                       ///< sum_a q_a x k_a - y_a x c_a
+  double work = 0.0;                  ///< c . y
+  double d_work = 0.0;                ///< c . (dK / d nu) d
+};
+
 /// Stiffness of a body's elements of N nodes in their own, unrotated frame, for E = 1 Pa: products, and blocks turned
 /// into the world. All elements pass through here in every step, so it is kept to what they need.
 template <int N>
@@ -22,9 +31,12 @@ class LocalStiffness {
   Vector times(int element, const Vector& d) const { return of(element).K.lazyProduct(d); }
   /// (dK / d nu) d.
   Vector derivative_times(int element, const Vector& d) const { return of(element).dK.lazyProduct(d); }
-  /// c . (dK / d nu) d.
-  double derivative_product(int element, const Vector& c, const Vector& d) const {
-    return c.dot(derivative_times(element, d));
+  [[nodiscard]] ReverseProducts<N> reverse(int element, const Vector& q, const Vector& d, const Vector& c) const {
+    const Vector y = times(element, d);
+    ReverseProducts<N> products{times(element, c), Vector3::Zero(), c.dot(y), c.dot(derivative_times(element, d))};
+    const auto node = [](const Vector& v, int a) -> Vector3 { return v.template segment<3>(3 * a); };
+    for (int a = 0; a < N; ++a) products.turn += node(q, a).cross(node(products.k, a)) - node(y, a).cross(node(c, a));
+    return products;
   }
   /// Adds factor R K_ab R^T to the matrix's blocks.
   /// @param blocks  N x N numbers: where block (a, b) goes
@@ -100,10 +112,19 @@ class LocalStiffness<4> {
 
   Vector times(int element, const Vector& d) const { return times(element, d, lame_.lambda, lame_.mu); }
   Vector derivative_times(int element, const Vector& d) const { return times(element, d, lame_.d_lambda, lame_.d_mu); }
-  double derivative_product(int element, const Vector& c, const Vector& d) const {
-    const Matrix3 C = gradient(element, c), D = gradient(element, d);
-    return body_->element_volume[std::size_t(element)] *
-           (lame_.d_lambda * C.trace() * D.trace() + lame_.d_mu * C.cwiseProduct(D + D.transpose()).sum());
+  /// With Q, H and C, the gradients of q, d and c, and stresses T of d and P of c: turn_i = V eps_ijl (Q P + C T)_jl.
+  [[nodiscard]] ReverseProducts<4> reverse(int element, const Vector& q, const Vector& d, const Vector& c) const {
+    const Matrix3 Q = gradient(element, q), H = gradient(element, d), C = gradient(element, c);
+    const Matrix3 strain = H + H.transpose();
+    const double volume = body_->element_volume[std::size_t(element)], twice = C.cwiseProduct(strain).sum();
+    const Matrix3 P = stress(C, volume * lame_.lambda, volume * lame_.mu);
+    const Matrix3 M = Q.lazyProduct(P) + C.lazyProduct(stress(H, volume * lame_.lambda, volume * lame_.mu));
+    ReverseProducts<4> products;
+    Eigen::Map<Matrix3x4>(products.k.data()).noalias() = P.lazyProduct(gradients(element));
+    products.turn << M(1, 2) - M(2, 1), M(2, 0) - M(0, 2), M(0, 1) - M(1, 0);
+    products.work = volume * (lame_.lambda * C.trace() * H.trace() + lame_.mu * twice);
+    products.d_work = volume * (lame_.d_lambda * C.trace() * H.trace() + lame_.d_mu * twice);
+    return products;
   }
 
   void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const {
@@ -139,13 +160,16 @@ class LocalStiffness<4> {
   }
   [[gnu::always_inline]] Vector times(int element, const Vector& d, double lambda, double mu) const {
     const auto g = gradients(element);
-    const Matrix3 H = gradient(element, d);
     const double volume = body_->element_volume[std::size_t(element)];
-    Matrix3 stress = (volume * mu) * (H + H.transpose());
-    stress.diagonal().array() += volume * lambda * H.trace();
     Vector force;
-    Eigen::Map<Matrix3x4>(force.data()).noalias() = stress.lazyProduct(g);
+    Eigen::Map<Matrix3x4>(force.data()).noalias() =
+        stress(gradient(element, d), volume * lambda, volume * mu).lazyProduct(g);
     return force;
+  }
+  [[gnu::always_inline]] static Matrix3 stress(const Matrix3& H, double lambda, double mu) {
+    Matrix3 stress = mu * (H + H.transpose());
+    stress.diagonal().array() += lambda * H.trace();
+    return stress;
   }
 
   std::shared_ptr<const Body> body_;
