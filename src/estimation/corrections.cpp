@@ -9,6 +9,9 @@ namespace pliant {
 
 namespace {
 
+/// An elastic model errs about as much as the sensor that sees it, in mean square; that is no sensor's fault.
+constexpr double tolerated = 1.0;
+
 /// Rows of the unconstrained vector that belong to parameters of these names.
 std::vector<Eigen::Index> rows_of(const ParameterSet& parameters, const std::vector<std::string>& names) {
   std::vector<Eigen::Index> rows;
@@ -69,7 +72,8 @@ std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluatio
   const double noise_scale = std::max(1.0, evaluation.cost / explained);
   std::vector<Correction> left = corrections;
   std::vector<NeededCorrection> needed;
-  for (double excess = evaluation.cost - explained; excess > 0.0 && !left.empty(); excess -= needed.back().gain) {
+  double excess = evaluation.cost - explained;
+  while (excess > tolerated * explained && !left.empty()) {
     NeededCorrection best;
     for (const Correction& c : left) {
       const std::vector<Eigen::Index> rows = rows_of(parameters, c.parameters);
@@ -82,6 +86,7 @@ std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluatio
     const std::vector<Eigen::Index> rows = rows_of(parameters, best.correction.parameters);
     following.insert(following.end(), rows.begin(), rows.end());
     std::erase_if(left, [&](const Correction& c) { return c.what == best.correction.what; });
+    excess -= best.gain;
     needed.push_back(std::move(best));
   }
   return needed;

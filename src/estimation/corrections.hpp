@@ -25,9 +25,9 @@ struct NeededCorrection {
 
 /// Rao's score test (1948) of each correction at an estimate that lacks it: one step of Gauss and Newton with it, all
 /// that was estimated following along. A model that is a little wrong leaves residuals that any correction lowers
-/// somewhat; so one is needed only where the residuals are larger than their noise, where it explains at least half of
-/// what the noise does not, and more than Schwarz's criterion (1978) asks, scaled by how much larger they are. The one
-/// that gains most comes first, then those still needed beside it.
+/// somewhat; so one is needed only where the residuals' mean square is more than twice that of their noise, where it
+/// explains at least half of what the noise does not, and more than Schwarz's criterion (1978) asks, scaled by how much
+/// larger they are. The one that gains most comes first, then those still needed beside it.
 /// @param evaluation  with derivatives by all of `parameters`: what was estimated, and the corrections
 /// @param parameters  that set, with the corrections estimated
 /// @param observations  independent ones behind the cost

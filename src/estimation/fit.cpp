@@ -148,6 +148,36 @@ class Fit {
 
   void set_reference(const VectorX& theta) { parameters_.set_reference(theta); }
 
+  VectorX without_pulls(VectorX theta) const {
+    for (const Parameter& p : parameters_.parameters())
+      if (p.estimated && p.name.starts_with("pull@")) theta.segment<3>(p.theta_index) = p.scale * p.prior_mean;
+    return theta;
+  }
+
+  /// Pulls that hold the pose before a release on one mesh bend another one otherwise: they are looked for anew, from
+  /// those at hand and from none.
+  VectorX pulled_on(const Grid& grid, const VectorX& theta) {
+    ParameterSet pulls = parameters_;
+    for (const Parameter& p : parameters_.parameters())
+      pulls.set_estimated(p.name, p.estimated && p.name.starts_with("pull@"));
+    if (pulls.dimension() == 0) return theta;
+    VectorX best = theta;
+    double least = std::numeric_limits<double>::infinity();
+    for (const VectorX& from : {theta, without_pulls(theta)}) {
+      pulls.set_reference(from);
+      Objective objective = recordings_.objective(grid, pulls, options_.wide_band, [](const Recording&) { return 0; });
+      OptimiserOptions o;
+      o.max_iterations = 24;
+      const OptimiserSummary s =
+          minimise(objective, start_of(pulls), o, [&](const Iteration&) { return !interrupted(); });
+      outcome_.forward_steps += s.steps;
+      if (!s.succeeded || !(s.evaluation.cost < least)) continue;
+      least = s.evaluation.cost;
+      best = pulls.to_theta(s.p);
+    }
+    return best;
+  }
+
   /// At rest every softer body hangs lower and costs more equilibria: from stiff to soft, until it is clear that the
   /// valley was passed, or that nothing softer can hold itself up.
   template <class Try>
@@ -186,10 +216,7 @@ class Fit {
     if (state_.scan.empty()) {
       if (interrupted() || !find_swing()) return false;
       // The pose before a release was found for another stiffness, which sags otherwise: look for it anew.
-      VectorX theta = parameters_.reference();
-      for (const Parameter& p : parameters_.parameters())
-        if (p.estimated && p.name.starts_with("pull@")) theta.segment<3>(p.theta_index) = p.scale * p.prior_mean;
-      set_reference(theta);
+      set_reference(without_pulls(parameters_.reference()));
       state_.motion.reset();
       estimate_initial_motion();
       if (interrupted()) return false;
@@ -413,8 +440,7 @@ class Fit {
     ParameterSet parameters = parameters_;
     OptimiserSummary s;
     int counter = 0;
-    FitState::Fine now{0, start, {}};
-    if (state_.fine) now = *state_.fine;
+    FitState::Fine now = state_.fine ? *state_.fine : FitState::Fine{0, pulled_on(fine_, start), {}};
     use_corrections();
     std::vector<Stage> stages = fine_stages();
     for (; now.stage < int(stages.size()) && state_.refined.empty(); ++now.stage, now.optimiser = {}) {
@@ -513,8 +539,8 @@ class Fit {
       if (i + 1 < done.size()) continue;  // before an interruption
       const Spacing& spacing = spacings[i];
       const int stage = first_stage + int(i);
-      parameters.set_reference(done.back().theta);
       Grid grid = recordings_.grid(spacing.cells, spacing.steps);
+      parameters.set_reference(pulled_on(grid, done.back().theta));
       Objective objective = recordings_.objective(grid, parameters, options_.fine_band, to_the_end);
       const bool goes_on = state_.fine && state_.fine->stage == stage;
       const std::string name =

@@ -127,10 +127,10 @@ TEST(Corrections, TheScoreTestPredictsTheFallOfAQuadraticCost) {
   MatrixX A(3, 3);
   A << 4.0, 1.0, 0.5, 1.0, 3.0, -0.7, 0.5, -0.7, 2.0;
   CostEvaluation e;
-  e.cost = 53.0;
+  e.cost = 650.0;
   e.gauss_newton = A;
   e.gradient.resize(3);
-  e.gradient << 0.0, 5.0, 1.0;
+  e.gradient << 0.0, 50.0, -10.0;
   const auto parameter = [](const char* name, int index) {
     return Parameter{name, "m", Transform::Shift, index, 1.0, -1.0, 1.0, true};
   };
@@ -141,12 +141,12 @@ TEST(Corrections, TheScoreTestPredictsTheFallOfAQuadraticCost) {
   const auto needed = needed_corrections(e, parameters, both, 100.0);
   ASSERT_EQ(needed.size(), 1u) << "beside the first, the second gains too little";
   EXPECT_EQ(needed[0].correction.what, "left");
-  const Eigen::Vector2d g(0.0, 5.0);
+  const Eigen::Vector2d g(0.0, 50.0);
   EXPECT_NEAR(needed[0].gain, 0.5 * g.dot(A.topLeftCorner<2, 2>().ldlt().solve(g)), 1e-12);
-  EXPECT_NEAR(needed[0].least, 0.5 * std::log(100.0) * 53.0 / 50.0, 1e-12);
-  e.cost = 49.0;  // no more than noise costs
+  EXPECT_NEAR(needed[0].least, 0.5 * (650.0 - 50.0), 1e-12) << "half of what noise does not explain";
+  e.cost = 99.0;  // an error of the model as large as the noise
   EXPECT_TRUE(needed_corrections(e, parameters, both, 100.0).empty());
-  e.cost = 60.0;  // it explains less than half of what is wrong
+  e.cost = 1000.0;  // it explains less than half of what is wrong
   EXPECT_TRUE(needed_corrections(e, parameters, both, 100.0).empty());
 }
 
