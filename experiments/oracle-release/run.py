@@ -36,7 +36,6 @@ FITS = {
     "regions": ("regions", {}),
     "regions-given-poisson": ("regions", GIVEN_POISSON),
     "regions-finer": ("regions", {"cells": 20}),
-    "regions-quadratic": ("regions", {"element": "quadratic_tetrahedra"}),
     **{f"points-{n}": ("zones", {"control_points": n}) for n in (1, 2, 3, 4, 6)},
     **{f"points-{n}-given-poisson": ("zones", {"control_points": n, **GIVEN_POISSON}) for n in (2, 3, 4)},
     **{f"short-{n}": ("short", {"control_points": n}) for n in (1, 2, 3)},

@@ -93,7 +93,7 @@ Vector3 Body::centre_of_mass() const {
   double total = 0.0;
   for (int row = 0; row < pattern->rows; ++row)
     for (int b = pattern->row_start[row]; b < pattern->row_start[row + 1]; ++b) {
-      moment += mass[b] * nodes.row(pattern->column[b]).transpose();
+      moment += mass[b] * scanned_positions().row(pattern->column[b]).transpose();
       total += mass[b];
     }
   return moment / total;

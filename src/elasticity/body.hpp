@@ -68,7 +68,7 @@ struct Body {
   /// Where the nodes were in the scan [m], n x 3: the same, unless it was taken under load (`with_reference`).
   const Points& scanned_positions() const;
   double volume() const;
-  Vector3 centre_of_mass() const;
+  Vector3 centre_of_mass() const;  ///< in the scan [m]
   /// Longest edge of the nodes' box [m].
   double size() const;
   /// The hexahedral grid of a body made from one. Throws std::bad_variant_access for another.

@@ -22,6 +22,7 @@ class TetReferenceForces : public ReferenceForces {
   void add_matrix(double scale, BlockMatrix& matrix) const override;
   void add_tangent(const Points& d_reference, Points& force) const override;
   void add_adjoint(const Points& w, Points& reference_bar) const override;
+  const Matrix3& rotation(int e) const override { return elements_[std::size_t(e)].polar.R; }
   double least_volume_ratio() const override { return least_volume_ratio_; }
 
  private:

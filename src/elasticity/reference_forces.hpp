@@ -27,6 +27,8 @@ class ReferenceForces {
   virtual void add_tangent(const Points& d_reference, Points& force) const = 0;
   /// The cotangent of X for the cotangent `w` of f is added.
   virtual void add_adjoint(const Points& w, Points& reference_bar) const = 0;
+  /// From the reference to x, of an element.
+  virtual const Matrix3& rotation(int element) const = 0;
   /// Smallest ratio of a volume at a quadrature point to that in the body as it was given.
   virtual double least_volume_ratio() const = 0;
 };

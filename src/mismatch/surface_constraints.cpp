@@ -32,7 +32,8 @@ std::shared_ptr<const HexGrid> lattice_of(const std::shared_ptr<const Body>& bod
   if (body->kind == ElementKind::Hexahedron) return {body, &body->grid()};
   if (!(cell_size > 0.0)) throw std::invalid_argument("a lattice over tetrahedra needs a cell size");
   Box box;
-  for (Eigen::Index n = 0; n < body->nodes.rows(); ++n) box.extend(body->nodes.row(n).transpose());
+  const Points& scanned = body->scanned_positions();
+  for (Eigen::Index n = 0; n < scanned.rows(); ++n) box.extend(scanned.row(n).transpose());
   return std::make_shared<HexGrid>(make_hex_grid(distance, box, cell_size));
 }
 
@@ -104,7 +105,7 @@ bool SurfaceConstraints::pull_back(int cell, const Points& lattice, const Vector
 
 std::vector<PointMatch> SurfaceConstraints::match(std::span<const SurfaceObservation> points,
                                                   const Points& positions) const {
-  const Points lattice = extension_.rest_positions() + extended(positions - body_->reference_positions());
+  const Points lattice = extension_.rest_positions() + extended(positions - body_->scanned_positions());
   const Tree tree = cell_tree(extension_.cells(), lattice);
   std::vector<PointMatch> matches(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {

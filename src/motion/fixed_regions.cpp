@@ -62,7 +62,7 @@ std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds) {
   std::vector<int> nodes;
   for (int n = 0; n < body.node_count(); ++n)
     for (const Hold& hold : holds)
-      if (hold.contains(body.nodes.row(n).transpose())) {
+      if (hold.contains(body.scanned_positions().row(n).transpose())) {
         nodes.push_back(n);
         break;
       }

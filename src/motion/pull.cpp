@@ -64,7 +64,8 @@ Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, co
   spread_.resize(body->node_count(), n);
   std::vector<Points> forces;
   for (Eigen::Index k = 0; k < n; ++k) {
-    const VectorX r2 = (body->nodes.rowwise() - points.at[std::size_t(k)].transpose()).rowwise().squaredNorm();
+    const VectorX r2 =
+        (body->scanned_positions().rowwise() - points.at[std::size_t(k)].transpose()).rowwise().squaredNorm();
     spread_.col(k) = volume.cwiseProduct((-0.5 * r2.array() / (reach * reach)).exp().matrix());
     for (int d = 0; d < 3; ++d) {
       forces.emplace_back(Points::Zero(body->node_count(), 3));

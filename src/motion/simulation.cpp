@@ -19,7 +19,7 @@ bool holds_strongly(const Body& body, const SimulationOptions& options) {
 
 PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) {
   std::vector<Vector3> all, there;
-  for (Eigen::Index n = 0; n < body.nodes.rows(); ++n) all.push_back(body.nodes.row(n).transpose());
+  for (Eigen::Index n = 0; n < body.nodes.rows(); ++n) all.push_back(body.scanned_positions().row(n).transpose());
   for (const int node : held) there.push_back(all[std::size_t(node)]);
   return {there.empty() ? all : far_points(all, there, count), body.size()};
 }
@@ -58,7 +58,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
       stepper_(body_, make_terms(body_, options_, fixed_regions_, pull_),
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
                 options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
-      rest_(body_->reference_positions()) {
+      rest_(body_->scanned_positions()) {
   if (holds_strongly(*body_, options_)) {
     std::vector<int> held = held_nodes(*body_, options_.holds);
     if (held.empty() && !options_.holds.empty())
@@ -76,7 +76,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   }
   prepare_holds();
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
-  lever_ = body_->reference_positions().rowwise() - body_->centre_of_mass().transpose();
+  lever_ = body_->scanned_positions().rowwise() - body_->centre_of_mass().transpose();
   for (int frame = 1; frame < frame_count() && !options_.is_static; ++frame) {
     const double interval = options_.times[frame] - options_.times[frame - 1];
     const int steps = std::max(1, int(std::ceil(interval / options_.max_dt - 1e-9)));
@@ -130,7 +130,7 @@ void Simulation::start_adjoint(const State& start, const State& bar, VectorX& th
 }
 
 void Simulation::prepare_holds() {
-  const Points& X = body_->nodes;
+  const Points& X = body_->scanned_positions();
   hold_share_.setZero(X.rows(), Eigen::Index(options_.holds.size()));
   for (std::size_t h = 0; h < options_.holds.size(); ++h) {
     const std::vector<int> nodes = held_nodes(*body_, {options_.holds[h]});
@@ -162,7 +162,8 @@ void Simulation::move_holds(double from, double to, Points& positions) {
   }
   for (std::size_t h = 0; h < there.size() && holds_strongly(*body_, options_); ++h)
     for (const int node : held_nodes(*body_, {there[h]}))
-      positions.row(node) = (there[h].rotation * body_->nodes.row(node).transpose() + there[h].translation).transpose();
+      positions.row(node) =
+          (there[h].rotation * body_->scanned_positions().row(node).transpose() + there[h].translation).transpose();
   if (fixed_regions_) fixed_regions_->move_to(there);
 }
 
@@ -171,7 +172,7 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
   constexpr int most_iterations = 400;
   double turn = 0.0;
   for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
-  state = {body_->reference_positions(), Points::Zero(rest_.rows(), 3)};
+  state = {body_->scanned_positions(), Points::Zero(rest_.rows(), 3)};
   const double longest = turn > 0.0 ? std::min(1.0, largest_turn / turn) : 1.0;
   double done = 0.0, stride = longest;
   while (done < 1.0) {

@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <random>
 
+#include "solvers/lu_solver.hpp"
 #include "support/dense.hpp"
 #include "support/tolerance.hpp"
 
@@ -82,6 +83,30 @@ TEST_P(General, NothingOnTheRightIsNothing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, General, ::testing::Values(SolverKind::Automatic, SolverKind::Simplicial));
+
+/// Matrices that no factorisation of their symmetric part comes near.
+TEST(LuSolver, SolvesBothSidesOfAnyMatrix) {
+  for (const double asymmetry : {0.0, 1.5}) {
+    const Chain chain(asymmetry, 2.0);
+    LuSolver solver(chain.pattern);
+    for (int again = 0; again < 2; ++again) {
+      ASSERT_TRUE(solver.factorise(chain.matrix));
+      const MatrixX A = test::dense(chain.matrix);
+      const VectorX b = VectorX::Random(A.rows());
+      EXPECT_LT((A * solver.solve(b) - b).norm(), tolerance(1e-10) * b.norm());
+      EXPECT_LT((A.transpose() * solver.solve_transposed(b) - b).norm(), tolerance(1e-10) * b.norm());
+    }
+  }
+}
+
+TEST(LuSolver, ASingularMatrixIsRefused) {
+  Chain chain(0.3);
+  for (int b = 0; b < chain.pattern->block_count(); ++b)
+    if (chain.pattern->column[b] == 7)
+      for (int k = 0; k < 9; ++k) chain.matrix.block(b)[k] = 0.0;
+  LuSolver solver(chain.pattern);
+  EXPECT_FALSE(solver.factorise(chain.matrix));
+}
 
 }  // namespace
 }  // namespace pliant
