@@ -40,6 +40,7 @@ int run(int argc, char** argv) {
   add_simulate(app, exit_code);
   add_evaluate(app, exit_code);
   add_synth(app, exit_code);
+  add_rest(app, exit_code);
   add_mesh(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -393,18 +393,25 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
 }
 
 Model make_model(const Capture& capture, const FitOutcome& outcome) {
-  const Discretisation& d = outcome.recordings.front().discretisation;
-  const VectorX& t = outcome.recordings.front().theta;
+  const RecordingOutcome& first = outcome.recordings.front();
+  return make_model(capture, first.discretisation, first.theta, modulus_statistics(outcome), outcome.cells);
+}
+
+Model make_model(const Capture& capture, const Discretisation& d, const VectorX& t, const ModulusStatistics& modulus,
+                 double cells) {
   Model model;
   model.name = capture.name;
   model.surface = *capture.surface;
-  const ModulusStatistics modulus = modulus_statistics(outcome);
   model.youngs_modulus = modulus.mean;
   model.poisson_ratio = t[theta::poissons_ratio];
   model.mass_damping = t[theta::mass_damping];
   model.stiffness_damping = t[theta::stiffness_damping];
-  model.density = t[theta::density];
   model.mass = t[theta::density] * enclosed_volume(*capture.surface);
+  if (d.body->kind != ElementKind::Hexahedron) {  // the scan may have been taken under load
+    const Points free = Embedding(*d.body, capture.surface->vertices).positions(d.body->reference_positions());
+    for (Eigen::Index v = 0; v < free.rows(); ++v) model.surface.vertices[std::size_t(v)] = free.row(v).transpose();
+  }
+  model.density = model.mass / enclosed_volume(model.surface);
   model.gravity = theta::vector_at(t, theta::gravity);
   model.planes = capture.planes;
   for (std::size_t i = 0; i < model.planes.size(); ++i) {
@@ -420,7 +427,7 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   model.initial.known = true;
   for (int k = 0; k < d.simulation.pulls; ++k)
     model.initial.pulls.push_back(theta::vector_at(t, theta::pull(k, d.simulation.planes)));
-  model.cell_size = object_size(capture) / outcome.cells;
+  model.cell_size = object_size(capture) / cells;
   if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
     model.cell_size = grid->cell_size;
     model.grid_origin = grid->origin;
@@ -439,7 +446,7 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
   model.volume.connectivity = d.body->connectivity;
   for (int e = 0; e < d.body->element_count(); ++e) {
     model.volume.youngs_modulus.push_back(modulus.value[e]);
-    if (outcome.covariance.size() > 0) model.volume.youngs_modulus_std.push_back(modulus.std[e]);
+    if (modulus.mean_std > 0.0) model.volume.youngs_modulus_std.push_back(modulus.std[e]);
     model.volume.poisson_ratio.push_back(model.poisson_ratio);
     const bool is_cell = d.body->kind == ElementKind::Hexahedron;
     model.volume.fill.push_back(is_cell ? d.body->element_volume[std::size_t(e)] / std::pow(model.cell_size, 3) : 1.0);

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "capture/observe.hpp"
+#include "elasticity/element_moduli.hpp"
 #include "estimation/fit.hpp"
 #include "model/model.hpp"
 #include "model/result.hpp"
@@ -23,6 +24,10 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
 
 /// The simulation-ready model of an estimate, in the scene of its first recording.
 Model make_model(const Capture& capture, const FitOutcome& outcome);
+
+/// The model of a material whose numbers are given, in a capture's scene; its surface and mesh are free of load.
+Model make_model(const Capture& capture, const Discretisation& discretisation, const VectorX& theta,
+                 const ModulusStatistics& modulus, double cells);
 
 /// Body, scene and parameters that a model describes.
 struct ModelScene {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <pugixml.hpp>
 #include <set>
@@ -56,16 +57,17 @@ class Session : public testing::Test {
   static ProgramRun run_fit(const std::string& name, std::vector<std::string> more = {},
                             const std::string& interrupt_at = "") {
     std::vector<std::string> arguments = {"fit", capture(), "--out", at(name), "--seed", "3"};
-    for (const char* choice :
-         {"cells=6", "coarse_cells=5", "points_per_frame=100", "scan_per_decade=1", "starts=1", "steps=0.4"})
+    for (const char* choice : {"cells=8", "coarse_cells=6", "points_per_frame=100", "scan_per_decade=1", "starts=1",
+                               "steps=0.4", "max_iterations=40"})
       arguments.insert(arguments.end(), {"--set", choice});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_pliant(arguments, interrupt_at);
   }
   /// The same at two resolutions, for the first who asks.
   static const ProgramRun& refined_fit() {
-    static const ProgramRun run = run_fit("refined", {"--refine", "2"});
-    return run;
+    static std::map<fs::path, ProgramRun> runs;  // every suite has its own folder's worth
+    if (!fs::exists(at("refined"))) runs[folder_] = run_fit("refined", {"--refine", "2"});
+    return runs[folder_];
   }
   static json result(const std::string& name = "fit") { return read_json(at(name) + "/result.json"); }
 
@@ -224,8 +226,8 @@ TEST_P(InterruptedRefinement, KeepsWhatIsDoneAndIsResumed) {
   EXPECT_EQ(without_times(result(name)), without_times(result("refined")));
 }
 
-INSTANTIATE_TEST_SUITE_P(Stages, InterruptedRefinement, testing::Values("0.8 x steps", "9 cells"),
-                         [](const auto& choice) { return choice.param[0] == '9' ? "mesh" : "time_step"; });
+INSTANTIATE_TEST_SUITE_P(Stages, InterruptedRefinement, testing::Values("12 cells"),
+                         [](const auto&) { return "mesh"; });
 
 TEST_F(Session, TwoRecordingsAreFittedTogetherAndAThirdIsPredicted) {
   for (const char* seed : {"11", "12"}) {
@@ -261,10 +263,13 @@ TEST_F(Session, AVolumeMeshMadeElsewhereIsFitted) {
   write_file(meshed / "capture.toml", facts);
   const ProgramRun run = run_pliant({"fit", meshed, "--out", at("on the mesh"), "--set", "element=tetrahedra", "--set",
                                      "points_per_frame=100", "--set", "scan_per_decade=1", "--set", "starts=1", "--set",
-                                     "steps=0.4", "--refine", "2"});
+                                     "steps=0.4", "--set", "max_iterations=40", "--refine", "2"});
   ASSERT_EQ(run.exit_code, fine) << run.err;
   const json found = result("on the mesh"), before = result("tetrahedra");
-  EXPECT_NEAR(value(found, "youngs_modulus") / value(before, "youngs_modulus"), 1.0, 0.05) << "the same elements";
+  const auto spread = [](const json& of) { return of["parameters"]["youngs_modulus"]["std"].get<double>(); };
+  EXPECT_NEAR(value(found, "youngs_modulus"), value(before, "youngs_modulus"),
+              2.0 * std::hypot(spread(found), spread(before)))
+      << "the same elements, whose boundary is the surface now";
   EXPECT_EQ(found["resolutions"].size(), 2U) << "finer steps, but no other mesh than the one given";
   EXPECT_FALSE(found["parameters"]["youngs_modulus"].contains("mesh_error"));
 }

@@ -1,0 +1,72 @@
+#include "estimation/load_free.hpp"
+
+#include <algorithm>
+
+#include "base/error.hpp"
+
+namespace pliant {
+
+namespace {
+
+/// As a simulator does that knows nothing of the scan: from the load-free shape, with the same nodes held.
+RolloutSummary sag_from_load_free(const Body& free, SimulationOptions options, const VectorX& theta, Points& sagged) {
+  const auto& mesh = std::get<TetMesh>(free.mesh);
+  const std::vector<int> held = held_nodes(free, options.holds);
+  Body body = make_body(make_tet_mesh(free.nodes, mesh.tets, mesh.mid_nodes), free.options);
+  body.mass = free.mass;
+  body.modulus = free.modulus;
+  const double close = 1e-9 * body.size();
+  options.holds = {{[&free, held, close](const Vector3& p) {
+    return std::ranges::any_of(held, [&](int n) { return (free.nodes.row(n).transpose() - p).norm() < close; });
+  }}};
+  for (HungWeight& weight : options.weights) weight.at = Embedding(free, {weight.at}).position(0, free.nodes);
+  options.newton.tolerance = 1e-11;
+  Simulation simulation(std::make_shared<Body>(std::move(body)), options);
+  return simulation.run(theta, [&](int, const State& state, auto) { return sagged = state.x, true; });
+}
+
+}  // namespace
+
+Capture at_rest(const Capture& capture) {
+  Capture still = capture;
+  still.is_static = true;
+  still.initial = {};
+  still.times = {0.0};
+  still.start_frame = 0;
+  still.depth.clear(), still.clouds.clear(), still.markers.clear();
+  return still;
+}
+
+LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const VectorX& theta,
+                        const ReferenceShapeOptions& options) {
+  if (resolution.element == ElementKind::Hexahedron)
+    throw InputError({{capture.file},
+                      "hexahedra have no shape free of load but their grid",
+                      "tetrahedra",
+                      "use element=quadratic_tetrahedra or element=tetrahedra"});
+  const Capture still = at_rest(capture);
+  const auto distance = capture_distance(still, resolution.band);
+  const Discretisation scanned = discretise(still, distance, resolution, theta);
+  const Body& body = *scanned.body;
+  LoadFree found;
+  ReferenceShapeSolver solver(scanned.body, held_nodes(body, scanned.simulation.holds), options);
+  found.shape = solver.find(theta, scan_load(body, theta, scanned.simulation.weights));
+  const Points& scan = body.scanned_positions();
+  const auto free = std::make_shared<Body>(with_reference(body, found.shape.X));
+  found.scene = discretise(still, distance, free, resolution, theta);
+  found.scene.control_points = scanned.control_points;
+  found.surface = *still.surface;
+  const Points vertices = Embedding(*free, still.surface->vertices).positions(found.shape.X);
+  for (Eigen::Index v = 0; v < vertices.rows(); ++v)
+    found.surface.vertices[std::size_t(v)] = vertices.row(v).transpose();
+  found.sag = (scan - found.shape.X).rowwise().norm().maxCoeff();
+  found.sagged_again = scan;
+  if (!found.shape.found) return found;
+  const RolloutSummary again = sag_from_load_free(*free, found.scene.simulation, theta, found.sagged_again);
+  if (!again.succeeded)
+    throw InputError({{capture.file}, "the shape found does not sag again: " + again.failure, "", ""});
+  found.re_sag_error = (found.sagged_again - scan).rowwise().norm().maxCoeff();
+  return found;
+}
+
+}  // namespace pliant
