@@ -1,0 +1,65 @@
+// From the scan of an object that sags to its shape free of load, the whole way of `pliant rest`.
+#include "estimation/load_free.hpp"
+
+#include <gtest/gtest.h>
+
+#include "base/error.hpp"
+#include "geometry/primitives.hpp"
+
+namespace pliant {
+namespace {
+
+constexpr double length = 0.3;
+
+/// A bar along x as it was scanned, clamped at its low end.
+Capture scanned_bar() {
+  Capture capture;
+  capture.surface = make_box(Vector3(length, 0.02, 0.03), 0.02);
+  for (Vector3& v : capture.surface->vertices) v += 0.5 * Vector3(length, 0.02, 0.03);  // one corner at the origin
+  capture.mass = 0.18;
+  capture.gravity = Vector3(0.0, -9.81, 0.0);
+  capture.fixed = {{RegionBox{Vector3::Constant(-0.01), Vector3(0.001, 0.04, 0.04)}, {}}};
+  return at_rest(capture);
+}
+
+LoadFree load_free(const Capture& capture, double youngs_modulus) {
+  Resolution resolution;
+  resolution.element = ElementKind::QuadraticTetrahedron;
+  VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
+  theta[theta::youngs_modulus] = youngs_modulus;
+  return find_load_free(capture, resolution, theta);
+}
+
+TEST(LoadFree, AScannedBarStoodHigherAndSagsBackIntoItsScan) {
+  const LoadFree found = load_free(scanned_bar(), 1e6);
+  ASSERT_TRUE(found.shape.found) << found.shape.reason;
+  // By the theory of slender beams the end of the bar sags by w L^4 / (8 E I).
+  const double weight = 0.18 * 9.81 / length, inertia = 0.03 * std::pow(0.02, 3) / 12.0;
+  const double theory = weight * std::pow(length, 4) / (8.0 * 1e6 * inertia);
+  ASSERT_GT(theory, 0.1 * length);
+  EXPECT_NEAR(found.sag / theory, 1.0, 0.1) << "so far it is no longer linear, and it shears";
+  EXPECT_LT(found.re_sag_error, 1e-6 * length);
+  double highest = 0.0;
+  for (const Vector3& v : found.surface.vertices) highest = std::max(highest, v.y());
+  EXPECT_NEAR(highest, 0.02 + theory, 0.15 * theory);
+  EXPECT_NEAR(enclosed_volume(found.surface) / enclosed_volume(*scanned_bar().surface), 1.0, 0.02);
+}
+
+TEST(LoadFree, AMaterialThatCannotCarryTheBarIsNamed) {
+  const LoadFree found = load_free(scanned_bar(), 1e3);
+  EXPECT_FALSE(found.shape.found);
+  ASSERT_GT(found.shape.carried, 0.0);
+  EXPECT_LT(found.shape.carried, 1.0);
+}
+
+TEST(LoadFree, WhatCannotBeDoneIsRefused) {
+  Capture loose = scanned_bar();
+  loose.fixed.clear();
+  EXPECT_THROW((void)load_free(loose, 1e6), InputError);
+  const Capture capture = scanned_bar();
+  const VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
+  EXPECT_THROW((void)find_load_free(capture, Resolution{}, theta), InputError) << "hexahedra";
+}
+
+}  // namespace
+}  // namespace pliant
