@@ -25,28 +25,29 @@ Capture scanned_bar() {
 LoadFree load_free(const Capture& capture, double youngs_modulus) {
   Resolution resolution;
   resolution.element = ElementKind::QuadraticTetrahedron;
+  resolution.cells = 8.0;
   VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
   theta[theta::youngs_modulus] = youngs_modulus;
   return find_load_free(capture, resolution, theta);
 }
 
 TEST(LoadFree, AScannedBarStoodHigherAndSagsBackIntoItsScan) {
-  const LoadFree found = load_free(scanned_bar(), 1e6);
+  const LoadFree found = load_free(scanned_bar(), 1e7);
   ASSERT_TRUE(found.shape.found) << found.shape.reason;
   // By the theory of slender beams the end of the bar sags by w L^4 / (8 E I).
   const double weight = 0.18 * 9.81 / length, inertia = 0.03 * std::pow(0.02, 3) / 12.0;
-  const double theory = weight * std::pow(length, 4) / (8.0 * 1e6 * inertia);
-  ASSERT_GT(theory, 0.1 * length);
-  EXPECT_NEAR(found.sag / theory, 1.0, 0.1) << "so far it is no longer linear, and it shears";
+  const double theory = weight * std::pow(length, 4) / (8.0 * 1e7 * inertia);
+  ASSERT_GT(theory, 0.09 * length);
+  EXPECT_NEAR(found.sag / theory, 1.0, 0.05) << "it shears a little, and the clamp keeps it wide";
   EXPECT_LT(found.re_sag_error, 1e-6 * length);
   double highest = 0.0;
   for (const Vector3& v : found.surface.vertices) highest = std::max(highest, v.y());
-  EXPECT_NEAR(highest, 0.02 + theory, 0.15 * theory);
+  EXPECT_NEAR(highest, 0.02 + theory, 0.05 * theory);
   EXPECT_NEAR(enclosed_volume(found.surface) / enclosed_volume(*scanned_bar().surface), 1.0, 0.02);
 }
 
 TEST(LoadFree, AMaterialThatCannotCarryTheBarIsNamed) {
-  const LoadFree found = load_free(scanned_bar(), 1e3);
+  const LoadFree found = load_free(scanned_bar(), 2e5);
   EXPECT_FALSE(found.shape.found);
   ASSERT_GT(found.shape.carried, 0.0);
   EXPECT_LT(found.shape.carried, 1.0);
