@@ -6,6 +6,7 @@
 #include <map>
 #include <tuple>
 
+#include "base/error.hpp"
 #include "base/files.hpp"
 #include "elasticity/corotated.hpp"
 #include "elasticity/element_moduli.hpp"
@@ -495,12 +496,21 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
   Model situated = model;
   situated.planes = capture.planes;
   situated.initial = capture.initial;
+  if (capture.initial.released && capture.initial.pulls.empty()) {
+    if (model.initial.pulls.empty())
+      throw InputError({{capture.file},
+                        "the object is released, and the model knows no pose before a release",
+                        "the model of a fit to this recording",
+                        "let `pliant fit --hold-out` find the pose and score the rest"});
+    situated.initial.pulls = model.initial.pulls;
+  }
   const Vector3 gravity = capture.gravity.value_or(model.gravity.value_or(-9.81 * capture.up));
   scene.theta = model_theta(situated, gravity, int(sensor_names(capture).size()));
   SimulationOptions settings;
   settings.newmark_theta = model.theta;
   Resolution resolution;
   resolution.cells = object_size(capture) / model.cell_size;
+  resolution.pulls = int(situated.initial.pulls.size());
   const auto body = body_of(model, *distance);
   resolution.element = body->kind;
   scene.discretisation =
