@@ -642,27 +642,6 @@ class Fit {
 
 }  // namespace
 
-std::string FitOptions::validate() const {
-  const auto outside = [](double v, double low, double high) { return !(v >= low && v <= high); };
-  if (outside(cells, 4, 64)) return "cells must lie in 4..64";
-  if (outside(coarse_cells, 4, 64)) return "coarse_cells must lie in 4..64";
-  if (!(steps > 0.0 && steps <= 16.0)) return "steps must lie in (0, 16]";
-  if (points_per_frame != 0 && points_per_frame < 10) return "points_per_frame must be 0 (all) or at least 10";
-  if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
-  if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
-  if (control_points < 1 || control_points > 500) return "control_points must lie in 1..500";
-  if (refine < 1 || refine > 3) return "refine must lie in 1..3";
-  if (const double finest = cells * std::pow(Refinement::mesh_ratio, refine - 1); finest > 64.0)
-    return "refine takes " + text_of(cells) + " cells to " + text_of(finest) + ", more than 64: begin with fewer";
-  if (starts < 1) return "starts must be at least 1";
-  if (max_iterations < 1) return "max_iterations must be at least 1";
-  if (!(wide_band > 0.0 && wide_band < 0.5) || !(fine_band > 0.0 && fine_band < 0.5))
-    return "bands must lie in (0, 0.5)";
-  if (!(newmark_theta >= 0.5 && newmark_theta < 1.0)) return "newmark_theta must lie in [0.5, 1)";
-  if (!(solver_tolerance > 0.0 && solver_tolerance < 1.0)) return "solver_tolerance must lie in (0, 1)";
-  return "";
-}
-
 MatrixX parameter_covariance(const CostEvaluation& evaluation) {
   const MatrixX& H = evaluation.gauss_newton;
   const Eigen::Index n = H.rows();

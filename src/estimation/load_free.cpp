@@ -44,6 +44,9 @@ LoadFree find_load_free(const Capture& capture, const Resolution& resolution, co
                       "hexahedra have no shape free of load but their grid",
                       "tetrahedra",
                       "use element=quadratic_tetrahedra or element=tetrahedra"});
+  if (capture.fixed.empty())
+    throw InputError(
+        {{capture.file}, "nothing holds the object while it sags", "a [[fixed]] region", "name what holds it"});
   const Capture still = at_rest(capture);
   const auto distance = capture_distance(still, resolution.band);
   const Discretisation scanned = discretise(still, distance, resolution, theta);
