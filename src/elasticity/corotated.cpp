@@ -2,8 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <stdexcept>
 
 #include "elasticity/local_stiffness.hpp"
+#include "elasticity/reference_forces.hpp"
 
 namespace pliant {
 
@@ -31,6 +33,10 @@ class CorotatedElasticity : public Elasticity {
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+  void set_reference(std::shared_ptr<const Body> body) override;
+  void linearise_reference(const Points& z) override;
+  void add_reference_tangent(const Points& d_reference, Points& force) override;
+  void add_reference_adjoint(const Points& w, Points& reference_bar) override;
   double energy(const Points& z) const override;
 
  private:
@@ -43,6 +49,7 @@ class CorotatedElasticity : public Elasticity {
   int count() const { return int(polar_.size()); }
   /// R^T z for the element's nodes, relative to the first.
   Vector unrotated(int element, const Points& z) const;
+  void take_reference();
 
   std::shared_ptr<const Body> body_;
   ElementModuli modulus_;
@@ -51,6 +58,8 @@ class CorotatedElasticity : public Elasticity {
   std::vector<Matrix3> gradients_;  // of the lag point
   std::vector<Vector> reference_;   // X of the element's nodes, relative to the first
   std::vector<int> blocks_;
+  std::unique_ptr<ReferenceForces> by_reference_;  // where the reference was set
+  Points lag_;                                     // likewise
 };
 
 template <int N>
@@ -59,6 +68,11 @@ CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body)
   polar_.resize(std::size_t(body_->element_count()));
   gradients_.resize(polar_.size());
   reference_.resize(polar_.size());
+  take_reference();
+}
+
+template <int N>
+void CorotatedElasticity<N>::take_reference() {
   for (int e = 0; e < count(); ++e)
     for (int a = 0; a < N; ++a)
       node(reference_[e], a) = (body_->nodes.row(nodes_of(e)[a]) - body_->nodes.row(nodes_of(e)[0])).transpose();
@@ -69,10 +83,36 @@ void CorotatedElasticity<N>::set_parameters(const VectorX& parameters) {
   // Rotations start from those of the step before; a run must not start from those of the run before.
   std::ranges::fill(polar_, Polar{});
   modulus_.set_parameters(parameters);
+  if (by_reference_) by_reference_->set_parameters(parameters);
   const double nu = parameters[theta::poissons_ratio];
   if (nu == poissons_ratio_) return;
   poissons_ratio_ = nu;
   stiffness_.set_poissons_ratio(nu);
+}
+
+template <int N>
+void CorotatedElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
+  body_ = std::move(body);
+  stiffness_ = LocalStiffness<N>(body_);
+  poissons_ratio_ = -2.0;
+  take_reference();
+  if (!by_reference_) by_reference_ = ReferenceForces::make(body_);
+}
+
+template <int N>
+void CorotatedElasticity<N>::linearise_reference(const Points& z) {
+  if (by_reference_ && !by_reference_->linearise(body_->reference_positions(), lag_, z))
+    throw std::logic_error("the reference has elements inside out");
+}
+
+template <int N>
+void CorotatedElasticity<N>::add_reference_tangent(const Points& d_reference, Points& force) {
+  if (by_reference_) by_reference_->add_tangent(d_reference, force);
+}
+
+template <int N>
+void CorotatedElasticity<N>::add_reference_adjoint(const Points& w, Points& reference_bar) {
+  if (by_reference_) by_reference_->add_adjoint(w, reference_bar);
 }
 
 template <int N>
@@ -84,6 +124,7 @@ void CorotatedElasticity<N>::linearise(const Points& lag) {
     for (int a = 0; a < N; ++a) F.noalias() += lag.row(nodes[a]).transpose() * g.row(a);
     gradients_[e] = F;
   }
+  if (by_reference_) lag_ = lag;
   polar_decompositions(gradients_, polar_);
 }
 

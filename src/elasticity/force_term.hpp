@@ -42,6 +42,14 @@ class ForceTerm {
   /// Adds the cotangents of p, z and theta for the cotangent `w` of f.
   virtual void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
                                  VectorX& theta_bar) = 0;
+
+  /// Makes ready for the two products below, about the lag point and z. Most terms do not ask where the object is free
+  /// of load.
+  virtual void linearise_reference(const Points& z) { (void)z; }
+  /// force += df for a change of where the nodes are free of load, p, z and theta staying as they are.
+  virtual void add_reference_tangent(const Points& d_reference, Points& force) { (void)d_reference, (void)force; }
+  /// Adds the cotangent of where they are, for the cotangent `w` of f.
+  virtual void add_reference_adjoint(const Points& w, Points& reference_bar) { (void)w, (void)reference_bar; }
 };
 
 }  // namespace pliant

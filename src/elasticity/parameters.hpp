@@ -7,8 +7,8 @@ namespace pliant {
 /// Everything that one scene depends on, as one vector theta, so that tangents and adjoints with respect to any of it
 /// are products with one matrix. After the numbers that every scene has there follow, per plane, its point and its
 /// normal; the pulls that hold a released object until it is let go; corrections of what sensors saw, which play no
-/// part in the motion; and at the very end the control moduli of an object of several (all but the first, which stands
-/// at `youngs_modulus`).
+/// part in the motion; corrections of the scan; and at the very end the control moduli of an object of several (all but
+/// the first, which stands at `youngs_modulus`).
 namespace theta {
 enum Index : int {
   youngs_modulus = 0,     ///< [Pa]
@@ -27,8 +27,10 @@ inline int plane_normal(int plane) { return first_plane + 6 * plane + 3; }  ///<
 inline int pull(int k, int planes) { return first_plane + 6 * planes + 3 * k; }
 /// 7, of camera k: its range's error [m], then turn [rad] and shift [m] of its points (see `SensorCorrection`)
 inline int sensor(int k, int planes, int pulls) { return pull(pulls, planes) + 7 * k; }
-inline int size(int planes, int moduli = 1, int pulls = 0, int sensors = 0) {
-  return sensor(sensors, planes, pulls) + (moduli - 1);
+/// 3, of mode k of the scan's correction [-], in standard deviations of the prior (see `ShapeField`)
+inline int shape(int k, int planes, int pulls, int sensors) { return sensor(sensors, planes, pulls) + 3 * k; }
+inline int size(int planes, int moduli = 1, int pulls = 0, int sensors = 0, int shapes = 0) {
+  return shape(shapes, planes, pulls, sensors) + (moduli - 1);
 }
 /// Where control modulus k of m stands in a theta of this size, [Pa].
 inline int modulus(int k, int moduli, Eigen::Index theta_size) {

@@ -17,7 +17,7 @@ class TetReferenceForces : public ReferenceForces {
   explicit TetReferenceForces(std::shared_ptr<const Body> body);
 
   void set_parameters(const VectorX& theta) override;
-  bool linearise(const Points& X, const Points& x) override;
+  bool linearise(const Points& X, const Points& p, const Points& z) override;
   void add_force(Points& force) const override;
   void add_matrix(double scale, BlockMatrix& matrix) const override;
   void add_tangent(const Points& d_reference, Points& force) const override;
@@ -33,10 +33,10 @@ class TetReferenceForces : public ReferenceForces {
   struct Element {
     double volume = 0.0;
     Polar polar;
-    std::array<double, points> part;     // of the volume
-    std::array<Nodes, points> gradient;  // of the shape functions
-    std::array<Matrix3, points> F;
-    std::array<Matrix3, points> stress;  // E C : (R^T F - I), in the element's own frame
+    std::array<double, points> part;       // of the volume
+    std::array<Nodes, points> gradient;    // of the shape functions
+    std::array<Matrix3, points> F, lag_F;  // of z, of p
+    std::array<Matrix3, points> stress;    // E C : (R^T F - I), in the element's own frame
   };
 
   const int* nodes_of(int e) const { return body_->connectivity.data() + std::size_t(e) * N; }
@@ -89,11 +89,11 @@ void TetReferenceForces<N>::set_parameters(const VectorX& theta) {
 }
 
 template <int N>
-bool TetReferenceForces<N>::linearise(const Points& X, const Points& x) {
+bool TetReferenceForces<N>::linearise(const Points& X, const Points& p, const Points& z) {
   least_volume_ratio_ = std::numeric_limits<double>::infinity();
   for (int e = 0; e < body_->element_count(); ++e) {
     Element& element = elements_[std::size_t(e)];
-    const Nodes own = of_element(e, X), moved = of_element(e, x);
+    const Nodes own = of_element(e, X), lagging = of_element(e, p), moved = of_element(e, z);
     Matrix3 sum = Matrix3::Zero();
     element.volume = 0.0;
     for (int q = 0; q < points; ++q) {
@@ -104,8 +104,9 @@ bool TetReferenceForces<N>::linearise(const Points& X, const Points& x) {
           std::min(least_volume_ratio_, element.part[i] / given_volumes_[std::size_t(e) * points + i]);
       element.gradient[i].noalias() = derivatives_[i] * J.inverse();
       element.F[i].noalias() = moved.transpose() * element.gradient[i];
+      element.lag_F[i].noalias() = lagging.transpose() * element.gradient[i];
       element.volume += element.part[i];
-      sum += element.part[i] * element.F[i];
+      sum += element.part[i] * element.lag_F[i];
     }
     if (!(least_volume_ratio_ > 0.0)) return false;
     element.polar = polar_decomposition(sum / element.volume, element.polar.quaternion);
@@ -138,8 +139,8 @@ auto TetReferenceForces<N>::tangent(int e, const Nodes& d_reference) const -> By
   for (std::size_t q = 0; q < points; ++q) {
     G[q].noalias() = d_reference.transpose() * element.gradient[q];
     const double growth = G[q].trace();
-    mean += element.part[q] * element.F[q];
-    d_mean += element.part[q] * (growth * element.F[q] - element.F[q] * G[q]);
+    mean += element.part[q] * element.lag_F[q];
+    d_mean += element.part[q] * (growth * element.lag_F[q] - element.lag_F[q] * G[q]);
     d_volume += element.part[q] * growth;
   }
   d_mean = (d_mean - mean * (d_volume / element.volume)) / element.volume;
@@ -198,13 +199,13 @@ void TetReferenceForces<N>::add_adjoint(const Points& w, Points& reference_bar) 
       w_bar += Vector3(W_bar(2, 1) - W_bar(1, 2), W_bar(0, 2) - W_bar(2, 0), W_bar(1, 0) - W_bar(0, 1));
       G_bar[q] =
           T_bar.cwiseProduct(sigma).sum() * Matrix3::Identity() - Q.transpose() * H_bar - T_bar.transpose() * sigma;
-      mean += element.part[q] * element.F[q];
+      mean += element.part[q] * element.lag_F[q];
     }
     const Matrix3 mean_bar = rotation_rate_adjoint(element.polar, w_bar) / element.volume;
     const double volume_bar = -mean_bar.cwiseProduct(mean).sum() / element.volume;
     for (std::size_t q = 0; q < points; ++q) {
-      const double growth_bar = element.part[q] * (mean_bar.cwiseProduct(element.F[q]).sum() + volume_bar);
-      G_bar[q] += growth_bar * Matrix3::Identity() - element.part[q] * element.F[q].transpose() * mean_bar;
+      const double growth_bar = element.part[q] * (mean_bar.cwiseProduct(element.lag_F[q]).sum() + volume_bar);
+      G_bar[q] += growth_bar * Matrix3::Identity() - element.part[q] * element.lag_F[q].transpose() * mean_bar;
       const Nodes bar = element.gradient[q] * G_bar[q].transpose();
       for (int a = 0; a < N; ++a) reference_bar.row(nodes_of(e)[a]) += bar.row(a);
     }

@@ -33,6 +33,7 @@ ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std
                                            const ReferenceShapeOptions& options)
     : body_(std::move(body)),
       held_(std::move(held)),
+      scan_(body_->scanned_positions()),
       options_(options),
       forces_(ReferenceForces::make(body_)),
       solver_(body_->pattern),
@@ -63,7 +64,7 @@ void ReferenceShapeSolver::clear_held(Points& points) const {
 }
 
 bool ReferenceShapeSolver::set_residual(const Points& X, const Points& load) {
-  if (!X.allFinite() || !forces_->linearise(X, body_->scanned_positions())) return false;
+  if (!X.allFinite() || !forces_->linearise(X, scan_)) return false;
   residual_ = load;
   forces_->add_force(residual_);
   clear_held(residual_);
@@ -171,17 +172,17 @@ bool ReferenceShapeSolver::holds_still(const VectorX& theta, const Points& X) {
   const auto reference = std::make_shared<Body>(with_reference(*body_, X));
   const auto elasticity = make_elasticity(reference);
   elasticity->set_parameters(theta);
-  elasticity->linearise(body_->scanned_positions());
+  elasticity->linearise(scan_);
   matrix_.set_zero();
   elasticity->add_matrix(1.0, matrix_);
-  elasticity->add_lag_matrix(body_->scanned_positions(), 1.0, matrix_);
+  elasticity->add_lag_matrix(scan_, 1.0, matrix_);
   constrain(matrix_);
   GeneralSolver general(body_->pattern, options_.solver);
   return general.factorise(matrix_, metric_) && general.symmetric_part_is_definite();
 }
 
 ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& load, const Points* guess) {
-  const Points& scan = body_->scanned_positions();
+  const Points& scan = scan_;
   forces_->set_parameters(theta);
   if (!set_residual(scan, load)) throw InputError({{}, "elements of the scan are inside out", "a sound mesh", ""});
   std::ranges::fill(turn_, Matrix3::Identity());
@@ -236,7 +237,7 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
 
 bool ReferenceShapeSolver::prepare_derivatives(const VectorX& theta, const Points& X) {
   forces_->set_parameters(theta);
-  if (!forces_->linearise(X, body_->scanned_positions())) return false;
+  if (!forces_->linearise(X, scan_)) return false;
   set_turns();
   set_jacobian();
   return solver_.factorise(jacobian_);

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "elasticity/reference_forces.hpp"
-#include "motion/simulation.hpp"
+#include "motion/body_forces.hpp"
 #include "motion/turning_step.hpp"
 #include "solvers/general_solver.hpp"
 #include "solvers/lu_solver.hpp"
@@ -53,6 +53,9 @@ class ReferenceShapeSolver {
   ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held,
                        const ReferenceShapeOptions& options = {});
 
+  /// Where the nodes truly were when they were scanned, n x 3 [m], if not where the body has them. Held ones are to
+  /// stay where they are.
+  void set_scan(Points scan) { scan_ = std::move(scan); }
   /// @param load   on the nodes of the scan [N], n x 3
   /// @param guess  of X; null: the scan
   /// A shape counts as found only where the scan is a stable equilibrium of it. Where a part of the load alone can be
@@ -92,6 +95,7 @@ class ReferenceShapeSolver {
 
   std::shared_ptr<const Body> body_;
   std::vector<int> held_;
+  Points scan_;
   ReferenceShapeOptions options_;
   std::unique_ptr<ReferenceForces> forces_;
   LuSolver solver_;

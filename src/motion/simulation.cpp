@@ -25,10 +25,12 @@ PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) 
 }
 
 std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const Body>& body,
-                                                   const SimulationOptions& options, FixedRegions*& fixed,
-                                                   Pull*& pull) {
+                                                   const SimulationOptions& options, Elasticity*& elasticity,
+                                                   FixedRegions*& fixed, Pull*& pull) {
   std::vector<std::unique_ptr<ForceTerm>> terms;
-  terms.push_back(make_elasticity(body));
+  auto elastic = make_elasticity(body);
+  elasticity = elastic.get();
+  terms.push_back(std::move(elastic));
   terms.push_back(std::make_unique<Gravity>(*body));
   for (int plane = 0; plane < options.planes; ++plane)
     terms.push_back(std::make_unique<PlaneContact>(body, plane, options.contact));
@@ -55,7 +57,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(std::move(body)),
       options_(std::move(options)),
-      stepper_(body_, make_terms(body_, options_, fixed_regions_, pull_),
+      stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_),
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
                 options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
       rest_(body_->scanned_positions()) {
@@ -75,6 +77,12 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     stepper_.carry(hung.points(), hung.masses());
   }
   prepare_holds();
+  if (options_.scan_sags || !options_.shape.points.empty()) {
+    const std::vector<int> held = held_nodes(*body_, options_.holds);
+    shape_ = std::make_unique<RestShape>(body_, held, options_.scan_sags, options_.weights,
+                                         shape_basis(*body_, options_.shape, held),
+                                         theta::shape(0, options_.planes, options_.pulls, options_.sensors));
+  }
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->scanned_positions().rowwise() - body_->centre_of_mass().transpose();
   for (int frame = 1; frame < frame_count() && !options_.is_static; ++frame) {
@@ -84,7 +92,30 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   }
 }
 
-void Simulation::set_parameters(const VectorX& parameters) { stepper_.set_parameters(parameters); }
+bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summary) {
+  if (shape_) {
+    summary.failure = shape_->find(parameters);
+    if (!summary.failure.empty()) return false;
+    elasticity_->set_reference(shape_->body());
+    rest_ = shape_->scan();
+    if (!options_.is_static) move_holds(0.0, 1.0, rest_);
+  }
+  stepper_.set_parameters(parameters);
+  return true;
+}
+
+bool Simulation::shape_tangents(const MatrixX& directions, ShapeChange& change, RolloutSummary& summary) {
+  if (!shape_ || directions.cols() == 0) return true;
+  if (!shape_->prepare_derivatives()) {
+    summary.failure = "the matrix of the load-free shape's derivatives cannot be factorised";
+    return false;
+  }
+  for (Eigen::Index c = 0; c < directions.cols(); ++c) {
+    change.scan.push_back(shape_->scan_tangent(directions.col(c)));
+    change.reference.push_back(shape_->reference_tangent(directions.col(c), change.scan.back()));
+  }
+  return true;
+}
 
 Points Simulation::velocities(const VectorX& parameters) const {
   const Vector3 linear = theta::vector_at(parameters, theta::linear_velocity);
@@ -105,28 +136,36 @@ bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& 
   return found;
 }
 
-std::vector<State> Simulation::start_tangents(const State& start, const MatrixX& directions) {
+std::vector<State> Simulation::start_tangents(const State& start, const MatrixX& directions, const ShapeChange& shape) {
   std::vector<State> tangents;
   if (pull_) pull_->set_active(true);
   for (Eigen::Index c = 0; c < directions.cols(); ++c) {
     const VectorX direction = directions.col(c);
     tangents.push_back({Points::Zero(rest_.rows(), 3), velocities(direction)});  // velocities are linear in theta
-    if (pull_) tangents.back().x = stepper_.equilibrium_tangent(start.x, direction);
+    if (shape_) tangents.back().x = shape.scan[std::size_t(c)];
+    if (pull_) tangents.back().x = stepper_.equilibrium_tangent(start.x, direction, shape.of(std::size_t(c)));
   }
   if (pull_) pull_->set_active(false);
   return tangents;
 }
 
-void Simulation::start_adjoint(const State& start, const State& bar, VectorX& theta_bar) {
+bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& theta_bar) {
   theta_bar.segment<3>(theta::linear_velocity) += bar.v.colwise().sum().transpose();
   for (Eigen::Index n = 0; n < bar.v.rows(); ++n) {
     const Vector3 lever = lever_.row(n), v_bar = bar.v.row(n);
     theta_bar.segment<3>(theta::angular_velocity) += lever.cross(v_bar);
   }
-  if (!pull_) return;
-  pull_->set_active(true);
-  if (stepper_.prepare_equilibrium_derivatives(start.x)) stepper_.equilibrium_adjoint(start.x, bar.x, theta_bar);
-  pull_->set_active(false);
+  if (pull_) {
+    pull_->set_active(true);
+    const bool ready = stepper_.prepare_equilibrium_derivatives(start.x);
+    if (ready) stepper_.equilibrium_adjoint(start.x, bar.x, theta_bar, shape_ ? &reference_bar_ : nullptr);
+    pull_->set_active(false);
+    if (!ready) return false;
+  }
+  if (!shape_) return true;
+  if (!shape_->prepare_derivatives()) return false;
+  shape_->adjoint(pull_ ? Points::Zero(rest_.rows(), 3) : bar.x, reference_bar_, theta_bar);
+  return true;
 }
 
 void Simulation::prepare_holds() {
@@ -172,7 +211,7 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
   constexpr int most_iterations = 400;
   double turn = 0.0;
   for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
-  state = {body_->scanned_positions(), Points::Zero(rest_.rows(), 3)};
+  state = {shape_ ? shape_->scan() : body_->scanned_positions(), Points::Zero(rest_.rows(), 3)};
   const double longest = turn > 0.0 ? std::min(1.0, largest_turn / turn) : 1.0;
   double done = 0.0, stride = longest;
   while (done < 1.0) {
@@ -225,13 +264,15 @@ RolloutSummary Simulation::run(const VectorX& parameters, const OnFrame& on_fram
 RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directions, int last_frame,
                                const OnFrame& on_frame) {
   RolloutSummary summary;
-  set_parameters(parameters);
+  ShapeChange shape;
+  if (!set_parameters(parameters, summary) || !shape_tangents(directions, shape, summary)) return summary;
   State state;
   std::vector<State> tangents;
   if (options_.is_static) {
     if (!find_equilibrium(parameters, state, summary)) return summary;
     for (Eigen::Index c = 0; c < directions.cols(); ++c)
-      tangents.push_back({stepper_.equilibrium_tangent(state.x, directions.col(c)), Points::Zero(rest_.rows(), 3)});
+      tangents.push_back({stepper_.equilibrium_tangent(state.x, directions.col(c), shape.of(std::size_t(c))),
+                          Points::Zero(rest_.rows(), 3)});
     for (int frame = 0; frame <= std::min(last_frame, frame_count() - 1); ++frame) {
       ++summary.frames;
       if (!on_frame(frame, state, tangents)) break;
@@ -239,7 +280,7 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
     return summary.succeeded = true, summary;
   }
   if (!start(parameters, state, summary)) return summary;
-  tangents = start_tangents(state, directions);
+  tangents = start_tangents(state, directions, shape);
   summary.frames = 1;
   if (!on_frame(0, state, tangents)) return summary.succeeded = true, summary;
   for (const StepPlan& plan : plan_) {
@@ -247,8 +288,9 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
     if (!forward_step(plan, state, summary)) return summary;
     if (!tangents.empty() && options_.integrator == Integrator::Newton && !stepper_.prepare_derivatives(state, delta_))
       return summary.failure = "a matrix of the tangents cannot be factorised", summary;
+    if (!shape.reference.empty()) stepper_.prepare_reference_derivatives(state, delta_);
     for (std::size_t c = 0; c < tangents.size(); ++c)
-      stepper_.tangent(state, delta_, directions.col(Eigen::Index(c)), tangents[c]);
+      stepper_.tangent(state, delta_, directions.col(Eigen::Index(c)), tangents[c], shape.of(c));
     stepper_.advance(delta_, state);
     if (plan.frame_after < 0) continue;
     ++summary.frames;
@@ -268,8 +310,10 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
                                        const std::function<void(int, const State&, Points&)>& cotangent,
                                        VectorX& theta_bar) {
   RolloutSummary summary;
-  set_parameters(parameters);
+  if (!set_parameters(parameters, summary)) return summary;
   theta_bar.setZero(theta_size());
+  reference_bar_ = Points::Zero(rest_.rows(), 3);
+  Points* const reference_bar = shape_ ? &reference_bar_ : nullptr;
   if (options_.is_static) {
     State state;
     if (!find_equilibrium(parameters, state, summary)) return summary;
@@ -279,7 +323,11 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       if (!cost(frame, state)) return summary.failure = "the cost failed", summary;
       cotangent(frame, state, x_bar);
     }
-    stepper_.equilibrium_adjoint(state.x, x_bar, theta_bar);
+    stepper_.equilibrium_adjoint(state.x, x_bar, theta_bar, reference_bar);
+    if (shape_) {
+      if (!shape_->prepare_derivatives()) return summary.failure = "the load-free shape has no derivatives", summary;
+      shape_->adjoint(Points::Zero(rest_.rows(), 3), reference_bar_, theta_bar);
+    }
     return summary.succeeded = true, summary;
   }
   std::size_t steps = 0;
@@ -329,12 +377,14 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     delta_ = state.x - start.x;
     if (!stepper_.prepare_derivatives(start, delta_))
       return summary.failure = "a matrix of the reverse sweep is not positive definite", summary;
-    stepper_.adjoint(start, delta_, bar, theta_bar);
+    if (shape_) stepper_.prepare_reference_derivatives(start, delta_);
+    stepper_.adjoint(start, delta_, bar, theta_bar, reference_bar);
     state = start;
     segment.pop_back();
   }
   cotangent(0, state, bar.x);
-  start_adjoint(released, bar, theta_bar);
+  if (!start_adjoint(released, bar, theta_bar))
+    return summary.failure = "a matrix of the start's derivatives cannot be factorised", summary;
   summary.succeeded = true;
   return summary;
 }

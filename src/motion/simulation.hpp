@@ -10,6 +10,7 @@
 #include "motion/fixed_regions.hpp"
 #include "motion/plane_contact.hpp"
 #include "motion/pull.hpp"
+#include "motion/rest_shape.hpp"
 #include "motion/stepper.hpp"
 
 namespace pliant {
@@ -27,9 +28,12 @@ struct SimulationOptions {
   int planes = 0;  ///< in theta
   int pulls = 0;   ///< in theta: the motion starts at rest in the equilibrium under these (see `Pull`); 0: in the
                    ///< reference pose
-  PullPoints pull_points;           ///< as many as pulls; none: nodes of the body far from what is held
-  int sensors = 0;                  ///< in theta; they play no part in the motion
-  std::vector<Hold> holds;          ///< held regions
+  PullPoints pull_points;   ///< as many as pulls; none: nodes of the body far from what is held
+  int sensors = 0;          ///< in theta; they play no part in the motion
+  bool scan_sags = false;   ///< the body stands in its scan as gravity and weights hold it; where it is free of load
+                            ///< follows from theta. Tetrahedra only
+  ShapeField shape;         ///< how the scan may err, likewise
+  std::vector<Hold> holds;  ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
@@ -53,7 +57,8 @@ class Simulation {
   const SimulationOptions& options() const { return options_; }
   int frame_count() const { return int(options_.times.size()); }
   int theta_size() const {
-    return theta::size(options_.planes, body_->modulus.controls, options_.pulls, options_.sensors);
+    return theta::size(options_.planes, body_->modulus.controls, options_.pulls, options_.sensors,
+                       int(options_.shape.points.size()));
   }
 
   /// Called at each frame, also the first, with the state and its tangents; false ends the run there (as a success).
@@ -80,14 +85,22 @@ class Simulation {
     double dt;
     int frame_after;  ///< frame reached by this step, -1: none
   };
-  void set_parameters(const VectorX& theta);
+  /// False where the object cannot be free of load anywhere: the summary says so.
+  bool set_parameters(const VectorX& theta, RolloutSummary& summary);
   /// Where and how fast the object is when it is let go; for a pulled one also the derivatives' matrix. False where
   /// there is no such equilibrium: the summary says so.
   bool start(const VectorX& theta, State& state, RolloutSummary& summary);
+  /// Changes of where the nodes are free of load along directions; empty where theta does not say that. `scan` is that
+  /// of where they were scanned.
+  struct ShapeChange {
+    std::vector<Points> reference, scan;
+    const Points* of(std::size_t direction) const { return reference.empty() ? nullptr : &reference[direction]; }
+  };
+  bool shape_tangents(const MatrixX& directions, ShapeChange& change, RolloutSummary& summary);
   /// Tangents of the start that was found last.
-  std::vector<State> start_tangents(const State& start, const MatrixX& directions);
+  std::vector<State> start_tangents(const State& start, const MatrixX& directions, const ShapeChange& shape);
   /// Adds to theta_bar. Any steps may have been taken since the start was found.
-  void start_adjoint(const State& start, const State& bar, VectorX& theta_bar);
+  bool start_adjoint(const State& start, const State& bar, VectorX& theta_bar);
   Points velocities(const VectorX& theta) const;
   /// The equilibrium of static scenes and of pulled objects: at once where Newton's method gets there from rest, else
   /// by steps of the load, gravity, pulls and the holds' displacement together, as large as it follows.
@@ -102,11 +115,14 @@ class Simulation {
 
   std::shared_ptr<const Body> body_;
   SimulationOptions options_;
-  FixedRegions* fixed_regions_ = nullptr;  // of the stepper's terms, if any
+  Elasticity* elasticity_ = nullptr;       // of the stepper's terms
+  FixedRegions* fixed_regions_ = nullptr;  // likewise, if any
   Pull* pull_ = nullptr;                   // likewise
   std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;
+  std::unique_ptr<RestShape> shape_;  // where theta says where the body is free of load
+  Points reference_bar_;              // likewise, of the reverse sweep
   std::vector<StepPlan> plan_;
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;

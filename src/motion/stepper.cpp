@@ -279,7 +279,13 @@ void Stepper::solve_derivative(const Points& b, Points& y, GeneralSolver::Side s
   y = as_points(std::as_const(solution_));
 }
 
-void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change) {
+void Stepper::prepare_reference_derivatives(const State& start, const Points& delta) {
+  set_points_at(scheme(), start.x, delta);
+  for (auto& term : terms_) term->linearise_reference(points_at_[std::size_t(term->at())]);
+}
+
+void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change,
+                      const Points* d_reference) {
   const Scheme s = scheme();
   const double dt = options_.dt, t = options_.newmark_theta;
   const double d_beta = d_theta[theta::stiffness_damping];
@@ -291,6 +297,7 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
     const bool blended = term->at() == ForceTerm::At::Blended;
     term->add_force_tangent(points_at_[std::size_t(term->at())], d_lag_[std::size_t(term->lag())],
                             blended ? d_blended_ : change.x, d_theta, d_force_);
+    if (d_reference) term->add_reference_tangent(*d_reference, d_force_);
   }
   d_force_ *= dt;
   mass_part_ = density_ / t * change.v;
@@ -311,7 +318,7 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
   change.v = w_ / (t * dt) - (1.0 - t) / t * change.v;
 }
 
-void Stepper::adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar) {
+void Stepper::adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar, Points* reference_bar) {
   const Scheme s = scheme();
   const double dt = options_.dt, t = options_.newmark_theta;
   set_points_at(s, start.x, delta);
@@ -349,6 +356,7 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   for (auto& term : terms_) {
     const auto at = std::size_t(term->at());
     term->add_force_adjoint(points_at_[at], w_, lag_bar_[std::size_t(term->lag())], bar_at_[at], theta_bar);
+    if (reference_bar) term->add_reference_adjoint(w_, *reference_bar);
   }
   theta_bar[theta::stiffness_damping] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
   for (const Points& p : bar_at_) bar.x += p;
@@ -371,26 +379,32 @@ SolveSummary Stepper::equilibrium(Points& x) {
 bool Stepper::prepare_equilibrium_derivatives(const Points& x) {
   const Points none = Points::Zero(x.rows(), 3);
   linearise(static_scheme(), x, none);
+  for (auto& term : terms_) term->linearise_reference(x);
   return factorise_exact(static_scheme(), x, none);
 }
 
-Points Stepper::equilibrium_tangent(const Points& x, const VectorX& d_theta) {
+Points Stepper::equilibrium_tangent(const Points& x, const VectorX& d_theta, const Points* d_reference) {
   const Points none = Points::Zero(x.rows(), 3);
   d_force_.setZero();
-  for (auto& term : terms_) term->add_force_tangent(x, none, none, d_theta, d_force_);
+  for (auto& term : terms_) {
+    term->add_force_tangent(x, none, none, d_theta, d_force_);
+    if (d_reference) term->add_reference_tangent(*d_reference, d_force_);
+  }
   clear_held(d_force_);
   Points change;
   solve_derivative(d_force_, change, GeneralSolver::Side::Plain);
   return change;
 }
 
-void Stepper::equilibrium_adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar) {
+void Stepper::equilibrium_adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar, Points* reference_bar) {
   force_ = x_bar;
   clear_held(force_);
   solve_derivative(force_, w_, GeneralSolver::Side::Transposed);
   clear_held(w_);
-  for (auto& term : terms_)
+  for (auto& term : terms_) {
     term->add_force_adjoint(x, w_, lag_bar_[std::size_t(term->lag())], bar_at_[std::size_t(term->at())], theta_bar);
+    if (reference_bar) term->add_reference_adjoint(w_, *reference_bar);
+  }
 }
 
 }  // namespace pliant

@@ -82,21 +82,25 @@ class Stepper {
 
   /// Makes ready for `tangent` or `adjoint` of a step whose Delta is known. False where a matrix cannot be factorised.
   [[nodiscard]] bool prepare_derivatives(const State& start, const Points& delta);
-  /// Change of the end for a change of start and theta. `change` goes in as that of the start and comes out as that of
-  /// the end.
-  void tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change);
-  /// Cotangent of the start for one of the end, in place; theta_bar accumulates.
-  void adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar);
+  /// Change of the end for a change of start, theta and, where given, of where the nodes are free of load. `change`
+  /// goes in as that of the start and comes out as that of the end.
+  void tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change,
+               const Points* d_reference = nullptr);
+  /// Cotangent of the start for one of the end, in place; theta_bar and, where given, reference_bar accumulate.
+  void adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar,
+               Points* reference_bar = nullptr);
+  /// Makes ready for derivatives by the reference, after `prepare_derivatives`.
+  void prepare_reference_derivatives(const State& start, const Points& delta);
 
   /// Positions without acceleration, from a guess, by Newton's method; held nodes stay where the guess has them. After
   /// a success the derivatives below refer to it. Not converged: says so, and x is the best found.
   [[nodiscard]] SolveSummary equilibrium(Points& x);
   /// Makes ready for them again after steps were taken. False where the matrix cannot be factorised.
   [[nodiscard]] bool prepare_equilibrium_derivatives(const Points& x);
-  /// Change of the equilibrium for a change of theta and of the held nodes' positions.
-  Points equilibrium_tangent(const Points& x, const VectorX& d_theta);
-  /// theta_bar += the cotangent for one of the equilibrium's positions.
-  void equilibrium_adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar);
+  /// Change of the equilibrium for a change of theta and, where given, of where the nodes are free of load.
+  Points equilibrium_tangent(const Points& x, const VectorX& d_theta, const Points* d_reference = nullptr);
+  /// theta_bar and, where given, reference_bar += the cotangents for one of the equilibrium's positions.
+  void equilibrium_adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar, Points* reference_bar = nullptr);
 
   const BlockMatrix& matrix() const { return matrix_; }
 
