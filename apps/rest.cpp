@@ -27,7 +27,6 @@ struct Arguments {
 
 FitOptions read_options(const Arguments& arguments) {
   FitOptions options;
-  options.element = ElementKind::QuadraticTetrahedron;
   for (const std::string& assignment : arguments.settings) set_fit_option(options, assignment);
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
@@ -90,7 +89,7 @@ int run(const Arguments& arguments) {
   if (!capture.surface) throw InputError({{capture.file}, "there is no scan ([object] surface)", "", ""});
   const double size = object_size(capture);
   Resolution resolution;
-  resolution.element = options.element;
+  resolution.element = options.element.value_or(ElementKind::QuadraticTetrahedron);
   resolution.cells = options.cells;
   resolution.field = {options.control_points, options.control_weights};
   const int controls = capture.regions.empty() ? options.control_points : int(capture.regions.size()) + 1;

@@ -67,6 +67,8 @@ struct Body {
   const Points& reference_positions() const { return nodes; }
   /// Where the nodes were in the scan [m], n x 3: the same, unless it was taken under load (`with_reference`).
   const Points& scanned_positions() const;
+  /// Whether that is so.
+  bool is_free_elsewhere() const { return nodes != scanned_positions(); }
   double volume() const;
   Vector3 centre_of_mass() const;  ///< in the scan [m]
   /// Longest edge of the nodes' box [m].

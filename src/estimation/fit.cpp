@@ -23,6 +23,10 @@ namespace pliant {
 
 namespace {
 
+/// The overload that goes on from a state.
+constexpr OptimiserSummary (*minimise_from)(Objective&, const OptimiserState&, const OptimiserOptions&,
+                                            const std::function<bool(const Iteration&)>&) = minimise;
+
 std::string text_of(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
@@ -49,6 +53,7 @@ class Fit {
   FitOutcome run() {
     scanned_ = !given_start("youngs_modulus");
     spread_start();
+    if (scanned_) start_where_it_carries();
     outcome_.start_theta = parameters_.reference();
     estimate_initial_motion();
     if (scanned_ && !start_from_swing()) scan();
@@ -103,7 +108,8 @@ class Fit {
     o.max_iterations = iterations;
     const int first = counter;
     counter += from.iterations;
-    OptimiserSummary s = minimise(objective, from, o, [&](const Iteration& i) {
+    const bool in_turns = options_.load_free == LoadFreeScheme::InTurns && recordings_.any_sags();
+    OptimiserSummary s = (in_turns ? minimise_in_turns : minimise_from)(objective, from, o, [&](const Iteration& i) {
       ++counter;
       if (on_state) on_state(i.state());
       const double part = double(counter - first) / iterations;
@@ -210,6 +216,38 @@ class Fit {
     set_reference(theta);
   }
 
+  /// An object that was scanned as it sags has to be stiff enough for its scan before anything can be tried.
+  void start_where_it_carries() {
+    constexpr double stride = 4.0, margin = 4.0, hopeless = 1e8;
+    const double first = parameters_.reference()[theta::youngs_modulus];
+    double modulus = first;
+    for (std::size_t i = 0; i < recordings_.all().size(); ++i) {
+      const Recording& r = recordings_.all()[i];
+      const Discretisation& d = coarse_.recording[i];
+      if (!d.simulation.scan_sags) continue;
+      ReferenceShapeOptions o;
+      o.by_parts = false;
+      ReferenceShapeSolver solver(d.body, held_nodes(*d.body, d.simulation.holds), o);
+      for (;; modulus *= stride) {
+        if (interrupted()) return;
+        if (modulus > hopeless * first)
+          throw InputError({{r.capture.file},
+                            "no material up to " + text_of(modulus) + " Pa holds the scan up",
+                            "the surface as the object sags",
+                            "check mass, gravity, [[fixed]] and the scan"});
+        VectorX theta = parameters_.reference();
+        set_all_moduli(theta, modulus);
+        const VectorX own = r.own(theta);
+        if (solver.find(own, scan_load(*d.body, own, d.simulation.weights)).found) break;
+      }
+    }
+    if (!recordings_.any_sags()) return;
+    carrying_modulus_ = modulus;
+    VectorX theta = parameters_.reference();
+    set_all_moduli(theta, margin * modulus);
+    set_reference(theta);
+  }
+
   /// The modulus whose vibrations are as fast as those that were seen (Wang 2015, section 6.3), if some were: by points
   /// that were followed, else by the middle of those that were not. False where the scan has to look for it.
   bool start_from_swing() {
@@ -290,7 +328,8 @@ class Fit {
   void scan() {
     const VectorX theta = parameters_.reference();
     const double g = std::max(theta::vector_at(theta, theta::gravity).norm(), 0.1);
-    const double stress = theta[theta::density] * g * recordings_.front().size;
+    const double stress =
+        carrying_modulus_ > 0.0 ? carrying_modulus_ : theta[theta::density] * g * recordings_.front().size;
     const int per_decade = options_.scan_per_decade * (swings() ? 2 : 1);
     const int count = 4 * per_decade + 1;
     if (int(state_.scan.size()) != count) {
@@ -591,9 +630,12 @@ class Fit {
       s.evaluation = objective.linearise(parameters.to_unconstrained(parameters.reference()));
     }
     outcome_.evaluation = std::move(s.evaluation);
-    for (std::size_t r = 0; r < recordings_.all().size(); ++r)
+    for (std::size_t r = 0; r < recordings_.all().size(); ++r) {
+      const VectorX own = recordings_.all()[r].own(outcome_.theta);
       outcome_.recordings.push_back(
-          {fine_.recording[r], recordings_.all()[r].own(outcome_.theta), outcome_.evaluation.of_recording(int(r))});
+          {fine_.recording[r], own, outcome_.evaluation.of_recording(int(r)),
+           Simulation(fine_.recording[r].body, fine_.recording[r].simulation).rest_body(own)});
+    }
     if (outcome_.evaluation.succeeded && parameters.dimension() > 0) {
       outcome_.covariance = parameter_covariance(outcome_.evaluation);
       outcome_.std = outcome_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -636,6 +678,7 @@ class Fit {
   VectorX relative_moduli_;  // of the scan and the starts, the first one's being one
   Grid coarse_, fine_;
   bool scanned_ = false;
+  double carrying_modulus_ = 0.0;  // [Pa] that is enough for a scan that sags; 0: no scan does
   std::vector<double> start_moduli_;
   std::mutex mutex_;
 };

@@ -13,6 +13,12 @@
 
 namespace pliant {
 
+/// How a fit minds that the load-free shape of an object scanned as it sags depends on its material.
+enum class LoadFreeScheme {
+  Together,  ///< derivatives pass through the equilibrium: one minimisation sees the whole dependence
+  InTurns,   ///< shape and parameters in turns, each as the other is (Wang 2015, algorithm 1)
+};
+
 /// Choices about a fit; none of them is needed. `validate` answers in words.
 struct FitOptions {
   double cells = 12.0;          ///< elements along the object's longest axis, [4, 64]
@@ -26,9 +32,13 @@ struct FitOptions {
   double wide_band = 0.12;      ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
   double fine_band = 0.05;      ///< of the last stage, (0, 0.5)
   double newmark_theta = 0.51;  ///< [0.5, 1)
-  ElementKind element = ElementKind::Hexahedron;
+  /// Left out: hexahedra, or quadratic tetrahedra where it follows from the fit where the object is free of load.
+  std::optional<ElementKind> element;
   Integrator integrator = Integrator::Lagged;
-  int pull_points = 4;     ///< that hold a released object until it is let go, 1..50
+  int pull_points = 4;  ///< that hold a released object until it is let go, 1..50
+  LoadFreeScheme load_free = LoadFreeScheme::Together;
+  int scan_points = 0;     ///< about which the scan may err, 0..50; 0: it is exact
+  double scan_std = 0.01;  ///< by how much, times the object's size, (0, 0.2]
   int control_points = 1;  ///< of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous
   FieldOptions::Weights control_weights = FieldOptions::Weights::Linear;
   OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
@@ -101,8 +111,9 @@ struct RecordedCapture {
 /// One of the recordings of a fit, at the solution.
 struct RecordingOutcome {
   Discretisation discretisation;
-  VectorX theta;              ///< its own part
-  CostEvaluation evaluation;  ///< its own frames
+  VectorX theta;                          ///< its own part
+  CostEvaluation evaluation;              ///< its own frames
+  std::shared_ptr<const Body> rest_body;  ///< the body where it is free of load
 };
 
 struct FitOutcome {

@@ -23,7 +23,10 @@ const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", S
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
-const std::vector<std::pair<std::string, ElementKind>> elements = {
+const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {{"together", LoadFreeScheme::Together},
+                                                                               {"in_turns", LoadFreeScheme::InTurns}};
+const std::vector<std::pair<std::string, std::optional<ElementKind>>> elements = {
+    {"automatic", std::nullopt},
     {"hexahedra", ElementKind::Hexahedron},
     {"tetrahedra", ElementKind::Tetrahedron},
     {"quadratic_tetrahedra", ElementKind::QuadraticTetrahedron}};
@@ -34,9 +37,9 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
 const std::set<std::string> parameter_names = {
-    "youngs_modulus",   "poisson_ratio", "mass_damping", "stiffness_damping", "density", "gravity", "linear_velocity",
-    "angular_velocity", "plane",         "plane_2",      "plane_3",           "plane_4", "pull",    "range_error",
-    "sensor_turn",      "sensor_shift"};
+    "youngs_modulus",   "poisson_ratio", "mass_damping",   "stiffness_damping", "density", "gravity", "linear_velocity",
+    "angular_velocity", "plane",         "plane_2",        "plane_3",           "plane_4", "pull",    "range_error",
+    "sensor_turn",      "sensor_shift",  "scan_correction"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -135,7 +138,18 @@ const std::vector<Entry>& entries() {
       real_entry("wide_band", "object sizes", "0..0.5", "distance at which a point stops counting, in the early stages",
                  &FitOptions::wide_band),
       real_entry("fine_band", "object sizes", "0..0.5", "the same, in the last stage", &FitOptions::fine_band),
-      choice_entry("element", "what the object is divided into", elements, &FitOptions::element),
+      choice_entry("element",
+                   "what the object is divided into; automatic: hexahedra, or quadratic_tetrahedra where it is unknown "
+                   "where the object is free of load",
+                   elements, &FitOptions::element),
+      choice_entry("load_free",
+                   "the load-free shape of an object scanned as it sags and its material: together, or in_turns",
+                   load_free_schemes, &FitOptions::load_free),
+      integer_entry("scan_points", "0..50",
+                    "about which a scan that is only roughly right is corrected; 0: it is right",
+                    &FitOptions::scan_points),
+      real_entry("scan_std", "object sizes", "0..0.2", "by how much such a scan is expected to err",
+                 &FitOptions::scan_std),
       choice_entry("integrator", "how time steps are taken: rotations predicted, or fully implicit", integrators,
                    &FitOptions::integrator),
       integer_entry("pull_points", "1..50", "about which a released object is pulled until it is let go",
@@ -361,6 +375,10 @@ std::string FitOptions::validate() const {
   if (!(steps > 0.0 && steps <= 16.0)) return "steps must lie in (0, 16]";
   if (points_per_frame != 0 && points_per_frame < 10) return "points_per_frame must be 0 (all) or at least 10";
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
+  if (scan_points < 0 || scan_points > 50) return "scan_points must lie in 0..50";
+  if (!(scan_std > 0.0 && scan_std <= 0.2)) return "scan_std must lie in (0, 0.2]";
+  if (scan_points > 0 && load_free == LoadFreeScheme::InTurns)
+    return "load_free=in_turns holds the shape while it moves parameters: it cannot correct the scan (scan_points)";
   if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
   if (control_points < 1 || control_points > 500) return "control_points must lie in 1..500";
   if (refine < 1 || refine > 3) return "refine must lie in 1..3";

@@ -62,6 +62,7 @@ class Objective::Part {
         simulation_(motion_.body, motion_.simulation) {}
 
   int theta_size() const { return simulation_.theta_size(); }
+  bool hold_shape(const VectorX& joint) { return simulation_.hold_shape(joint.segment(offset_, theta_size())).empty(); }
 
   CostEvaluation run(const VectorX& joint, const MatrixX& joint_directions);
   CostEvaluation gradient(const VectorX& joint, VectorX& joint_bar);
@@ -369,6 +370,11 @@ CostEvaluation Objective::run(const VectorX& p, bool with_tangents) {
       std::size_t(0), parts_.size(), [&](std::size_t i) { parts[i] = parts_[i]->run(theta, directions); },
       tbb::simple_partitioner());
   return sum(p, std::move(parts), with_tangents, with_tangents);
+}
+
+bool Objective::hold_shapes(const VectorX& p) {
+  const VectorX theta = parameters_.to_theta(p);
+  return std::ranges::all_of(parts_, [&](const auto& part) { return part->hold_shape(theta); });
 }
 
 CostEvaluation Objective::evaluate(const VectorX& p) { return run(p, false); }

@@ -90,6 +90,10 @@ class Objective {
 
   const ParameterSet& parameters() const { return parameters_; }
 
+  /// From now on load-free shapes and corrected scans stay what they are for p: costs and derivatives leave their
+  /// changes out. False where there are none.
+  [[nodiscard]] bool hold_shapes(const VectorX& p);
+
   /// Cost alone.
   [[nodiscard]] CostEvaluation evaluate(const VectorX& p);
   /// Cost, gradient and Gauss-Newton matrix by tangents: for few parameters.

@@ -284,4 +284,32 @@ OptimiserSummary minimise(Objective& objective, const VectorX& p, const Optimise
   return minimise(objective, OptimiserState{0, p, {}}, options, on_iteration);
 }
 
+OptimiserSummary minimise_in_turns(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+                                   const std::function<bool(const Iteration&)>& on_iteration) {
+  constexpr int iterations_of_a_turn = 3;
+  OptimiserSummary all;
+  all.p = state.p;
+  bool first = true;
+  for (int done = state.iterations; done < options.max_iterations || first; first = false) {
+    if (!objective.hold_shapes(all.p)) {
+      all.reason = "no shape free of load sags into the scan";
+      return all;
+    }
+    OptimiserOptions turn = options;
+    turn.max_iterations = std::min(done + iterations_of_a_turn, std::max(options.max_iterations, done + 1));
+    OptimiserSummary s = minimise(objective, OptimiserState{done, all.p, {}}, turn, on_iteration);
+    const double moved = (s.p - all.p).cwiseAbs().maxCoeff();
+    s.start_cost = first ? s.start_cost : all.start_cost;
+    s.evaluations += all.evaluations, s.steps += all.steps;
+    const bool stands = s.iterations == done;
+    done = s.iterations;
+    all = std::move(s);
+    if (!all.succeeded || all.interrupted) return all;
+    all.converged = moved < options.step_tolerance;
+    all.reason = all.converged ? "shape and parameters stay from turn to turn" : "too many iterations";
+    if (all.converged || stands) break;
+  }
+  return all;
+}
+
 }  // namespace pliant

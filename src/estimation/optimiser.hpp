@@ -64,4 +64,10 @@ OptimiserSummary minimise(Objective& objective, const VectorX& p, const Optimise
 OptimiserSummary minimise(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration = {});
 
+/// The splitting of Wang 2015 (algorithm 1): the load-free shape for p, then a few iterations towards the p that is
+/// best for that shape, in turns until p stays. `max_iterations` are those of all turns together; their costs are
+/// those of the shape of the turn and need not fall from one to the next.
+OptimiserSummary minimise_in_turns(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+                                   const std::function<bool(const Iteration&)>& on_iteration = {});
+
 }  // namespace pliant

@@ -136,6 +136,17 @@ PullPoints pull_points(const Capture& capture, int count) {
   return {far_points(capture.surface->vertices, held, count), object_size(capture)};
 }
 
+constexpr double shape_length = 0.25;  // over which a scan's errors are alike, times the object's size
+
+ShapeField shape_field(const Capture& capture, const Resolution& resolution) {
+  if (resolution.shape_points == 0) return {};
+  const double size = object_size(capture);
+  PullPoints far = pull_points(capture, resolution.shape_points);
+  const std::vector<Vector3>& vertices = capture.surface->vertices;
+  if (far.at.empty()) far.at = far_points(vertices, {vertices.front()}, resolution.shape_points);
+  return {std::move(far.at), resolution.shape_std * size, shape_length * size};
+}
+
 }  // namespace
 
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
@@ -161,6 +172,8 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.simulation.contact = default_contact(*d.body, parameters[theta::density] * d.body->volume(), gravity);
   for (const Weight& weight : capture.weights) d.simulation.weights.push_back({weight.at, weight.mass});
   d.simulation.pull_points = pull_points(capture, d.simulation.pulls);
+  d.simulation.scan_sags = capture.shape_is == ShapeIs::Static && !d.body->is_free_elsewhere();
+  d.simulation.shape = shape_field(capture, resolution);
   for (const FixedRegion& fixed : capture.fixed) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
     d.simulation.holds.push_back({region_test(capture, fixed.region), motion.rotation, motion.translation});
@@ -198,7 +211,7 @@ void set_moduli(VectorX& theta, int controls, double youngs_modulus) {
   for (int k = 0; k < controls; ++k) theta[theta::modulus(k, controls, theta.size())] = youngs_modulus;
 }
 
-ParameterSet default_parameters(const Capture& capture, double volume, int controls, int pulls) {
+ParameterSet default_parameters(const Capture& capture, double volume, int controls, int pulls, int shapes) {
   const double size = object_size(capture);
   const double gravity = capture.gravity ? capture.gravity->norm() : gravity_guess;
   const double density = capture.mass ? *capture.mass / volume : capture.density ? *capture.density : density_guess;
@@ -207,7 +220,7 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
 
   const int planes = int(capture.planes.size());
   const std::vector<std::string> sensors = sensor_names(capture);
-  VectorX theta = VectorX::Zero(theta::size(planes, controls, pulls, int(sensors.size())));
+  VectorX theta = VectorX::Zero(theta::size(planes, controls, pulls, int(sensors.size()), shapes));
   set_moduli(theta, controls, 20.0 * stress);
   theta[theta::poissons_ratio] = 0.35;
   theta[theta::mass_damping] = 0.05 / time;
@@ -272,6 +285,9 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
     add_vector(p, "sensor_turn@" + sensor, "rad", Transform::Vector, at + 1, 1.0, Vector3::Zero(), 0.05, false);
     add_vector(p, "sensor_shift@" + sensor, "m", Transform::Vector, at + 4, size, Vector3::Zero(), 0.05, false);
   }
+  for (int k = 0; k < shapes; ++k)
+    add_vector(p, "scan_correction@" + std::to_string(k + 1), "1", Transform::Vector,
+               theta::shape(k, planes, pulls, int(sensors.size())), 1.0, Vector3::Zero(), 1.0, true);
   return {std::move(p), std::move(theta)};
 }
 

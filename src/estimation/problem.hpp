@@ -21,10 +21,12 @@ struct FieldOptions {
 struct Resolution {
   ElementKind element = ElementKind::Hexahedron;
   FieldOptions field;
-  double cells = 12.0;  ///< elements along the object's longest axis
-  double steps = 1.0;   ///< time steps per default step: 2 halves the step
-  int pulls = 4;        ///< that hold a released object until it is let go
-  double band = 0.15;   ///< of the mismatch, times the object's longest axis
+  double cells = 12.0;      ///< elements along the object's longest axis
+  double steps = 1.0;       ///< time steps per default step: 2 halves the step
+  int pulls = 4;            ///< that hold a released object until it is let go
+  int shape_points = 0;     ///< about which the scan may err; 0: it is exact. Tetrahedra only
+  double shape_std = 0.01;  ///< by how much, times the object's longest axis
+  double band = 0.15;       ///< of the mismatch, times the object's longest axis
 };
 
 /// A recording made ready for simulation at one resolution.
@@ -61,7 +63,8 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
 /// estimated.
 /// @param controls  control moduli of the body: `modulus_names` tells what they are called
 /// @param pulls     that hold a released object: "pull@1", ... (see `Pull`)
-ParameterSet default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0);
+/// @param shapes    of the scan's correction: "scan_correction@1", ... (see `ShapeField`)
+ParameterSet default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0, int shapes = 0);
 
 /// What corrections of sensors apply to: each depth camera by its name, "clouds" and "markers".
 std::vector<std::string> sensor_names(const Capture& capture);

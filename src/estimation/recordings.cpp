@@ -18,9 +18,9 @@ void require_fittable(const Capture& capture) {
   if (capture.is_static && capture.fixed.empty() && capture.planes.empty())
     refuse("the recording is static, but nothing holds the object",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
-  if (capture.shape_is == ShapeIs::Static)
-    refuse("the scan was taken sagging (shape_is = \"static\")",
-           "scan the object free of load; load-free shapes are not estimated in this version");
+  if (capture.shape_is == ShapeIs::Static && capture.fixed.empty())
+    refuse("the scan was taken sagging (shape_is = \"static\"), and nothing holds the object",
+           "add the [[fixed]] region that it hangs from");
   if (capture.initial.released && capture.fixed.empty())
     refuse("the object is released from a held, deformed pose, and nothing holds it afterwards",
            "add the [[fixed]] region where it stays held");
@@ -139,8 +139,9 @@ ParameterSet Recordings::make_ready(RecordedCapture recorded, Recording& recordi
   recording.last_frame =
       std::min(int(capture.times.size()) - capture.start_frame - 1, recording.observations->back().frame);
   recording.distance = capture_distance(capture, widest_band());
-  ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.surface), controls_,
-                                               pull_count(capture, resolution(0.0, options_.steps)));
+  ParameterSet parameters =
+      default_parameters(capture, enclosed_volume(*capture.surface), controls_,
+                         pull_count(capture, resolution(0.0, options_.steps)), options_.scan_points);
   trust_planes_seen(parameters, planes_seen);
   return parameters;
 }
@@ -149,7 +150,16 @@ double Recordings::widest_band() const { return std::max(options_.wide_band, opt
 
 Resolution Recordings::resolution(double cells, double steps) const {
   Resolution r;
-  r.element = options_.element;
+  const bool moves_reference = any_sags() || options_.scan_points > 0;
+  r.element = options_.element.value_or(moves_reference ? ElementKind::QuadraticTetrahedron : ElementKind::Hexahedron);
+  if (moves_reference && r.element == ElementKind::Hexahedron)
+    throw InputError({{front().capture.file},
+                      any_sags() ? "the scan was taken sagging (shape_is = \"static\"), and element=hexahedra"
+                                 : "scan_points are given, and element=hexahedra",
+                      "tetrahedra: the grid of hexahedra is regular where the object is free of load",
+                      "leave out element, or choose quadratic_tetrahedra"});
+  r.shape_points = options_.scan_points;
+  r.shape_std = options_.scan_std;
   r.field = {options_.control_points, options_.control_weights};
   r.cells = cells;
   r.steps = steps;

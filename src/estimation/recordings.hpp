@@ -48,6 +48,10 @@ class Recordings {
   bool all_static() const {
     return std::ranges::all_of(all_, [](const Recording& r) { return r.capture.is_static; });
   }
+  /// Whether a scan was taken as the object sags.
+  bool any_sags() const {
+    return std::ranges::any_of(all_, [](const Recording& r) { return r.capture.shape_is == ShapeIs::Static; });
+  }
   bool any_meshed_here() const {
     return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.volume; });
   }

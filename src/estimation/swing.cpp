@@ -90,11 +90,17 @@ std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters
   constexpr int most_rounds = 6;
   constexpr double near_enough = 1.05;
   for (int round = 0; round < most_rounds; ++round) {
-    const auto simulated = swing_of(simulated_path(simulation, parameters), direction);
-    // Too slow or too fast to show in these frames: try a body that is stiffer, then one that is softer.
-    const double ratio = simulated ? std::pow(*observed / *simulated, 2) : round == 0 ? 10.0 : 0.1;
+    const Path moves = simulated_path(simulation, parameters);
+    const auto simulated = swing_of(moves, direction);
+    // Too slow or too fast to show in these frames: try a body that is stiffer, then one that is softer. One that
+    // cannot hold itself up has to be stiffer.
+    const bool fails = moves.points.size() < path.points.size();
+    const double ratio = simulated && !fails ? std::pow(*observed / *simulated, 2)
+                         : fails             ? 3.0
+                         : round == 0        ? 10.0
+                                             : 0.1;
     for (int k = 0; k < controls; ++k) parameters[theta::modulus(k, controls, parameters.size())] *= ratio;
-    if (simulated && std::abs(std::log(ratio)) < std::log(near_enough))
+    if (simulated && !fails && std::abs(std::log(ratio)) < std::log(near_enough))
       return SwingStart{parameters[theta::youngs_modulus], *observed / (2.0 * std::numbers::pi)};
   }
   return std::nullopt;

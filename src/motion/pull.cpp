@@ -36,7 +36,9 @@ VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const st
   matrix.set_zero();
   elasticity->add_matrix(1.0, matrix);
   for (const int node : held) matrix.constrain(node);
-  const auto solver = make_linear_solver(body->pattern);
+  SolverOptions direct;  // one matrix, many right-hand sides
+  direct.kind = best_direct_kind();
+  const auto solver = make_linear_solver(body->pattern, direct);
   if (held.size() < 3 || !solver->factorise(matrix))
     throw InputError({{},
                       "nothing holds the object while it is pulled",

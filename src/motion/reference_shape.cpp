@@ -211,7 +211,8 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
   if (!whole.converged && guess) whole = try_share(1.0, scan);
   take(whole, whole.converged ? 1.0 : 0.0);
   shape.found = whole.converged;
-  if (shape.found || options_.scheme != ReferenceScheme::PseudoTransient) return shape.reason = whole.reason, shape;
+  if (shape.found || !options_.by_parts || options_.scheme != ReferenceScheme::PseudoTransient)
+    return shape.reason = whole.reason, shape;
   // Part by part, from what the part before gave.
   shape.reason = whole.reason;
   Points from = scan;

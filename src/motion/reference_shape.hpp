@@ -25,6 +25,7 @@ struct ReferenceShapeOptions {
   int max_iterations = 200;  ///< >= 1
   /// Elements of the shape that was found keep at least this part of the volume that they have in the scan, (0, 1).
   double least_volume_ratio = 0.05;
+  bool by_parts = true;  ///< where the whole load cannot be carried, look for the part that can
   double virtual_step = 0.1, virtual_damping = 2.0;  ///< of the scheme by virtual forces [s], [1/s]
   SolverKind solver = SolverKind::Automatic;
 };

@@ -73,7 +73,9 @@ RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& h
   if (body_->kind == ElementKind::Hexahedron)
     throw std::invalid_argument("hexahedra are regular where they are free of load");
   if (!sags_) return;
-  solver_ = std::make_unique<ReferenceShapeSolver>(body_, held);
+  ReferenceShapeOptions options;
+  options.by_parts = false;
+  solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, options);
   elasticity_ = make_elasticity(body_);
   terms_.push_back(std::make_unique<Gravity>(*body_));
   if (!weights.empty()) terms_.push_back(std::make_unique<HungWeights>(*body_, weights));

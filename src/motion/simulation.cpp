@@ -93,7 +93,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
 }
 
 bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summary) {
-  if (shape_) {
+  if (shape_ && !shape_is_held_) {
     summary.failure = shape_->find(parameters);
     if (!summary.failure.empty()) return false;
     elasticity_->set_reference(shape_->body());
@@ -104,8 +104,20 @@ bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summa
   return true;
 }
 
+std::shared_ptr<const Body> Simulation::rest_body(const VectorX& parameters) {
+  if (follows_shape() && !shape_->find(parameters).empty()) return body_;
+  return shape_ ? shape_->body() : body_;
+}
+
+std::string Simulation::hold_shape(const VectorX& parameters) {
+  shape_is_held_ = false;
+  RolloutSummary summary;
+  shape_is_held_ = set_parameters(parameters, summary);
+  return summary.failure;
+}
+
 bool Simulation::shape_tangents(const MatrixX& directions, ShapeChange& change, RolloutSummary& summary) {
-  if (!shape_ || directions.cols() == 0) return true;
+  if (!follows_shape() || directions.cols() == 0) return true;
   if (!shape_->prepare_derivatives()) {
     summary.failure = "the matrix of the load-free shape's derivatives cannot be factorised";
     return false;
@@ -142,7 +154,7 @@ std::vector<State> Simulation::start_tangents(const State& start, const MatrixX&
   for (Eigen::Index c = 0; c < directions.cols(); ++c) {
     const VectorX direction = directions.col(c);
     tangents.push_back({Points::Zero(rest_.rows(), 3), velocities(direction)});  // velocities are linear in theta
-    if (shape_) tangents.back().x = shape.scan[std::size_t(c)];
+    if (!shape.scan.empty()) tangents.back().x = shape.scan[std::size_t(c)];
     if (pull_) tangents.back().x = stepper_.equilibrium_tangent(start.x, direction, shape.of(std::size_t(c)));
   }
   if (pull_) pull_->set_active(false);
@@ -158,11 +170,11 @@ bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& th
   if (pull_) {
     pull_->set_active(true);
     const bool ready = stepper_.prepare_equilibrium_derivatives(start.x);
-    if (ready) stepper_.equilibrium_adjoint(start.x, bar.x, theta_bar, shape_ ? &reference_bar_ : nullptr);
+    if (ready) stepper_.equilibrium_adjoint(start.x, bar.x, theta_bar, follows_shape() ? &reference_bar_ : nullptr);
     pull_->set_active(false);
     if (!ready) return false;
   }
-  if (!shape_) return true;
+  if (!follows_shape()) return true;
   if (!shape_->prepare_derivatives()) return false;
   shape_->adjoint(pull_ ? Points::Zero(rest_.rows(), 3) : bar.x, reference_bar_, theta_bar);
   return true;
@@ -209,6 +221,13 @@ void Simulation::move_holds(double from, double to, Points& positions) {
 bool Simulation::find_equilibrium(const VectorX& parameters, State& state, RolloutSummary& summary) {
   constexpr double smallest = 1.0 / 256.0, largest_turn = 0.4;
   constexpr int most_iterations = 400;
+  if (last_equilibrium_.rows() > 0 && !options_.is_static) {  // that of parameters that may be near
+    state = {last_equilibrium_, Points::Zero(rest_.rows(), 3)};
+    const SolveSummary solved = stepper_.equilibrium(state.x);
+    summary.solver_iterations += solved.iterations;
+    ++summary.steps;
+    if (solved.converged) return last_equilibrium_ = state.x, true;
+  }
   double turn = 0.0;
   for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
   state = {shape_ ? shape_->scan() : body_->scanned_positions(), Points::Zero(rest_.rows(), 3)};
@@ -235,6 +254,7 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
       return false;
     }
   }
+  last_equilibrium_ = state.x;
   return true;
 }
 
@@ -313,7 +333,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   if (!set_parameters(parameters, summary)) return summary;
   theta_bar.setZero(theta_size());
   reference_bar_ = Points::Zero(rest_.rows(), 3);
-  Points* const reference_bar = shape_ ? &reference_bar_ : nullptr;
+  Points* const reference_bar = follows_shape() ? &reference_bar_ : nullptr;
   if (options_.is_static) {
     State state;
     if (!find_equilibrium(parameters, state, summary)) return summary;
@@ -324,7 +344,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       cotangent(frame, state, x_bar);
     }
     stepper_.equilibrium_adjoint(state.x, x_bar, theta_bar, reference_bar);
-    if (shape_) {
+    if (reference_bar) {
       if (!shape_->prepare_derivatives()) return summary.failure = "the load-free shape has no derivatives", summary;
       shape_->adjoint(Points::Zero(rest_.rows(), 3), reference_bar_, theta_bar);
     }
@@ -377,7 +397,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     delta_ = state.x - start.x;
     if (!stepper_.prepare_derivatives(start, delta_))
       return summary.failure = "a matrix of the reverse sweep is not positive definite", summary;
-    if (shape_) stepper_.prepare_reference_derivatives(start, delta_);
+    if (reference_bar) stepper_.prepare_reference_derivatives(start, delta_);
     stepper_.adjoint(start, delta_, bar, theta_bar, reference_bar);
     state = start;
     segment.pop_back();

@@ -61,6 +61,13 @@ class Simulation {
                        int(options_.shape.points.size()));
   }
 
+  /// From now on the object is free of load where it is for this theta, whatever theta is: derivatives leave that out
+  /// too. Returns why it cannot, or nothing.
+  [[nodiscard]] std::string hold_shape(const VectorX& theta);
+
+  /// The body with its load-free shape for theta; the given one where theta does not say, or there is none.
+  std::shared_ptr<const Body> rest_body(const VectorX& theta);
+
   /// Called at each frame, also the first, with the state and its tangents; false ends the run there (as a success).
   using OnFrame = std::function<bool(int frame, const State& state, std::span<const State> tangents)>;
 
@@ -96,6 +103,7 @@ class Simulation {
     std::vector<Points> reference, scan;
     const Points* of(std::size_t direction) const { return reference.empty() ? nullptr : &reference[direction]; }
   };
+  bool follows_shape() const { return shape_ && !shape_is_held_; }
   bool shape_tangents(const MatrixX& directions, ShapeChange& change, RolloutSummary& summary);
   /// Tangents of the start that was found last.
   std::vector<State> start_tangents(const State& start, const MatrixX& directions, const ShapeChange& shape);
@@ -122,7 +130,9 @@ class Simulation {
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;
   std::unique_ptr<RestShape> shape_;  // where theta says where the body is free of load
-  Points reference_bar_;              // likewise, of the reverse sweep
+  bool shape_is_held_ = false;
+  Points reference_bar_;     // likewise, of the reverse sweep
+  Points last_equilibrium_;  // that was found, to begin with when the next is looked for; empty: none
   std::vector<StepPlan> plan_;
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;

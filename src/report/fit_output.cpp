@@ -395,7 +395,9 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
 
 Model make_model(const Capture& capture, const FitOutcome& outcome) {
   const RecordingOutcome& first = outcome.recordings.front();
-  return make_model(capture, first.discretisation, first.theta, modulus_statistics(outcome), outcome.cells);
+  Discretisation free = first.discretisation;
+  free.body = first.rest_body;
+  return make_model(capture, free, first.theta, modulus_statistics(outcome), outcome.cells);
 }
 
 Model make_model(const Capture& capture, const Discretisation& d, const VectorX& t, const ModulusStatistics& modulus,

@@ -1,6 +1,7 @@
 #include "solvers/linear_solver.hpp"
 
 #include <Eigen/SparseCholesky>
+#include <cmath>
 #include <stdexcept>
 
 #include "solvers/cholmod_solver.hpp"
@@ -43,6 +44,51 @@ class SimplicialSolver : public LinearSolver {
   bool analysed_ = false;
 };
 
+/// Iterates, until that has cost more than a factorisation several times in a row; from then on factorises. What counts
+/// are iterations, not time, so that every run takes the same way.
+class AutomaticSolver : public LinearSolver {
+ public:
+  AutomaticSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
+      : pattern_(std::move(pattern)), options_(options), iterative_(pattern_, options) {
+    // As measured (docs/performance.md): a factorisation costs about as much as so many iterations.
+    const double by_kind = best_direct_kind() == SolverKind::Cholmod ? 4.0 : 12.0;
+    worth_a_factor_ = int(by_kind * std::sqrt(double(pattern_->rows)));
+  }
+
+  [[nodiscard]] bool factorise(const BlockMatrix& matrix) override {
+    matrix_ = &matrix;
+    if (direct_) return direct_->factorise(matrix);
+    constexpr int often_enough = 3;
+    too_long_ = iterations_ > worth_a_factor_ ? too_long_ + 1 : 0;
+    iterations_ = 0;
+    return too_long_ >= often_enough ? turn_direct() : iterative_.factorise(matrix);
+  }
+  SolveSummary solve(const VectorX& b, VectorX& x) override {
+    if (direct_) return direct_->solve(b, x);
+    const SolveSummary summary = iterative_.solve(b, x);
+    iterations_ += summary.iterations;
+    if (summary.converged || !turn_direct()) return summary;
+    return direct_->solve(b, x);
+  }
+  std::string name() const override { return direct_ ? direct_->name() : iterative_.name(); }
+  std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<AutomaticSolver>(pattern_, options_); }
+
+ private:
+  bool turn_direct() {
+    SolverOptions direct = options_;
+    direct.kind = best_direct_kind();
+    direct_ = make_linear_solver(pattern_, direct);
+    return direct_->factorise(*matrix_);
+  }
+
+  std::shared_ptr<const BlockPattern> pattern_;
+  SolverOptions options_;
+  ConjugateGradients iterative_;
+  std::unique_ptr<LinearSolver> direct_;
+  const BlockMatrix* matrix_ = nullptr;
+  int worth_a_factor_, iterations_ = 0, too_long_ = 0;
+};
+
 }  // namespace
 
 SolverKind best_direct_kind() {
@@ -56,7 +102,8 @@ SolverKind best_direct_kind() {
 std::unique_ptr<LinearSolver> make_linear_solver(std::shared_ptr<const BlockPattern> pattern,
                                                  const SolverOptions& options) {
   switch (options.kind) {
-    case SolverKind::Automatic:  // faster than a factorisation at every size measured, see docs/performance.md
+    case SolverKind::Automatic:
+      return std::make_unique<AutomaticSolver>(std::move(pattern), options);
     case SolverKind::Iterative:
       return std::make_unique<ConjugateGradients>(std::move(pattern), options);
     case SolverKind::Simplicial:

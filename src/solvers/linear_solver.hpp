@@ -29,7 +29,7 @@ class LinearSolver {
 };
 
 enum class SolverKind {
-  Automatic,   ///< by size, as measured: see docs/performance.md
+  Automatic,   ///< iterative, until that has cost more than factorisations several times in a row
   Iterative,   ///< conjugate gradients with an incomplete Cholesky factor of 3 x 3 blocks
   Cholmod,     ///< supernodal sparse Cholesky (needs PLIANT_WITH_CHOLMOD)
   Simplicial,  ///< Eigen's sparse Cholesky
