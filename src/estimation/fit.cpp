@@ -14,6 +14,7 @@
 
 #include "base/error.hpp"
 #include "estimation/corrections.hpp"
+#include "estimation/load_free.hpp"
 #include "estimation/modal_start.hpp"
 #include "estimation/notes.hpp"
 #include "estimation/recordings.hpp"
@@ -218,33 +219,17 @@ class Fit {
 
   /// An object that was scanned as it sags has to be stiff enough for its scan before anything can be tried.
   void start_where_it_carries() {
-    constexpr double stride = 4.0, margin = 4.0, hopeless = 1e8;
-    const double first = parameters_.reference()[theta::youngs_modulus];
-    double modulus = first;
+    double modulus = 0.0;
     for (std::size_t i = 0; i < recordings_.all().size(); ++i) {
-      const Recording& r = recordings_.all()[i];
       const Discretisation& d = coarse_.recording[i];
       if (!d.simulation.scan_sags) continue;
-      ReferenceShapeOptions o;
-      o.by_parts = false;
-      ReferenceShapeSolver solver(d.body, held_nodes(*d.body, d.simulation.holds), o);
-      for (;; modulus *= stride) {
-        if (interrupted()) return;
-        if (modulus > hopeless * first)
-          throw InputError({{r.capture.file},
-                            "no material up to " + text_of(modulus) + " Pa holds the scan up",
-                            "the surface as the object sags",
-                            "check mass, gravity, [[fixed]] and the scan"});
-        VectorX theta = parameters_.reference();
-        set_all_moduli(theta, modulus);
-        const VectorX own = r.own(theta);
-        if (solver.find(own, scan_load(*d.body, own, d.simulation.weights)).found) break;
-      }
+      const VectorX own = recordings_.all()[i].own(parameters_.reference());
+      modulus = std::max(modulus, carrying_modulus(d.body, d.simulation, own, [this] { return interrupted(); }));
     }
-    if (!recordings_.any_sags()) return;
+    if (modulus == 0.0) return;
     carrying_modulus_ = modulus;
     VectorX theta = parameters_.reference();
-    set_all_moduli(theta, margin * modulus);
+    set_all_moduli(theta, modulus);
     set_reference(theta);
   }
 
@@ -329,7 +314,7 @@ class Fit {
     const VectorX theta = parameters_.reference();
     const double g = std::max(theta::vector_at(theta, theta::gravity).norm(), 0.1);
     const double stress =
-        carrying_modulus_ > 0.0 ? carrying_modulus_ : theta[theta::density] * g * recordings_.front().size;
+        carrying_modulus_ > 0.0 ? 0.25 * carrying_modulus_ : theta[theta::density] * g * recordings_.front().size;
     const int per_decade = options_.scan_per_decade * (swings() ? 2 : 1);
     const int count = 4 * per_decade + 1;
     if (int(state_.scan.size()) != count) {

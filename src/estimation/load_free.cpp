@@ -1,8 +1,11 @@
 #include "estimation/load_free.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/error.hpp"
+#include "elasticity/corotated.hpp"
+#include "solvers/linear_solver.hpp"
 
 namespace pliant {
 
@@ -25,6 +28,28 @@ RolloutSummary sag_from_load_free(const Body& free, SimulationOptions options, c
   return simulation.run(theta, [&](int, const State& state, auto) { return sagged = state.x, true; });
 }
 
+double largest_linear_displacement(const std::shared_ptr<const Body>& body, const std::vector<int>& held,
+                                   const VectorX& theta, const Points& load) {
+  const auto elasticity = make_elasticity(body);
+  elasticity->set_parameters(theta);
+  elasticity->linearise(body->reference_positions());
+  BlockMatrix matrix(body->pattern);
+  matrix.set_zero();
+  elasticity->add_matrix(1.0, matrix);
+  Points force = load;
+  for (const int node : held) {
+    matrix.constrain(node);
+    force.row(node).setZero();
+  }
+  SolverOptions direct;
+  direct.kind = best_direct_kind();
+  const auto solver = make_linear_solver(body->pattern, direct);
+  VectorX u = VectorX::Zero(force.size());
+  if (!solver->factorise(matrix)) return body->size();
+  (void)solver->solve(flat(force), u);
+  return as_points(std::as_const(u)).rowwise().norm().maxCoeff();
+}
+
 }  // namespace
 
 Capture at_rest(const Capture& capture) {
@@ -35,6 +60,30 @@ Capture at_rest(const Capture& capture) {
   still.start_frame = 0;
   still.depth.clear(), still.clouds.clear(), still.markers.clear();
   return still;
+}
+
+double carrying_modulus(const std::shared_ptr<const Body>& body, const SimulationOptions& scene, VectorX theta,
+                        const std::function<bool()>& interrupted) {
+  constexpr double sag_of_size = 0.5;
+  constexpr int most_doublings = 24;
+  const std::vector<int> held = held_nodes(*body, scene.holds);
+  ReferenceShapeOptions options;
+  options.by_parts = false;
+  options.max_iterations = 30;
+  ReferenceShapeSolver shape(body, held, options);
+  const Points load = scan_load(*body, theta, scene.weights);
+  const int controls = body->modulus.controls;
+  const auto scale = [&](double factor) {
+    for (int k = 0; k < controls; ++k) theta[theta::modulus(k, controls, theta.size())] *= factor;
+  };
+  scale(largest_linear_displacement(body, held, theta, load) / (sag_of_size * body->size()));
+  for (int i = 0; i < most_doublings; ++i, scale(2.0)) {
+    if ((interrupted && interrupted()) || shape.find(theta, load).found) return theta[theta::youngs_modulus];
+  }
+  throw InputError({{},
+                    "no material holds up the scan of the sagging object",
+                    "its surface as it sags, held where [[fixed]] says",
+                    "check mass, gravity, [[fixed]] and the scan"});
 }
 
 LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const VectorX& theta,

@@ -23,6 +23,14 @@ struct LoadFree {
 LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const VectorX& theta,
                         const ReferenceShapeOptions& options = {});
 
+/// A Young's modulus [Pa] that holds the scan of a sagging object up: the one by which linear elasticity lets it sag by
+/// half its size, or, where that gives way, the first that does not as it is doubled again and again.
+/// @param theta  with the density, Poisson's ratio and gravity; its moduli are scaled together
+/// @param interrupted  may be empty; asked now and then
+/// Throws InputError where none is found.
+double carrying_modulus(const std::shared_ptr<const Body>& body, const SimulationOptions& scene, VectorX theta,
+                        const std::function<bool()>& interrupted);
+
 /// The capture without its motion: what hangs or stands still as it was scanned.
 Capture at_rest(const Capture& capture);
 

@@ -164,7 +164,14 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.simulation.is_static = capture.is_static;
   d.simulation.times.assign(capture.times.begin() + capture.start_frame, capture.times.end());
   const double gravity = std::max(theta::vector_at(parameters, theta::gravity).norm(), 0.1);
-  d.simulation.max_dt = default_time_step(*d.body, gravity) / resolution.steps;
+  d.simulation.max_dt = default_time_step(*d.body, gravity);
+  d.simulation.scan_sags = capture.shape_is == ShapeIs::Static && !d.body->is_free_elsewhere();
+  // What hangs and touches nothing moves smoothly; its elements are quadratic, and its steps dear.
+  const std::vector<double>& times = d.simulation.times;
+  if (d.simulation.scan_sags && capture.planes.empty() && times.size() > 1)
+    d.simulation.max_dt =
+        std::max(d.simulation.max_dt, 0.25 * (times.back() - times.front()) / double(times.size() - 1));
+  d.simulation.max_dt /= resolution.steps;
   d.simulation.planes = int(capture.planes.size());
   d.simulation.pulls = pull_count(capture, resolution);
   d.simulation.sensors = int(sensor_names(capture).size());
@@ -172,7 +179,6 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.simulation.contact = default_contact(*d.body, parameters[theta::density] * d.body->volume(), gravity);
   for (const Weight& weight : capture.weights) d.simulation.weights.push_back({weight.at, weight.mass});
   d.simulation.pull_points = pull_points(capture, d.simulation.pulls);
-  d.simulation.scan_sags = capture.shape_is == ShapeIs::Static && !d.body->is_free_elsewhere();
   d.simulation.shape = shape_field(capture, resolution);
   for (const FixedRegion& fixed : capture.fixed) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});

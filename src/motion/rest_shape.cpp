@@ -11,7 +11,8 @@ namespace pliant {
 
 namespace {
 
-constexpr int most_pins = 24;  // points that stand for what is held
+constexpr int most_iterations = 40;  // from a shape nearby; those that succeed take about ten
+constexpr int most_pins = 24;        // points that stand for what is held
 
 MatrixX covariance(const std::vector<Vector3>& a, const std::vector<Vector3>& b, const ShapeField& field) {
   MatrixX K(Eigen::Index(a.size()), Eigen::Index(b.size()));
@@ -75,6 +76,7 @@ RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& h
   if (!sags_) return;
   ReferenceShapeOptions options;
   options.by_parts = false;
+  options.max_iterations = most_iterations;
   solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, options);
   elasticity_ = make_elasticity(body_);
   terms_.push_back(std::make_unique<Gravity>(*body_));

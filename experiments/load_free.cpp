@@ -1,0 +1,240 @@
+// A bar of two stiffnesses, scanned as it sags, then struck: its load-free shape and both moduli are unknown.
+//   pliant_load_free compare CELLS NOISE
+//     both moduli from several starts, with derivatives through the equilibrium, by the splitting of Wang 2015
+//     (algorithm 1), and with the scan taken for load-free; JSON on stdout
+//   pliant_load_free landscape CELLS NOISE COUNT
+//     the cost over a grid of COUNT x COUNT moduli; null where no load-free shape holds the scan up
+// CELLS are elements along the bar, those of the truth twice as many; NOISE [m] is that of the points that are
+// followed.
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <string>
+
+#include "elasticity/modulus_field.hpp"
+#include "estimation/optimiser.hpp"
+
+namespace pliant {
+namespace {
+
+using nlohmann::json;
+
+constexpr double length = 0.4, edge = 0.03;
+constexpr double youngs_moduli[] = {2.4e6, 8e5};  // of the held half and of the free one [Pa]
+constexpr double rho = 600.0, nu = 0.35, mass_damping = 0.3, stiffness_damping = 0.003;
+constexpr double rate = 60.0;
+constexpr int frames = 46;
+const int theta_size = theta::size(0, 2);
+
+std::vector<Hold> hold() {
+  return {{[](const Vector3& p) { return p.x() < 1e-6; }}};
+}
+
+/// Straight, or with its nodes elsewhere.
+Body make_bar(int cells, const Points* nodes = nullptr) {
+  Box box;
+  box.extend(Vector3(0.0, -0.5 * edge, -0.5 * edge));
+  box.extend(Vector3(length, 0.5 * edge, 0.5 * edge));
+  TetMesh mesh = with_mid_nodes(make_tet_box(box, {cells, cells / 10 + 1, cells / 10 + 1}, false));
+  Body straight = make_body(mesh);
+  const auto field = region_field(straight, {[](const Vector3& p) { return p.x() > 0.5 * length; }}).field;
+  Body body = nodes ? make_body(make_tet_mesh(*nodes, mesh.tets, mesh.mid_nodes)) : std::move(straight);
+  body.modulus = field;
+  return body;
+}
+
+VectorX make_theta(double held, double free) {
+  VectorX theta = VectorX::Zero(theta_size);
+  theta[theta::modulus(0, 2, theta_size)] = held;
+  theta[theta::modulus(1, 2, theta_size)] = free;
+  theta[theta::poissons_ratio] = nu;
+  theta[theta::mass_damping] = mass_damping;
+  theta[theta::stiffness_damping] = stiffness_damping;
+  theta[theta::density] = rho;
+  theta.segment<3>(theta::gravity) = Vector3(0.0, 0.0, -9.81);
+  theta.segment<3>(theta::linear_velocity) = Vector3(0.0, 0.5, 0.6);
+  return theta;
+}
+
+SimulationOptions scene_of(double steps_per_frame) {
+  SimulationOptions options;
+  for (int f = 0; f < frames; ++f) options.times.push_back(f / rate);
+  options.max_dt = (1.0 + 1e-9) / (rate * steps_per_frame);
+  options.holds = hold();
+  options.newton.tolerance = 1e-10;
+  return options;
+}
+
+Points sagged(const std::shared_ptr<const Body>& body, const VectorX& theta) {
+  SimulationOptions options = scene_of(1);
+  options.is_static = true;
+  options.times = {0.0};
+  Simulation simulation(body, options);
+  Points x;
+  const RolloutSummary summary =
+      simulation.run(theta, [&](int, const State& state, auto) { return x = state.x, true; });
+  if (!summary.succeeded) throw std::runtime_error(summary.failure);
+  return x;
+}
+
+/// What was recorded, of a bar of other elements than it is fitted with; the physics are the same (an inverse crime in
+/// that).
+struct Recorded {
+  std::shared_ptr<const Body> scanned;
+  Points straight;  // nodes of the scanned body, free of load
+  std::shared_ptr<std::vector<FrameObservations>> seen = std::make_shared<std::vector<FrameObservations>>();
+  std::vector<Vector3> followed;  // in the scan
+  double sag = 0.0;               // greatest [m]
+};
+
+Recorded record(int cells, double noise) {
+  const VectorX theta = make_theta(youngs_moduli[0], youngs_moduli[1]);
+  const auto fine = std::make_shared<Body>(make_bar(2 * cells));
+  const Points x = sagged(fine, theta);
+  Recorded recorded;
+  recorded.straight = make_bar(cells).nodes;
+  const auto at = [&](const Points& points) {
+    std::vector<Vector3> list;
+    for (Eigen::Index n = 0; n < points.rows(); ++n) list.push_back(points.row(n).transpose());
+    return Embedding(*fine, list);
+  };
+  const Points scan = at(recorded.straight).positions(x);
+  recorded.sag = (scan - recorded.straight).rowwise().norm().maxCoeff();
+  recorded.scanned = std::make_shared<Body>(make_bar(cells, &scan));
+  Points points(20, 3);
+  for (int i = 0; i < 20; ++i)
+    points.row(i) << length * (i / 4 + 1) / 5.0, (i % 2 ? 0.5 : -0.5) * edge, (i % 4 < 2 ? 0.5 : -0.5) * edge;
+  const Embedding followed = at(points);
+  const Points there = followed.positions(x);
+  for (Eigen::Index i = 0; i < there.rows(); ++i) recorded.followed.push_back(there.row(i).transpose());
+  // The bar is struck where it sags: its state at the start is that of the scan, not that free of load.
+  const auto fine_scanned = std::make_shared<Body>(make_bar(2 * cells, &x));
+  Body moving = with_reference(*fine_scanned, fine->nodes);
+  moving.mass = fine->mass;
+  Simulation simulation(std::make_shared<Body>(std::move(moving)), scene_of(8));
+  std::mt19937 random(11);
+  std::normal_distribution<double> error(0.0, noise);
+  const RolloutSummary summary = simulation.run(theta, [&](int frame, const State& state, auto) {
+    FrameObservations seen{frame};
+    const Points p = followed.positions(state.x);
+    for (int i = 0; i < int(p.rows()); ++i)
+      seen.tracks.push_back(
+          {i, p.row(i).transpose() + Vector3(error(random), error(random), error(random)), std::max(noise, 1e-5)});
+    if (frame > 0) recorded.seen->push_back(std::move(seen));
+    return true;
+  });
+  if (!summary.succeeded) throw std::runtime_error(summary.failure);
+  return recorded;
+}
+
+ParameterSet parameters_from(double held, double free) {
+  std::vector<Parameter> list;
+  for (int k = 0; k < 2; ++k)
+    list.push_back(
+        {k == 0 ? "held" : "free", "Pa", Transform::Logarithm, theta::modulus(k, 2, theta_size), 1.0, 1e3, 1e10, true});
+  return {std::move(list), make_theta(held, free)};
+}
+
+Objective objective_of(const Recorded& recorded, const ParameterSet& parameters, bool scan_sags) {
+  SimulationOptions options = scene_of(4);
+  options.scan_sags = scan_sags;
+  Mismatch mismatch;
+  mismatch.tracks = std::make_shared<PointTracks>(*recorded.scanned, recorded.followed);
+  ObjectiveOptions compare;
+  compare.outlier_scale = 0.5 * length;
+  compare.last_frame = frames - 1;
+  return {mismatch, recorded.scanned, options, recorded.seen, parameters, compare};
+}
+
+json compare(const Recorded& recorded) {
+  json runs = json::array();
+  const std::pair<double, double> starts[] = {{2.0, 0.5}, {0.7, 2.0}, {3.0, 3.0}, {1.0, 4.0}};
+  for (const auto& [held, free] : starts)
+    for (const std::string scheme : {"together", "in turns", "scan taken for load-free"}) {
+      const ParameterSet parameters = parameters_from(held * youngs_moduli[0], free * youngs_moduli[1]);
+      Objective objective = objective_of(recorded, parameters, scheme.front() != 's');
+      OptimiserOptions options;
+      options.max_iterations = 60;
+      options.step_tolerance = 1e-4;
+      options.cost_tolerance = 1e-6;
+      const OptimiserState start{0, parameters.to_unconstrained(parameters.reference()), {}};
+      const auto begin = std::chrono::steady_clock::now();
+      const OptimiserSummary s =
+          scheme == "in turns" ? minimise_in_turns(objective, start, options) : minimise(objective, start, options);
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      const VectorX theta = parameters.to_theta(s.p);
+      json run = {{"scheme", scheme},
+                  {"start", {held, free}},
+                  {"succeeded", s.succeeded},
+                  {"converged", s.converged},
+                  {"reason", s.reason},
+                  {"iterations", s.iterations},
+                  {"evaluations", s.evaluations},
+                  {"seconds", seconds}};
+      if (s.succeeded) {
+        run["cost"] = s.evaluation.cost;
+        run["errors"] = {theta[theta::modulus(0, 2, theta_size)] / youngs_moduli[0] - 1.0,
+                         theta[theta::modulus(1, 2, theta_size)] / youngs_moduli[1] - 1.0};
+        if (scheme.front() != 's') {
+          SimulationOptions own = scene_of(4);
+          own.scan_sags = true;
+          const Points X = Simulation(recorded.scanned, own).rest_body(theta)->nodes;
+          run["shape_error"] = (X - recorded.straight).rowwise().norm().maxCoeff() / length;
+        }
+      }
+      runs.push_back(run);
+      std::fprintf(stderr, "%s\n", run.dump().c_str());
+    }
+  return runs;
+}
+
+json landscape(const Recorded& recorded, int count) {
+  json rows = json::array();
+  for (int i = 0; i < count; ++i) {
+    json row = json::array();
+    for (int j = count - 1; j >= 0; --j) {  // from stiff to soft: what fails is beyond what holds
+      const auto modulus = [&](int k) { return 1e5 * std::pow(1e3, double(k) / (count - 1)); };
+      const ParameterSet parameters = parameters_from(modulus(i), modulus(j));
+      Objective objective = objective_of(recorded, parameters, true);
+      const CostEvaluation e = objective.evaluate(parameters.to_unconstrained(parameters.reference()));
+      row.push_back({{"held", modulus(i)}, {"free", modulus(j)}, {"cost", e.succeeded ? json(e.cost) : json()}});
+    }
+    rows.push_back(row);
+    std::fprintf(stderr, "row %d of %d\n", i + 1, count);
+  }
+  return rows;
+}
+
+int run(int argc, char** argv) {
+  if (argc < 4) {
+    std::fprintf(stderr, "usage: pliant_load_free compare|landscape CELLS NOISE [COUNT]\n");
+    return 2;
+  }
+  const Recorded recorded = record(std::atoi(argv[2]), std::atof(argv[3]));
+  json report = {{"nodes", recorded.scanned->node_count()},
+                 {"elements", recorded.scanned->element_count()},
+                 {"sag", recorded.sag},
+                 {"length", length},
+                 {"truth", youngs_moduli},
+                 {"noise", std::atof(argv[3])}};
+  if (std::string(argv[1]) == "compare")
+    report["runs"] = compare(recorded);
+  else
+    report["landscape"] = landscape(recorded, argc > 4 ? std::atoi(argv[4]) : 13);
+  std::cout << report.dump(1) << "\n";
+  return 0;
+}
+
+}  // namespace
+}  // namespace pliant
+
+int main(int argc, char** argv) try { return pliant::run(argc, argv); } catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 2;
+}
