@@ -14,6 +14,7 @@ namespace pliant {
 namespace {
 
 constexpr double first_step = 10.0;  // of pseudo-time: ten elevenths of Newton's
+constexpr double next_step = 1e3;    // where the shape under most of the load is known
 constexpr double least_step = 1e-4;
 constexpr double fastest_growth =
     8.0;                           // of steps that go well, in one iteration; those that go better grow with r's fall
@@ -106,7 +107,7 @@ Points ReferenceShapeSolver::moved(const Points& X, const Points& step) {
   return out;
 }
 
-auto ReferenceShapeSolver::attempt(const Points& load, const Points& from) -> Attempt {
+auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, double pseudo_step) -> Attempt {
   Attempt a;
   a.X = from;
   Points free_load = load;
@@ -117,7 +118,7 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from) -> At
   double r = residual_.norm();
   const bool is_newton = options_.scheme == ReferenceScheme::Newton,
              is_virtual = options_.scheme == ReferenceScheme::VirtualForce;
-  double step = is_newton ? std::numeric_limits<double>::infinity() : is_virtual ? options_.virtual_step : first_step;
+  double step = is_newton ? std::numeric_limits<double>::infinity() : is_virtual ? options_.virtual_step : pseudo_step;
   Points velocity = Points::Zero(load.rows(), 3);
   const int blocks = body_->pattern->block_count();
   const bool is_part = options_.by_parts && !is_newton && !is_virtual;
@@ -201,8 +202,8 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
     shape.X = a.X, shape.residual = a.residual, shape.least_volume_ratio = a.least_volume_ratio;
     shape.carried = share;
   };
-  const auto try_share = [&](double share, const Points& from) {
-    Attempt a = attempt(share * load, from);
+  const auto try_share = [&](double share, const Points& from, double pseudo_step = first_step) {
+    Attempt a = attempt(share * load, from, pseudo_step);
     shape.iterations += a.iterations;
     if (a.converged && !holds_still(theta, a.X)) {
       a.converged = false, a.gives_way = true;
@@ -226,7 +227,7 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
   if (whole.gives_way) stride = below_limit();
   while (stride >= least()) {
     const double share = std::min(1.0, done + stride);
-    const Attempt part = try_share(share, from);
+    const Attempt part = try_share(share, from, share < 2.0 * done ? next_step : first_step);
     if (part.converged) {
       if (share >= limit) limit = std::numeric_limits<double>::infinity(), stride *= 2.0;
       done = share;

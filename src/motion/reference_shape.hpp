@@ -78,7 +78,7 @@ class ReferenceShapeSolver {
     double residual = 0.0, least_volume_ratio = 1.0;
     int iterations = 0;
   };
-  Attempt attempt(const Points& load, const Points& from);
+  Attempt attempt(const Points& load, const Points& from, double pseudo_step);
   /// residual_ = f(X, scan) + load at free nodes; false where an element is inside out.
   bool set_residual(const Points& X, const Points& load);
   /// X moved by a step whose parts turn; out of the way of folding, no part by more than a radian.
