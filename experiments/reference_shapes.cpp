@@ -29,6 +29,7 @@
 #include "geometry/tet_mesh.hpp"
 #include "held_objects.hpp"
 #include "motion/reference_shape.hpp"
+#include "motion/simulation.hpp"
 #include "report/picture.hpp"
 
 namespace pliant {

@@ -6,6 +6,7 @@
 #include <benchmark/benchmark.h>
 
 #include "motion/reference_shape.hpp"
+#include "motion/simulation.hpp"
 
 namespace pliant {
 namespace {
