@@ -14,12 +14,14 @@ namespace pliant {
 namespace {
 
 constexpr double first_step = 10.0;  // of pseudo-time: ten elevenths of Newton's
+constexpr double next_step = 1e3;    // where the shape under most of the load is known
 constexpr double least_step = 1e-4;
 constexpr double fastest_growth =
     8.0;                           // of steps that go well, in one iteration; those that go better grow with r's fall
 constexpr double most_left = 4.0;  // of what was left to do, after one step
 constexpr double rounding = 1e-6;  // of the load: below, iterations that gain nothing have met rounding
-constexpr double least_share = 1e-4, least_stride = 1.0 / 32.0;  // of the load, and of what is carried already
+constexpr double least_share = 1e-4, least_stride = 1.0 / 40.0;  // of the load, and of what is carried already
+constexpr int most_steps = 30;  // of pseudo-time: a load that they do not balance is better taken part by part
 
 std::string percent(double share) {
   char text[32];
@@ -105,7 +107,7 @@ Points ReferenceShapeSolver::moved(const Points& X, const Points& step) {
   return out;
 }
 
-auto ReferenceShapeSolver::attempt(const Points& load, const Points& from) -> Attempt {
+auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, double pseudo_step) -> Attempt {
   Attempt a;
   a.X = from;
   Points free_load = load;
@@ -116,14 +118,16 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from) -> At
   double r = residual_.norm();
   const bool is_newton = options_.scheme == ReferenceScheme::Newton,
              is_virtual = options_.scheme == ReferenceScheme::VirtualForce;
-  double step = is_newton ? std::numeric_limits<double>::infinity() : is_virtual ? options_.virtual_step : first_step;
+  double step = is_newton ? std::numeric_limits<double>::infinity() : is_virtual ? options_.virtual_step : pseudo_step;
   Points velocity = Points::Zero(load.rows(), 3);
   const int blocks = body_->pattern->block_count();
+  const bool is_part = options_.by_parts && !is_newton && !is_virtual;
+  const int most = is_part ? std::min(options_.max_iterations, most_steps) : options_.max_iterations;
   for (;; ++a.iterations) {
     a.residual = r / scale;
     a.least_volume_ratio = forces_->least_volume_ratio();
     if (a.residual <= options_.tolerance) return a.converged = true, a;
-    if (a.iterations == options_.max_iterations) return a.reason = "too many iterations", a;
+    if (a.iterations == most) return a.reason = "too many iterations", a;
     set_turns();
     set_jacobian();
     const Points back = turned_back(residual_);
@@ -198,11 +202,11 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
     shape.X = a.X, shape.residual = a.residual, shape.least_volume_ratio = a.least_volume_ratio;
     shape.carried = share;
   };
-  const auto try_share = [&](double share, const Points& from) {
-    Attempt a = attempt(share * load, from);
+  const auto try_share = [&](double share, const Points& from, double pseudo_step = first_step) {
+    Attempt a = attempt(share * load, from, pseudo_step);
     shape.iterations += a.iterations;
     if (a.converged && !holds_still(theta, a.X)) {
-      a.converged = false;
+      a.converged = false, a.gives_way = true;
       a.reason = "the shape that balances the load gives way under it";
     }
     return a;
@@ -213,24 +217,33 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
   shape.found = whole.converged;
   if (shape.found || !options_.by_parts || options_.scheme != ReferenceScheme::PseudoTransient)
     return shape.reason = whole.reason, shape;
-  // Part by part, from what the part before gave.
+  // Part by part, from what the part before gave. Where forces find no balance a shorter stride may help. Where they do
+  // but the shape gives way, only less load helps: that limit is closed in on, and tried once more from nearby.
   shape.reason = whole.reason;
   Points from = scan;
-  for (double done = 0.0, stride = 0.5; stride >= std::max(least_share, least_stride * done);) {
+  double done = 0.0, limit = whole.gives_way ? 1.0 : std::numeric_limits<double>::infinity(), stride = 0.5;
+  const auto least = [&] { return std::max(least_share, least_stride * done); };
+  const auto below_limit = [&] { return done > 0.0 ? 0.5 * (limit - done) : 0.25 * limit; };
+  if (whole.gives_way) stride = below_limit();
+  while (stride >= least()) {
     const double share = std::min(1.0, done + stride);
-    const Attempt part = try_share(share, from);
-    if (!part.converged) {
-      shape.reason = part.reason;
-      stride *= 0.5;
+    const Attempt part = try_share(share, from, share < 2.0 * done ? next_step : first_step);
+    if (part.converged) {
+      if (share >= limit) limit = std::numeric_limits<double>::infinity(), stride *= 2.0;
+      done = share;
+      from = part.X;
+      take(part, done);
+      if (done == 1.0) {
+        shape.found = true;
+        shape.reason.clear();
+        return shape;
+      }
+      if (std::isfinite(limit)) stride = limit - done > 2.0 * least() ? below_limit() : std::max(limit - done, least());
       continue;
     }
-    done = share;
-    from = part.X;
-    take(part, done);
-    if (done < 1.0) continue;
-    shape.found = true;
-    shape.reason.clear();
-    return shape;
+    shape.reason = part.reason;
+    if (part.gives_way) limit = std::min(limit, share);
+    stride = part.gives_way ? below_limit() : 0.5 * (share - done);
   }
   shape.reason = "this material carries " + percent(shape.carried) + " of the load: " + shape.reason;
   return shape;

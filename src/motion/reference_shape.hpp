@@ -22,7 +22,7 @@ enum class ReferenceScheme {
 struct ReferenceShapeOptions {
   ReferenceScheme scheme = ReferenceScheme::PseudoTransient;
   double tolerance = 1e-10;  ///< of the residual, relative to the load, (0, 1)
-  int max_iterations = 200;  ///< >= 1
+  int max_iterations = 200;  ///< >= 1; by parts, no more than 30 for each
   /// Elements of the shape that was found keep at least this part of the volume that they have in the scan, (0, 1).
   double least_volume_ratio = 0.05;
   bool by_parts = true;  ///< where the whole load cannot be carried, look for the part that can
@@ -39,7 +39,7 @@ struct ReferenceShape {
   double least_volume_ratio = 1.0;
   int iterations = 0;
   /// The largest part of the load for which a shape was found; 1 where `found`. Forces are proportional to Young's
-  /// modulus: the smallest that carries the whole load is the given one over this.
+  /// modulus: the smallest that carries the whole load is the given one over this, to about 5 %.
   double carried = 0.0;
 };
 
@@ -72,13 +72,13 @@ class ReferenceShapeSolver {
 
  private:
   struct Attempt {
-    bool converged = false;
+    bool converged = false, gives_way = false;  // the latter: a balance, but not a stable one
     std::string reason;
     Points X;
     double residual = 0.0, least_volume_ratio = 1.0;
     int iterations = 0;
   };
-  Attempt attempt(const Points& load, const Points& from);
+  Attempt attempt(const Points& load, const Points& from, double pseudo_step);
   /// residual_ = f(X, scan) + load at free nodes; false where an element is inside out.
   bool set_residual(const Points& X, const Points& load);
   /// X moved by a step whose parts turn; out of the way of folding, no part by more than a radian.

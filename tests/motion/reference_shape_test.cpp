@@ -77,6 +77,10 @@ TEST_P(ReferenceShapes, AMaterialThatCannotCarryTheBodyIsNamed) {
   VectorX enough = soft;
   enough[theta::youngs_modulus] /= 0.9 * shape.carried;
   EXPECT_TRUE(solver.find(enough, load).found) << enough[theta::youngs_modulus];
+  VectorX little = soft;
+  little[theta::youngs_modulus] *= 0.94 / shape.carried;
+  EXPECT_FALSE(solver.find(little, load).found) << little[theta::youngs_modulus];
+  EXPECT_LT(shape.iterations, 130);  // a few for each part of the load that is tried, not many for one that is hopeless
 }
 
 TEST_P(ReferenceShapes, TangentAndAdjointAreTheDerivative) {
