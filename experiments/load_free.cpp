@@ -194,21 +194,23 @@ json compare(const Recorded& recorded) {
   return runs;
 }
 
+/// Costs by the free half's modulus, then the held one's.
 json landscape(const Recorded& recorded, int count) {
-  json rows = json::array();
-  for (int i = 0; i < count; ++i) {
-    json row = json::array();
-    for (int j = count - 1; j >= 0; --j) {  // from stiff to soft: what fails is beyond what holds
-      const auto modulus = [&](int k) { return 1e5 * std::pow(1e3, double(k) / (count - 1)); };
-      const ParameterSet parameters = parameters_from(modulus(i), modulus(j));
+  std::vector<double> moduli;
+  for (int k = 0; k < count; ++k) moduli.push_back(1e5 * std::pow(1e3, double(k) / (count - 1)));
+  std::vector<std::vector<json>> costs(moduli.size(), std::vector<json>(moduli.size()));
+  for (std::size_t held = 0; held < moduli.size(); ++held) {
+    int failed = 0;
+    for (std::size_t free = moduli.size(); free-- > 0 && failed < 2;) {  // what is softer than what gives way does too
+      const ParameterSet parameters = parameters_from(moduli[held], moduli[free]);
       Objective objective = objective_of(recorded, parameters, true);
       const CostEvaluation e = objective.evaluate(parameters.to_unconstrained(parameters.reference()));
-      row.push_back({{"held", modulus(i)}, {"free", modulus(j)}, {"cost", e.succeeded ? json(e.cost) : json()}});
+      if (e.succeeded) costs[free][held] = e.cost;
+      failed = e.succeeded ? 0 : failed + 1;
     }
-    rows.push_back(row);
-    std::fprintf(stderr, "row %d of %d\n", i + 1, count);
+    std::fprintf(stderr, "column %zu of %d\n", held + 1, count);
   }
-  return rows;
+  return {{"moduli", moduli}, {"costs", costs}, {"truth", youngs_moduli}};
 }
 
 int run(int argc, char** argv) {

@@ -199,6 +199,28 @@ TEST(LinearSolvers, AreWhatTheirNamesSay) {
   EXPECT_EQ(names.size(), 3u);
 }
 
+/// A stiff body without mass takes many iterations; a light one few.
+TEST(LinearSolvers, AutomaticFactorisesWhereIterationsCostMore) {
+  for (const bool is_hard : {false, true}) {
+    const BlockMatrix A = step_matrix(is_hard ? 1e-3 : 2000.0);
+    SolverOptions options;
+    options.tolerance = 1e-10;
+    options.max_iterations = 5000;
+    const auto solver = make_linear_solver(A.shared_pattern(), options);
+    const VectorX b = random_vector(A.rows(), 4);
+    for (int step = 0; step < 6; ++step) {
+      ASSERT_TRUE(solver->factorise(A));
+      for (unsigned side = 0; side < 4; ++side) {
+        VectorX x = VectorX::Zero(A.rows()), product;
+        EXPECT_TRUE(solver->solve(b, x).converged);
+        A.multiply(x, product);
+        EXPECT_LT((product - b).norm(), tolerance(1e-9) * b.norm());
+      }
+    }
+    EXPECT_EQ(solver->name().starts_with("conjugate"), !is_hard);
+  }
+}
+
 TEST(IncompleteCholesky, IsExactWithoutFill) {
   const BlockMatrix A = chain(12);
   IncompleteCholesky factor(A.pattern());

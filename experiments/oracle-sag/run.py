@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+"""A drooping leaf, scanned as it droops, then pulled aside and let go: a recording of another simulator (other elements, another
+material law, three depth sensors fused to clouds). Neither its load-free shape nor its material is known.
+
+Fitted with no choice of ours, with shape and material in turns (Wang 2015, algorithm 1), and as if the scan were load-free.
+truth.json and the true shapes are read for judging only. Standard library only."""
+import math
+import pathlib
+import struct
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+import common
+
+RECORDING = "oracle-sag"
+NAMES = ["youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]
+# name: (whether the scan is said to be load-free, choices)
+FITS = {
+    "together": (False, {}),
+    "finer-steps": (False, {"steps": 2}),
+    "in-turns": (False, {"load_free": "in_turns"}),
+    "scan-load-free": (True, {"element": "quadratic_tetrahedra", "steps": 0.25}),
+}
+
+
+def vertices(path):
+    """Of a PLY mesh as the recordings and models have it: x, y, z as the first properties, binary or in text."""
+    data = pathlib.Path(path).read_bytes()
+    head, body = data[:data.index(b"end_header\n")].decode().splitlines(), data[data.index(b"end_header\n") + 11:]
+    count = int(next(line for line in head if line.startswith("element vertex")).split()[2])
+    kinds = []
+    for line in head[head.index(f"element vertex {count}") + 1:]:
+        if not line.startswith("property"):
+            break
+        kinds.append(line.split()[1])
+    if head[1].split()[1] == "ascii":
+        return [tuple(map(float, line.split()[:3])) for line in body.decode().splitlines()[:count]]
+    row = struct.Struct("<" + "".join({"float": "f", "double": "d", "uchar": "B", "int": "i"}[k] for k in kinds))
+    return [row.unpack_from(body, i * row.size)[:3] for i in range(count)]
+
+
+def minus(a, b):
+    return [tuple(x - y for x, y in zip(p, q)) for p, q in zip(a, b)]
+
+
+def lengths(vectors):
+    return [math.hypot(*v) for v in vectors]
+
+
+def rms(values):
+    return math.sqrt(sum(v * v for v in values) / len(values))
+
+
+def sagged(program, fit, places):
+    """Where vertices of a fit's load-free surface come to rest under gravity: as the nearest nodes of its volume do."""
+    text = (fit / "model.toml").read_text().splitlines()
+    still = [line if not line.startswith(("frames =", "frame_rate =")) else line.split("=")[0] + "= 0" for line in text]
+    folder = fit / "at-rest"
+    folder.mkdir(exist_ok=True)
+    (folder / "model.toml").write_text("\n".join(still) + "\n")
+    for name in ("surface.ply", "model.vtu"):
+        if not (folder / name).exists():
+            (folder / name).symlink_to((fit / name).resolve())
+    common.run(program, "simulate", folder / "model.toml", "--out", folder)
+    frame = common.read_vtu(sorted((folder / "frames").glob("*.vtu"))[-1])
+    there, moved = frame["points"], frame["displacement [m]"]
+    nodes = [tuple(there[3 * n + d] - moved[3 * n + d] for d in range(3)) for n in range(len(there) // 3)]
+    out = []
+    for p in places:
+        n = min(range(len(nodes)), key=lambda k: (nodes[k][0] - p[0])**2 + (nodes[k][1] - p[1])**2 + (nodes[k][2] - p[2])**2)
+        out.append(tuple(p[d] + moved[3 * n + d] for d in range(3)))
+    return out
+
+
+def judge(program, fit, data):
+    """The load-free shape, and what it sags into, against the true ones, vertex by vertex."""
+    reference, static = vertices(data / "truth/reference.ply"), vertices(data / "truth/static.ply")
+    found = vertices(fit / "surface.ply")
+    size = max(max(p[d] for p in reference) - min(p[d] for p in reference) for d in range(3))
+    sag = lengths(minus(static, reference))
+    off = lengths(minus(found, reference))
+    rest = sagged(program, fit, found)
+    return {"size": common.number(size), "true_sag_rms": common.number(rms(sag)), "true_sag_greatest": common.number(max(sag)),
+            "load_free_rms": common.number(rms(off) / size, 3), "load_free_greatest": common.number(max(off) / size, 3),
+            "sag_error": common.number(rms(lengths(minus(minus(rest, found), minus(static, reference)))) / rms(sag), 3),
+            "static_rms": common.number(rms(lengths(minus(rest, static))) / size, 3),
+            "static_error_of_sag": common.number(rms(lengths(minus(rest, static))) / rms(sag), 3)}
+
+
+def main():
+    arguments = common.arguments(__doc__)
+    data = common.shared_data() / RECORDING
+    if not (data / "capture.toml").exists():
+        raise SystemExit(f"{data} is not there")
+    truth = common.read(data / "truth.json")["parameters"]
+    taken = arguments.work / "captures/load-free"
+    taken.mkdir(parents=True, exist_ok=True)
+    (taken / "capture.toml").write_text((data / "capture.toml").read_text().replace('shape_is = "static"', 'shape_is = "reference"'))
+    for name in ("rest.ply", "clouds"):
+        if not (taken / name).is_symlink():
+            (taken / name).symlink_to((data / name).resolve())
+    fits = {}
+    for name, (is_taken, choices) in FITS.items():
+        figures = common.fit(arguments.program, taken if is_taken else data, arguments.work / name, choices)
+        result = figures.pop("result")
+        parameters = {key: {"value": common.number(p["value"]), "std": common.number(p.get("std"), 2), "unit": p["unit"],
+                            "truth": truth.get(key, {}).get("value")}
+                      for key, p in result["parameters"].items() if key in NAMES}
+        fits[name] = {"choices": choices, "parameters": parameters, "surface_rms": common.number(result["error"]["surface_rms"], 4),
+                      "cost": common.number(result["cost"]["final"]), "forward_steps": result["time"].get("forward_steps"),
+                      "converged": figures["exit_code"] == 0, "commit": result["software"]["commit"], **figures,
+                      **judge(arguments.program, arguments.work / name, data)}
+        print(name, {key: fits[name][key] for key in ("load_free_rms", "load_free_greatest", "sag_error", "static_error_of_sag", "wall_seconds")},
+              {key: p["value"] for key, p in parameters.items()}, flush=True)
+    common.write_results(__file__, {"fits": fits})
+
+
+if __name__ == "__main__":
+    main()
