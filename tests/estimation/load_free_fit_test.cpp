@@ -56,9 +56,9 @@ struct StruckBar {
     auto frames = std::make_shared<std::vector<FrameObservations>>();
     Simulation simulation(std::make_shared<Body>(std::move(moving)), options);
     const RolloutSummary summary = simulation.run(truth, [&](int frame, const State& state, auto) {
-      FrameObservations seen{frame};
-      for (int n = 0; n < body->node_count(); ++n) seen.tracks.push_back({n, state.x.row(n).transpose(), 1e-3});
-      frames->push_back(std::move(seen));
+      FrameObservations one{frame};
+      for (int n = 0; n < body->node_count(); ++n) one.tracks.push_back({n, state.x.row(n).transpose(), 1e-3});
+      frames->push_back(std::move(one));
       return true;
     });
     EXPECT_TRUE(summary.succeeded) << summary.failure;
