@@ -72,7 +72,7 @@ class FieldChoice {
       judge(count, outcome);
     }
     const int count = best().control_points;
-    const FitState from = resumed_ == count ? left_ : *choice_.state;
+    const FitState from = resumed_ == count ? left_ : *choice_.state;  // the former where this one was interrupted
     choice_.under_way = count;
     return told(fit_once(count, from, options_.refine, done_before(int(choice_.tried.size())), 1.0, true));
   }
@@ -91,7 +91,10 @@ class FieldChoice {
 
   /// Nothing where one step promises too little.
   std::optional<FitState> beginning_of(int count) {
-    if (count == 1 || resumed_ == count) return left_;
+    if (count == 1 || resumed_ == count) {
+      resumed_ = 0;
+      return left_;
+    }
     TriedField promised{count, false, std::numeric_limits<double>::infinity(), impossible};
     FitState begin;
     try {
@@ -247,9 +250,9 @@ class FieldChoice {
   FitOptions options_;
   FitMonitor monitor_;
   FitState::FieldChoice choice_;
-  FitState left_;                                                 // by an interruption
-  FitState reached_;                                              // by the fit that runs
-  int resumed_ = 0;                                               // control points of the fit that was interrupted
+  FitState left_;     // by an interruption
+  FitState reached_;  // by the fit that runs
+  int resumed_ = 0;   // control points of the fit that was interrupted, until it goes on
   std::vector<std::pair<int, std::vector<FitEvent>>> histories_;  // by number of control points
   long long forward_steps_ = 0;
 };
