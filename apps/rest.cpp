@@ -85,6 +85,8 @@ nlohmann::json facts_of(const LoadFree& found, double modulus, double size, doub
 
 int run(const Arguments& arguments) {
   const FitOptions options = read_options(arguments);
+  if (options.control_points == FitOptions::automatic)
+    throw InputError({{}, "control_points is auto", "a number: nothing here tells how many the object needs", ""});
   const Capture capture = at_rest(read_capture(arguments.capture));
   if (!capture.surface) throw InputError({{capture.file}, "there is no scan ([object] surface)", "", ""});
   const double size = object_size(capture);

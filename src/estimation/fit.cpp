@@ -14,6 +14,8 @@
 
 #include "base/error.hpp"
 #include "estimation/corrections.hpp"
+#include "estimation/field_choice.hpp"
+#include "estimation/field_evidence.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/modal_start.hpp"
 #include "estimation/notes.hpp"
@@ -266,7 +268,7 @@ class Fit {
       if (held.size() < 3) continue;
       VectorX theta = parameters_.reference();
       const auto say = [&](const char* what, double modulus) {
-        outcome_.notes.push_back(std::string(what) + text_of(modulus) + " Pa; the fit started there.");
+        state_.notes.push_back(std::string(what) + text_of(modulus) + " Pa; the fit started there.");
       };
       if (!r.tracked.rest.empty()) {
         ModalStartOptions o;
@@ -461,11 +463,11 @@ class Fit {
   void estimate() {
     const auto [start, index] = best_start();
     const bool was_interrupted = outcome_.interrupted;
+    use_corrections();
     ParameterSet parameters = parameters_;
     OptimiserSummary s;
     int counter = 0;
     FitState::Fine now = state_.fine ? *state_.fine : FitState::Fine{0, pulled_on(fine_, start), {}};
-    use_corrections();
     std::vector<Stage> stages = fine_stages();
     for (; now.stage < int(stages.size()) && state_.refined.empty(); ++now.stage, now.optimiser = {}) {
       const Stage& stage = stages[std::size_t(now.stage)];
@@ -493,8 +495,9 @@ class Fit {
       stages = fine_stages();
     }
     parameters.set_reference(now.reference);
-    say_corrections(s);
-    if (options_.refine > 1 && !outcome_.interrupted && (s.succeeded || !state_.refined.empty()))
+    if (s.succeeded || !state_.refined.empty())
+      say_corrections(state_.refined.empty() ? s.evaluation.cost : state_.refined.front().cost);
+    if (!state_.refined.empty() || (options_.refine > 1 && !outcome_.interrupted && s.succeeded))
       repeat_finer(parameters, s, int(stages.size()), index, counter);
     finish(parameters, s);
   }
@@ -524,15 +527,14 @@ class Fit {
     for (const std::string& name : state_.corrected->parameters) parameters_.set_estimated(name, true);
   }
 
-  void say_corrections(const OptimiserSummary& s) {
-    if (!state_.corrected || state_.corrected->parameters.empty() || !s.succeeded) return;
+  void say_corrections(double cost) {
+    if (!state_.corrected || state_.corrected->parameters.empty()) return;
     const FitState::Corrected& c = *state_.corrected;
     outcome_.notes.push_back("The residuals showed that " + c.what +
                              " needed correction, which was estimated along with the "
                              "material: the cost fell from " +
-                             text_of(c.cost) + " to " + text_of(s.evaluation.cost) +
-                             ". Without it Young's modulus was " + text_of(c.youngs_modulus) +
-                             " Pa; correct = false leaves it so.");
+                             text_of(c.cost) + " to " + text_of(cost) + ". Without it Young's modulus was " +
+                             text_of(c.youngs_modulus) + " Pa; correct = false leaves it so.");
   }
 
   RefinedEstimate as_estimate(const Grid& grid, const VectorX& theta, const OptimiserSummary& s) const {
@@ -583,11 +585,13 @@ class Fit {
       save_state();
       if (spacing.steps == options_.steps) fine_ = std::move(grid), s = std::move(repeated);
     }
-    outcome_.refinement = extrapolate(done, parameters_);
-    const RefinedEstimate& finest = done[std::size_t(outcome_.refinement.finest)];
+    const Refinement refinement = extrapolate(done, parameters_);
+    if (options_.refine > 1) outcome_.refinement = refinement;
+    const RefinedEstimate& finest = done[std::size_t(refinement.finest)];
     parameters.set_reference(finest.theta);
     if (s.succeeded && fine_.cells == finest.cells) return;
-    fine_ = recordings_.grid(finest.cells, finest.steps);  // done before an interruption
+    if (fine_.cells != finest.cells || fine_.steps != finest.steps)
+      fine_ = recordings_.grid(finest.cells, finest.steps);  // done before an interruption
     s = {};
     s.succeeded = true, s.converged = finest.converged, s.reason = finest.reason, s.evaluation.cost = finest.cost;
   }
@@ -607,7 +611,7 @@ class Fit {
     outcome_.converged = s.converged && !outcome_.interrupted;
     outcome_.reason = outcome_.interrupted ? "interrupted" : s.reason;
     outcome_.theta = parameters.reference();
-    outcome_.parameters = parameters;
+    outcome_.parameters = recordings_.with_field_prior(parameters, fine_);
     outcome_.final_cost = s.evaluation.cost;
     outcome_.start_cost = start_cost_on_fine();
     if (s.succeeded && s.evaluation.gauss_newton.size() == 0 && parameters.dimension() > 0) {
@@ -630,6 +634,7 @@ class Fit {
     if (outcome_.evaluation.succeeded && !outcome_.interrupted) time_steps(parameters);
     std::vector<const Capture*> captures;
     for (const Recording& r : recordings_.all()) captures.push_back(&r.capture);
+    outcome_.notes.insert(outcome_.notes.end(), state_.notes.begin(), state_.notes.end());
     add_notes(outcome_, captures);
   }
 
@@ -674,18 +679,7 @@ MatrixX parameter_covariance(const CostEvaluation& evaluation) {
   const MatrixX& H = evaluation.gauss_newton;
   const Eigen::Index n = H.rows();
   const MatrixX inverse = H.ldlt().solve(MatrixX::Identity(n, n));
-  const auto& frames = evaluation.frames;
-  const int count = int(frames.size());
-  const int lags = std::min(count - 1, int(std::ceil(std::sqrt(double(count)))));
-  MatrixX scatter = MatrixX::Zero(n, n);
-  for (int lag = 0; lag <= lags; ++lag) {
-    const double weight = lag == 0 ? 1.0 : 1.0 - double(lag) / (lags + 1);
-    for (int f = lag; f < count; ++f) {
-      const MatrixX outer = frames[f].gradient * frames[f - lag].gradient.transpose();
-      scatter += weight * (lag == 0 ? outer : MatrixX(outer + outer.transpose()));
-    }
-  }
-  MatrixX sandwich = inverse * scatter * inverse;
+  MatrixX sandwich = inverse * gradient_scatter(evaluation) * inverse;
   // Fewer frames than parameters, or gradients that cancel by chance, must not make the estimate look sure.
   for (Eigen::Index i = 0; i < n; ++i) sandwich(i, i) = std::max(sandwich(i, i), 0.0);
   return sandwich + inverse;
@@ -696,6 +690,8 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
   if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
+  if (options.control_points == FitOptions::automatic)
+    return fit_with_chosen_field(recordings, options, monitor, std::move(resume));
   return Fit(std::move(recordings), options, monitor, std::move(resume)).run();
 }
 
@@ -703,6 +699,7 @@ FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOp
                  const FitMonitor& monitor) {
   FitOptions fixed = options;
   fixed.cells = fitted.cells, fixed.refine = 1;
+  fixed.control_points = fitted.recordings.front().discretisation.body->modulus.controls;
   for (const Parameter& p : fitted.parameters.parameters()) {
     if (!is_material(p)) continue;
     FitOptions::Override& change = fixed.parameters[p.name];

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,7 +40,12 @@ struct FitOptions {
   LoadFreeScheme load_free = LoadFreeScheme::Together;
   int scan_points = 0;     ///< about which the scan may err, 0..50; 0: it is exact
   double scan_std = 0.01;  ///< by how much, times the object's size, (0, 0.2]
-  int control_points = 1;  ///< of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous
+  /// Of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous; `automatic`: as many as the
+  /// recordings support.
+  int control_points = 1;
+  static constexpr int automatic = 0;
+  /// Prior deviation of ln E between two points of the object as far apart as it is long, (0, 10]; control points only.
+  double modulus_variation = 1.5;
   FieldOptions::Weights control_weights = FieldOptions::Weights::Linear;
   OptimiserKind optimiser = OptimiserKind::LevenbergMarquardt;
   SolverKind solver = SolverKind::Automatic;
@@ -79,6 +85,14 @@ struct FitStart {
   std::string reason;
 };
 
+/// What a number of control points is worth: see `fit_with_chosen_field`.
+struct TriedField {
+  int control_points = 1;
+  bool estimated = false;         ///< false: its evidence is what one step of Gauss and Newton promised
+  double cost = 0.0;              ///< of the estimate; infinite where there is none
+  double log_bayes_factor = 0.0;  ///< against the best before; infinitely low where it cannot be simulated
+};
+
 /// Where a fit stands, to go on after an interruption.
 struct FitState {
   /// Young's modulus and cost; infinite where it cannot be simulated. One alone: that of the swing that was seen.
@@ -100,6 +114,15 @@ struct FitState {
   };
   std::optional<Corrected> corrected;
   std::vector<RefinedEstimate> refined;  ///< repetitions that are done, after the first estimate
+  std::vector<std::string> notes;        ///< on how the fit began
+  /// Where the number of control points is chosen: all above is the fit with one of them.
+  struct FieldChoice {
+    std::vector<TriedField> tried;          ///< that are done
+    int best = 0;                           ///< of those tried
+    std::shared_ptr<const FitState> state;  ///< of the best one's fit, with its estimate in `refined`
+    int under_way = 0;                      ///< control points of the fit that was under way; 0: none
+  };
+  std::optional<FieldChoice> field;
 };
 
 /// A recording, and what its sensors saw.
@@ -130,6 +153,7 @@ struct FitOutcome {
   std::vector<FitEvent> history;
   bool converged = false, interrupted = false;
   std::string reason;
+  std::vector<TriedField> fields;  ///< where the number of control points was chosen: those tried, in their order
   std::vector<std::string> notes;  ///< plain sentences
   long long forward_steps = 0;
   double ms_per_forward_step = 0.0, ms_per_adjoint_step = 0.0;  ///< at the solution, measured by one rollout of each

@@ -119,6 +119,22 @@ Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*membe
           }};
 }
 
+Entry control_points_entry() {
+  Entry entry = integer_entry("control_points", "1..500, or auto: as many as the recordings support",
+                              "of Young's modulus over the object, where the capture names no regions",
+                              &FitOptions::control_points);
+  entry.key.type = "whole number or auto";
+  entry.write = [](const FitOptions& o) {
+    return o.control_points == FitOptions::automatic ? "\"auto\"" : std::to_string(o.control_points);
+  };
+  entry.read = [count = entry.read](FitOptions& o, const std::string& text) -> std::optional<std::string> {
+    if (text == "auto") return o.control_points = FitOptions::automatic, std::nullopt;
+    if (!number(text) || count(o, text) || o.control_points == 0) return "a whole number from 1, or auto";
+    return std::nullopt;
+  };
+  return entry;
+}
+
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = {
       real_entry("cells", "", "4..64", "elements along the object's longest axis; more is finer and slower",
@@ -154,9 +170,10 @@ const std::vector<Entry>& entries() {
                    &FitOptions::integrator),
       integer_entry("pull_points", "1..50", "about which a released object is pulled until it is let go",
                     &FitOptions::pull_points),
-      integer_entry("control_points", "1..500",
-                    "of Young's modulus over the object, where the capture names no regions",
-                    &FitOptions::control_points),
+      control_points_entry(),
+      real_entry("modulus_variation", "", "0..10",
+                 "prior deviation of ln E over the object's length, where there are control points",
+                 &FitOptions::modulus_variation),
       choice_entry("control_weights", "how moduli spread between control points", control_weights,
                    &FitOptions::control_weights),
       choice_entry("optimiser", "how the cost is minimised", optimisers, &FitOptions::optimiser),
@@ -380,7 +397,12 @@ std::string FitOptions::validate() const {
   if (scan_points > 0 && load_free == LoadFreeScheme::InTurns)
     return "load_free=in_turns holds the shape while it moves parameters: it cannot correct the scan (scan_points)";
   if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
-  if (control_points < 1 || control_points > 500) return "control_points must lie in 1..500";
+  if (control_points != automatic && (control_points < 1 || control_points > 500))
+    return "control_points must lie in 1..500, or be auto";
+  if (!(modulus_variation > 0.0 && modulus_variation <= 10.0)) return "modulus_variation must lie in (0, 10]";
+  if (const auto modulus = parameters.find("youngs_modulus");
+      control_points == automatic && modulus != parameters.end() && modulus->second.estimated == false)
+    return "control_points = auto asks how Young's modulus varies, youngs_modulus.estimate = false keeps it as it is";
   if (refine < 1 || refine > 3) return "refine must lie in 1..3";
   if (const double finest = cells * std::pow(Refinement::mesh_ratio, refine - 1); finest > 64.0)
     return "refine takes " + text_of(cells) + " cells to " + text_of(finest) + ", more than 64: begin with fewer";

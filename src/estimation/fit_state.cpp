@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/4";
+constexpr const char* format = "fit-state/5";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -24,10 +24,33 @@ double to_cost(const Json& json) {
 }
 Json from_cost(double cost) { return std::isfinite(cost) ? Json(cost) : Json(); }
 
-}  // namespace
+Json to_json(const FitState& state);
+FitState to_state(const Json& json);
 
-void write_fit_state(const std::filesystem::path& path, const FitState& state, const std::string& key) {
-  Json json = {{"format", format}, {"key", key}, {"scan", Json::array()}, {"starts", Json::array()}};
+Json from_field(const FitState::FieldChoice& field) {
+  Json json = {{"tried", Json::array()}, {"best", field.best}, {"under_way", field.under_way}};
+  for (const TriedField& t : field.tried)
+    json["tried"].push_back({{"control_points", t.control_points},
+                             {"estimated", t.estimated},
+                             {"cost", from_cost(t.cost)},
+                             {"against", from_cost(-t.log_bayes_factor)}});
+  if (field.state) json["state"] = to_json(*field.state);
+  return json;
+}
+
+FitState::FieldChoice to_field(const Json& json) {
+  FitState::FieldChoice field;
+  field.best = json.at("best").get<int>();
+  field.under_way = json.at("under_way").get<int>();
+  for (const Json& t : json.at("tried"))
+    field.tried.push_back({t.at("control_points").get<int>(), t.at("estimated").get<bool>(), to_cost(t.at("cost")),
+                           -to_cost(t.at("against"))});
+  if (json.contains("state")) field.state = std::make_shared<FitState>(to_state(json["state"]));
+  return field;
+}
+
+Json to_json(const FitState& state) {
+  Json json = {{"scan", Json::array()}, {"starts", Json::array()}, {"notes", state.notes}};
   for (const auto& [modulus, cost] : state.scan) json["scan"].push_back({modulus, from_cost(cost)});
   for (const FitStart& s : state.starts)
     json["starts"].push_back({{"start", from_vector(s.start)},
@@ -58,11 +81,48 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
                                {"cost", from_cost(e.cost)},
                                {"converged", e.converged},
                                {"reason", e.reason}});
+  if (state.field) json["field"] = from_field(*state.field);
+  return json;
+}
+
+FitState to_state(const Json& json) {
+  FitState state;
+  for (const Json& entry : json.at("scan")) state.scan.emplace_back(entry.at(0).get<double>(), to_cost(entry.at(1)));
+  for (const Json& s : json.at("starts"))
+    state.starts.push_back({to_vector(s.at("start")), to_vector(s.at("final")), to_cost(s.at("start_cost")),
+                            to_cost(s.at("cost")), s.at("iterations").get<int>(), s.at("converged").get<bool>(),
+                            s.at("reason").get<std::string>()});
+  if (json.contains("motion")) state.motion = to_vector(json["motion"]);
+  if (json.contains("fine")) {
+    const Json& fine = json["fine"];
+    state.fine = {fine.at("stage").get<int>(),
+                  to_vector(fine.at("reference")),
+                  {fine.at("iterations").get<int>(), to_vector(fine.at("p")), to_vector(fine.at("memory"))}};
+  }
+  if (json.contains("corrected")) {
+    const Json& c = json["corrected"];
+    state.corrected = {c.at("parameters").get<std::vector<std::string>>(), c.at("what").get<std::string>(),
+                       to_cost(c.at("cost")), c.at("youngs_modulus").get<double>()};
+  }
+  for (const Json& e : json.at("refined"))
+    state.refined.push_back({e.at("cells").get<double>(), e.at("steps").get<double>(), e.at("elements").get<int>(),
+                             to_vector(e.at("theta")), to_cost(e.at("cost")), e.at("converged").get<bool>(),
+                             e.at("reason").get<std::string>()});
+  state.notes = json.at("notes").get<std::vector<std::string>>();
+  if (json.contains("field")) state.field = to_field(json["field"]);
+  return state;
+}
+
+}  // namespace
+
+void write_fit_state(const std::filesystem::path& path, const FitState& state, const std::string& key) {
+  Json json = to_json(state);
+  json["format"] = format;
+  json["key"] = key;
   write_file(path, json.dump(1));
 }
 
 FitState read_fit_state(const std::filesystem::path& path, const std::string& key) {
-  FitState state;
   try {
     const Json json = Json::parse(read_file(path));
     if (json.at("format") != format) throw std::runtime_error("another format");
@@ -71,27 +131,7 @@ FitState read_fit_state(const std::filesystem::path& path, const std::string& ke
                         "the interrupted fit was of another capture or with other choices",
                         "the same ones",
                         "leave out --resume to start anew, or give the same capture and options"});
-    for (const Json& entry : json.at("scan")) state.scan.emplace_back(entry.at(0).get<double>(), to_cost(entry.at(1)));
-    for (const Json& s : json.at("starts"))
-      state.starts.push_back({to_vector(s.at("start")), to_vector(s.at("final")), to_cost(s.at("start_cost")),
-                              to_cost(s.at("cost")), s.at("iterations").get<int>(), s.at("converged").get<bool>(),
-                              s.at("reason").get<std::string>()});
-    if (json.contains("motion")) state.motion = to_vector(json["motion"]);
-    if (json.contains("fine")) {
-      const Json& fine = json["fine"];
-      state.fine = {fine.at("stage").get<int>(),
-                    to_vector(fine.at("reference")),
-                    {fine.at("iterations").get<int>(), to_vector(fine.at("p")), to_vector(fine.at("memory"))}};
-    }
-    if (json.contains("corrected")) {
-      const Json& c = json["corrected"];
-      state.corrected = {c.at("parameters").get<std::vector<std::string>>(), c.at("what").get<std::string>(),
-                         to_cost(c.at("cost")), c.at("youngs_modulus").get<double>()};
-    }
-    for (const Json& e : json.at("refined"))
-      state.refined.push_back({e.at("cells").get<double>(), e.at("steps").get<double>(), e.at("elements").get<int>(),
-                               to_vector(e.at("theta")), to_cost(e.at("cost")), e.at("converged").get<bool>(),
-                               e.at("reason").get<std::string>()});
+    return to_state(json);
   } catch (const InputError&) {
     throw;
   } catch (const std::exception& error) {
@@ -100,7 +140,6 @@ FitState read_fit_state(const std::filesystem::path& path, const std::string& ke
                       "",
                       "leave out --resume to start anew"});
   }
-  return state;
 }
 
 }  // namespace pliant

@@ -346,9 +346,9 @@ CostEvaluation Objective::sum(const VectorX& p, std::vector<CostEvaluation> part
   for (const CostEvaluation& part : parts) total.steps += part.steps;
   for (const CostEvaluation& part : parts)
     if (!part.succeeded) return total.failure = part.failure, total;
-  VectorX curvature;
+  MatrixX curvature;
   total.cost = parameters_.prior(p, &total.gradient, &curvature);
-  if (has_matrix) total.gauss_newton = curvature.asDiagonal();
+  if (has_matrix) total.gauss_newton = std::move(curvature);
   for (CostEvaluation& part : parts) {
     total.cost += part.cost;
     for (FrameFit& fit : part.frames) {

@@ -36,6 +36,17 @@ void ParameterSet::set_estimated(const std::string& name, bool estimated) {
   parameters_[std::size_t(found - parameters_.data())].estimated = estimated;
 }
 
+void ParameterSet::set_joint_prior(const std::vector<std::string>& names, MatrixX precision) {
+  joint_.clear();
+  for (const std::string& name : names) {
+    const Parameter* found = find(name);
+    if (!found || found->transform != Transform::Logarithm)
+      throw std::invalid_argument("there is no positive scalar " + name);
+    joint_.push_back(int(found - parameters_.data()));
+  }
+  joint_precision_ = std::move(precision);
+}
+
 template <class Function>
 void ParameterSet::for_each_estimated(Function&& function) const {
   int offset = 0;
@@ -194,19 +205,38 @@ VectorX ParameterSet::clamp(const VectorX& p) const {
   return out;
 }
 
-double ParameterSet::prior(const VectorX& p, VectorX* gradient, VectorX* curvature) const {
+double ParameterSet::prior(const VectorX& p, VectorX* gradient, MatrixX* curvature) const {
   double sum = 0.0;
   if (gradient) gradient->setZero(p.size());
-  if (curvature) curvature->setZero(p.size());
+  if (curvature) curvature->setZero(p.size(), p.size());
   for_each_estimated([&](const Parameter& q, int at) {
     if (!std::isfinite(q.prior_std)) return;
     for (int d = 0; d < q.dimension(); ++d) {
       const double t = (p[at + d] - q.prior_mean[d]) / q.prior_std;
       sum += 0.5 * t * t;
       if (gradient) (*gradient)[at + d] = t / q.prior_std;
-      if (curvature) (*curvature)[at + d] = 1.0 / (q.prior_std * q.prior_std);
+      if (curvature) (*curvature)(at + d, at + d) = 1.0 / (q.prior_std * q.prior_std);
     }
   });
+  if (joint_.empty()) return sum;
+  const auto count = Eigen::Index(joint_.size());
+  std::vector<int> place(parameters_.size(), -1);  // in p
+  for_each_estimated([&](const Parameter& q, int at) { place[std::size_t(&q - parameters_.data())] = at; });
+  VectorX t(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const int number = joint_[std::size_t(k)], at = place[std::size_t(number)];
+    t[k] = at >= 0 ? p[at] : std::log(reference_[parameters_[std::size_t(number)].theta_index]);
+  }
+  const VectorX slope = joint_precision_ * t;
+  sum += 0.5 * t.dot(slope);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const int at = place[std::size_t(joint_[std::size_t(k)])];
+    if (at < 0) continue;
+    if (gradient) (*gradient)[at] += slope[k];
+    for (Eigen::Index l = 0; curvature && l < count; ++l)
+      if (const int other = place[std::size_t(joint_[std::size_t(l)])]; other >= 0)
+        (*curvature)(at, other) += joint_precision_(k, l);
+  }
   return sum;
 }
 

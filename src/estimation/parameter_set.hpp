@@ -54,6 +54,12 @@ class ParameterSet {
   void set_estimated(const std::string& name, bool estimated);
   const VectorX& reference() const { return reference_; }
   void set_reference(const VectorX& theta) { reference_ = theta; }
+  /// A normal prior on the logarithms of several positive scalars together, beside their own priors: about zero, or,
+  /// where `precision` gives a common factor no weight, on their ratios alone. Those that are not estimated stay at the
+  /// reference. Throws std::invalid_argument for an unknown name or another kind of parameter.
+  /// @param precision  names x names, symmetric, not negative
+  void set_joint_prior(const std::vector<std::string>& names, MatrixX precision);
+  const MatrixX& joint_precision() const { return joint_precision_; }  ///< empty: there is no joint prior
 
   int dimension() const;
   /// Name of each number of p: "youngs_modulus", "linear_velocity.x", "plane.tilt_1", ...
@@ -66,8 +72,8 @@ class ParameterSet {
   /// Moves p into the bounds.
   [[nodiscard]] VectorX clamp(const VectorX& p) const;
 
-  /// Negative logarithm of the priors (up to a constant), its gradient and its curvature's diagonal.
-  double prior(const VectorX& p, VectorX* gradient = nullptr, VectorX* curvature = nullptr) const;
+  /// Negative logarithm of the priors (up to a constant), its gradient and its curvature.
+  double prior(const VectorX& p, VectorX* gradient = nullptr, MatrixX* curvature = nullptr) const;
 
  private:
   /// Point and normal of a plane's origin, or a direction's vector.
@@ -77,6 +83,8 @@ class ParameterSet {
 
   std::vector<Parameter> parameters_;
   VectorX reference_;
+  std::vector<int> joint_;  // numbers of the parameters of the joint prior
+  MatrixX joint_precision_;
 };
 
 }  // namespace pliant

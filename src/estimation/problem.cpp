@@ -58,6 +58,18 @@ Vector3 centre_of(const TriangleMesh& surface) {
 
 }  // namespace
 
+ControlledField control_field(const Body& body, const Capture& capture, const FieldOptions& options) {
+  const int count = options.control_points;
+  if (options.weights == FieldOptions::Weights::Linear) {
+    Eigen::Index longest = 0;
+    bounding_box(*capture.surface).extent().maxCoeff(&longest);
+    return linear_field(body, Vector3::Unit(longest), count);
+  }
+  const std::vector<Vector3> points = farthest_points(body, count);
+  return options.weights == FieldOptions::Weights::Harmonic ? harmonic_field(body, points)
+                                                            : inverse_distance_field(body, points);
+}
+
 double object_size(const Capture& capture) { return bounding_box(*capture.surface).extent().maxCoeff(); }
 
 std::shared_ptr<const SignedDistance> capture_distance(const Capture& capture, double band) {
@@ -93,17 +105,7 @@ std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDis
     for (const MaterialRegion& region : capture.regions) regions.push_back(region_test(capture, region.region));
     body.modulus = region_field(body, regions).field;
   } else if (resolution.field.control_points > 1) {
-    const int count = resolution.field.control_points;
-    ControlledField field;
-    if (resolution.field.weights == FieldOptions::Weights::Linear) {
-      Eigen::Index longest = 0;
-      bounding_box(*capture.surface).extent().maxCoeff(&longest);
-      field = linear_field(body, Vector3::Unit(longest), count);
-    } else if (resolution.field.weights == FieldOptions::Weights::Harmonic) {
-      field = harmonic_field(body, farthest_points(body, count));
-    } else {
-      field = inverse_distance_field(body, farthest_points(body, count));
-    }
+    ControlledField field = control_field(body, capture, resolution.field);
     body.modulus = std::move(field.field);
     control_points = std::move(field.points);
   }

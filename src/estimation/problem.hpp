@@ -6,6 +6,7 @@
 
 #include "capture/capture.hpp"
 #include "capture/observe.hpp"
+#include "elasticity/modulus_field.hpp"
 #include "estimation/objective.hpp"
 
 namespace pliant {
@@ -37,6 +38,9 @@ struct Discretisation {
   std::vector<Vector3> control_points;  ///< of the field of moduli; empty: homogeneous, or regions
   SimulationOptions simulation;
 };
+
+/// The field of a body where the capture names no regions.
+ControlledField control_field(const Body& body, const Capture& capture, const FieldOptions& options);
 
 /// Longest edge of the surface's box [m].
 double object_size(const Capture& capture);

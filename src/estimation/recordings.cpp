@@ -2,6 +2,7 @@
 
 #include "base/error.hpp"
 #include "capture/find_plane.hpp"
+#include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
 
 namespace pliant {
@@ -180,6 +181,14 @@ Grid Recordings::grid(double cells, double steps) const {
     grid.recording.push_back(discretise(r.capture, r.distance, resolution(cells, steps), r.own(parameters_.reference()),
                                         settings, r.tracked.rest));
   return grid;
+}
+
+ParameterSet Recordings::with_field_prior(ParameterSet parameters, const Grid& grid) const {
+  const std::vector<Vector3>& points = grid.recording.front().control_points;
+  if (points.size() > 1)
+    parameters.set_joint_prior(modulus_names(front().capture, controls_),
+                               field_precision(points, front().size, options_.modulus_variation));
+  return parameters;
 }
 
 void Recordings::set_moduli(VectorX& theta, const VectorX& moduli) const {

@@ -72,8 +72,10 @@ class Recordings {
       o.last_frame = std::min(r.last_frame, last_frame(r));
       motions.push_back({d.mismatch, d.body, d.simulation, r.observations, o});
     }
-    return {std::move(motions), parameters};
+    return {std::move(motions), with_field_prior(parameters, grid)};
   }
+  /// The parameters with the prior of their moduli at the grid's control points, if it has any.
+  [[nodiscard]] ParameterSet with_field_prior(ParameterSet parameters, const Grid& grid) const;
 
   /// Every recording's moduli [Pa], as many as controls.
   void set_moduli(VectorX& theta, const VectorX& moduli) const;

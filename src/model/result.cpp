@@ -48,6 +48,11 @@ Json field_json(const FieldResult& field) {
         {number(p.position.x()), number(p.position.y()), number(p.position.z()), number(p.value), number(p.std)});
   Json json{{"control_points", points}};
   if (!field.per_element.empty()) json["per_element"] = field.per_element;
+  for (const TriedFieldResult& t : field.tried)
+    json["tried"].push_back({{"control_points", t.control_points},
+                             {"estimated", t.estimated},
+                             {"cost", number(t.cost)},
+                             {"log_bayes_factor", number(t.log_bayes_factor)}});
   return json;
 }
 
@@ -203,6 +208,11 @@ FieldResult read_field(const std::string& name, const Member& member) {
   if (member.has("control_points"))
     member["control_points"].each_item(
         [&](const Member& item) { field.control_points.push_back(read_control_point(item)); });
+  if (member.has("tried"))
+    member["tried"].each_item([&](const Member& item) {
+      field.tried.push_back({int(item["control_points"].count()), item["estimated"].boolean(),
+                             optional_number(item, "cost"), optional_number(item, "log_bayes_factor")});
+    });
   return field;
 }
 

@@ -43,10 +43,19 @@ struct ControlPoint {
   std::optional<double> std;
 };
 
+/// What a number of control points was worth, where it was chosen.
+struct TriedFieldResult {
+  int control_points = 1;
+  bool estimated = false;                  ///< false: one step of Gauss and Newton promised too little
+  std::optional<double> cost;              ///< of the estimate
+  std::optional<double> log_bayes_factor;  ///< against the best before; nothing: it cannot be simulated
+};
+
 struct FieldResult {
   std::string name;  ///< the parameter's
-  std::vector<ControlPoint> control_points;
-  std::string per_element;  ///< file with the values of the elements, beside the result; empty: none
+  std::vector<ControlPoint> control_points = {};
+  std::string per_element = {};  ///< file with the values of the elements, beside the result; empty: none
+  std::vector<TriedFieldResult> tried = {};
 };
 
 /// Distances between what was seen and what was simulated [m].

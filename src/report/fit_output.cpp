@@ -302,9 +302,15 @@ ModulusStatistics modulus_statistics(const FitOutcome& outcome) {
 void add_modulus_field(Result& result, const FitOutcome& outcome) {
   const RecordingOutcome& first = outcome.recordings.front();
   const int controls = first.discretisation.body->modulus.controls;
-  if (controls == 1) return;
-  const MatrixX covariance = log_modulus_covariance(outcome);
+  if (controls == 1 && outcome.fields.empty()) return;
   FieldResult field{"youngs_modulus", {}, "model.vtu"};
+  for (const TriedField& t : outcome.fields) {
+    TriedFieldResult tried{t.control_points, t.estimated, {}, {}};
+    if (std::isfinite(t.cost)) tried.cost = t.cost;
+    if (std::isfinite(t.log_bayes_factor)) tried.log_bayes_factor = t.log_bayes_factor;
+    field.tried.push_back(tried);
+  }
+  const MatrixX covariance = log_modulus_covariance(outcome);
   const std::vector<Vector3>& points = first.discretisation.control_points;
   for (std::size_t k = 0; k < points.size(); ++k) {
     const double value = first.theta[theta::modulus(int(k), controls, first.theta.size())];

@@ -106,9 +106,10 @@ TEST_P(Gradient, GaussNewtonMatrixIsThatOfTheResiduals) {
   const RobustLoss loss{0.03};
   const VectorX w =
       r.unaryExpr([&](double d) { return loss.weight(d) / (1e-3 * 1e-3); });  // 40 points: all count in full
-  VectorX curvature, unused;
+  VectorX unused;
+  MatrixX curvature;
   scene.parameters.prior(scene.p, &unused, &curvature);
-  const MatrixX expected = J.transpose() * w.asDiagonal() * J + MatrixX(curvature.asDiagonal());
+  const MatrixX expected = J.transpose() * w.asDiagonal() * J + curvature;
   const VectorX scale = expected.diagonal().cwiseSqrt().cwiseInverse();
   const MatrixX difference = scale.asDiagonal() * (e.gauss_newton - expected) * scale.asDiagonal();
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), tolerance(1e-4));  // kinks of the distance's grid within the steps

@@ -92,15 +92,52 @@ TEST(ParameterSet, PriorsAreNormal) {
   list[5].prior_mean = mean;
   const ParameterSet set(list, all_estimated().reference());
   const VectorX p = somewhere(set);
-  VectorX gradient, curvature;
+  VectorX gradient;
+  MatrixX curvature;
   const double value = set.prior(p, &gradient, &curvature);
   const double expected = 0.5 * std::pow((p[0] - 8.0) / 0.5, 2) + 0.5 * (p.segment(5, 3) - mean).squaredNorm() / 4.0;
   EXPECT_NEAR(value, expected, tolerance(1e-12) * expected);
   for (int i = 0; i < 17; ++i) {
     const VectorX e = VectorX::Unit(17, i);
     EXPECT_NEAR(gradient[i], (set.prior(p + 1e-3 * e) - set.prior(p - 1e-3 * e)) / 2e-3, tolerance(1e-8));
-    EXPECT_DOUBLE_EQ(curvature[i], i == 0 ? 4.0 : i >= 5 && i < 8 ? 0.25 : 0.0);
+    EXPECT_EQ((curvature * e - (i == 0 ? 4.0 : i >= 5 && i < 8 ? 0.25 : 0.0) * e).norm(), 0.0);
   }
+}
+
+/// Three moduli tied to one another, the second of them not estimated, the first one with a prior of its own.
+TEST(ParameterSet, AJointPriorTiesLogarithmsTogether) {
+  std::vector<Parameter> list;
+  for (int k = 0; k < 3; ++k)
+    list.push_back({"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm, theta::modulus(k, 3, 16)});
+  list[0].estimated = list[2].estimated = true;
+  list[0].prior_std = 0.5;
+  list[0].prior_mean = VectorX::Constant(1, 8.0);
+  VectorX reference = VectorX::Constant(16, 2000.0);
+  ParameterSet set(list, reference);
+  MatrixX precision(3, 3);  // of differences, along a chain
+  precision << 4, -4, 0, -4, 5, -1, 0, -1, 1;
+  set.set_joint_prior({"youngs_modulus@1", "youngs_modulus@2", "youngs_modulus@3"}, precision);
+  VectorX p(2);
+  p << 8.3, 7.1;
+  const double fixed = std::log(2000.0);
+  const double expected =
+      0.5 * std::pow(0.3 / 0.5, 2) + 0.5 * (4.0 * std::pow(8.3 - fixed, 2) + std::pow(7.1 - fixed, 2));
+  VectorX gradient;
+  MatrixX curvature;
+  EXPECT_NEAR(set.prior(p, &gradient, &curvature), expected, tolerance(1e-12) * expected);
+  for (int i = 0; i < 2; ++i) {
+    const VectorX e = VectorX::Unit(2, i);
+    EXPECT_NEAR(gradient[i], (set.prior(p + 1e-3 * e) - set.prior(p - 1e-3 * e)) / 2e-3, tolerance(1e-8));
+  }
+  EXPECT_TRUE(curvature.isApprox((MatrixX(2, 2) << 8.0, 0.0, 0.0, 1.0).finished(), 1e-14));
+  set.set_estimated("youngs_modulus@2", true);
+  VectorX all(3);
+  all << 8.0, 7.0, 6.5;
+  const double before = set.prior(all), one = 0.5 * std::pow(0.7 / 0.5, 2);
+  EXPECT_NEAR(set.prior(all + VectorX::Constant(3, 0.7)) - before, one, 1e-12) << "a common factor is free";
+  set.prior(all, nullptr, &curvature);
+  EXPECT_EQ(curvature(1, 2), -1.0);
+  EXPECT_THROW(set.set_joint_prior({"mass_damping"}, MatrixX::Identity(1, 1)), std::invalid_argument);
 }
 
 TEST(ParameterSet, DirectionsKeepTheirLengthAndTheirOrigin) {

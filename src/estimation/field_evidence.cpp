@@ -1,0 +1,100 @@
+#include "estimation/field_evidence.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+namespace pliant {
+
+namespace {
+
+double log_determinant(const MatrixX& positive) { return positive.ldlt().vectorD().array().abs().log().sum(); }
+
+/// Rows of p that hold moduli.
+std::vector<Eigen::Index> modulus_rows(const ParameterSet& parameters) {
+  std::vector<Eigen::Index> rows;
+  Eigen::Index at = 0;
+  for (const Parameter& p : parameters.parameters()) {
+    if (!p.estimated) continue;
+    if (p.name.starts_with("youngs_modulus")) rows.push_back(at);
+    at += p.dimension();
+  }
+  return rows;
+}
+
+/// Orthonormal rows that span what is orthogonal to a matrix's columns.
+MatrixX contrasts_to(const MatrixX& columns) {
+  const Eigen::HouseholderQR<MatrixX> qr(columns);
+  const MatrixX q = qr.householderQ();
+  return q.rightCols(columns.rows() - columns.cols()).transpose();
+}
+
+}  // namespace
+
+MatrixX field_precision(const std::vector<Vector3>& points, double length, double deviation) {
+  const auto n = Eigen::Index(points.size());
+  if (n < 2) return MatrixX::Zero(n, n);
+  const auto distance = [&](Eigen::Index i, Eigen::Index j) {
+    return (points[std::size_t(i)] - points[std::size_t(j)]).norm();
+  };
+  MatrixX covariance(n - 1, n - 1);  // of ln E less that at the first point
+  for (Eigen::Index i = 1; i < n; ++i)
+    for (Eigen::Index j = 1; j < n; ++j)
+      covariance(i - 1, j - 1) =
+          0.5 * deviation * deviation / length * (distance(i, 0) + distance(j, 0) - distance(i, j));
+  MatrixX ratios(n - 1, n);
+  ratios << VectorX::Constant(n - 1, -1.0), MatrixX::Identity(n - 1, n - 1);
+  return ratios.transpose() * covariance.ldlt().solve(ratios);
+}
+
+double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
+                        const MatrixX& carried) {
+  const std::vector<Eigen::Index> rows = modulus_rows(parameters);
+  if (Eigen::Index(rows.size()) != carried.rows() || carried.rows() <= carried.cols()) return 0.0;
+  // The field's prior belongs to the hypotheses, not to the estimate; a trace of it stays for where nothing is seen.
+  constexpr double trace = 1e-4;
+  const MatrixX& precision = parameters.joint_precision();
+  MatrixX H = evaluation.gauss_newton;
+  VectorX g = evaluation.gradient;
+  H(rows, rows) -= (1.0 - trace) * precision;
+  g(rows) -= (1.0 - trace) * precision * p(rows);
+  const VectorX scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // pulls and dampings differ by 1e10
+  const MatrixX inverse =
+      scale.asDiagonal() *
+      MatrixX(scale.asDiagonal() * H * scale.asDiagonal()).ldlt().solve(MatrixX::Identity(H.rows(), H.cols())) *
+      scale.asDiagonal();
+  const MatrixX contrasts = contrasts_to(carried);
+  const MatrixX by_gradient = contrasts * inverse(rows, Eigen::all);
+  const VectorX d = contrasts * p(rows) - by_gradient * g;
+
+  const double explained = 0.5 * evaluation.independent_observations();  // the cost of residuals that are noise
+  const double left = std::max(evaluation.cost - 0.5 * g.dot(inverse * g), 0.0) / evaluation.cost;  // after the step
+  const double noise = std::max(1.0, left * evaluation.cost / explained);
+  VectorX mean = VectorX::Zero(g.size());
+  for (const FrameFit& frame : evaluation.frames) mean += frame.gradient / double(evaluation.frames.size());
+  const MatrixX V = noise * contrasts * inverse(rows, rows) * contrasts.transpose() +
+                    left * by_gradient * gradient_scatter(evaluation, mean) * by_gradient.transpose();
+  const MatrixX covariance = precision.completeOrthogonalDecomposition().pseudoInverse();  // of contrasts
+  const MatrixX both = V + contrasts * covariance * contrasts.transpose();
+  return 0.5 * (d.dot(V.ldlt().solve(d)) - d.dot(both.ldlt().solve(d)) + log_determinant(V) - log_determinant(both));
+}
+
+MatrixX gradient_scatter(const CostEvaluation& evaluation, const VectorX& mean) {
+  const auto& frames = evaluation.frames;
+  const int count = int(frames.size());
+  const int lags = std::min(count - 1, int(std::ceil(std::sqrt(double(count)))));
+  const Eigen::Index n = evaluation.gradient.size();
+  const VectorX centre = mean.size() > 0 ? mean : VectorX::Zero(n);
+  MatrixX scatter = MatrixX::Zero(n, n);
+  for (int lag = 0; lag <= lags; ++lag) {
+    const double weight = lag == 0 ? 1.0 : 1.0 - double(lag) / (lags + 1);
+    for (int f = lag; f < count; ++f) {
+      const MatrixX outer = (frames[f].gradient - centre) * (frames[f - lag].gradient - centre).transpose();
+      scatter += weight * (lag == 0 ? outer : MatrixX(outer + outer.transpose()));
+    }
+  }
+  return scatter;
+}
+
+}  // namespace pliant

@@ -1,0 +1,327 @@
+// How many control points a field of moduli needs: the evidence, and the choice by it.
+#include "estimation/field_choice.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <random>
+
+#include "elasticity/element_moduli.hpp"
+#include "estimation/field_evidence.hpp"
+#include "estimation/fit_config.hpp"
+#include "estimation/fit_state.hpp"
+#include "geometry/primitives.hpp"
+#include "input_errors.hpp"
+#include "support/bodies.hpp"
+#include "support/tolerance.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+constexpr double deviation = 1.5;
+
+/// Covariance of ln E less that at the first point.
+MatrixX ratio_covariance(const std::vector<Vector3>& points, double length) {
+  const MatrixX precision = field_precision(points, length, deviation);
+  const Eigen::Index n = precision.rows() - 1;
+  return precision.bottomRightCorner(n, n).inverse();
+}
+
+TEST(FieldPrior, RatiosVaryWithDistanceWhateverOtherPointsThereAre) {
+  const std::vector<Vector3> points = {{0, 0, 0}, {0.3, 0.1, 0}, {-0.2, 0.4, 0.1}, {0.1, 0.1, 0.5}};
+  const MatrixX precision = field_precision(points, 2.0, deviation);
+  EXPECT_LT((precision * VectorX::Ones(4)).norm(), tolerance(1e-12) * precision.norm()) << "a common factor is free";
+  const MatrixX covariance = ratio_covariance(points, 2.0);
+  const MatrixX fewer = ratio_covariance({points[0], points[1], points[2]}, 2.0);
+  EXPECT_LT((covariance.topLeftCorner(2, 2) - fewer).norm(), tolerance(1e-12) * fewer.norm());
+  const double between = covariance(0, 0) + covariance(1, 1) - 2.0 * covariance(0, 1);
+  EXPECT_NEAR(between, deviation * deviation * (points[1] - points[2]).norm() / 2.0, tolerance(1e-12));
+}
+
+TEST(FieldPrior, AlongALineNeighboursAloneAreTied) {
+  std::vector<Vector3> points;
+  for (const double x : {0.0, 0.1, 0.4, 0.6}) points.emplace_back(x, 0.2, 0.0);
+  const MatrixX precision = field_precision(points, 0.6, deviation);
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j)
+      if (std::abs(i - j) > 1) {
+        EXPECT_NEAR(precision(i, j), 0.0, tolerance(1e-10) * precision.norm());
+      }
+  EXPECT_NEAR(precision(0, 1), -0.6 / (deviation * deviation * 0.1), tolerance(1e-9));
+}
+
+/// Observations that are linear in ln E at two points, with unit noise: all of the evidence is Gaussian.
+struct LinearModel {
+  LinearModel() : parameters(both()) {
+    parameters.set_joint_prior({"youngs_modulus@1", "youngs_modulus@2"},
+                               field_precision({{0, 0, 0}, {1, 0, 0}}, 1.0, deviation));
+    design.resize(3, 2);
+    design << 2.0, 0.3, 0.5, 1.5, 1.0, 1.0;
+    seen.resize(3);
+    seen << 1.9, 0.2, 1.4;
+  }
+  static ParameterSet both() {
+    std::vector<Parameter> list;
+    for (int k = 0; k < 2; ++k) {
+      list.push_back({"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm,
+                      theta::modulus(k, 2, theta::size(0, 2))});
+      list.back().estimated = true;
+    }
+    return {list, VectorX::Ones(theta::size(0, 2))};
+  }
+  double cost(const VectorX& p) const { return 0.5 * (design * p - seen).squaredNorm(); }
+  /// In one frame, of so many observations that the residuals are noise.
+  CostEvaluation at(const VectorX& p) const {
+    CostEvaluation e;
+    VectorX gradient;
+    MatrixX curvature;
+    e.cost = parameters.prior(p, &gradient, &curvature) + cost(p);
+    e.gradient = gradient + design.transpose() * (design * p - seen);
+    e.gauss_newton = curvature + design.transpose() * design;
+    FrameFit frame;
+    frame.gradient = e.gradient - gradient;
+    frame.independent = 1e6;
+    e.frames = {frame};
+    return e;
+  }
+  double log_factor(const CostEvaluation& e, const VectorX& p) const {
+    return log_bayes_factor(e, parameters, p, MatrixX::Ones(2, 1));
+  }
+  ParameterSet parameters;
+  MatrixX design;
+  VectorX seen;
+};
+
+/// Against integrals over the parameters by the midpoint rule, the prior of the ratio being normal and that of the
+/// first modulus flat in both models.
+TEST(Evidence, IsTheIntegralOfLikelihoodTimesPrior) {
+  const LinearModel model;
+  constexpr double h = 0.02, range = 12.0;
+  double homogeneous = 0.0, field = 0.0;
+  for (double a = -range + 0.5 * h; a < range; a += h) {
+    homogeneous += h * std::exp(-model.cost(Eigen::Vector2d(a, a)));
+    for (double b = -range + 0.5 * h; b < range; b += h)
+      field += h * h * std::exp(-model.cost(Eigen::Vector2d(a, b)) - 0.5 * std::pow((b - a) / deviation, 2)) /
+               (deviation * std::sqrt(2.0 * M_PI));
+  }
+  // Far from the maximum: the step of Gauss and Newton that leads there is exact for a linear model.
+  for (const Eigen::Vector2d& p : {Eigen::Vector2d(-2.0, 1.0), Eigen::Vector2d(0.9, 0.9)})
+    EXPECT_NEAR(model.log_factor(model.at(p), p), std::log(field / homogeneous), tolerance(1e-3));
+}
+
+TEST(Evidence, ResidualsLargerThanTheNoiseCountLess) {
+  LinearModel model;
+  const VectorX p = model.design.colPivHouseholderQr().solve(model.seen);
+  CostEvaluation e = model.at(p);
+  e.cost = 2.0 * e.frames[0].independent;  // four times that of noise
+  const double large = model.log_factor(e, p);
+  model.design /= 2.0, model.seen /= 2.0;
+  EXPECT_NEAR(large, model.log_factor(model.at(p), p), tolerance(1e-3));
+}
+
+/// Two hundred frames share the curvature; their gradients scatter as it says, but in runs of ten that err together.
+TEST(Evidence, FramesThatErrTogetherCountLess) {
+  const LinearModel model;
+  const VectorX p = Eigen::Vector2d(0.9, -0.9);
+  const MatrixX root = (model.design.transpose() * model.design).llt().matrixL();
+  const auto factor = [&](int together) {
+    constexpr int frames = 200;
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal;
+    CostEvaluation e = model.at(p);
+    model.parameters.prior(p, &e.gradient);  // at the maximum of the likelihood
+    e.frames.clear();
+    VectorX gradient;
+    for (int f = 0; f < frames; ++f) {
+      if (f % together == 0) gradient = root * Eigen::Vector2d(normal(random), normal(random)) / std::sqrt(frames);
+      FrameFit frame;
+      frame.gradient = gradient;
+      frame.independent = 1e6;
+      e.frames.push_back(frame);
+    }
+    return model.log_factor(e, p);
+  };
+  CostEvaluation claimed = model.at(p);
+  model.parameters.prior(p, &claimed.gradient);
+  const double without = model.log_factor(claimed, p), apart = factor(1), together = factor(10);
+  EXPECT_LT(apart, without) << "curvature and scatter add up";
+  EXPECT_LT(together, 0.5 * apart);
+}
+
+TEST(CarriedOver, AFieldThatTheOtherCanHoldIsUnchanged) {
+  const auto body = test::box_body({0.4, 0.08, 0.08}, 0.02);
+  const Vector3 axis = Vector3::UnitX();
+  const auto field = [&](int count) { return linear_field(*body, axis, count).field; };
+  const VectorX logs = Eigen::Vector3d(8.0, 9.0, 8.5);
+  const MatrixX finer = carried_over(*body, field(3), field(5));
+  EXPECT_LT((field(5).weights * (finer * logs) - field(3).weights * logs).norm(), tolerance(1e-9));
+  EXPECT_LT((carried_over(*body, field(1), field(4)) - MatrixX::Ones(4, 1)).norm(), tolerance(1e-9));
+  const MatrixX coarser = carried_over(*body, field(3), field(1));
+  EXPECT_NEAR((coarser * logs)[0], 0.25 * 8.0 + 0.5 * 9.0 + 0.25 * 8.5, tolerance(1e-6)) << "the mean over the volume";
+}
+
+constexpr double length = 0.4, edge = 0.05, stiff = 2e5, soft = 4e4, noise = 1e-3;
+
+/// A bar along x, clamped at its low end, that sags to rest, seen as points with noise; beyond its middle its modulus
+/// may be another. Made by the same elements and law as it is fitted with, on a finer mesh: an inverse crime in part.
+RecordedCapture sagging_bar(double beyond, const Vector3& gravity = {0.0, -9.81, 0.0}, unsigned seed = 7) {
+  RecordedCapture recorded;
+  Capture& capture = recorded.capture;
+  capture.name = "bar";
+  capture.surface = make_box(Vector3(length, edge, edge), 0.0125);
+  capture.density = 400.0;
+  capture.gravity = gravity;
+  capture.up = -gravity.normalized();
+  capture.is_static = true;
+  capture.times = {0.0};
+  capture.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
+  capture.clouds = {{{"cloud.ply"}, 1, noise}};
+  Capture zoned = capture;
+  zoned.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  VectorX theta = default_parameters(zoned, enclosed_volume(*capture.surface), 2).reference();
+  theta[theta::modulus(0, 2, theta.size())] = stiff;
+  theta[theta::modulus(1, 2, theta.size())] = beyond;
+  Resolution resolution;
+  resolution.cells = 16.0;
+  const Discretisation d = discretise(zoned, capture_distance(zoned, 0.2), resolution, theta);
+  const Embedding embedding(*d.body, capture.surface->vertices);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  ObservedFrame seen;
+  Simulation(d.body, d.simulation).run(theta, [&](int, const State& state, auto) {
+    const Points x = embedding.positions(state.x);
+    for (Eigen::Index v = 0; v < x.rows(); ++v) {
+      seen.points.push_back(Vector3(x.row(v)) + noise * Vector3(normal(random), normal(random), normal(random)));
+      seen.noise.push_back(float(noise));
+      seen.view.emplace_back(Vector3::Zero());
+      seen.camera.push_back(-1);
+      seen.pixel.push_back(-1);
+    }
+    return true;
+  });
+  recorded.observed = {seen};
+  return recorded;
+}
+
+FitOptions quick() {
+  FitOptions options;
+  options.cells = options.coarse_cells = 8.0;
+  options.control_points = FitOptions::automatic;
+  options.parameters["poisson_ratio"].estimated = false;
+  options.starts = 1;
+  return options;
+}
+
+double modulus(const FitOutcome& outcome, int k) {
+  const VectorX& theta = outcome.recordings.front().theta;
+  return theta[theta::modulus(k, outcome.recordings.front().discretisation.body->modulus.controls, theta.size())];
+}
+int controls(const FitOutcome& outcome) { return outcome.recordings.front().discretisation.body->modulus.controls; }
+
+/// exp of the mean of ln E over the elements on one side of the middle.
+double mean_beyond(const FitOutcome& outcome, double side) {
+  const RecordingOutcome& r = outcome.recordings.front();
+  const ModulusStatistics statistics = modulus_statistics(r.discretisation.body, r.theta, MatrixX());
+  double sum = 0.0, volume = 0.0;
+  for (int e = 0; e < r.discretisation.body->element_count(); ++e) {
+    if (side * element_centre(*r.discretisation.body, e).x() < 0.0) continue;
+    const double v = r.discretisation.body->element_volume[std::size_t(e)];
+    sum += v * std::log(statistics.value[e]), volume += v;
+  }
+  return std::exp(sum / volume);
+}
+
+TEST(FieldChoice, AHomogeneousBarNeedsOneControlPoint) {
+  const FitOutcome outcome = fit({sagging_bar(stiff)}, quick());
+  ASSERT_TRUE(outcome.converged) << outcome.reason;
+  EXPECT_EQ(controls(outcome), 1);
+  ASSERT_EQ(outcome.fields.size(), 3u) << "two numbers that are not worth it end the search";
+  for (std::size_t i = 1; i < 3; ++i) EXPECT_LT(outcome.fields[i].log_bayes_factor, strong_evidence);
+  EXPECT_THAT(outcome.notes.front(), ::testing::HasSubstr("was given 1 control point,"));
+  EXPECT_NEAR(modulus(outcome, 0) / stiff, 1.0, 0.05);
+}
+
+TEST(FieldChoice, ABarOfTwoZonesNeedsMore) {
+  const FitOutcome outcome = fit({sagging_bar(soft)}, quick());
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  const int count = controls(outcome);
+  ASSERT_GT(count, 1);
+  EXPECT_GT(outcome.fields[1].log_bayes_factor, strong_evidence);
+  EXPECT_LT(outcome.final_cost, 0.5 * outcome.fields[0].cost);
+  // Moduli that vary evenly in the logarithm cannot step, and nothing bends at the free end: zones in the mean.
+  EXPECT_NEAR(std::log(mean_beyond(outcome, -1.0) / stiff), 0.0, std::log(1.6));
+  EXPECT_NEAR(std::log(mean_beyond(outcome, 1.0) / soft), 0.0, std::log(1.6));
+  EXPECT_GT(modulus(outcome, 0), 2.0 * modulus(outcome, count - 1));
+  for (const FitEvent& event : outcome.history) EXPECT_EQ(event.theta.size(), outcome.theta.size()) << event.stage;
+  // The same field for one who asks for that many: the path there is another, the valley the same.
+  FitOptions told = quick();
+  told.control_points = count;
+  const FitOutcome same = fit({sagging_bar(soft)}, told);
+  for (int k = 0; k < count; ++k)
+    EXPECT_NEAR(std::log(modulus(outcome, k) / modulus(same, k)), 0.0, 3e-2) << "within the optimiser's tolerance";
+}
+
+TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {
+  const Vector3 aside(0.0, 0.0, -9.81);
+  const FitOutcome outcome = fit({sagging_bar(soft), sagging_bar(soft, aside, 8)}, quick());
+  ASSERT_EQ(outcome.recordings.size(), 2u);
+  const int count = controls(outcome);
+  ASSERT_GT(count, 1);
+  for (int k = 0; k < count; ++k) {
+    const VectorX& other = outcome.recordings[1].theta;
+    EXPECT_EQ(modulus(outcome, k), other[theta::modulus(k, count, other.size())]);
+  }
+}
+
+/// Interrupted in every kind of fit on the way, written to a file and read back.
+TEST(FieldChoice, AnInterruptedChoiceGoesOnToTheSameEnd) {
+  const test::TemporaryFolder folder;
+  const FitOutcome undisturbed = fit({sagging_bar(soft)}, quick());
+  for (const char* stage : {"fine", "2 control points"}) {
+    FitState left;
+    bool stop = false;
+    FitMonitor monitor;
+    monitor.on_event = [&](const FitEvent& event) { stop = stop || event.stage == stage; };
+    monitor.on_state = [&](const FitState& state) { left = state; };
+    monitor.interrupted = [&] { return stop; };
+    const FitOutcome interrupted = fit({sagging_bar(soft)}, quick(), monitor);
+    EXPECT_TRUE(interrupted.interrupted) << stage;
+    write_fit_state(folder / "state.json", left, "key");
+    const FitOutcome resumed = fit({sagging_bar(soft)}, quick(), {}, read_fit_state(folder / "state.json", "key"));
+    EXPECT_EQ(controls(resumed), controls(undisturbed)) << stage;
+    EXPECT_EQ(resumed.notes, undisturbed.notes) << stage;
+    ASSERT_EQ(resumed.theta.size(), undisturbed.theta.size()) << stage;
+    EXPECT_LT((resumed.theta - undisturbed.theta).cwiseAbs().maxCoeff(), 1e-6 * undisturbed.theta.maxCoeff()) << stage;
+  }
+}
+
+TEST(FieldChoice, RegionsLeaveNothingToChoose) {
+  RecordedCapture bar = sagging_bar(soft);
+  bar.capture.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  const FitOutcome outcome = fit({bar}, quick());
+  EXPECT_EQ(controls(outcome), 2);
+  EXPECT_TRUE(outcome.fields.empty());
+}
+
+TEST(FieldChoice, IsAKeyOfAFit) {
+  FitOptions options;
+  set_fit_option(options, "control_points=auto");
+  EXPECT_EQ(options.control_points, FitOptions::automatic);
+  EXPECT_EQ(options.validate(), "");
+  EXPECT_THAT(to_toml(options), ::testing::HasSubstr("control_points = \"auto\""));
+  const test::TemporaryFolder folder;
+  FitOptions read;
+  read_fit_options(folder.write("fit.toml", to_toml(options)), read);
+  EXPECT_EQ(read.control_points, FitOptions::automatic);
+  for (const char* wrong : {"control_points=0", "control_points=many", "control_points=2.5"})
+    EXPECT_THAT(test::complaint_of([&] { set_fit_option(options, wrong); }), ::testing::HasSubstr("or auto")) << wrong;
+  set_fit_option(options, "youngs_modulus.estimate=false");
+  EXPECT_THAT(options.validate(), ::testing::HasSubstr("control_points = auto"));
+}
+
+}  // namespace
+}  // namespace pliant
