@@ -36,15 +36,19 @@ std::vector<Hold> hold() {
   return {{[](const Vector3& p) { return p.x() < 1e-6; }}};
 }
 
-/// Straight, or with its nodes elsewhere.
-Body make_bar(int cells, const Points* nodes = nullptr) {
+TetMesh corners_of(int cells) {
   Box box;
   box.extend(Vector3(0.0, -0.5 * edge, -0.5 * edge));
   box.extend(Vector3(length, 0.5 * edge, 0.5 * edge));
-  TetMesh mesh = with_mid_nodes(make_tet_box(box, {cells, cells / 10 + 1, cells / 10 + 1}, false));
-  Body straight = make_body(mesh);
+  return make_tet_box(box, {cells, cells / 10 + 1, cells / 10 + 1}, false);
+}
+
+/// Quadratic tetrahedra; straight, or with their corners elsewhere and edges straight there.
+Body make_bar(int cells, const Points* corners = nullptr) {
+  const TetMesh mesh = corners_of(cells);
+  Body straight = make_body(with_mid_nodes(mesh));
   const auto field = region_field(straight, {[](const Vector3& p) { return p.x() > 0.5 * length; }}).field;
-  Body body = nodes ? make_body(make_tet_mesh(*nodes, mesh.tets, mesh.mid_nodes)) : std::move(straight);
+  Body body = corners ? make_body(with_mid_nodes(make_tet_mesh(*corners, mesh.tets))) : std::move(straight);
   body.modulus = field;
   return body;
 }
@@ -87,7 +91,7 @@ Points sagged(const std::shared_ptr<const Body>& body, const VectorX& theta) {
 /// that).
 struct Recorded {
   std::shared_ptr<const Body> scanned;
-  Points straight;  // nodes of the scanned body, free of load
+  Points straight;  // corners of the scanned body's elements, free of load
   std::shared_ptr<std::vector<FrameObservations>> seen = std::make_shared<std::vector<FrameObservations>>();
   std::vector<Vector3> followed;  // in the scan
   double sag = 0.0;               // greatest [m]
@@ -98,7 +102,7 @@ Recorded record(int cells, double noise) {
   const auto fine = std::make_shared<Body>(make_bar(2 * cells));
   const Points x = sagged(fine, theta);
   Recorded recorded;
-  recorded.straight = make_bar(cells).nodes;
+  recorded.straight = corners_of(cells).nodes;
   const auto at = [&](const Points& points) {
     std::vector<Vector3> list;
     for (Eigen::Index n = 0; n < points.rows(); ++n) list.push_back(points.row(n).transpose());
@@ -114,8 +118,10 @@ Recorded record(int cells, double noise) {
   const Points there = followed.positions(x);
   for (Eigen::Index i = 0; i < there.rows(); ++i) recorded.followed.push_back(there.row(i).transpose());
   // The bar is struck where it sags: its state at the start is that of the scan, not that free of load.
-  const auto fine_scanned = std::make_shared<Body>(make_bar(2 * cells, &x));
-  Body moving = with_reference(*fine_scanned, fine->nodes);
+  const auto& mesh = std::get<TetMesh>(fine->mesh);
+  Body sagging = make_body(make_tet_mesh(x, mesh.tets, mesh.mid_nodes));
+  sagging.modulus = fine->modulus;
+  Body moving = with_reference(sagging, fine->nodes);
   moving.mass = fine->mass;
   Simulation simulation(std::make_shared<Body>(std::move(moving)), scene_of(8));
   std::mt19937 random(11);
@@ -154,13 +160,13 @@ Objective objective_of(const Recorded& recorded, const ParameterSet& parameters,
 
 json compare(const Recorded& recorded) {
   json runs = json::array();
-  const std::pair<double, double> starts[] = {{2.0, 0.5}, {0.7, 2.0}, {3.0, 3.0}, {1.0, 4.0}};
+  const std::pair<double, double> starts[] = {{2.0, 0.5}, {0.7, 2.0}, {3.0, 3.0}};
   for (const auto& [held, free] : starts)
     for (const std::string scheme : {"together", "in turns", "scan taken for load-free"}) {
       const ParameterSet parameters = parameters_from(held * youngs_moduli[0], free * youngs_moduli[1]);
       Objective objective = objective_of(recorded, parameters, scheme.front() != 's');
       OptimiserOptions options;
-      options.max_iterations = 60;
+      options.max_iterations = scheme.front() == 's' ? 15 : 60;
       options.step_tolerance = 1e-4;
       options.cost_tolerance = 1e-6;
       const OptimiserState start{0, parameters.to_unconstrained(parameters.reference()), {}};
@@ -185,7 +191,8 @@ json compare(const Recorded& recorded) {
           SimulationOptions own = scene_of(4);
           own.scan_sags = true;
           const Points X = Simulation(recorded.scanned, own).rest_body(theta)->nodes;
-          run["shape_error"] = (X - recorded.straight).rowwise().norm().maxCoeff() / length;
+          run["shape_error"] =
+              (X.topRows(recorded.straight.rows()) - recorded.straight).rowwise().norm().maxCoeff() / length;
         }
       }
       runs.push_back(run);

@@ -18,9 +18,8 @@ NAMES = ["youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]
 # name: (whether the scan is said to be load-free, choices)
 FITS = {
     "together": (False, {}),
-    "finer-steps": (False, {"steps": 2}),
     "in-turns": (False, {"load_free": "in_turns"}),
-    "scan-load-free": (True, {"element": "quadratic_tetrahedra", "steps": 0.25}),
+    "scan-load-free": (True, {"element": "quadratic_tetrahedra", "steps": 0.5}),
 }
 
 
@@ -55,7 +54,8 @@ def rms(values):
 def sagged(program, fit, places):
     """Where vertices of a fit's load-free surface come to rest under gravity: as the nearest nodes of its volume do."""
     text = (fit / "model.toml").read_text().splitlines()
-    still = [line if not line.startswith(("frames =", "frame_rate =")) else line.split("=")[0] + "= 0" for line in text]
+    zero, none = ("frame_rate", "frame_count", "start_frame"), ("released", "pulls")
+    still = [line.split("=")[0] + "= 0" if line.startswith(zero) else line for line in text if not line.startswith(none)]
     folder = fit / "at-rest"
     folder.mkdir(exist_ok=True)
     (folder / "model.toml").write_text("\n".join(still) + "\n")

@@ -9,8 +9,8 @@ sys.path.insert(0, str(HERE.parent))
 import common
 import subprocess
 
-CELLS, NOISE = 16, 2e-4
-LANDSCAPE_CELLS, SAMPLES = 8, 19
+CELLS, NOISE = 10, 2e-4
+LANDSCAPE_CELLS, SAMPLES = 8, 17
 
 
 def run(program, out, *words):

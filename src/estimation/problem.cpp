@@ -172,7 +172,7 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   const std::vector<double>& times = d.simulation.times;
   if (d.simulation.scan_sags && capture.planes.empty() && times.size() > 1)
     d.simulation.max_dt =
-        std::max(d.simulation.max_dt, 0.25 * (times.back() - times.front()) / double(times.size() - 1));
+        std::max(d.simulation.max_dt, 0.125 * (times.back() - times.front()) / double(times.size() - 1));
   d.simulation.max_dt /= resolution.steps;
   d.simulation.planes = int(capture.planes.size());
   d.simulation.pulls = pull_count(capture, resolution);

@@ -43,6 +43,7 @@ struct StruckBar {
     for (Eigen::Index n = 0; n < scan.rows(); ++n) scan(n, 1) += error * std::pow(free(n, 0) / length + 0.5, 2);
     Body scanned = make_body(make_tet_mesh(scan, mesh.tets, mesh.mid_nodes));
     scanned.modulus = straight->modulus;
+    if (sags) scanned.mass = straight->mass;  // what sagged there; the scan's own would differ a little
     Body moving = scanned;
     if (sags) moving = with_reference(scanned, free);
     if (error != 0.0) moving = *straight;
@@ -53,11 +54,12 @@ struct StruckBar {
     std::vector<Vector3> points;
     for (int n = 0; n < body->node_count(); ++n) points.push_back(scan.row(n).transpose());
     tracks = std::make_shared<PointTracks>(*body, points);
+    const Embedding followed(*body, points);  // nodes of curved elements are not exactly where they are looked for
     auto frames = std::make_shared<std::vector<FrameObservations>>();
     Simulation simulation(std::make_shared<Body>(std::move(moving)), options);
     const RolloutSummary summary = simulation.run(truth, [&](int frame, const State& state, auto) {
       FrameObservations one{frame};
-      for (int n = 0; n < body->node_count(); ++n) one.tracks.push_back({n, state.x.row(n).transpose(), 1e-3});
+      for (int n = 0; n < body->node_count(); ++n) one.tracks.push_back({n, followed.position(n, state.x), 1e-3});
       frames->push_back(std::move(one));
       return true;
     });
@@ -113,24 +115,30 @@ OptimiserOptions patient() {
   return o;
 }
 
-TEST(LoadFreeFit, FindsModuliAndShapeTogetherAndInTurns) {
+/// In turns it creeps towards the same, and ends where a turn hardly moves it.
+TEST(LoadFreeFit, FindsModuliAndShapeTogetherAndNearlyInTurns) {
   const StruckBar bar(true);
   const ParameterSet parameters = bar.parameters(1.8, 0.7);
   const VectorX start = parameters.to_unconstrained(parameters.reference());
-  Objective objective = bar.objective(parameters);
-  const OptimiserSummary together = minimise(objective, start, patient());
-  Objective other = bar.objective(parameters);
-  const OptimiserSummary in_turns = minimise_in_turns(other, OptimiserState{0, start, {}}, patient());
   EXPECT_GT(bar.shape_error(parameters.reference()), 0.02) << "the start is worth leaving";
-  for (const OptimiserSummary* s : {&together, &in_turns}) {
-    ASSERT_TRUE(s->succeeded && s->converged) << s->reason;
-    const VectorX theta = parameters.to_theta(s->p);
+  Objective objective = bar.objective(parameters), other = bar.objective(parameters);
+  const OptimiserSummary together = minimise(objective, start, patient());
+  OptimiserOptions longer = patient();
+  longer.max_iterations = 400;
+  longer.step_tolerance = 1e-4;
+  const OptimiserSummary in_turns = minimise_in_turns(other, OptimiserState{0, start, {}}, longer);
+  const auto expect_near = [&](const OptimiserSummary& s, double modulus, double shape) {
+    ASSERT_TRUE(s.succeeded && s.converged) << s.reason;
+    const VectorX theta = parameters.to_theta(s.p);
     const auto [of_stiff, of_soft] = bar.errors(theta);
-    EXPECT_LT(std::abs(of_stiff), tolerance(0.01));
-    EXPECT_LT(std::abs(of_soft), tolerance(0.01));
-    EXPECT_LT(bar.shape_error(theta), tolerance(1e-3));
-  }
-  EXPECT_LT(together.evaluations, in_turns.evaluations) << "what the derivatives through the equilibrium are for";
+    EXPECT_LT(std::abs(of_stiff), tolerance(modulus));
+    EXPECT_LT(std::abs(of_soft), tolerance(modulus));
+    EXPECT_LT(bar.shape_error(theta), tolerance(shape));
+  };
+  expect_near(together, 1e-3, 1e-4);
+  expect_near(in_turns, 0.05, 5e-3);
+  EXPECT_LT(together.evaluation.cost, 1e-2 * in_turns.evaluation.cost);
+  EXPECT_LT(together.evaluations, in_turns.evaluations);
 }
 
 TEST(LoadFreeFit, TheScanTakenForLoadFreeMisleads) {
