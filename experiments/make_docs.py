@@ -3,46 +3,14 @@
 
 Usage: experiments/make_docs.py [--check]
   --check  write nothing; return 1 where the page does not match the results"""
-import json
 import math
-import pathlib
 import sys
 
 import plots
+from load_free_page import reference_shapes, sagging_leaf, two_zones
+from page import IMAGES, ROOT, from_landscape, judged, machine, percent, results, table, with_truth
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent
-IMAGES = ROOT / "docs/images"
 PAGE, PLOT, BEAM_PLOT = ROOT / "docs/experiments.md", IMAGES / "torus-sweep.svg", IMAGES / "silicone-beam.svg"
-
-
-def results(name):
-    path = HERE / name / "results.json"
-    return json.loads(path.read_text()) if path.exists() else None
-
-
-def machine(figures):
-    m = figures["machine"]
-    return f"{m['cores']} cores ({m['processor']}), shared with other work: load {m['load']} at the end"
-
-
-def table(head, rows):
-    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
-    return "\n".join(lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]) + "\n"
-
-
-def percent(value, sign=True):
-    return f"{100 * value:{'+' if sign else ''}.1f} %"
-
-
-def with_truth(p, scale=1.0, unit=""):
-    text = f"{p['value'] * scale:.4g}"
-    if p.get("std"):
-        std = p["std"] * scale
-        text += f" ± {std:.0f}" if std >= 10 else f" ± {std:.2g}"
-    if p.get("truth") is not None:
-        text += f" ({p['truth'] * scale:g})"
-    return text + unit
 
 
 def oracle():
@@ -516,27 +484,6 @@ def track_rows(runs):
     return table(["case", "moduli", "frames", "worst E", "alpha", "beta", "evaluations", "time [s]", "processor time [s]", "why it ended"], rows)
 
 
-def from_landscape(figures, path):
-    """Cost over two moduli, in shades of its logarithm."""
-    moduli, costs, truth = figures["landscape"]["moduli"], figures["landscape"]["costs"], figures["landscape"]["truth"]
-    log = [math.log10(E) for E in moduli]
-    half = 0.5 * (log[1] - log[0])
-    span = (log[0] - half, log[-1] + half)
-    known = [math.log10(c) for row in costs for c in row if c]
-    low, high = min(known), max(known)
-    panel = plots.Panel(80, 20, 380, 380, span, span)
-    for second, row in zip(log, costs):
-        for first, cost in zip(log, row):
-            colour = plots.shade((math.log10(cost) - low) / (high - low)) if cost else "#ddd"
-            panel.cell((10**(first - half), 10**(first + half)), (10**(second - half), 10**(second + half)), colour)
-    panel.axes("modulus at the held end [Pa]", "modulus at the free end [Pa]")
-    panel.cross(*truth)
-    for i in range(40):
-        panel.parts.append(f'<rect x="490" y="{360 - 8 * i}" width="18" height="8.4" fill="{plots.shade(i / 39)}"/>')
-    panel.parts.append(f'<text x="514" y="368">{10**low:.1e}</text><text x="514" y="54">{10**high:.1e}</text><text x="490" y="30">cost</text>')
-    plots.write(path, 600, 460, panel.parts)
-
-
 def bar_plots(figures):
     runs = figures["runs"]
     panel = plots.Panel(80, 20, 540, 300, (0.0, 2.3), (-10.0, 1.5))
@@ -566,10 +513,6 @@ def bar_plots(figures):
             number += 1
     panel.axes("Young's modulus [Pa]; dashed: truth", "frequency mismatch")
     plots.write(IMAGES / "bar-frequency-match.svg", 660, 340, panel.parts)
-
-
-def judged(good):
-    return "met" if good else "missed"
 
 
 def bar_targets(runs):
@@ -672,76 +615,6 @@ def dinosaur():
         f": load {r['load_at_start']:.1f} at the start" if "load_at_start" in r else "") + ".\n"
 
 
-def tiny(value):
-    """Of errors that span decades."""
-    return "" if value is None else f"{value:.1e}"
-
-
-def found_or_why(row):
-    if row["found"]:
-        return "yes"
-    return "no: " + row["reason"].removeprefix("this material carries ")
-
-
-SCHEME_NAMES = {"pseudo_transient": "steps of pseudo-time (default)", "newton": "Newton's method from the scan", "virtual_force": "virtual forces (the paper's)"}
-
-
-def reference_object(r):
-    return [r["choices"]["object"], f"{float(r['choices']['youngs_modulus']):g}", f"{r['nodes']}", percent(r["sag"], sign=False)]
-
-
-def scheme_name(r, row):
-    name = SCHEME_NAMES[row["scheme"]]
-    if row["scheme"] == "virtual_force":
-        name += f", steps of {r['choices']['virtual_step']} s, damping {r['choices']['virtual_damping']} / s"
-    return name
-
-
-def reference_shapes():
-    figures = results("reference-shapes")
-    if not figures:
-        return "Not run yet.\n"
-    images = [f"![{name}: free of load and sagged, in grey; the scan as dots](images/reference-shapes-{name}.png)"
-              for name in dict.fromkeys(r["choices"]["object"] for r in figures["recovered"])]
-    rows = [reference_object(r) + [tiny(row.get("static_error")), tiny(row.get("known_error")), tiny(row["residual"]), row["iterations"],
-                                   f"{row['seconds']:.1f}", f"{row['re_sag_seconds']:.1f}" if "re_sag_seconds" in row else found_or_why(row)]
-            for r in figures["recovered"] for row in r["schemes"]]
-    text = "\n\n".join(images) + ("\n\nGrey: the shape that was found, and what it sags into; dots: the scan. Quadratic tetrahedra, Poisson's ratio 0.4, 1000 kg/m^3. Distances are the greatest of any node, "
-                                  "over the object's longest edge; residuals relative to the load; times are processor time of one thread. On the scan's own mesh, of which the known shape's nodes, mass, material and "
-                                  "elements are given, the problem is the exact inverse of the one that made the scan (an inverse crime): it shows that the solver finds what is there, not how well a real object's shape is known.\n\n")
-    text += table(["object", "E [Pa]", "nodes", "sag", "re-sagged against scan", "found against known shape", "residual", "iterations", "time [s]", "time to sag again [s]"], rows)
-    found = [row for r in figures["recovered"] for row in r["schemes"] if row["found"]]
-    total = sum(len(r["schemes"]) for r in figures["recovered"])
-    if found:
-        worst = lambda key: max(row.get(key, math.inf) for row in found)
-        text += "\n" + table(["target", "here", ""], [
-            ["static shape reproduced to 1e-6", tiny(worst("static_error")), judged(worst("static_error") <= 1e-6)],
-            ["known shape recovered to 1e-3", tiny(worst("known_error")), judged(worst("known_error") <= 1e-3)],
-            ["at most 60 s", f"{worst('seconds'):.1f} s on one thread", judged(worst("seconds") <= 60.0)],
-            ["a shape is found for each", f"{len(found)} of {total}", judged(len(found) == total)]])
-    same = lambda a, b: all(a["choices"][key] == b["choices"][key] for key in ("object", "youngs_modulus", "cell_size"))
-    compared = [(r, row) for rivals in figures["schemes"] for r in [*(r for r in figures["recovered"] if same(r, rivals)), rivals] for row in r["schemes"]]
-    limit = figures["schemes"][0]["choices"]["max_iterations"]
-    text += f"\n**Schemes.** The smallest mesh of each object; the rivals are stopped after {limit} iterations, or at a residual of {float(figures['schemes'][0]['choices']['tolerance']):g}.\n\n"
-    text += table(["object", "E [Pa]", "nodes", "sag", "scheme", "found", "residual", "found against known shape", "iterations", "time [s]"],
-                  [reference_object(r) + [scheme_name(r, row), found_or_why(row), tiny(row["residual"]), tiny(row.get("known_error")), row["iterations"], f"{row['seconds']:.1f}"]
-                   for r, row in compared])
-    text += ("\nThe paper's table 2 reports mean differences of 8.9e-5 (plant), 2.6e-4 (beam) and 1.7e-3 (phone holder) of the load-free shapes from those of another solver, 6.4e-5, 2.2e-5 and 2.3e-9 of the static ones, and 9 to 22 s; "
-             "its meshes, its sizes and its rule for stopping are not given, so the figures stand side by side only.\n")
-    text += "\n**On another mesh.** Of the known shape only the surface of its scan is taken, meshed anew with other tetrahedra, and its mass. What is reproduced is still the scan; how well the shape is known depends on the meshes, of which each has its own stiffness. Vertices of the load-free surface that was found, against where they belong, and their distance from the known surface, read from a grid of 0.4 % of the size, which near sharp edges is worth no better than 2e-3.\n\n"
-    text += table(["object", "E [Pa]", "nodes of the scan's mesh (known shape's)", "sag", "vertices: rms", "greatest", "surface: rms", "greatest", "scan taken for load-free: rms", "re-sagged against scan", "time [s]"],
-                  [[r["choices"]["object"], f"{float(r['choices']['youngs_modulus']):g}", f"{r['nodes']} ({r['known_nodes']})", percent(r["sag"], sign=False)] +
-                   ([tiny(row["vertices"]["rms"]), tiny(row["vertices"]["greatest"]), tiny(row["surface"]["rms"]), tiny(row["surface"]["greatest"]), tiny(row["scan_taken_for_load_free"]["rms"]), tiny(row.get("static_error"))]
-                    if row["found"] else [found_or_why(row), "", "", "", "", ""]) + [f"{row['seconds']:.1f}"]
-                   for r in figures["remeshed"] for row in r["schemes"]])
-    text += f"\n**Too soft.** The scans that sag most, asked for with a modulus {float(figures['refused'][0]['choices']['softer']):g} times too small. What is named as the smallest modulus that carries the load is tried, and 5 % less.\n\n"
-    text += table(["object", "nodes", "E asked for [Pa]", "refused in [s]", "iterations", "smallest E named [Pa]", "found at 0.95 / 1 of it"],
-                  [[r["choices"]["object"], r["nodes"], f"{float(r['choices']['youngs_modulus']) / float(r['choices']['softer']):.3g}", f"{row['seconds']:.1f}", row["iterations"],
-                    *([f"{row['least_youngs_modulus']['named']:.3g}", " / ".join("yes" if n["found"] else "no" for n in row["least_youngs_modulus"]["near"])] if "least_youngs_modulus" in row else ["", found_or_why(row)])]
-                   for r in figures["refused"] for row in r["schemes"]])
-    return text + f"\nMeasured on {machine(figures)}.\n"
-
-
 SECTIONS = [
     ("Another simulator's recordings", "oracle-bounce",
      "A ring dropped on the floor (twice), and a pebble dropped on a tilted board whose place is to be found too, recorded by another simulator with another material law, other elements "
@@ -770,6 +643,11 @@ SECTIONS = [
     ("Load-free shapes of objects that sag", "reference-shapes",
      "Wang et al. 2015, section 6.1 and table 2: a plant, a beam and a phone holder, as simple shapes. Each sags under its weight from a load-free shape that is known; from the sagged shape alone that shape is looked for, with the material given.",
      reference_shapes),
+    ("A leaf that is scanned as it droops", "oracle-sag",
+     "A drooping leaf, then pulled aside and let go; three depth sensors fused to clouds at 30 Hz. Made by another simulator with another material law and other elements. Neither the load-free shape nor the material is known; "
+     "fitted with no choice of ours, and in two other ways beside. The truth is read for judging only.", sagging_leaf),
+    ("A bar of two stiffnesses that sags", "two-zone-sag",
+     "Wang et al. 2015, figures 6 and 9 with the reference shape unknown: moduli and load-free shape together, with derivatives through the equilibrium, beside the paper's splitting.", two_zones),
     ("Memory of long recordings", "memory", "A torus that bounces for ten seconds, with about 2,400 nodes; long steps and few iterations.", memory),
 ]
 
