@@ -84,7 +84,7 @@ MatrixX gradient_scatter(const CostEvaluation& evaluation, const VectorX& mean) 
   const auto& frames = evaluation.frames;
   const int count = int(frames.size());
   const int lags = std::min(count - 1, int(std::ceil(std::sqrt(double(count)))));
-  const Eigen::Index n = evaluation.gradient.size();
+  const Eigen::Index n = evaluation.gauss_newton.rows();
   const VectorX centre = mean.size() > 0 ? mean : VectorX::Zero(n);
   MatrixX scatter = MatrixX::Zero(n, n);
   for (int lag = 0; lag <= lags; ++lag) {

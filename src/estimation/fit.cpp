@@ -453,6 +453,15 @@ class Fit {
     return stages;
   }
 
+  /// Thin objects are meshed by their thickness, however few cells are asked for: starts were then followed on the full
+  /// grid already.
+  bool coarse_is_as_fine() const {
+    constexpr double hardly = 0.8;  // of the elements
+    for (std::size_t i = 0; i < fine_.recording.size(); ++i)
+      if (coarse_.recording[i].body->element_count() < hardly * fine_.recording[i].body->element_count()) return false;
+    return true;
+  }
+
   /// The start that fits best, and its number.
   std::pair<VectorX, int> best_start() const {
     const auto best = std::ranges::min_element(outcome_.starts, {}, &FitStart::cost);
@@ -472,7 +481,7 @@ class Fit {
     for (; now.stage < int(stages.size()) && state_.refined.empty(); ++now.stage, now.optimiser = {}) {
       const Stage& stage = stages[std::size_t(now.stage)];
       const bool last = now.stage + 1 == int(stages.size());
-      if (was_interrupted && !last) continue;
+      if ((was_interrupted || coarse_is_as_fine()) && !last) continue;
       parameters = parameters_;
       // Where swings may still be out of step, Poisson's ratio would make up for what others lack.
       if (swings() && !last) parameters.set_estimated("poisson_ratio", false);

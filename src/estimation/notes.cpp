@@ -7,8 +7,8 @@ namespace pliant {
 
 namespace {
 
-/// Not of interest to a user: forces that stand for whoever held the object.
-bool is_auxiliary(const std::string& name) { return name.starts_with("pull@"); }
+/// Not of interest to a user one by one: forces that stand for whoever held the object, and parts of a scan's error.
+bool is_auxiliary(const std::string& name) { return name.starts_with("pull@") || name.starts_with("scan_correction@"); }
 
 std::string spoken(std::string name) {
   for (char& c : name)
@@ -68,6 +68,22 @@ void say_if_starts_disagree(FitOutcome& outcome) {
   }
 }
 
+/// Where the object is free of load is not where its scan has it.
+void say_what_shape(FitOutcome& outcome) {
+  for (const RecordingOutcome& r : outcome.recordings) {
+    const SimulationOptions& scene = r.discretisation.simulation;
+    if (!r.rest_body || (!scene.scan_sags && scene.shape.points.empty())) continue;
+    const Points moved = r.rest_body->nodes - r.rest_body->scanned_positions();
+    char text[64];
+    std::snprintf(text, sizeof text, "%.3g mm", 1e3 * moved.rowwise().norm().maxCoeff());
+    outcome.notes.push_back(
+        scene.scan_sags ? "The scan shows the object as it sags; free of load, as the model has it, parts of it "
+                          "lie up to " +
+                              std::string(text) + " elsewhere."
+                        : "The scan was corrected along with the material, by up to " + std::string(text) + ".");
+  }
+}
+
 }  // namespace
 
 void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures) {
@@ -77,6 +93,7 @@ void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures)
     say_what_is_assumed(outcome);
   }
   say_if_starts_disagree(outcome);
+  say_what_shape(outcome);
   if (outcome.evaluation.succeeded && outcome.evaluation.matched_fraction() < 0.9)
     outcome.notes.push_back(
         "More than a tenth of the observed points lie too far from the simulated object to be matched: "

@@ -293,6 +293,7 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
   d_blended_ = change.x + d_beta / dt * delta;
   for (const auto lag : all_lags) d_lag_[std::size_t(lag)] = change.x + s.prediction[std::size_t(lag)] * change.v;
   d_force_.setZero();
+  if (d_reference && d_reference->isZero(0.0)) d_reference = nullptr;  // pulls and dampings leave it where it is
   for (auto& term : terms_) {
     const bool blended = term->at() == ForceTerm::At::Blended;
     term->add_force_tangent(points_at_[std::size_t(term->at())], d_lag_[std::size_t(term->lag())],
