@@ -147,6 +147,22 @@ def read_vtu(path):
     return found
 
 
+def read_vertices(path):
+    """[(x, y, z) [m]] of a PLY mesh as recordings and models have it: x, y, z come first; binary or text."""
+    data = pathlib.Path(path).read_bytes()
+    head, body = data[:data.index(b"end_header\n")].decode().splitlines(), data[data.index(b"end_header\n") + 11:]
+    count = int(next(line for line in head if line.startswith("element vertex")).split()[2])
+    kinds = []
+    for line in head[head.index(f"element vertex {count}") + 1:]:
+        if not line.startswith("property"):
+            break
+        kinds.append(line.split()[1])
+    if head[1].split()[1] == "ascii":
+        return [tuple(map(float, line.split()[:3])) for line in body.decode().splitlines()[:count]]
+    row = struct.Struct("<" + "".join({"float": "f", "double": "d", "uchar": "B", "int": "i"}[k] for k in kinds))
+    return [row.unpack_from(body, i * row.size)[:3] for i in range(count)]
+
+
 def relative_error(estimate, truth):
     return estimate / truth - 1.0
 

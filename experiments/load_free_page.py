@@ -118,3 +118,21 @@ def two_zones():
     text += ("\nThe cost over both moduli, as in figure 6 of the paper, each with its own load-free shape; grey: degenerate, no load-free shape sags into the scan; cross: truth.\n\n"
              "![Cost over two moduli of a bar that sags](images/two-zone-sag.svg)\n")
     return text + f"\nMeasured on {machine(figures)}.\n"
+
+
+def rough_scan():
+    figures = results("rough-scan")
+    if not figures:
+        return "Not run yet.\n"
+    names = {"exact": "scan as it is", "bent": "scan bent", "corrected": f"scan bent, corrected about {figures['correction']['scan_points']} points"}
+    text = (f"The bend moves vertices by {percent(figures['bend']['rms'], False)} of the ring's size rms, {percent(figures['bend']['greatest'], False)} at most. All three fits: {figures['choices']['cells']} cells, linear tetrahedra, which "
+            "are too stiff for nearly incompressible solids: the first row is what the others are to be held against.\n\n")
+    rows = []
+    for name, f in figures["fits"].items():
+        p = f["parameters"]
+        E = p["youngs_modulus"]
+        rows.append([names[name], f["commit"][:7], with_truth(E), percent(E["value"] / figures["fits"]["exact"]["parameters"]["youngs_modulus"]["value"] - 1), with_truth(p["poisson_ratio"]),
+                     with_truth(p["mass_damping"]), with_truth(p["stiffness_damping"], 1e3), f"{percent(f['scan_off']['rms'], False)} / {percent(f['scan_off']['greatest'], False)}", f"{1e3 * f['surface_rms']:.2f}",
+                     f"{f['cost']:.0f}", f"{f['wall_seconds']:.0f}", "yes" if f["converged"] else "no"])
+    text += table(["", "program", "E [Pa] (truth)", "against the exact scan's", "nu (truth)", "mass damping [1/s] (truth)", "stiffness damping [ms] (truth)", "shape off the exact scan, rms / greatest", "surface rms [mm]", "cost", "time [s]", "converged"], rows)
+    return text + f"\nMeasured on {machine(figures)}.\n"

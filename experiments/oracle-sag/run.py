@@ -6,7 +6,6 @@ Fitted with no choice of ours, with shape and material in turns (Wang 2015, algo
 truth.json and the true shapes are read for judging only. Standard library only."""
 import math
 import pathlib
-import struct
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -21,22 +20,6 @@ FITS = {
     "in-turns": (False, {"load_free": "in_turns"}),
     "scan-load-free": (True, {"element": "quadratic_tetrahedra", "steps": 0.5}),
 }
-
-
-def vertices(path):
-    """Of a PLY mesh as the recordings and models have it: x, y, z as the first properties, binary or in text."""
-    data = pathlib.Path(path).read_bytes()
-    head, body = data[:data.index(b"end_header\n")].decode().splitlines(), data[data.index(b"end_header\n") + 11:]
-    count = int(next(line for line in head if line.startswith("element vertex")).split()[2])
-    kinds = []
-    for line in head[head.index(f"element vertex {count}") + 1:]:
-        if not line.startswith("property"):
-            break
-        kinds.append(line.split()[1])
-    if head[1].split()[1] == "ascii":
-        return [tuple(map(float, line.split()[:3])) for line in body.decode().splitlines()[:count]]
-    row = struct.Struct("<" + "".join({"float": "f", "double": "d", "uchar": "B", "int": "i"}[k] for k in kinds))
-    return [row.unpack_from(body, i * row.size)[:3] for i in range(count)]
 
 
 def minus(a, b):
@@ -75,8 +58,8 @@ def sagged(program, fit, places):
 
 def judge(program, fit, data):
     """The load-free shape, and what it sags into, against the true ones, vertex by vertex."""
-    reference, static = vertices(data / "truth/reference.ply"), vertices(data / "truth/static.ply")
-    found = vertices(fit / "surface.ply")
+    reference, static = common.read_vertices(data / "truth/reference.ply"), common.read_vertices(data / "truth/static.ply")
+    found = common.read_vertices(fit / "surface.ply")
     size = max(max(p[d] for p in reference) - min(p[d] for p in reference) for d in range(3))
     sag = lengths(minus(static, reference))
     off = lengths(minus(found, reference))
