@@ -18,7 +18,7 @@ NAMES = ["youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]
 FITS = {
     "together": (False, {}),
     "in-turns": (False, {"load_free": "in_turns"}),
-    "scan-load-free": (True, {"element": "quadratic_tetrahedra", "steps": 0.5}),
+    "scan-load-free": (True, {}),
 }
 
 
@@ -37,8 +37,8 @@ def rms(values):
 def sagged(program, fit, places):
     """Where vertices of a fit's load-free surface come to rest under gravity: as the nearest nodes of its volume do."""
     text = (fit / "model.toml").read_text().splitlines()
-    zero, none = ("frame_rate", "frame_count", "start_frame"), ("released", "pulls")
-    still = [line.split("=")[0] + "= 0" if line.startswith(zero) else line for line in text if not line.startswith(none)]
+    moving = ("[timing]", "frame_rate", "frame_count", "start_frame", "substeps", "released", "pulls")
+    still = [line for line in text if not line.startswith(moving)]
     folder = fit / "at-rest"
     folder.mkdir(exist_ok=True)
     (folder / "model.toml").write_text("\n".join(still) + "\n")
@@ -72,7 +72,7 @@ def judge(program, fit, data):
 
 
 def main():
-    arguments = common.arguments(__doc__)
+    arguments = common.arguments(__doc__, gather={"action": "store_true", "help": "no new fits: gather those that are in --work"})
     data = common.shared_data() / RECORDING
     if not (data / "capture.toml").exists():
         raise SystemExit(f"{data} is not there")
@@ -85,6 +85,8 @@ def main():
             (taken / name).symlink_to((data / name).resolve())
     fits = {}
     for name, (is_taken, choices) in FITS.items():
+        if arguments.gather and not (arguments.work / name / "figures.json").exists():
+            continue
         figures = common.fit(arguments.program, taken if is_taken else data, arguments.work / name, choices)
         result = figures.pop("result")
         parameters = {key: {"value": common.number(p["value"]), "std": common.number(p.get("std"), 2), "unit": p["unit"],
