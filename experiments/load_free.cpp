@@ -160,12 +160,12 @@ Objective objective_of(const Recorded& recorded, const ParameterSet& parameters,
 
 json compare(const Recorded& recorded) {
   json runs = json::array();
-  const std::pair<double, double> starts[] = {{2.0, 0.5}, {0.7, 2.0}, {3.0, 3.0}};
+  const std::pair<double, double> starts[] = {{2.0, 0.5}, {3.0, 3.0}};
   for (const auto& [held, free] : starts)
     for (const std::string scheme : {"together", "in turns", "scan taken for load-free"}) {
       const ParameterSet parameters = parameters_from(held * youngs_moduli[0], free * youngs_moduli[1]);
       OptimiserOptions options;
-      options.max_iterations = 60;
+      options.max_iterations = scheme.front() == 's' ? 8 : 60;  // it runs to a bound, slowly
       options.step_tolerance = 1e-4;
       options.cost_tolerance = 1e-6;
       const auto begin = std::chrono::steady_clock::now();
@@ -181,14 +181,9 @@ json compare(const Recorded& recorded) {
       }
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       const VectorX theta = parameters.to_theta(s.p);
-      json run = {{"scheme", scheme},
-                  {"start", {held, free}},
-                  {"succeeded", s.succeeded},
-                  {"converged", s.converged},
-                  {"reason", s.reason},
-                  {"iterations", iterations},
-                  {"evaluations", evaluations},
-                  {"seconds", seconds}};
+      json run = {{"scheme", scheme},           {"start", {held, free}}, {"succeeded", s.succeeded},
+                  {"converged", s.converged},   {"reason", s.reason},    {"iterations", iterations},
+                  {"evaluations", evaluations}, {"seconds", seconds}};
       if (s.succeeded) {
         run["cost"] = s.evaluation.cost;
         run["errors"] = {theta[theta::modulus(0, 2, theta_size)] / youngs_moduli[0] - 1.0,

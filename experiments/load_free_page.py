@@ -135,4 +135,8 @@ def rough_scan():
                      with_truth(p["mass_damping"]), with_truth(p["stiffness_damping"], 1e3), f"{percent(f['scan_off']['rms'], False)} / {percent(f['scan_off']['greatest'], False)}", f"{1e3 * f['surface_rms']:.2f}",
                      f"{f['cost']:.0f}", f"{f['wall_seconds']:.0f}", "yes" if f["converged"] else "no"])
     text += table(["", "program", "E [Pa] (truth)", "against the exact scan's", "nu (truth)", "mass damping [1/s] (truth)", "stiffness damping [ms] (truth)", "shape off the exact scan, rms / greatest", "surface rms [mm]", "cost", "time [s]", "converged"], rows)
+    c, b = figures["fits"]["corrected"], figures["fits"]["bent"]
+    nearer = c["scan_off"]["rms"] < b["scan_off"]["rms"]
+    text += (f"\nCorrected, the surface error falls from {1e3 * b['surface_rms']:.2f} to {1e3 * c['surface_rms']:.2f} mm. The shape as a whole is {'nearer to' if nearer else 'no nearer to'} the exact scan"
+             + (".\n" if nearer else ": one camera sees one side, and what it does not see moves along as the prior lets it.\n"))
     return text + f"\nMeasured on {machine(figures)}.\n"

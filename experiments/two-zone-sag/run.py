@@ -9,7 +9,7 @@ sys.path.insert(0, str(HERE.parent))
 import common
 import subprocess
 
-CELLS, NOISE = 14, 2e-4
+CELLS, NOISE = 10, 2e-4
 LANDSCAPE_CELLS, SAMPLES = 8, 17
 
 
