@@ -645,7 +645,7 @@ SECTIONS = [
      reference_shapes),
     ("A leaf that is scanned as it droops", "oracle-sag",
      "A drooping leaf, then pulled aside and let go; three depth sensors fused to clouds at 30 Hz. Made by another simulator with another material law and other elements. Neither the load-free shape nor the material is known; "
-     "fitted with no choice of ours, and in two other ways beside. The truth is read for judging only.", sagging_leaf),
+     "fitted with no choice of ours, and in other ways beside. The truth is read for judging only.", sagging_leaf),
     ("A bar of two stiffnesses that sags", "two-zone-sag",
      "Wang et al. 2015, figures 6 and 9 with the reference shape unknown: moduli and load-free shape together, with derivatives through the equilibrium, beside the paper's splitting.", two_zones),
     ("A scan that is only roughly right", "rough-scan",
