@@ -73,7 +73,7 @@ def sagging_leaf():
     figures = results("oracle-sag")
     if not figures:
         return "Not run yet.\n"
-    names = {"together": "together (default)", "in-turns": "in turns (Wang 2015, algorithm 1)", "scan-load-free": "scan taken for load-free"}
+    names = {"together": "together (default)", "in-turns": "in turns (Wang 2015, algorithm 1)", "scan-load-free": "scan taken for load-free, linear tetrahedra"}
     fits = figures["fits"]
     any_fit = next(iter(fits.values()))
     text = (f"The leaf is {1e3 * any_fit['size']:.0f} mm long and sags by up to {1e3 * any_fit['true_sag_greatest']:.0f} mm, {1e3 * any_fit['true_sag_rms']:.0f} mm rms. Vertices of the load-free surface "
