@@ -1,11 +1,9 @@
 #include "estimation/load_free.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "base/error.hpp"
-#include "elasticity/corotated.hpp"
-#include "solvers/linear_solver.hpp"
+#include "motion/linear_statics.hpp"
 
 namespace pliant {
 
@@ -26,28 +24,6 @@ RolloutSummary sag_from_load_free(const Body& free, SimulationOptions options, c
   options.newton.tolerance = 1e-11;
   Simulation simulation(std::make_shared<Body>(std::move(body)), options);
   return simulation.run(theta, [&](int, const State& state, auto) { return sagged = state.x, true; });
-}
-
-double largest_linear_displacement(const std::shared_ptr<const Body>& body, const std::vector<int>& held,
-                                   const VectorX& theta, const Points& load) {
-  const auto elasticity = make_elasticity(body);
-  elasticity->set_parameters(theta);
-  elasticity->linearise(body->reference_positions());
-  BlockMatrix matrix(body->pattern);
-  matrix.set_zero();
-  elasticity->add_matrix(1.0, matrix);
-  Points force = load;
-  for (const int node : held) {
-    matrix.constrain(node);
-    force.row(node).setZero();
-  }
-  SolverOptions direct;
-  direct.kind = best_direct_kind();
-  const auto solver = make_linear_solver(body->pattern, direct);
-  VectorX u = VectorX::Zero(force.size());
-  if (!solver->factorise(matrix)) return body->size();
-  (void)solver->solve(flat(force), u);
-  return as_points(std::as_const(u)).rowwise().norm().maxCoeff();
 }
 
 }  // namespace
@@ -76,7 +52,8 @@ double carrying_modulus(const std::shared_ptr<const Body>& body, const Simulatio
   const auto scale = [&](double factor) {
     for (int k = 0; k < controls; ++k) theta[theta::modulus(k, controls, theta.size())] *= factor;
   };
-  scale(largest_linear_displacement(body, held, theta, load) / (sag_of_size * body->size()));
+  const LinearStatics statics(body, held, theta);
+  if (statics.is_held()) scale(statics.greatest_displacement(load) / (sag_of_size * body->size()));
   for (int i = 0; i < most_doublings; ++i, scale(2.0)) {
     if ((interrupted && interrupted()) || shape.find(theta, load).found) return theta[theta::youngs_modulus];
   }

@@ -4,11 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <utility>
 
 #include "base/error.hpp"
-#include "elasticity/corotated.hpp"
-#include "solvers/linear_solver.hpp"
+#include "motion/linear_statics.hpp"
 
 namespace pliant {
 
@@ -29,29 +27,14 @@ VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const st
   VectorX theta = VectorX::Zero(theta::size(0, body->modulus.controls));
   for (int k = 0; k < body->modulus.controls; ++k) theta[theta::modulus(k, body->modulus.controls, theta.size())] = 1.0;
   theta[theta::poissons_ratio] = 0.3;
-  const auto elasticity = make_elasticity(body);
-  elasticity->set_parameters(theta);
-  elasticity->linearise(body->reference_positions());
-  BlockMatrix matrix(body->pattern);
-  matrix.set_zero();
-  elasticity->add_matrix(1.0, matrix);
-  for (const int node : held) matrix.constrain(node);
-  SolverOptions direct;  // one matrix, many right-hand sides
-  direct.kind = best_direct_kind();
-  const auto solver = make_linear_solver(body->pattern, direct);
-  if (held.size() < 3 || !solver->factorise(matrix))
+  const LinearStatics statics(body, held, theta);
+  if (!statics.is_held())
     throw InputError({{},
                       "nothing holds the object while it is pulled",
                       "a [[fixed]] region that contains a part of the object",
                       "say in capture.toml where the object is held before and after it is released"});
   VectorX greatest(Eigen::Index(forces.size()));
-  for (std::size_t i = 0; i < forces.size(); ++i) {
-    Points force = forces[i];
-    for (const int node : held) force.row(node).setZero();
-    VectorX u = VectorX::Zero(force.size());
-    (void)solver->solve(flat(force), u);
-    greatest[Eigen::Index(i)] = as_points(std::as_const(u)).rowwise().norm().maxCoeff();
-  }
+  for (std::size_t i = 0; i < forces.size(); ++i) greatest[Eigen::Index(i)] = statics.greatest_displacement(forces[i]);
   return greatest;
 }
 

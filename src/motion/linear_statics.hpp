@@ -1,0 +1,30 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "elasticity/body.hpp"
+#include "solvers/linear_solver.hpp"
+
+namespace pliant {
+
+/// Small displacements of a body from where it is free of load. One factorisation, any number of loads.
+class LinearStatics {
+ public:
+  /// @param held   nodes that stay where they are
+  /// @param theta  of the material
+  LinearStatics(const std::shared_ptr<const Body>& body, const std::vector<int>& held, const VectorX& theta);
+
+  /// Whether the held nodes hold the body; only then are there displacements.
+  bool is_held() const { return is_held_; }
+  /// Of any node [m], for forces at the nodes, n x 3 [N].
+  double greatest_displacement(Points force) const;
+
+ private:
+  std::vector<int> held_;
+  BlockMatrix matrix_;
+  std::unique_ptr<LinearSolver> solver_;
+  bool is_held_ = false;
+};
+
+}  // namespace pliant
