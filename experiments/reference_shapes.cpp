@@ -25,6 +25,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "choices.hpp"
 #include "geometry/signed_distance.hpp"
 #include "geometry/tet_mesh.hpp"
 #include "held_objects.hpp"
@@ -39,33 +40,20 @@ using nlohmann::json;
 
 constexpr double density = 1000.0;  // [kg/m^3]
 
-using Choices = std::map<std::string, std::string>;
-
-Choices read_choices(int argc, char** argv) {
-  Choices choices = {{"object", "beam"},
-                     {"cell_size", "0.02"},
-                     {"scan_cell_size", "0.025"},
-                     {"order", "2"},
-                     {"youngs_modulus", "1e6"},
-                     {"poissons_ratio", "0.4"},
-                     {"task", "recover"},
-                     {"softer", "30"},
-                     {"schemes", "pseudo_transient"},
-                     {"max_iterations", "1000"},
-                     {"tolerance", "1e-8"},
-                     {"virtual_step", "0.1"},
-                     {"virtual_damping", "2"},
-                     {"picture", ""}};
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    const auto equals = word.find('=');
-    if (equals == std::string::npos || !choices.contains(word.substr(0, equals)))
-      throw std::invalid_argument("\"" + word +
-                                  "\" is not one of this program's choices; see experiments/reference_shapes.cpp");
-    choices[word.substr(0, equals)] = word.substr(equals + 1);
-  }
-  return choices;
-}
+const Choices standard_choices = {{"object", "beam"},
+                                  {"cell_size", "0.02"},
+                                  {"scan_cell_size", "0.025"},
+                                  {"order", "2"},
+                                  {"youngs_modulus", "1e6"},
+                                  {"poissons_ratio", "0.4"},
+                                  {"task", "recover"},
+                                  {"softer", "30"},
+                                  {"schemes", "pseudo_transient"},
+                                  {"max_iterations", "1000"},
+                                  {"tolerance", "1e-8"},
+                                  {"virtual_step", "0.1"},
+                                  {"virtual_damping", "2"},
+                                  {"picture", ""}};
 
 double processor_seconds() {
   rusage usage{};
@@ -317,11 +305,5 @@ class Experiment {
 }  // namespace pliant
 
 int main(int argc, char** argv) {
-  try {
-    std::printf("%s\n", pliant::Experiment(pliant::read_choices(argc, argv)).run().dump(1).c_str());
-    return 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "pliant_reference_shapes: %s\n", error.what());
-    return 1;
-  }
+  return pliant::run_experiment<pliant::Experiment>("pliant_reference_shapes", argc, argv, pliant::standard_choices);
 }

@@ -29,6 +29,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "choices.hpp"
 #include "elasticity/corotated.hpp"
 #include "estimation/modal_start.hpp"
 #include "estimation/objective.hpp"
@@ -45,40 +46,28 @@ constexpr double alpha = 2e-2, beta = 1e-3;        // the truth's, as in the pap
 constexpr double poissons_ratio = 0.4, rho = 1e3;  // known
 constexpr double off = 10.0;
 
-using Choices = std::map<std::string, std::string>;
-
-Choices read_choices(int argc, char** argv) {
-  Choices choices = {{"object", "bar"},
-                     {"cell_size", "0.03"},
-                     {"task", "fit"},
-                     {"moduli", "6.8e5"},
-                     {"controls", "1"},
-                     {"noise", "0"},
-                     {"truth_steps", "1"},
-                     {"frames", "250"},
-                     {"rate", "60"},
-                     {"horizon", "50"},
-                     {"steps", "4"},
-                     {"solver", "cholmod"},
-                     {"newmark_theta", "0.51"},
-                     {"optimiser", "levenberg_marquardt"},
-                     {"start", "modal"},
-                     {"curve_samples", "0"},
-                     {"tolerance", "1e-3"},
-                     {"budget", "1e9"},
-                     {"evaluations", "1000000"},
-                     {"samples", "15"},
-                     {"from", "1e4"},
-                     {"to", "1e7"}};
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    const auto equals = word.find('=');
-    if (equals == std::string::npos || !choices.contains(word.substr(0, equals)))
-      throw std::invalid_argument("\"" + word + "\" is not one of this program's choices; see experiments/tracks.cpp");
-    choices[word.substr(0, equals)] = word.substr(equals + 1);
-  }
-  return choices;
-}
+const Choices standard_choices = {{"object", "bar"},
+                                  {"cell_size", "0.03"},
+                                  {"task", "fit"},
+                                  {"moduli", "6.8e5"},
+                                  {"controls", "1"},
+                                  {"noise", "0"},
+                                  {"truth_steps", "1"},
+                                  {"frames", "250"},
+                                  {"rate", "60"},
+                                  {"horizon", "50"},
+                                  {"steps", "4"},
+                                  {"solver", "cholmod"},
+                                  {"newmark_theta", "0.51"},
+                                  {"optimiser", "levenberg_marquardt"},
+                                  {"start", "modal"},
+                                  {"curve_samples", "0"},
+                                  {"tolerance", "1e-3"},
+                                  {"budget", "1e9"},
+                                  {"evaluations", "1000000"},
+                                  {"samples", "15"},
+                                  {"from", "1e4"},
+                                  {"to", "1e7"}};
 
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -474,11 +463,5 @@ class Experiment {
 }  // namespace pliant
 
 int main(int argc, char** argv) {
-  try {
-    std::printf("%s\n", pliant::Experiment(pliant::read_choices(argc, argv)).run().dump(1).c_str());
-    return 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "pliant_tracks: %s\n", error.what());
-    return 1;
-  }
+  return pliant::run_experiment<pliant::Experiment>("pliant_tracks", argc, argv, pliant::standard_choices);
 }
