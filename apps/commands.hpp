@@ -15,6 +15,7 @@ enum ExitCode : int { Fine = 0, BadInput = 2, NotConverged = 3, WasInterrupted =
 void add_check(CLI::App& app, int& exit_code);
 void add_fit(CLI::App& app, int& exit_code);
 void add_simulate(CLI::App& app, int& exit_code);
+void add_track(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_synth(CLI::App& app, int& exit_code);
 void add_rest(CLI::App& app, int& exit_code);

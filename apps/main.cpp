@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   add_check(app, exit_code);
   add_fit(app, exit_code);
   add_simulate(app, exit_code);
+  add_track(app, exit_code);
   add_evaluate(app, exit_code);
   add_synth(app, exit_code);
   add_rest(app, exit_code);

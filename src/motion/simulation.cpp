@@ -62,13 +62,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
                 options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
       rest_(body_->scanned_positions()) {
   if (holds_strongly(*body_, options_)) {
-    std::vector<int> held = held_nodes(*body_, options_.holds);
-    if (held.empty() && !options_.holds.empty())
-      throw InputError({{},
-                        "the held regions contain no node of the object",
-                        "regions that hold a part of it",
-                        "move them onto the object, make them larger, or use smaller elements"});
-    stepper_.hold(std::move(held));
+    stepper_.hold(eliminated_nodes(*body_, options_));
   } else {
     stepper_.anchor(held_nodes(*body_, options_.holds));
   }
@@ -407,6 +401,29 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     return summary.failure = "a matrix of the start's derivatives cannot be factorised", summary;
   summary.succeeded = true;
   return summary;
+}
+
+std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,
+                                                     const SimulationOptions& options) {
+  SimulationOptions without_pulls = options;
+  without_pulls.pulls = 0;
+  Elasticity* elasticity = nullptr;
+  FixedRegions* fixed = nullptr;
+  Pull* pull = nullptr;
+  std::vector<std::unique_ptr<ForceTerm>> terms = make_terms(body, without_pulls, elasticity, fixed, pull);
+  if (fixed) fixed->move_to(options.holds);
+  return terms;
+}
+
+std::vector<int> eliminated_nodes(const Body& body, const SimulationOptions& options) {
+  if (!holds_strongly(body, options)) return {};
+  std::vector<int> held = held_nodes(body, options.holds);
+  if (held.empty() && !options.holds.empty())
+    throw InputError({{},
+                      "the held regions contain no node of the object",
+                      "regions that hold a part of it",
+                      "move them onto the object, make them larger, or use smaller elements"});
+  return held;
 }
 
 ContactOptions default_contact(const Body& body, double mass, double gravity) {

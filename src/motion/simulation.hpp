@@ -138,6 +138,13 @@ class Simulation {
   std::size_t peak_state_bytes_ = 0;
 };
 
+/// All forces of a scene but pulls, each held region at the end of its way.
+std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,
+                                                     const SimulationOptions& options);
+
+/// Nodes that a simulation of the scene eliminates; the others in held regions are held by forces.
+std::vector<int> eliminated_nodes(const Body& body, const SimulationOptions& options);
+
 /// Stiffness and smoothing of contact that suit an object of this size and weight: its weight on its projected area
 /// presses it in by 1e-4 of its size, and contact sets in over 1e-3 of it: the smallest that steps of the default
 /// length resolve. Softer contact lets the object hover and rebound more than a rigid floor does.

@@ -105,6 +105,19 @@ bool Stepper::prepare(const State& start) {
   if (is_newton()) return true;
   const Scheme s = scheme();
   for (const auto lag : all_lags) lag_[std::size_t(lag)] = start.x + s.prediction[std::size_t(lag)] * start.v;
+  return factorise(s);
+}
+
+bool Stepper::prepare(const State& start, const Points& delta) {
+  if (!start.x.allFinite() || !delta.allFinite()) return false;
+  for (const auto lag : all_lags) {
+    const double share = lag == ForceTerm::Lag::Rotation ? options_.newmark_theta : options_.contact_weight;
+    lag_[std::size_t(lag)] = start.x + share * delta;
+  }
+  return factorise(scheme());
+}
+
+bool Stepper::factorise(const Scheme& s) {
   set_mass_matrix(s, matrix_);
   for (auto& term : terms_) {
     term->linearise(lag_[std::size_t(term->lag())]);

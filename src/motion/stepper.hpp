@@ -74,6 +74,9 @@ class Stepper {
 
   /// Linearises and factorises about a step's start. False where the matrix is not positive definite or not finite.
   [[nodiscard]] bool prepare(const State& start);
+  /// The same about where a step would end that is nearly known: steps of the lagged scheme can be repeated until their
+  /// rotations and contact are those of their own end.
+  [[nodiscard]] bool prepare(const State& start, const Points& delta);
   /// Delta of the prepared step; in: a guess (dt v is a good one). Not converged or not finite: `converged` is false.
   /// `iterations` are those of the linear solver, or Newton's.
   [[nodiscard]] SolveSummary solve(const State& start, Points& delta);
@@ -113,6 +116,8 @@ class Stepper {
     bool has_mass = true;
   };
   Scheme scheme() const;
+  /// Assembles and factorises the lagged step's matrix about the lag points at hand.
+  [[nodiscard]] bool factorise(const Scheme& scheme);
   static Scheme static_scheme();
   /// Sets `points_at_` to the positions x + s Delta at which terms act.
   void set_points_at(const Scheme& scheme, const Points& x, const Points& delta);

@@ -115,6 +115,8 @@ VtuCell vtu_cell(ElementKind kind) {
   return VtuCell::Hexahedron;
 }
 
+}  // namespace
+
 VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& parameters, const State& state,
                    Elasticity& elasticity) {
   const Body& body = *shared;
@@ -145,6 +147,8 @@ VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& par
   grid.cell_data = {std::move(strain), std::move(stress)};
   return grid;
 }
+
+namespace {
 
 /// What was observed in a frame, and how far it lies from the simulated surface; points outside the band are left out.
 void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, const Discretisation& d,

@@ -46,6 +46,11 @@ struct CaptureScene {
 };
 CaptureScene make_scene(const Model& model, const Capture& capture);
 
+/// A state as cells with displacement, velocity, strain and stress (at the elements' middles, turned into the world).
+/// @param elasticity  of the body, with these parameters; it is left linearised about the state
+VtuGrid frame_grid(const std::shared_ptr<const Body>& body, const VectorX& parameters, const State& state,
+                   Elasticity& elasticity);
+
 /// Writes `trajectory.pvd` and `frames/*.vtu`: displacement, velocity, strain and stress of each frame.
 /// @param progress  frames done and their total; false stops
 /// Returns the steps taken and why the simulation ended early, if it did.

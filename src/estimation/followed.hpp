@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "estimation/recordings.hpp"
+#include "tracking/tracker.hpp"
+
+namespace pliant {
+
+/// A recording whose object is followed through its points: the scene that it takes, with a body of its own. Where
+/// the scan was taken sagging and no element is chosen that is one of linear tetrahedra: they are too stiff in bending
+/// to estimate by, and good enough to follow by.
+class FollowedRecording {
+ public:
+  /// Throws InputError where the recording cannot be followed, with the reason.
+  /// @param notes  what the user should know about how it was read is added
+  FollowedRecording(RecordedCapture recorded, const FitOptions& options, std::vector<std::string>& notes);
+
+  /// Parameters at which nothing is known: the capture's facts, the options' choices, and middling guesses.
+  const VectorX& start() const { return start_; }
+  const Recording& recording() const { return recordings_.front(); }
+  /// @param theta     of this recording
+  /// @param progress  frames done and their total; false stops. May be empty
+  [[nodiscard]] Track follow(const VectorX& theta, const std::function<bool(int, int)>& progress = {},
+                             const TrackOptions& options = {}) const;
+
+ private:
+  std::vector<ObservedFrame> observed_;
+  Recordings recordings_;
+  Grid grid_;
+  VectorX start_;
+};
+
+}  // namespace pliant
