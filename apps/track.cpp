@@ -30,7 +30,9 @@ void report_track(const Track& track, double seconds) {
     if (f.points > 0) rms.push_back(f.surface_rms);
   std::ranges::sort(rms);
   std::cout << "  " << track.frames.size() << " frames, " << track.body->node_count() << " nodes, "
-            << track.surface.vertices.size() << " surface samples, " << seconds << " s\n";
+            << track.surface.vertices.size() << " surface samples, " << seconds << " s (" << track.times.correspondence
+            << " s correspondence, " << track.times.motion << " s motion, " << track.times.visibility
+            << " s visibility)\n";
   if (!rms.empty())
     std::cout << "  points to the surface: median " << 1e3 * rms[rms.size() / 2] << " mm rms, worst frame "
               << 1e3 * rms.back() << " mm\n";

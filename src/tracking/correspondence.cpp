@@ -55,7 +55,6 @@ Correspondence expect(const Points& samples, std::span<const double> share, cons
       double sum = outlier;
       if (std::exp(-nearest / (2.0 * s2)) > options.least_posterior * outlier) {
         near.within(cloud.points[i], std::sqrt(nearest + reach * s2) * (1.0 + 1e-12), found);
-        std::ranges::sort(found);  // the tree's order is not that of the samples
         for (const auto& [index, squared] : found) {
           const double p = share[std::size_t(index)] * std::exp(-squared / (2.0 * s2));
           if (p == 0.0) continue;

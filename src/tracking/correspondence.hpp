@@ -19,7 +19,7 @@ struct MixtureOptions {
   double sigma = 0.0;          ///< [m] standard deviation of the samples, > 0; a point's own noise is added in squares
   double outlier_share = 0.1;  ///< beforehand, (0, 1)
   double volume = 0.0;         ///< [m^3] in which outliers lie, > 0
-  double least_posterior = 1e-4;  ///< samples less likely than this times a point's nearest one are left out, (0, 1)
+  double least_posterior = 1e-3;  ///< samples less likely than this times a point's nearest one are left out, (0, 1)
 };
 
 /// Soft correspondences: the expectation step.

@@ -88,9 +88,10 @@ std::vector<SampleLevel> sample_levels(const TriangleMesh& mesh, int fewest) {
   SampleLevel all{0.0, {}, areas, {}};
   for (int v = 0; v < int(areas.size()); ++v) all.vertex.push_back(v), all.sample_of.push_back(v);
   std::vector<SampleLevel> levels = {std::move(all)};
+  constexpr double ratio = 1.5;
   double total = 0.0;
   for (const double area : areas) total += area;
-  for (double spacing = 2.0 * std::sqrt(total / double(areas.size()));; spacing *= 2.0) {
+  for (double spacing = ratio * std::sqrt(total / double(areas.size()));; spacing *= ratio) {
     SampleLevel next = level_of(vertices, near, areas, spacing);
     if (int(next.vertex.size()) < fewest) return levels;
     levels.push_back(std::move(next));

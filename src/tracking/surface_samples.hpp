@@ -19,7 +19,7 @@ struct SampleLevel {
   std::vector<int> sample_of;  ///< of each vertex: the nearest sample
 };
 
-/// Levels from all vertices to few, each about twice as wide as the one before, none with fewer than `fewest` samples
+/// Levels from all vertices to few, each half as wide again as the one before, none with fewer than `fewest` samples
 /// but the first.
 std::vector<SampleLevel> sample_levels(const TriangleMesh& mesh, int fewest = 60);
 

@@ -124,8 +124,9 @@ TrackedFrame Tracker::compare(const TrackView& view) {
 TrackedFrame Tracker::advance(double dt, const TrackView& view) { return look(dt, false, view); }
 
 const SampleLevel& Tracker::level_for(double deviation) const {
+  constexpr double densest = 1.2;  // deviations between samples: a mixture of such Gaussians is still smooth
   std::size_t level = 0;
-  while (level + 1 < levels_.size() && levels_[level + 1].spacing <= 0.8 * deviation) ++level;
+  while (level + 1 < levels_.size() && levels_[level + 1].spacing <= densest * deviation) ++level;
   return levels_[level];
 }
 
@@ -187,7 +188,6 @@ bool Tracker::relax(Points& delta, double tolerance) {
     last_way.swap(way);
     way = end - delta;
     const double farthest = way.cwiseAbs().maxCoeff();
-    if (getenv("DBG")) fprintf(stderr, "   relax %d change %.5f tol %.5f share %.2f\n", i, farthest, tolerance, share);
     if (farthest < tolerance) {
       delta += way;
       return true;
@@ -238,6 +238,8 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
   const double inertia = at_rest ? 0.0 : 1.0 / (dt * dt);
   const double stiffness = options_.data_weight * mass_ * (slowest_ + inertia);  // of all springs [N/m]
   const double sharpest = std::hypot(least, noise);
+  // Points spread about a surface that fits by a little less than the deviation they are sought with.
+  constexpr double sharpening = 0.85, settled = 0.95;
   const double volume = std::pow(2.0 * size_, 3);
   double sigma = std::clamp(distance, least, std::max(least, widest));
   see(state_.x + delta);
@@ -251,8 +253,8 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
       MixtureOptions mixture{sigma, outlier_share_, volume};
       c = expect(samples_of(level, nodes), shares_of(level), {view.points, view.noise}, mixture);
     }
-    // Wider correspondences are blunter: their springs are softer, though not by as much as eq. 5 has it with a constant
-    // eta, which would hardly draw a far surface at all.
+    // Wider correspondences are blunter: their springs are softer, though not by as much as eq. 5 has it with a
+    // constant eta, which would hardly draw a far surface at all.
     const double eta = stiffness * sharpest * std::hypot(sigma, noise) / typical_;
     VectorX k = VectorX::Zero(springs_->count());
     Points targets = Points::Zero(springs_->count(), 3);
@@ -268,15 +270,14 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
     const Points before = delta;
     if (!relax(delta, 0.02 * sigma)) return false;
     const double moved = (delta - before).rowwise().norm().maxCoeff();
-    if (getenv("DBG")) fprintf(stderr, "%d rest %d sigma %.4f moved %.4f max %.4f explained %.2f/%zu dist %.4f slowest %.3g eta %.3g\n", frame.rounds, at_rest, sigma, moved, delta.cwiseAbs().maxCoeff(), c.explained_points, view.points.size(), distance, slowest_, eta);
-    const bool is_finest = sigma <= least;
-    if (is_finest && moved < 0.05 * least) break;
     if (!view.points.empty()) {
       const double explained = c.explained_points / double(view.points.size());
       outlier_share_ = std::clamp(0.5 * outlier_share_ + 0.5 * (1.0 - explained), 0.01, 0.7);
     }
     const double seen = c.explained_points > 0.0 ? std::sqrt(c.sum_squares / (3.0 * c.explained_points)) : 0.0;
-    sigma = std::clamp(seen, std::max(least, options_.annealing * sigma), std::max(least, sigma));
+    const double next = std::clamp(sharpening * seen, std::max(least, options_.annealing * sigma), sigma);
+    if (moved < 0.1 * least && next > settled * sigma) break;
+    sigma = next;
     if (!saw_again && sigma <= 2.0 * least && frame.rounds > 3) see(state_.x + delta), saw_again = true;
   }
   frame.rounds = std::min(frame.rounds, options_.max_rounds);
@@ -438,6 +439,7 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
     result.frames.push_back(std::move(frame));
     if (progress && !progress(f - first + 1, frames - first)) break;
   }
+  result.times = tracker.times();
   return result;
 }
 

@@ -58,13 +58,19 @@ struct TrackedFrame {
   std::vector<int> mark_points;  ///< explained points about each mark
 };
 
+/// Where a tracker's time goes, summed over frames [s].
+struct TrackTimes {
+  double visibility = 0.0, correspondence = 0.0, motion = 0.0;
+};
+
 /// The motion of an object.
 struct Track {
   std::shared_ptr<const Body> body;  ///< free of load
   TriangleMesh surface;              ///< at rest, as sampled
   std::vector<Vector3> marks;        ///< [m] at rest, on the surface
   std::vector<TrackedFrame> frames;
-  std::string note;            ///< what the user should know; may be empty
+  std::string note;  ///< what the user should know; may be empty
+  TrackTimes times;
   std::optional<int> lost_at;  ///< the first frame of the recording in which the object was lost
 };
 
@@ -99,11 +105,8 @@ class Tracker {
   /// How what was seen fits where the object is now; nothing moves.
   TrackedFrame compare(const TrackView& view);
 
-  /// Time that was spent, summed over frames [s].
-  struct Times {
-    double visibility = 0.0, correspondence = 0.0, motion = 0.0;
-  };
-  const Times& times() const { return times_; }
+  /// Spent so far.
+  const TrackTimes& times() const { return times_; }
 
  private:
   TrackedFrame look(double dt, bool at_rest, const TrackView& view);
@@ -137,7 +140,7 @@ class Tracker {
   State state_;
   bool found_ = false;  // in some frame
   double outlier_share_;
-  Times times_;
+  TrackTimes times_;
 };
 
 /// Tracks a recording: frames from its start on, and those before a release, in which something holds it.
