@@ -18,7 +18,9 @@ class FollowedRecording {
   /// @param notes  what the user should know about how it was read is added
   FollowedRecording(RecordedCapture recorded, const FitOptions& options, std::vector<std::string>& notes);
 
-  /// Parameters at which nothing is known: the capture's facts, the options' choices, and middling guesses.
+  /// Parameters at which nothing is known: the capture's facts, the options' choices, and middling guesses. Young's
+  /// modulus is then at least so high that the object's weight hardly bends it: what is too soft hangs too low, while
+  /// what is too stiff is drawn to where it was seen.
   const VectorX& start() const { return start_; }
   const Recording& recording() const { return recordings_.front(); }
   /// @param theta     of this recording
@@ -27,6 +29,7 @@ class FollowedRecording {
                              const TrackOptions& options = {}) const;
 
  private:
+  void stiffen();
   std::vector<ObservedFrame> observed_;
   Recordings recordings_;
   Grid grid_;
