@@ -36,6 +36,7 @@ Correspondence expect(const Points& samples, std::span<const double> share, cons
   Correspondence c;
   const std::size_t n = cloud.points.size();
   c.precision.setZero(samples.rows());
+  c.mass.setZero(samples.rows());
   c.target.setZero(samples.rows(), 3);
   c.explained.assign(n, 0.0f);
   c.likeliest.assign(n, -1);
@@ -82,6 +83,7 @@ Correspondence expect(const Points& samples, std::span<const double> share, cons
         const Weighed& weighed = chunks[k].weighed[j];
         const double precision = weighed.probability / s2;
         c.precision[weighed.sample] += precision;
+        c.mass[weighed.sample] += weighed.probability;
         c.target.row(weighed.sample) += precision * cloud.points[point].transpose();
         c.sum_squares += weighed.probability * weighed.squared_distance;
         c.explained_points += weighed.probability;

@@ -25,6 +25,7 @@ struct MixtureOptions {
 /// Soft correspondences: the expectation step.
 struct Correspondence {
   VectorX precision;              ///< of each sample: sum_n p_kn / s_n^2 [1/m^2], s_n^2 = sigma^2 + noise_n^2
+  VectorX mass;                   ///< of each sample: sum_n p_kn, the points that it explains
   Points target;                  ///< the mean of its points with those weights [m]; zero where there are none
   std::vector<float> explained;   ///< of each point: its probability to be no outlier
   std::vector<int> likeliest;     ///< sample of each point; -1: none is near

@@ -73,6 +73,7 @@ Tracker::Tracker(std::shared_ptr<const Body> body, const SimulationOptions& scen
       samples_(int(surface_.vertices.size())),
       levels_(sample_levels(surface_)),
       visible_(surface_.vertices.size(), 1.0),
+      density_(surface_.vertices.size(), 1.0),
       outlier_share_(options.outlier_share) {
   while (mark_level_ + 1 < levels_.size() && int(levels_[mark_level_ + 1].vertex.size()) >= options.marks / 2)
     ++mark_level_;
@@ -92,6 +93,7 @@ Tracker::Tracker(std::shared_ptr<const Body> body, const SimulationOptions& scen
   stepper_->hold(eliminated_nodes(*body_, scene));
   stepper_->set_parameters(theta);
   slowest_ = slowest_vibration(body_, theta, held);
+  pendulum_ = theta::vector_at(theta, theta::gravity).norm() / size_;
   const Points& rest = body_->scanned_positions();
   state_ = {rest, Points::Zero(rest.rows(), 3)};
   const Vector3 linear = theta::vector_at(theta, theta::linear_velocity);
@@ -142,11 +144,34 @@ std::vector<double> Tracker::shares_of(const SampleLevel& level) const {
   std::vector<double> shares(level.vertex.size());
   double sum = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    shares[i] = level.area[i] * std::max(hidden, visible_[std::size_t(level.vertex[i])]);
+    const auto v = std::size_t(level.vertex[i]);
+    shares[i] = level.area[i] * std::max(hidden, visible_[v]) * density_[v];
     sum += shares[i];
   }
   for (double& share : shares) share /= sum;
   return shares;
+}
+
+void Tracker::learn_density(const SampleLevel& level, const std::vector<double>& shares, const Correspondence& c) {
+  if (c.explained_points <= 0.0) return;
+  const double prior = options_.density_prior;
+  std::vector<double> density(shares.size());
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    const double before = shares[i] / density_[std::size_t(level.vertex[i])];  // up to a factor
+    const double seen = c.mass[Eigen::Index(i)] / c.explained_points;
+    density[i] = before > 0.0 ? (seen / before + prior) / (1.0 + prior) : 1.0;
+  }
+  for (std::size_t v = 0; v < density_.size(); ++v) density_[v] = density[std::size_t(level.sample_of[v])];
+}
+
+Points Tracker::normals_of(const Points& nodes) const {
+  TriangleMesh now{{}, surface_.triangles};
+  now.vertices.reserve(std::size_t(samples_));
+  for (int v = 0; v < samples_; ++v) now.vertices.push_back(springs_->points().position(v, nodes));
+  Points normals(samples_, 3);
+  const std::vector<Vector3> of_vertices = vertex_normals(now);
+  for (int v = 0; v < samples_; ++v) normals.row(v) = of_vertices[std::size_t(v)].transpose();
+  return normals;
 }
 
 void Tracker::see(const Points& nodes) {
@@ -203,7 +228,7 @@ bool Tracker::relax(Points& delta, double tolerance) {
 
 bool Tracker::drift(double dt) {
   constexpr int steps = 4;
-  springs_->set(VectorX::Zero(springs_->count()), Points::Zero(springs_->count(), 3));
+  springs_->clear();
   for (int i = 0; i < steps; ++i) {
     stepper_->set_time_step(dt / steps);
     Points delta = dt / steps * state_.v;
@@ -218,7 +243,7 @@ double Tracker::choose(std::vector<Points> candidates, const TrackView& view, Po
   double best = std::numeric_limits<double>::infinity();
   for (Points& candidate : candidates) {
     const Points nodes = state_.x + candidate;
-    const Points samples = samples_of(levels_[mark_level_], nodes);
+    const Points samples = samples_of(levels_.front(), nodes);
     const Neighbours near(samples);
     std::vector<double> distances;
     const std::size_t stride = std::max<std::size_t>(1, view.points.size() / most);
@@ -236,7 +261,7 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
                        TrackedFrame& frame) {
   const double noise = spread(view), least = std::max(finest_, noise), widest = options_.widest * size_;
   const double inertia = at_rest ? 0.0 : 1.0 / (dt * dt);
-  const double stiffness = options_.data_weight * mass_ * (slowest_ + inertia);  // of all springs [N/m]
+  const double stiffness = options_.data_weight * mass_ * (slowest_ + pendulum_ + inertia);  // of all springs [N/m]
   const double sharpest = std::hypot(least, noise);
   // Points spread about a surface that fits by a little less than the deviation they are sought with.
   constexpr double sharpening = 0.85, settled = 0.95;
@@ -251,13 +276,16 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
     {
       const Stopwatch watch(times_.correspondence);
       MixtureOptions mixture{sigma, outlier_share_, volume};
-      c = expect(samples_of(level, nodes), shares_of(level), {view.points, view.noise}, mixture);
+      const std::vector<double> shares = shares_of(level);
+      c = expect(samples_of(level, nodes), shares, {view.points, view.noise}, mixture);
+      learn_density(level, shares, c);
     }
     // Wider correspondences are blunter: their springs are softer, though not by as much as eq. 5 has it with a
     // constant eta, which would hardly draw a far surface at all.
     const double eta = stiffness * sharpest * std::hypot(sigma, noise) / typical_;
     VectorX k = VectorX::Zero(springs_->count());
-    Points targets = Points::Zero(springs_->count(), 3);
+    Points targets = Points::Zero(springs_->count(), 3), normals = Points::Zero(springs_->count(), 3);
+    normals.topRows(samples_) = normals_of(nodes);
     for (std::size_t i = 0; i < level.vertex.size(); ++i) {
       k[level.vertex[i]] = eta * c.precision[Eigen::Index(i)];
       targets.row(level.vertex[i]) = c.target.row(Eigen::Index(i));
@@ -266,7 +294,10 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
       k[samples_ + seen.point] = stiffness / double(view.markers.size());
       targets.row(samples_ + seen.point) = seen.position.transpose();
     }
-    springs_->set(std::move(k), std::move(targets));
+    // Where the surface lies along itself shows in its ends and edges; what pulls it sideways elsewhere is mostly
+    // chance.
+    const double tangential = std::clamp(sigma / (options_.sliding * size_), 0.02, 1.0);
+    springs_->set(std::move(k), std::move(targets), std::move(normals), tangential);
     const Points before = delta;
     if (!relax(delta, 0.02 * sigma)) return false;
     const double moved = (delta - before).rowwise().norm().maxCoeff();
@@ -300,7 +331,7 @@ TrackedFrame Tracker::look(double dt, bool at_rest, const TrackView& view) {
     if (at_rest) {
       distance = found_ ? choose({delta}, view, delta) : options_.widest * size_;
     } else {
-      springs_->set(VectorX::Zero(springs_->count()), Points::Zero(springs_->count(), 3));
+      springs_->clear();
       Points predicted = dt * state_.v;
       std::vector<Points> candidates = {dt * state_.v, delta};
       if (relax(predicted, 1e-3 * size_)) candidates.push_back(std::move(predicted));

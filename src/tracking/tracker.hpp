@@ -21,11 +21,17 @@ namespace pliant {
 /// Choices of a tracker; none is needed.
 struct TrackOptions {
   /// How stiff all virtual springs of a frame are together, in units of the body's own stiffness against its slowest
-  /// vibration and of its inertia over a frame. Both the body's and the springs' grow with its modulus: how the object
-  /// is tracked depends little on how stiff it is thought to be.
+  /// vibration, of its inertia over a frame and of its weight over its size. The body's and the springs' stiffness grow
+  /// together: how the object is tracked depends little on how stiff it is thought to be.
   double data_weight = 1000.0;
-  double outlier_share = 0.1;    ///< of the points, beforehand, (0, 1)
-  double widest = 0.15;          ///< deviation of the correspondences where they are sought, times the object's size
+  double outlier_share = 0.1;  ///< of the points, beforehand, (0, 1)
+  double widest = 0.15;        ///< deviation of the correspondences where they are sought, times the object's size
+  /// How much the expected density of points over the surface is worth against what was seen: sensors see less of what
+  /// is steep, hidden or at an edge, and a surface must not stretch to make up for that. > 0
+  double density_prior = 0.1;
+  /// Deviation of the correspondences at which a spring pulls alike in every direction, times the object's size;
+  /// narrower ones let the surface slide along itself in proportion.
+  double sliding = 0.3;
   double annealing = 0.7;        ///< of that deviation from one round to the next, (0, 1)
   int max_rounds = 40;           ///< of expectation and maximisation a frame, >= 1
   double sample_spacing = 0.01;  ///< of the surface, times the object's size
@@ -117,6 +123,8 @@ class Tracker {
   double choose(std::vector<Points> candidates, const TrackView& view, Points& delta) const;
   [[nodiscard]] bool maximise(double dt, bool at_rest, const TrackView& view, double distance, Points& delta,
                               TrackedFrame& frame);
+  void learn_density(const SampleLevel& level, const std::vector<double>& shares, const Correspondence& c);
+  Points normals_of(const Points& nodes) const;
   void see(const Points& nodes);
   const SampleLevel& level_for(double deviation) const;
   Points samples_of(const SampleLevel& level, const Points& nodes) const;
@@ -128,12 +136,13 @@ class Tracker {
   TriangleMesh surface_;
   std::vector<PinholeCamera> cameras_;
   TrackOptions options_;
-  double size_ = 0.0, mass_ = 0.0, slowest_ = 0.0, noise_ = 0.0, finest_ = 0.0, typical_ = 1.0;
+  double size_ = 0.0, mass_ = 0.0, slowest_ = 0.0, pendulum_ = 0.0, noise_ = 0.0, finest_ = 0.0, typical_ = 1.0;
   double usually_supported_ = 0.0;
   int samples_ = 0;  // vertices of the surface; markers follow them among the springs' points
   std::vector<SampleLevel> levels_;
   std::size_t mark_level_ = 0;
   std::vector<double> visible_;  // of each vertex, 0..1
+  std::vector<double> density_;  // of points seen there, to what visibility alone says
   RayScene rays_;
   PointSprings* springs_ = nullptr;  // of the stepper's terms
   std::unique_ptr<Stepper> stepper_;
