@@ -13,6 +13,7 @@
 #include "capture/rest_scan.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/ray_scene.hpp"
 #include "report/picture.hpp"
 
 namespace pliant::apps {

@@ -4,13 +4,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include "base/files.hpp"
-#include "capture/depth_points.hpp"
+#include "capture/even_mesh.hpp"
 #include "capture/view_hull.hpp"
-#include "geometry/primitives.hpp"
 #include "geometry/signed_distance.hpp"
 
 namespace pliant {
@@ -70,7 +68,9 @@ class Solid {
     mirror_ = mirror;
     for (const Reading& reading : readings_) {
       const double excess = mirrored_value(reading.point) - 2.0 * noise_;
-      if (excess > 0.0) spared_.push_back({reading.point, excess});
+      if (excess <= 0.0) continue;
+      spared_.push_back({reading.point, excess});
+      most_excess_ = std::max(most_excess_, excess);
     }
   }
   double spared_share() const { return double(spared_.size()) / double(readings_.size()); }
@@ -105,7 +105,7 @@ class Solid {
   double completed_value(const Vector3& p) const {
     const double cut = mirrored_value(p);
     double pushed = 0.0;
-    if (cut > 0.0)
+    if (cut > 0.0 && cut < most_excess_ + 2.0 * noise_)
       for (const Spared& spared : spared_)
         pushed = std::max(pushed, spared.excess + 2.0 * noise_ - (p - spared.point).norm());
     return cut - pushed;
@@ -117,7 +117,7 @@ class Solid {
   std::vector<Spared> spared_;
   Vector3 up_ = Vector3::UnitY(), centre_ = Vector3::Zero();
   std::optional<Vector3> ahead_;
-  double foot_ = 0.0, noise_ = 0.0;
+  double foot_ = 0.0, noise_ = 0.0, most_excess_ = 0.0;
 };
 
 // How badly the mirrored part fits, 0..1: where it cuts readings off, and where both show a surface but not the same.
@@ -156,74 +156,16 @@ Plane find_mirror(const Solid& solid, const Vector3& ahead, double spacing) {
   std::vector<std::pair<double, double>> misfits;
   for (double s = along[along.size() / 20] + 0.1 * width; s < along.back() + 0.5 * width; s += 0.5 * spacing)
     misfits.emplace_back(s, mirror_misfit(solid, {s * ahead, -ahead, true}, scale));
+  if (std::getenv("DBG")) for (auto [a, b] : misfits) std::fprintf(stderr, "%.4f %.4f\n", a, b);
   const double least = std::ranges::min_element(misfits, {}, &std::pair<double, double>::second)->second;
   const auto chosen = std::ranges::find_if(misfits, [&](const auto& m) { return m.second <= least + tolerance; });
   return {chosen->first * ahead, -ahead, true};
-}
-
-TriangleMesh largest_part(const TriangleMesh& mesh) {
-  std::vector<int> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[std::size_t(i)] != i) i = parent[std::size_t(i)] = parent[std::size_t(parent[std::size_t(i)])];
-    return i;
-  };
-  for (const auto& [a, b, c] : mesh.triangles) {
-    parent[std::size_t(root(b))] = root(a);
-    parent[std::size_t(root(c))] = root(a);
-  }
-  std::vector<double> volume(mesh.vertices.size(), 0.0);
-  for (const auto& [a, b, c] : mesh.triangles)
-    volume[std::size_t(root(a))] += mesh.vertices[std::size_t(a)].dot(
-        mesh.vertices[std::size_t(b)].cross(mesh.vertices[std::size_t(c)]));
-  const int largest = int(std::ranges::max_element(volume) - volume.begin());
-  TriangleMesh result;
-  std::vector<int> number(mesh.vertices.size(), -1);
-  for (const auto& triangle : mesh.triangles) {
-    if (root(triangle[0]) != largest) continue;
-    auto& own = result.triangles.emplace_back();
-    for (int k = 0; k < 3; ++k) {
-      int& vertex = number[std::size_t(triangle[std::size_t(k)])];
-      if (vertex < 0) {
-        vertex = int(result.vertices.size());
-        result.vertices.push_back(mesh.vertices[std::size_t(triangle[std::size_t(k)])]);
-      }
-      own[std::size_t(k)] = vertex;
-    }
-  }
-  return result;
 }
 
 Box grown(Box box, double margin) {
   box.min.array() -= margin;
   box.max.array() += margin;
   return box;
-}
-
-// A mean over the 27 lattice points around, weighted 1 2 1 each way: steps of the raw solid smaller than the lattice go.
-double smoothed(const SignedDistance& distance, const Vector3& p, double spacing) {
-  double sum = 0.0;
-  for (int k = -1; k <= 1; ++k)
-    for (int j = -1; j <= 1; ++j)
-      for (int i = -1; i <= 1; ++i)
-        sum += (2 - std::abs(i)) * (2 - std::abs(j)) * (2 - std::abs(k)) *
-               distance.value(p + spacing * Vector3(i, j, k));
-  return sum / 64.0;
-}
-
-template <class Function>
-TriangleMesh even_mesh(const Function& raw, const Box& box, double spacing, const std::optional<Plane>& plane) {
-  const double margin = 4.0 * spacing;
-  const TriangleMesh rough = largest_part(make_level_surface(raw, box, spacing));
-  if (rough.triangles.empty()) return rough;
-  const SignedDistance distance = signed_distance(rough, spacing, margin);
-  return largest_part(make_level_surface(
-      [&](const Vector3& p) {
-        const double above = plane ? plane->normal.dot(p - plane->point) : std::numeric_limits<double>::max();
-        const double inner = plane ? std::max(0.0, 2.0 * spacing - above) : 0.0;  // its edge at the plane stays sharp
-        return std::max(smoothed(distance, inner > 0 ? Vector3(p + inner * plane->normal) : p, spacing), -above);
-      },
-      grown(bounding_box(rough), margin), spacing));
 }
 
 double triangle_area(const TriangleMesh& mesh, const std::array<int, 3>& t) {
