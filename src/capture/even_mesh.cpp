@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "geometry/level_mesh.hpp"
+#include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
 #include "geometry/signed_distance.hpp"
 
@@ -20,6 +22,8 @@ Box grown(Box box, double margin) {
 
 // A mean over the 27 lattice points around, weighted 1 2 1 each way: steps of the raw solid smaller than the lattice go.
 double smoothed(const SignedDistance& distance, const Vector3& p, double spacing) {
+  const double own = distance.value(p);
+  if (std::abs(own) > 4.0 * spacing) return own;
   double sum = 0.0;
   for (int k = -1; k <= 1; ++k)
     for (int j = -1; j <= 1; ++j)
@@ -70,13 +74,15 @@ TriangleMesh even_mesh(const std::function<double(const Vector3&)>& raw, const B
   const TriangleMesh rough = largest_part(make_level_surface(raw, box, spacing));
   if (rough.triangles.empty()) return rough;
   const SignedDistance distance = signed_distance(rough, spacing, margin);
-  return largest_part(make_level_surface(
-      [&](const Vector3& p) {
-        const double above = plane ? plane->normal.dot(p - plane->point) : std::numeric_limits<double>::max();
-        const double inner = plane ? std::max(0.0, 2.0 * spacing - above) : 0.0;  // its edge at the plane stays sharp
-        return std::max(smoothed(distance, inner > 0 ? Vector3(p + inner * plane->normal) : p, spacing), -above);
-      },
-      grown(bounding_box(rough), margin), spacing));
+  const auto even = [&](const Vector3& p) {
+    const double above = plane ? plane->normal.dot(p - plane->point) : std::numeric_limits<double>::max();
+    const double inner = plane ? std::max(0.0, 2.0 * spacing - above) : 0.0;  // its edge at the plane stays sharp
+    return std::max(smoothed(distance, inner > 0 ? Vector3(p + inner * plane->normal) : p, spacing), -above);
+  };
+  const Box around = grown(bounding_box(rough), margin);
+  const TriangleMesh mesh = largest_part(make_even_level_surface(even, around, spacing));
+  if (examine(mesh).is_closed_solid) return mesh;
+  return largest_part(make_level_surface(even, around, spacing));
 }
 
 }  // namespace pliant

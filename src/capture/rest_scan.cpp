@@ -143,7 +143,7 @@ double mirror_misfit(const Solid& solid, const Plane& mirror, double scale) {
 
 // Of the places that fit about equally well the nearest: the object is no deeper than what was seen asks for.
 Plane find_mirror(const Solid& solid, const Vector3& ahead, double spacing) {
-  constexpr double tolerance = 0.01;
+  constexpr double slack = 0.05, tolerance = 0.0003;
   std::vector<double> along, across;
   const Vector3 side = ahead.cross(solid.up());
   for (const Reading& reading : solid.readings()) {
@@ -156,9 +156,8 @@ Plane find_mirror(const Solid& solid, const Vector3& ahead, double spacing) {
   std::vector<std::pair<double, double>> misfits;
   for (double s = along[along.size() / 20] + 0.1 * width; s < along.back() + 0.5 * width; s += 0.5 * spacing)
     misfits.emplace_back(s, mirror_misfit(solid, {s * ahead, -ahead, true}, scale));
-  if (std::getenv("DBG")) for (auto [a, b] : misfits) std::fprintf(stderr, "%.4f %.4f\n", a, b);
   const double least = std::ranges::min_element(misfits, {}, &std::pair<double, double>::second)->second;
-  const auto chosen = std::ranges::find_if(misfits, [&](const auto& m) { return m.second <= least + tolerance; });
+  const auto chosen = std::ranges::find_if(misfits, [&](const auto& m) { return m.second <= (1.0 + slack) * least + tolerance; });
   return {chosen->first * ahead, -ahead, true};
 }
 

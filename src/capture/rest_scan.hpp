@@ -44,7 +44,7 @@ struct RestScan {
 /// A closed slab of even thickness around a thin sheet that is seen as points alone: every point within half the
 /// thickness of the sheet's middle, the local plane through the neighbouring points. Stray points are left out.
 /// @param points     [m]
-/// @param thickness  [m]; the lattice's spacing is half of it
+/// @param thickness  [m]; the lattice's spacing is 0.4 of it
 /// @return           a scan without mirror, all of it called seen
 /// Throws InputError where fewer than 100 points are left, or they are too sparse for one sheet of that thickness.
 [[nodiscard]] RestScan scan_sheet(const std::vector<Vector3>& points, double thickness,

@@ -88,21 +88,36 @@ Average read_average(const Capture& capture, const DepthCamera& camera, const De
   return result;
 }
 
-// The largest plane that is about level, of all cameras.
-std::optional<FoundPlane> largest_level_plane(const Capture& capture, const std::vector<Segmentation>& scenes) {
+// Pixels on a plane of the scene that no mask gives to the object; 0 where those are fewer than half.
+int free_pixels(const Segmentation& scene, int plane, const std::optional<Image<std::uint8_t>>& mask) {
+  int all = 0, free = 0;
+  for (std::size_t p = 0; p < scene.label.pixels.size(); ++p) {
+    if (scene.label.pixels[p] != -2 - plane) continue;
+    ++all;
+    free += !mask || mask->pixels[p] == 0;
+  }
+  return 2 * free > all ? free : 0;
+}
+
+// The largest plane that is about level, of all cameras; a flat top of the object is none.
+std::optional<FoundPlane> largest_level_plane(const Capture& capture, const std::vector<Segmentation>& scenes,
+                                              const std::vector<Average>& averages) {
   std::optional<FoundPlane> best;
-  for (const Segmentation& scene : scenes)
-    for (const PlaneFit& fit : scene.planes) {
+  for (std::size_t c = 0; c < scenes.size(); ++c)
+    for (int i = 0; i < int(scenes[c].planes.size()); ++i) {
+      const PlaneFit& fit = scenes[c].planes[std::size_t(i)];
       const double cosine = fit.normal.dot(capture.up);
-      if (std::abs(cosine) < std::cos(greatest_tilt) || (best && fit.inliers <= best->pixels)) continue;
+      const int pixels = free_pixels(scenes[c], i, averages[c].mask);
+      if (std::abs(cosine) < std::cos(greatest_tilt) || pixels <= (best ? best->pixels : 0)) continue;
       best.emplace();
       best->point = fit.point, best->normal = cosine < 0 ? Vector3(-fit.normal) : fit.normal;
-      best->rms = fit.rms, best->pixels = fit.inliers;
+      best->rms = fit.rms, best->pixels = pixels;
     }
   return best;
 }
 
-void find_support(const Capture& capture, const std::vector<Segmentation>& scenes, ScanViews& result) {
+void find_support(const Capture& capture, const std::vector<Segmentation>& scenes,
+                  const std::vector<Average>& averages, ScanViews& result) {
   if (!capture.planes.empty()) {
     const auto found = find_plane(capture, capture.planes[0]);
     result.plane = capture.planes[0];
@@ -110,7 +125,7 @@ void find_support(const Capture& capture, const std::vector<Segmentation>& scene
     if (found && !capture.planes[0].known) result.plane = Plane(*found);
     return;
   }
-  const auto found = largest_level_plane(capture, scenes);
+  const auto found = largest_level_plane(capture, scenes, averages);
   if (!found)
     fail(capture, "no plane is seen on which the object could stand", "a large plane within 40 degrees of level",
          "declare it as [[plane]], check `up`, or say that the object stands on none (--floating)");
@@ -259,7 +274,7 @@ ScanViews read_scan_views(const Capture& capture, const ScanChoice& choice) {
     scenes.push_back(segment(averages.back().depth, camera.camera, noise));
   }
   ScanViews result;
-  if (!choice.floating) find_support(capture, scenes, result);
+  if (!choice.floating) find_support(capture, scenes, averages, result);
 
   for (std::size_t c = 0; c < capture.depth.size(); ++c) {
     const DepthCamera& camera = capture.depth[c];

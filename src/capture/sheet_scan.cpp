@@ -149,7 +149,7 @@ RestScan scan_sheet(const std::vector<Vector3>& points, double thickness, const 
   Box box;
   for (const Vector3& point : sheet) box.extend(point);
   RestScan scan;
-  scan.spacing = 0.5 * thickness;
+  scan.spacing = 0.4 * thickness;
   const double margin = 2.0 * reach + 8.0 * scan.spacing;
   box.min.array() -= margin, box.max.array() += margin;
   if ((box.extent() / scan.spacing).prod() > most_lattice_points)
