@@ -156,7 +156,8 @@ void scan_object(const Capture& capture, const Arguments& arguments) {
 
 void scan_cloud(const Capture& capture, const Arguments& arguments) {
   if (capture.clouds.empty())
-    throw InputError(Problem{{capture.file}, "no [[cloud]] to make a sheet of", "point clouds", "leave out --thickness"});
+    throw InputError(
+        Problem{{capture.file}, "no [[cloud]] to make a sheet of", "point clouds", "leave out --thickness"});
   const CloudSequence& cloud = capture.clouds[0];
   const int frame = std::max(0, arguments.frame);
   if (frame >= capture.frame_count() || frame % cloud.every != 0)
@@ -211,8 +212,9 @@ void add_scan(CLI::App& app, int& exit_code) {
   command->add_option("--resolution", arguments->resolution, "edges of the mesh across the object")
       ->capture_default_str()
       ->check(CLI::Range(10, 200));
-  command->add_option("--thickness", arguments->thickness,
-                      "the object is a thin sheet, seen as a cloud: make a slab of this thickness [m]")
+  command
+      ->add_option("--thickness", arguments->thickness,
+                   "the object is a thin sheet, seen as a cloud: make a slab of this thickness [m]")
       ->check(CLI::PositiveNumber);
   command->add_option("--frame", arguments->frame, "of the cloud with --thickness")->check(CLI::Range(0, 1000000000));
   command->footer(footer);

@@ -57,7 +57,7 @@ def write_capture(folder, name, sensors, frames, up, surface=None, density=None,
     if density:
         lines.append(f"density = {density}             # kg/m^3: a guess, nobody weighed it")
     gravity = [-9.81 * x for x in up]
-    lines += ["", "[world]", f"gravity = {vector(gravity)}" if plane else f"up = {vector(up)}", "", "[timing]",
+    lines += ["", "[world]", f"gravity = {vector(gravity)}" if surface else f"up = {vector(up)}", "", "[timing]",
               f"frame_rate = {frame_rate}           # nominal: the recording states none", f"frame_count = {frames}",
               f"start_frame = {start}", f"static = {str(static).lower()}", ""]
     if plane:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Two cloths lifted by one corner, as clouds: a slab around the last cloud, and the recording run backwards.
+"""Two cloths lifted by one corner, as clouds: a slab around a late cloud, and the recording run backwards.
 
 Makes in --work (default: build/captures/cloth-lift), for each of `paper` and `polka`:
-  NAME-scan/   the clouds without a surface; NAME-scan/rest/ is what `pliant scan --thickness` makes of the last one
-  NAME/        frames 24, 23 ... 8
+  NAME-scan/   the clouds without a surface; NAME-scan/rest/ is what `pliant scan --thickness` makes of the first one
+  NAME/        frames 20 or 24 back to 8
 
 Backwards, because the clouds hold only what the robot has lifted off the table: forwards, material appears that no rest
 surface of an early frame has, backwards it only goes out of sight. Frames 0 to 7 show little or something else.
@@ -18,7 +18,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent)]
 import rest_captures as rc
 
-FIRST, LAST = 8, 24
+FIRST, LAST = 8, {"paper": 20, "polka": 24}  # later the paper's lower half is lost to the cameras
 THICKNESS = 0.008      # [m]
 MASS_OF_AREA = 0.15    # kg/m^2, a guess
 SENSORS = """[[cloud]]
@@ -30,8 +30,8 @@ noise = 0.003
 def main():
     arguments = rc.arguments(__doc__, "cloth-lift")
     data = rc.shared_data() / "cloth-lift-cloud"
-    frames = range(LAST, FIRST - 1, -1)
-    for name in ("paper", "polka"):
+    for name, last in LAST.items():
+        frames = range(last, FIRST - 1, -1)
         scan, lift = arguments.work / f"{name}-scan", arguments.work / name
         for folder in (scan, lift):
             for i, frame in enumerate(frames):

@@ -20,7 +20,8 @@ Box grown(Box box, double margin) {
   return box;
 }
 
-// A mean over the 27 lattice points around, weighted 1 2 1 each way: steps of the raw solid smaller than the lattice go.
+// A mean over the 27 lattice points around, weighted 1 2 1 each way: steps of the raw solid smaller than the lattice
+// go.
 double smoothed(const SignedDistance& distance, const Vector3& p, double spacing) {
   const double own = distance.value(p);
   if (std::abs(own) > 4.0 * spacing) return own;
@@ -28,8 +29,8 @@ double smoothed(const SignedDistance& distance, const Vector3& p, double spacing
   for (int k = -1; k <= 1; ++k)
     for (int j = -1; j <= 1; ++j)
       for (int i = -1; i <= 1; ++i)
-        sum += (2 - std::abs(i)) * (2 - std::abs(j)) * (2 - std::abs(k)) *
-               distance.value(p + spacing * Vector3(i, j, k));
+        sum +=
+            (2 - std::abs(i)) * (2 - std::abs(j)) * (2 - std::abs(k)) * distance.value(p + spacing * Vector3(i, j, k));
   return sum / 64.0;
 }
 
@@ -48,8 +49,8 @@ TriangleMesh largest_part(const TriangleMesh& mesh) {
   }
   std::vector<double> volume(mesh.vertices.size(), 0.0);
   for (const auto& [a, b, c] : mesh.triangles)
-    volume[std::size_t(root(a))] += mesh.vertices[std::size_t(a)].dot(
-        mesh.vertices[std::size_t(b)].cross(mesh.vertices[std::size_t(c)]));
+    volume[std::size_t(root(a))] +=
+        mesh.vertices[std::size_t(a)].dot(mesh.vertices[std::size_t(b)].cross(mesh.vertices[std::size_t(c)]));
   const int largest = int(std::ranges::max_element(volume) - volume.begin());
   TriangleMesh result;
   std::vector<int> number(mesh.vertices.size(), -1);

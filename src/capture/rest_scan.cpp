@@ -64,8 +64,9 @@ class Solid {
   double noise() const { return noise_; }
   double height(const Vector3& p) const { return up_.dot(p - plane_->point); }
 
-  void set_mirror(const Plane& mirror) {
+  void set_mirror(const Plane& mirror, bool limits_depth) {
     mirror_ = mirror;
+    limits_depth_ = limits_depth;
     for (const Reading& reading : readings_) {
       const double excess = mirrored_value(reading.point) - 2.0 * noise_;
       if (excess <= 0.0) continue;
@@ -80,7 +81,10 @@ class Solid {
     const double above = plane_ ? height(p) : std::numeric_limits<double>::max();
     if (above < foot_) p += (foot_ - above) * up_;
     double result = seen_value(p);
-    if (mirror_) result = std::max(result, completed_value(p));
+    if (mirror_) {
+      result = std::max(result, completed_value(p));
+      for (const ViewHull& hull : hulls_) result = std::max(result, limits_depth_ ? hull.beyond_back(p) : result);
+    }
     return std::max(result, -above);
   }
 
@@ -117,6 +121,7 @@ class Solid {
   std::vector<Spared> spared_;
   Vector3 up_ = Vector3::UnitY(), centre_ = Vector3::Zero();
   std::optional<Vector3> ahead_;
+  bool limits_depth_ = true;
   double foot_ = 0.0, noise_ = 0.0, most_excess_ = 0.0;
 };
 
@@ -157,7 +162,8 @@ Plane find_mirror(const Solid& solid, const Vector3& ahead, double spacing) {
   for (double s = along[along.size() / 20] + 0.1 * width; s < along.back() + 0.5 * width; s += 0.5 * spacing)
     misfits.emplace_back(s, mirror_misfit(solid, {s * ahead, -ahead, true}, scale));
   const double least = std::ranges::min_element(misfits, {}, &std::pair<double, double>::second)->second;
-  const auto chosen = std::ranges::find_if(misfits, [&](const auto& m) { return m.second <= (1.0 + slack) * least + tolerance; });
+  const auto chosen =
+      std::ranges::find_if(misfits, [&](const auto& m) { return m.second <= (1.0 + slack) * least + tolerance; });
   return {chosen->first * ahead, -ahead, true};
 }
 
@@ -232,12 +238,13 @@ RestScan scan_rest_surface(const ScanViews& views, const Vector3& up, const Rest
     } else {
       scan.mirror = find_mirror(solid, *ahead, scan.spacing);
     }
-    solid.set_mirror(*scan.mirror);
+    solid.set_mirror(*scan.mirror, !options.depth);
     scan.kept_from_mirror = solid.spared_share();
   }
   Box box = box_of(solid, scan.mirror);
   if (views.plane)  // down to the plane, also where a look from above sees nothing near it
-    for (const Reading& reading : solid.readings()) box.extend(reading.point - solid.height(reading.point) * solid.up());
+    for (const Reading& reading : solid.readings())
+      box.extend(reading.point - solid.height(reading.point) * solid.up());
   box = grown(box, 0.1 * box.extent().maxCoeff() + 6.0 * scan.spacing);
   scan.mesh = even_mesh([&](const Vector3& p) { return solid.value(p); }, box, scan.spacing, views.plane);
   if (scan.mesh.triangles.empty())

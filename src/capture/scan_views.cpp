@@ -13,12 +13,12 @@ namespace pliant {
 
 namespace {
 
-constexpr double trimmed = 3.0;          // deviations around the median that a mean takes
-constexpr double moving = 4.0;           // deviations of a mean's change that are motion
-constexpr double plane_reach = 3.5;      // deviations from the plane within which a reading does not tell the object
+constexpr double trimmed = 3.0;      // deviations around the median that a mean takes
+constexpr double moving = 4.0;       // deviations of a mean's change that are motion
+constexpr double plane_reach = 3.5;  // deviations from the plane within which a reading does not tell the object
 constexpr double greatest_tilt = 40.0 / 180.0 * std::numbers::pi;  // of the plane from `up`
-constexpr double least_share = 0.05;     // of the object's readings, of a part that counts
-constexpr int least_readings = 100;      // on an object
+constexpr double least_share = 0.05;                               // of the object's readings, of a part that counts
+constexpr int least_readings = 100;                                // on an object
 
 [[noreturn]] void fail(const Capture& capture, const std::string& found, const std::string& expected,
                        const std::string& advice) {
@@ -116,8 +116,8 @@ std::optional<FoundPlane> largest_level_plane(const Capture& capture, const std:
   return best;
 }
 
-void find_support(const Capture& capture, const std::vector<Segmentation>& scenes,
-                  const std::vector<Average>& averages, ScanViews& result) {
+void find_support(const Capture& capture, const std::vector<Segmentation>& scenes, const std::vector<Average>& averages,
+                  ScanViews& result) {
   if (!capture.planes.empty()) {
     const auto found = find_plane(capture, capture.planes[0]);
     result.plane = capture.planes[0];

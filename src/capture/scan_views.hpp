@@ -21,10 +21,10 @@ struct ScanChoice {
 struct ScanView {
   PinholeCamera camera;
   DepthNoise noise;
-  DepthImage depth;               ///< [m] readings on the object's surface, flying pixels removed; else 0
+  DepthImage depth;                ///< [m] readings on the object's surface, flying pixels removed; else 0
   Image<std::uint8_t> silhouette;  ///< 255 inside the object's outline, also where nothing was read
-  int frames = 0;                 ///< that took part
-  double moved = 0.0;             ///< share of the readings that changed beyond noise from the first frames to the last
+  int frames = 0;                  ///< that took part
+  double moved = 0.0;  ///< share of the readings that changed beyond noise from the first frames to the last
 };
 
 struct ScanViews {

@@ -12,7 +12,8 @@ namespace {
 
 constexpr float far_away = 1e6f;  // squared pixels
 
-// Squared distance to the nearest zero of one row (Felzenszwalb and Huttenlocher 2012): the lower envelope of parabolas.
+// Squared distance to the nearest zero of one row (Felzenszwalb and Huttenlocher 2012): the lower envelope of
+// parabolas.
 void squared_distances(std::vector<float>& row) {
   const int n = int(row.size());
   std::vector<int> place(row.size(), 0);
@@ -41,7 +42,8 @@ void squared_distances(std::vector<float>& row) {
 template <class Target>
 Image<float> distance_to(const Image<std::uint8_t>& image, const Target& is_target) {
   Image<float> result(image.width, image.height);
-  for (std::size_t p = 0; p < result.pixels.size(); ++p) result.pixels[p] = is_target(image.pixels[p]) ? 0.0f : far_away;
+  for (std::size_t p = 0; p < result.pixels.size(); ++p)
+    result.pixels[p] = is_target(image.pixels[p]) ? 0.0f : far_away;
   std::vector<float> line;
   for (int v = 0; v < image.height; ++v) {
     line.assign(&result(0, v), &result(0, v) + image.width);
@@ -90,7 +92,8 @@ DepthImage smooth(const DepthImage& depth, const DepthNoise& noise) {
   return result;
 }
 
-// Continues an image over the outline and a little beyond it, ring by ring, by the mean of the neighbours that have one.
+// Continues an image over the outline and a little beyond it, ring by ring, by the mean of the neighbours that have
+// one.
 void continue_outwards(Image<float>& image, const Image<float>& outside) {
   constexpr float beyond = 3.0f;  // [pixels]
   std::vector<std::pair<int, float>> ring;
@@ -123,6 +126,7 @@ double bilinear(const Image<float>& image, double u, double v) {
 ViewHull::ViewHull(const ScanView& view)
     : camera_(view.camera), noise_(view.noise), depth_(view.depth), outside_(signed_outline(view.silhouette)) {
   fill_front();
+  find_widths();
 }
 
 void ViewHull::fill_front() {
@@ -137,6 +141,28 @@ void ViewHull::fill_front() {
     }
   continue_outwards(front_, outside_);
   continue_outwards(cosine_, outside_);
+}
+
+void ViewHull::find_widths() {
+  width_ = Image<float>(depth_.width, depth_.height);
+  for (int v = 0; v < depth_.height; ++v)
+    for (int u = 0; u < depth_.width; ++u) {
+      const float radius = -outside_(u, v);
+      if (!(radius > 0)) continue;
+      const int reach = int(radius);
+      for (int b = std::max(0, v - reach); b <= std::min(depth_.height - 1, v + reach); ++b)
+        for (int a = std::max(0, u - reach); a <= std::min(depth_.width - 1, u + reach); ++a)
+          if (float((a - u) * (a - u) + (b - v) * (b - v)) <= radius * radius && width_(a, b) < radius)
+            width_(a, b) = radius;
+    }
+  continue_outwards(width_, outside_);
+}
+
+double ViewHull::beyond_back(const Vector3& point) const {
+  constexpr double deepest = 2.5;  // radii
+  const Vector3 pixel = camera_.project(point);
+  const double front = bilinear(front_, pixel.x(), pixel.y()), width = bilinear(width_, pixel.x(), pixel.y());
+  return pixel.z() - front - deepest * width * front / std::min(camera_.fx, camera_.fy);
 }
 
 Vector3 ViewHull::normal(int u, int v) const {
@@ -154,8 +180,8 @@ double ViewHull::value(const Vector3& point) const {
   const double behind = (front - pixel.z()) * bilinear(cosine_, pixel.x(), pixel.y());
   const double focal = std::min(camera_.fx, camera_.fy);
   double outside = bilinear(outside_, pixel.x(), pixel.y());
-  const double beyond = std::max({0.0, -pixel.x(), -pixel.y(), pixel.x() - (camera_.width - 1),
-                                  pixel.y() - (camera_.height - 1)});
+  const double beyond =
+      std::max({0.0, -pixel.x(), -pixel.y(), pixel.x() - (camera_.width - 1), pixel.y() - (camera_.height - 1)});
   if (beyond > 0.0) outside = std::max(outside, 0.0) + beyond;
   return std::max(behind, outside * pixel.z() / focal);
 }

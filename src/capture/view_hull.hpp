@@ -11,6 +11,9 @@ class ViewHull {
 
   /// Negative in that space; near its border about the distance from it [m].
   double value(const Vector3& point) const;
+  /// How far [m] a point lies beyond a plausible back: no part is deeper along its ray than 2.5 times the radius of the
+  /// largest disc in the outline that covers it there. Negative before it.
+  double beyond_back(const Vector3& point) const;
   /// Whether a reading shows the point, up to the reading's noise or `reach` [m], whichever is more.
   bool shows(const Vector3& point, double reach) const;
 
@@ -23,12 +26,14 @@ class ViewHull {
 
  private:
   void fill_front();
+  void find_widths();
 
   PinholeCamera camera_;
   DepthNoise noise_;
   DepthImage depth_;
   Image<float> front_;    // depth [m], smooth and continued over the whole image
   Image<float> cosine_;   // of the angle between ray and normal, continued the same way
+  Image<float> width_;    // radius of the largest disc in the outline over a pixel [pixels], continued the same way
   Image<float> outside_;  // signed distance from the outline [pixels], negative inside
 };
 

@@ -13,8 +13,7 @@ namespace pliant {
 
 namespace {
 
-openvdb::FloatGrid::Ptr sampled(const std::function<double(const Vector3&)>& function, const Box& box,
-                                double spacing) {
+openvdb::FloatGrid::Ptr sampled(const std::function<double(const Vector3&)>& function, const Box& box, double spacing) {
   constexpr float band = 3.0f;  // lattice spacings: beyond it only the sign matters
   auto grid = openvdb::FloatGrid::create(band);
   auto accessor = grid->getAccessor();
