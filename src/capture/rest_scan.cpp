@@ -18,6 +18,8 @@ namespace {
 constexpr double plane_reach = 3.5;  // deviations above the plane within which readings do not show the object
 constexpr double steep = 0.2;        // of the view's level part: less is a look from above, which needs no mirror
 
+constexpr double shell = 4.0;  // lattice spacings that stay behind readings that contradict the mirror image
+
 struct Reading {
   Vector3 point, normal;
   double noise;
@@ -64,7 +66,8 @@ class Solid {
   double noise() const { return noise_; }
   double height(const Vector3& p) const { return up_.dot(p - plane_->point); }
 
-  void set_mirror(const Plane& mirror, bool limits_depth) {
+  void set_mirror(const Plane& mirror, double shell, bool limits_depth) {
+    shell_ = shell + 2.0 * noise_;
     mirror_ = mirror;
     limits_depth_ = limits_depth;
     for (const Reading& reading : readings_) {
@@ -105,13 +108,13 @@ class Solid {
 
   double mirrored_value(const Vector3& p) const { return mirrored_value(p, *mirror_); }
 
-  // The mirrored part, pushed out where it would cut off what was seen.
+  // The mirrored part, pushed out where it would cut off what was seen: a shell stays behind those readings.
   double completed_value(const Vector3& p) const {
     const double cut = mirrored_value(p);
     double pushed = 0.0;
-    if (cut > 0.0 && cut < most_excess_ + 2.0 * noise_)
+    if (cut > 0.0 && cut < most_excess_ + shell_)
       for (const Spared& spared : spared_)
-        pushed = std::max(pushed, spared.excess + 2.0 * noise_ - (p - spared.point).norm());
+        pushed = std::max(pushed, spared.excess + shell_ - (p - spared.point).norm());
     return cut - pushed;
   }
 
@@ -122,7 +125,7 @@ class Solid {
   Vector3 up_ = Vector3::UnitY(), centre_ = Vector3::Zero();
   std::optional<Vector3> ahead_;
   bool limits_depth_ = true;
-  double foot_ = 0.0, noise_ = 0.0, most_excess_ = 0.0;
+  double foot_ = 0.0, noise_ = 0.0, most_excess_ = 0.0, shell_ = 0.0;
 };
 
 // How badly the mirrored part fits, 0..1: where it cuts readings off, and where both show a surface but not the same.
@@ -238,7 +241,7 @@ RestScan scan_rest_surface(const ScanViews& views, const Vector3& up, const Rest
     } else {
       scan.mirror = find_mirror(solid, *ahead, scan.spacing);
     }
-    solid.set_mirror(*scan.mirror, !options.depth);
+    solid.set_mirror(*scan.mirror, shell * scan.spacing, !options.depth);
     scan.kept_from_mirror = solid.spared_share();
   }
   Box box = box_of(solid, scan.mirror);
