@@ -66,8 +66,8 @@ class Solid {
   double noise() const { return noise_; }
   double height(const Vector3& p) const { return up_.dot(p - plane_->point); }
 
-  void set_mirror(const Plane& mirror, double shell, bool limits_depth) {
-    shell_ = shell + 2.0 * noise_;
+  void set_mirror(const Plane& mirror, double thickness, bool limits_depth) {
+    shell_ = thickness + 2.0 * noise_;
     mirror_ = mirror;
     limits_depth_ = limits_depth;
     for (const Reading& reading : readings_) {
