@@ -265,7 +265,8 @@ double moved_share(const Average& average, const ScanView& view) {
 
 ScanViews read_scan_views(const Capture& capture, const ScanChoice& choice) {
   if (capture.depth.empty() || capture.frame_count() == 0)
-    fail(capture, "the capture has no depth camera", "[[depth]] images of the object at rest", "");
+    fail(capture, "the capture has no depth camera", "[[depth]] images of the object at rest",
+         "of a thin sheet that is seen as clouds, state its --thickness");
   std::vector<Average> averages;
   std::vector<Segmentation> scenes;
   for (const DepthCamera& camera : capture.depth) {
