@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = Fine;
   add_check(app, exit_code);
+  add_scan(app, exit_code);
   add_fit(app, exit_code);
   add_simulate(app, exit_code);
   add_track(app, exit_code);

@@ -28,7 +28,7 @@ TEST(Usage, VersionIsOneLineOnStdout) {
 TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
-  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "130"})
+  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -42,7 +42,8 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
   EXPECT_THAT(run.err, IsEmpty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp, testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh"),
+INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp,
+                         testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {

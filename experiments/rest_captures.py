@@ -1,0 +1,161 @@
+"""Captures whose rest surface is made of a recording's own frames by `pliant scan`. Standard library only.
+
+The recordings' images stay where they are: captures refer to them by relative paths."""
+import argparse
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import sys
+import zlib
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+
+def shared_data():
+    """The folder of shared recordings: PLIANT_SHARED_DATA, or beside the source tree."""
+    data = pathlib.Path(os.environ.get("PLIANT_SHARED_DATA", ROOT.parent / "shared/data")).resolve()
+    if not data.is_dir():
+        sys.exit(f"no folder {data}: set PLIANT_SHARED_DATA to the shared recordings")
+    return data
+
+
+def arguments(description, name):
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", nargs="?", type=pathlib.Path, default=ROOT / "build/release/apps/pliant",
+                        help="the pliant binary")
+    parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build/captures" / name,
+                        help="folder for the captures; outside of version control")
+    parsed = parser.parse_args()
+    parsed.program, parsed.work = parsed.program.resolve(), parsed.work.resolve()
+    return parsed
+
+
+def pattern(folder, data, name):
+    """A pattern of images of the shared recordings, relative to a capture's folder."""
+    return os.path.relpath(data / name, folder)
+
+
+def refer(link, target):
+    """A file of the recording under another name: frames that are renumbered."""
+    link.parent.mkdir(parents=True, exist_ok=True)
+    link.unlink(missing_ok=True)
+    link.symlink_to(os.path.relpath(target, link.parent))
+
+
+def vector(v):
+    return "[" + ", ".join(f"{x:.6g}" for x in v) + "]"
+
+
+def write_capture(folder, name, sensors, frames, up, surface=None, density=None, plane=None, static=False, start=0,
+                  frame_rate=30.0):
+    """Writes capture.toml; `sensors` are its [[depth]] or [[cloud]] blocks as text."""
+    lines = ['format = "capture/1"', f'name = "{name}"', "", "[object]"]
+    if surface:
+        lines.append(f'surface = "{os.path.relpath(surface, folder)}"')
+    if density:
+        lines.append(f"density = {density}             # kg/m^3: a guess, nobody weighed it")
+    gravity = [-9.81 * x for x in up]
+    lines += ["", "[world]", f"gravity = {vector(gravity)}" if surface else f"up = {vector(up)}", "", "[timing]",
+              f"frame_rate = {frame_rate}           # nominal: the recording states none", f"frame_count = {frames}",
+              f"start_frame = {start}", f"static = {str(static).lower()}", ""]
+    if plane:
+        lines += ["[[plane]]", f"point = {vector(plane['point'])}", f"normal = {vector(plane['normal'])}",
+                  "known = true", ""]
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "capture.toml").write_text("\n".join(lines) + "\n" + sensors)
+
+
+def call(program, *words):
+    done = subprocess.run([str(program), *map(str, words)], capture_output=True, text=True)
+    print(done.stdout, end="")
+    if done.returncode != 0:
+        sys.exit(f"pliant {' '.join(map(str, words))} returned {done.returncode}\n{done.stderr}")
+
+
+def scan(program, folder, *options):
+    """Runs `pliant scan`; returns its figures. The surface is `folder`/rest/rest.ply."""
+    call(program, "scan", folder, "--out", folder / "rest", *options)
+    return json.loads((folder / "rest/scan.json").read_text())
+
+
+def check(program, folder):
+    call(program, "check", folder, "--out", folder / "look")
+
+
+def vertices(path):
+    """Vertices of a PLY as `pliant scan` writes it."""
+    header, data = path.read_bytes().split(b"end_header\n", 1)
+    count = int(header.split(b"element vertex ")[1].split(b"\n")[0])
+    return [struct.unpack_from("<ddd", data, 25 * i) for i in range(count)]
+
+
+def read_png(path):
+    """Width, height and the rows of a 16-bit grey PNG."""
+    content = path.read_bytes()
+    width, height, bits, colour = struct.unpack_from(">IIBB", content, 16)
+    assert (bits, colour) == (16, 0), f"{path}: not a 16-bit grey PNG"
+    at, packed = 8, b""
+    while at < len(content):
+        length, kind = struct.unpack_from(">I4s", content, at)
+        if kind == b"IDAT":
+            packed += content[at + 8:at + 8 + length]
+        at += length + 12
+    raw, stride, rows = zlib.decompress(packed), 2 * width, []
+    before = bytearray(stride)
+    for v in range(height):
+        kind, row = raw[v * (stride + 1)], bytearray(raw[v * (stride + 1) + 1:(v + 1) * (stride + 1)])
+        unfilter(kind, row, before)
+        rows.append(struct.unpack(f">{width}H", row))
+        before = row
+    return width, height, rows
+
+
+def unfilter(kind, row, before):
+    """Undoes a PNG row's filter in place, two bytes a pixel."""
+    for i in range(len(row) if kind else 0):
+        a, b, c = row[i - 2] if i > 1 else 0, before[i], before[i - 2] if i > 1 else 0
+        if kind == 1:
+            add = a
+        elif kind == 2:
+            add = b
+        elif kind == 3:
+            add = (a + b) // 2
+        else:
+            p = a + b - c
+            add = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+        row[i] = (row[i] + add) & 255
+
+
+def write_mask(path, width, rows):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    packed = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, len(rows), 8, 0, 0, 0, 0)) +
+                     chunk(b"IDAT", packed) + chunk(b"IEND", b""))
+
+
+def mask_of_box(image, pinhole, box, plane, clearance=0.004):
+    """255 where the reading lies in a box of the camera's axes and above the plane, both in camera axes [m]; depth in
+    millimetres."""
+    width, height, rows = image
+    fx, fy, cx, cy = pinhole
+    low, high = box
+    n, offset = plane["normal"], sum(a * b for a, b in zip(plane["point"], plane["normal"])) + clearance
+    mask = [bytearray(width) for _ in range(height)]
+    for v in range(height):
+        for u, raw in enumerate(rows[v]):
+            z = 1e-3 * raw
+            if not low[2] <= z <= high[2]:
+                continue
+            x, y = (u - cx) / fx * z, (v - cy) / fy * z
+            if low[0] <= x <= high[0] and low[1] <= y <= high[1] and n[0] * x + n[1] * y + n[2] * z > offset:
+                mask[v][u] = 255
+    return mask
+
+
+def box_of(points, margin):
+    return [min(p[k] for p in points) - margin for k in range(3)], [max(p[k] for p in points) + margin for k in range(3)]
