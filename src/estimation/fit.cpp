@@ -21,6 +21,7 @@
 #include "estimation/notes.hpp"
 #include "estimation/recordings.hpp"
 #include "estimation/swing.hpp"
+#include "estimation/tracking_loop.hpp"
 
 namespace pliant {
 
@@ -699,6 +700,7 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
   if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
+  if (tracks(recordings, options)) return fit_with_tracking(recordings, options, monitor, std::move(resume));
   if (options.control_points == FitOptions::automatic)
     return fit_with_chosen_field(recordings, options, monitor, std::move(resume));
   return Fit(std::move(recordings), options, monitor, std::move(resume)).run();
@@ -707,6 +709,7 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
 FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
                  const FitMonitor& monitor) {
   FitOptions fixed = options;
+  fixed.tracking = TrackingUse::Off;
   fixed.cells = fitted.cells, fixed.refine = 1;
   fixed.control_points = fitted.recordings.front().discretisation.body->modulus.controls;
   for (const Parameter& p : fitted.parameters.parameters()) {

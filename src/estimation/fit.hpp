@@ -11,6 +11,7 @@
 #include "estimation/optimiser.hpp"
 #include "estimation/problem.hpp"
 #include "estimation/refinement.hpp"
+#include "tracking/tracker.hpp"
 
 namespace pliant {
 
@@ -18,6 +19,14 @@ namespace pliant {
 enum class LoadFreeScheme {
   Together,  ///< derivatives pass through the equilibrium: one minimisation sees the whole dependence
   InTurns,   ///< shape and parameters in turns, each as the other is (Wang 2015, algorithm 1)
+};
+
+/// What a fit compares the simulated motion with, where only points on the surface were seen.
+enum class TrackingUse {
+  Automatic,  ///< both, where point clouds or several cameras saw the object move; else no tracking
+  Off,        ///< the points, by surface constraints (Weiss 2020)
+  Loop,       ///< the motion that the tracker found, in turns with it (Wang 2015, section 3)
+  Both,       ///< each from a part of the frames; the one that predicts the others better is kept
 };
 
 /// Choices about a fit; none of them is needed. `validate` answers in words.
@@ -37,6 +46,8 @@ struct FitOptions {
   std::optional<ElementKind> element;
   Integrator integrator = Integrator::Lagged;
   int pull_points = 4;  ///< that hold a released object until it is let go, 1..50
+  TrackingUse tracking = TrackingUse::Automatic;
+  int tracking_rounds = 3;  ///< of tracking and estimation in turns, at most, 1..10
   LoadFreeScheme load_free = LoadFreeScheme::Together;
   int scan_points = 0;     ///< about which the scan may err, 0..50; 0: it is exact
   double scan_std = 0.01;  ///< by how much, times the object's size, (0, 0.2]
@@ -93,6 +104,17 @@ struct TriedField {
   double log_bayes_factor = 0.0;  ///< against the best before; infinitely low where it cannot be simulated
 };
 
+/// One round of tracking and estimation in turns.
+struct TrackingRound {
+  double youngs_modulus = 0.0;  ///< [Pa] that the object was tracked with; with control points the first one's
+  double surface_rms = 0.0;     ///< [m] from points that are no outliers to the tracked surface
+  double confidence = 0.0;      ///< least of all frames in which the object was seen
+  double fit_rms = 0.0;         ///< [m] from the tracked points to the simulated ones, with the estimate
+  double change = 0.0;          ///< of ln E by the estimate, the greatest of all moduli
+  bool lost = false;            ///< in some frame
+  VectorX theta;                ///< estimated
+};
+
 /// Where a fit stands, to go on after an interruption.
 struct FitState {
   /// Young's modulus and cost; infinite where it cannot be simulated. One alone: that of the swing that was seen.
@@ -123,12 +145,39 @@ struct FitState {
     int under_way = 0;                      ///< control points of the fit that was under way; 0: none
   };
   std::optional<FieldChoice> field;
+  /// Where the object is tracked: all above is the fit that was under way.
+  struct Tracking {
+    enum class Phase { Loop, Direct, Last };
+    Phase phase = Phase::Loop;
+    std::vector<TrackingRound> rounds;       ///< that are done
+    std::shared_ptr<const FitState> loop;    ///< of the last of them, with its estimate
+    std::shared_ptr<const FitState> direct;  ///< of the fit to the points, with its estimate
+    bool keeps_loop = true;                  ///< in the last phase
+  };
+  std::optional<Tracking> tracking;
 };
 
 /// A recording, and what its sensors saw.
 struct RecordedCapture {
   Capture capture;
   std::vector<ObservedFrame> observed;
+  std::optional<TrackedPoints> followed = {};  ///< points of the object, instead of the capture's markers
+};
+
+/// How an estimate predicts frames that took no part in it.
+struct HeldOutFrames {
+  bool succeeded = false;
+  int frames = 0;
+  double cost = 0.0, surface_rms = 0.0;  ///< [-], [m]
+};
+
+/// What tracking gave to a fit.
+struct TrackingOutcome {
+  std::vector<TrackingRound> rounds;
+  bool keeps_loop = true;                            ///< the estimate is the loop's; else that from the points alone
+  std::optional<HeldOutFrames> loop, direct;         ///< where both were tried
+  std::string why;                                   ///< a sentence
+  std::vector<std::shared_ptr<const Track>> tracks;  ///< of each recording, as tracked last
 };
 
 /// One of the recordings of a fit, at the solution.
@@ -153,6 +202,7 @@ struct FitOutcome {
   std::vector<FitEvent> history;
   bool converged = false, interrupted = false;
   std::string reason;
+  std::optional<TrackingOutcome> tracking;
   std::vector<TriedField> fields;  ///< where the number of control points was chosen: those tried, in their order
   std::vector<std::string> notes;  ///< plain sentences
   long long forward_steps = 0;

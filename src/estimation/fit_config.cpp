@@ -23,6 +23,10 @@ const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", S
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
+const std::vector<std::pair<std::string, TrackingUse>> tracking_uses = {{"auto", TrackingUse::Automatic},
+                                                                        {"off", TrackingUse::Off},
+                                                                        {"loop", TrackingUse::Loop},
+                                                                        {"both", TrackingUse::Both}};
 const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {{"together", LoadFreeScheme::Together},
                                                                                {"in_turns", LoadFreeScheme::InTurns}};
 const std::vector<std::pair<std::string, std::optional<ElementKind>>> elements = {
@@ -158,6 +162,12 @@ const std::vector<Entry>& entries() {
                    "what the object is divided into; automatic: hexahedra, or quadratic_tetrahedra where it is unknown "
                    "where the object is free of load",
                    elements, &FitOptions::element),
+      choice_entry("tracking",
+                   "track the object and fit its motion, in turns (loop), fit what was seen of its surface (off), or "
+                   "both, keeping what predicts frames left out; auto: both for clouds and several cameras",
+                   tracking_uses, &FitOptions::tracking),
+      integer_entry("tracking_rounds", "1..10", "of tracking and fitting in turns, at most",
+                    &FitOptions::tracking_rounds),
       choice_entry("load_free",
                    "the load-free shape of an object scanned as it sags and its material: together, or in_turns",
                    load_free_schemes, &FitOptions::load_free),
@@ -396,6 +406,7 @@ std::string FitOptions::validate() const {
   if (!(scan_std > 0.0 && scan_std <= 0.2)) return "scan_std must lie in (0, 0.2]";
   if (scan_points > 0 && load_free == LoadFreeScheme::InTurns)
     return "load_free=in_turns holds the shape while it moves parameters: it cannot correct the scan (scan_points)";
+  if (tracking_rounds < 1 || tracking_rounds > 10) return "tracking_rounds must lie in 1..10";
   if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
   if (control_points != automatic && (control_points < 1 || control_points > 500))
     return "control_points must lie in 1..500, or be auto";

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/5";
+constexpr const char* format = "fit-state/6";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -49,6 +49,34 @@ FitState::FieldChoice to_field(const Json& json) {
   return field;
 }
 
+Json from_tracking(const FitState::Tracking& tracking) {
+  Json json = {{"phase", int(tracking.phase)}, {"keeps_loop", tracking.keeps_loop}, {"rounds", Json::array()}};
+  for (const TrackingRound& r : tracking.rounds)
+    json["rounds"].push_back({{"youngs_modulus", r.youngs_modulus},
+                              {"surface_rms", r.surface_rms},
+                              {"confidence", r.confidence},
+                              {"fit_rms", r.fit_rms},
+                              {"change", r.change},
+                              {"lost", r.lost},
+                              {"theta", from_vector(r.theta)}});
+  if (tracking.loop) json["loop"] = to_json(*tracking.loop);
+  if (tracking.direct) json["direct"] = to_json(*tracking.direct);
+  return json;
+}
+
+FitState::Tracking to_tracking(const Json& json) {
+  FitState::Tracking tracking;
+  tracking.phase = FitState::Tracking::Phase(json.at("phase").get<int>());
+  tracking.keeps_loop = json.at("keeps_loop").get<bool>();
+  for (const Json& r : json.at("rounds"))
+    tracking.rounds.push_back({r.at("youngs_modulus").get<double>(), r.at("surface_rms").get<double>(),
+                               r.at("confidence").get<double>(), r.at("fit_rms").get<double>(),
+                               r.at("change").get<double>(), r.at("lost").get<bool>(), to_vector(r.at("theta"))});
+  if (json.contains("loop")) tracking.loop = std::make_shared<FitState>(to_state(json["loop"]));
+  if (json.contains("direct")) tracking.direct = std::make_shared<FitState>(to_state(json["direct"]));
+  return tracking;
+}
+
 Json to_json(const FitState& state) {
   Json json = {{"scan", Json::array()}, {"starts", Json::array()}, {"notes", state.notes}};
   for (const auto& [modulus, cost] : state.scan) json["scan"].push_back({modulus, from_cost(cost)});
@@ -82,6 +110,7 @@ Json to_json(const FitState& state) {
                                {"converged", e.converged},
                                {"reason", e.reason}});
   if (state.field) json["field"] = from_field(*state.field);
+  if (state.tracking) json["tracking"] = from_tracking(*state.tracking);
   return json;
 }
 
@@ -110,6 +139,7 @@ FitState to_state(const Json& json) {
                              e.at("reason").get<std::string>()});
   state.notes = json.at("notes").get<std::vector<std::string>>();
   if (json.contains("field")) state.field = to_field(json["field"]);
+  if (json.contains("tracking")) state.tracking = to_tracking(json["tracking"]);
   return state;
 }
 

@@ -121,7 +121,7 @@ ParameterSet Recordings::make_ready(RecordedCapture recorded, Recording& recordi
   for (const int plane : planes_seen)
     notes.push_back("Plane " + std::to_string(plane + 1) +
                     " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
-  recording.tracked = tracked_points(capture);
+  recording.tracked = recorded.followed ? std::move(*recorded.followed) : tracked_points(capture);
   recording.observations = std::make_shared<std::vector<FrameObservations>>(
       frame_observations(capture, recorded.observed, recording.tracked));
   if (recording.observations->empty())

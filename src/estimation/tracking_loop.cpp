@@ -1,0 +1,387 @@
+#include "estimation/tracking_loop.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "base/error.hpp"
+#include "estimation/followed.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr int every_so_many = 5;  // frames one is left out
+constexpr double settled = 0.02;  // change of ln E
+
+using Phase = FitState::Tracking::Phase;
+
+std::string text_of(const char* format, double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOptions& options) {
+  if (options.tracking != TrackingUse::Automatic) return options.tracking;
+  const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
+    const Capture& c = r.capture;
+    return !r.followed && !c.is_static && c.markers.empty() && (!c.clouds.empty() || c.depth.size() > 1);
+  });
+  return suits ? TrackingUse::Both : TrackingUse::Off;
+}
+
+class TrackingLoop {
+ public:
+  TrackingLoop(const std::vector<RecordedCapture>& recordings, const FitOptions& options, const FitMonitor& monitor,
+               FitState resume)
+      : all_(recordings),
+        options_(options),
+        monitor_(monitor),
+        is_both_(use_of(recordings, options) == TrackingUse::Both) {
+    options_.tracking = TrackingUse::Off;
+    if (resume.tracking) {
+      state_ = *resume.tracking;
+      left_ = std::move(resume);
+      left_.tracking.reset();
+    }
+    for (const RecordedCapture& r : all_) split(r);
+    for (const RecordedCapture& r : is_both_ ? training_ : all_) followed_.emplace_back(r, options_, notes_);
+  }
+
+  FitOutcome run() {
+    if (state_.phase == Phase::Loop && !loop()) return told(std::move(*outcome_));
+    if (!is_both_) return told(std::move(*outcome_));
+    if (state_.phase == Phase::Direct && !direct()) return told(std::move(*outcome_));
+    return last();
+  }
+
+ private:
+  void split(const RecordedCapture& r) {
+    RecordedCapture training{r.capture, {}, {}}, held_out = training;
+    for (const ObservedFrame& frame : r.observed) {
+      const int since = frame.frame - r.capture.start_frame;
+      (since > 0 && since % every_so_many == 3 ? held_out : training).observed.push_back(frame);
+    }
+    training_.push_back(std::move(training));
+    held_out_.push_back(std::move(held_out));
+  }
+
+  bool interrupted() const { return monitor_.interrupted && monitor_.interrupted(); }
+
+  void save(const FitState& under_way) {
+    if (!monitor_.on_state) return;
+    FitState state = under_way;
+    state.tracking = state_;
+    monitor_.on_state(state);
+  }
+
+  /// Follows all recordings with their parts of the estimate, or with what is known at first.
+  void follow(const std::vector<FollowedRecording>& recordings, const VectorX& theta) {
+    tracks_.clear();
+    Eigen::Index offset = 0;
+    for (const FollowedRecording& r : recordings) {
+      const Eigen::Index size = r.start().size();
+      VectorX own = r.start();
+      if (theta.size() > 0) own = with_material(own, theta.segment(offset, own_size(theta, recordings)));
+      offset += theta.size() > 0 ? own_size(theta, recordings) : size;
+      tracks_.push_back(std::make_shared<Track>(r.follow(own, [this](int, int) { return !interrupted(); })));
+      used_.push_back(own);
+    }
+  }
+
+  static Eigen::Index own_size(const VectorX& theta, const std::vector<FollowedRecording>& recordings) {
+    return theta.size() / Eigen::Index(recordings.size());
+  }
+
+  /// A theta of the tracker's, with the material of one of the fit's: its pulls, sensors and moduli may be other ones.
+  static VectorX with_material(VectorX own, const VectorX& estimated) {
+    own.head(theta::first_plane) = estimated.head(theta::first_plane);
+    if (own.size() == estimated.size()) own = estimated;
+    return own;
+  }
+
+  std::vector<RecordedCapture> followed_captures(const std::vector<RecordedCapture>& recordings) const {
+    std::vector<RecordedCapture> followed;
+    for (std::size_t i = 0; i < recordings.size(); ++i) {
+      const Capture& capture = recordings[i].capture;
+      followed.push_back({capture, {}, supported_points(*tracks_[i], object_size(capture))});
+      if (followed.back().followed->frames.empty())
+        throw InputError({{capture.file},
+                          "the tracker finds the object in no frame",
+                          "points near its surface at rest",
+                          "look at `pliant track`; or fit the points themselves with --set tracking=off"});
+    }
+    return followed;
+  }
+
+  TrackingRound described(const VectorX& used) const {
+    TrackingRound round;
+    round.youngs_modulus = used[theta::youngs_modulus];
+    round.confidence = 1.0;
+    double squares = 0.0, points = 0.0;
+    for (const auto& track : tracks_) {
+      round.lost = round.lost || track->lost_at.has_value();
+      for (const TrackedFrame& f : track->frames) {
+        squares += f.surface_rms * f.surface_rms * f.points * f.explained;
+        points += f.points * f.explained;
+        if (f.points > 0 || f.markers > 0) round.confidence = std::min(round.confidence, f.confidence);
+      }
+    }
+    if (points > 0.0) round.surface_rms = std::sqrt(squares / points);
+    return round;
+  }
+
+  /// One fit, told as a part of the whole.
+  FitOutcome fit_once(const std::vector<RecordedCapture>& recordings, const FitOptions& options, FitState from,
+                      const std::string& name, double done_from, double done_to) {
+    reached_ = from;
+    FitMonitor monitor = monitor_;
+    monitor.on_event = [&](FitEvent event) {
+      event.fraction_done = done_from + (done_to - done_from) * event.fraction_done;
+      event.stage = name + ": " + event.stage;
+      if (monitor_.on_event) monitor_.on_event(event);
+    };
+    monitor.on_state = [&](const FitState& state) {
+      reached_ = state;
+      save(state);
+    };
+    FitOutcome outcome = fit(recordings, options, monitor, std::move(from));
+    for (FitEvent& event : outcome.history) {
+      event.stage = name + ": " + event.stage;
+      history_.push_back(event);
+    }
+    forward_steps_ += outcome.forward_steps;
+    return outcome;
+  }
+
+  /// The state that a fit has reached, with its estimate: a fit that goes on from it returns that.
+  FitState concluded(const FitOutcome& outcome) const {
+    FitState state = reached_.field && reached_.field->state ? *reached_.field->state : reached_;
+    state.refined = {{outcome.cells, options_.steps, outcome.recordings.front().discretisation.body->element_count(),
+                      outcome.theta, outcome.final_cost, outcome.converged, outcome.reason}};
+    return state;
+  }
+
+  /// And one that looks again from there, with other observations.
+  static FitState from_there(FitState state, const VectorX& theta) {
+    state.refined.clear();
+    if (state.fine) state.fine->reference = theta, state.fine->optimiser = {};
+    return state;
+  }
+
+  FitOptions with_chosen_controls(const FitOutcome& outcome) const {
+    FitOptions options = options_;
+    if (options.control_points == FitOptions::automatic)
+      options.control_points = outcome.recordings.front().discretisation.body->modulus.controls;
+    return options;
+  }
+
+  double share(int round) const { return (is_both_ ? 0.5 : 1.0) * round / options_.tracking_rounds; }
+
+  /// False where it was interrupted or failed: the outcome says so.
+  bool loop() {
+    const std::vector<RecordedCapture>& recordings = is_both_ ? training_ : all_;
+    VectorX theta = state_.rounds.empty() ? VectorX() : state_.rounds.back().theta;
+    FitOptions options = options_;
+    FitState from = std::exchange(left_, {});
+    bool is_resumed = !from.scan.empty() || from.motion || from.fine;
+    while (int(state_.rounds.size()) < options_.tracking_rounds) {
+      const int round = int(state_.rounds.size());
+      used_.clear();
+      follow(followed_, theta);
+      TrackingRound described_round = described(used_.front());
+      if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
+      is_resumed = false;
+      outcome_ = fit_once(followed_captures(recordings), options, std::move(from), "round " + std::to_string(round + 1),
+                          share(round), share(round + 1));
+      if (outcome_->interrupted || !outcome_->evaluation.succeeded) return false;
+      options = with_chosen_controls(*outcome_);
+      described_round.theta = outcome_->theta;
+      described_round.fit_rms = outcome_->evaluation.track_rms();
+      described_round.change = change(theta.size() > 0 ? theta : VectorX(), described_round);
+      theta = outcome_->theta;
+      state_.loop = std::make_shared<FitState>(concluded(*outcome_));
+      state_.rounds.push_back(std::move(described_round));
+      save({});
+      if (state_.rounds.back().change < settled) break;
+    }
+    if (!outcome_ && state_.loop) resume_loop(recordings, options, theta);
+    state_.phase = Phase::Direct;
+    save({});
+    return true;
+  }
+
+  /// All rounds were done before an interruption.
+  void resume_loop(const std::vector<RecordedCapture>& recordings, const FitOptions& options, const VectorX& theta) {
+    used_.clear();
+    follow(followed_, theta);
+    outcome_ = fit_once(followed_captures(recordings), options, *state_.loop, "rounds", 0.5, 0.5);
+  }
+
+  static double change(const VectorX& before, const TrackingRound& round) {
+    const double from = before.size() > 0 ? before[theta::youngs_modulus] : round.youngs_modulus;
+    return std::abs(std::log(round.theta[theta::youngs_modulus] / from));
+  }
+
+  bool direct() {
+    direct_ = fit_once(training_, options_, std::exchange(left_, {}), "points", 0.5, 0.9);
+    if (direct_->interrupted) {
+      outcome_ = std::move(*direct_);
+      return false;
+    }
+    if (direct_->evaluation.succeeded) state_.direct = std::make_shared<FitState>(concluded(*direct_));
+    if (!outcome_) resume_loop(training_, options_, state_.rounds.back().theta);
+    result_.loop = score(*outcome_), result_.direct = score(*direct_);
+    state_.keeps_loop =
+        !result_.direct->succeeded || (result_.loop->succeeded && result_.loop->cost < result_.direct->cost);
+    state_.phase = Phase::Last;
+    save({});
+    return true;
+  }
+
+  HeldOutFrames score(const FitOutcome& outcome) const {
+    HeldOutFrames score;
+    if (!outcome.evaluation.succeeded) return score;
+    double squares = 0.0, points = 0.0;
+    score.succeeded = true;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      const CostEvaluation e = predicted(outcome.recordings[i], held_out_[i]);
+      score.succeeded = score.succeeded && e.succeeded;
+      score.cost += e.cost;
+      for (const FrameFit& f : e.frames) squares += f.sum_squares, points += f.points, ++score.frames;
+    }
+    if (points > 0.0) score.surface_rms = std::sqrt(squares / points);
+    return score;
+  }
+
+  /// How an estimate fits points that were seen.
+  CostEvaluation predicted(const RecordingOutcome& estimate, const RecordedCapture& seen) const {
+    const Discretisation& d = estimate.discretisation;
+    ObjectiveOptions o;
+    o.outlier_scale = options_.fine_band * object_size(seen.capture);
+    o.last_frame = int(d.simulation.times.size()) - 1;
+    const auto observations =
+        std::make_shared<std::vector<FrameObservations>>(frame_observations(seen.capture, seen.observed, {}));
+    return Objective(d.mismatch, d.body, d.simulation, observations, ParameterSet({}, estimate.theta), o)
+        .evaluate(VectorX(0));
+  }
+
+  /// The better one again, from where it is, with all frames.
+  FitOutcome last() {
+    const std::shared_ptr<const FitState> best = state_.keeps_loop ? state_.loop : state_.direct;
+    const VectorX& theta = best->refined.front().theta;
+    FitOptions options = options_;
+    if (options.control_points == FitOptions::automatic) {
+      if (!outcome_ && state_.keeps_loop) resume_loop(training_, options_, state_.rounds.back().theta);
+      options = with_chosen_controls(state_.keeps_loop ? *outcome_ : *direct_);
+    }
+    std::vector<FollowedRecording> all;
+    std::vector<std::string> ignored;
+    for (const RecordedCapture& r : all_) all.emplace_back(r, options_, ignored);
+    used_.clear();
+    follow(all, theta);
+    const bool goes_on = left_.fine.has_value();
+    FitState from = goes_on ? std::exchange(left_, {}) : from_there(*best, theta);
+    FitOutcome outcome =
+        fit_once(state_.keeps_loop ? followed_captures(all_) : all_, options, std::move(from), "all frames", 0.9, 1.0);
+    return told(std::move(outcome));
+  }
+
+  /// With all that was done on the way; the agreement is that with the points.
+  FitOutcome told(FitOutcome outcome) {
+    outcome.history = std::move(history_);
+    outcome.forward_steps = forward_steps_;
+    result_.rounds = state_.rounds;
+    result_.keeps_loop = state_.keeps_loop;
+    result_.tracks = tracks_;
+    result_.why = why();
+    if (outcome.evaluation.succeeded) agree_with_points(outcome);
+    outcome.notes.insert(outcome.notes.begin(), result_.why);
+    for (const auto& track : tracks_) {
+      if (!track->note.empty()) outcome.notes.push_back(track->note);
+      if (track->lost_at)
+        outcome.notes.push_back("The tracker lost the object in frame " + std::to_string(*track->lost_at) + ".");
+    }
+    outcome.tracking = std::move(result_);
+    return outcome;
+  }
+
+  void agree_with_points(FitOutcome& outcome) const {
+    std::vector<FrameFit> frames;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      CostEvaluation e = predicted(outcome.recordings[i], all_[i]);
+      if (!e.succeeded) return;
+      for (FrameFit& f : e.frames) {
+        f.recording = int(i);
+        frames.push_back(f);
+      }
+      outcome.recordings[i].evaluation.frames = e.frames;
+    }
+    outcome.evaluation.frames = std::move(frames);
+  }
+
+  std::string why() const {
+    const int rounds = int(state_.rounds.size());
+    std::string text = "The object was tracked and its motion fitted in " + std::to_string(rounds) +
+                       (rounds == 1 ? " round" : " rounds in turns");
+    if (!is_both_) return text + ".";
+    text +=
+        ", and the points were fitted themselves; every " + std::to_string(every_so_many) + "th frame was left out. ";
+    if (!result_.loop || !result_.direct) return text + "It was interrupted before they were compared.";
+    const auto said = [](const HeldOutFrames& f) {
+      return f.succeeded ? text_of("%.4g", f.cost) + " (" + text_of("%.3g", 1e3 * f.surface_rms) + " mm rms)"
+                         : std::string("cannot be simulated");
+    };
+    return text + "Cost of those frames: " + said(*result_.loop) + " of the tracked motion's estimate, " +
+           said(*result_.direct) + " of the points'; " + (state_.keeps_loop ? "the tracked motion's" : "the points'") +
+           " was kept and finished with all frames.";
+  }
+
+  const std::vector<RecordedCapture>& all_;
+  FitOptions options_;
+  FitMonitor monitor_;
+  bool is_both_;
+  std::vector<RecordedCapture> training_, held_out_;
+  std::vector<FollowedRecording> followed_;
+  std::vector<std::string> notes_;  // of reading the recordings, which the fits tell too
+  FitState::Tracking state_;
+  FitState left_;     // by an interruption
+  FitState reached_;  // by the fit that runs
+  std::vector<std::shared_ptr<const Track>> tracks_;
+  std::vector<VectorX> used_;  // to track with
+  std::optional<FitOutcome> outcome_, direct_;
+  TrackingOutcome result_;
+  std::vector<FitEvent> history_;
+  long long forward_steps_ = 0;
+};
+
+}  // namespace
+
+bool tracks(const std::vector<RecordedCapture>& recordings, const FitOptions& options) {
+  return use_of(recordings, options) != TrackingUse::Off;
+}
+
+TrackedPoints supported_points(const Track& track, double size) {
+  constexpr int fewest = 2;             // points about a mark
+  constexpr double least_noise = 5e-4;  // times the size
+  TrackedPoints tracked;
+  tracked.rest = track.marks;
+  const Embedding marks(*track.body, track.marks);
+  for (const TrackedFrame& frame : track.frames) {
+    if (frame.is_lost || frame.points == 0) continue;
+    const double noise = std::max(frame.surface_rms, least_noise * size);
+    for (int m = 0; m < marks.point_count(); ++m)
+      if (frame.mark_points[std::size_t(m)] >= fewest)
+        tracked.frames[frame.frame].push_back({m, marks.position(m, frame.nodes), noise, 0});
+  }
+  return tracked;
+}
+
+FitOutcome fit_with_tracking(const std::vector<RecordedCapture>& recordings, const FitOptions& options,
+                             const FitMonitor& monitor, FitState resume) {
+  return TrackingLoop(recordings, options, monitor, std::move(resume)).run();
+}
+
+}  // namespace pliant
