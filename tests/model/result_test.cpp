@@ -159,5 +159,30 @@ TEST(Evaluation, HasTheNamesOfTheFormat) {
   EXPECT_TRUE(json["loads"].is_array());
 }
 
+TEST(Evaluation, TellsHowFarLoadsAreOff) {
+  const TemporaryFolder folder;
+  LoadError cloud{{"load 1", "test"}, "cloud", 400, 3, 1e-3, 4e-3, 0.005, 0.02};
+  LoadError lost{{"load 2", "fit"}};
+  lost.failure = "no equilibrium was found";
+  write_evaluation(folder / "e.json", {{}, {}, {cloud, lost}});
+  const auto json = nlohmann::json::parse(read_file(folder / "e.json"));
+  EXPECT_EQ(json["loads"][0], nlohmann::json({{"name", "load 1"},
+                                              {"role", "test"},
+                                              {"marker_rms", nullptr},
+                                              {"marker_max", nullptr},
+                                              {"max_displacement", nullptr},
+                                              {"relative_error", nullptr},
+                                              {"observed", "cloud"},
+                                              {"points", 400},
+                                              {"outliers", 3},
+                                              {"mean", 1e-3},
+                                              {"max", 4e-3},
+                                              {"relative_mean", 0.005},
+                                              {"relative_max", 0.02}}));
+  EXPECT_EQ(json["loads"][1]["failure"], "no equilibrium was found");
+  EXPECT_TRUE(json["loads"][1]["mean"].is_null());
+  EXPECT_TRUE(json["loads"][1]["observed"].is_null());
+}
+
 }  // namespace
 }  // namespace pliant

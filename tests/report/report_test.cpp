@@ -89,6 +89,22 @@ ReportData example(int width, int height) {
   return data;
 }
 
+TEST(Report, ShowsLoadsThatWereKeptApart) {
+  ReportData data = example(8, 5);
+  EXPECT_THAT(report_html(data), Not(HasSubstr("Under hung weights")));
+  LoadError lost{{"load <2>", "test"}};
+  lost.failure = "no equilibrium was found";
+  data.loads = {{{"load 1", "test"}, "cloud", 400, 3, 1e-3, 4e-3, 0.005, 0.02}, lost};
+  const std::string html = report_html(data);
+  EXPECT_THAT(html, HasSubstr("Under hung weights"));
+  EXPECT_THAT(html, HasSubstr("<td>1 mm, 0.5 %</td><td>4 mm, 2 %</td><td>cloud, 400 points</td>"));
+  EXPECT_THAT(html, HasSubstr("load &lt;2&gt;"));
+  EXPECT_THAT(html, HasSubstr("no equilibrium was found"));
+  EXPECT_THAT(html, HasSubstr("sliding along it does not show"));
+  data.loads[0].observed = "markers";
+  EXPECT_THAT(report_html(data), Not(HasSubstr("sliding")));
+}
+
 TEST(ValueWithUncertainty, RoundsBothToTheSamePlace) {
   EXPECT_EQ(value_with_uncertainty(590.3, 21.4, "Pa"), "590 ± 21\u00a0Pa");
   EXPECT_EQ(value_with_uncertainty(0.2437, 0.052, "1/s"), "0.244 ± 0.052\u00a01/s");
