@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "input_errors.hpp"
+#include "support/load_errors.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant {
@@ -161,10 +162,7 @@ TEST(Evaluation, HasTheNamesOfTheFormat) {
 
 TEST(Evaluation, TellsHowFarLoadsAreOff) {
   const TemporaryFolder folder;
-  LoadError cloud{{"load 1", "test"}, "cloud", 400, 3, 1e-3, 4e-3, 0.005, 0.02};
-  LoadError lost{{"load 2", "fit"}};
-  lost.failure = "no equilibrium was found";
-  write_evaluation(folder / "e.json", {{}, {}, {cloud, lost}});
+  write_evaluation(folder / "e.json", {{}, {}, {test::seen_load(), test::failed_load()}});
   const auto json = nlohmann::json::parse(read_file(folder / "e.json"));
   EXPECT_EQ(json["loads"][0], nlohmann::json({{"name", "load 1"},
                                               {"role", "test"},

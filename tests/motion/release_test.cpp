@@ -21,7 +21,7 @@ enum class HeldBy { Pulls, Weight };
 class Release : public ::testing::TestWithParam<std::tuple<int, ElementKind, Integrator, HeldBy>> {
  protected:
   Release() {
-    if (std::get<3>(GetParam()) == HeldBy::Weight) scene.hang(0.02);
+    if (std::get<3>(GetParam()) == HeldBy::Weight) scene.hang(0.05);
   }
   int index() const { return std::get<0>(GetParam()); }
   Released scene{bar(std::get<1>(GetParam())), std::get<2>(GetParam())};
@@ -93,7 +93,7 @@ INSTANTIATE_TEST_SUITE_P(TetrahedraUnderAWeight, Release,
 /// Before, it is the equilibrium under a weight that stays; afterwards nothing of the weight is left.
 TEST(Releases, TheWeightHangsUntilTheStringIsCut) {
   Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);
-  scene.hang(0.02);
+  scene.hang(0.05);
   const VectorX start = scene.positions_at(scene.theta, 0), end = scene.positions_at(scene.theta, last);
   Released loaded = scene, bare = scene;
   std::swap(loaded.options.weights, loaded.options.released_weights);
@@ -106,13 +106,12 @@ TEST(Releases, TheWeightHangsUntilTheStringIsCut) {
   scene.options.is_static = true;
   EXPECT_LT((scene.positions_at(scene.theta, 0) - sagging).cwiseAbs().maxCoeff(), tolerance(1e-9))
       << "at rest nothing is released";
-  // The motion is that of the pose alone: the same as from an equilibrium under any other force that ends.
-  Released lighter = scene;
-  lighter.options.is_static = false;
-  lighter.options.times = {0.0, 4.0};
-  lighter.options.max_dt = 0.02;
-  lighter.theta[theta::mass_damping] = 8.0;
-  EXPECT_LT((lighter.positions_at(lighter.theta, 1) - sagging).cwiseAbs().maxCoeff(), 1e-4) << "it ends without it";
+  Released damped = scene;  // nearly critically
+  damped.options.is_static = false;
+  damped.options.times = {0.0, 2.0};
+  damped.options.max_dt = 0.01;
+  damped.theta[theta::mass_damping] = 25.0;
+  EXPECT_LT((damped.positions_at(damped.theta, 1) - sagging).cwiseAbs().maxCoeff(), 1e-4) << "it ends without it";
 }
 
 /// A cantilever under a weight at its end, small against its length: P L^3 / 3EI and shear; let go, it swings at
@@ -123,7 +122,7 @@ TEST(Releases, DeflectionAndFrequencyOfACantileverAreThoseOfBeams) {
     Hanging scene(body);
     scene.options.is_static = false;
     scene.options.newmark_theta = 0.5;
-    scene.theta.segment<3>(theta::gravity) *= 0.05;
+    scene.theta.segment<3>(theta::gravity) *= 0.01;
     const double E = scene.theta[theta::youngs_modulus], rho = scene.theta[theta::density], nu = 0.3;
     const double I = std::pow(edge, 4) / 12.0, A = edge * edge, mass = 0.2;
     const double P = -mass * scene.theta[theta::gravity + 2];

@@ -6,6 +6,7 @@
 
 #include "capture/point_cloud.hpp"
 #include "geometry/primitives.hpp"
+#include "support/load_errors.hpp"
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
@@ -183,10 +184,9 @@ TEST_F(LoadClouds, TooHeavyALoadLeavesTheOthers) {
   EXPECT_NE(errors[2].failure.find("nothing of the object was seen"), std::string::npos) << errors[2].failure;
 }
 
-TEST_F(LoadClouds, AreToldInMillimetresAndPercent) {
-  LoadError error{{"load 2", "test"}, "cloud", 400, 3, 1e-3, 4e-3, 0.005, 0.02};
-  EXPECT_EQ(load_sentence(error),
-            "load 2 (test): mean 1.00 mm (0.50 % of the object's size), max 4.00 mm (2.00 % of the object's size), "
+TEST(LoadSentence, IsToldInMillimetresAndPercent) {
+  EXPECT_EQ(load_sentence(test::seen_load()),
+            "load 1 (test): mean 1.00 mm (0.50 % of the object's size), max 4.00 mm (2.00 % of the object's size), "
             "400 points, 3 that stand alone left out");
 }
 

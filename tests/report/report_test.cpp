@@ -6,6 +6,7 @@
 #include "geometry/primitives.hpp"
 #include "geometry/ray_scene.hpp"
 #include "report/picture.hpp"
+#include "support/load_errors.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant {
@@ -92,9 +93,7 @@ ReportData example(int width, int height) {
 TEST(Report, ShowsLoadsThatWereKeptApart) {
   ReportData data = example(8, 5);
   EXPECT_THAT(report_html(data), Not(HasSubstr("Under hung weights")));
-  LoadError lost{{"load <2>", "test"}};
-  lost.failure = "no equilibrium was found";
-  data.loads = {{{"load 1", "test"}, "cloud", 400, 3, 1e-3, 4e-3, 0.005, 0.02}, lost};
+  data.loads = {test::seen_load(), test::failed_load()};
   const std::string html = report_html(data);
   EXPECT_THAT(html, HasSubstr("Under hung weights"));
   EXPECT_THAT(html, HasSubstr("<td>1 mm, 0.5 %</td><td>4 mm, 2 %</td><td>cloud, 400 points</td>"));
