@@ -61,8 +61,9 @@ def with_material(model, out, values, finer=1.0):
     out.mkdir(parents=True, exist_ok=True)
     text = re.sub(r"volume_mesh = .*\n", "", model.read_text())  # the elements' own moduli
     for key in ("youngs_modulus", "poisson_ratio", "density", "mass"):
-        text = re.sub(rf"(?m)^{key} = \S+", f"{key} = {values[key]['value']}", text)
-    text = re.sub(r"(?m)^cell_size = (\S+)", lambda m: f"cell_size = {float(m[1]) / finer}", text)
+        text, changes = re.subn(rf"(?m)^{key} *= *\S+", f"{key} = {values[key]['value']}", text)
+        assert changes == 1, key
+    text = re.sub(r"(?m)^cell_size *= *(\S+)", lambda m: f"cell_size = {float(m[1]) / finer}", text)
     (out / "model.toml").write_text(text)
     (out / "surface.ply").write_bytes((model.parent / "surface.ply").read_bytes())
     return out / "model.toml"
@@ -83,7 +84,8 @@ def main():
     seen = common.evaluate(arguments.program, model, source, work / "clouds.json")
     folder = judge(source, work)
     judged = {"fitted": model, "true material": with_material(model, work / "true", values),
-              "true material, half the cells": with_material(model, work / "true-finer", values, 2.0)}
+              "true material, cells half as long": with_material(model, work / "true-half", values, 2.0),
+              "true material, a quarter": with_material(model, work / "true-quarter", values, 4.0)}
     nodes = {name: figures_of(common.evaluate(arguments.program, path, folder, work / f"{path.parent.name}.json")["loads"])
              for name, path in judged.items()}
     common.write_results(__file__, {
@@ -94,7 +96,7 @@ def main():
         "loads": [{"mass": l["mass_kg"], "moved": common.number(l["max_displacement_from_static_m"], 4)} for l in truth["loads"]],
         "clouds": figures_of(seen["loads"]), "nodes": nodes})
     for name, loads in nodes.items():
-        print(f"{name}: mean node distances {', '.join(f'{100 * l['relative_mean']:.2f} %' for l in loads)}")
+        print(f"{name}: mean node distances " + ", ".join(f"{100 * l['relative_mean']:.2f} %" for l in loads))
 
 
 if __name__ == "__main__":
