@@ -75,7 +75,7 @@ struct CutString {
 };
 
 TEST(CutString, AnchorsModulusAndDensity) {
-  const CutString scene(0.02);
+  const CutString scene(0.1);
   Objective objective = scene.objective();
   OptimiserOptions options;
   options.max_iterations = 40;
@@ -86,7 +86,7 @@ TEST(CutString, AnchorsModulusAndDensity) {
   const VectorX found = scene.parameters.to_theta(summary.p);
   EXPECT_NEAR(found[theta::youngs_modulus] / scene.truth[theta::youngs_modulus], 1.0, tolerance(1e-3));
   EXPECT_NEAR(found[theta::density] / scene.truth[theta::density], 1.0, tolerance(1e-3));
-  EXPECT_LT(scene.correlation(), 0.98);
+  EXPECT_LT(scene.correlation(), 0.95);
   EXPECT_GT(CutString(1e-7).correlation(), 0.99999) << "nothing tells them apart but the weight";
 }
 
@@ -120,7 +120,8 @@ TEST_F(ReleasedCapture, HasTheWeightAndNoPulls) {
 
 TEST_F(ReleasedCapture, EstimatesTheDensityOnlyWhereNobodyKnowsIt) {
   const auto is_estimated = [](const Capture& c) {
-    for (const Parameter& p : default_parameters(c, 1e-4).parameters())
+    const ParameterSet parameters = default_parameters(c, 1e-4);
+    for (const Parameter& p : parameters.parameters())
       if (p.name == "density") return p.estimated;
     return false;
   };
