@@ -88,7 +88,10 @@ void describe_world(const Capture& capture) {
     say("hung",
         formatted("%.4g kg at %zu point%s", mass, capture.weights.size(), capture.weights.size() == 1 ? "" : "s"));
   }
-  if (capture.initial.released) say("start", "released from a held, deformed pose");
+  if (const auto& weight = capture.initial.release_of)
+    say("start", formatted("released from under a hung weight of %.4g kg", weight->mass));
+  else if (capture.initial.released)
+    say("start", "released from a held, deformed pose");
 }
 
 void describe_sensors(const Capture& capture) {

@@ -1,5 +1,4 @@
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -41,26 +40,30 @@ int run(const Arguments& arguments) {
   const Model model = load_model(arguments.model);
   const Capture capture = read_capture(arguments.capture);
   if (!capture.presses.empty()) std::cerr << "pliant: presses of this capture are passed over\n";
-  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.markers.has_value(); });
   ObserveOptions options;
   options.max_points_per_frame = 1000;
   const auto observed = observe(capture, options, [](int done, int total) { show_progress("read", done, total); });
   stop_if_interrupted();
   const auto seen =
       std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed, tracked_points(capture)));
-  if (seen->empty() && !has_loads)
+  if (seen->empty() && capture.loads.empty())
     throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
   const CaptureScene scene = make_scene(model, capture);
   Evaluation result;
-  if (!seen->empty() && !evaluate_frames(capture, scene, seen, result)) return NotConverged;
+  bool converged = seen->empty() || evaluate_frames(capture, scene, seen, result);
+  if (!converged && capture.loads.empty()) return NotConverged;
   result.loads = predict_loads(capture, scene);
+  for (const LoadError& load : result.loads) {
+    std::cerr << load_sentence(load) << "\n";
+    converged = converged && load.failure.empty();
+  }
   std::cout << to_json(result) << "\n";
   if (!arguments.out.empty()) write_evaluation(arguments.out, result);
   if (!arguments.markers.empty()) {
     const MarkerPrediction prediction = predict_markers(capture, scene);
     write_marker_track(arguments.markers, prediction.ids, prediction.frames);
   }
-  return Fine;
+  return converged ? Fine : NotConverged;
 }
 
 }  // namespace

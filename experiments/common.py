@@ -1,5 +1,6 @@
 """What every experiment needs: run the program, time it, and keep figures as JSON. Standard library only."""
 import argparse
+import ast
 import base64
 import csv
 import json
@@ -119,6 +120,16 @@ def write_results(script, figures):
     path = pathlib.Path(script).resolve().parent / "results.json"
     path.write_text(json.dumps({"machine": machine(), **figures}, indent=1, allow_nan=False) + "\n")
     print(path)
+
+
+def read_array(archive, name):
+    """Shape and flat values of an array in an .npz file."""
+    data = archive.read(name + ".npy")
+    size = struct.unpack_from("<H", data, 8)[0]
+    header = ast.literal_eval(data[10:10 + size].decode())
+    codes = {"<i2": "h", "<i4": "i", "<f4": "f", "<f8": "d"}
+    count = math.prod(header["shape"])
+    return header["shape"], struct.unpack_from(f"<{count}{codes[header['descr']]}", data, 10 + size)
 
 
 def dot(a, b):

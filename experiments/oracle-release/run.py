@@ -6,7 +6,6 @@ The even bar is fitted with no choice of ours. Nobody tells the program where th
 a field over 1 to 6 control points; and once more as two regions, as one who knows the place would write. What a user can
 judge a number of control points by (cost, deviations, and what a part of the frames gives) stands beside what the truth says.
 truth.json is read for judging only. Standard library only."""
-import ast
 import math
 import pathlib
 import struct
@@ -86,22 +85,12 @@ def zones_of(model, zones):
     return out
 
 
-def read_array(archive, name):
-    """Shape and flat values of an array in an .npz file."""
-    data = archive.read(name + ".npy")
-    size = struct.unpack_from("<H", data, 8)[0]
-    header = ast.literal_eval(data[10:10 + size].decode())
-    codes = {"<i2": "h", "<i4": "i", "<f4": "f", "<f8": "d"}
-    count = math.prod(header["shape"])
-    return header["shape"], struct.unpack_from(f"<{count}{codes[header['descr']]}", data, 10 + size)
-
-
 def swing_errors(fit, source, first):
     """How far the free end of a fit's motion is off the true one, rms of each coordinate [m] over the frames."""
     data = common.shared_data() / source / "truth"
     with zipfile.ZipFile(data / "trajectory.npz") as archive:
-        (frames, count, _), q = read_array(archive, "q")
-        scale = read_array(archive, "scale")[1][0]
+        (frames, count, _), q = common.read_array(archive, "q")
+        scale = common.read_array(archive, "scale")[1][0]
     ply = (data / "reference.ply").read_bytes()
     rest = struct.unpack_from(f"<{3 * count}d", ply, ply.index(b"end_header\n") + 11)
     files = sorted((fit / "frames").glob("*.vtu"))

@@ -49,6 +49,12 @@ struct Plane {
 
 enum class ShapeIs { Reference, Static };
 
+/// A small heavy thing that hangs at a point of the object, and moves along with it.
+struct Weight {
+  double mass = 0.0;             ///< [kg]
+  Vector3 at = Vector3::Zero();  ///< on the undeformed surface
+};
+
 struct Initial {
   Vector3 linear_velocity = Vector3::Zero();   ///< [m/s], of the centre of mass
   Vector3 angular_velocity = Vector3::Zero();  ///< [rad/s], about the centre of mass
@@ -56,6 +62,9 @@ struct Initial {
   bool released = false;
   /// Of a model or scene whose object is released: what pulls it until then, in the unit of `Pull`.
   std::vector<Vector3> pulls = {};
+  /// Of an object that is released: the weight that hangs from it until then, and whose string is cut. Nothing: nobody
+  /// knows what held it.
+  std::optional<Weight> release_of = {};
 };
 
 /// Paths of one file a frame: a printf pattern like "front/%06d.png", relative to the capture's folder.
@@ -108,12 +117,6 @@ struct Load {
   std::string role = "fit";                                           ///< "fit" or "test"
 };
 
-/// A small heavy thing that hangs at a point of the object in every frame, and moves along with it.
-struct Weight {
-  double mass = 0.0;             ///< [kg]
-  Vector3 at = Vector3::Zero();  ///< on the undeformed surface
-};
-
 /// Facts read from a `capture.toml`, valid as a whole (see docs/formats.md). SI units, world coordinates.
 struct Capture {
   std::filesystem::path folder;  ///< absolute; patterns of the capture are relative to it
@@ -138,7 +141,7 @@ struct Capture {
   std::vector<FixedRegion> fixed;
   std::vector<MaterialRegion> regions;
   std::vector<Plane> planes;
-  std::vector<Weight> weights;
+  std::vector<Weight> weights;  ///< that hang in every frame
   Initial initial;
 
   std::vector<DepthCamera> depth;

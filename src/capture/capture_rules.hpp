@@ -29,6 +29,7 @@ void check_timing(RuleContext&);
 void check_start_frame(RuleContext&);
 void check_static(RuleContext&);
 void check_initial_velocity(RuleContext&);
+void check_release(RuleContext&);
 void check_vertex_lists(RuleContext&);
 void check_fixed_regions(RuleContext&);
 void check_material_regions(RuleContext&);

@@ -27,7 +27,10 @@ DepthImage to_metres(const Image<std::uint16_t>& raw, double depth_scale) {
 }
 
 DepthImage read_depth(const Capture& capture, const DepthCamera& camera, int frame) {
-  const auto path = capture.folder / camera.images(frame);
+  return read_depth(camera, capture.folder / camera.images(frame));
+}
+
+DepthImage read_depth(const DepthCamera& camera, const std::filesystem::path& path) {
   return to_metres(of_size(read_depth_image(path), camera, path), camera.depth_scale);
 }
 
@@ -38,7 +41,10 @@ std::optional<DepthImage> read_background(const DepthCamera& camera) {
 
 std::optional<Image<std::uint8_t>> read_object_mask(const Capture& capture, const DepthCamera& camera, int frame) {
   if (!camera.masks) return std::nullopt;
-  const auto path = capture.folder / (*camera.masks)(frame);
+  return read_object_mask(camera, capture.folder / (*camera.masks)(frame));
+}
+
+Image<std::uint8_t> read_object_mask(const DepthCamera& camera, const std::filesystem::path& path) {
   return of_size(read_mask(path), camera, path);
 }
 

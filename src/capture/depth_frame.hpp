@@ -13,11 +13,15 @@ using DepthImage = Image<float>;
 /// A depth camera's image of one frame. Throws InputError where it cannot be decoded or has another size.
 DepthImage read_depth(const Capture& capture, const DepthCamera& camera, int frame);
 
+/// An image of that camera that belongs to no frame. Throws likewise.
+DepthImage read_depth(const DepthCamera& camera, const std::filesystem::path& path);
+
 /// The camera's view of the scene without the object; nothing where the capture has none.
 std::optional<DepthImage> read_background(const DepthCamera& camera);
 
 /// 255 where the pixel shows the object; nothing where the capture has no masks.
 std::optional<Image<std::uint8_t>> read_object_mask(const Capture& capture, const DepthCamera& camera, int frame);
+Image<std::uint8_t> read_object_mask(const DepthCamera& camera, const std::filesystem::path& path);
 
 /// Raw readings to metres.
 DepthImage to_metres(const Image<std::uint16_t>& raw, double depth_scale);

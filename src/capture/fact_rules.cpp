@@ -7,6 +7,7 @@
 #include "capture/capture_rules.hpp"
 #include "capture/region.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/surface_distance.hpp"
 
 namespace pliant {
 
@@ -41,34 +42,9 @@ std::string item(const char* name, std::size_t i, const char* key = "") {
 
 double size_of(const TriangleMesh& surface) { return bounding_box(surface).extent().maxCoeff(); }
 
-Vector3 closest_on_triangle(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c) {
-  const auto on_segment = [&](const Vector3& s, const Vector3& e) -> Vector3 {
-    const Vector3 d = e - s;
-    const double length = d.squaredNorm();
-    return length > 0 ? Vector3(s + std::clamp((p - s).dot(d) / length, 0.0, 1.0) * d) : s;
-  };
-  const Vector3 n = (b - a).cross(c - a);
-  const bool inside = n.squaredNorm() > 0 && n.dot((b - a).cross(p - a)) >= 0 && n.dot((c - b).cross(p - b)) >= 0 &&
-                      n.dot((a - c).cross(p - c)) >= 0;
-  if (inside) return p - n * (n.dot(p - a) / n.squaredNorm());
-  Vector3 best = on_segment(a, b);
-  for (const Vector3& other : {on_segment(b, c), on_segment(c, a)})
-    if ((other - p).squaredNorm() < (best - p).squaredNorm()) best = other;
-  return best;
-}
-
-double distance_to(const TriangleMesh& surface, const Vector3& point) {
-  double least = 1e300;
-  for (const auto& [a, b, c] : surface.triangles)
-    least = std::min(
-        least,
-        (closest_on_triangle(point, surface.vertices[a], surface.vertices[b], surface.vertices[c]) - point).norm());
-  return least;
-}
-
 void complain_off_surface(RuleContext& context, const std::string& key, const Vector3& point) {
   if (!context.capture.surface) return;
-  const double distance = distance_to(*context.capture.surface, point);
+  const double distance = distances_to_surface(*context.capture.surface, {&point, 1}).front();
   if (distance > surface_tolerance * size_of(*context.capture.surface))
     context.toml.complain(key, text_of(point) + " is " + text_of(distance, "m") + " off the rest surface",
                           "a point on the undeformed surface", "give it in metres, in world coordinates, at rest");
@@ -356,6 +332,20 @@ void check_weights(RuleContext& context) {
     complain_of_mass(context, item("weight", i, "mass"), context.capture.weights[i].mass);
     complain_off_surface(context, item("weight", i, "at"), context.capture.weights[i].at);
   }
+}
+
+void check_release(RuleContext& context) {
+  const Capture& capture = context.capture;
+  const auto& weight = capture.initial.release_of;
+  if (!weight || !context.toml.is_sound("initial")) return;
+  if (!capture.initial.released)
+    context.toml.complain("initial.release_of", "`release_of` without `released`", "released = true",
+                          "a weight that hangs in every frame is a block [[weight]]");
+  if (capture.gravity && capture.gravity->norm() == 0)
+    context.toml.complain("initial.release_of", "a hung weight without gravity", "a gravity that pulls at it",
+                          "remove `release_of`");
+  complain_of_mass(context, "initial.release_of.mass", weight->mass);
+  complain_off_surface(context, "initial.release_of.at", weight->at);
 }
 
 void check_loads(RuleContext& context) {

@@ -169,6 +169,7 @@ std::vector<Rule> make_rules() {
           check_has_observations,
           check_presses,
           check_weights,
+          check_release,
           check_loads,
           check_depth_files,
           check_clouds,

@@ -10,6 +10,7 @@
 #include "capture/capture_rules.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_points.hpp"
+#include "capture/isolated_points.hpp"
 #include "capture/pixel_kinds.hpp"
 #include "capture/point_cloud.hpp"
 
@@ -45,15 +46,23 @@ void append_camera(ObservedFrame& frame, const Capture& capture, const PixelSort
   append_pixels(frame, sorter, camera, index, depth, sorter.sort(depth, mask));
 }
 
-void append_cloud(ObservedFrame& frame, const Capture& capture, const CloudSequence& cloud,
-                  const ObserveOptions& options) {
+/// Points of a cloud that may be the object's.
+std::vector<Vector3> reachable_points(const Capture& capture, const std::filesystem::path& path,
+                                      const ObserveOptions& options) {
   const double size = capture.surface ? bounding_box(*capture.surface).extent().maxCoeff() : 0.0;
   const auto reachable = reachable_box(capture, options.band > 0 ? options.band : size);
-  for (const Vector3& point : read_points(capture.folder / cloud.points(frame.frame))) {
-    if (reachable && ((point.array() < reachable->min.array()).any() || (point.array() > reachable->max.array()).any()))
-      continue;
+  std::vector<Vector3> points = read_points(path);
+  std::erase_if(points, [&](const Vector3& point) {
+    return reachable &&
+           ((point.array() < reachable->min.array()).any() || (point.array() > reachable->max.array()).any());
+  });
+  return points;
+}
+
+void append_points(ObservedFrame& frame, const std::vector<Vector3>& points, std::optional<double> noise) {
+  for (const Vector3& point : points) {
     frame.points.push_back(point);
-    frame.noise.push_back(float(cloud.noise.value_or(default_cloud_noise)));
+    frame.noise.push_back(float(noise.value_or(default_cloud_noise)));
     frame.view.push_back(Vector3::Zero());
     frame.camera.push_back(-1);
     frame.pixel.push_back(-1);
@@ -101,13 +110,41 @@ std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions&
     for (std::size_t c = 0; c < capture.depth.size(); ++c)
       if (frame.frame % capture.depth[c].every == 0) append_camera(frame, capture, sorters[c], int(c));
     for (const CloudSequence& cloud : capture.clouds)
-      if (frame.frame % cloud.every == 0) append_cloud(frame, capture, cloud, options);
+      if (frame.frame % cloud.every == 0)
+        append_points(frame, reachable_points(capture, capture.folder / cloud.points(frame.frame), options),
+                      cloud.noise);
     thin_out(frame, options.max_points_per_frame);
     if (!progress) return;
     const std::lock_guard lock(mutex);
     progress(++done, int(numbers.size()));
   });
   return frames;
+}
+
+ObservedLoad observe_load(const Capture& capture, const Load& load, const ObserveOptions& options) {
+  ObservedLoad observed;
+  observed.seen.frame = -1;
+  for (std::size_t c = 0; c < capture.depth.size(); ++c) {
+    const DepthCamera& camera = capture.depth[c];
+    const auto image = load.images.find(camera.name), mask_file = load.masks.find(camera.name);
+    if (image == load.images.end()) continue;
+    const PixelSorter sorter(capture, camera, options);
+    const DepthImage depth = read_depth(camera, image->second);
+    std::optional<Image<std::uint8_t>> mask;
+    if (mask_file != load.masks.end()) mask = read_object_mask(camera, mask_file->second);
+    append_pixels(observed.seen, sorter, camera, int(c), depth, sorter.sort(depth, mask));
+  }
+  if (load.cloud) {
+    std::vector<Vector3> points = reachable_points(capture, *load.cloud, options);
+    const std::vector<bool> alone = isolated_points(points);
+    std::vector<Vector3> kept;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (!alone[i]) kept.push_back(points[i]);
+    observed.outliers = int(points.size() - kept.size());
+    append_points(observed.seen, kept, capture.clouds.empty() ? std::nullopt : capture.clouds.front().noise);
+  }
+  thin_out(observed.seen, options.max_points_per_frame);
+  return observed;
 }
 
 }  // namespace pliant

@@ -33,4 +33,15 @@ struct ObserveOptions {
 std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions& options = {},
                                    const std::function<void(int, int)>& progress = {});
 
+/// What sensors saw of the object under a hung weight.
+struct ObservedLoad {
+  ObservedFrame seen;  ///< of frame -1
+  int outliers = 0;    ///< points of the cloud that were dropped for standing alone
+};
+
+/// The cloud and the depth images of a load, as `observe` reads those of a frame; of the cloud, points that stand alone
+/// (`isolated_points`) are dropped too. Markers are not looked at.
+/// Throws InputError where a file cannot be read.
+ObservedLoad observe_load(const Capture& capture, const Load& load, const ObserveOptions& options = {});
+
 }  // namespace pliant

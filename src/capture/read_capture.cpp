@@ -315,6 +315,10 @@ class Reader {
     initial.angular_velocity = table.optional<Vector3>("angular_velocity").value_or(Vector3::Zero());
     initial.known = table.optional<bool>("known").value_or(true);
     initial.released = table.optional<bool>("released").value_or(false);
+    if (auto weight = table.table("release_of")) {
+      initial.release_of = read_weight(*weight);
+      weight->finish();
+    }
     table.finish();
   }
 

@@ -176,8 +176,8 @@ class Reader {
 
   void read_first_velocities(TomlTable& table) {
     scene_.initial = read_initial(table);
-    if (scene_.initial.released)
-      context_.reject("initial.released", "a release from a held pose", "released = false",
+    if (scene_.initial.released || scene_.initial.release_of)
+      context_.reject("initial", "a release from a held pose", "neither `released` nor `release_of`",
                       "scenes begin with the load-free shape");
   }
 

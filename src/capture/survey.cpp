@@ -293,6 +293,8 @@ bool has_forces_to_fit(const Capture& capture) {
 void add_scale(const Capture& capture, Prospects& result) {
   if (has_forces_to_fit(capture))
     result.possible.push_back("Pascals are anchored by measured forces: `[[press]]` or `[[load]]`.");
+  else if (capture.initial.release_of)
+    result.possible.push_back("Pascals are anchored by the weight from which the object is released.");
   else if (capture.mass || capture.density)
     result.possible.push_back(std::string("Pascals are anchored by the ") + (capture.mass ? "mass." : "density."));
   else

@@ -135,6 +135,7 @@ Initial read_initial(TomlTable table) {
   initial.known = table.optional<bool>("known").value_or(true);
   initial.released = table.optional<bool>("released").value_or(false);
   initial.pulls = table.optional<std::vector<Vector3>>("pulls").value_or(std::vector<Vector3>{});
+  if (const auto weight = table.table("release_of")) initial.release_of = read_weight(*weight);
   table.finish();
   return initial;
 }
@@ -225,6 +226,9 @@ void write_toml(std::ostream& out, const Initial& initial) {
     for (std::size_t k = 0; k < initial.pulls.size(); ++k) out << (k > 0 ? ", " : "") << toml_text(initial.pulls[k]);
     out << "]   # what holds the object until it is released, times its size about how far each moves it\n";
   }
+  if (initial.release_of)
+    out << "release_of = { mass = " << toml_text(initial.release_of->mass)
+        << ", at = " << toml_text(initial.release_of->at) << " }   # kg and m: hangs until the object is released\n";
   out << "\n";
 }
 

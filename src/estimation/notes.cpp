@@ -17,7 +17,11 @@ std::string spoken(std::string name) {
 }
 
 void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
-  if (!capture.mass && !capture.density)
+  if (capture.mass || capture.density) return;
+  if (capture.initial.release_of)
+    outcome.notes.push_back(
+        "Neither mass nor density is known: both pascals and the density follow from the weight that was released.");
+  else
     outcome.notes.push_back(
         "Neither mass nor density is known, so nothing anchors pascals: only the ratio of Young's modulus to density "
         "is "

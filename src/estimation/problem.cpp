@@ -180,6 +180,8 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.mismatch.centre = centre_of(*capture.surface);
   d.simulation.contact = default_contact(*d.body, parameters[theta::density] * d.body->volume(), gravity);
   for (const Weight& weight : capture.weights) d.simulation.weights.push_back({weight.at, weight.mass});
+  if (const auto& weight = capture.initial.release_of; weight && capture.initial.released)
+    d.simulation.released_weights.push_back({weight->at, weight->mass});
   d.simulation.pull_points = pull_points(capture, d.simulation.pulls);
   d.simulation.shape = shape_field(capture, resolution);
   for (const FixedRegion& fixed : capture.fixed) {
@@ -198,7 +200,7 @@ std::vector<std::string> sensor_names(const Capture& capture) {
 }
 
 int pull_count(const Capture& capture, const Resolution& resolution) {
-  if (!capture.initial.released) return 0;
+  if (!capture.initial.released || capture.initial.release_of) return 0;
   return capture.initial.pulls.empty() ? resolution.pulls : int(capture.initial.pulls.size());
 }
 
@@ -251,7 +253,8 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
              std::log(theta[theta::mass_damping]), 1.5, !capture.is_static);
   add_scalar(p, "stiffness_damping", "s", Transform::Logarithm, theta::stiffness_damping, 1e-5 * time, 2.0 * time,
              std::log(theta[theta::stiffness_damping]), 1.5, !capture.is_static);
-  add_scalar(p, "density", "kg/m^3", Transform::Logarithm, theta::density, 0.1, 3e4, std::log(density), 0.5, false);
+  add_scalar(p, "density", "kg/m^3", Transform::Logarithm, theta::density, 0.1, 3e4, std::log(density), 0.5,
+             !capture.mass && !capture.density && capture.initial.release_of.has_value());
   if (capture.gravity) {  // its length is known better than how the world's axes stand
     Parameter direction{"gravity", "m/s^2", Transform::Direction, theta::gravity};
     direction.prior_std = 0.05;

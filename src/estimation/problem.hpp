@@ -61,7 +61,7 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
 
 /// All parameters of a capture with their start values, bounds and priors. What the capture leaves unknown is
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
-/// it does not give.
+/// it does not give; density only where it is unknown and the object is released from under a known weight.
 /// @param volume    of the object [m^3], for the density that belongs to a mass
 /// Corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") are there and not
 /// estimated.
@@ -73,7 +73,7 @@ ParameterSet default_parameters(const Capture& capture, double volume, int contr
 /// What corrections of sensors apply to: each depth camera by its name, "clouds" and "markers".
 std::vector<std::string> sensor_names(const Capture& capture);
 
-/// The pulls of a capture's motion: none where it is not released.
+/// The pulls of a capture's motion: none where it is not released, or from under a known weight.
 int pull_count(const Capture& capture, const Resolution& resolution);
 
 /// "youngs_modulus" alone; with regions followed by "youngs_modulus@name" of each; with control points

@@ -110,6 +110,19 @@ Json static_json(const StaticError& error) {
           {"relative_error", number(error.relative_error)}};
 }
 
+Json load_json(const LoadError& error) {
+  Json json = static_json(error);
+  json["observed"] = error.observed.empty() ? Json(nullptr) : Json(error.observed);
+  json["points"] = error.points;
+  json["outliers"] = error.outliers;
+  json["mean"] = number(error.mean);
+  json["max"] = number(error.max);
+  json["relative_mean"] = number(error.relative_mean);
+  json["relative_max"] = number(error.relative_max);
+  if (!error.failure.empty()) json["failure"] = error.failure;
+  return json;
+}
+
 std::string text(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 // ---- reading
@@ -374,7 +387,7 @@ std::string to_json(const Evaluation& evaluation) {
   return text({{"format", "evaluation/1"},
                {"error", error_json(evaluation.error)},
                {"presses", list(evaluation.presses, static_json)},
-               {"loads", list(evaluation.loads, static_json)}});
+               {"loads", list(evaluation.loads, load_json)}});
 }
 
 void write_evaluation(const fs::path& path, const Evaluation& evaluation) { write_file(path, to_json(evaluation)); }

@@ -166,10 +166,22 @@ struct StaticError {
   std::optional<double> relative_error;          ///< rms over max_displacement
 };
 
+/// A measurement under a hung weight: where the object was seen and where the model has it.
+struct LoadError : StaticError {
+  std::string observed;  ///< "markers", "cloud", "depth", "cloud and depth"; empty: nothing of the object was seen
+  int points = 0;        ///< markers that were seen, or points
+  int outliers = 0;      ///< points that were left out because they stand alone in their cloud
+  std::optional<double> mean;  ///< distance of the markers, or of the points to the simulated surface [m]
+  std::optional<double> max;
+  std::optional<double> relative_mean, relative_max;  ///< over the object's size
+  std::string failure;                                ///< why there are no figures; empty: there are
+};
+
 /// What a model is worth on another recording: "evaluation/1" of docs/formats.md.
 struct Evaluation {
   ErrorResult error;
-  std::vector<StaticError> presses, loads;
+  std::vector<StaticError> presses;
+  std::vector<LoadError> loads;
 };
 
 std::string to_json(const Evaluation& evaluation);

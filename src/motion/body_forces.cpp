@@ -38,16 +38,19 @@ HungWeights::HungWeights(const Body& body, const std::vector<HungWeight>& weight
 }
 
 void HungWeights::add_force(const Points&, Points& force) {
+  if (!is_active_) return;
   for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * gravity_, force);
 }
 
 void HungWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta,
                                     Points& force) {
+  if (!is_active_) return;
   const Vector3 change = theta::vector_at(d_theta, theta::gravity);
   for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * change, force);
 }
 
 void HungWeights::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
+  if (!is_active_) return;
   for (int i = 0; i < points_.point_count(); ++i)
     theta_bar.segment<3>(theta::gravity) += mass_[std::size_t(i)] * points_.position(i, w);
 }

@@ -37,6 +37,8 @@ class HungWeights : public ForceTerm {
   HungWeights(const Body& body, const std::vector<HungWeight>& weights);
   const Embedding& points() const { return points_; }
   const std::vector<double>& masses() const { return mass_; }
+  /// Nothing hangs while it is not active.
+  void set_active(bool active) { is_active_ = active; }
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
   void set_parameters(const VectorX& theta) override { gravity_ = theta::vector_at(theta, theta::gravity); }
@@ -51,6 +53,7 @@ class HungWeights : public ForceTerm {
   Embedding points_;
   std::vector<double> mass_;
   Vector3 gravity_ = Vector3::Zero();
+  bool is_active_ = true;
 };
 
 }  // namespace pliant

@@ -26,7 +26,7 @@ PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) 
 
 std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const Body>& body,
                                                    const SimulationOptions& options, Elasticity*& elasticity,
-                                                   FixedRegions*& fixed, Pull*& pull) {
+                                                   FixedRegions*& fixed, Pull*& pull, HungWeights*& let_go) {
   std::vector<std::unique_ptr<ForceTerm>> terms;
   auto elastic = make_elasticity(body);
   elasticity = elastic.get();
@@ -35,6 +35,12 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   for (int plane = 0; plane < options.planes; ++plane)
     terms.push_back(std::make_unique<PlaneContact>(body, plane, options.contact));
   if (!options.weights.empty()) terms.push_back(std::make_unique<HungWeights>(*body, options.weights));
+  if (!options.released_weights.empty()) {
+    auto weights = std::make_unique<HungWeights>(*body, options.released_weights);
+    let_go = weights.get();
+    let_go->set_active(false);
+    terms.push_back(std::move(weights));
+  }
   if (!options.holds.empty() && !holds_strongly(*body, options)) {
     auto regions = std::make_unique<FixedRegions>(body, options.holds);
     fixed = regions.get();
@@ -57,7 +63,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(std::move(body)),
       options_(std::move(options)),
-      stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_),
+      stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_),
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
                 options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
       rest_(body_->scanned_positions()) {
@@ -129,13 +135,18 @@ Points Simulation::velocities(const VectorX& parameters) const {
   return (lever_ * spin.transpose()).rowwise() + linear.transpose();
 }
 
+void Simulation::hold_start(bool held) {
+  if (pull_) pull_->set_active(held);
+  if (let_go_) let_go_->set_active(held);
+}
+
 bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& summary) {
   state = {rest_, velocities(parameters)};
-  if (!pull_) return true;
-  pull_->set_active(true);
+  if (!starts_held()) return true;
+  hold_start(true);
   RolloutSummary search;
   const bool found = find_equilibrium(parameters, state, search);
-  pull_->set_active(false);
+  hold_start(false);
   summary.solver_iterations += search.solver_iterations;
   summary.failure = search.failure;
   state.v = velocities(parameters);
@@ -144,14 +155,14 @@ bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& 
 
 std::vector<State> Simulation::start_tangents(const State& start, const MatrixX& directions, const ShapeChange& shape) {
   std::vector<State> tangents;
-  if (pull_) pull_->set_active(true);
+  hold_start(true);
   for (Eigen::Index c = 0; c < directions.cols(); ++c) {
     const VectorX direction = directions.col(c);
     tangents.push_back({Points::Zero(rest_.rows(), 3), velocities(direction)});  // velocities are linear in theta
     if (!shape.scan.empty()) tangents.back().x = shape.scan[std::size_t(c)];
-    if (pull_) tangents.back().x = stepper_.equilibrium_tangent(start.x, direction, shape.of(std::size_t(c)));
+    if (starts_held()) tangents.back().x = stepper_.equilibrium_tangent(start.x, direction, shape.of(std::size_t(c)));
   }
-  if (pull_) pull_->set_active(false);
+  hold_start(false);
   return tangents;
 }
 
@@ -161,16 +172,16 @@ bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& th
     const Vector3 lever = lever_.row(n), v_bar = bar.v.row(n);
     theta_bar.segment<3>(theta::angular_velocity) += lever.cross(v_bar);
   }
-  if (pull_) {
-    pull_->set_active(true);
+  if (starts_held()) {
+    hold_start(true);
     const bool ready = stepper_.prepare_equilibrium_derivatives(start.x);
     if (ready) stepper_.equilibrium_adjoint(start.x, bar.x, theta_bar, follows_shape() ? &reference_bar_ : nullptr);
-    pull_->set_active(false);
+    hold_start(false);
     if (!ready) return false;
   }
   if (!follows_shape()) return true;
   if (!shape_->prepare_derivatives()) return false;
-  shape_->adjoint(pull_ ? Points::Zero(rest_.rows(), 3) : bar.x, reference_bar_, theta_bar);
+  shape_->adjoint(starts_held() ? Points::Zero(rest_.rows(), 3) : bar.x, reference_bar_, theta_bar);
   return true;
 }
 

@@ -28,8 +28,9 @@ struct SimulationOptions {
   int planes = 0;  ///< in theta
   int pulls = 0;   ///< in theta: the motion starts at rest in the equilibrium under these (see `Pull`); 0: in the
                    ///< reference pose
-  PullPoints pull_points;   ///< as many as pulls; none: nodes of the body far from what is held
-  int sensors = 0;          ///< in theta; they play no part in the motion
+  PullPoints pull_points;                    ///< as many as pulls; none: nodes of the body far from what is held
+  std::vector<HungWeight> released_weights;  ///< likewise of the equilibrium at the start, and gone from then on
+  int sensors = 0;                           ///< in theta; they play no part in the motion
   bool scan_sags = false;   ///< the body stands in its scan as gravity and weights hold it; where it is free of load
                             ///< follows from theta. Tetrahedra only
   ShapeField shape;         ///< how the scan may err, likewise
@@ -94,7 +95,10 @@ class Simulation {
   };
   /// False where the object cannot be free of load anywhere: the summary says so.
   bool set_parameters(const VectorX& theta, RolloutSummary& summary);
-  /// Where and how fast the object is when it is let go; for a pulled one also the derivatives' matrix. False where
+  /// Whether the motion starts from an equilibrium, under forces that end there.
+  bool starts_held() const { return pull_ || let_go_; }
+  void hold_start(bool held);
+  /// Where and how fast the object is when it is let go; for a held one also the derivatives' matrix. False where
   /// there is no such equilibrium: the summary says so.
   bool start(const VectorX& theta, State& state, RolloutSummary& summary);
   /// Changes of where the nodes are free of load along directions; empty where theta does not say that. `scan` is that
@@ -126,6 +130,7 @@ class Simulation {
   Elasticity* elasticity_ = nullptr;       // of the stepper's terms
   FixedRegions* fixed_regions_ = nullptr;  // likewise, if any
   Pull* pull_ = nullptr;                   // likewise
+  HungWeights* let_go_ = nullptr;          // likewise
   std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;

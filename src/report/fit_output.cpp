@@ -12,6 +12,7 @@
 #include "elasticity/element_moduli.hpp"
 #include "model/vtu.hpp"
 #include "report/gallery.hpp"
+#include "report/prediction.hpp"
 #include "report/report.hpp"
 
 namespace pliant {
@@ -508,7 +509,7 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
   Model situated = model;
   situated.planes = capture.planes;
   situated.initial = capture.initial;
-  if (capture.initial.released && capture.initial.pulls.empty()) {
+  if (capture.initial.released && !capture.initial.release_of && capture.initial.pulls.empty()) {
     if (model.initial.pulls.empty())
       throw InputError({{capture.file},
                         "the object is released, and the model knows no pose before a release",
@@ -575,6 +576,10 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     const int frame = f.frame + capture.start_frame;
     report.residuals.push_back({frame, capture.times[std::size_t(frame)], f.rms, f.points, f.noise});
   }
+  tell("loads", 0, 1);
+  report.loads = predict_loads(capture, {first.discretisation, first.theta});
+  std::erase_if(report.loads, [](const LoadError& load) { return load.role != "test"; });
+  tell("loads", 1, 1);
   if (outcome.correlation.size() > 0)
     report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   tell("pictures", 0, 1);

@@ -311,6 +311,30 @@ std::string resolutions_table(const Result& result) {
          "convergence index.</p>\n";
 }
 
+std::string loads_table(const std::vector<LoadError>& loads) {
+  if (loads.empty()) return "";
+  const auto cell = [](const std::optional<double>& length, const std::optional<double>& relative) {
+    if (!length || !relative) return std::string("<td></td>");
+    return fmt::format("<td>{} mm, {} %</td>", readable(1e3 * *length, 3), readable(100.0 * *relative, 3));
+  };
+  std::string body;
+  bool has_surface_distances = false;
+  for (const LoadError& load : loads) {
+    const bool is_surface = load.observed.find("markers") == std::string::npos;
+    has_surface_distances = has_surface_distances || (is_surface && load.mean);
+    body += fmt::format("<tr><td>{}</td>{}{}<td>{}</td></tr>\n", escape_html(load.name),
+                        cell(load.mean, load.relative_mean), cell(load.max, load.relative_max),
+                        load.failure.empty() ? fmt::format("{}, {} points", escape_html(load.observed), load.points)
+                                             : escape_html(load.failure));
+  }
+  const char* of_surfaces =
+      has_surface_distances
+          ? " Points are compared with the nearest place of the simulated surface: sliding along it does not show."
+          : "";
+  return table("<th></th><th>mean distance, of the object's size</th><th>greatest</th><th>seen</th>", body) +
+         "<p class=\"given\">Equilibria under weights that took no part in the fit." + of_surfaces + "</p>\n";
+}
+
 std::string usage(const ReportData& data) {
   const std::string capture = data.capture_path.empty() ? "CAPTURE" : data.capture_path;
   const std::string model = escape_html(data.model_file);
@@ -347,6 +371,7 @@ std::string report_html(const ReportData& data) {
   html += section("What this means", words(data));
   html += section("Seen and simulated", pictures(data));
   html += section("Agreement over time", data.residuals.size() > 1 ? residual_plot(data.residuals) : "");
+  html += section("Under hung weights", loads_table(data.loads));
   html += section("How the estimation went", convergence(data));
   html += section("All parameters", parameter_table(data.result));
   html += section("Mesh and time step", resolutions_table(data.result));

@@ -40,6 +40,7 @@ struct ReportData {
   double residual_range = 0.0;  ///< [m], where the colours of the discs in the pictures end; 0: no colour scale
   std::vector<ReportPicture> pictures;
   CorrelationTable correlations;
+  std::vector<LoadError> loads;           ///< that took no part in the fit, as the model predicts them
   std::string model_file = "model.toml";  ///< beside the page
   std::string capture_path;               ///< as the user named it; empty: "CAPTURE" in the commands shown
 };

@@ -379,6 +379,32 @@ TEST(CaptureRules, CheckLoads) {
               HasSubstr("no depth camera \"back\""));
 }
 
+TEST(CaptureRules, CheckRelease) {
+  const auto said = [](const std::string& block) {
+    return complaint_of([&] { (void)SmallCapture().append("\n[initial]\n" + block).read(); });
+  };
+  const std::string good = "release_of = { mass = 0.1, at = [0, 0.1, 0] }";
+  EXPECT_EQ(said("released = true\n" + good), "");
+  EXPECT_THAT(said(good), HasSubstr("`release_of` without `released`"));
+  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0, at = [0, 0.1, 0] }"), HasSubstr("a hung mass of 0 kg"));
+  EXPECT_THAT(said("released = true\nrelease_of = { mass = 100, at = [0, 0.1, 0] }"),
+              HasSubstr("masses are in kilograms"));
+  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0.1, at = [0, 0.5, 0] }"),
+              HasSubstr("off the rest surface"));
+  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0.1 }"), HasSubstr("at"));
+  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0.1, at = [0, 0.1, 0], force = 3 }"),
+              HasSubstr("unknown key `force`"));
+  EXPECT_THAT(said("released = true\nrelease_of = 0.1"), HasSubstr("release_of"));
+  SmallCapture weightless;
+  weightless.edit("[0.0, 9.81, 0.0]", "[0.0, 0.0, 0.0]").append("\n[initial]\nreleased = true\n" + good);
+  EXPECT_THAT(complaint_of([&] { (void)weightless.read(); }), HasSubstr("a hung weight without gravity"));
+  SmallCapture small;
+  const Capture capture = small.append("\n[initial]\nreleased = true\n" + good).read();
+  ASSERT_TRUE(capture.initial.release_of);
+  EXPECT_EQ(capture.initial.release_of->mass, 0.1);
+  EXPECT_EQ(capture.initial.release_of->at, Vector3(0, 0.1, 0));
+}
+
 TEST(CaptureRules, CheckWeights) {
   const auto said = [](const std::string& block) {
     return complaint_of([&] { (void)SmallCapture().append("\n[[weight]]\n" + block).read(); });

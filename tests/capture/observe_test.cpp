@@ -113,5 +113,30 @@ TEST(Observe, RefusesADamagedImage) {
   EXPECT_THROW((void)observe(capture), InputError);
 }
 
+TEST(ObserveLoad, ReadsCloudAndImagesAndLeavesOutWhatStandsAlone) {
+  SmallCapture small;
+  std::vector<Vector3> points;
+  for (int i = 0; i < 10; ++i)
+    for (int j = 0; j < 10; ++j) points.emplace_back(0.01 * i - 0.05, 0.01 * j - 0.05, -0.1);
+  points.emplace_back(0.0, 0.0, -0.2);   // alone
+  points.emplace_back(0.0, 0.0, 900.0);  // nowhere near
+  write_points(small.folder / "load.ply", points);
+  const std::string head = "\n[[load]]\nmass = 0.1\nat = [0, 0.1, 0]\n";
+  small.append(head + "cloud = \"load.ply\"\n");
+  small.append(head + "images = { front = \"front/000000.png\" }\nmasks = { front = \"front/mask_000000.png\" }\n");
+  small.append(head + "markers = \"load.csv\"\nmarkers_rest = \"markers_rest.csv\"\n");
+  small.folder.write("load.csv", "id,x,y,z\n0,0,0,-0.1\n");
+  const Capture capture = small.read();
+  const ObservedLoad cloud = observe_load(capture, capture.loads[0]);
+  EXPECT_THAT(cloud.seen.points, SizeIs(100));
+  EXPECT_EQ(cloud.outliers, 1);
+  EXPECT_THAT(cloud.seen.camera, Each(-1));
+  const ObservedLoad images = observe_load(capture, capture.loads[1]);
+  EXPECT_THAT(images.seen.points, SizeIs(16u * 16u));
+  EXPECT_EQ(images.outliers, 0);
+  expect_on_near_face(images.seen);
+  EXPECT_THAT(observe_load(capture, capture.loads[2]).seen.points, SizeIs(0));
+}
+
 }  // namespace
 }  // namespace pliant

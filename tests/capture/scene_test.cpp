@@ -135,6 +135,8 @@ TEST_F(SceneFile, RefusesWhatMakesNoSense) {
   EXPECT_THAT(after("\"front\"", "\"../front\""), HasSubstr("can be a folder"));
   EXPECT_THAT(after("[world]\ngravity = [0.0, -9.81, 0.0]", ""), HasSubstr("no table [world]"));
   EXPECT_THAT(after("linear_velocity", "released = true\nlinear_velocity"), HasSubstr("released"));
+  EXPECT_THAT(after("linear_velocity", "release_of = { mass = 0.1, at = [0.0, 0.3, 0.0] }\nlinear_velocity"),
+              HasSubstr("release_of"));
   EXPECT_THAT(after("normal = [0.0, 1.0, 0.0]", "normal = [0.0, 0.0, 0.0]"), HasSubstr("without length"));
   EXPECT_EQ(after("seed", "seed"), "");
 }

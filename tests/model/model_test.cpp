@@ -25,7 +25,7 @@ Model full_model() {
              {RegionHalfSpace{{0, 0, 0}, {1, 0, 0}}, std::nullopt},
              {RegionVertices{{3, 1, 4}}, std::nullopt}};
   m.weights = {{0.05, {0.01, -0.06, 0.15}}};
-  m.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true};
+  m.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true, {}, Weight{0.02, {0.1, 1.0 / 3.0, 0}}};
   m.frames = 80, m.frame_rate = 60.0, m.start_frame = 4;
   m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
   m.substeps = 4, m.theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;
@@ -113,6 +113,9 @@ TEST(Model, PlanesRegionsAndVelocitiesComeBack) {
   EXPECT_EQ(read.initial.angular_velocity, m.initial.angular_velocity);
   EXPECT_FALSE(read.initial.known);
   EXPECT_TRUE(read.initial.released);
+  ASSERT_TRUE(read.initial.release_of);
+  EXPECT_EQ(read.initial.release_of->mass, 0.02);
+  EXPECT_EQ(read.initial.release_of->at, m.initial.release_of->at);
 }
 
 TEST(Model, MayHaveNoVolumeNoGravityAndNoTiming) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "input_errors.hpp"
+#include "support/load_errors.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant {
@@ -157,6 +158,28 @@ TEST(Evaluation, HasTheNamesOfTheFormat) {
                                                 {"max_displacement", 0.02},
                                                 {"relative_error", 0.05}}));
   EXPECT_TRUE(json["loads"].is_array());
+}
+
+TEST(Evaluation, TellsHowFarLoadsAreOff) {
+  const TemporaryFolder folder;
+  write_evaluation(folder / "e.json", {{}, {}, {test::seen_load(), test::failed_load()}});
+  const auto json = nlohmann::json::parse(read_file(folder / "e.json"));
+  EXPECT_EQ(json["loads"][0], nlohmann::json({{"name", "load 1"},
+                                              {"role", "test"},
+                                              {"marker_rms", nullptr},
+                                              {"marker_max", nullptr},
+                                              {"max_displacement", nullptr},
+                                              {"relative_error", nullptr},
+                                              {"observed", "cloud"},
+                                              {"points", 400},
+                                              {"outliers", 3},
+                                              {"mean", 1e-3},
+                                              {"max", 4e-3},
+                                              {"relative_mean", 0.005},
+                                              {"relative_max", 0.02}}));
+  EXPECT_EQ(json["loads"][1]["failure"], "no equilibrium was found");
+  EXPECT_TRUE(json["loads"][1]["mean"].is_null());
+  EXPECT_TRUE(json["loads"][1]["observed"].is_null());
 }
 
 }  // namespace

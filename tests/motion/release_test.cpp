@@ -1,4 +1,6 @@
 // Objects that are held in a deformed pose and let go.
+#include <numbers>
+
 #include "base/error.hpp"
 #include "support/derivatives.hpp"
 #include "support/released.hpp"
@@ -13,9 +15,14 @@ using test::released::Released;
 
 constexpr int last = test::released::last;
 
-/// A parameter of theta, the elements, and the integrator.
-class Release : public ::testing::TestWithParam<std::tuple<int, ElementKind, Integrator>> {
+enum class HeldBy { Pulls, Weight };
+
+/// A parameter of theta, the elements, the integrator, and what holds the object until it is let go.
+class Release : public ::testing::TestWithParam<std::tuple<int, ElementKind, Integrator, HeldBy>> {
  protected:
+  Release() {
+    if (std::get<3>(GetParam()) == HeldBy::Weight) scene.hang(0.05);
+  }
   int index() const { return std::get<0>(GetParam()); }
   Released scene{bar(std::get<1>(GetParam())), std::get<2>(GetParam())};
   VectorX direction() const {
@@ -64,15 +71,103 @@ TEST_P(Release, AdjointMatchesTangent) {
 const auto parameters_that_act = ::testing::Values(
     int(theta::youngs_modulus), int(theta::poissons_ratio), int(theta::stiffness_damping), int(theta::density),
     int(theta::gravity) + 1, int(theta::linear_velocity) + 2, theta::pull(0, 0) + 1, theta::pull(1, 0) + 2);
+const auto without_pulls =
+    ::testing::Values(int(theta::youngs_modulus), int(theta::poissons_ratio), int(theta::stiffness_damping),
+                      int(theta::density), int(theta::gravity) + 1, int(theta::linear_velocity) + 2);
 
 INSTANTIATE_TEST_SUITE_P(Hexahedra, Release,
                          ::testing::Combine(parameters_that_act, ::testing::Values(ElementKind::Hexahedron),
-                                            ::testing::Values(Integrator::Lagged)));
+                                            ::testing::Values(Integrator::Lagged), ::testing::Values(HeldBy::Pulls)));
 INSTANTIATE_TEST_SUITE_P(Tetrahedra, Release,
                          ::testing::Combine(parameters_that_act,
                                             ::testing::Values(ElementKind::Tetrahedron,
                                                               ElementKind::QuadraticTetrahedron),
-                                            ::testing::Values(Integrator::Newton)));
+                                            ::testing::Values(Integrator::Newton), ::testing::Values(HeldBy::Pulls)));
+INSTANTIATE_TEST_SUITE_P(HexahedraUnderAWeight, Release,
+                         ::testing::Combine(without_pulls, ::testing::Values(ElementKind::Hexahedron),
+                                            ::testing::Values(Integrator::Lagged), ::testing::Values(HeldBy::Weight)));
+INSTANTIATE_TEST_SUITE_P(TetrahedraUnderAWeight, Release,
+                         ::testing::Combine(without_pulls, ::testing::Values(ElementKind::QuadraticTetrahedron),
+                                            ::testing::Values(Integrator::Newton), ::testing::Values(HeldBy::Weight)));
+
+/// Before, it is the equilibrium under a weight that stays; afterwards nothing of the weight is left.
+TEST(Releases, TheWeightHangsUntilTheStringIsCut) {
+  Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);
+  scene.hang(0.05);
+  const VectorX start = scene.positions_at(scene.theta, 0), end = scene.positions_at(scene.theta, last);
+  Released loaded = scene, bare = scene;
+  std::swap(loaded.options.weights, loaded.options.released_weights);
+  bare.options.released_weights.clear();
+  loaded.options.is_static = bare.options.is_static = true;
+  const VectorX held = loaded.positions_at(loaded.theta, 0), sagging = bare.positions_at(bare.theta, 0);
+  ASSERT_GT((held - sagging).cwiseAbs().maxCoeff(), 0.05) << "a weight worth hanging";
+  EXPECT_LT((start - held).cwiseAbs().maxCoeff(), tolerance(1e-9));
+  EXPECT_GT((end - start).cwiseAbs().maxCoeff(), 1e-3) << "it moves";
+  scene.options.is_static = true;
+  EXPECT_LT((scene.positions_at(scene.theta, 0) - sagging).cwiseAbs().maxCoeff(), tolerance(1e-9))
+      << "at rest nothing is released";
+  Released damped = scene;  // nearly critically
+  damped.options.is_static = false;
+  damped.options.times = {0.0, 2.0};
+  damped.options.max_dt = 0.01;
+  damped.theta[theta::mass_damping] = 25.0;
+  EXPECT_LT((damped.positions_at(damped.theta, 1) - sagging).cwiseAbs().maxCoeff(), 1e-4) << "it ends without it";
+}
+
+/// A cantilever under a weight at its end, small against its length: P L^3 / 3EI and shear; let go, it swings at
+/// 1.8751^2 / 2 pi sqrt(EI / rho A L^4) (Euler and Bernoulli).
+TEST(Releases, DeflectionAndFrequencyOfACantileverAreThoseOfBeams) {
+  using namespace test::hanging;
+  for (const auto& body : {quadratic_bar(20, 1), hex_bar(1)}) {
+    Hanging scene(body);
+    scene.options.is_static = false;
+    scene.options.newmark_theta = 0.5;
+    scene.theta.segment<3>(theta::gravity) *= 0.01;
+    const double E = scene.theta[theta::youngs_modulus], rho = scene.theta[theta::density], nu = 0.3;
+    const double I = std::pow(edge, 4) / 12.0, A = edge * edge, mass = 0.2;
+    const double P = -mass * scene.theta[theta::gravity + 2];
+    const double frequency =
+        std::pow(1.87510407, 2) / (2 * std::numbers::pi) * std::sqrt(E * I / (rho * A * std::pow(length, 4)));
+    const double quarter = 0.25 / frequency;
+    constexpr int frames = 48;
+    scene.options.times.clear();
+    for (int f = 0; f <= frames; ++f) scene.options.times.push_back(1.25 * quarter * f / frames);
+    scene.options.max_dt = quarter;  // one step a frame
+    scene.options.released_weights = {{Vector3(0.5 * length, 0.0, 0.0), mass}};
+    // The share of the first mode, of which a clamped end's higher ones are free.
+    VectorX mode(body->node_count());
+    for (Eigen::Index n = 0; n < mode.size(); ++n) {
+      constexpr double k = 1.87510407, sigma = 0.73409551;
+      const double s = k * (body->nodes(n, 0) / length + 0.5);
+      mode[n] = std::cosh(s) - std::cos(s) - sigma * (std::sinh(s) - std::sin(s));
+    }
+    Points along = Points::Zero(body->node_count(), 3), weights = along;
+    along.col(2) = mode;
+    body->add_mass_product(1.0, along, weights);
+    Hanging bare(body);
+    bare.theta = scene.theta;
+    const Points sagging = bare.positions(bare.theta);
+    std::vector<double> share;
+    double deflection = 0.0;
+    Simulation simulation(body, scene.options);
+    const RolloutSummary summary = simulation.run(scene.theta, [&](int f, const State& state, auto) {
+      const Points moved = state.x - sagging;
+      if (f == 0) deflection = -bare.tip(sagging + moved).z() + bare.tip(sagging).z();
+      share.push_back(weights.cwiseProduct(moved).sum());
+      return true;
+    });
+    ASSERT_TRUE(summary.succeeded) << summary.failure;
+    const double expected = P * std::pow(length, 3) / (3 * E * I) + P * length / (5.0 / 6.0 * E / (2 * (1 + nu)) * A);
+    ASSERT_LT(expected, 0.03 * length) << "small deflections";
+    EXPECT_NEAR(deflection / expected, 1.0, tolerance(0.02));
+    int after = 1;
+    while (after < frames && share[std::size_t(after)] * share[0] > 0.0) ++after;
+    const double before = share[std::size_t(after) - 1], behind = share[std::size_t(after)];
+    ASSERT_LT(behind * share[0], 0.0) << "it swings through where it rests";
+    const double crossing = 1.25 * quarter / frames * (after - 1 + before / (before - behind));
+    EXPECT_NEAR(quarter / crossing, 1.0, tolerance(0.02));
+  }
+}
 
 TEST(Releases, WithoutAPullTheObjectStaysWhereItSags) {
   Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);

@@ -6,6 +6,7 @@
 #include "geometry/primitives.hpp"
 #include "geometry/ray_scene.hpp"
 #include "report/picture.hpp"
+#include "support/load_errors.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant {
@@ -87,6 +88,20 @@ ReportData example(int width, int height) {
   data.correlations.values << 1, 0.1, -0.93, 0.1, 1, 0.4, -0.93, 0.4, 1;
   data.capture_path = "examples/ring";
   return data;
+}
+
+TEST(Report, ShowsLoadsThatWereKeptApart) {
+  ReportData data = example(8, 5);
+  EXPECT_THAT(report_html(data), Not(HasSubstr("Under hung weights")));
+  data.loads = {test::seen_load(), test::failed_load()};
+  const std::string html = report_html(data);
+  EXPECT_THAT(html, HasSubstr("Under hung weights"));
+  EXPECT_THAT(html, HasSubstr("<td>1 mm, 0.5 %</td><td>4 mm, 2 %</td><td>cloud, 400 points</td>"));
+  EXPECT_THAT(html, HasSubstr("load &lt;2&gt;"));
+  EXPECT_THAT(html, HasSubstr("no equilibrium was found"));
+  EXPECT_THAT(html, HasSubstr("sliding along it does not show"));
+  data.loads[0].observed = "markers";
+  EXPECT_THAT(report_html(data), Not(HasSubstr("sliding")));
 }
 
 TEST(ValueWithUncertainty, RoundsBothToTheSamePlace) {

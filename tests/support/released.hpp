@@ -23,6 +23,15 @@ struct Released : hanging::Hanging {
     theta[theta::stiffness_damping] = 0.004;
     theta.segment<6>(theta::pull(0, 0)) << 0.01, 0.1, 0.05, 0.0, -0.03, 0.02;
   }
+  /// Instead of pulls a weight hangs from the free end, until its string is cut; the bar is light and stiff enough for
+  /// that to show.
+  void hang(double mass) {
+    options.pulls = 0;
+    theta.conservativeResize(theta::size(0));
+    theta[theta::youngs_modulus] = 5e6;
+    theta[theta::density] = 200.0;
+    options.released_weights = {{Vector3(0.5 * hanging::length, 0.2 * hanging::edge, -0.5 * hanging::edge), mass}};
+  }
   VectorX positions_at(const VectorX& at, int frame) const {
     Simulation simulation(body, options);
     VectorX out;

@@ -1,0 +1,70 @@
+#include "geometry/surface_distance.hpp"
+
+#include <algorithm>
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace pliant {
+
+namespace {
+
+namespace bg = boost::geometry;
+using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
+using TreeBox = bg::model::box<TreePoint>;
+using Tree = bg::index::rtree<std::pair<TreeBox, int>, bg::index::quadratic<8>>;
+
+Tree triangle_tree(const TriangleMesh& surface) {
+  std::vector<std::pair<TreeBox, int>> boxes;
+  boxes.reserve(surface.triangles.size());
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    Box box;
+    for (const int v : surface.triangles[t]) box.extend(surface.vertices[std::size_t(v)]);
+    boxes.emplace_back(TreeBox({box.min.x(), box.min.y(), box.min.z()}, {box.max.x(), box.max.y(), box.max.z()}),
+                       int(t));
+  }
+  return Tree(boxes);  // packed
+}
+
+}  // namespace
+
+Vector3 closest_on_triangle(const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c) {
+  const auto on_segment = [&](const Vector3& s, const Vector3& e) -> Vector3 {
+    const Vector3 d = e - s;
+    const double length = d.squaredNorm();
+    return length > 0 ? Vector3(s + std::clamp((p - s).dot(d) / length, 0.0, 1.0) * d) : s;
+  };
+  const Vector3 n = (b - a).cross(c - a);
+  const bool inside = n.squaredNorm() > 0 && n.dot((b - a).cross(p - a)) >= 0 && n.dot((c - b).cross(p - b)) >= 0 &&
+                      n.dot((a - c).cross(p - c)) >= 0;
+  if (inside) return p - n * (n.dot(p - a) / n.squaredNorm());
+  Vector3 best = on_segment(a, b);
+  for (const Vector3& other : {on_segment(b, c), on_segment(c, a)})
+    if ((other - p).squaredNorm() < (best - p).squaredNorm()) best = other;
+  return best;
+}
+
+std::vector<double> distances_to_surface(const TriangleMesh& surface, std::span<const Vector3> points) {
+  if (surface.triangles.empty()) throw std::invalid_argument("distances to a surface without triangles");
+  const Tree tree = triangle_tree(surface);
+  std::vector<double> distances;
+  distances.reserve(points.size());
+  for (const Vector3& p : points) {
+    const TreePoint at(p.x(), p.y(), p.z());
+    double least = std::numeric_limits<double>::infinity();
+    // Boxes come in the order of their distance, which is never more than that of what they hold.
+    for (auto it = tree.qbegin(bg::index::nearest(at, unsigned(surface.triangles.size()))); it != tree.qend(); ++it) {
+      if (bg::comparable_distance(at, it->first) > least) break;
+      const auto& [a, b, c] = surface.triangles[std::size_t(it->second)];
+      least = std::min(
+          least,
+          (closest_on_triangle(p, surface.vertices[a], surface.vertices[b], surface.vertices[c]) - p).squaredNorm());
+    }
+    distances.push_back(std::sqrt(least));
+  }
+  return distances;
+}
+
+}  // namespace pliant
