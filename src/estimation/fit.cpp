@@ -259,6 +259,15 @@ class Fit {
     return true;
   }
 
+  /// The first modulus of a swing whose modes about rest are known, where its weight changes them.
+  std::optional<double> with_weight(const Discretisation& d, const Recording& r, const VectorX& theta) const {
+    const VectorX own = r.own(theta);
+    if (theta::vector_at(own, theta::gravity).isZero()) return std::nullopt;
+    Simulation simulation(d.body, d.simulation);
+    const auto start = swing_start(simulation, own, controls_, *r.observations);
+    return start ? std::optional(start->youngs_modulus) : std::nullopt;
+  }
+
   /// Takes over moduli and, where they show, dampings.
   bool find_swing() {
     for (std::size_t i = 0; i < recordings_.all().size(); ++i) {
@@ -282,7 +291,10 @@ class Fit {
         theta = parameters_.reference();
         set_all_moduli(theta, start.moduli[0]);
         set_reference(theta);
-        say("The vibrations of the followed points are those of a Young's modulus of about ", start.moduli[0]);
+        const double modulus = with_weight(d, r, theta).value_or(start.moduli[0]);
+        set_all_moduli(theta, modulus);
+        set_reference(theta);
+        say("The vibrations of the followed points are those of a Young's modulus of about ", modulus);
         return true;
       }
       Simulation simulation(d.body, d.simulation);

@@ -55,10 +55,12 @@ Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<dou
   constexpr std::size_t fewest = 10;
   Path path;
   for (const FrameObservations& frame : seen) {
-    if (frame.points.size() < fewest) continue;
-    Points points(Eigen::Index(frame.points.size()), 3);
-    for (std::size_t i = 0; i < frame.points.size(); ++i)
-      points.row(Eigen::Index(i)) = frame.points[i].position.transpose();
+    std::vector<Vector3> there;
+    for (const SurfaceObservation& point : frame.points) there.push_back(point.position);
+    for (const TrackObservation& point : frame.tracks) there.push_back(point.position);
+    if (there.size() < fewest) continue;
+    Points points(Eigen::Index(there.size()), 3);
+    for (std::size_t i = 0; i < there.size(); ++i) points.row(Eigen::Index(i)) = there[i].transpose();
     path.times.push_back(times[std::size_t(frame.frame)]);
     path.points.push_back(middle(points));
   }

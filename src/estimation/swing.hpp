@@ -12,7 +12,8 @@ struct SwingStart {
   double frequency = 0.0;       ///< observed [Hz]
 };
 
-/// The warm start of `modal_start` for points that nobody followed: the middle of each frame's points swings, and so
+/// The warm start of `modal_start` for points that nobody followed, and its second look at those of bodies that sag or
+/// hang, which their weight slows down or speeds up: the middle of each frame's points swings, and so
 /// does that of the simulated surface; frequencies go with the square root of the modulus. Two or three simulations
 /// take in what modes about rest leave out: far swings, sag, and how the body is held.
 /// @param theta       where the simulation begins; moduli within a factor of a few hundred of the truth

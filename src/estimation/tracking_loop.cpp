@@ -27,7 +27,7 @@ TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOpti
   if (options.tracking != TrackingUse::Automatic) return options.tracking;
   const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
     const Capture& c = r.capture;
-    return !r.followed && !c.is_static && c.markers.empty() && (!c.clouds.empty() || c.depth.size() > 1);
+    return !r.followed && !c.is_static && c.shape_is == ShapeIs::Reference && c.markers.empty() && (!c.clouds.empty() || c.depth.size() > 1);
   });
   return suits ? TrackingUse::Both : TrackingUse::Off;
 }

@@ -123,6 +123,21 @@ Json load_json(const LoadError& error) {
   return json;
 }
 
+Json tracking_json(const TrackingResult& tracking) {
+  const auto held_out = [](const std::optional<HeldOutFramesResult>& h) {
+    return h ? Json{{"frames", h->frames}, {"cost", number(h->cost)}, {"surface_rms", number(h->surface_rms)}} : Json();
+  };
+  Json json = {{"kept", tracking.kept}, {"why", tracking.why}};
+  json["rounds"] = list(tracking.rounds, [](const TrackingRoundResult& r) {
+    return Json{{"tracked_with", number(r.tracked_with)}, {"youngs_modulus", number(r.youngs_modulus)},
+                {"surface_rms", number(r.surface_rms)},   {"fit_rms", number(r.fit_rms)},
+                {"confidence", number(r.confidence)},     {"lost", r.lost}};
+  });
+  if (tracking.loop || tracking.direct)
+    json["held_out_frames"] = {{"tracked motion", held_out(tracking.loop)}, {"points", held_out(tracking.direct)}};
+  return json;
+}
+
 std::string text(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 // ---- reading
@@ -265,6 +280,26 @@ ResolutionResult read_resolution(const Member& member) {
           optional_string(member, "reason")};
 }
 
+std::optional<HeldOutFramesResult> read_held_out(const Member& member, const char* key) {
+  if (!member.has(key)) return std::nullopt;
+  return HeldOutFramesResult{int(member[key]["frames"].count()), optional_number(member[key], "cost"),
+                             optional_number(member[key], "surface_rms")};
+}
+
+TrackingResult read_tracking(const Member& member) {
+  TrackingResult tracking{member["kept"].string(), optional_string(member, "why"), {}, {}, {}};
+  member["rounds"].each_item([&](const Member& m) {
+    tracking.rounds.push_back({m["tracked_with"].number(), m["youngs_modulus"].number(),
+                               optional_number(m, "surface_rms"), optional_number(m, "fit_rms"),
+                               m["confidence"].number(), m["lost"].boolean()});
+  });
+  if (member.has("held_out_frames")) {
+    tracking.loop = read_held_out(member["held_out_frames"], "tracked motion");
+    tracking.direct = read_held_out(member["held_out_frames"], "points");
+  }
+  return tracking;
+}
+
 TimeResult read_time(const Member& member) {
   return {optional_number(member, "wall_seconds").value_or(NAN),
           member.has("forward_steps") ? member["forward_steps"].count() : 0,
@@ -306,6 +341,7 @@ Result read_all(const Member& top) {
   if (top.has("starts")) top["starts"].each_item([&](const Member& m) { result.starts.push_back(read_start(m)); });
   if (top.has("resolutions"))
     top["resolutions"].each_item([&](const Member& m) { result.resolutions.push_back(read_resolution(m)); });
+  if (top.has("tracking")) result.tracking = read_tracking(top["tracking"]);
   if (top.has("time")) result.time = read_time(top["time"]);
   if (top.has("notes")) top["notes"].each_item([&](const Member& m) { result.notes.push_back(m.string()); });
   return result;
@@ -352,6 +388,7 @@ std::string to_json(const Result& result) {
   });
   json["starts"] = list(result.starts, start_json);
   if (!result.resolutions.empty()) json["resolutions"] = list(result.resolutions, resolution_json);
+  if (result.tracking) json["tracking"] = tracking_json(*result.tracking);
   json["time"] = time_json(result.time);
   if (!result.notes.empty()) json["notes"] = result.notes;
   return text(json);

@@ -99,6 +99,29 @@ struct ResolutionResult {
   std::string reason;  ///< why the optimiser stopped
 };
 
+/// One round of tracking and estimation in turns.
+struct TrackingRoundResult {
+  double tracked_with = 0.0;                   ///< Young's modulus [Pa] that the object was followed with
+  double youngs_modulus = 0.0;                 ///< estimated from its motion [Pa]
+  std::optional<double> surface_rms, fit_rms;  ///< [m] points to the tracked surface; tracked to simulated points
+  double confidence = 0.0;                     ///< least of all frames
+  bool lost = false;
+};
+
+/// How an estimate predicts frames that were left out.
+struct HeldOutFramesResult {
+  int frames = 0;
+  std::optional<double> cost, surface_rms;  ///< nothing: it cannot be simulated; [m]
+};
+
+/// Where the object was tracked.
+struct TrackingResult {
+  std::string kept;  ///< "tracked motion" or "points": what the estimate was made from
+  std::string why;   ///< a sentence
+  std::vector<TrackingRoundResult> rounds;
+  std::optional<HeldOutFramesResult> loop, direct;  ///< where both were tried
+};
+
 struct TimeResult {
   double wall_seconds = 0.0;
   long long forward_steps = 0;
@@ -121,6 +144,7 @@ struct Result {
   std::vector<CorrelationResult> identifiability;
   std::vector<StartResult> starts;
   std::vector<ResolutionResult> resolutions;  ///< where there are several, in the order in which they were used
+  std::optional<TrackingResult> tracking;
   TimeResult time;
   std::vector<std::string> notes;  ///< plain sentences for the user
 

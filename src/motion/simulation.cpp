@@ -418,10 +418,12 @@ std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const
                                                      const SimulationOptions& options) {
   SimulationOptions without_pulls = options;
   without_pulls.pulls = 0;
+  without_pulls.released_weights.clear();
   Elasticity* elasticity = nullptr;
   FixedRegions* fixed = nullptr;
   Pull* pull = nullptr;
-  std::vector<std::unique_ptr<ForceTerm>> terms = make_terms(body, without_pulls, elasticity, fixed, pull);
+  HungWeights* let_go = nullptr;
+  std::vector<std::unique_ptr<ForceTerm>> terms = make_terms(body, without_pulls, elasticity, fixed, pull, let_go);
   if (fixed) fixed->move_to(options.holds);
   return terms;
 }

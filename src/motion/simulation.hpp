@@ -143,7 +143,7 @@ class Simulation {
   std::size_t peak_state_bytes_ = 0;
 };
 
-/// All forces of a scene but pulls, each held region at the end of its way.
+/// All forces of a scene but what holds it until it is let go, each held region at the end of its way.
 std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,
                                                      const SimulationOptions& options);
 

@@ -14,6 +14,7 @@
 #include "report/gallery.hpp"
 #include "report/prediction.hpp"
 #include "report/report.hpp"
+#include "report/track_output.hpp"
 
 namespace pliant {
 
@@ -354,6 +355,25 @@ SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
   return errors;
 }
 
+namespace {
+
+TrackingResult tracking_result(const TrackingOutcome& outcome) {
+  TrackingResult result{outcome.keeps_loop ? "tracked motion" : "points", outcome.why, {}, {}, {}};
+  for (const TrackingRound& r : outcome.rounds)
+    result.rounds.push_back(
+        {r.youngs_modulus, r.theta[theta::youngs_modulus], r.surface_rms, r.fit_rms, r.confidence, r.lost});
+  const auto held_out = [](const std::optional<HeldOutFrames>& h) -> std::optional<HeldOutFramesResult> {
+    if (!h) return std::nullopt;
+    HeldOutFramesResult r{h->frames, {}, {}};
+    if (h->succeeded) r.cost = h->cost, r.surface_rms = h->surface_rms;
+    return r;
+  };
+  result.loop = held_out(outcome.loop), result.direct = held_out(outcome.direct);
+  return result;
+}
+
+}  // namespace
+
 Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome, const RunFacts& facts) {
   const Capture& capture = recordings.front().capture;
   Result result;
@@ -401,6 +421,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
   if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
   result.notes = outcome.notes;
+  if (outcome.tracking) result.tracking = tracking_result(*outcome.tracking);
   return result;
 }
 
@@ -586,6 +607,12 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
   add_pictures(report, gallery_of(recordings.front(), first));
   tell("pictures", 1, 1);
   write_report(folder / "report.html", report);
+  if (!outcome.tracking) return;
+  for (std::size_t i = 0; i < outcome.tracking->tracks.size(); ++i) {
+    const std::string name = recordings.size() == 1 ? "track" : "track-" + std::to_string(i + 1);
+    write_track(folder / name, recordings[i].capture, recordings[i].observed, *outcome.tracking->tracks[i],
+                outcome.recordings[i].theta, true, progress);
+  }
 }
 
 }  // namespace pliant

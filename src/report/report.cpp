@@ -284,6 +284,39 @@ std::string starts_table(const Result& result) {
 }
 
 // Scalars, a row for each resolution and one for their limit.
+std::string tracking_part(const Result& result) {
+  if (!result.tracking) return "";
+  const TrackingResult& tracking = *result.tracking;
+  const auto mm = [](const std::optional<double>& length) { return length ? readable(1e3 * *length, 3) : "?"; };
+  std::string html = "<p>" + escape_html(tracking.why) + "</p>\n", body;
+  Series tracked{"points to the tracked surface", {}, {}, Mark::LineAndDots, {}, {}, 0};
+  Series fitted{"tracked to simulated points", {}, {}, Mark::LineAndDots, {}, {}, 1};
+  Series modulus{"", {}, {}, Mark::LineAndDots, {}, {}, 0};
+  for (std::size_t i = 0; i < tracking.rounds.size(); ++i) {
+    const TrackingRoundResult& r = tracking.rounds[i];
+    const double round = double(i) + 1.0;
+    tracked.x.push_back(round), tracked.y.push_back(1e3 * r.surface_rms.value_or(NAN));
+    fitted.x.push_back(round), fitted.y.push_back(1e3 * r.fit_rms.value_or(NAN));
+    if (i == 0) modulus.x.push_back(0.0), modulus.y.push_back(r.tracked_with);
+    modulus.x.push_back(round), modulus.y.push_back(r.youngs_modulus);
+    body += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.2f}{}</td></tr>\n", i + 1,
+                        escape_html(value_with_uncertainty(r.tracked_with, std::nullopt, "Pa")),
+                        escape_html(value_with_uncertainty(r.youngs_modulus, std::nullopt, "Pa")), mm(r.surface_rms),
+                        mm(r.fit_rms), r.confidence, r.lost ? ", lost" : "");
+  }
+  PlotOptions errors, moduli;
+  errors.title = "Error of each round", errors.x_label = "round", errors.y_label = "rms [mm]", errors.zero_y = true;
+  moduli.title = "Young's modulus after each round", moduli.x_label = "round", moduli.y_label = "[Pa]";
+  moduli.log_y = true;
+  for (PlotOptions* options : {&errors, &moduli}) options->width = 460, options->height = 250;
+  html += "<div class=\"small-plots\">\n" + panel(plot_svg({tracked, fitted}, errors)) +
+          panel(plot_svg({modulus}, moduli)) + "</div>\n";
+  return html + table(
+                    "<th>round</th><th>tracked with</th><th>estimated</th><th>points to surface [mm]</th>"
+                    "<th>tracked to simulated [mm]</th><th>least confidence</th>",
+                    body);
+}
+
 std::string resolutions_table(const Result& result) {
   if (result.resolutions.size() < 2) return "";
   std::vector<const ParameterResult*> shown;
@@ -374,6 +407,7 @@ std::string report_html(const ReportData& data) {
   html += section("Under hung weights", loads_table(data.loads));
   html += section("How the estimation went", convergence(data));
   html += section("All parameters", parameter_table(data.result));
+  html += section("Tracking and estimation in turns", tracking_part(data.result));
   html += section("Mesh and time step", resolutions_table(data.result));
   html += section("Which parameters go together", correlation_table(data.correlations));
   html += section("Starting points", starts_table(data.result));
