@@ -27,7 +27,8 @@ TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOpti
   if (options.tracking != TrackingUse::Automatic) return options.tracking;
   const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
     const Capture& c = r.capture;
-    return !r.followed && !c.is_static && c.shape_is == ShapeIs::Reference && c.markers.empty() && (!c.clouds.empty() || c.depth.size() > 1);
+    return !r.followed && !c.is_static && c.shape_is == ShapeIs::Reference && c.markers.empty() &&
+           (!c.clouds.empty() || c.depth.size() > 1);
   });
   return suits ? TrackingUse::Both : TrackingUse::Off;
 }
@@ -178,13 +179,21 @@ class TrackingLoop {
     return options;
   }
 
+  /// The modulus that a user gives is the one to track with: how fast the tracked motion is tells a better one to begin
+  /// its fit.
+  static FitOptions without_start(FitOptions options) {
+    for (auto& [name, change] : options.parameters)
+      if (name.starts_with("youngs_modulus") && change.estimated.value_or(true)) change.start.reset();
+    return options;
+  }
+
   double share(int round) const { return (is_both_ ? 0.5 : 1.0) * round / options_.tracking_rounds; }
 
   /// False where it was interrupted or failed: the outcome says so.
   bool loop() {
     const std::vector<RecordedCapture>& recordings = is_both_ ? training_ : all_;
     VectorX theta = state_.rounds.empty() ? VectorX() : state_.rounds.back().theta;
-    FitOptions options = options_;
+    FitOptions options = without_start(options_);
     FitState from = std::exchange(left_, {});
     bool is_resumed = !from.scan.empty() || from.motion || from.fine;
     while (int(state_.rounds.size()) < options_.tracking_rounds) {
@@ -197,7 +206,7 @@ class TrackingLoop {
       outcome_ = fit_once(followed_captures(recordings), options, std::move(from), "round " + std::to_string(round + 1),
                           share(round), share(round + 1));
       if (outcome_->interrupted || !outcome_->evaluation.succeeded) return false;
-      options = with_chosen_controls(*outcome_);
+      options = without_start(with_chosen_controls(*outcome_));
       described_round.theta = outcome_->theta;
       described_round.fit_rms = outcome_->evaluation.track_rms();
       described_round.change = change(theta.size() > 0 ? theta : VectorX(), described_round);

@@ -27,10 +27,13 @@ Box motion_box(const Gallery& gallery) {
 std::string caption(const Gallery& gallery, const GalleryFrame& frame) {
   std::string text = fmt::format("Frame {}, {} s", frame.frame, readable(frame.time, 3));
   double squares = 0.0;
-  for (const double r : frame.residuals) squares += r * r;
-  if (!frame.residuals.empty())
-    text += fmt::format(": {} points, {} mm rms", readable(double(frame.residuals.size()), 6),
-                        readable(1e3 * std::sqrt(squares / double(frame.residuals.size())), 2));
+  std::size_t near = 0;
+  for (const double r : frame.residuals)
+    if (std::isfinite(r)) squares += r * r, ++near;
+  if (near > 0)
+    text += fmt::format(": {} points, {} mm rms", readable(double(near), 6),
+                        readable(1e3 * std::sqrt(squares / double(near)), 2));
+  if (near < frame.residuals.size()) text += fmt::format(", {} outliers", frame.residuals.size() - near);
   if (!gallery.planes.empty())
     text += fmt::format("; grid {} mm", readable(1e3 * grid_spacing(box_of(frame.surface)), 3));
   return text;

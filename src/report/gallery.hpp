@@ -15,7 +15,7 @@ struct GalleryFrame {
   double time = 0.0;              ///< [s]
   Points surface;                 ///< simulated vertices [m], n x 3
   std::vector<Vector3> points;    ///< observed [m]; may be empty
-  std::vector<double> residuals;  ///< signed distance of each to the surface [m]
+  std::vector<double> residuals;  ///< signed distance of each to the surface [m]; not a number: an outlier
 };
 
 /// Frames of one motion, drawn from one place with one colour scale.

@@ -32,6 +32,11 @@ Result full_result() {
               {{{"youngs_modulus", 1e7}}, {}, std::nullopt, 3, false, "no finite cost"}};
   r.resolutions = {{12.0, 1.0, 800, {{"youngs_modulus", 590.0}}, 8.46, true, "cost settled"},
                    {18.0, 1.0, 2600, {{"youngs_modulus", 580.0}}, std::nullopt, false, "interrupted"}};
+  r.tracking = {"points",
+                "They predict better.",
+                {{9e4, 1.8e5, 1e-3, 2e-3, 0.9, false}, {1.8e5, 1.7e5, {}, {}, 0.1, true}},
+                HeldOutFramesResult{17, 484.0, 2.4e-3},
+                HeldOutFramesResult{17, {}, {}}};
   r.time = {41.0, 9600, 2.1, std::nullopt};
   r.notes = {"The floor was taken as known."};
   return r;
@@ -51,6 +56,11 @@ TEST(Result, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.starts[1].cost, std::nullopt);
   EXPECT_EQ(read.fields[0].control_points[0].std, 0.5);
   EXPECT_EQ(read.find("nothing"), nullptr);
+  ASSERT_TRUE(read.tracking && read.tracking->loop && read.tracking->direct);
+  EXPECT_EQ(read.tracking->rounds[0].surface_rms, 1e-3);
+  EXPECT_TRUE(read.tracking->rounds[1].lost);
+  EXPECT_EQ(read.tracking->loop->cost, 484.0);
+  EXPECT_EQ(read.tracking->direct->cost, std::nullopt) << "it cannot be simulated";
 }
 
 // The layout is a contract with readers in other languages: names and kinds, looked at without our own reader.

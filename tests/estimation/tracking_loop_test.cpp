@@ -1,0 +1,183 @@
+// Tracking and estimation in turns, against the fit of the points, on a bar that swings under its weight.
+#include "estimation/tracking_loop.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+
+#include "estimation/fit_config.hpp"
+#include "estimation/fit_state.hpp"
+#include "geometry/primitives.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double length = 0.4, edge = 0.05, modulus = 1.2e5, noise = 1.5e-3;
+constexpr int frames = 30;
+
+/// A bar along x, clamped at its low end, let go straight; half of its surface is seen as points. Made by the same
+/// elements and law as it is fitted with, on a finer mesh with shorter steps: an inverse crime in part.
+RecordedCapture swinging_bar() {
+  RecordedCapture recorded;
+  Capture& capture = recorded.capture;
+  capture.name = "bar";
+  capture.surface = make_box(Vector3(length, edge, edge), 0.0125);
+  capture.density = 300.0;
+  capture.gravity = Vector3(0.0, -9.81, 0.0);
+  for (int f = 0; f < frames; ++f) capture.times.push_back(f / 30.0);
+  capture.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
+  capture.clouds = {{{"cloud.ply"}, 1, noise}};
+  VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
+  theta[theta::youngs_modulus] = modulus;
+  theta[theta::mass_damping] = 0.4;
+  theta[theta::stiffness_damping] = 4e-3;
+  Resolution resolution;
+  resolution.cells = 16.0, resolution.steps = 2.0;
+  const Discretisation d = discretise(capture, capture_distance(capture, 0.2), resolution, theta);
+  const Embedding embedding(*d.body, capture.surface->vertices);
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const RolloutSummary summary = Simulation(d.body, d.simulation).run(theta, [&](int frame, const State& state, auto) {
+    const Points x = embedding.positions(state.x);
+    ObservedFrame seen;
+    seen.frame = frame;
+    for (Eigen::Index v = 0; v < x.rows(); ++v) {
+      if (capture.surface->vertices[std::size_t(v)].z() < 0.0) continue;
+      seen.points.push_back(Vector3(x.row(v)) + noise * Vector3(normal(random), normal(random), normal(random)));
+      seen.noise.push_back(float(noise));
+      seen.view.emplace_back(Vector3::Zero());
+      seen.camera.push_back(-1);
+      seen.pixel.push_back(-1);
+    }
+    recorded.observed.push_back(std::move(seen));
+    return true;
+  });
+  EXPECT_TRUE(summary.succeeded) << summary.failure;
+  return recorded;
+}
+
+FitOptions quick(TrackingUse tracking) {
+  FitOptions options;
+  options.cells = options.coarse_cells = 8.0;
+  options.parameters["poisson_ratio"].estimated = false;
+  options.starts = 1;
+  options.tracking = tracking;
+  return options;
+}
+
+double found(const FitOutcome& outcome) { return outcome.theta[theta::youngs_modulus]; }
+
+TEST(TrackingLoop, LeadsToTheModulusFromOneTenTimesOff) {
+  for (const double wrong : {0.1, 10.0}) {
+    FitOptions options = quick(TrackingUse::Loop);
+    options.parameters["youngs_modulus"].start = VectorX::Constant(1, wrong * modulus);
+    const FitOutcome outcome = fit({swinging_bar()}, options);
+    ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+    ASSERT_TRUE(outcome.tracking.has_value());
+    ASSERT_GE(outcome.tracking->rounds.size(), 2u) << "what was tracked with a wrong material is tracked again";
+    EXPECT_EQ(outcome.tracking->rounds.front().youngs_modulus, wrong * modulus);
+    EXPECT_FALSE(outcome.tracking->rounds.back().lost);
+    EXPECT_LT(outcome.tracking->rounds.back().surface_rms, noise);
+    EXPECT_NEAR(found(outcome) / modulus, 1.0, 0.1) << wrong;
+    EXPECT_LT(outcome.evaluation.surface_rms(), 1.5 * noise) << "the agreement told is that with the points";
+    EXPECT_GT(outcome.evaluation.surface_rms(), 0.5 * noise);
+  }
+}
+
+TEST(TrackingLoop, AndThePointsAreComparedByFramesLeftOut) {
+  const FitOutcome outcome = fit({swinging_bar()}, quick(TrackingUse::Both));
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  ASSERT_TRUE(outcome.tracking.has_value());
+  const TrackingOutcome& tracking = *outcome.tracking;
+  ASSERT_TRUE(tracking.loop && tracking.direct);
+  EXPECT_EQ(tracking.loop->frames, 6);
+  EXPECT_EQ(tracking.keeps_loop, tracking.loop->cost < tracking.direct->cost);
+  EXPECT_LT(tracking.direct->surface_rms, 1.5 * noise);
+  EXPECT_THAT(outcome.notes.front(), HasSubstr("every 5th frame was left out"));
+  EXPECT_THAT(outcome.notes.front(), HasSubstr(tracking.keeps_loop ? "tracked motion's was kept" : "points' was kept"));
+  EXPECT_EQ(outcome.evaluation.frames.size(), std::size_t(frames)) << "all frames take part at last";
+  ASSERT_EQ(tracking.tracks.size(), 1u);
+  EXPECT_EQ(tracking.tracks.front()->frames.size(), std::size_t(frames));
+  EXPECT_NEAR(found(outcome) / modulus, 1.0, 0.1);
+}
+
+/// Interrupted in every phase, written to a file and read back.
+TEST(TrackingLoop, GoesOnAfterAnInterruptionToTheSameEnd) {
+  const test::TemporaryFolder folder;
+  const FitOptions options = quick(TrackingUse::Both);
+  const RecordedCapture bar = swinging_bar();
+  const FitOutcome undisturbed = fit({bar}, options);
+  for (const char* stage : {"round 2: fine", "points: fine", "all frames: fine"}) {
+    FitState left;
+    bool stop = false;
+    FitMonitor monitor;
+    monitor.on_event = [&](const FitEvent& event) { stop = stop || event.stage == stage; };
+    monitor.on_state = [&](const FitState& state) { left = state; };
+    monitor.interrupted = [&] { return stop; };
+    const FitOutcome interrupted = fit({bar}, options, monitor);
+    ASSERT_TRUE(stop) << stage;
+    EXPECT_TRUE(interrupted.interrupted) << stage;
+    write_fit_state(folder / "state.json", left, "key");
+    const FitOutcome resumed = fit({bar}, options, {}, read_fit_state(folder / "state.json", "key"));
+    EXPECT_EQ(resumed.tracking->keeps_loop, undisturbed.tracking->keeps_loop) << stage;
+    EXPECT_NEAR(found(resumed) / found(undisturbed), 1.0, 2e-3) << stage;
+  }
+}
+
+TEST(TrackingLoop, IsWhereItSuits) {
+  RecordedCapture bar = swinging_bar();
+  EXPECT_TRUE(tracks({bar}, {}));
+  EXPECT_FALSE(tracks({bar}, quick(TrackingUse::Off)));
+  RecordedCapture still = bar;
+  still.capture.is_static = true;
+  EXPECT_FALSE(tracks({still}, {}));
+  EXPECT_TRUE(tracks({still}, quick(TrackingUse::Loop))) << "on request";
+  RecordedCapture one_camera = bar;
+  one_camera.capture.clouds.clear();
+  one_camera.capture.depth.resize(1);
+  EXPECT_FALSE(tracks({one_camera}, {}));
+  one_camera.capture.depth.resize(2);
+  EXPECT_TRUE(tracks({one_camera}, {}));
+}
+
+TEST(TrackingLoop, IsAKeyOfAFit) {
+  FitOptions options;
+  for (const char* use : {"off", "loop", "both", "auto"}) {
+    set_fit_option(options, std::string("tracking=") + use);
+    EXPECT_THAT(to_toml(options), HasSubstr("tracking = \"" + std::string(use) + "\""));
+  }
+  set_fit_option(options, "tracking_rounds=11");
+  EXPECT_THAT(options.validate(), HasSubstr("tracking_rounds"));
+}
+
+TEST(SupportedPoints, AreThoseAboutWhichPointsWereSeen) {
+  const RecordedCapture bar = swinging_bar();
+  Track track;
+  const auto distance = capture_distance(bar.capture, 0.2);
+  Resolution resolution;
+  resolution.cells = 8.0;
+  const VectorX theta = default_parameters(bar.capture, enclosed_volume(*bar.capture.surface)).reference();
+  track.body = discretise(bar.capture, distance, resolution, theta).body;
+  track.marks = {Vector3(0.1, 0.0, 0.02), Vector3(-0.1, 0.01, 0.0)};
+  TrackedFrame frame;
+  frame.nodes = track.body->nodes.rowwise() + Eigen::RowVector3d(0.0, 0.5, 0.0);
+  frame.points = 100, frame.surface_rms = 2e-3;
+  frame.mark_points = {5, 0};
+  track.frames = {frame, frame, frame};
+  track.frames[1].frame = 1, track.frames[1].is_lost = true;
+  track.frames[2].frame = 2, track.frames[2].points = 0;
+  const TrackedPoints points = supported_points(track, length);
+  EXPECT_EQ(points.rest.size(), 2u);
+  ASSERT_EQ(points.frames.size(), 1u) << "lost and empty frames say nothing";
+  ASSERT_EQ(points.frames.at(0).size(), 1u);
+  const TrackObservation& seen = points.frames.at(0).front();
+  EXPECT_EQ(seen.point, 0);
+  EXPECT_EQ(seen.noise, 2e-3);
+  EXPECT_LT((seen.position - (track.marks[0] + Vector3(0.0, 0.5, 0.0))).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace pliant
