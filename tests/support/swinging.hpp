@@ -20,7 +20,7 @@ enum class SwingShape { Bar, Leaf };
 
 struct SwingOptions {
   SwingShape shape = SwingShape::Bar;
-  double youngs_modulus = 5e5;  ///< [Pa]
+  double youngs_modulus = 5e5;                                          ///< [Pa]
   std::vector<Vector3> pulls = {{0.25, 0.1, 0.0}, {-0.02, 0.02, 0.0}};  ///< of the free end and of the middle
   double rate = 30.0;                                                   ///< [Hz]
   int held = 2, frames = 12;                                            ///< until it is let go, and altogether
@@ -125,10 +125,10 @@ struct Swing {
 
   SwingOptions options;
   std::shared_ptr<const Body> truth, body;
-  SimulationOptions scene;  ///< for the tracked body
-  VectorX theta;            ///< the true material
-  TriangleMesh surface;     ///< the scan
-  double size = 0.0;        ///< [m]
+  SimulationOptions scene;        ///< for the tracked body
+  VectorX theta;                  ///< the true material
+  TriangleMesh surface;           ///< the scan
+  double size = 0.0;              ///< [m]
   std::vector<Points> positions;  ///< of the truth's nodes in each frame [m]
   Embedding nodes_in_truth, surface_in_truth;
 };
@@ -162,8 +162,7 @@ struct Sensors {
           if (hidden && hidden(rest)) continue;
           Vector3 point = camera.unproject(u, v, double(seen.depth[pixel]) + noise * normal(random));
           if (uniform(random) < 2.0 * outliers - 1.0)
-            point = 0.5 * (low + high) +
-                    swing.size * Vector3(uniform(random), uniform(random), uniform(random));
+            point = 0.5 * (low + high) + swing.size * Vector3(uniform(random), uniform(random), uniform(random));
           view.points.push_back(point);
           view.noise.push_back(float(noise));
         }

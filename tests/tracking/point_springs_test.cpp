@@ -22,8 +22,8 @@ struct Springs {
       const double phase = 1.7 * double(i);
       stiffness[i] = i % 5 == 0 ? 0.0 : 40.0 * (1.5 + std::sin(phase));
       targets.row(i) = (at[std::size_t(i)] + 0.05 * Vector3(std::sin(phase), std::cos(2.0 * phase), 0.3)).transpose();
-      normals.row(i) = i % 7 == 0 ? Vector3::Zero().transpose()
-                                  : Vector3(std::cos(phase), 0.4, std::sin(3.0 * phase)).normalized().transpose();
+      const Vector3 normal(std::cos(phase), 0.4, std::sin(3.0 * phase));
+      normals.row(i) = (i % 7 == 0 ? 0.0 : 1.0) * normal.normalized().transpose();
     }
   }
   std::unique_ptr<PointSprings> make(const Body& body) const {
@@ -54,7 +54,8 @@ std::vector<Family> families() {
   std::vector<Family> list;
   for (const test::BodyKind& kind : test::body_kinds())
     for (const double t : {1.0, 0.1})
-      list.push_back({"SpringsOn" + kind.name + (t < 1.0 ? "Sliding" : ""), kind.make,
+      list.push_back({"SpringsOn" + kind.name + (t < 1.0 ? "Sliding" : ""),
+                      kind.make,
                       [t](const auto& body) { return Springs(*body, t).make(*body); },
                       false,
                       true,
