@@ -184,9 +184,12 @@ inline Sensors three_sensors(const Swing& swing, int height) {
   return sensors;
 }
 
-/// The middle third of the object, along it.
+/// In the middle third of the object, along it, or in the one at its free end.
 inline bool is_in_middle_third(SwingShape shape, const Vector3& rest) {
   return shape == SwingShape::Bar ? rest.z() < -0.2 && rest.z() > -0.4 : rest.x() > 0.1 && rest.x() < 0.2;
+}
+inline bool is_in_end_third(SwingShape shape, const Vector3& rest) {
+  return shape == SwingShape::Bar ? rest.z() <= -0.4 : rest.x() >= 0.2;
 }
 
 /// A recording as `track` takes it.
