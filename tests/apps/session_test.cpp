@@ -278,8 +278,8 @@ TEST_F(Session, AVolumeMeshMadeElsewhereIsFitted) {
 
 TEST_F(Session, TrackFollowsTheObject) {
   write_file(at("follow.csv"), "id,x,y,z\ntop,0,0.12,0\nmiddle,0,0.07,0\n");
-  const ProgramRun run = run_pliant({"track", capture(), "--out", at("track"), "--set", "cells=6", "--points-per-frame",
-                                     "400", "--points", at("follow.csv")});
+  const ProgramRun run =
+      run_pliant({"track", capture(), "--out", at("track"), "--set", "cells=8", "--points", at("follow.csv")});
   ASSERT_EQ(run.exit_code, fine) << run.err << run.out;
   EXPECT_THAT(run.out, HasSubstr("14 frames"));
   EXPECT_THAT(run.out, HasSubstr("track.html"));
