@@ -3,12 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <pugixml.hpp>
 #include <set>
+#include <sstream>
 
 #include "apps/program.hpp"
 #include "base/files.hpp"
@@ -272,6 +274,78 @@ TEST_F(Session, AVolumeMeshMadeElsewhereIsFitted) {
       << "the same elements, whose boundary is the surface now";
   EXPECT_EQ(found["resolutions"].size(), 2U) << "finer steps, but no other mesh than the one given";
   EXPECT_FALSE(found["parameters"]["youngs_modulus"].contains("mesh_error"));
+}
+
+TEST_F(Session, TrackFollowsTheObject) {
+  write_file(at("follow.csv"), "id,x,y,z\ntop,0,0.12,0\nmiddle,0,0.07,0\n");
+  const ProgramRun run =
+      run_pliant({"track", capture(), "--out", at("track"), "--set", "cells=8", "--points", at("follow.csv")});
+  ASSERT_EQ(run.exit_code, fine) << run.err << run.out;
+  EXPECT_THAT(run.out, HasSubstr("14 frames"));
+  EXPECT_THAT(run.out, HasSubstr("track.html"));
+  for (const char* name : {"track.json", "track.csv", "track.html", "trajectory.pvd", "points.csv", "frames/000000.vtu",
+                           "frames/000013.vtu", "pictures/000000.png", "pictures/000013.png"})
+    EXPECT_TRUE(fs::is_regular_file(at("track") + "/" + name)) << name;
+
+  const json track = read_json(at("track") + "/track.json");
+  EXPECT_EQ(track["format"], "track/1");
+  EXPECT_EQ(track["capture"]["name"], "a small ball");
+  EXPECT_TRUE(track["lost_at"].is_null());
+  ASSERT_EQ(track["frames"].size(), std::size_t(frames));
+  for (const json& frame : track["frames"]) {
+    EXPECT_FALSE(frame["lost"].get<bool>()) << frame;
+    EXPECT_GT(frame["points"].get<int>(), 100) << frame;
+    EXPECT_GT(frame["explained"].get<double>(), 0.9) << frame;
+    EXPECT_LT(frame["surface_rms"].get<double>(), 0.002) << frame;
+  }
+  const std::string table = read_file(at("track") + "/track.csv");
+  EXPECT_EQ(std::ranges::count(table, '\n'), frames + 1);
+  EXPECT_THAT(read_file(at("track") + "/track.html"), HasSubstr("Never lost"));
+
+  std::map<std::pair<int, std::string>, double> height;
+  std::istringstream points(read_file(at("track") + "/points.csv"));
+  std::string line;
+  std::getline(points, line);
+  EXPECT_EQ(line, "frame,id,x,y,z");
+  while (std::getline(points, line)) {
+    std::istringstream row(line);
+    std::string cells[4];
+    for (std::string& cell : cells) std::getline(row, cell, ',');
+    height[{std::stoi(cells[0]), cells[1]}] = std::stod(cells[3]);
+  }
+  EXPECT_EQ(height.size(), 2U * frames);
+  EXPECT_NEAR((height[{0, "top"}]), 0.12, 1e-9);
+  const double fallen = 0.5 * 9.81 * std::pow(3.0 / 60.0, 2);  // it meets the floor after that
+  for (const auto& [id, rest] : {std::pair{"top", 0.12}, std::pair{"middle", 0.07}})
+    EXPECT_NEAR((height[{3, id}]), rest - fallen, 0.001) << id;
+}
+
+TEST_F(Session, TrackSaysThatTheObjectIsLost) {
+  const fs::path elsewhere = at("elsewhere");
+  fs::copy(capture(), elsewhere, fs::copy_options::recursive);
+  std::string facts = read_file(elsewhere / "capture.toml");
+  const std::size_t row = facts.find("camera_to_world = [[");
+  ASSERT_NE(row, std::string::npos);
+  const std::size_t end = facts.find(']', row), begin = facts.rfind(',', end) + 1;
+  facts.replace(begin, end - begin, std::to_string(std::stod(facts.substr(begin, end - begin)) + 0.1));
+  write_file(elsewhere / "capture.toml", facts);
+  const ProgramRun run = run_pliant({"track", elsewhere, "--out", at("lost track"), "--set", "cells=6",
+                                     "--points-per-frame", "400", "--no-pictures"});
+  EXPECT_EQ(run.exit_code, not_converged) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("was lost in frame 0"));
+  EXPECT_EQ(read_json(at("lost track") + "/track.json")["lost_at"], 0);
+  EXPECT_FALSE(fs::exists(at("lost track") + "/pictures/000000.png"));
+}
+
+TEST_F(Session, TrackRefusesBadInputWithItsPlace) {
+  write_file(at("broken.csv"), "id,x,y,z\ntop,0,high,0\n");
+  const ProgramRun points = run_pliant({"track", capture(), "--out", at("no track"), "--points", at("broken.csv")});
+  EXPECT_EQ(points.exit_code, 2);
+  EXPECT_THAT(points.err, HasSubstr("broken.csv"));
+  const ProgramRun choice = run_pliant({"track", capture(), "--out", at("no track"), "--set", "cels=8"});
+  EXPECT_EQ(choice.exit_code, 2);
+  EXPECT_THAT(choice.err, HasSubstr("cells"));
+  EXPECT_FALSE(fs::exists(at("no track") + "/track.json"));
 }
 
 class InterruptedSession : public Session, public testing::WithParamInterface<const char*> {};

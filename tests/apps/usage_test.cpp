@@ -28,7 +28,7 @@ TEST(Usage, VersionIsOneLineOnStdout) {
 TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
-  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "130"})
+  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -43,7 +43,7 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp,
-                         testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan"),
+                         testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {
@@ -67,6 +67,7 @@ TEST(Usage, AMissingFileIsNamed) {
   const std::string missing = (folder.path() / "nowhere").string(), out = (folder.path() / "out").string();
   for (const std::vector<std::string>& arguments : {std::vector<std::string>{"check", missing},
                                                     {"fit", missing, "--out", out},
+                                                    {"track", missing, "--out", out},
                                                     {"simulate", missing + "/model.toml", "--out", out},
                                                     {"evaluate", missing + "/model.toml", missing},
                                                     {"synth", missing + "/scene.toml", "--out", out}}) {
@@ -80,7 +81,7 @@ TEST(Usage, AMissingFileIsNamed) {
 TEST(Usage, ABrokenCaptureIsToldWithItsPlace) {
   const TemporaryFolder folder;
   std::ofstream(folder.path() / "capture.toml") << "format = \"capture/1\"\nname = \"x\"\nmass = = 3\n";
-  for (const char* command : {"check", "fit"}) {
+  for (const char* command : {"check", "fit", "track"}) {
     const ProgramRun run = run_pliant({command, folder.path().string(), "--out", (folder.path() / "out").string()});
     EXPECT_EQ(run.exit_code, bad_input);
     EXPECT_THAT(run.err, HasSubstr("capture.toml:3:8"));

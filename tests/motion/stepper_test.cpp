@@ -9,6 +9,7 @@
 #include "support/bodies.hpp"
 #include "support/convergence.hpp"
 #include "support/dense.hpp"
+#include "support/scenes.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant {
@@ -251,6 +252,59 @@ TEST(Stepper, WithoutDampingThetaOneHalfKeepsTheAmplitude) {
   const double period = 2.0 * std::numbers::pi / mode.omega;
   EXPECT_NEAR(mode.released(10 * period, period / 200, 0.5), 1.0, tolerance(5e-3));
   EXPECT_LT(mode.released(10 * period, period / 200, 0.55), 0.95) << "above one half it damps numerically";
+}
+
+/// Repeated about its own end, a step of the lagged scheme is that of the implicit one: rotations, contact, damping.
+TEST(Stepper, RepeatedLaggedStepsConvergeToTheImplicitStep) {
+  const test::TorusScene scene = test::torus_scene(0.05, 2);
+  const auto& body = scene.body;
+  for (const double blend : {0.51, 0.999}) {
+    const auto make = [&](Integrator integrator) {
+      auto terms = Stepped::terms(body);
+      terms.push_back(std::make_unique<PlaneContact>(body, 0, scene.options.contact));
+      StepOptions options = step_options(1.0 / 120.0, blend);
+      options.integrator = integrator;
+      options.newton.tolerance = 1e-13;
+      auto stepper = std::make_unique<Stepper>(body, std::move(terms), options);
+      stepper->set_parameters(scene.theta);
+      return stepper;
+    };
+    State start = spinning(*body, 6.0);
+    start.x.col(0) *= 1.1;  // stretched
+    start.x.col(1).array() -= 0.03;
+    const auto implicit = make(Integrator::Newton), lagged = make(Integrator::Lagged);
+    Points exact = Points::Zero(start.x.rows(), 3);
+    ASSERT_TRUE(implicit->prepare(start));
+    ASSERT_TRUE(implicit->solve(start, exact).converged);
+    Points delta = lagged->options().dt * start.v;
+    ASSERT_TRUE(lagged->prepare(start));
+    ASSERT_TRUE(lagged->solve(start, delta).converged);
+    const double once = (delta - exact).norm() / exact.norm();
+    EXPECT_GT(once, 1e-4) << "one lagged step is not the implicit one";
+    double change = 1.0;
+    for (int i = 0; i < 200 && change > 1e-13; ++i) {
+      Points end = delta;
+      ASSERT_TRUE(lagged->prepare(start, delta));
+      ASSERT_TRUE(lagged->solve(start, end).converged);
+      change = (end - delta).norm() / delta.norm();
+      delta = end;
+    }
+    EXPECT_LT((delta - exact).norm(), tolerance(1e-9) * exact.norm()) << blend;
+    State by_lagged = start, by_implicit = start;
+    lagged->advance(delta, by_lagged);
+    implicit->advance(exact, by_implicit);
+    EXPECT_LT((by_lagged.v - by_implicit.v).norm(), tolerance(1e-8) * by_implicit.v.norm()) << blend;
+  }
+}
+
+TEST(Stepper, ReportsAnEndThatIsNotFinite) {
+  const auto body = test::torus_body(0.1, 0.04, 0.05);
+  Stepped scene(body, soft_material(), step_options(0.01, 0.5));
+  const State state{body->reference_positions(), Points::Zero(body->node_count(), 3)};
+  Points delta = Points::Zero(body->node_count(), 3);
+  EXPECT_TRUE(scene.stepper.prepare(state, delta));
+  delta(3, 1) = std::nan("");
+  EXPECT_FALSE(scene.stepper.prepare(state, delta));
 }
 
 TEST(Stepper, RefusesSenselessOptions) {

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "elasticity/force_term.hpp"
+#include "support/bodies.hpp"
+#include "support/dense.hpp"
+#include "support/derivatives.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant::test {
+
+/// One battery for every force: a room's test instantiates it for its own.
+inline constexpr int pulls = 2;
+
+struct Family {
+  std::string name;
+  std::function<std::shared_ptr<const Body>()> body;
+  std::function<std::unique_ptr<ForceTerm>(std::shared_ptr<const Body>)> make;
+  bool depends_on_lag, depends_on_position;
+  std::vector<int> parameters;  ///< of theta that it depends on
+};
+
+inline void PrintTo(const Family& family, std::ostream* out) { *out << family.name; }
+
+struct ForceTerms : ::testing::TestWithParam<Family> {
+  ForceTerms() : body(GetParam().body()), term(GetParam().make(body)) {
+    theta.setZero(theta::size(2, body->modulus.controls, pulls));
+    theta.segment<6>(theta::pull(0, 2)) << 0.1, -0.2, 0.05, 0.02, 0.15, -0.1;
+    theta.tail(body->modulus.controls - 1).setLinSpaced(2000.0, 5000.0);
+    theta[theta::youngs_modulus] = 3000.0;
+    theta[theta::poissons_ratio] = 0.35;
+    theta[theta::mass_damping] = 0.4;
+    theta[theta::stiffness_damping] = 0.002;
+    theta[theta::density] = 120.0;
+    theta.segment<3>(theta::gravity) = Vector3(0.3, -9.7, 0.2);
+    theta.segment<3>(theta::plane_normal(0)) = Vector3::UnitX();
+    theta.segment<3>(theta::plane_point(0)) = Vector3(-1, 0, 0);
+    theta.segment<3>(theta::plane_normal(1)) = Vector3(0.2, 0.9, -0.3).normalized();
+    theta.segment<3>(theta::plane_point(1)) = Vector3(0.01, 0.0, -0.02);  // through the middle: gaps of both signs
+    lag = deformed(body->reference_positions(), 0.3);
+    z = deformed(body->reference_positions(), 0.28, 1.93);
+    d_lag = deformed(body->reference_positions(), 0.6, -0.7);
+    d_z = deformed(body->reference_positions(), 0.9, 0.6);
+  }
+
+  Points force(const Points& at_lag, const Points& at_z, const VectorX& at_theta) {
+    term->set_parameters(at_theta);
+    term->linearise(at_lag);
+    Points f = Points::Zero(at_z.rows(), 3);
+    term->add_force(at_z, f);
+    return f;
+  }
+  Points tangent(const Points& change_lag, const Points& change_z, const VectorX& change_theta) {
+    term->set_parameters(theta);
+    term->linearise(lag);
+    Points df = Points::Zero(z.rows(), 3);
+    term->add_force_tangent(z, change_lag, change_z, change_theta, df);
+    return df;
+  }
+  Points none() const { return Points::Zero(z.rows(), 3); }
+
+  std::shared_ptr<const Body> body;
+  std::unique_ptr<ForceTerm> term;
+  VectorX theta;
+  Points lag, z, d_lag, d_z;
+};
+
+// Bottom of the V of central differences: truncation h^2 against rounding 1e-16 / h.
+inline constexpr double difference_error = 1e-7;
+
+TEST_P(ForceTerms, AddsToWhatIsThere) {
+  const Points f = force(lag, z, theta);
+  ASSERT_GT(f.norm(), 0.0);
+  Points twice = f;
+  term->add_force(z, twice);
+  EXPECT_LT((twice - 2 * f).norm(), tolerance(1e-14) * f.norm());
+}
+
+TEST_P(ForceTerms, MatrixIsMinusTheDerivativeByPosition) {
+  const VectorX change = flat(Points(force(lag, z + d_z, theta) - force(lag, z, theta)));
+  BlockMatrix K(body->pattern);
+  term->add_matrix(3.0, K);
+  const MatrixX whole = dense(K);
+  EXPECT_LE((whole - whole.transpose()).norm(), tolerance(1e-13) * whole.norm());
+  ASSERT_EQ(change.norm() > 0.0, GetParam().depends_on_position);
+  EXPECT_LE((whole * flat(d_z) + 3.0 * change).norm(), tolerance(1e-10) * change.norm());  // affine: rounding alone
+}
+
+TEST_P(ForceTerms, TangentByLagPoint) {
+  const Points df = tangent(d_lag, none(), VectorX::Zero(theta.size()));
+  ASSERT_EQ(df.norm() > 0.0, GetParam().depends_on_lag);
+  if (!GetParam().depends_on_lag) return;
+  const auto along = [&](double s) -> VectorX { return flat(force(lag + s * d_lag, z, theta)); };
+  EXPECT_LT(best_relative_error(along, flat(df), 0.1), tolerance(difference_error));
+  EXPECT_GT(best_relative_error(along, 1.001 * flat(df), 0.1), 1e-4) << "a wrong derivative would pass";
+}
+
+TEST_P(ForceTerms, TangentByPosition) {
+  const Points df = tangent(none(), d_z, VectorX::Zero(theta.size()));
+  const Points difference = force(lag, z + d_z, theta) - force(lag, z, theta);
+  EXPECT_LE((df - difference).norm(), tolerance(1e-10) * difference.norm());
+}
+
+TEST_P(ForceTerms, TangentByEveryParameter) {
+  const auto& active = GetParam().parameters;
+  for (int i = 0; i < theta.size(); ++i) {
+    const VectorX direction = VectorX::Unit(theta.size(), i);
+    const Points df = tangent(none(), none(), direction);
+    const bool is_active = std::find(active.begin(), active.end(), i) != active.end();
+    ASSERT_EQ(df.norm() > 0.0, is_active) << "theta[" << i << "]";
+    const double step = 0.1 * std::max(std::abs(theta[i]), 0.05);
+    if (!is_active) {
+      EXPECT_EQ((force(lag, z, theta + step * direction) - force(lag, z, theta)).norm(), 0.0) << "theta[" << i << "]";
+      continue;
+    }
+    const auto along = [&](double s) -> VectorX { return flat(force(lag, z, theta + s * direction)); };
+    EXPECT_LT(best_relative_error(along, flat(df), step), tolerance(difference_error)) << "theta[" << i << "]";
+  }
+}
+
+TEST_P(ForceTerms, AdjointIsTheTransposeOfTheTangent) {
+  term->set_parameters(theta);
+  term->linearise(lag);
+  const Points w = deformed(body->reference_positions(), -0.8, 2.9);
+  Points lag_bar = none(), z_bar = none();
+  VectorX theta_bar = VectorX::Zero(theta.size());
+  term->add_force_adjoint(z, w, lag_bar, z_bar, theta_bar);
+  const VectorX zero = VectorX::Zero(theta.size());
+  const auto expect_same = [&](double by_adjoint, const Points& df, const char* what) {
+    EXPECT_LE(std::abs(by_adjoint - w.cwiseProduct(df).sum()), tolerance(1e-12) * w.norm() * df.norm()) << what;
+  };
+  expect_same(lag_bar.cwiseProduct(d_lag).sum(), tangent(d_lag, none(), zero), "lag");
+  expect_same(z_bar.cwiseProduct(d_z).sum(), tangent(none(), d_z, zero), "z");
+  for (int i = 0; i < theta.size(); ++i)
+    expect_same(theta_bar[i], tangent(none(), none(), VectorX::Unit(theta.size(), i)), "theta");
+  // It adds: a second call doubles.
+  term->add_force_adjoint(z, w, lag_bar, z_bar, theta_bar);
+  expect_same(0.5 * z_bar.cwiseProduct(d_z).sum(), tangent(none(), d_z, zero), "z, twice");
+}
+
+/// The lag point's share, as a matrix.
+TEST_P(ForceTerms, LagMatrixIsMinusTheDerivativeByLagPoint) {
+  term->set_parameters(theta);
+  const auto product = [&](const Points& at_lag, const Points& at_z) {
+    term->linearise(at_lag);
+    BlockMatrix K(body->pattern);
+    term->add_lag_matrix(at_z, 3.0, K);
+    VectorX y;
+    K.multiply(flat(d_lag), y);
+    return y;
+  };
+  // Contact gives its share where it is needed, with the lag point at z itself: there is none.
+  const bool is_elastic = GetParam().name.starts_with("ElasticityOf") || GetParam().name.starts_with("ThreeModuliOf");
+  const Points& at_lag = is_elastic ? lag : z;
+  const VectorX y = product(at_lag, z);
+  term->linearise(at_lag);
+  Points df = none();
+  term->add_force_tangent(z, d_lag, none(), VectorX::Zero(theta.size()), df);
+  EXPECT_EQ(df.norm() > 0.0, is_elastic);
+  EXPECT_LE((y + 3.0 * flat(df)).norm(), tolerance(1e-11) * df.norm());
+}
+
+}  // namespace pliant::test
