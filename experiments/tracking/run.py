@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 """Objects that swing before three depth sensors: how far the tracked nodes are from the true ones.
 
-A bar and a thin curved leaf at 30 Hz, noise of 3 mm, a third of the surface hidden (its
-middle, or its free end), 1 % outliers; slow, and so fast that they
-move by a tenth of their size between frames; tracked with the true Young's modulus, a tenth and ten times of it. Standard
-library only."""
+A bar and a thin curved leaf at 30 Hz, noise of 3 mm, a third of the surface hidden (its middle, or its free end), 1 % outliers;
+slow, and so fast that they move by a tenth of their size between frames; tracked with the true Young's modulus, a tenth and ten
+times of it. Standard library only."""
 import os
 import pathlib
 import sys
