@@ -9,6 +9,7 @@ import sys
 import plots
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
 from page import IMAGES, ROOT, from_landscape, judged, machine, percent, results, table, with_truth
+from real_tracks_page import real_tracks
 
 PAGE, PLOT, BEAM_PLOT = ROOT / "docs/experiments.md", IMAGES / "torus-sweep.svg", IMAGES / "silicone-beam.svg"
 
@@ -650,6 +651,8 @@ SECTIONS = [
      "Wang et al. 2015, figures 6 and 9 with the reference shape unknown: moduli and load-free shape together, with derivatives through the equilibrium, beside the paper's splitting.", two_zones),
     ("A scan that is only roughly right", "rough-scan",
      "The dropped ring of the example, one depth camera, with its scan bent on purpose: the shape as an unknown of a dynamic fit, by a smooth field with a prior.", rough_scan),
+    ("Real objects that are followed", "real-tracks",
+     "Real: a knobbly ball, a plush dog and two cloths, moved by hands and a robot; rest surfaces made of their own frames. `pliant track`, with no choice of ours.", real_tracks),
     ("Memory of long recordings", "memory", "A torus that bounces for ten seconds, with about 2,400 nodes; long steps and few iterations.", memory),
 ]
 

@@ -92,6 +92,7 @@ Tracker::Tracker(std::shared_ptr<const Body> body, const SimulationOptions& scen
   const std::vector<int> held = held_nodes(*body_, scene.holds);
   stepper_->hold(eliminated_nodes(*body_, scene));
   stepper_->set_parameters(theta);
+  is_free_ = held.empty();
   slowest_ = slowest_vibration(body_, theta, held);
   pendulum_ = theta::vector_at(theta, theta::gravity).norm() / size_;
   const Points& rest = body_->scanned_positions();
@@ -199,6 +200,14 @@ double Tracker::spread(const TrackView& view) const {
   return view.noise.empty() ? noise_ : std::sqrt(sum / double(view.noise.size()));
 }
 
+double Tracker::volume_of(const TrackView& view) const {
+  constexpr double thinnest = 0.2;  // of the size: points of one side are flat
+  if (view.points.empty()) return std::pow(size_, 3);
+  Vector3 low = view.points.front(), high = low;
+  for (const Vector3& point : view.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
+  return (high - low).cwiseMax(thinnest * size_).prod();
+}
+
 bool Tracker::relax(Points& delta, double tolerance) {
   const Stopwatch watch(times_.motion);
   constexpr int most = 15;
@@ -240,6 +249,7 @@ bool Tracker::drift(double dt) {
 
 double Tracker::choose(std::vector<Points> candidates, const TrackView& view, Points& delta) const {
   constexpr std::size_t most = 400;  // points are enough to tell poses apart
+  constexpr double most_outliers = 0.5;
   double best = std::numeric_limits<double>::infinity();
   for (Points& candidate : candidates) {
     const Points nodes = state_.x + candidate;
@@ -251,7 +261,8 @@ double Tracker::choose(std::vector<Points> candidates, const TrackView& view, Po
       distances.push_back(std::sqrt(near.nearest(view.points[i]).squared_distance));
     for (const TrackObservation& seen : view.markers)
       distances.push_back((springs_->points().position(samples_ + seen.point, nodes) - seen.position).norm());
-    const double distance = quantile(std::move(distances), 0.8);
+    // What was no part of the object a moment ago is hardly one now.
+    const double distance = quantile(std::move(distances), 0.8 * (1.0 - std::min(outlier_share_, most_outliers)));
     if (distance < best) best = distance, delta = std::move(candidate);
   }
   return best;
@@ -261,11 +272,15 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
                        TrackedFrame& frame) {
   const double noise = spread(view), least = std::max(finest_, noise), widest = options_.widest * size_;
   const double inertia = at_rest ? 0.0 : 1.0 / (dt * dt);
-  const double stiffness = options_.data_weight * mass_ * (slowest_ + pendulum_ + inertia);  // of all springs [N/m]
+  // Between slow frames a free body would fall out of sight: something that nobody told of carries it.
+  const bool is_flying = is_free_ && inertia > pendulum_;
+  const double motion = (is_flying ? options_.free_weight : options_.data_weight) * (pendulum_ + inertia);
+  const double shape = (is_free_ ? options_.shape_weight : options_.data_weight) * slowest_;
+  const double stiffness = mass_ * (motion + shape);  // of all springs [N/m]
   const double sharpest = std::hypot(least, noise);
   // Points spread about a surface that fits by a little less than the deviation they are sought with.
   constexpr double sharpening = 0.85, settled = 0.95;
-  const double volume = std::pow(2.0 * size_, 3);
+  const double volume = volume_of(view);
   double sigma = std::clamp(distance, least, std::max(least, widest));
   see(state_.x + delta);
   bool saw_again = false;
@@ -351,6 +366,14 @@ TrackedFrame Tracker::look(double dt, bool at_rest, const TrackView& view) {
   frame.nodes = state_.x;
   frame.is_lost = !fine;
   describe(state_.x, view, frame);
+  if (frame.is_lost && fine) {  // it waits where it was last seen, to be found again
+    state_ = {start.x, Points::Zero(start.x.rows(), 3)};
+    outlier_share_ = options_.outlier_share;
+    frame.nodes = state_.x;
+    see(state_.x);
+    describe(state_.x, view, frame);
+    frame.is_lost = true;
+  }
   return frame;
 }
 
@@ -371,7 +394,7 @@ void Tracker::describe(const Points& nodes, const TrackView& view, TrackedFrame&
   const double noise = spread(view), least = std::max(finest_, noise);
   const Points samples = samples_of(all, nodes);
   const Correspondence c =
-      expect(samples, shares_of(all), {view.points, view.noise}, {least, outlier_share_, std::pow(2.0 * size_, 3)});
+      expect(samples, shares_of(all), {view.points, view.noise}, {least, outlier_share_, volume_of(view)});
   TriangleMesh now{{}, surface_.triangles};
   for (Eigen::Index v = 0; v < samples.rows(); ++v) now.vertices.push_back(samples.row(v).transpose());
   const std::vector<Vector3> normals = vertex_normals(now);

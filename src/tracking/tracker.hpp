@@ -24,6 +24,9 @@ struct TrackOptions {
   /// vibration, of its inertia over a frame and of its weight over its size. The body's and the springs' stiffness grow
   /// together: how the object is tracked depends little on how stiff it is thought to be.
   double data_weight = 1000.0;
+  /// That weight where nothing holds the body: against inertia and weight, and against its slowest vibration. It moves
+  /// and turns freely then, and what need not bend keeps its shape: a hand that lies on it is no part of it.
+  double free_weight = 30.0, shape_weight = 10.0;
   double outlier_share = 0.1;  ///< of the points, beforehand, (0, 1)
   double widest = 0.15;        ///< deviation of the correspondences where they are sought, times the object's size
   /// How much the expected density of points over the surface is worth against what was seen: sensors see less of what
@@ -131,6 +134,8 @@ class Tracker {
   std::vector<double> shares_of(const SampleLevel& level) const;
   void describe(const Points& nodes, const TrackView& view, TrackedFrame& frame);
   double spread(const TrackView& view) const;
+  /// In which outliers lie [m^3]: where points were seen.
+  double volume_of(const TrackView& view) const;
 
   std::shared_ptr<const Body> body_;
   TriangleMesh surface_;
@@ -147,7 +152,8 @@ class Tracker {
   PointSprings* springs_ = nullptr;  // of the stepper's terms
   std::unique_ptr<Stepper> stepper_;
   State state_;
-  bool found_ = false;  // in some frame
+  bool is_free_ = false;  // nothing holds it
+  bool found_ = false;    // in some frame
   double outlier_share_;
   TrackTimes times_;
 };
