@@ -380,10 +380,15 @@ TrackedPoints supported_points(const Track& track, double size) {
   const Embedding marks(*track.body, track.marks);
   for (const TrackedFrame& frame : track.frames) {
     if (frame.is_lost || frame.points == 0) continue;
-    const double noise = std::max(frame.surface_rms, least_noise * size);
+    std::vector<TrackObservation> seen;
     for (int m = 0; m < marks.point_count(); ++m)
-      if (frame.mark_points[std::size_t(m)] >= fewest)
-        tracked.frames[frame.frame].push_back({m, marks.position(m, frame.nodes), noise, 0});
+      if (frame.mark_points[std::size_t(m)] >= fewest) seen.push_back({m, marks.position(m, frame.nodes), 0.0, 0});
+    if (seen.empty()) continue;
+    // Neighbouring marks err together, as neighbouring pixels do: a frame counts as much as its points would.
+    const double together = std::max(1.0, 3.0 * double(seen.size()) / ObjectiveOptions{}.independent_points);
+    for (TrackObservation& mark : seen)
+      mark.noise = std::max(frame.surface_rms, least_noise * size) * std::sqrt(together);
+    tracked.frames[frame.frame] = std::move(seen);
   }
   return tracked;
 }

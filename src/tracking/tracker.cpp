@@ -54,6 +54,8 @@ bool is_in_picture(const PinholeCamera& camera, const Vector3& point) {
          seen.y() < camera.height - 0.5;
 }
 
+constexpr int burst = 3;  // frames of outliers that pass
+
 // Nearly backward Euler: velocities are those of the way from frame to frame, which rings for no mode of the body.
 constexpr double implicit = 0.999;
 
@@ -249,6 +251,7 @@ bool Tracker::drift(double dt) {
 
 double Tracker::choose(std::vector<Points> candidates, const TrackView& view, Points& delta) const {
   constexpr std::size_t most = 400;  // points are enough to tell poses apart
+  constexpr double most_outliers = 0.5;
   double best = std::numeric_limits<double>::infinity();
   for (Points& candidate : candidates) {
     const Points nodes = state_.x + candidate;
@@ -261,7 +264,11 @@ double Tracker::choose(std::vector<Points> candidates, const TrackView& view, Po
     for (const TrackObservation& seen : view.markers)
       distances.push_back((springs_->points().position(samples_ + seen.point, nodes) - seen.position).norm());
     // What was no part of the object a moment ago is hardly one now.
+<<<<<<< HEAD
     const double distance = quantile(std::move(distances), 0.8 * (1.0 - outlier_share_));
+=======
+    const double distance = quantile(std::move(distances), 0.8 * (1.0 - std::min(outlier_share_, most_outliers)));
+>>>>>>> real
     if (distance < best) best = distance, delta = std::move(candidate);
   }
   return best;
@@ -271,9 +278,17 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
                        TrackedFrame& frame) {
   const double noise = spread(view), least = std::max(finest_, noise), widest = options_.widest * size_;
   const double inertia = at_rest ? 0.0 : 1.0 / (dt * dt);
+<<<<<<< HEAD
   const double along = options_.data_weight * (pendulum_ + inertia);
   const double bending = (is_free_ ? options_.shape_weight : options_.data_weight) * slowest_;
   const double stiffness = mass_ * (along + bending);  // of all springs [N/m]
+=======
+  // Between slow frames a free body would fall out of sight: something that nobody told of carries it.
+  const bool is_flying = is_free_ && inertia > pendulum_;
+  const double motion = (is_flying ? options_.free_weight : options_.data_weight) * (pendulum_ + inertia);
+  const double shape = (is_free_ ? options_.shape_weight : options_.data_weight) * slowest_;
+  const double stiffness = mass_ * (motion + shape);  // of all springs [N/m]
+>>>>>>> real
   const double sharpest = std::hypot(least, noise);
   // Points spread about a surface that fits by a little less than the deviation they are sought with.
   constexpr double sharpening = 0.85, settled = 0.95;
@@ -363,6 +378,17 @@ TrackedFrame Tracker::look(double dt, bool at_rest, const TrackView& view) {
   frame.nodes = state_.x;
   frame.is_lost = !fine;
   describe(state_.x, view, frame);
+  lost_for_ = frame.is_lost ? lost_for_ + 1 : 0;
+  if (frame.is_lost && fine) {
+    // A burst of outliers passes, and the object goes on as it did; after that it waits to be found again.
+    state_ = start;
+    if (at_rest || lost_for_ > burst || !drift(dt)) state_ = {start.x, Points::Zero(start.x.rows(), 3)};
+    outlier_share_ = options_.outlier_share;
+    frame.nodes = state_.x;
+    see(state_.x);
+    describe(state_.x, view, frame);
+    frame.is_lost = true;
+  }
   return frame;
 }
 
@@ -414,6 +440,21 @@ void Tracker::describe(const Points& nodes, const TrackView& view, TrackedFrame&
   const bool enough = frame.points >= 0.1 * typical_;
   frame.is_lost = frame.is_lost || (enough && frame.confidence < lost);
 }
+
+namespace {
+
+/// Of the first run of lost frames that is longer than a burst, or lasts to the end.
+std::optional<int> first_lost(const std::vector<TrackedFrame>& frames) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    std::size_t end = i;
+    while (end < frames.size() && frames[end].is_lost) ++end;
+    if (end - i > std::size_t(burst) || (end > i && end == frames.size())) return frames[i].frame;
+    i = std::max(i, end);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 Track track(const Capture& capture, const std::shared_ptr<const Body>& body, const SimulationOptions& scene,
             const VectorX& theta, const std::vector<ObservedFrame>& observed, const std::vector<Vector3>& markers,
@@ -478,10 +519,10 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
       frame = tracker.advance(time - capture.times[std::size_t(f) - 1], view);
     }
     frame.frame = f, frame.time = time;
-    if (frame.is_lost && !result.lost_at) result.lost_at = f;
     result.frames.push_back(std::move(frame));
     if (progress && !progress(f - first + 1, frames - first)) break;
   }
+  result.lost_at = first_lost(result.frames);
   result.times = tracker.times();
   return result;
 }

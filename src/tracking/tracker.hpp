@@ -24,9 +24,9 @@ struct TrackOptions {
   /// vibration, of its inertia over a frame and of its weight over its size. The body's and the springs' stiffness grow
   /// together: how the object is tracked depends little on how stiff it is thought to be.
   double data_weight = 1000.0;
-  /// That weight against the slowest vibration where nothing holds the body. Springs move and turn it as freely as they
-  /// like then, and what they need not bend keeps its shape: a hand that lies on it is no part of it.
-  double shape_weight = 10.0;
+  /// That weight where nothing holds the body: against inertia and weight, and against its slowest vibration. It moves
+  /// and turns freely then, and what need not bend keeps its shape: a hand that lies on it is no part of it.
+  double free_weight = 30.0, shape_weight = 10.0;
   double outlier_share = 0.1;  ///< of the points, beforehand, (0, 1)
   double widest = 0.15;        ///< deviation of the correspondences where they are sought, times the object's size
   /// How much the expected density of points over the surface is worth against what was seen: sensors see less of what
@@ -80,7 +80,7 @@ struct Track {
   std::vector<TrackedFrame> frames;
   std::string note;  ///< what the user should know; may be empty
   TrackTimes times;
-  std::optional<int> lost_at;  ///< the first frame of the recording in which the object was lost
+  std::optional<int> lost_at;  ///< the first frame of the recording from which the object stays lost for some
 };
 
 /// Follows a deforming object through points that were seen of its surface: maximum a posteriori by expectation

@@ -117,7 +117,7 @@ TEST(Tracker, OutlastsFramesWithoutPointsAndFramesOfOutliers) {
   EXPECT_FALSE(track.frames[5].is_lost) << "nothing says that it is elsewhere";
   EXPECT_LT(track.frames[8].explained, 0.3);
   EXPECT_TRUE(track.frames[8].is_lost);
-  EXPECT_EQ(track.lost_at, 8);
+  EXPECT_FALSE(track.lost_at) << "it is found again in the next";
   for (const int f : {4, 5, 6, 7, 9, 10, 11}) {
     EXPECT_LT(swing.error(f, track.frames[std::size_t(f)].nodes), one_percent) << "frame " << f;
     EXPECT_FALSE(track.frames[std::size_t(f)].is_lost) << "frame " << f;
