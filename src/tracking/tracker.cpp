@@ -264,11 +264,7 @@ double Tracker::choose(std::vector<Points> candidates, const TrackView& view, Po
     for (const TrackObservation& seen : view.markers)
       distances.push_back((springs_->points().position(samples_ + seen.point, nodes) - seen.position).norm());
     // What was no part of the object a moment ago is hardly one now.
-<<<<<<< HEAD
-    const double distance = quantile(std::move(distances), 0.8 * (1.0 - outlier_share_));
-=======
     const double distance = quantile(std::move(distances), 0.8 * (1.0 - std::min(outlier_share_, most_outliers)));
->>>>>>> real
     if (distance < best) best = distance, delta = std::move(candidate);
   }
   return best;
@@ -278,17 +274,11 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
                        TrackedFrame& frame) {
   const double noise = spread(view), least = std::max(finest_, noise), widest = options_.widest * size_;
   const double inertia = at_rest ? 0.0 : 1.0 / (dt * dt);
-<<<<<<< HEAD
-  const double along = options_.data_weight * (pendulum_ + inertia);
-  const double bending = (is_free_ ? options_.shape_weight : options_.data_weight) * slowest_;
-  const double stiffness = mass_ * (along + bending);  // of all springs [N/m]
-=======
   // Between slow frames a free body would fall out of sight: something that nobody told of carries it.
   const bool is_flying = is_free_ && inertia > pendulum_;
   const double motion = (is_flying ? options_.free_weight : options_.data_weight) * (pendulum_ + inertia);
   const double shape = (is_free_ ? options_.shape_weight : options_.data_weight) * slowest_;
   const double stiffness = mass_ * (motion + shape);  // of all springs [N/m]
->>>>>>> real
   const double sharpest = std::hypot(least, noise);
   // Points spread about a surface that fits by a little less than the deviation they are sought with.
   constexpr double sharpening = 0.85, settled = 0.95;

@@ -154,6 +154,7 @@ class Tracker {
   State state_;
   bool is_free_ = false;  // nothing holds it
   bool found_ = false;    // in some frame
+  int lost_for_ = 0;      // frames
   double outlier_share_;
   TrackTimes times_;
 };
