@@ -24,7 +24,7 @@ LATER = range(800, 961, 80)
 NEAR = 0.004                     # [m]
 EVERY = 7                        # of the dog's points
 IMAGES = common.ROOT / "docs/images"
-PICTURES = {"real-ball-press": ("press", (60, 90, 120)), "real-ball-late": ("press", (150, 190, 240)),
+PICTURES = {"real-ball-lift": ("press", (60, 90)), "real-ball-press": ("press", (120, 150)), "real-ball-late": ("press", (190, 240)),
             "real-dog": ("move", (0, 1)), "real-paper": ("paper", (0, 3, 5))}
 
 
@@ -39,15 +39,15 @@ def surface_of(capture):
 
 
 def track(program, capture, out):
-    """Follows a recording and all vertices of its surface; not again where it was done. Figures of the run and the frames'."""
+    """Follows a recording and all vertices of its surface; not again where it was done. The frames' figures."""
     if not (out / "figures.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         ball.write_points(out / "rest.csv", rest_captures.vertices(surface_of(capture)))
         run = common.run(program, "track", capture, "--points", out / "rest.csv", "--out", out, allowed=(0, 3))
         (out / "figures.json").write_text(common.json.dumps(run))
-    run, found = common.read(out / "figures.json"), common.read(out / "track.json")
+    found = common.read(out / "track.json")
     frames = [f for f in found["frames"] if f["points"] > 0]
-    return {**run, "nodes": found["nodes"], "frames": len(found["frames"]), "lost_at": found["lost_at"],
+    return {"nodes": found["nodes"], "frames": len(found["frames"]), "lost_at": found["lost_at"],
             "least_confidence": common.number(min(f["confidence"] for f in frames), 3),
             "explained": [common.number(g(f["explained"] for f in frames), 3) for g in (min, common.median, max)],
             "explained_rms": [common.number(g(f["surface_rms"] for f in frames), 3) for g in (common.median, max)],
