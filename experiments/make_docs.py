@@ -9,11 +9,8 @@ import sys
 import plots
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
 from page import IMAGES, ROOT, from_landscape, judged, machine, percent, results, table, with_truth
-<<<<<<< HEAD
 from tracking_page import swinging
-=======
 from real_tracks_page import real_tracks
->>>>>>> real
 
 PAGE, PLOT, BEAM_PLOT = ROOT / "docs/experiments.md", IMAGES / "torus-sweep.svg", IMAGES / "silicone-beam.svg"
 
@@ -683,13 +680,10 @@ SECTIONS = [
      "Wang et al. 2015, figures 6 and 9 with the reference shape unknown: moduli and load-free shape together, with derivatives through the equilibrium, beside the paper's splitting.", two_zones),
     ("A scan that is only roughly right", "rough-scan",
      "The dropped ring of the example, one depth camera, with its scan bent on purpose: the shape as an unknown of a dynamic fit, by a smooth field with a prior.", rough_scan),
-<<<<<<< HEAD
     ("Objects that swing before three sensors", "tracking",
      "A hanging bar and a thin leaf, curved both ways, held at one end, pulled aside and let go; three depth sensors around them do not see a third of the surface. Followed by `pliant track`'s tracker.", swinging),
-=======
     ("Real objects that are followed", "real-tracks",
      "Real: a knobbly ball, a plush dog and two cloths, moved by hands and a robot; rest surfaces made of their own frames. `pliant track`, with no choice of ours.", real_tracks),
->>>>>>> real
     ("Memory of long recordings", "memory", "A torus that bounces for ten seconds, with about 2,400 nodes; long steps and few iterations.", memory),
 ]
 
