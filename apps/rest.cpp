@@ -93,8 +93,8 @@ int run(const Arguments& arguments) {
   Resolution resolution;
   resolution.element = options.element.value_or(ElementKind::QuadraticTetrahedron);
   resolution.cells = options.cells;
-  resolution.field = {options.control_points, options.control_weights};
-  const int controls = capture.regions.empty() ? options.control_points : int(capture.regions.size()) + 1;
+  resolution.field = {options.controls(), options.control_weights};
+  const int controls = capture.regions.empty() ? options.controls() : int(capture.regions.size()) + 1;
   ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.surface), controls);
   apply_overrides(parameters, options);
   const VectorX theta = parameters.reference();

@@ -124,14 +124,17 @@ Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*membe
 }
 
 Entry control_points_entry() {
-  Entry entry = integer_entry("control_points", "1..500, or auto: as many as the recordings support",
-                              "of Young's modulus over the object, where the capture names no regions",
-                              &FitOptions::control_points);
+  Entry entry = integer_entry(
+      "control_points", "1..500, auto: as many as the recordings support, or default: auto with tracking=both, else 1",
+      "of Young's modulus over the object, where the capture names no regions", &FitOptions::control_points);
   entry.key.type = "whole number or auto";
+  entry.key.standard = "default";
   entry.write = [](const FitOptions& o) {
-    return o.control_points == FitOptions::automatic ? "\"auto\"" : std::to_string(o.control_points);
+    if (o.control_points == FitOptions::unsaid) return std::string("\"default\"");
+    return o.control_points == FitOptions::automatic ? std::string("\"auto\"") : std::to_string(o.control_points);
   };
   entry.read = [count = entry.read](FitOptions& o, const std::string& text) -> std::optional<std::string> {
+    if (text == "default") return o.control_points = FitOptions::unsaid, std::nullopt;
     if (text == "auto") return o.control_points = FitOptions::automatic, std::nullopt;
     if (!number(text) || count(o, text) || o.control_points == 0) return "a whole number from 1, or auto";
     return std::nullopt;
@@ -408,7 +411,7 @@ std::string FitOptions::validate() const {
     return "load_free=in_turns holds the shape while it moves parameters: it cannot correct the scan (scan_points)";
   if (tracking_rounds < 1 || tracking_rounds > 10) return "tracking_rounds must lie in 1..10";
   if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
-  if (control_points != automatic && (control_points < 1 || control_points > 500))
+  if (control_points != automatic && control_points != unsaid && (control_points < 1 || control_points > 500))
     return "control_points must lie in 1..500, or be auto";
   if (!(modulus_variation > 0.0 && modulus_variation <= 10.0)) return "modulus_variation must lie in (0, 10]";
   if (const auto modulus = parameters.find("youngs_modulus");

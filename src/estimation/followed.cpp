@@ -13,7 +13,7 @@ namespace {
 
 FitOptions for_following(const Capture& capture, FitOptions options) {
   if (!options.element && capture.shape_is == ShapeIs::Static) options.element = ElementKind::Tetrahedron;
-  if (options.control_points == FitOptions::automatic) options.control_points = 1;
+  options.control_points = options.controls();
   return options;
 }
 

@@ -129,7 +129,7 @@ ParameterSet Recordings::make_ready(RecordedCapture recorded, Recording& recordi
                       "no frame shows any point of the object",
                       "depth images or clouds that see it",
                       "run `pliant check` on the capture to see what the cameras saw"});
-  const int controls = capture.regions.empty() ? options_.control_points : int(capture.regions.size()) + 1;
+  const int controls = capture.regions.empty() ? options_.controls() : int(capture.regions.size()) + 1;
   if (all_.size() > 1 && controls != controls_)
     throw InputError({{capture.file},
                       "the object has " + std::to_string(capture.regions.size()) + " regions",
@@ -161,7 +161,7 @@ Resolution Recordings::resolution(double cells, double steps) const {
                       "leave out element, or choose quadratic_tetrahedra"});
   r.shape_points = options_.scan_points;
   r.shape_std = options_.scan_std;
-  r.field = {options_.control_points, options_.control_weights};
+  r.field = {options_.controls(), options_.control_weights};
   r.cells = cells;
   r.steps = steps;
   r.pulls = options_.pull_points;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <utility>
 
 #include "base/error.hpp"
@@ -48,6 +49,7 @@ class TrackingLoop {
       left_.tracking.reset();
     }
     for (const RecordedCapture& r : all_) split(r);
+    shared_ = shared_sizes(all_, options_);
     for (const RecordedCapture& r : is_both_ ? training_ : all_) followed_.emplace_back(r, options_, notes_);
   }
 
@@ -80,27 +82,20 @@ class TrackingLoop {
 
   /// Follows all recordings with their parts of the estimate, or with what is known at first.
   void follow(const std::vector<FollowedRecording>& recordings, const VectorX& theta) {
-    tracks_.clear();
-    Eigen::Index offset = 0;
-    for (const FollowedRecording& r : recordings) {
-      const Eigen::Index size = r.start().size();
-      VectorX own = r.start();
-      if (theta.size() > 0) own = with_material(own, theta.segment(offset, own_size(theta, recordings)));
-      offset += theta.size() > 0 ? own_size(theta, recordings) : size;
-      tracks_.push_back(std::make_shared<Track>(r.follow(own, [this](int, int) { return !interrupted(); })));
+    tracks_.clear(), used_.clear();
+    Eigen::Index at = 0;
+    for (std::size_t i = 0; i < recordings.size(); ++i) {
+      VectorX own = recordings[i].start();
+      if (theta.size() > 0) {
+        const int controls = int(own.size() - shared_[i]) + 1;
+        const VectorX estimated = with_controls(theta, controls);
+        own = estimated.segment(at, own.size());
+        at += own.size();
+      }
+      tracks_.push_back(
+          std::make_shared<Track>(recordings[i].follow(own, [this](int, int) { return !interrupted(); })));
       used_.push_back(own);
     }
-  }
-
-  static Eigen::Index own_size(const VectorX& theta, const std::vector<FollowedRecording>& recordings) {
-    return theta.size() / Eigen::Index(recordings.size());
-  }
-
-  /// A theta of the tracker's, with the material of one of the fit's: its pulls, sensors and moduli may be other ones.
-  static VectorX with_material(VectorX own, const VectorX& estimated) {
-    own.head(theta::first_plane) = estimated.head(theta::first_plane);
-    if (own.size() == estimated.size()) own = estimated;
-    return own;
   }
 
   std::vector<RecordedCapture> followed_captures(const std::vector<RecordedCapture>& recordings) const {
@@ -172,6 +167,43 @@ class TrackingLoop {
     return state;
   }
 
+  /// Sizes of the recordings' parts of a theta of a homogeneous object.
+  static std::vector<Eigen::Index> shared_sizes(const std::vector<RecordedCapture>& recordings, FitOptions options) {
+    options.control_points = 1;
+    std::vector<Eigen::Index> sizes;
+    for (const RecordedCapture& r : recordings) {
+      const int controls = r.capture.regions.empty() ? 1 : int(r.capture.regions.size()) + 1;
+      Resolution pulls;
+      pulls.pulls = options.pull_points;
+      sizes.push_back(default_parameters(r.capture, 1.0, controls, pull_count(r.capture, pulls), options.scan_points)
+                          .reference()
+                          .size() -
+                      (controls - 1));
+    }
+    return sizes;
+  }
+  int controls_of(const VectorX& theta) const {
+    const Eigen::Index shared = std::accumulate(shared_.begin(), shared_.end(), Eigen::Index(0));
+    return 1 + int((theta.size() - shared) / Eigen::Index(shared_.size()));
+  }
+  /// A theta of all recordings with another number of control moduli: their mean in the logarithm where it differs.
+  VectorX with_controls(const VectorX& theta, int controls) const {
+    const int before = controls_of(theta);
+    if (before == controls) return theta;
+    VectorX changed(theta.size() + Eigen::Index(shared_.size()) * (controls - before));
+    Eigen::Index from = 0, to = 0;
+    for (const Eigen::Index shared : shared_) {
+      const VectorX own = theta.segment(from, shared + before - 1);
+      changed.segment(to, shared) = own.head(shared);
+      auto there = changed.segment(to, shared + controls - 1);
+      double mean = 0.0;
+      for (int k = 0; k < before; ++k) mean += std::log(own[theta::modulus(k, before, own.size())]) / before;
+      for (int k = 0; k < controls; ++k) there[theta::modulus(k, controls, there.size())] = std::exp(mean);
+      from += own.size(), to += there.size();
+    }
+    return changed;
+  }
+
   FitOptions with_chosen_controls(const FitOutcome& outcome) const {
     FitOptions options = options_;
     if (options.control_points == FitOptions::automatic)
@@ -187,6 +219,14 @@ class TrackingLoop {
     return options;
   }
 
+  /// Points of the surface tell how its modulus varies; where the tracked motion bends is partly how the tracker bent
+  /// it.
+  static FitOptions for_points(FitOptions options) {
+    if (options.control_points == FitOptions::unsaid && !options.parameters.contains("youngs_modulus"))
+      options.control_points = FitOptions::automatic;
+    return options;
+  }
+
   double share(int round) const { return (is_both_ ? 0.5 : 1.0) * round / options_.tracking_rounds; }
 
   /// False where it was interrupted or failed: the outcome says so.
@@ -198,7 +238,6 @@ class TrackingLoop {
     bool is_resumed = !from.scan.empty() || from.motion || from.fine;
     while (int(state_.rounds.size()) < options_.tracking_rounds) {
       const int round = int(state_.rounds.size());
-      used_.clear();
       follow(followed_, theta);
       TrackingRound described_round = described(used_.front());
       if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
@@ -224,7 +263,6 @@ class TrackingLoop {
 
   /// All rounds were done before an interruption.
   void resume_loop(const std::vector<RecordedCapture>& recordings, const FitOptions& options, const VectorX& theta) {
-    used_.clear();
     follow(followed_, theta);
     outcome_ = fit_once(followed_captures(recordings), options, *state_.loop, "rounds", 0.5, 0.5);
   }
@@ -235,7 +273,7 @@ class TrackingLoop {
   }
 
   bool direct() {
-    direct_ = fit_once(training_, options_, std::exchange(left_, {}), "points", 0.5, 0.9);
+    direct_ = fit_once(training_, for_points(options_), std::exchange(left_, {}), "points", 0.5, 0.9);
     if (direct_->interrupted) {
       outcome_ = std::move(*direct_);
       return false;
@@ -281,15 +319,11 @@ class TrackingLoop {
   FitOutcome last() {
     const std::shared_ptr<const FitState> best = state_.keeps_loop ? state_.loop : state_.direct;
     const VectorX& theta = best->refined.front().theta;
-    FitOptions options = options_;
-    if (options.control_points == FitOptions::automatic) {
-      if (!outcome_ && state_.keeps_loop) resume_loop(training_, options_, state_.rounds.back().theta);
-      options = with_chosen_controls(state_.keeps_loop ? *outcome_ : *direct_);
-    }
+    FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
+    if (options.control_points == FitOptions::automatic) options.control_points = controls_of(theta);
     std::vector<FollowedRecording> all;
     std::vector<std::string> ignored;
     for (const RecordedCapture& r : all_) all.emplace_back(r, options_, ignored);
-    used_.clear();
     follow(all, theta);
     const bool goes_on = left_.fine.has_value();
     FitState from = goes_on ? std::exchange(left_, {}) : from_there(*best, theta);
@@ -300,6 +334,8 @@ class TrackingLoop {
 
   /// With all that was done on the way; the agreement is that with the points.
   FitOutcome told(FitOutcome outcome) {
+    const int controls = controls_of(outcome.theta);
+    for (FitEvent& event : history_) event.theta = with_controls(event.theta, controls);
     outcome.history = std::move(history_);
     outcome.forward_steps = forward_steps_;
     result_.rounds = state_.rounds;
@@ -354,7 +390,8 @@ class TrackingLoop {
   bool is_both_;
   std::vector<RecordedCapture> training_, held_out_;
   std::vector<FollowedRecording> followed_;
-  std::vector<std::string> notes_;  // of reading the recordings, which the fits tell too
+  std::vector<Eigen::Index> shared_;  // see `shared_sizes`
+  std::vector<std::string> notes_;    // of reading the recordings, which the fits tell too
   FitState::Tracking state_;
   FitState left_;     // by an interruption
   FitState reached_;  // by the fit that runs
