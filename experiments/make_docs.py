@@ -9,6 +9,7 @@ import sys
 import plots
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
 from page import IMAGES, ROOT, from_landscape, judged, machine, percent, results, table, with_truth
+from oracle_tracking_page import clouds
 from tracking_page import swinging
 from real_tracks_page import real_tracks
 
@@ -682,6 +683,8 @@ SECTIONS = [
      "The dropped ring of the example, one depth camera, with its scan bent on purpose: the shape as an unknown of a dynamic fit, by a smooth field with a prior.", rough_scan),
     ("Objects that swing before three sensors", "tracking",
      "A hanging bar and a thin leaf, curved both ways, held at one end, pulled aside and let go; three depth sensors around them do not see a third of the surface. Followed by `pliant track`'s tracker.", swinging),
+    ("Two ways from clouds to a material", "oracle-tracking",
+     "Another simulator's bars again: from the motion that the tracker finds, in turns with it (Wang et al. 2015, section 3), and from the points themselves by surface constraints (Weiss et al. 2020).", clouds),
     ("Real objects that are followed", "real-tracks",
      "Real: a knobbly ball, a plush dog and two cloths, moved by hands and a robot; rest surfaces made of their own frames. `pliant track`, with no choice of ours.", real_tracks),
     ("Memory of long recordings", "memory", "A torus that bounces for ten seconds, with about 2,400 nodes; long steps and few iterations.", memory),

@@ -329,6 +329,10 @@ class TrackingLoop {
     FitState from = goes_on ? std::exchange(left_, {}) : from_there(*best, theta);
     FitOutcome outcome =
         fit_once(state_.keeps_loop ? followed_captures(all_) : all_, options, std::move(from), "all frames", 0.9, 1.0);
+    if (!state_.keeps_loop && direct_) {
+      outcome.fields = direct_->fields;
+      if (!outcome.fields.empty()) outcome.notes.insert(outcome.notes.begin(), direct_->notes.front());
+    }
     return told(std::move(outcome));
   }
 

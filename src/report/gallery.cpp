@@ -62,6 +62,7 @@ std::vector<ReportPicture> draw_gallery(const Gallery& gallery, double range) {
   const PinholeCamera view = gallery.camera ? framed(*gallery.camera, box, gallery.width, gallery.height)
                                             : view_of(box, gallery.up, gallery.width, gallery.height);
   PictureOptions options;
+  options.samples = gallery.samples;
   options.residual_range = range > 0.0 ? range : residual_range(all_residuals(gallery));
   std::vector<ReportPicture> pictures;
   for (const GalleryFrame& frame : gallery.frames) {

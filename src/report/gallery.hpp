@@ -26,6 +26,7 @@ struct Gallery {
   Vector3 up = Vector3::UnitY();        ///< for that view
   std::vector<GalleryFrame> frames;
   int width = 760, height = 475;  ///< of a picture [pixels]
+  int samples = 3;                ///< see PictureOptions
 };
 
 /// `count` frames spread evenly over first..last, both ends included; all of them where there are fewer.

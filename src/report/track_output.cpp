@@ -85,6 +85,7 @@ Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& obs
   if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
   gallery.up = capture.up;
   gallery.width = 560, gallery.height = 420;
+  gallery.samples = 2;  // a picture a frame
   const Embedding embedding(*track.body, track.surface.vertices);
   for (const TrackedFrame& f : track.frames) {
     GalleryFrame drawn{f.frame, f.time, embedding.positions(f.nodes), {}, {}};

@@ -327,7 +327,7 @@ TEST_F(Session, TrackSaysThatTheObjectIsLost) {
   const std::size_t row = facts.find("camera_to_world = [[");
   ASSERT_NE(row, std::string::npos);
   const std::size_t end = facts.find(']', row), begin = facts.rfind(',', end) + 1;
-  facts.replace(begin, end - begin, std::to_string(std::stod(facts.substr(begin, end - begin)) + 0.1));
+  facts.replace(begin, end - begin, std::to_string(std::stod(facts.substr(begin, end - begin)) + 0.15));
   write_file(elsewhere / "capture.toml", facts);
   const ProgramRun run = run_pliant({"track", elsewhere, "--out", at("lost track"), "--set", "cells=6",
                                      "--points-per-frame", "400", "--no-pictures"});
