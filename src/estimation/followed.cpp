@@ -1,10 +1,8 @@
 #include "estimation/followed.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
-#include "elasticity/modes.hpp"
 #include "motion/linear_statics.hpp"
 
 namespace pliant {
@@ -32,28 +30,11 @@ FollowedRecording::FollowedRecording(RecordedCapture recorded, const FitOptions&
 void FollowedRecording::stiffen() {
   constexpr double sag_of_size = 0.005;
   const Discretisation& d = grid_.recording.front();
-  const std::vector<int> held = held_nodes(*d.body, d.simulation.holds);
-  if (held.empty()) return stiffen_free();
-  const LinearStatics statics(d.body, held, start_);
+  const LinearStatics statics(d.body, held_nodes(*d.body, d.simulation.holds), start_);
   if (!statics.is_held()) return;
   const double sag = statics.greatest_displacement(scan_load(*d.body, start_, d.simulation.weights));
-  multiply_modulus(std::max(1.0, sag / (sag_of_size * recording().size)));
-}
-
-void FollowedRecording::stiffen_free() {
-  constexpr double times = 100.0;
-  const Discretisation& d = grid_.recording.front();
-  const Capture& capture = recording().capture;
-  double least = theta::vector_at(start_, theta::gravity).norm() / recording().size;
-  if (const std::size_t n = capture.times.size(); n > 1 && !capture.is_static)
-    least += std::pow(double(n - 1) / (capture.times.back() - capture.times.front()), 2);
-  constexpr int first = 6;  // after the rigid motions
-  const Modes found = modes(d.body, start_, {}, first + 1);
-  if (found.converged) multiply_modulus(std::max(1.0, times * least / found.squared_frequencies[first]));
-}
-
-void FollowedRecording::multiply_modulus(double factor) {
-  const int controls = grid_.recording.front().body->modulus.controls;
+  const int controls = d.body->modulus.controls;
+  const double factor = std::max(1.0, sag / (sag_of_size * recording().size));
   for (int k = 0; k < controls; ++k) start_[theta::modulus(k, controls, start_.size())] *= factor;
 }
 

@@ -20,8 +20,7 @@ class FollowedRecording {
 
   /// Parameters at which nothing is known: the capture's facts, the options' choices, and middling guesses. Young's
   /// modulus is then at least so high that the object's weight hardly bends it: what is too soft hangs too low, while
-  /// what is too stiff is drawn to where it was seen. Where nothing holds the object, its slowest vibration is quick
-  /// against the frames and against its size's pendulum.
+  /// what is too stiff is drawn to where it was seen.
   const VectorX& start() const { return start_; }
   const Recording& recording() const { return recordings_.front(); }
   /// @param theta     of this recording
@@ -31,8 +30,6 @@ class FollowedRecording {
 
  private:
   void stiffen();
-  void stiffen_free();
-  void multiply_modulus(double factor);
   std::vector<ObservedFrame> observed_;
   Recordings recordings_;
   Grid grid_;
