@@ -27,9 +27,10 @@ namespace pliant {
 
 namespace {
 
-/// The overload that goes on from a state.
-constexpr OptimiserSummary (*minimise_from)(Objective&, const OptimiserState&, const OptimiserOptions&,
-                                            const std::function<bool(const Iteration&)>&) = minimise;
+OptimiserSummary minimise_from(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+                               const std::function<bool(const Iteration&)>& on_iteration) {
+  return minimise(objective, state, options, on_iteration);
+}
 
 std::string text_of(double value) {
   char text[32];

@@ -74,32 +74,44 @@ struct ObservedMotion {
   ObjectiveOptions options;
 };
 
+/// What is minimised: parameters to cost. One instance for one thread.
+class CostFunction {
+ public:
+  virtual ~CostFunction() = default;
+  virtual const ParameterSet& parameters() const = 0;
+  /// Cost alone.
+  [[nodiscard]] virtual CostEvaluation evaluate(const VectorX& p) = 0;
+  /// Cost, gradient and Gauss-Newton matrix: for few parameters.
+  [[nodiscard]] virtual CostEvaluation linearise(const VectorX& p) = 0;
+  /// Cost and gradient: any number of parameters.
+  [[nodiscard]] virtual CostEvaluation gradient(const VectorX& p) = 0;
+};
+
 /// Maps parameters to the cost of recordings: the sum over recordings, frames and points of a robust loss of the
 /// pulled-back distance, or of the distance from where a followed point was seen, over its noise, plus the priors. The
 /// recordings' thetas stand one after the other in that of the parameters. One instance for one thread; recordings are
 /// simulated side by side, and the mismatch of a frame is evaluated beside the simulation of the next.
-class Objective {
+class Objective : public CostFunction {
  public:
   Objective(std::vector<ObservedMotion> recordings, ParameterSet parameters);
   /// Of one recording.
   Objective(Mismatch mismatch, std::shared_ptr<const Body> body, SimulationOptions simulation,
             std::shared_ptr<const std::vector<FrameObservations>> observations, ParameterSet parameters,
             ObjectiveOptions options);
-  ~Objective();
+  ~Objective() override;
   Objective(Objective&&) noexcept;
 
-  const ParameterSet& parameters() const { return parameters_; }
+  const ParameterSet& parameters() const override { return parameters_; }
 
   /// From now on load-free shapes and corrected scans stay what they are for p: costs and derivatives leave their
   /// changes out. False where there are none.
   [[nodiscard]] bool hold_shapes(const VectorX& p);
 
-  /// Cost alone.
-  [[nodiscard]] CostEvaluation evaluate(const VectorX& p);
-  /// Cost, gradient and Gauss-Newton matrix by tangents: for few parameters.
-  [[nodiscard]] CostEvaluation linearise(const VectorX& p);
-  /// Cost and gradient by the adjoint: any number of parameters.
-  [[nodiscard]] CostEvaluation gradient(const VectorX& p);
+  [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override;
+  /// By tangents.
+  [[nodiscard]] CostEvaluation linearise(const VectorX& p) override;
+  /// By the adjoint.
+  [[nodiscard]] CostEvaluation gradient(const VectorX& p) override;
 
  private:
   class Part;

@@ -30,7 +30,7 @@ Derivatives needed_by(OptimiserKind kind) {
 /// What the optimisers share: bookkeeping of the best point and the end.
 class Run {
  public:
-  Run(Objective& objective, const OptimiserOptions& options, const std::function<bool(const Iteration&)>& on_iteration)
+  Run(CostFunction& objective, const OptimiserOptions& options, const std::function<bool(const Iteration&)>& on_iteration)
       : objective_(objective), options_(options), on_iteration_(on_iteration) {}
 
   CostEvaluation evaluate(const VectorX& p, Derivatives by) {
@@ -76,7 +76,7 @@ class Run {
   OptimiserSummary summary;
 
  private:
-  Objective& objective_;
+  CostFunction& objective_;
   const OptimiserOptions& options_;
   const std::function<bool(const Iteration&)>& on_iteration_;
 };
@@ -253,7 +253,7 @@ void nelder_mead(Run& run, const OptimiserOptions&, const VectorX&) {
 
 }  // namespace
 
-OptimiserSummary minimise(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+OptimiserSummary minimise(CostFunction& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration) {
   Run run(objective, options, on_iteration);
   if (!run.begin(state, needed_by(options.kind))) return run.summary;
@@ -279,7 +279,7 @@ OptimiserSummary minimise(Objective& objective, const OptimiserState& state, con
   return run.summary;
 }
 
-OptimiserSummary minimise(Objective& objective, const VectorX& p, const OptimiserOptions& options,
+OptimiserSummary minimise(CostFunction& objective, const VectorX& p, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration) {
   return minimise(objective, OptimiserState{0, p, {}}, options, on_iteration);
 }

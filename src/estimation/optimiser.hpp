@@ -57,11 +57,11 @@ struct OptimiserSummary {
 /// Minimises from p. A failed or non-finite evaluation is a step back, not an end; only a start that cannot be
 /// evaluated fails, and Nelder-Mead in a program built without NLopt.
 /// @param on_iteration  called after each; false stops ("interrupted")
-OptimiserSummary minimise(Objective& objective, const VectorX& p, const OptimiserOptions& options,
+OptimiserSummary minimise(CostFunction& objective, const VectorX& p, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration = {});
 
 /// Goes on from where a run of the same objective, options and kind of optimiser stood.
-OptimiserSummary minimise(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+OptimiserSummary minimise(CostFunction& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration = {});
 
 /// The splitting of Wang 2015 (algorithm 1): the load-free shape for p, then a few iterations towards the p that is

@@ -82,8 +82,6 @@ std::shared_ptr<const SignedDistance> capture_distance(const Capture& capture, d
   return std::make_shared<SignedDistance>(signed_distance(*capture.surface, size / 80.0, (band + 0.1) * size));
 }
 
-namespace {
-
 std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDistance& distance,
                                          const Resolution& resolution, std::vector<Vector3>& control_points) {
   const double edge = object_size(capture) / resolution.cells;
@@ -112,7 +110,14 @@ std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDis
   return std::make_shared<Body>(std::move(body));
 }
 
-}  // namespace
+std::vector<Hold> held_regions(const Capture& capture) {
+  std::vector<Hold> holds;
+  for (const FixedRegion& fixed : capture.fixed) {
+    const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
+    holds.push_back({region_test(capture, fixed.region), motion.rotation, motion.translation});
+  }
+  return holds;
+}
 
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
                           const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings,
@@ -184,10 +189,7 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
     d.simulation.released_weights.push_back({weight->at, weight->mass});
   d.simulation.pull_points = pull_points(capture, d.simulation.pulls);
   d.simulation.shape = shape_field(capture, resolution);
-  for (const FixedRegion& fixed : capture.fixed) {
-    const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
-    d.simulation.holds.push_back({region_test(capture, fixed.region), motion.rotation, motion.translation});
-  }
+  d.simulation.holds = held_regions(capture);
   return d;
 }
 

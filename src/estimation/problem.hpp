@@ -49,6 +49,14 @@ double object_size(const Capture& capture);
 /// Throws InputError where the capture has no surface.
 std::shared_ptr<const SignedDistance> capture_distance(const Capture& capture, double band);
 
+/// The object's elements at one resolution; `control_points` are those of its field of moduli, if any.
+/// @param distance  of the capture's surface; only hexahedra ask for it
+std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDistance& distance,
+                                         const Resolution& resolution, std::vector<Vector3>& control_points);
+
+/// The capture's held regions.
+std::vector<Hold> held_regions(const Capture& capture);
+
 /// Body, scene and mismatch of a capture. `theta` gives the weight and gravity that contact is scaled by.
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
                           const Resolution& resolution, const VectorX& theta, const SimulationOptions& settings = {},

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <functional>
+#include <span>
+
+#include "elasticity/corotated.hpp"
+#include "elasticity/material_law.hpp"
+
+namespace pliant {
+
+/// The forces of a body of tetrahedra made of any material law, integrated at the elements' quadrature points (one of a
+/// linear element, four of a quadratic one):
+///   f = -dW/dx,   W(x) = sum_q V_q W_e(F_q),   F_q = sum_a x_a g_a^T.
+/// As a force term it is made affine by its exact stiffness, or by that without its negative parts:
+///   f(z | p) = f(p) - K(p) (z - p),
+/// which is all that implicit steps and equilibria need (z = p). Its parameters are the law's and not in theta.
+class LawElasticity : public Elasticity {
+ public:
+  /// @param pattern  of the matrices to come; null: the body's own. It may have more rows than the body has nodes.
+  /// Throws std::invalid_argument for hexahedra, and for a law of another number of elements.
+  static std::unique_ptr<LawElasticity> make(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
+                                             std::shared_ptr<const BlockPattern> pattern = nullptr);
+
+  const MaterialLaw& law() const { return *law_; }
+  /// A law of the same elements in its place.
+  void set_law(std::shared_ptr<const MaterialLaw> law) { law_ = std::move(law); }
+
+  enum class Stiffness {
+    Exact,     ///< d2W/dx2
+    Positive,  ///< the same with the negative eigenvalues of every point's tangent left out
+  };
+
+  /// Energies and stresses at x, and tangents where asked for. Returns the energy [J], infinite where the law knows no
+  /// such deformation somewhere.
+  virtual double evaluate(const Points& x, bool with_tangent) = 0;
+  /// gradient += dW/dx at the last `evaluate`.
+  virtual void add_gradient(Points& gradient) const = 0;
+  /// matrix += scale K there.
+  virtual void add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const = 0;
+  /// Gives, element by element, the derivatives of dW/dx by the law's parameters of that element, there.
+  /// @param visit  (element, nodes, derivatives 3 N x parameters)
+  using VisitDerivatives =
+      std::function<void(int element, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& derivatives)>;
+  virtual void for_parameter_derivatives(const VisitDerivatives& visit) const = 0;
+  /// Mean over each element's points of S - I, F = R S, there; elements x 6.
+  virtual MatrixX strains() const = 0;
+
+  void set_reference(std::shared_ptr<const Body>) override;
+  void set_parameters(const VectorX&) override {}
+  void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                         Points& force) override;
+  void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+
+ protected:
+  explicit LawElasticity(std::shared_ptr<const MaterialLaw> law) : law_(std::move(law)) {}
+  std::shared_ptr<const MaterialLaw> law_;
+};
+
+/// S - I of F = R S, as xx, yy, zz, xy, xz, yz.
+Strain6 biot_strain(const Matrix3& F);
+
+}  // namespace pliant

@@ -1,0 +1,223 @@
+#include "elasticity/material_law.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "elasticity/polar.hpp"
+
+namespace pliant {
+
+void TabulatedLaw::set_table(MatrixX table) {
+  if (!table.allFinite()) throw std::invalid_argument("a material's parameters must be finite");
+  check(table);
+  table_ = std::move(table);
+}
+
+LambdaAlpha lambda_alpha(const SmallStrainModuli& m) {
+  const double lambda = m.youngs_modulus / ((1.0 + m.poissons_ratio) * (1.0 - 2.0 * m.poissons_ratio));
+  return {lambda, lambda * m.poissons_ratio};
+}
+
+SmallStrainModuli moduli_of(const LambdaAlpha& p) {
+  const double nu = p.alpha / p.lambda;
+  return {p.lambda * (1.0 + nu) * (1.0 - 2.0 * nu), nu};
+}
+
+/// R^T dF = [w]x S + dS with (tr(S) I - S) w = vee(skew part). So Z = R^T P, whose work must be that of T alone, has
+/// the symmetric part T and a skew part [a]x such that Z S is symmetric: (tr(S) I - S) a = -vee(T S - S T), which
+/// vanishes where T has the axes of S, as it does in isotropic materials.
+void set_strain_stress(const Matrix3& F, const Matrix3& T, const Matrix9* C, PointStress& out) {
+  const Polar polar = polar_decomposition(F);
+  const Matrix3& S = polar.S;
+  const auto vee = [](const Matrix3& skew) { return Vector3(skew(2, 1), skew(0, 2), skew(1, 0)); };
+  const Vector3 a = -(polar.rate_inverse * vee(T * S - S * T));
+  const Matrix3 Z = T + cross_matrix(a);
+  out.P = polar.R * Z;
+  if (!C) return;
+  out.left = polar.R;
+  out.right.setIdentity();
+  for (int j = 0; j < 3; ++j)
+    for (int i = 0; i < 3; ++i) {
+      Matrix3 change = Matrix3::Zero();
+      change(i, j) = 1.0;
+      const Matrix3 W = cross_matrix(polar.rate_inverse * vee(change - change.transpose()));
+      Matrix3 dS = change - W * S;
+      dS = (0.5 * (dS + dS.transpose())).eval();
+      Matrix3 dT;
+      Eigen::Map<Eigen::Matrix<double, 9, 1>>(dT.data()).noalias() =
+          *C * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dS.data());
+      const Vector3 da = -(polar.rate_inverse * (vee(dT * S - S * dT + T * dS - dS * T) + dS.trace() * a - dS * a));
+      const Matrix3 dP = W * Z + dT + cross_matrix(da);
+      out.tangent.col(i + 3 * j) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dP.data());
+    }
+}
+
+// ---- linear
+
+void LinearLaw::check(const MatrixX& table) const {
+  if (table.cols() != 2) throw std::invalid_argument("the linear law has two parameters an element");
+  for (Eigen::Index e = 0; e < table.rows(); ++e)
+    if (const auto [E, nu] = moduli_of({table(e, 0), table(e, 1)}); !(table(e, 0) > 0.0 && nu > -1.0 && nu < 0.5))
+      throw std::invalid_argument("the linear law needs lambda > 0 and -lambda < alpha < lambda / 2");
+}
+
+void LinearLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
+  const Polar polar = polar_decomposition(F);
+  const double alpha = table_(e, 1), twice_mu = table_(e, 0) - 2.0 * alpha;
+  Matrix3 strain = polar.S - Matrix3::Identity();
+  Matrix3 T = twice_mu * strain;
+  T.diagonal().array() += alpha * strain.trace();
+  out.energy = 0.5 * T.cwiseProduct(strain).sum();
+  if (!with_tangent) {
+    out.P = polar.R * T;
+    return;
+  }
+  Matrix9 C = twice_mu * Matrix9::Identity();
+  for (const int i : {0, 4, 8})
+    for (const int j : {0, 4, 8}) C(i, j) += alpha;
+  set_strain_stress(F, T, &C, out);
+}
+
+void LinearLaw::parameter_derivatives(int, const Matrix3& F, std::span<Matrix3> out) const {
+  const Polar polar = polar_decomposition(F);
+  const Matrix3 strain = polar.S - Matrix3::Identity();
+  out[0] = polar.R * strain;
+  out[1] = polar.R * (strain.trace() * Matrix3::Identity() - 2.0 * strain);
+}
+
+SmallStrainModuli LinearLaw::small_strain(int e) const { return moduli_of({table_(e, 0), table_(e, 1)}); }
+
+// ---- Ogden
+
+namespace {
+
+/// A law of the principal stretches at F: F = U diag(l) V^T.
+struct Principal {
+  Vector3 stretch;
+  Matrix3 U, V;
+  bool is_valid = false;  // J > 0
+};
+
+Principal principal(const Matrix3& F) {
+  Principal p;
+  if (!(F.determinant() > 0.0)) return p;
+  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(F.transpose() * F);
+  p.stretch = solver.eigenvalues().cwiseMax(1e-300).cwiseSqrt();
+  p.V = solver.eigenvectors();
+  p.U = F * p.V * p.stretch.cwiseInverse().asDiagonal();
+  p.is_valid = p.stretch.allFinite() && p.stretch.minCoeff() > 1e-100;
+  return p;
+}
+
+/// (exp(-a b ln J) - 1) / b, also for b = 0.
+double volumetric(double a, double b, double log_J) {
+  const double x = -a * b * log_J;
+  return std::abs(x) < 1e-8 ? -a * log_J * (1.0 + 0.5 * x) : std::expm1(x) / b;
+}
+
+double beta_of(double nu) { return nu / (1.0 - 2.0 * nu); }
+
+}  // namespace
+
+std::vector<std::string> OgdenLaw::parameter_names() const {
+  std::vector<std::string> names;
+  for (int i = 1; i <= terms(); ++i)
+    for (const char* name : {"mu_", "exponent_", "poisson_ratio_"}) names.push_back(name + std::to_string(i));
+  return names;
+}
+
+void OgdenLaw::check(const MatrixX& table) const {
+  if (table.cols() == 0 || table.cols() % 3 != 0)
+    throw std::invalid_argument("Ogden's law has three parameters a term");
+  for (Eigen::Index e = 0; e < table.rows(); ++e)
+    for (Eigen::Index c = 0; c < table.cols(); c += 3)
+      if (!(table(e, c) > 0.0 && table(e, c + 1) != 0.0 && table(e, c + 2) > -1.0 && table(e, c + 2) < 0.5))
+        throw std::invalid_argument("Ogden's law needs mu > 0, an exponent other than 0 and -1 < nu < 1/2");
+}
+
+void OgdenLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
+  const Principal p = principal(F);
+  if (!p.is_valid) {
+    out.energy = std::numeric_limits<double>::infinity();
+    return;
+  }
+  const Vector3 l = p.stretch, log_l = l.array().log();
+  const double log_J = log_l.sum();
+  out.energy = 0.0;
+  Vector3 first = Vector3::Zero();     // dW/dl_k
+  Matrix3 second = Matrix3::Zero();    // d2W/dl_k dl_m
+  Matrix3 quotient = Matrix3::Zero();  // (W_k - W_m) / (l_k - l_m), k < m
+  for (int i = 0; i < terms(); ++i) {
+    const double mu = table_(e, 3 * i), a = table_(e, 3 * i + 1), b = beta_of(table_(e, 3 * i + 2));
+    const Vector3 power = (a * log_l).array().exp();
+    const double bulk = std::exp(-a * b * log_J), factor = 2.0 * mu / a;
+    // sum (l^a - 1) by expm1, which keeps its digits near rest
+    double shape = 0.0;
+    for (int k = 0; k < 3; ++k) shape += std::expm1(a * log_l[k]);
+    out.energy += factor / a * (shape + volumetric(a, b, log_J));
+    for (int k = 0; k < 3; ++k) first[k] += factor * (std::expm1(a * log_l[k]) - std::expm1(-a * b * log_J)) / l[k];
+    if (!with_tangent) continue;
+    for (int k = 0; k < 3; ++k)
+      for (int m = 0; m < 3; ++m) {
+        second(k, m) += factor * a * b * bulk / (l[k] * l[m]);
+        if (k == m) second(k, k) += factor * ((a - 1.0) * power[k] + bulk) / (l[k] * l[k]);
+      }
+  }
+  out.P = p.U * first.asDiagonal() * p.V.transpose();
+  if (!with_tangent) return;
+  out.left = p.U;
+  out.right = p.V;
+  out.tangent.setZero();
+  const auto at = [](int i, int j) { return i + 3 * j; };
+  for (int k = 0; k < 3; ++k)
+    for (int m = 0; m < 3; ++m) out.tangent(at(k, k), at(m, m)) = second(k, m);
+  for (int k = 0; k < 3; ++k)
+    for (int m = k + 1; m < 3; ++m) {
+      const double gap = l[k] - l[m];
+      // Where two stretches meet the quotient is W_kk - W_km, up to the square of their gap by the mean of both ends.
+      quotient(k, m) = std::abs(gap) > 1e-5 * (l[k] + l[m]) ? (first[k] - first[m]) / gap
+                                                            : 0.5 * (second(k, k) + second(m, m)) - second(k, m);
+      const double twist = (first[k] + first[m]) / (l[k] + l[m]);
+      const double same = 0.5 * (quotient(k, m) + twist), other = 0.5 * (quotient(k, m) - twist);
+      out.tangent(at(k, m), at(k, m)) = out.tangent(at(m, k), at(m, k)) = same;
+      out.tangent(at(k, m), at(m, k)) = out.tangent(at(m, k), at(k, m)) = other;
+    }
+}
+
+void OgdenLaw::parameter_derivatives(int e, const Matrix3& F, std::span<Matrix3> out) const {
+  const Principal p = principal(F);
+  for (Matrix3& derivative : out) derivative.setZero();
+  if (!p.is_valid) return;
+  const Vector3 l = p.stretch, log_l = l.array().log();
+  const double log_J = log_l.sum();
+  const auto in_frame = [&](const Vector3& principal_stress) -> Matrix3 {
+    return p.U * principal_stress.asDiagonal() * p.V.transpose();
+  };
+  for (int i = 0; i < terms(); ++i) {
+    const double mu = table_(e, 3 * i), a = table_(e, 3 * i + 1), nu = table_(e, 3 * i + 2), b = beta_of(nu);
+    const Vector3 power = (a * log_l).array().exp();
+    const double bulk = std::exp(-a * b * log_J);
+    Vector3 by_mu, by_a, by_nu;
+    for (int k = 0; k < 3; ++k) {
+      by_mu[k] = 2.0 / a * (std::expm1(a * log_l[k]) - std::expm1(-a * b * log_J)) / l[k];
+      by_a[k] = -mu / a * by_mu[k] + 2.0 * mu / a * (log_l[k] * power[k] + b * log_J * bulk) / l[k];
+      by_nu[k] = 2.0 * mu * log_J * bulk / l[k] / ((1.0 - 2.0 * nu) * (1.0 - 2.0 * nu));
+    }
+    out[3 * i] = in_frame(by_mu);
+    out[3 * i + 1] = in_frame(by_a);
+    out[3 * i + 2] = in_frame(by_nu);
+  }
+}
+
+SmallStrainModuli OgdenLaw::small_strain(int e) const {
+  double mu = 0.0, bulk = 0.0;
+  for (int i = 0; i < terms(); ++i) {
+    mu += table_(e, 3 * i);
+    bulk += 2.0 * table_(e, 3 * i) * (1.0 / 3.0 + beta_of(table_(e, 3 * i + 2)));
+  }
+  return {9.0 * bulk * mu / (3.0 * bulk + mu), (3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu))};
+}
+
+}  // namespace pliant

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/types.hpp"
+
+namespace pliant {
+
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+/// Symmetric strains or stresses as xx, yy, zz, xy, xz, yz (Bickel 2009, section 3.2): tensor components, no factor 2.
+using Strain6 = Eigen::Matrix<double, 6, 1>;
+
+/// What a deformed point of the material stores and how hard it pulls back.
+struct PointStress {
+  double energy = 0.0;          ///< [J/m^3] of volume free of load; infinite where the law knows no such deformation
+  Matrix3 P = Matrix3::Zero();  ///< first Piola-Kirchhoff stress dW/dF [Pa]
+  Matrix3 left, right;          ///< rotations of the frame below
+  Matrix9 tangent;              ///< d(left^T P right) / d(left^T F right) [Pa], columns of F first; symmetric
+};
+
+/// Small-strain constants of an isotropic material.
+struct SmallStrainModuli {
+  double youngs_modulus, poissons_ratio;  ///< [Pa], [-]
+};
+
+/// An elastic material: energy of the deformation gradient F, the same in every rotated frame. Every element has its
+/// own parameters q, some of which may vary over a body. All laws here have an energy, so that no closed path of
+/// deformations gives or takes work. Reading from several threads is safe.
+class MaterialLaw {
+ public:
+  virtual ~MaterialLaw() = default;
+  virtual std::string name() const = 0;
+  virtual int element_count() const = 0;
+  /// Energy, stress and, where asked for, tangent of an element at F.
+  virtual void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const = 0;
+  virtual SmallStrainModuli small_strain(int element) const = 0;
+
+  /// Numbers q of an element that can be estimated; none where `parameter_names` is empty.
+  virtual std::vector<std::string> parameter_names() const { return {}; }
+  /// dP / dq_k at F [Pa per unit of q_k].
+  virtual void parameter_derivatives(int element, const Matrix3& F, std::span<Matrix3> out) const {
+    (void)element, (void)F, (void)out;
+  }
+};
+
+/// Laws whose parameters stand in a table: elements x parameters.
+class TabulatedLaw : public MaterialLaw {
+ public:
+  int element_count() const override { return int(table_.rows()); }
+  const MatrixX& table() const { return table_; }
+  /// @param table  elements x `parameter_names().size()`. Throws std::invalid_argument for inadmissible numbers.
+  void set_table(MatrixX table);
+
+ protected:
+  virtual void check(const MatrixX& table) const = 0;
+  MatrixX table_;
+};
+
+/// Linear elasticity in a frame that turns along (Bickel 2009, eq. 1-7): with F = R S and the strain e = S - I,
+///   W = e . E e / 2,   E = lambda G + alpha H,
+/// which in tensors is (lambda - 2 alpha) e + alpha tr(e) I: alpha is Lame's first parameter, lambda - 2 alpha twice
+/// the shear modulus. (G and H as printed belong to engineering shear strains, 2 e_xy.) q = (lambda, alpha) [Pa].
+class LinearLaw : public TabulatedLaw {
+ public:
+  explicit LinearLaw(MatrixX table) { set_table(std::move(table)); }
+  std::string name() const override { return "linear"; }
+  std::vector<std::string> parameter_names() const override { return {"lambda", "alpha"}; }
+  void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override;
+  void parameter_derivatives(int element, const Matrix3& F, std::span<Matrix3> out) const override;
+  SmallStrainModuli small_strain(int element) const override;
+
+ protected:
+  void check(const MatrixX& table) const override;
+};
+
+/// (lambda, alpha) of Young's modulus and Poisson's ratio (eq. 6), and back.
+struct LambdaAlpha {
+  double lambda, alpha;
+};
+LambdaAlpha lambda_alpha(const SmallStrainModuli& moduli);
+SmallStrainModuli moduli_of(const LambdaAlpha& p);
+
+/// Ogden's law for compressible foams and rubbers (Ogden 1972; Storakers 1986), of N terms:
+///   W = sum_i 2 mu_i / a_i^2 [l1^a_i + l2^a_i + l3^a_i - 3 + (J^(-a_i b_i) - 1) / b_i],   b_i = nu_i / (1 - 2 nu_i)
+/// with the principal stretches l and J = l1 l2 l3. The small-strain shear modulus is the sum of mu_i, and nu_i the
+/// Poisson's ratio of a term. With mu_i > 0 every term is convex in the logarithmic strains, so stress never falls as
+/// strain grows (Hill's stability). Negative exponents stiffen in compression, exponents above 2 in tension.
+/// q = (mu_1 [Pa], a_1 [-], nu_1 [-], mu_2, ...).
+class OgdenLaw : public TabulatedLaw {
+ public:
+  explicit OgdenLaw(MatrixX table) { set_table(std::move(table)); }
+  std::string name() const override { return "ogden"; }
+  int terms() const { return int(table_.cols()) / 3; }
+  std::vector<std::string> parameter_names() const override;
+  void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override;
+  void parameter_derivatives(int element, const Matrix3& F, std::span<Matrix3> out) const override;
+  SmallStrainModuli small_strain(int element) const override;
+
+ protected:
+  void check(const MatrixX& table) const override;
+};
+
+/// Tangent of an energy of the strain e = S - I in the frame of R, F = R S: out.P and, where asked for, out.tangent
+/// from
+/// @param T  dW/de [Pa], symmetric
+/// @param C  d2W/de2 by tensor components (dT = C : de), 9 x 9 of the symmetric pairs; may be null
+void set_strain_stress(const Matrix3& F, const Matrix3& T, const Matrix9* C, PointStress& out);
+
+}  // namespace pliant

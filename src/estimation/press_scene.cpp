@@ -1,0 +1,197 @@
+#include "estimation/press_scene.hpp"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.hpp"
+#include "estimation/problem.hpp"
+#include "motion/body_forces.hpp"
+
+namespace pliant {
+
+namespace {
+
+/// Gravity's nodal forces for a density of 1.
+Points unit_weight(const Body& body, const Vector3& gravity) {
+  VectorX theta = VectorX::Zero(theta::size(0));
+  theta[theta::density] = 1.0;
+  theta.segment<3>(theta::gravity) = gravity;
+  Gravity term(body);
+  term.set_parameters(theta);
+  Points force = Points::Zero(body.node_count(), 3);
+  term.add_force(body.nodes, force);
+  return force;
+}
+
+ObservedPress observe_press(const Capture& capture, std::size_t i) {
+  const Press& press = capture.presses[i];
+  ObservedPress seen;
+  seen.name = "press " + std::to_string(i + 1);
+  seen.role = press.role;
+  seen.force = press.force;
+  const MarkerSet markers = read_marker_pair(press.markers_rest, press.markers);
+  for (int m = 0; m < markers.marker_count(); ++m) {
+    if (!markers.is_seen(0, m)) continue;
+    seen.rest.emplace_back(markers.rest.row(m).transpose());
+    seen.loaded.emplace_back(markers.frames[0].row(m).transpose());
+    seen.greatest_displacement = std::max(seen.greatest_displacement, (seen.loaded.back() - seen.rest.back()).norm());
+  }
+  if (seen.rest.size() < 3)
+    throw InputError({{press.markers},
+                      fmt::format("{} markers of {} under load", seen.rest.size(), seen.name),
+                      "at least three that are also among those at rest",
+                      "see which ids the two files share"});
+  if (press.probe && press.glued) {
+    seen.has_probe = true;
+    seen.rest.push_back(press.contact_centre);
+    seen.loaded.push_back(press.probe->point);
+    // What the probe went counts as measured: no marker lies under it.
+    seen.greatest_displacement = std::max(seen.greatest_displacement, (seen.loaded.back() - seen.rest.back()).norm());
+  }
+  return seen;
+}
+
+RigidContact contact_of(const PressScene& scene, const Press& press, double youngs_modulus) {
+  const Body& body = *scene.body;
+  const ContactSamples disc = disc_samples(body, press.contact_centre, press.contact_radius);
+  if (disc.rest.empty())
+    throw InputError({{},
+                      fmt::format("the disc at ({:.4g}, {:.4g}, {:.4g}) m touches nothing of the object",
+                                  press.contact_centre.x(), press.contact_centre.y(), press.contact_centre.z()),
+                      "`contact.centre` on the surface at rest",
+                      "correct the press in capture.toml"});
+  const double stiffness = glued_stiffness(youngs_modulus, press.contact_radius);
+  if (press.glued) return RigidContact::glued(body, disc, stiffness);
+  const Vector3 axis = press.probe ? press.probe->normal : press.force.normalized();
+  return RigidContact::sliding(
+      body, boundary_samples(body, 4),
+      rigid_punch(press.contact_centre, axis, press.contact_radius, 0.05 * press.contact_radius), stiffness,
+      0.005 * press.contact_radius);
+}
+
+ProbeControl control_of(const Press& press) {
+  ProbeControl control;
+  control.force = press.force;
+  if (press.glued) return control;
+  control.axis = press.probe ? press.probe->normal : press.force.normalized();
+  control.force = *control.axis * control.axis->dot(press.force);
+  return control;
+}
+
+std::vector<RigidContact> one(RigidContact contact) {
+  std::vector<RigidContact> contacts;
+  contacts.push_back(std::move(contact));
+  return contacts;
+}
+
+std::vector<Vector3> without_probe(const ObservedPress& seen) {
+  return {seen.rest.begin(), seen.rest.end() - (seen.has_probe ? 1 : 0)};
+}
+
+}  // namespace
+
+PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body) {
+  PressScene scene;
+  scene.held = held_nodes(*body, held_regions(capture));
+  if (scene.held.size() < 3)
+    throw InputError({{capture.file},
+                      "nothing holds the object while it is pressed",
+                      "a block [[fixed]] that holds nodes of the mesh",
+                      "say where the object stands or is clamped"});
+  const double volume = body->volume();
+  scene.density = capture.mass ? *capture.mass / volume : capture.density.value_or(0.0);
+  scene.unit_weight = unit_weight(*body, capture.gravity.value_or(Vector3::Zero()));
+  scene.noise = 1e-3 * object_size(capture);
+  scene.body = std::move(body);
+  for (std::size_t i = 0; i < capture.presses.size(); ++i) scene.presses.push_back(observe_press(capture, i));
+  scene.facts = capture.presses;
+  return scene;
+}
+
+PressedBody::PressedBody(const PressScene& scene, int press, std::shared_ptr<const MaterialLaw> law,
+                         double youngs_modulus)
+    : equilibrium_(scene.body, std::move(law), scene.held,
+                   one(contact_of(scene, scene.facts[std::size_t(press)], youngs_modulus))),
+      points_(*scene.body, without_probe(scene.presses[std::size_t(press)])),
+      centre_(scene.facts[std::size_t(press)].contact_centre),
+      has_probe_(scene.presses[std::size_t(press)].has_probe) {
+  equilibrium_.set_dead_load(scene.dead_load());
+  equilibrium_.set_control(0, control_of(scene.facts[std::size_t(press)]));
+}
+
+SolveSummary PressedBody::solve() {
+  if (has_placement_) {
+    const SolveSummary summary = equilibrium_.solve(placement_);
+    if (summary.converged) return summary;
+  }
+  placement_ = equilibrium_.rest();
+  const SolveSummary summary = equilibrium_.solve(placement_);
+  has_placement_ = summary.converged;
+  return summary;
+}
+
+Points PressedBody::points() const {
+  Points all(point_count(), 3);
+  all.topRows(points_.point_count()) = points_.positions(placement_.nodes);
+  if (has_probe_) all.row(all.rows() - 1) = centre_.transpose() + placement_.translations.row(0);
+  return all;
+}
+
+PressPrediction predict_press(const PressScene& scene, int press, const std::shared_ptr<const MaterialLaw>& law,
+                              double youngs_modulus) {
+  PressPrediction prediction;
+  PressedBody pressed(scene, press, law, youngs_modulus);
+  if (!pressed.solve().converged) {
+    prediction.failure = pressed.equilibrium().failure();
+    return prediction;
+  }
+  const ObservedPress& seen = scene.presses[std::size_t(press)];
+  const Points points = pressed.points();
+  const int markers = pressed.embedding().point_count();
+  double squares = 0.0;
+  for (int m = 0; m < markers; ++m) {
+    const double d = (points.row(m).transpose() - seen.loaded[std::size_t(m)]).norm();
+    squares += d * d;
+    prediction.marker_max = std::max(prediction.marker_max, d);
+  }
+  prediction.marker_rms = std::sqrt(squares / double(markers));
+  if (seen.greatest_displacement > 0.0) prediction.relative_error = prediction.marker_rms / seen.greatest_displacement;
+  prediction.placement = pressed.placement();
+  prediction.succeeded = true;
+  return prediction;
+}
+
+std::vector<PressPrediction> predict_presses(const PressScene& scene, const std::shared_ptr<const MaterialLaw>& law) {
+  const double modulus = mean_modulus(*scene.body, *law);
+  std::vector<PressPrediction> predictions(scene.presses.size());
+  tbb::parallel_for(0, int(predictions.size()),
+                    [&](int i) { predictions[std::size_t(i)] = predict_press(scene, i, law, modulus); });
+  return predictions;
+}
+
+double punch_modulus(const PressScene& scene, double poissons_ratio) {
+  std::vector<double> moduli;
+  for (std::size_t i = 0; i < scene.presses.size(); ++i) {
+    const ObservedPress& seen = scene.presses[i];
+    if (seen.role != "fit" || seen.greatest_displacement <= 0.0) continue;
+    moduli.push_back(seen.force.norm() * (1.0 - poissons_ratio * poissons_ratio) /
+                     (2.0 * scene.facts[i].contact_radius * seen.greatest_displacement));
+  }
+  if (moduli.empty()) return 1e4;
+  std::ranges::nth_element(moduli, moduli.begin() + std::ptrdiff_t(moduli.size() / 2));
+  return moduli[moduli.size() / 2];
+}
+
+double mean_modulus(const Body& body, const MaterialLaw& law) {
+  double sum = 0.0, volume = 0.0;
+  for (int e = 0; e < body.element_count(); ++e) {
+    sum += body.element_volume[std::size_t(e)] * law.small_strain(e).youngs_modulus;
+    volume += body.element_volume[std::size_t(e)];
+  }
+  return sum / volume;
+}
+
+}  // namespace pliant

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "capture/capture.hpp"
+#include "capture/markers.hpp"
+#include "estimation/parameter_set.hpp"
+#include "motion/equilibrium.hpp"
+
+namespace pliant {
+
+/// One press as it was measured.
+struct ObservedPress {
+  std::string name;                    ///< "press 1", ...
+  std::string role;                    ///< "fit" or "test"
+  Vector3 force;                       ///< [N], of the probe on the object
+  std::vector<Vector3> rest;           ///< of the points below [m]
+  std::vector<Vector3> loaded;         ///< where they were seen [m]
+  bool has_probe = false;              ///< the last point is the disc's middle, by the probe's pose
+  double greatest_displacement = 0.0;  ///< [m]
+};
+
+/// What presses of one object share, and the presses.
+struct PressScene {
+  std::shared_ptr<const Body> body;
+  std::vector<int> held;     ///< nodes
+  double noise = 0.0;        ///< first guess of a coordinate's deviation [m]
+  double force_noise = 0.0;  ///< relative
+  Points unit_weight;        ///< nodal forces [m^4/s^2]: times the density [kg/m^3] [N]
+  double density = 0.0;      ///< [kg/m^3]
+  std::vector<ObservedPress> presses;
+  std::vector<Press> facts;  ///< of the same presses
+
+  Points dead_load() const { return density * unit_weight; }
+};
+
+/// Reads a capture's presses (all roles) around a body of its object.
+/// Throws InputError where nothing holds the object, a press' markers are too few, or its disc covers nothing.
+PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body);
+
+/// One press, ready to be solved: its rigid contact on the body, led by its force, and its points' embedding.
+class PressedBody {
+ public:
+  /// @param youngs_modulus  [Pa] about which the contact is stiff
+  PressedBody(const PressScene& scene, int press, std::shared_ptr<const MaterialLaw> law, double youngs_modulus);
+
+  /// To equilibrium from where it was last; where that fails, or at first, from rest.
+  SolveSummary solve();
+  void forget() { has_placement_ = false; }
+  Equilibrium& equilibrium() { return equilibrium_; }
+  const Placement& placement() const { return placement_; }
+  /// Simulated places of the press' points, one row each [m]; the probe's last.
+  Points points() const;
+  int point_count() const { return points_.point_count() + int(has_probe_); }
+  const Embedding& embedding() const { return points_; }
+  bool has_probe() const { return has_probe_; }
+  const Vector3& contact_centre() const { return centre_; }
+
+ private:
+  Equilibrium equilibrium_;
+  Embedding points_;
+  Vector3 centre_;
+  bool has_probe_;
+  Placement placement_;
+  bool has_placement_ = false;
+};
+
+/// What a material predicts of one press.
+struct PressPrediction {
+  bool succeeded = false;
+  std::string failure;
+  double marker_rms = 0.0, marker_max = 0.0;  ///< [m], of the markers (the probe not among them)
+  double relative_error = 0.0;                ///< rms over the greatest measured displacement
+  Placement placement;
+};
+PressPrediction predict_press(const PressScene& scene, int press, const std::shared_ptr<const MaterialLaw>& law,
+                              double youngs_modulus);
+/// All of them, side by side.
+std::vector<PressPrediction> predict_presses(const PressScene& scene, const std::shared_ptr<const MaterialLaw>& law);
+
+/// A Young's modulus to set out from [Pa]: that of half spaces under flat punches (Sneddon 1965), E = F (1 - nu^2) /
+/// (2 a u), the median of the presses to fit.
+double punch_modulus(const PressScene& scene, double poissons_ratio);
+
+/// Volume-weighted mean of the small-strain Young's moduli of a law [Pa].
+double mean_modulus(const Body& body, const MaterialLaw& law);
+
+}  // namespace pliant

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "elasticity/law_elasticity.hpp"
+#include "motion/rigid_contact.hpp"
+#include "solvers/linear_solver.hpp"
+
+namespace pliant {
+
+/// How a rigid body is led.
+struct ProbeControl {
+  enum class Kind {
+    Force,     ///< it is where the object balances `force`
+    Position,  ///< it is at `translation`
+  };
+  Kind kind = Kind::Force;
+  Vector3 force = Vector3::Zero();        ///< [N], of the rigid body on the object
+  Vector3 translation = Vector3::Zero();  ///< [m]; led by force along an axis: of the line that it stays on
+  /// Unit: led by force the body keeps to a line along it, as a linear guide does. Nothing: it goes where it will.
+  std::optional<Vector3> axis;
+};
+
+/// Where the object's nodes and the rigid bodies are.
+struct Placement {
+  Points nodes;         ///< n x 3 [m]
+  Points translations;  ///< one row a rigid body [m]
+};
+
+struct EquilibriumOptions {
+  double tolerance = 1e-9;  ///< of the forces that are left, relative to those that meet, (0, 1)
+  int max_iterations = 60;  ///< of Newton's method, a step of the load; >= 1
+  int max_halvings = 8;     ///< of the load's steps, where it does not follow
+};
+
+/// The object at rest under dead loads and rigid bodies: the minimum of
+///   W(x) - f . x + sum over rigid bodies (potential of the contact - F . u)
+/// over nodes x and the translations u of bodies that are led by force, by Newton's method on the exact Hessian, with
+/// what makes it positive definite where it is not, and backtracking on the energy. Loads that it does not follow at
+/// once are applied in steps (incremental loading, Bickel 2009, section 3.4), each to full convergence. One instance
+/// for one thread.
+class Equilibrium {
+ public:
+  /// @param held  nodes that stay where a placement has them; there must be enough to hold the object
+  Equilibrium(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law, std::vector<int> held,
+              std::vector<RigidContact> contacts, const EquilibriumOptions& options = {});
+  ~Equilibrium();
+  Equilibrium(Equilibrium&&) noexcept;
+
+  const Body& body() const;
+  int contact_count() const;
+  const RigidContact& contact(int i) const;
+  void set_law(std::shared_ptr<const MaterialLaw> law);
+  /// Forces on nodes [N], n x 3: the weight, for one. None at the beginning.
+  void set_dead_load(Points forces);
+  void set_control(int contact, const ProbeControl& control);
+
+  /// Nodes free of load and rigid bodies where they are led to.
+  Placement rest() const;
+  /// From one placement to the equilibrium under the controls; a near placement takes fewer iterations. Not converged:
+  /// the placement is the best that was reached.
+  SolveSummary solve(Placement& placement);
+  const std::string& failure() const;  ///< of the last solve, in words
+
+  /// Elastic energy, that of contacts, and of all with the loads' potential [J], at the last placement.
+  struct Energies {
+    double elastic = 0.0, contact = 0.0, total = 0.0;
+  };
+  const Energies& energies() const;
+  /// Force of a rigid body on the object [N].
+  Vector3 contact_force(int contact, const Placement& placement) const;
+  LawElasticity& elasticity();
+
+  /// Factorises the exact Hessian at an equilibrium, for the two calls below. False where it is not positive definite:
+  /// the equilibrium is not stable, or nothing holds the object.
+  [[nodiscard]] bool prepare_derivatives(const Placement& placement);
+  /// Change of the placement for a change of the forces on nodes and rigid bodies, (n + contacts) x 3 [N]: H^-1 f, with
+  /// zeros for what is held. It is its own adjoint.
+  const Points& response(const Points& forces);
+
+ private:
+  class Solver;
+  std::unique_ptr<Solver> solver_;
+};
+
+/// Stiffness [Pa/m] and smoothing [m] of contacts that suit a rigid body of some size on a material: soft enough to be
+/// solved well, stiff enough to change a displacement by little.
+double glued_stiffness(double youngs_modulus, double radius);
+
+}  // namespace pliant

@@ -1,0 +1,102 @@
+#include "motion/rigid_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pliant {
+
+namespace {
+
+class HalfSpace : public RigidShape {
+ public:
+  HalfSpace(const Vector3& point, const Vector3& normal) : point_(point), normal_(normal.normalized()) {}
+  Sample sample(const Vector3& p) const override { return {normal_.dot(p - point_), normal_, Matrix3::Zero()}; }
+
+ private:
+  Vector3 point_, normal_;
+};
+
+/// Distance to a point or a straight piece, less a radius.
+class Capsule : public RigidShape {
+ public:
+  Capsule(const Vector3& from, const Vector3& to, double radius) : from_(from), along_(to - from), radius_(radius) {}
+  Sample sample(const Vector3& p) const override {
+    const double length = along_.squaredNorm();
+    const double share = length > 0.0 ? along_.dot(p - from_) / length : 0.0;
+    const bool is_beside = share > 0.0 && share < 1.0;
+    const Vector3 offset = p - from_ - std::clamp(share, 0.0, 1.0) * along_;
+    const double distance = offset.norm();
+    if (distance == 0.0) return {-radius_, Vector3::UnitX(), Matrix3::Zero()};
+    const Vector3 n = offset / distance;
+    Matrix3 across = Matrix3::Identity() - n * n.transpose();
+    if (is_beside) across -= along_ * along_.transpose() / length;
+    return {distance - radius_, n, across / distance};
+  }
+
+ private:
+  Vector3 from_, along_;
+  double radius_;
+};
+
+class Punch : public RigidShape {
+ public:
+  Punch(const Vector3& tip, const Vector3& axis, double radius, double edge)
+      : tip_(tip), axis_(axis.normalized()), radius_(radius), edge_(edge) {}
+  /// In the plane of axis and point: a corner rounded by `edge_`.
+  Sample sample(const Vector3& p) const override {
+    const double height = axis_.dot(p - tip_);
+    const Vector3 beside = p - tip_ - height * axis_;
+    const double r = beside.norm();
+    const Vector3 out = r > 0.0 ? Vector3(beside / r) : axis_.unitOrthogonal();
+    const double x = r - (radius_ - edge_), y = height + edge_;
+    double by_r = 0.0, by_height = 1.0, distance = height, bend = 0.0;
+    if (x > 0.0 && y > 0.0) {
+      const double corner = std::hypot(x, y);
+      by_r = x / corner, by_height = y / corner, distance = corner - edge_, bend = 1.0 / corner;
+    } else if (x > y) {
+      by_r = 1.0, by_height = 0.0, distance = x - edge_;
+    }
+    const Vector3 gradient = by_r * out + by_height * axis_;
+    const Vector3 tangent = by_height * out - by_r * axis_, around = axis_.cross(out);
+    Matrix3 hessian = bend * tangent * tangent.transpose();
+    if (r > 0.0) hessian += by_r / r * around * around.transpose();
+    return {distance, gradient, hessian};
+  }
+
+ private:
+  Vector3 tip_, axis_;
+  double radius_, edge_;
+};
+
+class Grid : public RigidShape {
+ public:
+  Grid(SignedDistance distance, bool hollow) : distance_(std::move(distance)), sign_(hollow ? -1.0 : 1.0) {}
+  Sample sample(const Vector3& p) const override {
+    const SignedDistance::Sample s = distance_.sample(p);
+    return {sign_ * s.value, sign_ * s.gradient, Matrix3::Zero()};
+  }
+
+ private:
+  SignedDistance distance_;
+  double sign_;
+};
+
+}  // namespace
+
+std::shared_ptr<const RigidShape> rigid_half_space(const Vector3& point, const Vector3& normal) {
+  return std::make_shared<HalfSpace>(point, normal);
+}
+std::shared_ptr<const RigidShape> rigid_ball(const Vector3& centre, double radius) {
+  return std::make_shared<Capsule>(centre, centre, radius);
+}
+std::shared_ptr<const RigidShape> rigid_capsule(const Vector3& from, const Vector3& to, double radius) {
+  return std::make_shared<Capsule>(from, to, radius);
+}
+std::shared_ptr<const RigidShape> rigid_punch(const Vector3& tip, const Vector3& axis, double radius, double edge) {
+  return std::make_shared<Punch>(tip, axis, radius, edge);
+}
+std::shared_ptr<const RigidShape> rigid_grid(SignedDistance distance, bool hollow) {
+  return std::make_shared<Grid>(std::move(distance), hollow);
+}
+
+}  // namespace pliant

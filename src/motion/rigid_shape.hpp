@@ -1,0 +1,34 @@
+#pragma once
+
+#include <memory>
+
+#include "geometry/signed_distance.hpp"
+
+namespace pliant {
+
+/// A rigid body as a signed distance [m], negative inside: a probe, a table, a skull under the skin.
+class RigidShape {
+ public:
+  struct Sample {
+    double distance;
+    Vector3 gradient;  ///< unit where the surface is smooth
+    Matrix3 hessian;   ///< [1/m]
+  };
+  virtual ~RigidShape() = default;
+  [[nodiscard]] virtual Sample sample(const Vector3& point) const = 0;
+};
+
+/// All that lies behind a plane. @param normal  points out of the body
+std::shared_ptr<const RigidShape> rigid_half_space(const Vector3& point, const Vector3& normal);
+std::shared_ptr<const RigidShape> rigid_ball(const Vector3& centre, double radius);
+/// A rod with round ends, from one point to another.
+std::shared_ptr<const RigidShape> rigid_capsule(const Vector3& from, const Vector3& to, double radius);
+/// A flat-ended cylinder without another end.
+/// @param tip   middle of its flat end
+/// @param axis  along which it points, out of that end
+/// @param edge  radius by which the rim is rounded, in (0, radius]
+std::shared_ptr<const RigidShape> rigid_punch(const Vector3& tip, const Vector3& axis, double radius, double edge);
+/// Any closed mesh, or its outside (`hollow`: an object that lies in a mould). Its curvature is not known.
+std::shared_ptr<const RigidShape> rigid_grid(SignedDistance distance, bool hollow = false);
+
+}  // namespace pliant

@@ -1,0 +1,145 @@
+#include "elasticity/law_elasticity.hpp"
+
+#include "support/bodies.hpp"
+#include "support/dense.hpp"
+#include "support/derivatives.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+std::shared_ptr<const OgdenLaw> foam(const Body& body) {
+  MatrixX q(body.element_count(), 6);
+  for (Eigen::Index e = 0; e < q.rows(); ++e) q.row(e) << 800.0 + 5.0 * double(e), 7.0, 0.2, 500.0, -5.0, 0.1;
+  return std::make_shared<OgdenLaw>(q);
+}
+
+struct LawForces : ::testing::TestWithParam<bool> {
+  LawForces()
+      : body(test::tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, GetParam())), term(LawElasticity::make(body, foam(*body))) {
+    x = test::deformed(body->nodes, 0.25);
+    d = test::deformed(body->nodes, 0.6, -0.7);
+  }
+  Points gradient(const Points& at) {
+    term->evaluate(at, false);
+    Points g = Points::Zero(at.rows(), 3);
+    term->add_gradient(g);
+    return g;
+  }
+  std::shared_ptr<const Body> body;
+  std::unique_ptr<LawElasticity> term;
+  Points x, d;
+};
+
+TEST_P(LawForces, AreTheEnergysGradient) {
+  const double derivative = gradient(x).cwiseProduct(d).sum();
+  const auto along = [&](double h) { return VectorX::Constant(1, term->evaluate(x + h * d, false)); };
+  EXPECT_LT(test::best_relative_error(along, VectorX::Constant(1, derivative), 0.01), tolerance(1e-7));
+}
+
+TEST_P(LawForces, HaveTheirExactStiffness) {
+  term->evaluate(x, true);
+  BlockMatrix K(body->pattern);
+  term->add_stiffness(LawElasticity::Stiffness::Exact, 1.0, K);
+  VectorX product;
+  K.multiply(VectorX(flat(d)), product);
+  const auto along = [&](double h) { return VectorX(flat(gradient(x + h * d))); };
+  EXPECT_LT(test::best_relative_error(along, product, 0.01), tolerance(1e-7));
+  term->evaluate(x, true);
+  BlockMatrix positive(body->pattern);
+  term->add_stiffness(LawElasticity::Stiffness::Positive, 1.0, positive);
+  const MatrixX P = test::dense(positive);
+  EXPECT_GT(P.selfadjointView<Eigen::Lower>().eigenvalues()[0], -tolerance(1e-9) * P.norm());
+}
+
+TEST_P(LawForces, ChangeWithTheLawsParameters) {
+  const auto law = foam(*body);
+  gradient(x);
+  for (int k = 0; k < 6; ++k) {
+    Points derivative = Points::Zero(x.rows(), 3);
+    term->for_parameter_derivatives([&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by) {
+      for (std::size_t a = 0; a < nodes.size(); ++a)  // elements' own parameters change by different amounts
+        derivative.row(nodes[a]) += (1.0 + 0.1 * e) * by.col(k).segment<3>(3 * Eigen::Index(a)).transpose();
+    });
+    const auto along = [&](double h) {
+      MatrixX q = law->table();
+      for (Eigen::Index e = 0; e < q.rows(); ++e) q(e, k) += h * (1.0 + 0.1 * double(e));
+      term->set_law(std::make_shared<OgdenLaw>(q));
+      const VectorX g = flat(gradient(x));
+      term->set_law(law);
+      return g;
+    };
+    EXPECT_LT(test::best_relative_error(along, flat(derivative), k % 3 == 0 ? 1.0 : 0.01), tolerance(1e-7)) << k;
+    gradient(x);
+  }
+}
+
+TEST_P(LawForces, PassThePatchTest) {
+  // An affine deformation of a homogeneous body leaves no force inside.
+  MatrixX q(body->element_count(), 3);
+  q.rowwise() = Eigen::RowVector3d(1000.0, 6.0, 0.3);
+  term->set_law(std::make_shared<OgdenLaw>(q));
+  Matrix3 A;
+  A << 1.2, 0.1, 0.0, -0.2, 0.9, 0.1, 0.1, 0.0, 1.1;
+  const Points g = gradient(body->nodes * A.transpose());
+  const Vector3 half(0.1, 0.05, 0.06);
+  for (Eigen::Index n = 0; n < g.rows(); ++n) {
+    const Vector3 X = body->nodes.row(n).transpose().cwiseAbs();
+    if (((half - X).array() > 1e-9).all()) {
+      EXPECT_LT(g.row(n).norm(), tolerance(1e-12) * g.norm());
+    }
+  }
+}
+
+TEST_P(LawForces, AsAForceTermAreAffineAboutTheLagPoint) {
+  term->linearise(x);
+  Points f = Points::Zero(x.rows(), 3), moved = f;
+  term->add_force(x, f);
+  EXPECT_LT((f + gradient(x)).norm(), tolerance(1e-12) * f.norm());
+  term->linearise(x);
+  const Points z = x + 1e-3 * d;
+  term->add_force(z, moved);
+  BlockMatrix K(body->pattern);
+  term->add_matrix(1.0, K);
+  VectorX product;
+  K.multiply(VectorX(flat(d)), product);
+  EXPECT_LT((flat(moved) - flat(f) + 1e-3 * product).norm(), tolerance(1e-10) * product.norm());
+}
+
+INSTANTIATE_TEST_SUITE_P(Tetrahedra, LawForces, ::testing::Values(false, true),
+                         [](const auto& c) { return c.param ? "Quadratic" : "Linear"; });
+
+TEST(LawElasticity, OfTheLinearLawIsCorotatedElasticity) {
+  const auto body = test::tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, false);
+  const LambdaAlpha p = lambda_alpha({3000.0, 0.35});
+  MatrixX q(body->element_count(), 2);
+  q.rowwise() = Eigen::RowVector2d(p.lambda, p.alpha);
+  const auto by_law = LawElasticity::make(body, std::make_shared<LinearLaw>(q));
+  const auto corotated = make_elasticity(body);
+  VectorX theta = VectorX::Zero(theta::size(0));
+  theta[theta::youngs_modulus] = 3000.0;
+  theta[theta::poissons_ratio] = 0.35;
+  corotated->set_parameters(theta);
+  const Points x = test::deformed(body->nodes, 0.25);
+  Points f = Points::Zero(x.rows(), 3), g = f;
+  corotated->linearise(x);
+  corotated->add_force(x, f);
+  by_law->linearise(x);
+  by_law->add_force(x, g);
+  EXPECT_LT((f - g).norm(), tolerance(1e-10) * f.norm());
+  EXPECT_NEAR(by_law->energy(x), corotated->energy(x), tolerance(1e-10) * corotated->energy(x));
+}
+
+TEST(LawElasticity, RefusesOtherBodies) {
+  const auto hexahedra = test::box_body({0.1, 0.1, 0.1}, 0.05);
+  MatrixX q(hexahedra->element_count(), 2);
+  q.rowwise() = Eigen::RowVector2d(1000.0, 100.0);
+  EXPECT_THROW(LawElasticity::make(hexahedra, std::make_shared<LinearLaw>(q)), std::invalid_argument);
+  EXPECT_THROW(LawElasticity::make(test::tet_body({0.2, 0.1, 0.1}, {1, 1, 1}, false), std::make_shared<LinearLaw>(q)),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace pliant

@@ -1,0 +1,253 @@
+#include "elasticity/material_law.hpp"
+
+#include <Eigen/Geometry>
+#include <random>
+
+#include "elasticity/sampled_law.hpp"
+#include "support/derivatives.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+std::shared_ptr<const MaterialLaw> sampled(unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<MaterialSample> samples(6);
+  for (MaterialSample& sample : samples) {
+    sample.strains.resize(1, 6);
+    for (int k = 0; k < 6; ++k) sample.strains(0, k) = 0.15 * normal(random);
+    const double stiffening = 1.0 + 8.0 * sample.strains.norm();
+    sample.p.push_back(lambda_alpha({2000.0 * stiffening, 0.25 + 0.03 * normal(random)}));
+  }
+  return sample_material(samples, {1e-3, 6}).law;
+}
+
+struct LawCase {
+  std::string name;
+  std::shared_ptr<const MaterialLaw> law;
+  friend void PrintTo(const LawCase& c, std::ostream* out) { *out << c.name; }
+};
+
+std::vector<LawCase> laws() {
+  MatrixX linear(1, 2), foam(1, 6), rubber(1, 3), cork(1, 3);
+  const LambdaAlpha p = lambda_alpha({3000.0, 0.3});
+  linear << p.lambda, p.alpha;
+  foam << 800.0, 9.0, 0.2, 500.0, -6.0, 0.1;
+  rubber << 1e5, 2.0, 0.49;
+  cork << 1e5, -1.5, 0.0;
+  return {{"Linear", std::make_shared<LinearLaw>(linear)},
+          {"Ogden", std::make_shared<OgdenLaw>(foam)},
+          {"NearlyIncompressible", std::make_shared<OgdenLaw>(rubber)},
+          {"WithoutPoissonsEffect", std::make_shared<OgdenLaw>(cork)},
+          {"Sampled", sampled(3)}};
+}
+
+Matrix3 generic(double amount) {
+  Matrix3 H;
+  H << 0.3, -0.5, 0.2, 0.4, -0.6, 0.1, -0.2, 0.7, 0.5;
+  return Eigen::AngleAxisd(1.3, Vector3(0.3, -0.8, 0.5).normalized()).toRotationMatrix() *
+         (Matrix3::Identity() + amount * H);
+}
+
+VectorX vec(const Matrix3& m) { return Eigen::Map<const VectorX>(m.data(), 9); }
+
+struct Law : ::testing::TestWithParam<LawCase> {
+  PointStress at(const Matrix3& F, bool with_tangent = false) const {
+    PointStress s;
+    GetParam().law->stress(0, F, with_tangent, s);
+    return s;
+  }
+};
+
+TEST_P(Law, StressIsTheEnergysGradient) {
+  for (const double amount : {0.02, 0.3}) {
+    const Matrix3 F = generic(amount), dF = generic(0.9);
+    const double derivative = at(F).P.cwiseProduct(dF).sum();
+    const auto along = [&](double h) { return VectorX::Constant(1, at(F + h * dF).energy); };
+    EXPECT_LT(test::best_relative_error(along, VectorX::Constant(1, derivative), 0.1), tolerance(1e-7));
+  }
+}
+
+TEST_P(Law, TangentIsTheStressesDerivative) {
+  std::vector<Matrix3> places = {generic(0.02), generic(0.3), Matrix3::Identity()};
+  places.push_back(Vector3(1.2, 1.2, 0.9).asDiagonal());  // two stretches meet
+  for (const Matrix3& F : places) {
+    const PointStress s = at(F, true);
+    for (int k = 0; k < 9; ++k) {
+      Matrix3 dF = Matrix3::Zero();
+      dF.data()[k] = 1.0;
+      const Matrix3 local = s.left.transpose() * dF * s.right;
+      const VectorX turned = s.tangent * vec(local);
+      const Matrix3 dP = s.left * Eigen::Map<const Matrix3>(turned.data()) * s.right.transpose();
+      const auto along = [&](double h) { return vec(at(F + h * dF).P); };
+      EXPECT_LT(test::best_relative_error(along, vec(dP), 0.1), tolerance(3e-7)) << k;
+    }
+    EXPECT_LT((s.tangent - s.tangent.transpose()).norm(), tolerance(1e-12) * s.tangent.norm());
+  }
+}
+
+TEST_P(Law, ParametersMoveTheStressAsTheirDerivativesSay) {
+  const auto* table = dynamic_cast<const TabulatedLaw*>(GetParam().law.get());
+  if (!table) GTEST_SKIP() << "nothing of it is estimated";
+  const Matrix3 F = generic(0.3);
+  std::vector<Matrix3> derivatives(table->parameter_names().size());
+  table->parameter_derivatives(0, F, derivatives);
+  for (std::size_t k = 0; k < derivatives.size(); ++k) {
+    const auto along = [&](double h) {
+      MatrixX changed = table->table();
+      changed(0, Eigen::Index(k)) += h;
+      PointStress s;
+      if (table->name() == "linear")
+        LinearLaw(changed).stress(0, F, false, s);
+      else
+        OgdenLaw(changed).stress(0, F, false, s);
+      return vec(s.P);
+    };
+    const double scale = 0.01 * std::max(1e-2, std::abs(table->table()(0, Eigen::Index(k))));
+    EXPECT_LT(test::best_relative_error(along, vec(derivatives[k]), scale), tolerance(1e-7)) << k;
+  }
+}
+
+TEST_P(Law, IsTheSameInEveryRotatedFrame) {
+  const Matrix3 F = generic(0.3), R = Eigen::AngleAxisd(2.1, Vector3(1, 2, -1).normalized()).toRotationMatrix();
+  EXPECT_NEAR(at(R * F).energy, at(F).energy, tolerance(1e-12) * at(F).energy);
+  EXPECT_LT((at(R * F).P - R * at(F).P).norm(), tolerance(1e-11) * at(F).P.norm());
+}
+
+TEST_P(Law, IsFreeOfStressAtRestAndLinearNearby) {
+  EXPECT_NEAR(at(Matrix3::Identity()).P.norm(), 0.0, 1e-12);
+  const SmallStrainModuli m = GetParam().law->small_strain(0);
+  const LambdaAlpha p = lambda_alpha(m);
+  const double h = 1e-6;
+  Matrix3 strain;
+  strain << 1.0, 0.3, -0.2, 0.3, -0.5, 0.4, -0.2, 0.4, 0.7;
+  Matrix3 expected = (p.lambda - 2.0 * p.alpha) * strain;
+  expected.diagonal().array() += p.alpha * strain.trace();
+  const Matrix3 P = at(Matrix3::Identity() + h * strain).P / h;
+  // The sampled law changes over strains of its kernel's rounding, 1e-3.
+  EXPECT_LT((P - expected).norm(), tolerance(1e-3) * expected.norm());
+}
+
+TEST_P(Law, ClosedPathsOfStrainTakeAndGiveNoWork) {
+  // A loop in the plane of two deformations, far beyond what was sampled; the trapezoidal rule is exact for periodic
+  // smooth integrands.
+  const Matrix3 A = generic(0.0).transpose() * generic(0.25) - Matrix3::Identity();
+  Matrix3 B;
+  B << -0.1, 0.3, 0.0, 0.1, 0.2, -0.2, 0.3, 0.0, 0.1;
+  double work = 0.0, size = 0.0;
+  const int steps = 4000;
+  for (int k = 0; k < steps; ++k) {
+    const double s = 2.0 * M_PI * k / steps;
+    const Matrix3 F = Matrix3::Identity() + std::sin(s) * A + (1.0 - std::cos(s)) * 0.7 * B;
+    const Matrix3 dF = (std::cos(s) * A + std::sin(s) * 0.7 * B) * (2.0 * M_PI / steps);
+    const double part = at(F).P.cwiseProduct(dF).sum();
+    work += part, size += std::abs(part);
+  }
+  EXPECT_LT(std::abs(work), tolerance(1e-7) * size);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Law, ::testing::ValuesIn(laws()), [](const auto& c) { return c.param.name; });
+
+TEST(OgdenLaw, PullsLessAndLessOfNothingFromItsTerms) {
+  // Uniaxial stretch of one term with nu = 0: P = 2 mu / a (l^(a-1) - 1/l), by hand.
+  MatrixX q(1, 3);
+  q << 1000.0, 4.0, 0.0;
+  const OgdenLaw law(q);
+  PointStress s;
+  law.stress(0, Vector3(1.5, 1.0, 1.0).asDiagonal(), false, s);
+  EXPECT_NEAR(s.P(0, 0), 500.0 * (std::pow(1.5, 3) - 1.0 / 1.5), 1e-9);
+  EXPECT_NEAR(s.P(1, 1), 0.0, 1e-10);
+}
+
+TEST(OgdenLaw, RefusesWhatIsNotAMaterial) {
+  MatrixX q(1, 3);
+  q << -1.0, 2.0, 0.3;
+  EXPECT_THROW(OgdenLaw{q}, std::invalid_argument);
+  q << 1.0, 2.0, 0.5;
+  EXPECT_THROW(OgdenLaw{q}, std::invalid_argument);
+}
+
+TEST(OgdenLaw, HasNoElementsInsideOut) {
+  PointStress s;
+  laws()[1].law->stress(0, Vector3(1.0, 1.0, -0.5).asDiagonal(), true, s);
+  EXPECT_EQ(s.energy, std::numeric_limits<double>::infinity());
+}
+
+TEST(LambdaAlpha, AndModuliAreTheSame) {
+  const LambdaAlpha p = lambda_alpha({1234.0, 0.31});
+  EXPECT_NEAR(moduli_of(p).youngs_modulus, 1234.0, 1e-9);
+  EXPECT_NEAR(moduli_of(p).poissons_ratio, 0.31, 1e-12);
+}
+
+// ---- sampled
+
+TEST(SampledLaw, PassesThroughItsSamplesAlongStraightPaths) {
+  // Stiffness by the strain's energy norm alone: stress is E(p(e)) e then, and at a sample that of the sample.
+  std::vector<MaterialSample> samples;
+  const Strain6 direction = (Strain6() << 0.5, -0.3, 0.2, 0.1, 0.4, -0.2).finished();
+  for (int k = 1; k <= 5; ++k)
+    samples.push_back({(0.06 * k * direction).transpose(), {lambda_alpha({1000.0 * (1.0 + k), 0.3})}});
+  const SampledMaterial material = sample_material(samples, {1e-6, 6});
+  for (const MaterialSample& sample : samples) {
+    const Strain6 e = sample.strains.row(0).transpose();
+    Matrix3 strain;
+    strain << e[0], e[3], e[4], e[3], e[1], e[5], e[4], e[5], e[2];
+    PointStress s;
+    material.law->stress(0, Matrix3::Identity() + strain, false, s);
+    const LambdaAlpha p = sample.p[0];
+    Matrix3 expected = (p.lambda - 2.0 * p.alpha) * strain;
+    expected.diagonal().array() += p.alpha * strain.trace();
+    // The path runs through the kernel's kinks at the samples before, which five points do not integrate exactly.
+    EXPECT_LT((s.P - expected).norm(), 0.05 * expected.norm());
+  }
+}
+
+TEST(SampledLaw, IsPassiveAndBoundedFarFromItsSamples) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const auto law = std::dynamic_pointer_cast<const SampledLaw>(sampled(seed));
+    const StrainSamples& samples = law->samples(0);
+    for (int k = 0; k < 200; ++k) {
+      Strain6 e;
+      for (int i = 0; i < 6; ++i) e[i] = normal(random) * (k % 2 ? 0.1 : 3.0);
+      const Eigen::Vector2d p = law->interpolated(0, e);
+      EXPECT_GT(p[0], 0.5 * samples.least[0]);
+      EXPECT_LT(p[0], 2.0 * samples.most[0]);
+      EXPECT_GT(p[1], -1.0);
+      EXPECT_LT(p[1], 0.5);
+      Matrix3 strain;
+      strain << e[0], e[3], e[4], e[3], e[1], e[5], e[4], e[5], e[2];
+      const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(strain);
+      if (eigen.eigenvalues()[0] < -0.95) continue;  // inside out
+      PointStress s;
+      law->stress(0, Matrix3::Identity() + strain, false, s);
+      EXPECT_GT(s.energy, 0.0);
+      EXPECT_GT(s.P.cwiseProduct(strain).sum(), 0.0) << e.transpose();
+    }
+  }
+}
+
+TEST(SampledLaw, ErrorFallsAsTheBasisGrows) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::vector<MaterialSample> samples(30);
+  for (MaterialSample& sample : samples) {
+    sample.strains.resize(3, 6);
+    for (int e = 0; e < 3; ++e) {
+      for (int k = 0; k < 6; ++k) sample.strains(e, k) = 0.1 * (e + 1) * normal(random);
+      sample.p.push_back(lambda_alpha({1000.0 * (1.0 + 10.0 * sample.strains.row(e).squaredNorm()), 0.3}));
+    }
+  }
+  const SampledMaterial material = sample_material(samples, {1e-9, 10});
+  ASSERT_EQ(material.error_by_size.size(), 10u);
+  for (std::size_t k = 1; k < 10; ++k) EXPECT_LT(material.error_by_size[k], 1.05 * material.error_by_size[k - 1]);
+  EXPECT_LT(material.error_by_size[9], 0.3 * material.error_by_size[0]);
+  EXPECT_THROW((void)sample_material({}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace pliant
