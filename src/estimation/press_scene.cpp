@@ -63,7 +63,7 @@ RigidContact contact_of(const PressScene& scene, const Press& press, double youn
                                   press.contact_centre.x(), press.contact_centre.y(), press.contact_centre.z()),
                       "`contact.centre` on the surface at rest",
                       "correct the press in capture.toml"});
-  const double stiffness = glued_stiffness(youngs_modulus, press.contact_radius);
+  const double stiffness = glued_stiffness(youngs_modulus, mean_edge(body));
   if (press.glued) return RigidContact::glued(body, disc, stiffness);
   const Vector3 axis = press.probe ? press.probe->normal : press.force.normalized();
   return RigidContact::sliding(

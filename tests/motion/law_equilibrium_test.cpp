@@ -30,7 +30,7 @@ struct Block {
         held(nodes_where(*body, [](const Vector3& p) { return p.y() < -0.0499; })) {
     if (glued) {
       contacts.push_back(
-          RigidContact::glued(*body, disc_samples(*body, {0.02, 0.05, -0.01}, 0.03), glued_stiffness(7000.0, 0.03)));
+          RigidContact::glued(*body, disc_samples(*body, {0.02, 0.05, -0.01}, 0.03), glued_stiffness(7000.0, 0.01)));
     } else {
       contacts.push_back(
           RigidContact::sliding(*body, boundary_samples(*body, 4), rigid_ball({0.01, 0.09, 0.0}, 0.04), 1e6, 5e-4));
@@ -84,14 +84,14 @@ TEST(LawEquilibrium, BalancesTheForceOfAGluedDisc) {
     ASSERT_TRUE(summary.converged) << equilibrium.failure();
     EXPECT_LT((equilibrium.contact_force(0, placement) - force).norm(), tolerance(1e-6) * force.norm());
     EXPECT_LT(placement.translations(0, 1), -0.01);
-    // The disc stays flat: its samples move as it does but for the springs' stretch.
+    // The disc stays flat: its samples move as it does but for the springs' stretch, the most at its rim.
     const Embedding& points = equilibrium.contact(0).points();
     double slip = 0.0;
     for (int i = 0; i < points.point_count(); ++i)
       slip = std::max(slip, (points.position(i, placement.nodes) - points.position(i, block.body->nodes) -
                              placement.translations.row(0).transpose())
                                 .norm());
-    EXPECT_LT(slip, 0.1 * placement.translations.row(0).norm());
+    EXPECT_LT(slip, 0.25 * placement.translations.row(0).norm());
   }
 }
 
@@ -135,7 +135,7 @@ TEST(LawEquilibrium, OnARigidBodyInsideSlides) {
   contacts.push_back(RigidContact::sliding(*body, boundary_samples(*body, 3),
                                            rigid_half_space({0.0, -0.025, 0.0}, {0.0, 1.0, 0.0}), 3e6, 2e-4));
   contacts.push_back(
-      RigidContact::glued(*body, disc_samples(*body, {0.02, 0.025, 0.0}, 0.02), glued_stiffness(7000.0, 0.02)));
+      RigidContact::glued(*body, disc_samples(*body, {0.02, 0.025, 0.0}, 0.02), glued_stiffness(7000.0, 0.01)));
   Equilibrium equilibrium(body, ogden(*body, foam), held, contacts);
   equilibrium.set_control(0, {ProbeControl::Kind::Position, {}, {}, {}});
   equilibrium.set_control(1, {ProbeControl::Kind::Force, {0.4, -3.0, 0.0}, {}, {}});

@@ -1,0 +1,285 @@
+#include "estimation/sample_fit.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace pliant {
+
+namespace {
+
+constexpr double least_ratio = -0.5;
+
+using Sparse = Eigen::SparseMatrix<double>;
+
+Sparse umbrella(const Body& body) {
+  std::vector<std::vector<int>> elements_of(std::size_t(body.node_count()));
+  for (int e = 0; e < body.element_count(); ++e)
+    for (const int node : body.element(e)) elements_of[std::size_t(node)].push_back(e);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int e = 0; e < body.element_count(); ++e) {
+    std::set<int> neighbours;
+    for (const int node : body.element(e))
+      neighbours.insert(elements_of[std::size_t(node)].begin(), elements_of[std::size_t(node)].end());
+    neighbours.erase(e);
+    entries.emplace_back(e, e, double(neighbours.size()));
+    for (const int other : neighbours) entries.emplace_back(e, other, -1.0);
+  }
+  Sparse L(body.element_count(), body.element_count());
+  L.setFromTriplets(entries.begin(), entries.end());
+  return L;
+}
+
+}  // namespace
+
+struct ElementSmoothness::Factors {
+  Sparse A;
+  Eigen::SimplicialLLT<Sparse> factor;
+};
+
+ElementSmoothness::ElementSmoothness(const Body& body) : factors_(std::make_unique<Factors>()) {
+  const Sparse L = umbrella(body);
+  Sparse identity(L.rows(), L.cols());
+  identity.setIdentity();
+  factors_->A = Sparse(L.transpose() * L);
+  // So that a field that is wrong by a constant everywhere costs little against one that changes between neighbours.
+  factors_->A += 1e-4 * factors_->A.diagonal().mean() * identity;
+  factors_->factor.compute(factors_->A);
+}
+ElementSmoothness::~ElementSmoothness() = default;
+ElementSmoothness::ElementSmoothness(ElementSmoothness&&) noexcept = default;
+int ElementSmoothness::size() const { return int(factors_->A.rows()); }
+MatrixX ElementSmoothness::times(const MatrixX& x) const { return factors_->A * x; }
+MatrixX ElementSmoothness::solve(const MatrixX& x) const { return factors_->factor.solve(x); }
+
+double unconstrained_ratio(double nu) { return std::log((nu - least_ratio) / (0.5 - nu)); }
+double ratio_of(double z) { return least_ratio + (0.5 - least_ratio) / (1.0 + std::exp(-z)); }
+
+namespace {
+
+MatrixX table_of(const VectorX& q) {
+  const Eigen::Index count = q.size() / 2;
+  MatrixX table(count, 2);
+  for (Eigen::Index e = 0; e < count; ++e) {
+    const LambdaAlpha p = lambda_alpha({std::exp(q[e]), ratio_of(q[count + e])});
+    table.row(e) << p.lambda, p.alpha;
+  }
+  return table;
+}
+
+/// d(lambda, alpha) / d(ln E, z) of an element.
+Eigen::Matrix2d table_derivative(double lambda, double alpha) {
+  const double nu = alpha / lambda, by_z = (nu - least_ratio) * (0.5 - nu) / (0.5 - least_ratio);
+  const double by_nu = lambda * (1.0 + 4.0 * nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
+  Eigen::Matrix2d by;
+  by << lambda, by_nu * by_z, alpha, (lambda + nu * by_nu) * by_z;
+  return by;
+}
+
+}  // namespace
+
+MatrixX sample_jacobian(PressedBody& body, const Body& mesh, const LinearLaw& law, JacobianBy by) {
+  const int n = mesh.node_count(), count = mesh.element_count();
+  const Embedding& points = body.embedding();
+  Equilibrium& equilibrium = body.equilibrium();
+  const int rows = n + equilibrium.contact_count(), coordinates = 3 * body.point_count();
+  MatrixX J(coordinates, 2 * count);
+  // Derivatives of dW/dx by an element's two unknowns, 3 N x 2.
+  const auto for_elements = [&](const auto& visit) {
+    equilibrium.elasticity().for_parameter_derivatives(
+        [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
+          const MatrixX derivative = by_q * table_derivative(law.table()(e, 0), law.table()(e, 1));
+          visit(e, nodes, derivative);
+        });
+  };
+  if (by == JacobianBy::Tangents) {
+    for_elements([&](int e, std::span<const int> nodes, const MatrixX& derivative) {
+      for (int k = 0; k < 2; ++k) {
+        Points forces = Points::Zero(rows, 3);
+        for (std::size_t a = 0; a < nodes.size(); ++a)
+          forces.row(nodes[a]) -= derivative.col(k).segment<3>(3 * Eigen::Index(a)).transpose();
+        const Points& change = equilibrium.response(forces);
+        Points moved = Points::Zero(body.point_count(), 3);
+        moved.topRows(points.point_count()) = points.positions(change.topRows(n));
+        if (body.has_probe()) moved.row(moved.rows() - 1) = change.row(n);
+        J.col(k * count + e) = flat(moved);
+      }
+    });
+    return J;
+  }
+  MatrixX responses(3 * rows, coordinates);  // H^-1 of each coordinate's own unit force
+  for (int c = 0; c < coordinates; ++c) {
+    Points forces = Points::Zero(rows, 3), nodal = Points::Zero(n, 3);
+    const int point = c / 3;
+    if (point < points.point_count()) {
+      points.add_transpose(point, Vector3::Unit(c % 3), nodal);
+      forces.topRows(n) = nodal;
+    } else {
+      forces(n, c % 3) = 1.0;
+    }
+    responses.col(c) = flat(equilibrium.response(forces));
+  }
+  for_elements([&](int e, std::span<const int> nodes, const MatrixX& derivative) {
+    MatrixX own(Eigen::Index(3 * nodes.size()), coordinates);
+    for (std::size_t a = 0; a < nodes.size(); ++a)
+      own.middleRows<3>(3 * Eigen::Index(a)) = responses.middleRows<3>(3 * Eigen::Index(nodes[a]));
+    const MatrixX block = -own.transpose() * derivative;
+    J.col(e) = block.col(0);
+    J.col(count + e) = block.col(1);
+  });
+  return J;
+}
+
+namespace {
+
+class SampleFit {
+ public:
+  SampleFit(const PressScene& scene, int press, const SmallStrainModuli& start, const ElementSmoothness& smoothness,
+            const SampleFitOptions& options)
+      : mesh_(*scene.body),
+        seen_(scene.presses[std::size_t(press)]),
+        smoothness_(smoothness),
+        options_(options),
+        q_(2 * smoothness.size()) {
+    q_.head(smoothness.size()).setConstant(std::log(start.youngs_modulus));
+    q_.tail(smoothness.size()).setConstant(unconstrained_ratio(start.poissons_ratio));
+    start_ = q_;
+    law_ = std::make_shared<LinearLaw>(table_of(q_));
+    body_.emplace(scene, press, law_, start.youngs_modulus);
+  }
+
+  PressSample run() {
+    PressSample result;
+    if (!solve(q_)) {
+      result.failure = body_->equilibrium().failure();
+      return result;
+    }
+    result.start_rms = rms();
+    double damping = 0.0;
+    bool is_new = true;
+    for (int rejected = 0; result.iterations < options_.max_iterations; ++result.iterations) {
+      if (is_new && !linearise()) {
+        result.failure = "the equilibrium is not stable";
+        return result;
+      }
+      const VectorX last = q_;
+      const double gamma = choose_weight(), cost = cost_of(gamma);
+      VectorX step = step_for(gamma, damping);
+      const double longest = step.cwiseAbs().maxCoeff();
+      if (longest > 1.0) step /= longest;  // a factor of e at most
+      q_ = last + step;
+      const bool solved = solve(q_);
+      is_new = solved && cost_of(gamma) < cost;
+      result.weight = gamma;
+      if (is_new) {
+        rejected = 0;
+        damping *= 0.3;
+        if (step.cwiseAbs().maxCoeff() < options_.step_tolerance) result.converged = true;
+      } else {
+        q_ = last;
+        damping = std::max(0.3, 5.0 * damping);
+        (void)solve(q_);
+        if (step.cwiseAbs().maxCoeff() < options_.step_tolerance || ++rejected == 6) result.converged = true;
+      }
+      if (result.converged) break;
+    }
+    result.rms = rms();
+    const MatrixX table = table_of(q_);
+    for (Eigen::Index e = 0; e < table.rows(); ++e) result.sample.p.push_back({table(e, 0), table(e, 1)});
+    body_->equilibrium().elasticity().evaluate(body_->placement().nodes, false);
+    result.sample.strains = body_->equilibrium().elasticity().strains();
+    result.succeeded = true;
+    return result;
+  }
+
+ private:
+  bool solve(const VectorX& q) {
+    law_ = std::make_shared<LinearLaw>(table_of(q));
+    body_->equilibrium().set_law(law_);
+    if (!body_->solve().converged) return false;
+    Points residuals = body_->points();
+    for (Eigen::Index m = 0; m < residuals.rows(); ++m) residuals.row(m) -= seen_.loaded[std::size_t(m)].transpose();
+    r_ = flat(residuals) / options_.noise;
+    return true;
+  }
+  double rms() const { return options_.noise * std::sqrt(3.0 * r_.squaredNorm() / double(r_.size())); }
+
+  VectorX smooth(const VectorX& d) const {
+    VectorX out(d.size());
+    out << smoothness_.times(d.head(d.size() / 2)), smoothness_.times(d.tail(d.size() / 2));
+    return out;
+  }
+  double cost_of(double gamma) const {
+    const VectorX d = q_ - start_;
+    return 0.5 * r_.squaredNorm() + 0.5 * gamma * d.dot(smooth(d));
+  }
+
+  /// J over the noise, Z = A^-1 J^T, and G = J Z by its eigenvalues.
+  bool linearise() {
+    Equilibrium& equilibrium = body_->equilibrium();
+    if (!equilibrium.prepare_derivatives(body_->placement())) return false;
+    const auto by = r_.size() < q_.size() ? JacobianBy::Adjoints : JacobianBy::Tangents;
+    J_ = sample_jacobian(*body_, mesh_, *law_, by) / options_.noise;
+    const Eigen::Index half = q_.size() / 2;
+    Z_.resize(q_.size(), J_.rows());
+    Z_.topRows(half) = smoothness_.solve(J_.leftCols(half).transpose());
+    Z_.bottomRows(half) = smoothness_.solve(J_.rightCols(half).transpose());
+    G_.compute(J_ * Z_);
+    return G_.info() == Eigen::Success;
+  }
+
+  /// Where the linearised model is fitted with gamma, its residual is gamma (gamma I + G)^-1 b, b = r - J (q - q0).
+  double choose_weight() const {
+    const VectorX b = G_.eigenvectors().transpose() * (r_ - J_ * (q_ - start_));
+    const double aim = double(r_.size()), top = std::max(G_.eigenvalues().maxCoeff(), 1e-300);
+    const auto misfit = [&](double gamma) {
+      double sum = 0.0;
+      for (Eigen::Index k = 0; k < b.size(); ++k) {
+        const double share = gamma / (gamma + std::max(G_.eigenvalues()[k], 0.0));
+        sum += share * share * b[k] * b[k];
+      }
+      return sum;
+    };
+    double low = 1e-7 * top, high = 1e4 * top;
+    if (misfit(low) > aim) return low;
+    if (misfit(high) < aim) return high;
+    for (int k = 0; k < 60; ++k) {
+      const double middle = std::sqrt(low * high);
+      (misfit(middle) > aim ? high : low) = middle;
+    }
+    return low;
+  }
+
+  /// -(J^T J + (1 + damping) gamma A)^-1 (J^T r + gamma A d), d = q - q0, by G alone:
+  /// with g = (1 + damping) gamma, (J^T J + g A)^-1 J^T = Z (G + g I)^-1, and A d moves along the same way.
+  VectorX step_for(double gamma, double damping) const {
+    const double g = (1.0 + damping) * gamma, back = gamma / g;
+    const VectorX d = q_ - start_;
+    // (J^T J + g A)^-1 gamma A d = back (d - Z (G + g I)^-1 J d)
+    const VectorX right = r_ - back * (J_ * d);
+    const VectorX turned = G_.eigenvectors().transpose() * right;
+    const VectorX scaled = (turned.array() / (G_.eigenvalues().array().max(0.0) + g)).matrix();
+    return -(Z_ * (G_.eigenvectors() * scaled)) - back * d;
+  }
+
+  const Body& mesh_;
+  const ObservedPress& seen_;
+  const ElementSmoothness& smoothness_;
+  SampleFitOptions options_;
+  VectorX q_, start_, r_;
+  std::shared_ptr<const LinearLaw> law_;
+  std::optional<PressedBody> body_;
+  MatrixX J_, Z_;
+  Eigen::SelfAdjointEigenSolver<MatrixX> G_;
+};
+
+}  // namespace
+
+PressSample fit_sample(const PressScene& scene, int press, const SmallStrainModuli& start,
+                       const ElementSmoothness& smoothness, const SampleFitOptions& options) {
+  return SampleFit(scene, press, start, smoothness, options).run();
+}
+
+}  // namespace pliant
