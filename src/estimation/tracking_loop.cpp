@@ -294,8 +294,16 @@ class TrackingLoop {
     return true;
   }
 
-  static double change(const VectorX& before, const VectorX& after) {
-    return std::abs(std::log(after[theta::youngs_modulus] / before[theta::youngs_modulus]));
+  /// Of ln E by an estimate, the greatest of all moduli.
+  double change(const VectorX& before, const VectorX& after) const {
+    const int controls = controls_of(after);
+    const VectorX from = with_controls(before, controls);
+    double greatest = 0.0;
+    for (int k = 0; k < controls; ++k) {
+      const int at = theta::modulus(k, controls, shared_.front() + controls - 1);
+      greatest = std::max(greatest, std::abs(std::log(after[at] / from[at])));
+    }
+    return greatest;
   }
 
   bool direct() {

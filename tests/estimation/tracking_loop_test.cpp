@@ -204,6 +204,26 @@ TEST(TrackingLoop, InterruptedAsItFollowsEndsWithTheBestSoFar) {
   EXPECT_EQ(direct.theta, points.refined.front().theta);
 }
 
+TEST(TrackingLoop, GoesOnUntilNoModulusChanges) {
+  FitOptions options = quickest(TrackingUse::Loop);
+  RecordedCapture bar = swinging_bar(few);
+  bar.capture.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  constexpr double wrong = 5.0;
+  options.parameters["youngs_modulus"] = {VectorX::Constant(1, modulus), false, {}};
+  options.parameters["youngs_modulus@beyond"].start = VectorX::Constant(1, wrong * modulus);
+  const FitOutcome outcome = fit({bar}, options);
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  const std::vector<TrackingRound>& rounds = outcome.tracking->rounds;
+  ASSERT_EQ(rounds.size(), 2u) << "the modulus beyond has changed, though the first one has not";
+  double before = wrong * modulus;
+  for (const TrackingRound& round : rounds) {
+    EXPECT_EQ(round.theta[theta::youngs_modulus], modulus);
+    const double now = round.theta[theta::modulus(1, 2, round.theta.size())];
+    EXPECT_NEAR(round.change, std::abs(std::log(now / before)), 1e-12);
+    before = now;
+  }
+}
+
 TEST(TrackingLoop, IsWhereItSuits) {
   RecordedCapture bar = swinging_bar();
   EXPECT_TRUE(tracks({bar}, {}));
