@@ -48,6 +48,15 @@ def vector(v):
     return "[" + ", ".join(f"{x:.6g}" for x in v) + "]"
 
 
+def depth_camera(name, size, pinhole, images, masks):
+    """A [[depth]] block: readings in millimetres, of a camera whose axes are the world's; `pinhole` is fx, fy, cx, cy."""
+    lines = ["[[depth]]", f'name = "{name}"'] + [f"{key} = {x}" for key, x in zip(("width", "height"), size)]
+    lines += [f"{key} = {x}" for key, x in zip(("fx", "fy", "cx", "cy"), pinhole)]
+    lines += ["camera_to_world = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]", f'images = "{images}"', "depth_scale = 1000.0",
+              f'masks = "{masks}"']
+    return "\n".join(lines) + "\n"
+
+
 def write_capture(folder, name, sensors, frames, up, surface=None, density=None, plane=None, static=False, start=0,
                   frame_rate=30.0):
     """Writes capture.toml; `sensors` are its [[depth]] or [[cloud]] blocks as text."""
