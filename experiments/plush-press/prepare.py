@@ -14,6 +14,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent)]
+import png
 import rest_captures as rc
 
 UNTOUCHED = 36         # frames
@@ -41,7 +42,7 @@ def main():
     press = work / "press"
     box = rc.box_of(rc.vertices(surface), REACH)
     for frame in range(250):
-        mask = rc.mask_of_box(rc.read_png(data / f"depth/{frame:06d}.png"), PINHOLE, box, found["plane"])
+        mask = rc.mask_of_box(png.read_depth(data / f"depth/{frame:06d}.png"), PINHOLE, box, found["plane"])
         rc.write_mask(press / f"mask/{frame:06d}.png", SIZE[0], mask)
     sensors = camera(rc.pattern(press, data, "depth/%06d.png"), "mask/%06d.png")
     rc.write_capture(press, "a knobbly ball pressed by hand", sensors, 250, start=UNTOUCHED, **world)
