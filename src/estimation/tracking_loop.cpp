@@ -266,8 +266,8 @@ class TrackingLoop {
       TrackingRound described_round = described(theta);
       if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
       is_resumed = false;
-      outcome_ = fit_once(followed_captures(recordings), options, std::move(from), "round " + std::to_string(round + 1),
-                          share(round), share(round + 1));
+      outcome_ = fit_once(followed_captures(recordings), options, std::exchange(from, {}),
+                          "round " + std::to_string(round + 1), share(round), share(round + 1));
       if (outcome_->interrupted || !outcome_->evaluation.succeeded) return false;
       options = without_start(with_chosen_controls(options_, outcome_->theta));
       described_round.theta = outcome_->theta;
