@@ -21,6 +21,7 @@
 #include "capture/survey.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
+#include "speech.hpp"
 
 namespace pliant::apps {
 
@@ -33,17 +34,6 @@ struct Arguments {
   std::string capture, out, compare_masks;
   int pictures = 3;
 };
-
-template <class... Values>
-std::string formatted(const char* format, Values... values) {
-  char text[512];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
-
-void say(const std::string& heading, const std::string& text) {
-  std::cout << formatted("%-13s", heading.c_str()) << text << '\n';
-}
 
 std::string vector_text(const Vector3& v) { return formatted("[%.4g, %.4g, %.4g]", v.x(), v.y(), v.z()); }
 

@@ -12,6 +12,7 @@
 #include "geometry/tet_mesh.hpp"
 #include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
+#include "speech.hpp"
 
 namespace pliant::apps {
 
@@ -26,14 +27,7 @@ struct Arguments {
   bool quadratic = false;
 };
 
-template <class... Values>
-std::string formatted(const char* format, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
-
-void say(const char* what, const std::string& text) { std::cout << formatted("  %-12s", what) << text << '\n'; }
+void say(const std::string& heading, const std::string& text) { apps::say("  " + heading, text, 14); }
 
 /// What is known about a mesh, told and for mesh.json.
 Json describe(const VolumeMesh& file, const TetMesh& mesh, const MeshReport& boundary) {

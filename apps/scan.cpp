@@ -15,6 +15,7 @@
 #include "geometry/mesh_io.hpp"
 #include "geometry/ray_scene.hpp"
 #include "report/picture.hpp"
+#include "speech.hpp"
 
 namespace pliant::apps {
 
@@ -31,15 +32,6 @@ struct Arguments {
   double depth = 0.0, thickness = 0.0;
   int resolution = 60;
 };
-
-template <class... Values>
-std::string formatted(const char* format, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
-
-void say(const char* what, const std::string& text) { std::cout << formatted("%-13s", what) << text << '\n'; }
 
 Json vector_json(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 

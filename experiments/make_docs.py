@@ -6,14 +6,15 @@ Usage: experiments/make_docs.py [--check]
 import math
 import sys
 
-import plots
+from bar_page import bar, dinosaur
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
-from page import IMAGES, ROOT, from_landscape, judged, machine, percent, results, table, with_truth
 from oracle_tracking_page import clouds
-from tracking_page import swinging
+from page import IMAGES, ROOT, judged, machine, percent, results, table, with_truth
 from real_tracks_page import real_tracks
+from silicone_beam_page import silicone_beam
+from tracking_page import swinging
 
-PAGE, PLOT, BEAM_PLOT = ROOT / "docs/experiments.md", IMAGES / "torus-sweep.svg", IMAGES / "silicone-beam.svg"
+PAGE, PLOT = ROOT / "docs/experiments.md", IMAGES / "torus-sweep.svg"
 
 
 def oracle():
@@ -238,117 +239,6 @@ def memory():
                         [[r["frames"], f"{r['all_states_bytes'] / 1024:.0f}", f"{r['peak_state_bytes'] / 1024:.0f}"] for r in figures["adjoint"]])
 
 
-BEAM_FITS = {
-    "release": "release", "release-coarse": "release, coarser mesh", "release-b": "release, repeat, coarser mesh",
-    "release-half-step": "release, coarser mesh, half the step", "release-later": "release, coarser mesh, let go 5 ms later",
-    "release-markers": "release, coarser mesh, markers of 1 g each",
-    "release-load52_V2_a": "release with the weight (not a prediction)", "release-load52_V2_b": "the same, repeat",
-    "rest": "at rest", "rest-coarse": "at rest, coarser mesh", "rest-finer": "at rest, finer mesh", "rest-b": "at rest, repeat",
-    "rest-markers": "at rest, markers of 1 g each"}
-BEAM_NAMES = {"gravity_V2_a": "own weight", "gravity_V2_b": "own weight, repeat", "load52_V2_a": "hung weight", "load52_V2_b": "hung weight, repeat"}
-
-
-def silicone_beam():
-    figures = results("silicone-beam")
-    if not figures:
-        return "Not run yet.\n"
-    write_beam_plot(figures)
-    fits = {f["label"]: f for f in figures["rest_fits"] + figures["release_fits"]}
-    authors = figures["authors_modulus"]
-    E = lambda label: fits[label]["youngs_modulus"]
-    drop = lambda name, k: 1e3 * figures["recordings"][name]["drops"][k][2]
-    text = ("![Drop of the tip over time, recorded and simulated](images/silicone-beam.svg)\n\n"
-            "The drop of the tip's three markers (their mean, along gravity). Blue: the model fitted to the release under the beam's own "
-            "weight, upper panel; dots: recorded. The lower panel is predicted.\n\n"
-            "What is assumed: the end face is held, all of it; the beam is free of load where it is held straight, so that markers "
-            "are at rest where they were before the release, in a frame fitted to all six markers (0.8 to 1.0 mm rms are left of the "
-            "nominal places); simulation begins at the last frame before the tip moves; density 1070 kg/m^3, Poisson's ratio 0.49. "
-            f"Gravity stands {figures['recordings']['gravity_V2_a']['tilt']:.1f} degrees off the beam's normal by that frame. The weight is a mass of 52 g "
-            "spread along the top edge, and moves along with it. A fit of a release sees one second.\n\n")
-    rows = [[BEAM_FITS[key], f["cells"], f"{f['youngs_modulus'] / 1e3:.1f} ± {f['std'] / 1e3:.1f}",
-             "" if f["at_rest"] else f"{f['mass_damping']:.2f}", "" if f["at_rest"] else f"{1e3 * f['stiffness_damping']:.2f}",
-             f"{1e3 * f['marker_rms']:.2f}"] for key in BEAM_FITS if (f := fits.get(key))]
-    text += table(["fit", "cells", "E [kPa]", "mass damping [1/s]", "stiffness damping [ms]", "markers' rms [mm]"], rows)
-    spread = math.sqrt(0.08 ** 2 + sum((E(label) / E("rest") - 1) ** 2 for label in ("rest-b", "rest-finer", "rest-nu-0.499")))
-    nu = [f for f in figures["rest_fits"] if f["label"].startswith("rest-nu")]
-    text += (f"\nThe authors' fit of the same recordings has {authors / 1e3:.1f} kPa; the beam at rest gives {percent(E('rest') / authors - 1)} of that, "
-             f"its release {percent(E('release') / authors - 1)}. The deviations in the table come from 0.1 mm of noise alone; these do more: "
-             f"the repeat {percent(E('rest-b') / E('rest') - 1)} (release {percent(E('release-b') / E('release-coarse') - 1)}); "
-             f"the mesh {percent(E('rest-coarse') / E('rest') - 1)} for the coarser and {percent(E('rest-finer') / E('rest') - 1)} for the finer one "
-             f"(release {percent(E('release-coarse') / E('release') - 1)} for the coarser); half the time step {percent(E('release-half-step') / E('release-coarse') - 1)}; "
-             f"letting go 5 ms, half a frame, later {percent(E('release-later') / E('release-coarse') - 1)}; "
-             f"1 g for each marker {percent(E('rest-markers') / E('rest') - 1)} (release {percent(E('release-markers') / E('release-coarse') - 1)}); Poisson's ratio "
-             + ", ".join(f"{f['poisson_ratio']:g}: {percent(f['youngs_modulus'] / E('rest') - 1)}" for f in nu) +
-             " (against 0.49). The held beam is straight to about half a millimetre, 8 % of the drop. Without the markers' mass, which is not known, "
-             f"these add up to a deviation of about {percent(spread, False)}, {E('rest') / 1e3:.0f} ± {spread * E('rest') / 1e3:.0f} kPa at rest; "
-             f"the authors' value lies {'inside' if abs(E('rest') / authors - 1) < spread else 'outside'}.\n\n")
-    text += (f"The release is stiffer than the rest by {percent(E('release') / E('rest') - 1, False)}: the silicone relaxes. The recorded tip sinks from "
-             + " to ".join(f"{drop('gravity_V2_a', k):.2f}" for k in (0, 1, 2)) + " mm between 1.0 to 1.5, 1.5 to 2.5 and 3.0 to 3.9 s; with the weight from "
-             + " to ".join(f"{drop('load52_V2_a', k):.2f}" for k in (0, 1, 2)) + " mm.\n\nThe tip at rest, 1.5 to 2.5 s after the release:\n\n")
-    model = {"rest": "at rest, own weight", "release": "release, own weight"}
-    text += table(["fitted to", "predicted", "drop [mm]", "recorded [mm]", "error"],
-                  [[model[p["model"]], BEAM_NAMES[p["recording"]], f"{1e3 * p['drop']:.2f}", f"{1e3 * p['measured']:.2f}", percent(p["error"])]
-                   for p in figures["rest_predictions"]])
-    text += "\nThe first second of each release, by the model fitted to the first one:\n\n"
-    text += table(["release", "frequency [Hz] (recorded)", "error", "damping ratio (recorded)", "markers' rms [mm]", "after 0.5 s", "without the mean"],
-                  [[BEAM_NAMES[p["recording"]] + (" (fitted)" if p["recording"] == "gravity_V2_a" else ""),
-                    f"{p['swing']['frequency']:.3f} ({p['measured_swing']['frequency']:.3f})", percent(p["frequency_error"]),
-                    f"{p['swing']['damping_ratio']:.3f} ({p['measured_swing']['damping_ratio']:.3f})", f"{1e3 * p['rms']:.2f}",
-                    f"{1e3 * p['rms_second_half']:.2f}", f"{1e3 * p['rms_without_mean']:.2f}"] for p in figures["release_predictions"]])
-    of_meshes = lambda at: sorted((p for p in figures["weight_meshes"] if p["at"] == at), key=lambda p: p["cells"])
-    both = lambda rows, key: " and ".join(percent(p[key]) for p in rows)
-    text += ("\nHung from the middle of the edge alone, the weight dents the edge beside a marker by as much as the mesh lets it: the drops at rest would be "
-             + both([p for p in figures["point_rest_predictions"] if p["model"] == "rest"], "error") + " off by the model fitted at rest, "
-             + both([p for p in figures["point_rest_predictions"] if p["model"] == "release"], "error") + " by the other, and the frequencies "
-             + both(figures["point_release_predictions"], "frequency_error") + ". On " + ", ".join(str(p["cells"]) for p in of_meshes("edge")) +
-             " cells the first drop, of the model fitted at rest on the same mesh, is " + ", ".join(percent(p["error"]) for p in of_meshes("edge")) + " off with the weight spread and "
-             + ", ".join(percent(p["error"]) for p in of_meshes("one point")) + " with it at one point, so it is spread.\n")
-    return text + beam_misses(figures, fits) + f"\nMeasured on {machine(figures)}.\n"
-
-
-def beam_misses(figures, fits):
-    """Why the loaded release is not met: how it sets out, how it dies out, and what its own fit leaves."""
-    loaded = [p for p in figures["release_predictions"] if p["recording"].startswith("load")]
-    own = figures["release_predictions"][0]
-    each = lambda value: " and ".join(value(p) for p in loaded)
-    first = len(own["drops"]) // 6  # the first swing down of the loaded tip
-    return ("\nThe loaded release was to be met within 2 mm rms: missed, with " + each(lambda p: f"{1e3 * p['rms']:.1f}") + " mm. It does not set out as simulated, from rest: "
-            "20 ms after the last frame at rest the tip is " + each(lambda p: f"{p['measured_drops'][2]:.1f}") + " mm down, where free fall gives 2.0 mm; at 50 to 60 ms its fall slows to half and "
-            "quickens again, as if the weight were caught by its string only then; and its first swing reaches " + each(lambda p: f"{max(p['measured_drops'][:first]):.1f}") +
-            " mm, where a release without loss reaches " + each(lambda p: f"{max(p['drops'][:first]):.1f}") + " mm. Nor does it die out as simulated: the recorded "
-            f"damping ratio is {own['measured_swing']['damping_ratio']:.3f} at {own['measured_swing']['frequency']:.1f} Hz and " + each(lambda p: f"{p['measured_swing']['damping_ratio']:.3f}") +
-            f" at {loaded[0]['measured_swing']['frequency']:.1f} Hz, nearly the same at both, where stiffness damping falls and mass damping rises with the period; one frequency cannot tell the two apart "
-            f"(the fit says so of mass damping), and the first half swing, which loses more than the later ones, makes the fitted ratio {own['swing']['damping_ratio']:.3f}. "
-            "Fitted to the loaded releases themselves, stiffness and dampings still leave " +
-            " and ".join(f"{1e3 * fits['release-' + p['recording']]['marker_rms']:.1f}" for p in loaded) + " mm.\n")
-
-
-def write_beam_plot(figures):
-    """Two panels: the tip's drop under its own weight and under the hung one."""
-    chosen = [p for p in figures["release_predictions"] if p["recording"] in ("gravity_V2_a", "load52_V2_a")]
-    width, height, left, top, gap = 640, 200, 60, 16, 36
-    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {2 * height + gap + 60}" font-family="sans-serif" font-size="12">',
-             '<rect width="100%" height="100%" fill="#fff"/>']
-    for number, p in enumerate(chosen):
-        offset, most = top + number * (height + gap), {0: 12.0, 1: 30.0}[number]
-        sx = lambda k: left + (width - left - 20) * k / (len(p["drops"]) - 1)
-        sy = lambda y: offset + height * (y + 0.05 * most) / (1.1 * most)
-        parts.append(f'<rect x="{left}" y="{offset}" width="{width - left - 20}" height="{height}" fill="none" stroke="#ccc"/>')
-        for y in range(0, int(most) + 1, int(most) // 3):
-            parts.append(f'<line x1="{left}" x2="{width - 20}" y1="{sy(y):.1f}" y2="{sy(y):.1f}" stroke="#eee"/>')
-            parts.append(f'<text x="{left - 6}" y="{sy(y) + 4:.1f}" text-anchor="end">{y}</text>')
-        points = " ".join(f"{sx(k):.1f},{sy(y):.1f}" for k, y in enumerate(p["drops"]))
-        parts.append(f'<polyline points="{points}" fill="none" stroke="#1f5fa8" stroke-width="2"/>')
-        for k, y in enumerate(p["measured_drops"]):
-            parts.append(f'<circle cx="{sx(k):.1f}" cy="{sy(y):.1f}" r="2" fill="#b5401f"/>')
-        label = {"gravity_V2_a": "own weight: fitted", "load52_V2_a": "with 52 g hung from the tip: predicted"}[p["recording"]]
-        parts.append(f'<text x="{width - 28}" y="{offset + 18}" text-anchor="end">{label}</text>')
-    bottom = top + 2 * height + gap
-    for tenth in range(0, 11, 2):
-        parts.append(f'<text x="{left + (width - left - 20) * tenth / 10:.1f}" y="{bottom + 16}" text-anchor="middle">{tenth / 10:g}</text>')
-    parts.append(f'<text x="{(left + width - 20) / 2:.0f}" y="{bottom + 34}" text-anchor="middle">time after the release [s]; drop of the tip [mm], '
-                 'downwards; dots: recorded, line: simulated</text></svg>')
-    BEAM_PLOT.write_text("\n".join(parts) + "\n")
 SILICONE_NAMES = {"silicone-h_e_c": "bar, Ecoflex 00-50", "silicone-h_e_s": "spine, Ecoflex 00-50", "silicone-t_em_c": "twisted bar, Ecoflex 00-50 and Mold Star 15",
                   "silicone-h_e_c-raw": "bar, range as recorded"}
 
@@ -486,161 +376,6 @@ def arm():
                    "points fall on frames 10 ms apart; weight, which stretches the arm if it hangs, is left out and changes E by some per cent. Steps of 400 mbar and more are left out: "
                    "after them the arm creeps as far as it swings.\n\nWhat cannot be had: the pressure's load (no chambers), its course over time (only the "
                    "set point), and where the markers sit on the arm (they stand off the tip; their mean is taken for its middle).\n")
-def small(value):
-    """A relative error in percent, without digits that say nothing."""
-    percents = 100 * abs(value)
-    if percents < 1e-3:
-        return "< 0.001 %"
-    return f"{100 * value:+.0f} %" if percents >= 10 else f"{100 * value:+.2g} %"
-
-
-def unsigned(value):
-    return small(value).lstrip("+")
-
-
-WHAT = {"clean": "no noise", "noise": "noise", "finer_truth": "no noise, truth with half the step", "homogeneous": "no noise, truth even",
-        "nelder_mead": "no noise, Nelder-Mead"}
-
-
-def track_rows(runs):
-    rows = []
-    for name, r in runs.items():
-        kind, count = name.rsplit("-", 1)
-        e = r["errors"]
-        rows.append([WHAT[kind], count, r["settings"]["horizon"].replace(",", ", then "), small(e["worst_modulus"]), small(e["mass_damping"]), small(e["stiffness_damping"]),
-                     r["evaluations"], f"{r['wall_seconds']:.0f}", f"{r['processor_seconds']:.0f}", r["reason"] if r["converged"] else "stopped by its budget"])
-    return table(["case", "moduli", "frames", "worst E", "alpha", "beta", "evaluations", "time [s]", "processor time [s]", "why it ended"], rows)
-
-
-def bar_plots(figures):
-    runs = figures["runs"]
-    panel = plots.Panel(80, 20, 540, 300, (0.0, 2.3), (-10.0, 1.5))
-    number = 0
-    for count, colour in zip((1, 2, 8), plots.COLOURS):
-        for kind, title in (("clean", "Levenberg-Marquardt"), ("nelder_mead", "Nelder-Mead")):
-            row = runs.get(f"{kind}-{count}")
-            if not row:
-                continue
-            points = [(1 + i, max(worst, 1e-10)) for i, _, _, worst in row["history"]]
-            panel.line([(1, abs(start_error(row)))] + points, colour, f"{title}, {count} {'modulus' if count == 1 else 'moduli'}", number,
-                       dashed=kind == "nelder_mead")
-            number += 1
-    panel.axes("evaluations of the cost", "worst relative error of a modulus")
-    plots.write(IMAGES / "bar.svg", 660, 380, panel.parts)
-    from_landscape(figures, IMAGES / "bar-landscape.svg")
-    panel = plots.Panel(80, 20, 540, 260, (3.0, 8.0), (-6.0, 2.5))
-    number = 0
-    for name in ("clean-1", "clean-2"):
-        row = runs.get(name, {})
-        for curve in row.get("start", {}).get("curves", []):
-            count, control = int(name[-1]), curve["control"]
-            colour = plots.COLOURS[number]
-            label = "one modulus" if count == 1 else f"modulus {control} of {count}"
-            panel.vertical(row["parameters"][control - 1]["truth"], colour)
-            panel.line(list(zip(curve["moduli"], curve["mismatch"])), colour, label, number)
-            number += 1
-    panel.axes("Young's modulus [Pa]; dashed: truth", "frequency mismatch")
-    plots.write(IMAGES / "bar-frequency-match.svg", 660, 340, panel.parts)
-
-
-def bar_targets(runs):
-    """The targets, and whether the runs at hand meet them."""
-    def worst(kind, key):
-        return max(abs(r["errors"][key]) for name, r in runs.items() if name.startswith(kind + "-"))
-
-    rows = []
-    if "clean-8" in runs:
-        eight = runs["clean-8"]
-        dampings = max(worst("clean", "mass_damping"), worst("clean", "stiffness_damping"))
-        rows += [["without noise, every E within 1 %", unsigned(worst("clean", "worst_modulus")), judged(worst("clean", "worst_modulus") < 0.01)],
-                 ["without noise, alpha and beta within 2 %", unsigned(dampings), judged(dampings < 0.02)],
-                 ["eight moduli in at most 3 min", f"{eight['wall_seconds']:.0f} s at load {eight['load_at_start']:.0f}, {eight['processor_seconds']:.0f} s of processor", judged(eight["wall_seconds"] <= 180)]]
-    if "homogeneous-8" in runs:
-        rows.append(["eight moduli of an even bar within 2 %", unsigned(worst("homogeneous", "worst_modulus")), judged(worst("homogeneous", "worst_modulus") < 0.02)])
-    for name, r in sorted(runs.items()):
-        if name.startswith("noise-"):
-            rows.append([f"with noise, every E within 5 %: {name.split('-')[1]}", unsigned(abs(r["errors"]["worst_modulus"])), judged(abs(r["errors"]["worst_modulus"]) < 0.05)])
-    return table(["target", "worst", ""], rows)
-
-
-def bar():
-    figures = results("bar")
-    if not figures:
-        return "Not run yet.\n"
-    bar_plots(figures)
-    runs = figures["runs"]
-    some = next(iter(runs.values()))
-    eight, simplex = runs["clean-8"], runs["nelder_mead-8"]
-    text = table(["", "Wang 2015", "here"], [
-        ["nodes / tetrahedra", "756 / 3000", f"{some['nodes']} / {some['elements']}"],
-        ["frames that are compared", "3 x 250", f"3 x {figures['frames']}"],
-        ["eight moduli, worst E", "0 to 20 %, one 37 %", small(eight["errors"]["worst_modulus"])],
-        [f"even bar, eight moduli, first {figures['first_horizon']} frames: worst E", "7 %", small(runs["homogeneous-8"]["errors"]["worst_modulus"])],
-        ["beta, worst", "60 %", small(max((r["errors"]["stiffness_damping"] for n, r in runs.items() if n.startswith("clean")), key=abs))],
-        ["fit of eight moduli", "1.5 h, 8 cores", f"{eight['wall_seconds']:.0f} s, 2 shared cores ({eight['processor_seconds']:.0f} s of processor)"],
-        ["optimiser", "Nelder-Mead", "Levenberg-Marquardt"],
-        ["forward / adjoint step", "", f"{eight['costs']['ms_per_forward_step']:.1f} / {eight['costs']['ms_per_adjoint_step']:.1f} ms"]])
-    text += (f"\nFits compare the first {figures['first_horizon']} frames, at 60 a second, of each motion, and then all {figures['frames']}; where they begin comes from "
-             f"the frequencies in {figures['frames']} frames of the bend ({eight['start']['wall_seconds']:.0f} s beside those of the fit of eight moduli). The paper lets the bar go from bent, twisted and stretched shapes; here it sets out "
-             "straight with a velocity. Control points mix in the logarithm, in the paper linearly.\n\n"
-             "**Without noise this is an inverse crime**: the truth is made by the very model that fits it, so the errors show that the optimiser finds the minimum, "
-             "not how well a real bar would be measured. The row whose truth was simulated with half the step shows what another discretisation of time alone does.\n\n")
-    text += bar_targets(runs) + "\n" + track_rows(runs)
-    text += noise_by_frames(figures)
-    text += (f"\nNoise is {100 * figures['noise']:g} % of the bar's length on each coordinate of each node. Nelder-Mead begins where the others do, compares the first "
-             f"{figures['first_horizon']} frames alone, and ends where its simplex is as small as the last step of the others, or after {figures['nelder_mead_budget_seconds']} s. With eight moduli it stood at {small(simplex['errors']['worst_modulus'])} after "
-             f"{simplex['evaluations']} evaluations (start: {small(start_error(simplex))}).\n"
-             "\n![Worst error of a modulus over evaluations](images/bar.svg)\n"
-             "\nThe cost over the two moduli of the bar with two control points (the paper's figure 6), first "
-             f"{figures['landscape_frames']} frames; grey: cannot be simulated; cross: truth. It is a narrow curved valley, along which a softer held end and a stiffer free end make up for each other.\n\n![Cost over two moduli](images/bar-landscape.svg)\n"
-             "\nHow well the body's frequencies match those seen in its bend, over each modulus with the others as found (figure 7). Its minimum is where the fits begin.\n"
-             "\n![Frequency mismatch over Young's modulus](images/bar-frequency-match.svg)\n")
-    return text + f"\nMeasured on {machine(figures)}.\n"
-
-
-def noise_by_frames(figures):
-    """What noise does to each of eight moduli, and what it must do."""
-    stages, bounds = figures["runs"]["noise-8"]["stages"], {d["frames"]: d["log_deviations"] for d in figures["deviations"]}
-    rows = []
-    for k in range(8):
-        rows.append([f"{k + 1}"] + [cell for s in stages for cell in (small(s["parameters"][k]["relative_error"]), f"{100 * bounds[s['frames']][k]:.2g} %")])
-    heads = [head for s in stages for head in (f"error, {s['frames']} frames", "least deviation")]
-    free, = [bounds[s["frames"]][7] for s in stages[-1:]]
-    return ("\nWith noise, eight moduli from the held end to the free one, as found after each stage, and the least standard deviation that any unbiased estimate of ln E can "
-            "have with this noise in this many frames (the Cramer-Rao bound, from the cost's curvature at the truth):\n\n" + table(["modulus"] + heads, rows) +
-            f"\nThe free end hardly deforms: its modulus cannot be told with less than {100 * free:.2g} % of deviation from {stages[-1]['frames']} frames of these motions, and the estimate is "
-            f"{abs(stages[-1]['parameters'][7]['relative_error']) / free:.1f} such deviations off.\n")
-
-
-def start_error(row):
-    """Worst relative error of a modulus that the modes' frequencies gave."""
-    return max((found / p["truth"] - 1.0 for found, p in zip(row["start"].get("moduli", []), row["parameters"])), key=abs, default=float("nan"))
-
-
-def dinosaur():
-    figures = results("dinosaur")
-    if not figures:
-        return "Not run yet.\n"
-    r = figures["runs"]["clean-7"]
-    places = ["head", "tail", "left hand", "right hand", "left foot", "right foot", "belly"]
-    text = table(["", "Wang 2015", "here"], [
-        ["nodes / tetrahedra", "4867 / 16270", f"{r['nodes']} / {r['elements']}"],
-        ["frames that are compared", "523", r["settings"]["horizon"]],
-        ["worst E", "5 %", small(r["errors"]["worst_modulus"])],
-        ["beta", "60 %", small(r["errors"]["stiffness_damping"])],
-        ["time", "", f"{r['wall_seconds']:.0f} s, 2 shared cores ({r['processor_seconds']:.0f} s of processor)"],
-        ["forward / adjoint step", "", f"{r['costs']['ms_per_forward_step']:.0f} / {r['costs']['ms_per_adjoint_step']:.0f} ms"]])
-    text += "\n" + table(["", "truth", "found", "error"], [[place, f"{p['truth']:g}", f"{p['value']:.5g}", small(p["relative_error"])]
-                                                       for place, p in zip(places + ["alpha [1/s]", "beta [s]"], r["parameters"])])
-    text += "\n" + table(["target", "here", ""], [
-        ["every E within 3 %", unsigned(abs(r["errors"]["worst_modulus"])), judged(abs(r["errors"]["worst_modulus"]) < 0.03)],
-        ["at most 30 min", f"{r['wall_seconds'] / 60:.1f} min", judged(r["wall_seconds"] <= 1800)]])
-    text += ("\nIt began at ten times the truth's mean modulus and dampings, since no vibration was seen well enough" if r["start"]["by"] == "off" else "\nIt began at what the modes' frequencies give") + ". "
-    text += ("Made of rounded limbs, meshed, held at the feet and pushed. Also an inverse crime: model and truth are one, and there is no noise. "
-             f"It {'converged' if r['converged'] else 'did not converge'} after {r['evaluations']} evaluations.\n")
-    cores = figures["machine"]
-    return text + f"\nMeasured on {cores['cores']} cores ({cores['processor']}), shared with other work" + (
-        f": load {r['load_at_start']:.1f} at the start" if "load_at_start" in r else "") + ".\n"
 
 
 SECTIONS = [

@@ -8,7 +8,8 @@ import pathlib
 import struct
 import subprocess
 import sys
-import zlib
+
+import png
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
@@ -46,6 +47,15 @@ def refer(link, target):
 
 def vector(v):
     return "[" + ", ".join(f"{x:.6g}" for x in v) + "]"
+
+
+def depth_camera(name, size, pinhole, images, masks):
+    """A [[depth]] block: readings in millimetres, of a camera whose axes are the world's; `pinhole` is fx, fy, cx, cy."""
+    lines = ["[[depth]]", f'name = "{name}"'] + [f"{key} = {x}" for key, x in zip(("width", "height"), size)]
+    lines += [f"{key} = {x}" for key, x in zip(("fx", "fy", "cx", "cy"), pinhole)]
+    lines += ["camera_to_world = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]", f'images = "{images}"', "depth_scale = 1000.0",
+              f'masks = "{masks}"']
+    return "\n".join(lines) + "\n"
 
 
 def write_capture(folder, name, sensors, frames, up, surface=None, density=None, plane=None, static=False, start=0,
@@ -91,51 +101,8 @@ def vertices(path):
     return [struct.unpack_from("<ddd", data, 25 * i) for i in range(count)]
 
 
-def read_png(path):
-    """Width, height and the rows of a 16-bit grey PNG."""
-    content = path.read_bytes()
-    width, height, bits, colour = struct.unpack_from(">IIBB", content, 16)
-    assert (bits, colour) == (16, 0), f"{path}: not a 16-bit grey PNG"
-    at, packed = 8, b""
-    while at < len(content):
-        length, kind = struct.unpack_from(">I4s", content, at)
-        if kind == b"IDAT":
-            packed += content[at + 8:at + 8 + length]
-        at += length + 12
-    raw, stride, rows = zlib.decompress(packed), 2 * width, []
-    before = bytearray(stride)
-    for v in range(height):
-        kind, row = raw[v * (stride + 1)], bytearray(raw[v * (stride + 1) + 1:(v + 1) * (stride + 1)])
-        unfilter(kind, row, before)
-        rows.append(struct.unpack(f">{width}H", row))
-        before = row
-    return width, height, rows
-
-
-def unfilter(kind, row, before):
-    """Undoes a PNG row's filter in place, two bytes a pixel."""
-    for i in range(len(row) if kind else 0):
-        a, b, c = row[i - 2] if i > 1 else 0, before[i], before[i - 2] if i > 1 else 0
-        if kind == 1:
-            add = a
-        elif kind == 2:
-            add = b
-        elif kind == 3:
-            add = (a + b) // 2
-        else:
-            p = a + b - c
-            add = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-        row[i] = (row[i] + add) & 255
-
-
 def write_mask(path, width, rows):
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    packed = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, len(rows), 8, 0, 0, 0, 0)) +
-                     chunk(b"IDAT", packed) + chunk(b"IEND", b""))
+    png.write(path, width, len(rows), 0, b"".join(b"\0" + bytes(row) for row in rows))
 
 
 def mask_of_box(image, pinhole, box, plane, clearance=0.004):

@@ -15,19 +15,7 @@ sys.path[:0] = [str(HERE.parent)]
 import rest_captures as rc
 
 DENSITY = 60           # kg/m^3, of a stuffed toy
-CAMERA = """[[depth]]
-name = "kinect"
-width = 640
-height = 480
-fx = 517.0
-fy = 517.0
-cx = 320.0
-cy = 240.0
-camera_to_world = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-images = "{images}"
-depth_scale = 1000.0
-masks = "{masks}"
-"""
+SIZE, PINHOLE = (640, 480), (517.0, 517.0, 320.0, 240.0)
 UP = [0.0, -0.87, -0.5]  # about; the scan finds the ground's normal
 
 
@@ -36,8 +24,8 @@ def main():
     work, data = arguments.work, rc.shared_data() / "plush-depth-pair"
 
     def camera(folder):
-        return CAMERA.format(images=rc.pattern(folder, data, "snoopy_depth_00005%d.png"),
-                             masks=rc.pattern(folder, data, "snoopy_omask_00005%d.png"))
+        return rc.depth_camera("kinect", SIZE, PINHOLE, rc.pattern(folder, data, "snoopy_depth_00005%d.png"),
+                               rc.pattern(folder, data, "snoopy_omask_00005%d.png"))
 
     scan, move = work / "scan", work / "move"
     rc.write_capture(scan, "a plush dog", camera(scan), 2, UP)

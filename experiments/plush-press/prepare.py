@@ -14,27 +14,18 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent)]
+import png
 import rest_captures as rc
 
 UNTOUCHED = 36         # frames
 DENSITY = 150          # kg/m^3, of a soft foamed toy
 REACH = 0.025          # [m]; the bear's arm is 40 mm away
-PINHOLE = (275.0, 275.0, 160.0, 120.0)
+SIZE, PINHOLE = (320, 240), (275.0, 275.0, 160.0, 120.0)
 UP = [-0.017, -0.867, -0.498]  # about; the scan finds the table's normal
 
-CAMERA = """[[depth]]
-name = "table"
-width = 320
-height = 240
-fx = 275.0
-fy = 275.0
-cx = 160.0
-cy = 120.0
-camera_to_world = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-images = "{images}"
-depth_scale = 1000.0
-masks = "{masks}"
-"""
+
+def camera(images, masks):
+    return rc.depth_camera("table", SIZE, PINHOLE, images, masks)
 
 
 def main():
@@ -42,8 +33,7 @@ def main():
     work, data = arguments.work, rc.shared_data() / "plush-press-rgbd"
 
     scan = work / "scan"
-    sensors = CAMERA.format(images=rc.pattern(scan, data, "depth/%06d.png"),
-                            masks=rc.pattern(scan, data, "mask_ball/%06d.png"))
+    sensors = camera(rc.pattern(scan, data, "depth/%06d.png"), rc.pattern(scan, data, "mask_ball/%06d.png"))
     rc.write_capture(scan, "a knobbly ball at rest", sensors, UNTOUCHED, UP, static=True)
     found = rc.scan(arguments.program, scan)
     surface = scan / "rest/rest.ply"
@@ -52,9 +42,9 @@ def main():
     press = work / "press"
     box = rc.box_of(rc.vertices(surface), REACH)
     for frame in range(250):
-        mask = rc.mask_of_box(rc.read_png(data / f"depth/{frame:06d}.png"), PINHOLE, box, found["plane"])
-        rc.write_mask(press / f"mask/{frame:06d}.png", 320, mask)
-    sensors = CAMERA.format(images=rc.pattern(press, data, "depth/%06d.png"), masks="mask/%06d.png")
+        mask = rc.mask_of_box(png.read_depth(data / f"depth/{frame:06d}.png"), PINHOLE, box, found["plane"])
+        rc.write_mask(press / f"mask/{frame:06d}.png", SIZE[0], mask)
+    sensors = camera(rc.pattern(press, data, "depth/%06d.png"), "mask/%06d.png")
     rc.write_capture(press, "a knobbly ball pressed by hand", sensors, 250, start=UNTOUCHED, **world)
 
     after = work / "after"
@@ -62,7 +52,7 @@ def main():
     for i, frame in enumerate(later):
         rc.refer(after / f"depth/{i:06d}.png", data / f"depth/{frame:06d}.png")
         rc.refer(after / f"mask/{i:06d}.png", data / f"mask_ball/{frame:06d}.png")
-    sensors = CAMERA.format(images="depth/%06d.png", masks="mask/%06d.png")
+    sensors = camera("depth/%06d.png", "mask/%06d.png")
     rc.write_capture(after, "a knobbly ball after it was pressed", sensors, len(later), static=True, **world)
 
     for capture in (press, after):

@@ -4,61 +4,24 @@ import csv
 import math
 import pathlib
 import struct
-import zlib
 
 import common
-import rest_captures
+import png
 
 PINHOLE = (275.0, 275.0, 160.0, 120.0)
 SHADES = 2  # pixels to each side whose majority must be red, too
-
-
-def read_colours(path):
-    """Width, height and rows of (r, g, b) or (r, g, b, a) of an 8-bit PNG."""
-    return read_samples(path, {2: 3, 6: 4})
-
-
-def read_samples(path, sizes):
-    """Width, height and rows of pixels of an 8-bit PNG: numbers where they have one sample, else tuples.
-
-    `sizes`: how many samples a pixel has, by the kinds of colour that are allowed."""
-    content = path.read_bytes()
-    width, height, bits, colour = struct.unpack_from(">IIBB", content, 16)
-    assert bits == 8 and colour in sizes, f"{path}: not an 8-bit PNG of the kind asked for"
-    size = sizes[colour]
-    at, packed = 8, b""
-    while at < len(content):
-        length, kind = struct.unpack_from(">I4s", content, at)
-        if kind == b"IDAT":
-            packed += content[at + 8:at + 8 + length]
-        at += length + 12
-    raw, stride, rows = zlib.decompress(packed), size * width, []
-    before = bytearray(stride)
-    for v in range(height):
-        kind, row = raw[v * (stride + 1)], bytearray(raw[v * (stride + 1) + 1:(v + 1) * (stride + 1)])
-        for i in range(stride if kind else 0):
-            a, b, c = row[i - size] if i >= size else 0, before[i], before[i - size] if i >= size else 0
-            if kind == 4:
-                p = a + b - c
-                add = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-            else:
-                add = (a, b, (a + b) // 2)[kind - 1]
-            row[i] = (row[i] + add) & 255
-        rows.append(list(row) if size == 1 else [tuple(row[i:i + size]) for i in range(0, stride, size)])
-        before = row
-    return width, height, rows
 
 
 def pixels(data, frame):
     """Points [m] of the owners' mask in a frame, and whether each is as red as the ball; None where there is no picture in
     colour. Skin is yellower than the ball: a pixel is the ball's where it and most of those about it are red and at least
     as blue as they are green."""
-    width, height, depth = rest_captures.read_png(data / f"depth/{frame:06d}.png")
-    mask = read_colours(data / f"mask_ball/{frame:06d}.png")[2]
+    width, height, depth = png.read_depth(data / f"depth/{frame:06d}.png")
+    mask = png.read_colours(data / f"mask_ball/{frame:06d}.png")[2]
     picture = data / f"color/{frame:06d}.png"
     red = None
     if picture.exists():
-        colours = read_colours(picture)[2]
+        colours = png.read_colours(picture)[2]
         red = [[r - g > 40 and b - g > -5 for r, g, b in row] for row in colours]
     fx, fy, cx, cy = PINHOLE
     points, is_ball = [], []

@@ -7,15 +7,14 @@ There is no truth: what is measured is how far the object's points are from the 
 which points are the ball's and which the hand's; the program does not see them. Standard library only."""
 import math
 import pathlib
-import struct
 import subprocess
 import sys
-import zlib
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 import ball
 import common
+import png
 import rest_captures
 
 PREPARED = ("plush-press", "plush-pair", "cloth-lift")
@@ -130,8 +129,8 @@ def pair(program, work):
 
 
 def dog_points(data):
-    width, height, depth = rest_captures.read_png(data / "snoopy_depth_000051.png")
-    mask = read_mask(data / "snoopy_omask_000051.png")
+    width, height, depth = png.read_depth(data / "snoopy_depth_000051.png")
+    mask = png.read(data / "snoopy_omask_000051.png")[2]
     f, cx, cy, points = 517.0, 320.0, 240.0, []
     for v in range(height):
         for u in range(v % EVERY, width, EVERY):
@@ -139,11 +138,6 @@ def dog_points(data):
                 z = 1e-3 * depth[v][u]
                 points.append(((u - cx) / f * z, (v - cy) / f * z, z))
     return points
-
-
-def read_mask(path):
-    """Rows of an 8-bit grey PNG."""
-    return ball.read_samples(path, {0: 1})[2]
 
 
 def cloth(program, work, name):
@@ -170,7 +164,7 @@ def write_strip(path, sources):
     """Pictures side by side, at half their size."""
     strips = []
     for source in sources:
-        width, height, rows = ball.read_samples(source, {2: 3, 6: 4})
+        width, height, rows = png.read_colours(source)
         strips.append([[tuple((rows[v][u][k] + rows[v][u + 1][k] + rows[v + 1][u][k] + rows[v + 1][u + 1][k]) // 4 for k in range(3))
                         for u in range(0, width - 1, 2)] for v in range(0, height - 1, 2)])
     raw, before = b"", None
@@ -178,10 +172,7 @@ def write_strip(path, sources):
         row = bytes(x for strip in strips for pixel in strip[v] for x in pixel)
         raw += b"\2" + bytes((x - y) & 255 for x, y in zip(row, before or bytes(len(row))))
         before = row
-    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    width = sum(len(strip[0]) for strip in strips)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, len(strips[0]), 8, 2, 0, 0, 0)) +
-                     chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b""))
+    png.write(path, sum(len(strip[0]) for strip in strips), len(strips[0]), 2, raw, level=9)
 
 
 def main():

@@ -6,10 +6,10 @@ import pathlib
 import struct
 import sys
 import tomllib
-import zlib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import common
+import png
 
 POSE = {"sensor_turn.estimate": True, "sensor_shift.estimate": True}
 NEARLY_INCOMPRESSIBLE = {"poisson_ratio": 0.49, "poisson_ratio.estimate": False}
@@ -65,38 +65,10 @@ def captures(work):
     return work / "captures"
 
 
-def read_png(path):
-    """Rows of a grey PNG of 8 or 16 bits."""
-    data, at, packed = path.read_bytes(), 8, b""
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at:at + 8])
-        if kind == b"IHDR":
-            width, height, bits = struct.unpack(">IIB", data[at + 8:at + 17])
-        if kind == b"IDAT":
-            packed += data[at + 8:at + 8 + size]
-        at += 12 + size
-    raw, step, rows = zlib.decompress(packed), bits // 8, []
-    stride = width * step
-    above = [0] * stride
-    for r in range(height):
-        kind, line = raw[r * (stride + 1)], list(raw[r * (stride + 1) + 1:(r + 1) * (stride + 1)])
-        if kind == 2:
-            line = [(v + u) & 255 for v, u in zip(line, above)]
-        elif kind:
-            for i in range(stride):
-                left, up, corner = (line[i - step], above[i], above[i - step]) if i >= step else (0, above[i], 0)
-                off = [abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)]
-                paeth = left if off[0] <= min(off[1:]) else up if off[1] <= off[2] else corner
-                line[i] = (line[i] + {1: left, 3: (left + up) // 2, 4: paeth}[kind]) & 255
-        above = line
-        rows.append(line if step == 1 else [256 * a + b for a, b in zip(line[::2], line[1::2])])
-    return rows
-
-
 def observed_points(capture, most=400):
     """Points of the object's pixels in the world [m], evenly taken."""
     camera = tomllib.loads((capture / "capture.toml").read_text())["depth"][0]
-    depth, mask = (read_png(capture / (camera[key] % 0)) for key in ("images", "masks"))
+    depth, mask = (png.read(capture / (camera[key] % 0), bits)[2] for key, bits in (("images", 16), ("masks", 8)))
     pixels = [(u, v) for v, row in enumerate(depth) for u, d in enumerate(row) if d and mask[v][u]]
     points = []
     for u, v in pixels[::max(1, len(pixels) // most)]:

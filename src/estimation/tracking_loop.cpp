@@ -55,7 +55,10 @@ class TrackingLoop {
 
   FitOutcome run() {
     if (state_.phase == Phase::Loop && !loop()) return told(std::move(*outcome_));
-    if (!is_both_) return told(std::move(*outcome_));
+    if (!is_both_) {
+      if (!outcome_) resume_loop();
+      return told(std::move(*outcome_));
+    }
     if (state_.phase == Phase::Direct && !direct()) return told(std::move(*outcome_));
     return last();
   }
@@ -80,22 +83,43 @@ class TrackingLoop {
     monitor_.on_state(state);
   }
 
-  /// Follows all recordings with their parts of the estimate, or with what is known at first.
-  void follow(const std::vector<FollowedRecording>& recordings, const VectorX& theta) {
-    tracks_.clear(), used_.clear();
-    Eigen::Index at = 0;
-    for (std::size_t i = 0; i < recordings.size(); ++i) {
-      VectorX own = recordings[i].start();
-      if (theta.size() > 0) {
-        const int controls = int(own.size() - shared_[i]) + 1;
-        const VectorX estimated = with_controls(theta, controls);
-        own = estimated.segment(at, own.size());
-        at += own.size();
-      }
-      tracks_.push_back(
-          std::make_shared<Track>(recordings[i].follow(own, [this](int, int) { return !interrupted(); })));
-      used_.push_back(own);
+  /// Theta of all recordings where nothing is known yet.
+  VectorX known_at_first() const {
+    Eigen::Index size = 0, at = 0;
+    for (const FollowedRecording& r : followed_) size += r.start().size();
+    VectorX theta(size);
+    for (const FollowedRecording& r : followed_) {
+      theta.segment(at, r.start().size()) = r.start();
+      at += r.start().size();
     }
+    return theta;
+  }
+
+  /// An estimate with the moduli that the object is followed with.
+  VectorX to_follow_with(const VectorX& theta) const {
+    return with_controls(theta, int(followed_.front().start().size() - shared_.front()) + 1);
+  }
+
+  /// Follows all recordings with their parts of the estimate. False, with the tracks before, where it was interrupted.
+  [[nodiscard]] bool follow(const std::vector<FollowedRecording>& recordings, const VectorX& theta) {
+    std::vector<std::shared_ptr<const Track>> tracks;
+    const VectorX all = to_follow_with(theta);
+    Eigen::Index at = 0;
+    for (const FollowedRecording& r : recordings) {
+      const VectorX own = all.segment(at, r.start().size());
+      at += own.size();
+      tracks.push_back(std::make_shared<Track>(r.follow(own, [this](int, int) { return !interrupted(); })));
+      if (interrupted()) return false;
+    }
+    tracks_ = std::move(tracks);
+    return true;
+  }
+
+  /// Interrupted as it followed: the end is what was reached before, which may be nothing. False.
+  bool stop(std::optional<FitOutcome> reached) {
+    outcome_ = reached ? std::move(reached) : FitOutcome{};
+    outcome_->interrupted = true, outcome_->converged = false, outcome_->reason = "interrupted";
+    return false;
   }
 
   std::vector<RecordedCapture> followed_captures(const std::vector<RecordedCapture>& recordings) const {
@@ -112,9 +136,9 @@ class TrackingLoop {
     return followed;
   }
 
-  TrackingRound described(const VectorX& used) const {
+  TrackingRound described(const VectorX& theta) const {
     TrackingRound round;
-    round.youngs_modulus = used[theta::youngs_modulus];
+    round.youngs_modulus = to_follow_with(theta)[theta::youngs_modulus];
     round.confidence = 1.0;
     double squares = 0.0, points = 0.0;
     for (const auto& track : tracks_) {
@@ -204,10 +228,9 @@ class TrackingLoop {
     return changed;
   }
 
-  FitOptions with_chosen_controls(const FitOutcome& outcome) const {
-    FitOptions options = options_;
-    if (options.control_points == FitOptions::automatic)
-      options.control_points = outcome.recordings.front().discretisation.body->modulus.controls;
+  /// How many control points there are is chosen once.
+  FitOptions with_chosen_controls(FitOptions options, const VectorX& theta) const {
+    if (options.control_points == FitOptions::automatic) options.control_points = controls_of(theta);
     return options;
   }
 
@@ -232,44 +255,55 @@ class TrackingLoop {
   /// False where it was interrupted or failed: the outcome says so.
   bool loop() {
     const std::vector<RecordedCapture>& recordings = is_both_ ? training_ : all_;
-    VectorX theta = state_.rounds.empty() ? VectorX() : state_.rounds.back().theta;
-    FitOptions options = without_start(options_);
+    const bool is_first = state_.rounds.empty();
+    VectorX theta = is_first ? known_at_first() : state_.rounds.back().theta;
+    FitOptions options = without_start(is_first ? options_ : with_chosen_controls(options_, theta));
     FitState from = std::exchange(left_, {});
     bool is_resumed = !from.scan.empty() || from.motion || from.fine;
     while (int(state_.rounds.size()) < options_.tracking_rounds) {
       const int round = int(state_.rounds.size());
-      follow(followed_, theta);
-      TrackingRound described_round = described(used_.front());
+      if (!follow(followed_, theta)) return stop(std::move(outcome_));
+      TrackingRound described_round = described(theta);
       if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
       is_resumed = false;
-      outcome_ = fit_once(followed_captures(recordings), options, std::move(from), "round " + std::to_string(round + 1),
-                          share(round), share(round + 1));
+      outcome_ = fit_once(followed_captures(recordings), options, std::exchange(from, {}),
+                          "round " + std::to_string(round + 1), share(round), share(round + 1));
       if (outcome_->interrupted || !outcome_->evaluation.succeeded) return false;
-      options = without_start(with_chosen_controls(*outcome_));
+      options = without_start(with_chosen_controls(options_, outcome_->theta));
       described_round.theta = outcome_->theta;
       described_round.fit_rms = outcome_->evaluation.track_rms();
-      described_round.change = change(theta.size() > 0 ? theta : VectorX(), described_round);
+      described_round.change = change(theta, outcome_->theta);
       theta = outcome_->theta;
       state_.loop = std::make_shared<FitState>(concluded(*outcome_));
       state_.rounds.push_back(std::move(described_round));
       save({});
       if (state_.rounds.back().change < settled) break;
     }
-    if (!outcome_ && state_.loop) resume_loop(recordings, options, theta);
+    if (!outcome_ && !resume_loop()) return false;
     state_.phase = Phase::Direct;
     save({});
     return true;
   }
 
-  /// All rounds were done before an interruption.
-  void resume_loop(const std::vector<RecordedCapture>& recordings, const FitOptions& options, const VectorX& theta) {
-    follow(followed_, theta);
-    outcome_ = fit_once(followed_captures(recordings), options, *state_.loop, "rounds", 0.5, 0.5);
+  /// All rounds were done before an interruption. False where there was another one.
+  bool resume_loop() {
+    const VectorX& theta = state_.rounds.back().theta;
+    if (!follow(followed_, theta)) return stop({});
+    outcome_ = fit_once(followed_captures(is_both_ ? training_ : all_),
+                        with_chosen_controls(without_start(options_), theta), *state_.loop, "rounds", 0.5, 0.5);
+    return true;
   }
 
-  static double change(const VectorX& before, const TrackingRound& round) {
-    const double from = before.size() > 0 ? before[theta::youngs_modulus] : round.youngs_modulus;
-    return std::abs(std::log(round.theta[theta::youngs_modulus] / from));
+  /// Of ln E by an estimate, the greatest of all moduli.
+  double change(const VectorX& before, const VectorX& after) const {
+    const int controls = controls_of(after);
+    const VectorX from = with_controls(before, controls);
+    double greatest = 0.0;
+    for (int k = 0; k < controls; ++k) {
+      const int at = theta::modulus(k, controls, shared_.front() + controls - 1);
+      greatest = std::max(greatest, std::abs(std::log(after[at] / from[at])));
+    }
+    return greatest;
   }
 
   bool direct() {
@@ -279,7 +313,7 @@ class TrackingLoop {
       return false;
     }
     if (direct_->evaluation.succeeded) state_.direct = std::make_shared<FitState>(concluded(*direct_));
-    if (!outcome_) resume_loop(training_, options_, state_.rounds.back().theta);
+    if (!outcome_ && !resume_loop()) return stop(std::move(direct_));
     result_.loop = score(*outcome_), result_.direct = score(*direct_);
     state_.keeps_loop =
         !result_.direct->succeeded || (result_.loop->succeeded && result_.loop->cost < result_.direct->cost);
@@ -320,11 +354,14 @@ class TrackingLoop {
     const std::shared_ptr<const FitState> best = state_.keeps_loop ? state_.loop : state_.direct;
     const VectorX& theta = best->refined.front().theta;
     FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
-    if (options.control_points == FitOptions::automatic) options.control_points = controls_of(theta);
+    options = with_chosen_controls(std::move(options), theta);
     std::vector<FollowedRecording> all;
     std::vector<std::string> ignored;
     for (const RecordedCapture& r : all_) all.emplace_back(r, options_, ignored);
-    follow(all, theta);
+    if (!follow(all, theta)) {
+      stop(std::move(state_.keeps_loop ? outcome_ : direct_));
+      return told(std::move(*outcome_));
+    }
     const bool goes_on = left_.fine.has_value();
     FitState from = goes_on ? std::exchange(left_, {}) : from_there(*best, theta);
     FitOutcome outcome =
@@ -338,14 +375,14 @@ class TrackingLoop {
 
   /// With all that was done on the way; the agreement is that with the points.
   FitOutcome told(FitOutcome outcome) {
-    const int controls = controls_of(outcome.theta);
-    for (FitEvent& event : history_) event.theta = with_controls(event.theta, controls);
+    if (outcome.theta.size() > 0)
+      for (FitEvent& event : history_) event.theta = with_controls(event.theta, controls_of(outcome.theta));
     outcome.history = std::move(history_);
     outcome.forward_steps = forward_steps_;
     result_.rounds = state_.rounds;
     result_.keeps_loop = state_.keeps_loop;
     result_.tracks = tracks_;
-    result_.why = why();
+    result_.why = why(outcome.interrupted);
     if (outcome.evaluation.succeeded) agree_with_points(outcome);
     outcome.notes.insert(outcome.notes.begin(), result_.why);
     for (const auto& track : tracks_) {
@@ -371,7 +408,7 @@ class TrackingLoop {
     outcome.evaluation.frames = std::move(frames);
   }
 
-  std::string why() const {
+  std::string why(bool is_interrupted) const {
     const int rounds = int(state_.rounds.size());
     std::string text = "The object was tracked and its motion fitted in " + std::to_string(rounds) +
                        (rounds == 1 ? " round" : " rounds in turns");
@@ -385,7 +422,8 @@ class TrackingLoop {
     };
     return text + "Cost of those frames: " + said(*result_.loop) + " of the tracked motion's estimate, " +
            said(*result_.direct) + " of the points'; " + (state_.keeps_loop ? "the tracked motion's" : "the points'") +
-           " was kept and finished with all frames.";
+           (is_interrupted ? " was kept; it was interrupted before that was finished with all frames."
+                           : " was kept and finished with all frames.");
   }
 
   const std::vector<RecordedCapture>& all_;
@@ -400,7 +438,6 @@ class TrackingLoop {
   FitState left_;     // by an interruption
   FitState reached_;  // by the fit that runs
   std::vector<std::shared_ptr<const Track>> tracks_;
-  std::vector<VectorX> used_;  // to track with
   std::optional<FitOutcome> outcome_, direct_;
   TrackingOutcome result_;
   std::vector<FitEvent> history_;

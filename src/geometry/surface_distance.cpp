@@ -1,31 +1,24 @@
 #include "geometry/surface_distance.hpp"
 
 #include <algorithm>
-#include <boost/geometry.hpp>
-#include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "geometry/box_tree.hpp"
 
 namespace pliant {
 
 namespace {
 
 namespace bg = boost::geometry;
-using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
-using TreeBox = bg::model::box<TreePoint>;
-using Tree = bg::index::rtree<std::pair<TreeBox, int>, bg::index::quadratic<8>>;
 
-Tree triangle_tree(const TriangleMesh& surface) {
-  std::vector<std::pair<TreeBox, int>> boxes;
-  boxes.reserve(surface.triangles.size());
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+BoxTree triangle_tree(const TriangleMesh& surface) {
+  return box_tree(surface.triangles.size(), [&](std::size_t t) {
     Box box;
     for (const int v : surface.triangles[t]) box.extend(surface.vertices[std::size_t(v)]);
-    boxes.emplace_back(TreeBox({box.min.x(), box.min.y(), box.min.z()}, {box.max.x(), box.max.y(), box.max.z()}),
-                       int(t));
-  }
-  return Tree(boxes);  // packed
+    return box;
+  });
 }
 
 }  // namespace
@@ -48,11 +41,11 @@ Vector3 closest_on_triangle(const Vector3& p, const Vector3& a, const Vector3& b
 
 std::vector<double> distances_to_surface(const TriangleMesh& surface, std::span<const Vector3> points) {
   if (surface.triangles.empty()) throw std::invalid_argument("distances to a surface without triangles");
-  const Tree tree = triangle_tree(surface);
+  const BoxTree tree = triangle_tree(surface);
   std::vector<double> distances;
   distances.reserve(points.size());
   for (const Vector3& p : points) {
-    const TreePoint at(p.x(), p.y(), p.z());
+    const TreePoint at = tree_point(p);
     double least = std::numeric_limits<double>::infinity();
     // Boxes come in the order of their distance, which is never more than that of what they hold.
     for (auto it = tree.qbegin(bg::index::nearest(at, unsigned(surface.triangles.size()))); it != tree.qend(); ++it) {

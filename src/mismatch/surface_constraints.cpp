@@ -1,29 +1,20 @@
 #include "mismatch/surface_constraints.hpp"
 
-#include <boost/geometry.hpp>
-#include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <stdexcept>
+
+#include "geometry/box_tree.hpp"
 
 namespace pliant {
 
 namespace {
 
-namespace bg = boost::geometry;
-using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
-using TreeBox = bg::model::box<TreePoint>;
-using Tree = bg::index::rtree<std::pair<TreeBox, int>, bg::index::quadratic<8>>;
-
-Tree cell_tree(const std::vector<std::array<int, 8>>& cells, const Points& lattice) {
-  std::vector<std::pair<TreeBox, int>> boxes;
-  boxes.reserve(cells.size());
-  for (std::size_t c = 0; c < cells.size(); ++c) {
+BoxTree cell_tree(const std::vector<std::array<int, 8>>& cells, const Points& lattice) {
+  return box_tree(cells.size(), [&](std::size_t c) {
     Box box;
     for (const int n : cells[c]) box.extend(lattice.row(n).transpose());
-    boxes.emplace_back(TreeBox({box.min.x(), box.min.y(), box.min.z()}, {box.max.x(), box.max.y(), box.max.z()}),
-                       int(c));
-  }
-  return Tree(boxes);  // packed
+    return box;
+  });
 }
 
 /// The body's own grid, or one laid over another kind of body.
@@ -106,13 +97,13 @@ bool SurfaceConstraints::pull_back(int cell, const Points& lattice, const Vector
 std::vector<PointMatch> SurfaceConstraints::match(std::span<const SurfaceObservation> points,
                                                   const Points& positions) const {
   const Points lattice = extension_.rest_positions() + extended(positions - body_->scanned_positions());
-  const Tree tree = cell_tree(extension_.cells(), lattice);
+  const BoxTree tree = cell_tree(extension_.cells(), lattice);
   std::vector<PointMatch> matches(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     PointMatch& best = matches[i];
     const Vector3& p = points[i].position;
-    const TreePoint at(p.x(), p.y(), p.z());
-    for (auto it = tree.qbegin(bg::index::intersects(at)); it != tree.qend(); ++it) {
+    const TreePoint at = tree_point(p);
+    for (auto it = tree.qbegin(boost::geometry::index::intersects(at)); it != tree.qend(); ++it) {
       Vector3 local;
       Matrix3 jacobian;
       if (!pull_back(it->second, lattice, p, local, jacobian)) continue;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <set>
 
 #include "base/error.hpp"
 #include "elasticity/modes.hpp"
@@ -167,10 +166,10 @@ void Tracker::learn_density(const SampleLevel& level, const std::vector<double>&
   for (std::size_t v = 0; v < density_.size(); ++v) density_[v] = density[std::size_t(level.sample_of[v])];
 }
 
-Points Tracker::normals_of(const Points& nodes) const {
+Points Tracker::normals_of(const Points& vertices) const {
   TriangleMesh now{{}, surface_.triangles};
   now.vertices.reserve(std::size_t(samples_));
-  for (int v = 0; v < samples_; ++v) now.vertices.push_back(springs_->points().position(v, nodes));
+  for (int v = 0; v < samples_; ++v) now.vertices.push_back(vertices.row(v).transpose());
   Points normals(samples_, 3);
   const std::vector<Vector3> of_vertices = vertex_normals(now);
   for (int v = 0; v < samples_; ++v) normals.row(v) = of_vertices[std::size_t(v)].transpose();
@@ -183,17 +182,17 @@ void Tracker::see(const Points& nodes) {
   constexpr double clear = 2e-3;  // of the size: a ray begins so far outside
   const Points vertices = samples_of(levels_.front(), nodes);
   rays_.set_vertices(0, vertices);
-  TriangleMesh now{{}, surface_.triangles};
-  for (Eigen::Index v = 0; v < vertices.rows(); ++v) now.vertices.push_back(vertices.row(v).transpose());
-  const std::vector<Vector3> normals = vertex_normals(now);
+  const Points normals = normals_of(vertices);
   std::ranges::fill(visible_, 0.0);
-  for (std::size_t v = 0; v < visible_.size(); ++v)
+  for (std::size_t v = 0; v < visible_.size(); ++v) {
+    const Vector3 vertex = vertices.row(Eigen::Index(v)), normal = normals.row(Eigen::Index(v));
     for (const PinholeCamera& camera : cameras_) {
-      const Vector3 from = now.vertices[v] + clear * size_ * normals[v], to = camera.camera_to_world.translation - from;
-      const double cosine = to.normalized().dot(normals[v]);
-      if (cosine > visible_[v] && is_in_picture(camera, now.vertices[v]) && !rays_.is_blocked(from, to, 0.0, 1.0))
+      const Vector3 from = vertex + clear * size_ * normal, to = camera.camera_to_world.translation - from;
+      const double cosine = to.normalized().dot(normal);
+      if (cosine > visible_[v] && is_in_picture(camera, vertex) && !rays_.is_blocked(from, to, 0.0, 1.0))
         visible_[v] = cosine;
     }
+  }
 }
 
 double Tracker::spread(const TrackView& view) const {
@@ -302,7 +301,7 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
     const double eta = stiffness * sharpest * std::hypot(sigma, noise) / typical_;
     VectorX k = VectorX::Zero(springs_->count());
     Points targets = Points::Zero(springs_->count(), 3), normals = Points::Zero(springs_->count(), 3);
-    normals.topRows(samples_) = normals_of(nodes);
+    normals.topRows(samples_) = normals_of(samples_of(levels_.front(), nodes));
     for (std::size_t i = 0; i < level.vertex.size(); ++i) {
       k[level.vertex[i]] = eta * c.precision[Eigen::Index(i)];
       targets.row(level.vertex[i]) = c.target.row(Eigen::Index(i));
@@ -400,19 +399,18 @@ void Tracker::describe(const Points& nodes, const TrackView& view, TrackedFrame&
   const Points samples = samples_of(all, nodes);
   const Correspondence c =
       expect(samples, shares_of(all), {view.points, view.noise}, {least, outlier_share_, volume_of(view)});
-  TriangleMesh now{{}, surface_.triangles};
-  for (Eigen::Index v = 0; v < samples.rows(); ++v) now.vertices.push_back(samples.row(v).transpose());
-  const std::vector<Vector3> normals = vertex_normals(now);
+  const Points normals = normals_of(samples);
   squares = 0.0;
   int explained = 0;
   for (std::size_t i = 0; i < view.points.size(); ++i) {
     if (c.explained[i] < 0.5f || c.likeliest[i] < 0) continue;
-    const auto v = std::size_t(c.likeliest[i]);
-    const double off = normals[v].dot(view.points[i] - now.vertices[v]);
+    const int v = c.likeliest[i];
+    const Vector3 vertex = samples.row(v), normal = normals.row(v);
+    const double off = normal.dot(view.points[i] - vertex);
     frame.residuals[i] = float(off);
     squares += off * off;
     ++explained;
-    ++frame.mark_points[std::size_t(coarse.sample_of[v])];
+    ++frame.mark_points[std::size_t(coarse.sample_of[std::size_t(v)])];
   }
   frame.explained = double(explained) / frame.points;
   if (explained > 0) frame.surface_rms = std::sqrt(squares / explained);

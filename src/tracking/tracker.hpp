@@ -127,7 +127,8 @@ class Tracker {
   [[nodiscard]] bool maximise(double dt, bool at_rest, const TrackView& view, double distance, Points& delta,
                               TrackedFrame& frame);
   void learn_density(const SampleLevel& level, const std::vector<double>& shares, const Correspondence& c);
-  Points normals_of(const Points& nodes) const;
+  /// Of the surface with its vertices there.
+  Points normals_of(const Points& vertices) const;
   void see(const Points& nodes);
   const SampleLevel& level_for(double deviation) const;
   Points samples_of(const SampleLevel& level, const Points& nodes) const;

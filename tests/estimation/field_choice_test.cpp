@@ -10,10 +10,10 @@
 #include "elasticity/element_moduli.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
-#include "estimation/fit_state.hpp"
 #include "geometry/primitives.hpp"
 #include "input_errors.hpp"
 #include "support/bodies.hpp"
+#include "support/interruption.hpp"
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
@@ -279,19 +279,12 @@ TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {
 
 /// Interrupted in every kind of fit on the way, written to a file and read back.
 TEST(FieldChoice, AnInterruptedChoiceGoesOnToTheSameEnd) {
-  const test::TemporaryFolder folder;
   const FitOutcome undisturbed = fit({sagging_bar(soft)}, quick());
   for (const char* stage : {"fine", "2 control points"}) {
-    FitState left;
-    bool stop = false;
-    FitMonitor monitor;
-    monitor.on_event = [&](const FitEvent& event) { stop = stop || event.stage == stage; };
-    monitor.on_state = [&](const FitState& state) { left = state; };
-    monitor.interrupted = [&] { return stop; };
-    const FitOutcome interrupted = fit({sagging_bar(soft)}, quick(), monitor);
+    test::Interruption interruption(stage);
+    const FitOutcome interrupted = fit({sagging_bar(soft)}, quick(), interruption.monitor());
     EXPECT_TRUE(interrupted.interrupted) << stage;
-    write_fit_state(folder / "state.json", left, "key");
-    const FitOutcome resumed = fit({sagging_bar(soft)}, quick(), {}, read_fit_state(folder / "state.json", "key"));
+    const FitOutcome resumed = fit({sagging_bar(soft)}, quick(), {}, interruption.left());
     EXPECT_EQ(controls(resumed), controls(undisturbed)) << stage;
     EXPECT_EQ(resumed.notes, undisturbed.notes) << stage;
     ASSERT_EQ(resumed.theta.size(), undisturbed.theta.size()) << stage;

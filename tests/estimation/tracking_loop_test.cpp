@@ -6,9 +6,8 @@
 #include <random>
 
 #include "estimation/fit_config.hpp"
-#include "estimation/fit_state.hpp"
 #include "geometry/primitives.hpp"
-#include "temporary_folder.hpp"
+#include "support/interruption.hpp"
 
 namespace pliant {
 namespace {
@@ -20,14 +19,14 @@ constexpr int frames = 30;
 
 /// A bar along x, clamped at its low end, let go straight; half of its surface is seen as points. Made by the same
 /// elements and law as it is fitted with, on a finer mesh with shorter steps: an inverse crime in part.
-RecordedCapture swinging_bar() {
+RecordedCapture swinging_bar(int frames_seen = frames) {
   RecordedCapture recorded;
   Capture& capture = recorded.capture;
   capture.name = "bar";
   capture.surface = make_box(Vector3(length, edge, edge), 0.0125);
   capture.density = 300.0;
   capture.gravity = Vector3(0.0, -9.81, 0.0);
-  for (int f = 0; f < frames; ++f) capture.times.push_back(f / 30.0);
+  for (int f = 0; f < frames_seen; ++f) capture.times.push_back(f / 30.0);
   capture.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
   capture.clouds = {{{"cloud.ply"}, 1, noise}};
   VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
@@ -106,24 +105,122 @@ TEST(TrackingLoop, AndThePointsAreComparedByFramesLeftOut) {
 
 /// Interrupted in every phase, written to a file and read back.
 TEST(TrackingLoop, GoesOnAfterAnInterruptionToTheSameEnd) {
-  const test::TemporaryFolder folder;
   const FitOptions options = quick(TrackingUse::Both);
   const RecordedCapture bar = swinging_bar();
   const FitOutcome undisturbed = fit({bar}, options);
   for (const char* stage : {"round 2: fine", "points: fine", "all frames: fine"}) {
-    FitState left;
-    bool stop = false;
-    FitMonitor monitor;
-    monitor.on_event = [&](const FitEvent& event) { stop = stop || event.stage == stage; };
-    monitor.on_state = [&](const FitState& state) { left = state; };
-    monitor.interrupted = [&] { return stop; };
-    const FitOutcome interrupted = fit({bar}, options, monitor);
-    ASSERT_TRUE(stop) << stage;
+    test::Interruption interruption(stage);
+    const FitOutcome interrupted = fit({bar}, options, interruption.monitor());
+    ASSERT_TRUE(interruption.came()) << stage;
     EXPECT_TRUE(interrupted.interrupted) << stage;
-    write_fit_state(folder / "state.json", left, "key");
-    const FitOutcome resumed = fit({bar}, options, {}, read_fit_state(folder / "state.json", "key"));
+    const FitOutcome resumed = fit({bar}, options, {}, interruption.left());
     EXPECT_EQ(resumed.tracking->keeps_loop, undisturbed.tracking->keeps_loop) << stage;
     EXPECT_NEAR(found(resumed) / found(undisturbed), 1.0, 2e-3) << stage;
+  }
+}
+
+constexpr int few = 10;  // frames
+
+FitOptions quickest(TrackingUse tracking) {
+  FitOptions options = quick(tracking);
+  options.cells = options.coarse_cells = 5.0;
+  options.tracking_rounds = 2;
+  options.max_iterations = 6;
+  options.parameters["youngs_modulus"].start = VectorX::Constant(1, 2.0 * modulus);
+  return options;
+}
+
+TEST(TrackingLoop, GoesOnWhereAllRoundsWereDone) {
+  const FitOptions options = quickest(TrackingUse::Loop);
+  const RecordedCapture bar = swinging_bar(few);
+  test::Interruption never;
+  const FitOutcome undisturbed = fit({bar}, options, never.monitor());
+  ASSERT_TRUE(undisturbed.evaluation.succeeded) << undisturbed.reason;
+  FitState left = never.left();
+  ASSERT_EQ(left.tracking->phase, FitState::Tracking::Phase::Direct);
+  const FitOutcome resumed = fit({bar}, options, {}, std::move(left));
+  ASSERT_TRUE(resumed.evaluation.succeeded) << resumed.reason;
+  EXPECT_EQ(resumed.theta, undisturbed.theta);
+  EXPECT_EQ(resumed.tracking->rounds.size(), undisturbed.tracking->rounds.size());
+}
+
+/// Half-followed recordings say nothing.
+void expect_nothing(const FitOutcome& outcome) {
+  EXPECT_TRUE(outcome.interrupted);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_EQ(outcome.reason, "interrupted");
+  EXPECT_FALSE(outcome.evaluation.succeeded);
+  EXPECT_EQ(outcome.theta.size(), 0);
+  EXPECT_TRUE(outcome.tracking->tracks.empty());
+}
+void expect_best_so_far(const FitOutcome& outcome, const VectorX& theta, int frames_followed) {
+  EXPECT_TRUE(outcome.interrupted);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_EQ(outcome.reason, "interrupted");
+  EXPECT_TRUE(outcome.evaluation.succeeded);
+  EXPECT_EQ(outcome.theta, theta);
+  ASSERT_EQ(outcome.tracking->tracks.size(), 1u);
+  EXPECT_EQ(int(outcome.tracking->tracks.front()->frames.size()), frames_followed);
+}
+
+FitMonitor interrupted_at_once() {
+  FitMonitor monitor;
+  monitor.interrupted = [] { return true; };
+  return monitor;
+}
+
+TEST(TrackingLoop, InterruptedAsItFollowsEndsWithTheBestSoFar) {
+  using Phase = FitState::Tracking::Phase;
+  const FitOptions options = quickest(TrackingUse::Both);
+  const RecordedCapture bar = swinging_bar(few);
+  const auto after = [](std::size_t rounds, Phase phase) {
+    return [=](const FitState& s) { return s.tracking->rounds.size() == rounds && s.tracking->phase == phase; };
+  };
+  expect_nothing(fit({bar}, options, interrupted_at_once()));
+  {
+    test::Interruption second(after(1, Phase::Loop));
+    const FitOutcome outcome = fit({bar}, options, second.monitor());
+    ASSERT_TRUE(second.came());
+    const FitState left = second.left();
+    expect_best_so_far(outcome, left.tracking->rounds.front().theta, few);
+    expect_nothing(fit({bar}, options, interrupted_at_once(), left));
+  }
+  FitOptions one_round = options;
+  one_round.tracking_rounds = 1;
+  test::Interruption at_last(after(1, Phase::Last));
+  const FitOutcome outcome = fit({bar}, one_round, at_last.monitor());
+  ASSERT_TRUE(at_last.came());
+  const FitState left = at_last.left();
+  const auto& best = left.tracking->keeps_loop ? left.tracking->loop : left.tracking->direct;
+  expect_best_so_far(outcome, best->refined.front().theta, few);
+  expect_nothing(fit({bar}, one_round, interrupted_at_once(), left));
+
+  // The points were fitted before, and the rounds' estimate is looked for again to compare with.
+  FitState points = *left.tracking->direct;
+  points.tracking = left.tracking;
+  points.tracking->phase = Phase::Direct, points.tracking->direct.reset();
+  const FitOutcome direct = fit({bar}, one_round, interrupted_at_once(), points);
+  EXPECT_TRUE(direct.interrupted);
+  EXPECT_EQ(direct.theta, points.refined.front().theta);
+}
+
+TEST(TrackingLoop, GoesOnUntilNoModulusChanges) {
+  FitOptions options = quickest(TrackingUse::Loop);
+  RecordedCapture bar = swinging_bar(few);
+  bar.capture.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  constexpr double wrong = 5.0;
+  options.parameters["youngs_modulus"] = {VectorX::Constant(1, modulus), false, {}};
+  options.parameters["youngs_modulus@beyond"].start = VectorX::Constant(1, wrong * modulus);
+  const FitOutcome outcome = fit({bar}, options);
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  const std::vector<TrackingRound>& rounds = outcome.tracking->rounds;
+  ASSERT_EQ(rounds.size(), 2u) << "the modulus beyond has changed, though the first one has not";
+  double before = wrong * modulus;
+  for (const TrackingRound& round : rounds) {
+    EXPECT_EQ(round.theta[theta::youngs_modulus], modulus);
+    const double now = round.theta[theta::modulus(1, 2, round.theta.size())];
+    EXPECT_NEAR(round.change, std::abs(std::log(now / before)), 1e-12);
+    before = now;
   }
 }
 

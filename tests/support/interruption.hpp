@@ -1,0 +1,50 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "estimation/fit.hpp"
+#include "estimation/fit_state.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant::test {
+
+/// Interrupts the fit that it watches, and keeps what that leaves to go on from. Outlives the monitor.
+class Interruption {
+ public:
+  Interruption() = default;  ///< never
+  /// At the first step of a stage.
+  explicit Interruption(std::string stage) : stage_(std::move(stage)) {}
+  /// As soon as such a state is saved.
+  explicit Interruption(std::function<bool(const FitState&)> state) : state_(std::move(state)) {}
+
+  FitMonitor monitor() {
+    FitMonitor monitor;
+    monitor.on_event = [this](const FitEvent& event) {
+      if (!stage_.empty() && event.stage == stage_) came_ = true;
+    };
+    monitor.on_state = [this](const FitState& state) {
+      left_ = state;
+      if (state_ && state_(state)) came_ = true;
+    };
+    monitor.interrupted = [this] { return came_.load(); };
+    return monitor;
+  }
+  bool came() const { return came_; }
+  /// As it is read back from a file.
+  FitState left() const {
+    const TemporaryFolder folder;
+    write_fit_state(folder / "state.json", left_, "key");
+    return read_fit_state(folder / "state.json", "key");
+  }
+
+ private:
+  std::string stage_;
+  std::function<bool(const FitState&)> state_;
+  std::atomic<bool> came_ = false;
+  FitState left_;
+};
+
+}  // namespace pliant::test
