@@ -54,6 +54,7 @@ class TetLawElasticity : public LawElasticity {
   void add_gradient(Points& gradient) const override;
   void add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const override;
   void for_parameter_derivatives(const VisitDerivatives& visit) const override;
+  Matrix3 cauchy_stress(int element) const override;
   MatrixX strains() const override;
 
  private:
@@ -176,6 +177,18 @@ void TetLawElasticity<N>::for_parameter_derivatives(const VisitDerivatives& visi
 }
 
 template <int N>
+Matrix3 TetLawElasticity<N>::cauchy_stress(int e) const {
+  Matrix3 sum = Matrix3::Zero();
+  double volume = 0.0;
+  for (int q = 0; q < points; ++q) {
+    const Point& point = points_[std::size_t(e * points + q)];
+    sum += point.volume / point.F.determinant() * point.stress.P * point.F.transpose();
+    volume += point.volume;
+  }
+  return sum / volume;
+}
+
+template <int N>
 MatrixX TetLawElasticity<N>::strains() const {
   MatrixX strains = MatrixX::Zero(body_->element_count(), 6);
   for (int e = 0; e < body_->element_count(); ++e) {
@@ -207,6 +220,16 @@ template <int N>
 void TetLawElasticity<N>::linearise(const Points& lag) {
   evaluate(lag, true);
   lag_ = lag;
+  for (int e = 0; e < body_->element_count(); ++e) {  // rotations, for who asks
+    Matrix3 F = Matrix3::Zero();
+    double volume = 0.0;
+    for (int q = 0; q < points; ++q) {
+      const Point& point = points_[std::size_t(e * points + q)];
+      F += point.volume * point.F;
+      volume += point.volume;
+    }
+    polar_[std::size_t(e)] = polar_decomposition(F / volume, polar_[std::size_t(e)].quaternion);
+  }
 }
 
 template <int N>

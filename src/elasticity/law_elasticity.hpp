@@ -13,7 +13,9 @@ namespace pliant {
 ///   f = -dW/dx,   W(x) = sum_q V_q W_e(F_q),   F_q = sum_a x_a g_a^T.
 /// As a force term it is made affine by its exact stiffness, or by that without its negative parts:
 ///   f(z | p) = f(p) - K(p) (z - p),
-/// which is all that implicit steps and equilibria need (z = p). Its parameters are the law's and not in theta.
+/// which is all that implicit steps and equilibria need. Where stiffness damping moves z away from p, it acts by K(p)
+/// without its negative parts, and Newton's matrix leaves out how that changes. Its parameters are the law's and not in
+/// theta.
 class LawElasticity : public Elasticity {
  public:
   /// @param pattern  of the matrices to come; null: the body's own. It may have more rows than the body has nodes.
@@ -42,6 +44,8 @@ class LawElasticity : public Elasticity {
   using VisitDerivatives =
       std::function<void(int element, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& derivatives)>;
   virtual void for_parameter_derivatives(const VisitDerivatives& visit) const = 0;
+  /// Mean over an element's points of the Cauchy stress there [Pa].
+  virtual Matrix3 cauchy_stress(int element) const = 0;
   /// Mean over each element's points of S - I, F = R S, there; elements x 6.
   virtual MatrixX strains() const = 0;
 

@@ -29,6 +29,13 @@ enum class TrackingUse {
   Both,       ///< each from a part of the frames; the one that predicts the others better is kept
 };
 
+/// What a fit of presses looks for.
+enum class PressMaterial {
+  Ogden,    ///< one smooth law, its modulus a field: fitted to all presses at once
+  Linear,   ///< one E and nu for all strains: the average fit to compare with
+  Sampled,  ///< the stiffness of each press, interpolated in strain space (Bickel 2009)
+};
+
 /// Choices about a fit; none of them is needed. `validate` answers in words.
 struct FitOptions {
   double cells = 12.0;          ///< elements along the object's longest axis, [4, 64]
@@ -66,6 +73,12 @@ struct FitOptions {
   /// Whether a correction of sensors or of gravity's direction is estimated where the residuals ask for it.
   bool correct = true;
   bool hold_strongly = false;  ///< eliminate nodes in held regions instead of Nitsche's method
+  /// Of presses with known force.
+  PressMaterial material = PressMaterial::Ogden;
+  int law_terms = 0;              ///< of Ogden's law, 1..3; 0: as many as the presses support
+  double marker_noise = 0.0;      ///< of a coordinate [m]; 0: what the residuals say
+  double basis_tolerance = 0.02;  ///< of a sampled material's stress, > 0
+  int basis_samples = 12;         ///< of a sampled material, an element, >= 1
   unsigned seed = 0;
   /// By parameter name: a start value (a number, or three), and whether it is estimated.
   struct Override {

@@ -23,6 +23,8 @@ const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", S
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
+const std::vector<std::pair<std::string, PressMaterial>> press_materials = {
+    {"ogden", PressMaterial::Ogden}, {"linear", PressMaterial::Linear}, {"sampled", PressMaterial::Sampled}};
 const std::vector<std::pair<std::string, TrackingUse>> tracking_uses = {{"auto", TrackingUse::Automatic},
                                                                         {"off", TrackingUse::Off},
                                                                         {"loop", TrackingUse::Loop},
@@ -201,6 +203,17 @@ const std::vector<Entry>& entries() {
           &FitOptions::correct),
       flag_entry("hold_strongly", "held regions fix grid nodes instead of using Nitsche's method",
                  &FitOptions::hold_strongly),
+      choice_entry("material",
+                   "of presses with known force: Ogden's law fitted to all at once, one linear law, or the stiffness of "
+                   "each press interpolated in strain space",
+                   press_materials, &FitOptions::material),
+      integer_entry("law_terms", "0..3", "of Ogden's law; 0: as many as the presses support", &FitOptions::law_terms),
+      real_entry("marker_noise", "m", ">= 0", "of a marker's coordinate under a press; 0: what the residuals say",
+                 &FitOptions::marker_noise),
+      real_entry("basis_tolerance", "", "> 0", "of stress, relative to the greatest, in a sampled material",
+                 &FitOptions::basis_tolerance),
+      integer_entry("basis_samples", ">= 1", "of an element in a sampled material, at most",
+                    &FitOptions::basis_samples),
       integer_entry("seed", "", "of everything random", &FitOptions::seed),
   };
   return all;

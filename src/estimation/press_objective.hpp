@@ -5,11 +5,6 @@
 
 namespace pliant {
 
-enum class PressLaw {
-  Linear,  ///< one E and nu for all strains (LinearLaw)
-  Ogden,   ///< OgdenLaw, with terms of alternating sign
-};
-
 /// theta of a pressed object: control moduli first (as many as the body's field has), then Poisson's ratio, the first
 /// term's exponent, and of each further term its exponent and how stiff it is against the first, mu_i / mu_1. All terms
 /// share Poisson's ratio.

@@ -22,6 +22,16 @@ struct ModelVolume {
   std::vector<double> fill;                ///< part of the cell that the object fills, one a cell
 };
 
+/// A material of its own in the place of Young's modulus and Poisson's ratio, as a table (`material.csv`). What its
+/// columns mean depends on the law: see docs/model.md.
+struct ModelLaw {
+  std::string name;                       ///< "ogden", "linear" or "sampled"
+  std::vector<std::string> columns;       ///< the first is "element"
+  std::vector<std::vector<double>> rows;  ///< as many numbers each
+  double metric_nu = 0.0;                 ///< of a sampled law
+  bool operator==(const ModelLaw&) const = default;
+};
+
 /// A fitted object, ready to be simulated. SI units, the capture's world frame.
 struct Model {
   std::string name;
@@ -51,7 +61,8 @@ struct Model {
   double contact_stiffness = 0.0;         ///< pressure by penetration [Pa/m] >= 0
   double contact_smoothing = 0.0;         ///< length over which contact sets in [m] >= 0
 
-  ModelVolume volume;  ///< may be empty: then no `model.vtu` is written
+  std::optional<ModelLaw> law;  ///< nothing: corotated linear elasticity of the moduli above
+  ModelVolume volume;           ///< may be empty: then no `model.vtu` is written
 };
 
 /// Writes `model.toml` (with comments and units), `surface.ply` and `model.vtu` into a folder.

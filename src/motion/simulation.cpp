@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "elasticity/law_elasticity.hpp"
 #include "base/error.hpp"
 #include "elasticity/corotated.hpp"
 #include "motion/body_forces.hpp"
@@ -28,7 +29,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
                                                    const SimulationOptions& options, Elasticity*& elasticity,
                                                    FixedRegions*& fixed, Pull*& pull, HungWeights*& let_go) {
   std::vector<std::unique_ptr<ForceTerm>> terms;
-  auto elastic = make_elasticity(body);
+  auto elastic = scene_elasticity(body, options);
   elasticity = elastic.get();
   terms.push_back(std::move(elastic));
   terms.push_back(std::make_unique<Gravity>(*body));
@@ -65,7 +66,8 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
       options_(std::move(options)),
       stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_),
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
-                options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
+                options_.rotation_prediction, options_.solver,
+                options_.law ? Integrator::Newton : options_.integrator, options_.newton}),
       rest_(body_->scanned_positions()) {
   if (holds_strongly(*body_, options_)) {
     stepper_.hold(eliminated_nodes(*body_, options_));
@@ -412,6 +414,12 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     return summary.failure = "a matrix of the start's derivatives cannot be factorised", summary;
   summary.succeeded = true;
   return summary;
+}
+
+std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body,
+                                             const SimulationOptions& options) {
+  if (options.law) return LawElasticity::make(body, options.law);
+  return make_elasticity(body);
 }
 
 std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,

@@ -15,6 +15,8 @@
 
 namespace pliant {
 
+class MaterialLaw;
+
 /// A scene in motion: what is fixed about it while parameters vary.
 struct SimulationOptions {
   std::vector<double> times;  ///< [s] of each frame; the first is when the object is let go
@@ -37,6 +39,9 @@ struct SimulationOptions {
   std::vector<Hold> holds;  ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
+  /// The elements' material in the place of theta's moduli and Poisson's ratio: no derivatives then, steps are fully
+  /// implicit. Tetrahedra only.
+  std::shared_ptr<const MaterialLaw> law;
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
                                ///< tetrahedra, which follow the shape
   std::size_t memory_budget = std::size_t(256) << 20;  ///< [bytes] for states kept for the adjoint
@@ -142,6 +147,9 @@ class Simulation {
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;
 };
+
+/// The elasticity of a scene's body.
+std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body, const SimulationOptions& options);
 
 /// All forces of a scene but what holds it until it is let go, each held region at the end of its way.
 std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,
