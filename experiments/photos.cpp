@@ -24,6 +24,7 @@ int main(int argc, char** argv) try {
       photographs[std::size_t(camera)].push_back(example.photograph(camera, number));
   const MarkerMeasurement measured = measure_markers(
       example.session(), [&](int camera, int number) { return photographs[std::size_t(camera)][std::size_t(number)]; });
+  const Points dots = dot_centres(example.scene(0));
   const double spacing = spacing_of(measured.rest.positions);
   std::printf("%d x %d pixels, %d dots, seed %d, %.1f mm apart\n", options.width, options.height, options.dots,
               int(options.seed), 1e3 * spacing);
@@ -31,7 +32,7 @@ int main(int argc, char** argv) try {
       "| photographs | moved [spacings] | seen | wrong | unclear | mean error [px] | greatest [px] | chi^2 | "
       "deviation [mm] | middles moved by [px] | tip off [mm] | seconds |\n");
   for (int number = 0; number < count; ++number) {
-    const test::MarkerErrors e = test::marker_errors(example, measured, number);
+    const test::MarkerErrors e = test::marker_errors(example, measured, number, dots);
     const bool is_rest = number == 0;
     const MeasuredPress* press = is_rest ? nullptr : &measured.presses[std::size_t(number) - 1];
     const PhotoFigures& f = is_rest ? measured.rest_figures : press->figures;

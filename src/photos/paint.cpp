@@ -294,7 +294,7 @@ Vector3 seen_middle(const Matrix3& moment, const Vector3& area) {
 }  // namespace
 
 Points dot_centres(const PaintedScene& scene) {
-  constexpr int parts = 12;  // of a triangle's edge
+  constexpr int parts = 40;  // of a triangle's edge
   Points out = Points::Zero(Eigen::Index(scene.dots.size()), 3);
   for (std::size_t i = 0; i < scene.dots.size(); ++i) {
     const PaintedDot& dot = scene.dots[i];

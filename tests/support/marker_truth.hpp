@@ -29,10 +29,12 @@ inline int nearest_row(const Points& points, const Vector3& place) {
   return int(nearest);
 }
 
-/// @param number  of the photograph; 0: at rest
-inline MarkerErrors marker_errors(const PhotoExample& example, const MarkerMeasurement& measured, int number) {
+/// @param number   of the photograph; 0: at rest
+/// @param at_rest  the dots' centres then [m]
+inline MarkerErrors marker_errors(const PhotoExample& example, const MarkerMeasurement& measured, int number,
+                                  const Points& at_rest) {
   constexpr double wrong_from = 2.0;  // [pixels]: far above the error of any right match, far below the dots' spacing
-  const Points at_rest = dot_centres(example.scene(0)), now = dot_centres(example.scene(number));
+  const Points now = dot_centres(example.scene(number));
   const MeasuredMarkers& markers = number == 0 ? measured.rest : measured.presses[std::size_t(number) - 1].markers;
   MarkerErrors out;
   out.markers = int(markers.positions.rows());
