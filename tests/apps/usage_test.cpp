@@ -43,7 +43,8 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp,
-                         testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers"),
+                         testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track",
+                                         "markers"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {
