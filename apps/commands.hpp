@@ -20,6 +20,7 @@ void add_evaluate(CLI::App& app, int& exit_code);
 void add_synth(CLI::App& app, int& exit_code);
 void add_rest(CLI::App& app, int& exit_code);
 void add_mesh(CLI::App& app, int& exit_code);
+void add_markers(CLI::App& app, int& exit_code);
 void add_scan(CLI::App& app, int& exit_code);
 
 /// Thrown where a command notices that the user pressed Ctrl-C.

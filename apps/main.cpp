@@ -37,6 +37,7 @@ int run(int argc, char** argv) {
   int exit_code = Fine;
   add_check(app, exit_code);
   add_scan(app, exit_code);
+  add_markers(app, exit_code);
   add_fit(app, exit_code);
   add_simulate(app, exit_code);
   add_track(app, exit_code);

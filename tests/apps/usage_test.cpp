@@ -28,7 +28,7 @@ TEST(Usage, VersionIsOneLineOnStdout) {
 TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
-  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "130"})
+  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -43,7 +43,8 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp,
-                         testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track"),
+                         testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track",
+                                         "markers"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {
