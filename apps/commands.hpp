@@ -17,6 +17,7 @@ void add_fit(CLI::App& app, int& exit_code);
 void add_simulate(CLI::App& app, int& exit_code);
 void add_track(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
+void add_press(CLI::App& app, int& exit_code);
 void add_synth(CLI::App& app, int& exit_code);
 void add_rest(CLI::App& app, int& exit_code);
 void add_mesh(CLI::App& app, int& exit_code);

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/error.hpp"
@@ -8,6 +9,7 @@
 #include "commands.hpp"
 #include "report/fit_output.hpp"
 #include "report/prediction.hpp"
+#include "report/press_output.hpp"
 
 namespace pliant::apps {
 
@@ -39,20 +41,31 @@ bool evaluate_frames(const Capture& capture, const CaptureScene& scene, const Ob
 int run(const Arguments& arguments) {
   const Model model = load_model(arguments.model);
   const Capture capture = read_capture(arguments.capture);
-  if (!capture.presses.empty()) std::cerr << "pliant: presses of this capture are passed over\n";
   ObserveOptions options;
   options.max_points_per_frame = 1000;
   const auto observed = observe(capture, options, [](int done, int total) { show_progress("read", done, total); });
   stop_if_interrupted();
   const auto seen =
       std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed, tracked_points(capture)));
-  if (seen->empty() && capture.loads.empty())
-    throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
-  const CaptureScene scene = make_scene(model, capture);
   Evaluation result;
-  bool converged = seen->empty() || evaluate_frames(capture, scene, seen, result);
-  if (!converged && capture.loads.empty()) return NotConverged;
-  result.loads = predict_loads(capture, scene);
+  bool converged = true;
+  if (!capture.presses.empty()) {
+    result.presses = predict_presses(model, capture);
+    for (const StaticError& press : result.presses) {
+      std::cerr << press_sentence(press) << "\n";
+      converged = converged && press.marker_rms;
+    }
+  }
+  if (seen->empty() && capture.loads.empty() && capture.presses.empty())
+    throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
+  const bool has_frames = !seen->empty(), has_loads = !capture.loads.empty();
+  std::optional<CaptureScene> scene;
+  if (has_frames || has_loads || !arguments.markers.empty()) scene = make_scene(model, capture);
+  if (has_frames && !evaluate_frames(capture, *scene, seen, result)) {
+    converged = false;
+    if (!has_loads && result.presses.empty()) return NotConverged;
+  }
+  if (has_loads) result.loads = predict_loads(capture, *scene);
   for (const LoadError& load : result.loads) {
     std::cerr << load_sentence(load) << "\n";
     converged = converged && load.failure.empty();
@@ -60,7 +73,7 @@ int run(const Arguments& arguments) {
   std::cout << to_json(result) << "\n";
   if (!arguments.out.empty()) write_evaluation(arguments.out, result);
   if (!arguments.markers.empty()) {
-    const MarkerPrediction prediction = predict_markers(capture, scene);
+    const MarkerPrediction prediction = predict_markers(capture, *scene);
     write_marker_track(arguments.markers, prediction.ids, prediction.frames);
   }
   return converged ? Fine : NotConverged;

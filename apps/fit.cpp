@@ -16,6 +16,7 @@
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
 #include "report/fit_output.hpp"
+#include "report/press_output.hpp"
 #include "report/report.hpp"
 
 namespace pliant::apps {
@@ -152,6 +153,86 @@ RecordingResult score_held_out(const RecordedCapture& held_out, const FitOutcome
   return result;
 }
 
+/// Whether a capture's presses are what there is to fit.
+bool is_of_presses(const Capture& capture) { return !capture.presses.empty() && capture.times.empty(); }
+
+std::string describe(const PressFitEvent& event) {
+  char text[160];
+  if (event.stage.starts_with("press"))
+    std::snprintf(text, sizeof text, "%-18s %2d iterations  rms %6.2f mm", event.stage.c_str(), event.iteration,
+                  1e3 * event.marker_rms);
+  else
+    std::snprintf(text, sizeof text, "%-18s iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
+                  event.iteration, event.cost, 1e3 * event.marker_rms);
+  return text + ("  E " + with_prefix(event.youngs_modulus, "Pa"));
+}
+
+void print_result(const Result& result, const PressFitOutcome& outcome, const fs::path& out, double seconds) {
+  std::cout << result.capture.name << "\n";
+  for (const ParameterResult& p : result.parameters) {
+    const auto* value = std::get_if<double>(&p.value);
+    if (!p.estimated || !value) continue;
+    std::optional<double> std;
+    if (p.std) std = std::get<double>(*p.std);
+    std::cout << "  " << spoken_name(p.name) << ": " << value_with_uncertainty(*value, std, p.unit) << "\n";
+  }
+  for (const StaticError& press : press_errors(*outcome.scene, outcome.predictions))
+    if (press.role == "test") std::cout << "  " << press_sentence(press) << "\n";
+  char line[120];
+  std::snprintf(line, sizeof line, "  markers %.2f mm rms over the fitted presses; %s after %.0f s\n",
+                1e3 * result.error.marker_rms.value_or(0.0), outcome.reason.c_str(), seconds);
+  std::cout << line;
+  for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
+  std::cout << "Look at " << (out / "report.html").string() << "; press it with: pliant press "
+            << (out / "model.toml").string() << " --contact X,Y,Z --force X,Y,Z --out DIR\n";
+}
+
+int run_presses(const Arguments& arguments, const FitOptions& options, const Capture& capture, const std::string& words,
+                Log& log) {
+  const auto begin = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  const fs::path out = arguments.out, state_file = out / "state.json";
+  const std::string key = capture.sha256 + "\n" + to_toml(options);
+  PressFitState state;
+  if (arguments.resume) {
+    if (!fs::exists(state_file))
+      throw InputError({{state_file},
+                        "there is no interrupted fit to resume",
+                        "the state that an interrupted fit leaves",
+                        "leave out --resume"});
+    state = read_press_state(state_file, key);
+    log.line("resuming the fit in " + out.string());
+  } else {
+    fs::remove(state_file);
+  }
+  write_file(out / "fit.toml", to_toml(options));
+  PressFitMonitor monitor;
+  monitor.on_event = [&](const PressFitEvent& event) { log.live(describe(event)); };
+  monitor.on_state = [&](const PressFitState& s) { write_press_state(state_file, s, key); };
+  monitor.interrupted = [] { return is_interrupted(); };
+  const PressFitOutcome outcome = fit_presses(capture, press_options(options), monitor, std::move(state));
+  log.clear_live();
+  if (outcome.interrupted && !fs::exists(state_file)) write_press_state(state_file, {}, key);
+  if (!outcome.succeeded) {
+    log.line("the fit ended without a result: " + outcome.reason);
+    write_file(out / "log.txt", log.text());
+    return outcome.interrupted ? WasInterrupted : NotConverged;
+  }
+  const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
+  const Result result = make_result(capture, outcome, facts);
+  write_press_output(out, capture, outcome, result, facts, show_progress);
+  log.line(outcome.reason);
+  write_file(out / "log.txt", log.text());
+  print_result(result, outcome, out, seconds());
+  if (outcome.interrupted) {
+    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out.string()
+              << " --resume\n";
+    return WasInterrupted;
+  }
+  fs::remove(state_file);
+  return outcome.converged ? Fine : NotConverged;
+}
+
 int run(const Arguments& arguments) {
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
@@ -174,6 +255,8 @@ int run(const Arguments& arguments) {
 
   Log log;
   log.line("pliant " PLIANT_VERSION " fit " + words);
+  if (recordings.size() == 1 && !held_out && is_of_presses(recordings.front().capture))
+    return run_presses(arguments, options, recordings.front().capture, words, log);
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
   const auto read = [&](RecordedCapture& recording) {

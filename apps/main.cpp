@@ -42,6 +42,7 @@ int run(int argc, char** argv) {
   add_simulate(app, exit_code);
   add_track(app, exit_code);
   add_evaluate(app, exit_code);
+  add_press(app, exit_code);
   add_synth(app, exit_code);
   add_rest(app, exit_code);
   add_mesh(app, exit_code);

@@ -203,10 +203,11 @@ const std::vector<Entry>& entries() {
           &FitOptions::correct),
       flag_entry("hold_strongly", "held regions fix grid nodes instead of using Nitsche's method",
                  &FitOptions::hold_strongly),
-      choice_entry("material",
-                   "of presses with known force: Ogden's law fitted to all at once, one linear law, or the stiffness of "
-                   "each press interpolated in strain space",
-                   press_materials, &FitOptions::material),
+      choice_entry(
+          "material",
+          "of presses with known force: Ogden's law fitted to all at once, one linear law, or the stiffness of "
+          "each press interpolated in strain space",
+          press_materials, &FitOptions::material),
       integer_entry("law_terms", "0..3", "of Ogden's law; 0: as many as the presses support", &FitOptions::law_terms),
       real_entry("marker_noise", "m", ">= 0", "of a marker's coordinate under a press; 0: what the residuals say",
                  &FitOptions::marker_noise),

@@ -145,23 +145,93 @@ FitState to_state(const Json& json) {
 
 }  // namespace
 
-void write_fit_state(const std::filesystem::path& path, const FitState& state, const std::string& key) {
-  Json json = to_json(state);
-  json["format"] = format;
+namespace {
+
+constexpr const char* press_format = "press-fit-state/1";
+
+Json from_matrix(const MatrixX& m) {
+  return {{"rows", m.rows()}, {"values", std::vector<double>(m.data(), m.data() + m.size())}};
+}
+MatrixX to_matrix(const Json& json) {
+  const auto values = json.at("values").get<std::vector<double>>();
+  const auto rows = json.at("rows").get<Eigen::Index>();
+  return Eigen::Map<const MatrixX>(values.data(), rows, rows == 0 ? 0 : Eigen::Index(values.size()) / rows);
+}
+
+Json from_sample(const PressSample& s) {
+  MatrixX p(Eigen::Index(s.sample.p.size()), 2);
+  for (Eigen::Index e = 0; e < p.rows(); ++e)
+    p.row(e) << s.sample.p[std::size_t(e)].lambda, s.sample.p[std::size_t(e)].alpha;
+  return {{"succeeded", s.succeeded},  {"converged", s.converged},
+          {"failure", s.failure},      {"strains", from_matrix(s.sample.strains)},
+          {"p", from_matrix(p)},       {"weight", s.weight},
+          {"start_rms", s.start_rms},  {"rms", s.rms},
+          {"iterations", s.iterations}};
+}
+
+PressSample to_sample(const Json& json) {
+  PressSample s;
+  s.succeeded = json.at("succeeded").get<bool>();
+  s.converged = json.at("converged").get<bool>();
+  s.failure = json.at("failure").get<std::string>();
+  s.sample.strains = to_matrix(json.at("strains"));
+  const MatrixX p = to_matrix(json.at("p"));
+  for (Eigen::Index e = 0; e < p.rows(); ++e) s.sample.p.push_back({p(e, 0), p(e, 1)});
+  s.weight = json.at("weight").get<double>();
+  s.start_rms = json.at("start_rms").get<double>();
+  s.rms = json.at("rms").get<double>();
+  s.iterations = json.at("iterations").get<int>();
+  return s;
+}
+
+Json to_json(const PressFitState& state) {
+  Json json = {{"done", Json::array()}, {"samples", Json::array()}};
+  for (const PressFitState::Done& d : state.done)
+    json["done"].push_back({{"terms", d.terms},
+                            {"controls", d.controls},
+                            {"theta", from_vector(d.theta)},
+                            {"cost", from_cost(d.cost)},
+                            {"against", from_cost(-d.evidence)},
+                            {"noise", d.noise},
+                            {"kept", d.kept}});
+  for (const PressSample& s : state.samples) json["samples"].push_back(from_sample(s));
+  json["under_way"] = {{"iterations", state.under_way.iterations},
+                       {"p", from_vector(state.under_way.p)},
+                       {"memory", from_vector(state.under_way.memory)}};
+  return json;
+}
+
+PressFitState to_press_state(const Json& json) {
+  PressFitState state;
+  for (const Json& d : json.at("done"))
+    state.done.push_back({d.at("terms").get<int>(), d.at("controls").get<int>(), to_vector(d.at("theta")),
+                          to_cost(d.at("cost")), -to_cost(d.at("against")), d.at("noise").get<double>(),
+                          d.at("kept").get<bool>()});
+  for (const Json& s : json.at("samples")) state.samples.push_back(to_sample(s));
+  const Json& under_way = json.at("under_way");
+  state.under_way = {under_way.at("iterations").get<int>(), to_vector(under_way.at("p")),
+                     to_vector(under_way.at("memory"))};
+  return state;
+}
+
+void write_state(const std::filesystem::path& path, Json json, const char* kind, const std::string& key) {
+  json["format"] = kind;
   json["key"] = key;
   write_file(path, json.dump(1));
 }
 
-FitState read_fit_state(const std::filesystem::path& path, const std::string& key) {
+/// The state of that kind and key, as `make` understands it.
+template <class Make>
+auto read_state(const std::filesystem::path& path, const char* kind, const std::string& key, const Make& make) {
   try {
     const Json json = Json::parse(read_file(path));
-    if (json.at("format") != format) throw std::runtime_error("another format");
+    if (json.at("format") != kind) throw std::runtime_error("another format");
     if (json.at("key") != key)
       throw InputError({{path},
                         "the interrupted fit was of another capture or with other choices",
                         "the same ones",
                         "leave out --resume to start anew, or give the same capture and options"});
-    return to_state(json);
+    return make(json);
   } catch (const InputError&) {
     throw;
   } catch (const std::exception& error) {
@@ -170,6 +240,24 @@ FitState read_fit_state(const std::filesystem::path& path, const std::string& ke
                       "",
                       "leave out --resume to start anew"});
   }
+}
+
+}  // namespace
+
+void write_fit_state(const std::filesystem::path& path, const FitState& state, const std::string& key) {
+  write_state(path, to_json(state), format, key);
+}
+
+FitState read_fit_state(const std::filesystem::path& path, const std::string& key) {
+  return read_state(path, format, key, [](const Json& json) { return to_state(json); });
+}
+
+void write_press_state(const std::filesystem::path& path, const PressFitState& state, const std::string& key) {
+  write_state(path, to_json(state), press_format, key);
+}
+
+PressFitState read_press_state(const std::filesystem::path& path, const std::string& key) {
+  return read_state(path, press_format, key, [](const Json& json) { return to_press_state(json); });
 }
 
 }  // namespace pliant

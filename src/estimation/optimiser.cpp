@@ -30,7 +30,8 @@ Derivatives needed_by(OptimiserKind kind) {
 /// What the optimisers share: bookkeeping of the best point and the end.
 class Run {
  public:
-  Run(CostFunction& objective, const OptimiserOptions& options, const std::function<bool(const Iteration&)>& on_iteration)
+  Run(CostFunction& objective, const OptimiserOptions& options,
+      const std::function<bool(const Iteration&)>& on_iteration)
       : objective_(objective), options_(options), on_iteration_(on_iteration) {}
 
   CostEvaluation evaluate(const VectorX& p, Derivatives by) {

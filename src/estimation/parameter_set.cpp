@@ -201,6 +201,8 @@ VectorX ParameterSet::clamp(const VectorX& p) const {
       out[at] = std::clamp(p[at], std::log(std::max(q.lower, 1e-300)), std::log(q.upper));
     else if (q.transform == Transform::LogitHalf)
       out[at] = std::clamp(p[at], logit_half(std::max(q.lower, 1e-4)), logit_half(std::min(q.upper, 0.4999)));
+    else if (q.transform == Transform::Shift)
+      out[at] = std::clamp(p[at], q.lower / q.scale, q.upper / q.scale);
   });
   return out;
 }

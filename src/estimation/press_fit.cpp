@@ -45,7 +45,8 @@ std::shared_ptr<const Body> with_field(const Body& body, ModulusField field) {
 VectorX with_term(const PressTheta& from, const VectorX& theta) {
   const PressTheta to{from.controls, from.terms + 1};
   VectorX more = VectorX::Zero(to.size());
-  more.head(theta.size()) = theta;
+  more.head(2 + from.shapes()) = theta.head(2 + from.shapes());
+  more.tail(from.controls - 1) = theta.tail(from.controls - 1);
   // The second term has the other sign, the third stiffens more than the first.
   more[to.exponent(to.terms - 1)] = to.terms % 2 == 0 ? -6.0 : 10.0;
   more[to.ratio(to.terms - 1)] = 0.2;
@@ -170,7 +171,7 @@ class PressFit {
     for (const double r : residuals) sum += r * r;
     event.marker_rms = std::sqrt(3.0 * sum / double(std::max<std::size_t>(residuals.size(), 1)));
     double log = 0.0;
-    for (int k = 0; k < layout.controls; ++k) log += std::log(theta[k]) / layout.controls;
+    for (int k = 0; k < layout.controls; ++k) log += std::log(theta[layout.modulus(k)]) / layout.controls;
     event.youngs_modulus = std::exp(log);
     if (monitor_.on_event) monitor_.on_event(event);
     outcome_.history.push_back(event);
@@ -267,10 +268,11 @@ class PressFit {
     scene->body = with_field(*before.scene->body, field.field);
     const PressTheta layout{size, before.layout.terms};
     const MatrixX carried = carried_over(*scene->body, before.scene->body->modulus, scene->body->modulus);
-    VectorX start = VectorX::Zero(layout.size());
-    start.head(size) =
-        (carried * before.theta.head(before.layout.controls).array().log().matrix()).array().exp().matrix();
-    start.tail(layout.size() - size) = before.theta.tail(before.layout.size() - before.layout.controls);
+    VectorX start = VectorX::Zero(layout.size()), logs{before.layout.controls};
+    start.head(2 + layout.shapes()) = before.theta.head(2 + layout.shapes());
+    for (int k = 0; k < before.layout.controls; ++k) logs[k] = std::log(before.theta[before.layout.modulus(k)]);
+    const VectorX moduli = (carried * logs).array().exp();
+    for (int k = 0; k < size; ++k) start[layout.modulus(k)] = moduli[k];
     TriedLaw tried{layout.terms, size, infinite, -infinite, false};
     std::optional<Estimate> next;
     const bool is_chosen = options_.control_points > 1;

@@ -11,11 +11,11 @@ namespace pliant {
 namespace {
 
 /// ln E of an element by those of the control moduli.
-double log_modulus(const Body& body, int e, const VectorX& theta) {
+double log_modulus(const Body& body, int e, const PressTheta& layout, const VectorX& theta) {
   const ModulusField& field = body.modulus;
   double log = std::log(field.relative[std::size_t(e)]);
-  if (field.controls == 1) return log + std::log(theta[0]);
-  for (int k = 0; k < field.controls; ++k) log += field.weights(e, k) * std::log(theta[k]);
+  if (field.controls == 1) return log + std::log(theta[layout.modulus(0)]);
+  for (int k = 0; k < field.controls; ++k) log += field.weights(e, k) * std::log(theta[layout.modulus(k)]);
   return log;
 }
 double weight_of(const Body& body, int e, int control) {
@@ -43,14 +43,14 @@ MatrixX table_derivative(const PressTheta& layout, const VectorX& theta, double 
   }
   const VectorX share = shares(layout, theta);
   const double mu = E / (2.0 * (1.0 + nu));
-  MatrixX by = MatrixX::Zero(3 * layout.terms, layout.size() - layout.controls + 1);
+  MatrixX by = MatrixX::Zero(3 * layout.terms, 2 + layout.shapes());
   for (int i = 0; i < layout.terms; ++i) {
     by(3 * i, 0) = mu * share[i];
     by(3 * i, 1) = -mu * share[i] / (1.0 + nu);
-    by(3 * i + 1, layout.exponent(i) - layout.controls + 1) = 1.0;
+    by(3 * i + 1, layout.exponent(i)) = 1.0;
     by(3 * i + 2, 1) = 1.0;
     for (int j = 1; j < layout.terms; ++j)
-      by(3 * i, layout.ratio(j) - layout.controls + 1) = mu * share[j] / theta[layout.ratio(j)] * ((i == j) - share[i]);
+      by(3 * i, layout.ratio(j)) = mu * share[j] / theta[layout.ratio(j)] * ((i == j) - share[i]);
   }
   return by;
 }
@@ -75,15 +75,14 @@ ParameterSet press_parameters(const Body& body, const std::vector<std::string>& 
   };
   const double none = std::numeric_limits<double>::infinity();
   for (int k = 0; k < layout.controls; ++k)
-    add(modulus_names[std::size_t(k)], "Pa", Transform::Logarithm, k, youngs_modulus, 1e-4 * youngs_modulus,
-        1e4 * youngs_modulus, none);
+    add(modulus_names[std::size_t(k)], "Pa", Transform::Logarithm, layout.modulus(k), youngs_modulus,
+        1e-4 * youngs_modulus, 1e4 * youngs_modulus, none);
   add("poisson_ratio", "1", Transform::LogitHalf, layout.poissons_ratio(), 0.3, 0.01, 0.495, 2.0);
   for (int i = 0; i < terms; ++i) {
     const std::string number = "@" + std::to_string(i + 1);
-    // Exponents keep their sign: even terms stiffen in compression, odd ones in tension.
+    // Negative exponents stiffen in compression, great ones in tension; which of them do follows from the presses.
     const double sign = i % 2 == 0 ? 1.0 : -1.0, size = i < 2 ? 3.0 : 12.0;
-    add("exponent" + number, "1", Transform::Shift, layout.exponent(i), sign * size, sign > 0 ? 0.2 : -60.0,
-        sign > 0 ? 60.0 : -0.2, none);
+    add("exponent" + number, "1", Transform::Shift, layout.exponent(i), sign * size, -60.0, 60.0, none);
     parameters.back().scale = 4.0;
     parameters.back().prior_mean /= 4.0;
     parameters.back().prior_std = 3.0;
@@ -98,7 +97,7 @@ std::shared_ptr<const TabulatedLaw> press_law(const Body& body, const PressTheta
   MatrixX table(body.element_count(), layout.terms == 0 ? 2 : 3 * layout.terms);
   const VectorX share = layout.terms == 0 ? VectorX() : shares(layout, theta);
   for (int e = 0; e < body.element_count(); ++e) {
-    const double E = std::exp(log_modulus(body, e, theta));
+    const double E = std::exp(log_modulus(body, e, layout, theta));
     if (layout.terms == 0) {
       const LambdaAlpha p = lambda_alpha({E, nu});
       table.row(e) << p.lambda, p.alpha;
@@ -194,19 +193,19 @@ void PressObjective::add_press(std::size_t i, const MatrixX& by_p, bool with_der
   }
   // Changes of the forces -dW/dx by each number of theta.
   const int n = scene_->body->node_count(), rows = n + body.equilibrium().contact_count();
-  const int shapes = layout_.size() - layout_.controls;
   std::vector<Points> forces(std::size_t(layout_.size()), Points::Zero(rows, 3));
   body.equilibrium().elasticity().for_parameter_derivatives(
       [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
-        const double E = std::exp(log_modulus(*scene_->body, e, theta_));
+        const double E = std::exp(log_modulus(*scene_->body, e, layout_, theta_));
         const MatrixX by = by_q * table_derivative(layout_, theta_, E);
         for (std::size_t a = 0; a < nodes.size(); ++a) {
           const auto at = 3 * Eigen::Index(a);
           for (int k = 0; k < layout_.controls; ++k)
             if (const double w = weight_of(*scene_->body, e, k); w != 0.0)
-              forces[std::size_t(k)].row(nodes[a]) -= w / theta_[k] * by.col(0).segment<3>(at).transpose();
-          for (int s = 0; s < shapes; ++s)
-            forces[std::size_t(layout_.controls + s)].row(nodes[a]) -= by.col(1 + s).segment<3>(at).transpose();
+              forces[std::size_t(layout_.modulus(k))].row(nodes[a]) -=
+                  w / theta_[layout_.modulus(k)] * by.col(0).segment<3>(at).transpose();
+          for (int s = 1; s < 2 + layout_.shapes(); ++s)
+            forces[std::size_t(s)].row(nodes[a]) -= by.col(s).segment<3>(at).transpose();
         }
       });
   MatrixX by_theta(residuals.size(), layout_.size());

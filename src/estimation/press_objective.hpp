@@ -5,15 +5,17 @@
 
 namespace pliant {
 
-/// theta of a pressed object: control moduli first (as many as the body's field has), then Poisson's ratio, the first
-/// term's exponent, and of each further term its exponent and how stiff it is against the first, mu_i / mu_1. All terms
-/// share Poisson's ratio.
+/// theta of a pressed object: the first control modulus and Poisson's ratio where every theta has them, then the first
+/// term's exponent, of each further term its exponent and how stiff it is against the first, mu_i / mu_1, and at the
+/// end the other control moduli. All terms share Poisson's ratio.
 struct PressTheta {
   int controls = 1, terms = 1;  ///< terms is 0 for the linear law
-  int poissons_ratio() const { return controls; }
-  int exponent(int term) const { return controls + 1 + (term == 0 ? 0 : 2 * term - 1); }
-  int ratio(int term) const { return exponent(term) + 1; }  ///< of a term but the first
-  int size() const { return controls + 1 + (terms == 0 ? 0 : 2 * terms - 1); }
+  int modulus(int k) const { return theta::modulus(k, controls, size()); }
+  static int poissons_ratio() { return theta::poissons_ratio; }
+  static int exponent(int term) { return 2 + (term == 0 ? 0 : 2 * term - 1); }
+  static int ratio(int term) { return exponent(term) + 1; }  ///< of a term but the first
+  int shapes() const { return terms == 0 ? 0 : 2 * terms - 1; }
+  int size() const { return 2 + shapes() + controls - 1; }
 };
 
 /// The parameters of a law for presses: moduli "youngs_modulus" (or "youngs_modulus@1" ...), "poisson_ratio",

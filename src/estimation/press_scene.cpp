@@ -8,23 +8,11 @@
 
 #include "base/error.hpp"
 #include "estimation/problem.hpp"
-#include "motion/body_forces.hpp"
+#include "motion/press_session.hpp"
 
 namespace pliant {
 
 namespace {
-
-/// Gravity's nodal forces for a density of 1.
-Points unit_weight(const Body& body, const Vector3& gravity) {
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::density] = 1.0;
-  theta.segment<3>(theta::gravity) = gravity;
-  Gravity term(body);
-  term.set_parameters(theta);
-  Points force = Points::Zero(body.node_count(), 3);
-  term.add_force(body.nodes, force);
-  return force;
-}
 
 ObservedPress observe_press(const Capture& capture, std::size_t i) {
   const Press& press = capture.presses[i];
@@ -103,7 +91,7 @@ PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> 
                       "say where the object stands or is clamped"});
   const double volume = body->volume();
   scene.density = capture.mass ? *capture.mass / volume : capture.density.value_or(0.0);
-  scene.unit_weight = unit_weight(*body, capture.gravity.value_or(Vector3::Zero()));
+  scene.unit_weight = weight_of(*body, 1.0, capture.gravity.value_or(Vector3::Zero()));
   scene.noise = 1e-3 * object_size(capture);
   scene.body = std::move(body);
   for (std::size_t i = 0; i < capture.presses.size(); ++i) scene.presses.push_back(observe_press(capture, i));

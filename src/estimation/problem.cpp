@@ -17,13 +17,12 @@ constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: 
 constexpr double gravity_guess = 9.81;
 constexpr double range_error_std = 0.02;  // [m], of light that enters a translucent material
 
-std::function<bool(const Vector3&)> region_test(const Capture& capture, const Region& region) {
+std::function<bool(const Vector3&)> region_test(const TriangleMesh& mesh, const Region& region) {
   const auto* vertices = std::get_if<RegionVertices>(&region);
   if (!vertices) return [region](const Vector3& p) { return contains(region, p); };
   // Named vertices hold the object around them, as far as the next vertices.
   std::vector<Vector3> centres;
   double radius = 0.0;
-  const TriangleMesh& mesh = *capture.surface;
   for (const int v : vertices->indices) centres.push_back(mesh.vertices[std::size_t(v)]);
   for (const auto& triangle : mesh.triangles)
     for (int side = 0; side < 3; ++side)
@@ -100,7 +99,8 @@ std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDis
   }
   if (!capture.regions.empty()) {
     std::vector<std::function<bool(const Vector3&)>> regions;
-    for (const MaterialRegion& region : capture.regions) regions.push_back(region_test(capture, region.region));
+    for (const MaterialRegion& region : capture.regions)
+      regions.push_back(region_test(*capture.surface, region.region));
     body.modulus = region_field(body, regions).field;
   } else if (resolution.field.control_points > 1) {
     ControlledField field = control_field(body, capture, resolution.field);
@@ -110,14 +110,16 @@ std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDis
   return std::make_shared<Body>(std::move(body));
 }
 
-std::vector<Hold> held_regions(const Capture& capture) {
+std::vector<Hold> held_regions(const std::vector<FixedRegion>& regions, const TriangleMesh& surface) {
   std::vector<Hold> holds;
-  for (const FixedRegion& fixed : capture.fixed) {
+  for (const FixedRegion& fixed : regions) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
-    holds.push_back({region_test(capture, fixed.region), motion.rotation, motion.translation});
+    holds.push_back({region_test(surface, fixed.region), motion.rotation, motion.translation});
   }
   return holds;
 }
+
+std::vector<Hold> held_regions(const Capture& capture) { return held_regions(capture.fixed, *capture.surface); }
 
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
                           const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings,
@@ -136,7 +138,7 @@ namespace {
 PullPoints pull_points(const Capture& capture, int count) {
   std::vector<Vector3> held;
   for (const FixedRegion& fixed : capture.fixed) {
-    const auto contains = region_test(capture, fixed.region);
+    const auto contains = region_test(*capture.surface, fixed.region);
     std::ranges::copy_if(capture.surface->vertices, std::back_inserter(held), contains);
   }
   if (count == 0 || held.empty()) return {};

@@ -56,6 +56,8 @@ std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDis
 
 /// The capture's held regions.
 std::vector<Hold> held_regions(const Capture& capture);
+/// Those of a model, say.
+std::vector<Hold> held_regions(const std::vector<FixedRegion>& fixed, const TriangleMesh& surface);
 
 /// Body, scene and mismatch of a capture. `theta` gives the weight and gravity that contact is scaled by.
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,

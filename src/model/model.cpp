@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "base/files.hpp"
+#include "capture/csv.hpp"
 #include "capture/toml_facts.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/volume_mesh.hpp"
@@ -44,7 +45,12 @@ std::string model_toml(const Model& m) {
     out << "volume_mesh = \"model.vtu\"        # elements with the material of each\n";
   line(out, "mass", m.mass, "kg");
   line(out, "density", m.density, "kg/m^3");
-  out << "\n[material]                          # isotropic, linear in the rotated frame of each element\n";
+  out << (m.law ? "\n[material]                          # moduli are those of small strains\n"
+                : "\n[material]                          # isotropic, linear in the rotated frame of each element\n");
+  if (m.law) {
+    out << fmt::format("law = \"{}\"\ntable = \"material.csv\"            # of the law, by element\n", m.law->name);
+    if (m.law->metric_nu != 0.0) line(out, "metric_nu", m.law->metric_nu, "Poisson's ratio of the norm of strains");
+  }
   line(out, "youngs_modulus", m.youngs_modulus, "Pa; the mean where elements differ");
   line(out, "poisson_ratio", m.poisson_ratio, "-1 .. 0.5");
   line(out, "mass_damping", m.mass_damping, "Rayleigh, 1/s");
@@ -84,6 +90,36 @@ void write_volume(const fs::path& path, const ModelVolume& volume) {
       {modulus_field, 1, volume.youngs_modulus}, {ratio_field, 1, volume.poisson_ratio}, {fill_field, 1, volume.fill}};
   if (!volume.youngs_modulus_std.empty()) grid.cell_data.push_back({modulus_std_field, 1, volume.youngs_modulus_std});
   write_vtu(path, grid);
+}
+
+void write_law(const fs::path& path, const ModelLaw& law) {
+  std::string text = fmt::format("{}\n", fmt::join(law.columns, ","));
+  for (const std::vector<double>& row : law.rows) {
+    if (row.size() != law.columns.size()) throw std::invalid_argument("a law's rows have a number a column");
+    text += fmt::format("{:.17g}\n", fmt::join(row, ","));
+  }
+  write_file(path, text);
+}
+
+ModelLaw read_law(const fs::path& path, std::string name) {
+  ModelLaw law{std::move(name), {}, {}, 0.0};
+  const std::string text = read_file(path);
+  std::string header = text.substr(0, text.find_first_of("\r\n"));
+  for (std::size_t begin = 0; begin <= header.size();) {
+    const std::size_t end = std::min(header.find(',', begin), header.size());
+    law.columns.push_back(header.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  std::vector<Problem> problems;
+  read_csv(path, header, problems, [&](CsvRow& row) {
+    std::vector<double>& numbers = law.rows.emplace_back();
+    for (std::size_t c = 0; c < law.columns.size(); ++c) numbers.push_back(row.number(c).value_or(0.0));
+  });
+  if (law.columns.front() != "element")
+    problems.push_back(
+        {{path, 1, 1}, "the first column \"" + law.columns.front() + "\"", "\"element\"", "save the model again"});
+  if (!problems.empty()) throw InputError(std::move(problems));
+  return law;
 }
 
 void write_vertices(const fs::path& folder, const Model& model) {
@@ -155,6 +191,11 @@ class Reader {
   }
 
   void read_material(TomlTable& material) {
+    if (const auto law = material.optional<std::string>("law"))
+      with_file(read_path(material, "table", folder_),
+                [&](const fs::path& path) { model_.law = read_law(path, *law); });
+    const double metric_nu = read_number(material, "metric_nu", {.low = -1.0, .high = 0.5, .meaning = "a norm's"}, 0.0);
+    if (model_.law) model_.law->metric_nu = metric_nu;
     model_.youngs_modulus = read_number(material, "youngs_modulus",
                                         {.low = 0.0, .low_allowed = false, .meaning = "Young's modulus in pascals"});
     model_.poisson_ratio = read_number(
@@ -240,6 +281,7 @@ void save_model(const fs::path& folder, const Model& model) {
   if (!model.volume.connectivity.empty()) write_volume(folder / "model.vtu", model.volume);
   write_mesh(folder / "surface.ply", model.surface);
   write_vertices(folder, model);
+  if (model.law) write_law(folder / "material.csv", *model.law);
   write_file(folder / "model.toml", model_toml(model));
 }
 

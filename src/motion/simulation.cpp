@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "elasticity/law_elasticity.hpp"
 #include "base/error.hpp"
 #include "elasticity/corotated.hpp"
+#include "elasticity/law_elasticity.hpp"
 #include "motion/body_forces.hpp"
 
 namespace pliant {
@@ -66,8 +66,8 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
       options_(std::move(options)),
       stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_),
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
-                options_.rotation_prediction, options_.solver,
-                options_.law ? Integrator::Newton : options_.integrator, options_.newton}),
+                options_.rotation_prediction, options_.solver, options_.law ? Integrator::Newton : options_.integrator,
+                options_.newton}),
       rest_(body_->scanned_positions()) {
   if (holds_strongly(*body_, options_)) {
     stepper_.hold(eliminated_nodes(*body_, options_));

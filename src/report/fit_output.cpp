@@ -10,9 +10,11 @@
 #include "base/files.hpp"
 #include "elasticity/corotated.hpp"
 #include "elasticity/element_moduli.hpp"
+#include "elasticity/law_elasticity.hpp"
 #include "model/vtu.hpp"
 #include "report/gallery.hpp"
 #include "report/prediction.hpp"
+#include "report/press_output.hpp"
 #include "report/report.hpp"
 #include "report/track_output.hpp"
 
@@ -124,8 +126,9 @@ VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& par
   const Body& body = *shared;
   VtuGrid grid;
   grid.kind = vtu_cell(body.kind);
+  auto* by_law = dynamic_cast<LawElasticity*>(&elasticity);
   ElementModuli modulus(shared);
-  modulus.set_parameters(parameters);
+  if (!by_law) modulus.set_parameters(parameters);
   grid.points = state.x;
   VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}},
       stress{"stress [Pa]", 6, {}};
@@ -139,9 +142,10 @@ VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& par
     grid.connectivity.insert(grid.connectivity.end(), cell.begin(), cell.end());
     const Polar& polar = elasticity.rotation(e);
     const Matrix3 in_body = polar.S - Matrix3::Identity();
-    const double E = modulus[e];
     const Matrix3 in_world = polar.R * in_body * polar.R.transpose();
-    const Matrix3 sigma = E * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world);
+    const Matrix3 sigma =
+        by_law ? by_law->cauchy_stress(e)
+               : Matrix3(modulus[e] * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world));
     for (const double v : six(in_world)) strain.values.push_back(v);
     for (const double v : six(sigma)) stress.values.push_back(v);
   }
@@ -493,11 +497,11 @@ namespace {
 
 /// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's
 /// modulus where the volume mesh has as many elements.
-std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance& distance) {
+std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* distance) {
   const ModelVolume& volume = model.volume;
   Body body;
   if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
-    body = make_body(make_hex_grid(distance, bounding_box(model.surface), model.cell_size));
+    body = make_body(make_hex_grid(*distance, bounding_box(model.surface), model.cell_size));
   } else {
     const auto points = std::size_t(corner_count(volume.kind));
     std::vector<std::array<int, 4>> tets;
@@ -516,6 +520,8 @@ std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance& di
 }
 
 }  // namespace
+
+std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, nullptr); }
 
 ModelScene make_scene(const Model& model) {
   const CaptureScene scene = make_scene(model, as_capture(model));
@@ -545,7 +551,8 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
   Resolution resolution;
   resolution.cells = object_size(capture) / model.cell_size;
   resolution.pulls = int(situated.initial.pulls.size());
-  const auto body = body_of(model, *distance);
+  const auto body = body_of(model, distance.get());
+  if (model.law) settings.law = make_law(*model.law, body->element_count());
   resolution.element = body->kind;
   scene.discretisation =
       discretise(capture, distance, body, resolution, scene.theta, settings, tracked_points(capture).rest);
@@ -560,7 +567,7 @@ RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Bo
                                 const SimulationOptions& options, const VectorX& parameters,
                                 const std::function<bool(int, int)>& progress) {
   std::vector<PvdEntry> entries;
-  const auto elasticity = make_elasticity(body);
+  const auto elasticity = scene_elasticity(body, options);
   elasticity->set_parameters(parameters);
   Simulation simulation(body, options);
   const RolloutSummary summary = simulation.run(parameters, [&](int frame, const State& state, auto) {

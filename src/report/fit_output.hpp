@@ -37,6 +37,8 @@ struct ModelScene {
   VectorX theta;
 };
 ModelScene make_scene(const Model& model);
+/// The body of a model of tetrahedra, with each element's modulus.
+std::shared_ptr<const Body> model_body(const Model& model);
 
 /// A model's material in a capture's situation, on a grid as fine as the model's.
 /// Throws InputError where the capture has no moving object.

@@ -344,6 +344,51 @@ std::string resolutions_table(const Result& result) {
          "convergence index.</p>\n";
 }
 
+std::string presses_section(const ReportData& data) {
+  if (data.presses.empty()) return "";
+  std::string body;
+  std::array<Series, 2> series;
+  series[0].label = "fitted", series[1].label = "test, took no part in the fit";
+  for (std::size_t i = 0; i < data.presses.size(); ++i) {
+    const StaticError& press = data.presses[i];
+    const bool is_test = press.role == "test";
+    const auto length = [](const std::optional<double>& l) {
+      return l ? readable(1e3 * *l, 3) + " mm" : "no equilibrium";
+    };
+    body += fmt::format("<tr><td>{}{}</td><td>{} N</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                        escape_html(press.name), is_test ? " (test)" : "", readable(data.press_forces[i], 3),
+                        length(press.max_displacement), length(press.marker_rms),
+                        press.relative_error ? readable(100.0 * *press.relative_error, 3) + " %" : "");
+    if (!press.marker_rms) continue;
+    Series& s = series[is_test];
+    s.mark = Mark::Dots;
+    s.x.push_back(data.press_forces[i]);
+    s.y.push_back(1e3 * *press.marker_rms);
+  }
+  PlotOptions options;
+  options.x_label = "force [N]";
+  options.y_label = "markers, rms [mm]";
+  options.zero_y = true;
+  std::vector<Series> drawn;
+  for (Series& s : series)
+    if (!s.x.empty()) drawn.push_back(std::move(s));
+  std::string html = plot_svg(drawn, options);
+  if (!data.basis_errors.empty()) {
+    Series errors;
+    errors.mark = Mark::LineAndDots;
+    for (std::size_t k = 0; k < data.basis_errors.size(); ++k) {
+      errors.x.push_back(double(k + 1));
+      errors.y.push_back(100.0 * data.basis_errors[k]);
+    }
+    options.x_label = "samples of an element", options.y_label = "error of stress [%]";
+    html += "<p>How well few of the presses' stiffnesses stand for all of them:</p>\n" + plot_svg({errors}, options);
+  }
+  return html + "<details><summary>All presses</summary>\n" +
+         table("<th></th><th>force</th><th>greatest displacement</th><th>markers, rms</th><th>of the displacement</th>",
+               body) +
+         "</details>\n";
+}
+
 std::string loads_table(const std::vector<LoadError>& loads) {
   if (loads.empty()) return "";
   const auto cell = [](const std::optional<double>& length, const std::optional<double>& relative) {
@@ -404,6 +449,7 @@ std::string report_html(const ReportData& data) {
   html += section("What this means", words(data));
   html += section("Seen and simulated", pictures(data));
   html += section("Agreement over time", data.residuals.size() > 1 ? residual_plot(data.residuals) : "");
+  html += section("Presses", presses_section(data));
   html += section("Under hung weights", loads_table(data.loads));
   html += section("How the estimation went", convergence(data));
   html += section("All parameters", parameter_table(data.result));

@@ -41,6 +41,9 @@ struct ReportData {
   std::vector<ReportPicture> pictures;
   CorrelationTable correlations;
   std::vector<LoadError> loads;           ///< that took no part in the fit, as the model predicts them
+  std::vector<StaticError> presses;       ///< all of them, as the model predicts them ...
+  std::vector<double> press_forces;       ///< ... and their forces [N]
+  std::vector<double> basis_errors;       ///< of a sampled material: error of stress with 1, 2, ... samples an element
   std::string model_file = "model.toml";  ///< beside the page
   std::string capture_path;               ///< as the user named it; empty: "CAPTURE" in the commands shown
 };

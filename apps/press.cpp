@@ -1,0 +1,123 @@
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+
+#include "base/error.hpp"
+#include "commands.hpp"
+#include "estimation/problem.hpp"
+#include "geometry/mesh_io.hpp"
+#include "motion/press_session.hpp"
+#include "report/press_output.hpp"
+
+namespace pliant::apps {
+
+namespace {
+
+struct Arguments {
+  std::string model, out, surface;
+  std::vector<double> contact, force, to, axis;
+  double radius = 0.01;
+  std::string probe = "disc";
+  int steps = 1;
+};
+
+Vector3 vector_of(const std::vector<double>& numbers) { return {numbers[0], numbers[1], numbers[2]}; }
+
+int run(const Arguments& arguments) {
+  const Model model = load_model(arguments.model);
+  const auto body = model_body(model);
+  const auto law = law_of(model, *body);
+  if (arguments.force.empty() == arguments.to.empty())
+    throw InputError({{}, "neither or both of --force and --move", "one of them", "say what leads the probe"});
+  PressSessionOptions options;
+  options.held = held_nodes(*body, held_regions(model.fixed, model.surface));
+  if (model.gravity) options.dead_load = weight_of(*body, model.density, *model.gravity);
+  ProbeOptions probe;
+  probe.centre = vector_of(arguments.contact);
+  probe.radius = arguments.radius;
+  probe.kind = arguments.probe == "disc"    ? ProbeKind::GluedDisc
+               : arguments.probe == "punch" ? ProbeKind::Punch
+                                            : ProbeKind::Ball;
+  if (!arguments.axis.empty()) probe.axis = vector_of(arguments.axis).normalized();
+  PressSession session(body, law, probe, options);
+  const std::string file = arguments.surface.empty() ? "" : arguments.surface;
+  const TriangleMesh fine = file.empty() ? model.surface : read_mesh(file);
+  const SurfaceFollower follower(*body, fine.vertices);
+  std::vector<PvdEntry> entries;
+  std::cout << "step  force [N]                        displacement [mm]              iterations\n";
+  const auto elasticity = LawElasticity::make(body, law);
+  for (int step = 1; step <= arguments.steps; ++step) {
+    stop_if_interrupted();
+    const double share = double(step) / arguments.steps;
+    const SolveSummary summary = arguments.to.empty() ? session.push(share * vector_of(arguments.force))
+                                                      : session.move_to(share * vector_of(arguments.to));
+    if (!summary.converged) {
+      std::cerr << "pliant: step " << step << ": " << session.failure() << "\n";
+      return NotConverged;
+    }
+    const Vector3 force = session.force(), moved = 1e3 * session.displacement();
+    char line[160];
+    std::snprintf(line, sizeof line, "%4d  %8.4g %8.4g %8.4g      %8.4g %8.4g %8.4g      %d\n", step, force.x(),
+                  force.y(), force.z(), moved.x(), moved.y(), moved.z(), summary.iterations);
+    std::cout << line;
+    if (arguments.out.empty()) continue;
+    char name[40];
+    std::snprintf(name, sizeof name, "frames/%06d", step);
+    const State state{session.nodes(), Points::Zero(session.nodes().rows(), 3)};
+    const std::filesystem::path folder = arguments.out;
+    write_vtu(folder / (std::string(name) + ".vtu"),
+              frame_grid(body, VectorX::Zero(theta::size(0)), state, *elasticity), VtuPrecision::Single);
+    TriangleMesh deformed = fine;
+    const Points positions = follower.positions(session.nodes());
+    for (std::size_t v = 0; v < deformed.vertices.size(); ++v)
+      deformed.vertices[v] = positions.row(Eigen::Index(v)).transpose();
+    write_mesh(folder / (std::string(name) + ".ply"), deformed);
+    entries.push_back({double(step), std::string(name) + ".vtu"});
+  }
+  if (arguments.out.empty()) return Fine;
+  write_pvd(std::filesystem::path(arguments.out) / "press.pvd", entries);
+  std::cout << arguments.steps << " equilibria in " << arguments.out << "/press.pvd, surfaces beside them\n";
+  return Fine;
+}
+
+}  // namespace
+
+void add_press(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("press", "Press a fitted model with a probe, by force or by moving it");
+  command->add_option("model", arguments->model, "model.toml of a fit, of tetrahedra")->required()->type_name("MODEL");
+  command->add_option("--contact", arguments->contact, "where the probe touches the surface at rest, metres")
+      ->required()
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z");
+  command->add_option("--force", arguments->force, "of the probe on the object, newtons")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z");
+  command->add_option("--move", arguments->to, "where the probe goes from there, metres")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z");
+  command->add_option("--probe", arguments->probe, "a disc that is glued on, a flat punch or a ball that slides")
+      ->check(CLI::IsMember({"disc", "punch", "ball"}));
+  command->add_option("--radius", arguments->radius, "of the probe, metres")->check(CLI::PositiveNumber);
+  command
+      ->add_option("--axis", arguments->axis,
+                   "along which a punch or ball points into the object; else the force's or the surface's")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z");
+  command->add_option("--steps", arguments->steps, "equilibria on the way")->check(CLI::PositiveNumber);
+  command->add_option("--surface", arguments->surface, "a finer mesh of the same object that follows along")
+      ->type_name("FILE");
+  command->add_option("--out,-o", arguments->out, "folder for the deformed meshes and surfaces")->type_name("DIR");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace pliant::apps

@@ -1,0 +1,145 @@
+#include "motion/press_session.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/error.hpp"
+#include "motion/body_forces.hpp"
+
+namespace pliant {
+
+namespace {
+
+Vector3 axis_at(const Body& body, const ProbeOptions& probe) {
+  if (probe.axis) return probe.axis->normalized();
+  const auto nearest = std::ranges::min_element(
+      body.surface, {}, [&](const SurfacePoint& p) { return (p.position - probe.centre).squaredNorm(); });
+  return -nearest->normal;
+}
+
+std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, const ProbeOptions& probe,
+                                      const std::vector<RigidContact>& inner) {
+  const double E = law.small_strain(0).youngs_modulus, edge = mean_edge(body);
+  std::vector<RigidContact> contacts;
+  if (probe.kind == ProbeKind::GluedDisc) {
+    const ContactSamples disc = disc_samples(body, probe.centre, probe.radius);
+    if (disc.rest.empty())
+      throw InputError({{},
+                        "the probe touches nothing of the object",
+                        "a contact on its surface at rest",
+                        "see where the model's surface.ply lies"});
+    contacts.push_back(RigidContact::glued(body, disc, glued_stiffness(E, edge)));
+  } else {
+    const Vector3 axis = axis_at(body, probe);
+    const auto shape = probe.kind == ProbeKind::Ball
+                           ? rigid_ball(probe.centre - probe.radius * axis, probe.radius)
+                           : rigid_punch(probe.centre, axis, probe.radius, 0.1 * probe.radius);
+    contacts.push_back(RigidContact::sliding(body,
+                                             boundary_samples(body, std::clamp(int(2.0 * edge / probe.radius), 2, 8)),
+                                             shape, 100.0 * E / edge, 0.01 * probe.radius));
+  }
+  contacts.insert(contacts.end(), inner.begin(), inner.end());
+  return contacts;
+}
+
+}  // namespace
+
+PressSession::PressSession(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
+                           const ProbeOptions& probe, const PressSessionOptions& options)
+    : probe_(probe),
+      equilibrium_(body, law, options.held, contacts_of(*body, *law, probe, options.inner), options.equilibrium) {
+  probe_.axis = axis_at(*body, probe);
+  if (options.dead_load.rows() > 0) equilibrium_.set_dead_load(options.dead_load);
+  for (int i = 0; i < equilibrium_.contact_count(); ++i)
+    equilibrium_.set_control(i, {ProbeControl::Kind::Position, {}, Vector3::Zero(), {}});
+  placement_ = equilibrium_.rest();
+}
+
+SolveSummary PressSession::solve(const ProbeControl& control) {
+  equilibrium_.set_control(0, control);
+  Placement next = placement_;
+  const SolveSummary summary = equilibrium_.solve(next);
+  if (summary.converged) placement_ = std::move(next);
+  return summary;
+}
+
+SolveSummary PressSession::move_to(const Vector3& displacement) {
+  return solve({ProbeControl::Kind::Position, {}, displacement, {}});
+}
+
+SolveSummary PressSession::push(const Vector3& force) {
+  ProbeControl control{ProbeControl::Kind::Force, force, Vector3::Zero(), {}};
+  if (probe_.kind != ProbeKind::GluedDisc) {
+    control.axis = *probe_.axis;
+    control.force = *probe_.axis * probe_.axis->dot(force);
+  }
+  return solve(control);
+}
+
+SurfaceFollower::SurfaceFollower(const Body& body, const std::vector<Vector3>& rest) : start_{0} {
+  const int n = body.node_count();
+  // Nodes near a point: those of the elements around it, and of theirs; at least a dozen, not in a plane.
+  const Embedding embedding(body, rest);
+  std::vector<std::vector<int>> elements_of(static_cast<std::size_t>(n));
+  for (int e = 0; e < body.element_count(); ++e)
+    for (const int node : body.element(e)) elements_of[std::size_t(node)].push_back(e);
+  std::vector<int> near;
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    near.clear();
+    for (const int node : body.element(embedding.element(int(i))))
+      for (const int e : elements_of[std::size_t(node)]) {
+        const auto own = body.element(e);
+        near.insert(near.end(), own.begin(), own.end());
+      }
+    std::ranges::sort(near);
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    double reach = 0.0;
+    for (const int node : near) reach = std::max(reach, (body.nodes.row(node).transpose() - rest[i]).norm());
+    reach *= 1.05;
+    // Weights w_a(1 - |d|^2 / h^2)^2; the affine fit's value at the point is sum_a c_a x_a, c_a = w_a q_a . M^-1 e_1.
+    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+    std::vector<Eigen::Vector4d> q;
+    std::vector<double> bump;
+    for (const int node : near) {
+      const Vector3 d = (body.nodes.row(node).transpose() - rest[i]) / reach;
+      const double w = std::pow(std::max(0.0, 1.0 - d.squaredNorm()), 2);
+      q.emplace_back(1.0, d.x(), d.y(), d.z());
+      bump.push_back(w);
+      moments += w * q.back() * q.back().transpose();
+    }
+    const Eigen::Vector4d row = moments.fullPivLu().solve(Eigen::Vector4d::Unit(0));
+    for (std::size_t a = 0; a < near.size(); ++a) {
+      const double c = bump[a] * q[a].dot(row);
+      if (c == 0.0) continue;
+      node_.push_back(near[a]);
+      weight_.push_back(c);
+    }
+    start_.push_back(int(node_.size()));
+  }
+}
+
+Points SurfaceFollower::positions(const Points& nodes) const {
+  Points out(point_count(), 3);
+  for (int i = 0; i < point_count(); ++i) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (int k = start_[std::size_t(i)]; k < start_[std::size_t(i) + 1]; ++k)
+      sum += weight_[std::size_t(k)] * nodes.row(node_[std::size_t(k)]);
+    out.row(i) = sum;
+  }
+  return out;
+}
+
+Points weight_of(const Body& body, double density, const Vector3& gravity) {
+  VectorX theta = VectorX::Zero(theta::size(0));
+  theta[theta::density] = density;
+  theta.segment<3>(theta::gravity) = gravity;
+  Gravity term(body);
+  term.set_parameters(theta);
+  Points force = Points::Zero(body.node_count(), 3);
+  term.add_force(body.nodes, force);
+  return force;
+}
+
+}  // namespace pliant

@@ -1,0 +1,128 @@
+#include "estimation/press_objective.hpp"
+
+#include "estimation/optimiser.hpp"
+#include "support/derivatives.hpp"
+#include "support/presses.hpp"
+#include "support/tolerance.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+/// Two halves of different stiffness along x.
+std::shared_ptr<const Body> with_halves(const Body& body) {
+  auto copy = std::make_shared<Body>(body);
+  copy->modulus.controls = 2;
+  copy->modulus.weights = MatrixX::Zero(body.element_count(), 2);
+  for (int e = 0; e < body.element_count(); ++e) {
+    double x = 0.0;
+    for (const int n : body.element(e)) x += 0.25 * body.nodes(n, 0);
+    const double share = std::clamp(0.5 + 5.0 * x, 0.0, 1.0);
+    copy->modulus.weights.row(e) << 1.0 - share, share;
+  }
+  return copy;
+}
+
+struct Presses : ::testing::TestWithParam<int> {
+  Presses() {
+    test::PressedBlock block;
+    block.body = with_halves(*block.body);
+    layout = {2, GetParam()};
+    set = press_parameters(*block.body, {"youngs_modulus@1", "youngs_modulus@2"}, layout.terms, 9000.0);
+    truth = set.reference();
+    truth[layout.modulus(1)] = 14000.0;
+    truth[PressTheta::poissons_ratio()] = 0.2;
+    scene = std::make_shared<PressScene>(
+        block.scene(test::PressedBlock::presses(), press_law(*block.body, layout, truth), 1e-4));
+  }
+  PressObjective objective(double outlier_scale = 5.0) const {
+    return {scene, {0, 1, 2, 3}, layout, set, {1e-4, outlier_scale}};
+  }
+  PressTheta layout;
+  ParameterSet set;
+  VectorX truth;
+  std::shared_ptr<const PressScene> scene;
+};
+
+TEST_P(Presses, GradientMatchesCentralDifferences) {
+  PressObjective cost = objective();
+  const VectorX p = set.to_unconstrained(set.reference());
+  const CostEvaluation at = cost.linearise(p);
+  ASSERT_TRUE(at.succeeded) << at.failure;
+  for (Eigen::Index k = 0; k < p.size(); ++k) {
+    const auto along = [&](double h) {
+      const CostEvaluation e = cost.evaluate(p + h * VectorX::Unit(p.size(), k));
+      EXPECT_TRUE(e.succeeded) << e.failure;
+      return VectorX::Constant(1, e.cost);
+    };
+    EXPECT_LT(test::best_relative_error(along, at.gradient.segment(k, 1), 0.1), tolerance(1e-5)) << k;
+  }
+}
+
+TEST_P(Presses, GaussNewtonMatrixIsThatOfTheResidualsDerivatives) {
+  PressObjective cost = objective(1e9);  // no loss: the matrix is J^T J
+  const VectorX p = set.to_unconstrained(set.reference());
+  const CostEvaluation at = cost.linearise(p);
+  const auto residuals = [&](const VectorX& q) {
+    EXPECT_TRUE(cost.evaluate(q).succeeded);
+    const std::vector<double> r = cost.residuals();
+    return VectorX(Eigen::Map<const VectorX>(r.data(), Eigen::Index(r.size())) / 1e-4);
+  };
+  MatrixX J;
+  const double h = 1e-4;
+  for (Eigen::Index k = 0; k < p.size(); ++k) {
+    const VectorX column =
+        (residuals(p + h * VectorX::Unit(p.size(), k)) - residuals(p - h * VectorX::Unit(p.size(), k))) / (2 * h);
+    J.conservativeResize(column.size(), p.size());
+    J.col(k) = column;
+  }
+  MatrixX expected = J.transpose() * J, curvature;
+  VectorX gradient;
+  set.prior(p, &gradient, &curvature);
+  expected += curvature;
+  EXPECT_LT((at.gauss_newton - expected).norm(), tolerance(1e-5) * expected.norm());
+}
+
+TEST_P(Presses, TruthIsFoundFromElsewhere) {
+  PressObjective cost = objective();
+  OptimiserOptions options;
+  options.max_iterations = 40;
+  const OptimiserSummary s = minimise(cost, set.to_unconstrained(set.reference()), options);
+  ASSERT_TRUE(s.succeeded) << s.reason;
+  const VectorX theta = set.to_theta(s.p);
+  // The law itself and the mesh are those of the recording; 0.1 mm of noise on a hundred markers.
+  EXPECT_NEAR(theta[layout.modulus(0)], truth[layout.modulus(0)], 0.03 * truth[layout.modulus(0)]);
+  EXPECT_NEAR(theta[layout.modulus(1)], truth[layout.modulus(1)], 0.03 * truth[layout.modulus(1)]);
+  EXPECT_NEAR(theta[PressTheta::poissons_ratio()], 0.2, 0.02);
+}
+
+TEST_P(Presses, AWrongMarkerHardlyMoves) {
+  auto spoilt = std::make_shared<PressScene>(*scene);
+  spoilt->presses[1].loaded[3] += Vector3(0.03, 0.0, 0.02);
+  PressObjective cost(spoilt, {0, 1, 2, 3}, layout, set, {1e-4, 5.0});
+  const OptimiserSummary s = minimise(cost, set.to_unconstrained(truth), {});
+  ASSERT_TRUE(s.succeeded) << s.reason;
+  EXPECT_NEAR(set.to_theta(s.p)[0], truth[0], 0.03 * truth[0]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Terms, Presses, ::testing::Values(0, 1, 2),
+                         [](const auto& c) { return c.param == 0 ? "Linear" : "Ogden" + std::to_string(c.param); });
+
+TEST(PressScene, SoftMaterialThatCannotBeSolvedFailsInWords) {
+  const test::PressedBlock block;
+  const PressTheta layout{1, 1};
+  const ParameterSet set = press_parameters(*block.body, {"youngs_modulus"}, 1, 9000.0);
+  const auto scene = std::make_shared<PressScene>(
+      block.scene(test::PressedBlock::presses(), press_law(*block.body, layout, set.reference())));
+  EXPECT_GT(punch_modulus(*scene, 0.3), 1000.0);
+  EXPECT_LT(punch_modulus(*scene, 0.3), 30000.0);
+  PressObjective cost(scene, {2}, layout, set, {1e-4, 5.0});
+  VectorX p = set.to_unconstrained(set.reference());
+  p[0] -= 8.0;  // e^8 times softer
+  const CostEvaluation e = cost.evaluate(p);
+  if (!e.succeeded) EXPECT_THAT(e.failure, ::testing::HasSubstr("press 3"));
+}
+
+}  // namespace
+}  // namespace pliant
