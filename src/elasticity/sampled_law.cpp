@@ -103,11 +103,10 @@ void SampledLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress&
   ones.head<3>().setOnes();
   double energy = 0.0;
   Vector6 gradient = Vector6::Zero();
-  Matrix6 hessian = Matrix6::Zero();
+  Matrix6 hessian = Matrix6::Zero(), of_y = Matrix6::Zero();  // the second by y, from both sides still without L
   for (const GaussPoint& g : path) {
     Vector2 value = given.constant;
     Vector6 d_lambda = Vector6::Zero(), d_nu = Vector6::Zero();  // by y at t y
-    Matrix6 dd_lambda = Matrix6::Zero(), dd_nu = Matrix6::Zero();
     for (std::size_t i = 0; i < element.centres.size(); ++i) {
       const Vector6 d = g.t * y - element.centres[i];
       const double r = std::sqrt(d.squaredNorm() + tip * tip);
@@ -115,12 +114,6 @@ void SampledLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress&
       value += w * r;
       d_lambda += w[0] / r * d;
       d_nu += w[1] / r * d;
-      if (!with_tangent) continue;
-      const Matrix6 outer = d * d.transpose() / (r * r * r);
-      dd_lambda -= w[0] * outer;
-      dd_nu -= w[1] * outer;
-      dd_lambda.diagonal().array() += w[0] / r;
-      dd_nu.diagonal().array() += w[1] / r;
     }
     const Bounded lambda = bounded_lambda(given, value[0]), nu = bounded_nu(given, value[1]);
     const double shape = 1.0 - 2.0 * nu.value, weight = g.weight * g.t;
@@ -132,18 +125,26 @@ void SampledLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress&
     energy += weight * lambda.value * by_lambda;
     gradient += weight * (by_m + by_lambda * m_lambda + by_nu * m_nu);
     if (!with_tangent) continue;
-    Matrix6 second = 2.0 * lambda.value * nu.value * ones * ones.transpose();
-    second.diagonal().array() += 2.0 * lambda.value * shape;
     const Vector6 m_by_lambda = by_m / lambda.value;                        // d2Q / dm dlambda
     const Vector6 m_by_nu = 2.0 * lambda.value * (trace * ones - 2.0 * m);  // d2Q / dm dnu
     const Matrix6 mixed =
         m_by_lambda * m_lambda.transpose() + m_by_nu * m_nu.transpose() + slope * m_lambda * m_nu.transpose();
-    second += mixed + mixed.transpose();
-    Matrix6 of_y = by_lambda * (lambda.first * dd_lambda + lambda.second * d_lambda * d_lambda.transpose()) +
-                   by_nu * (nu.first * dd_nu + nu.second * d_nu * d_nu.transpose());
-    second += g.t * g.t * to_metric_ * of_y * to_metric_;
-    hessian += weight * second;
+    hessian += weight * (mixed + mixed.transpose());
+    hessian.topLeftCorner<3, 3>().array() += weight * 2.0 * lambda.value * nu.value;
+    hessian.diagonal().array() += weight * 2.0 * lambda.value * shape;
+    const double back = weight * g.t * g.t;
+    for (std::size_t i = 0; i < element.centres.size(); ++i) {  // I / r - d d^T / r^3
+      const Vector6 d = g.t * y - element.centres[i];
+      const double square_r = d.squaredNorm() + tip * tip;
+      const Vector2& w = given.weights[i];
+      const double c = back * (by_lambda * lambda.first * w[0] + by_nu * nu.first * w[1]) / std::sqrt(square_r);
+      of_y.diagonal().array() += c;
+      of_y.noalias() -= (c / square_r) * d * d.transpose();
+    }
+    if (lambda.second != 0.0) of_y += back * by_lambda * lambda.second * d_lambda * d_lambda.transpose();
+    if (nu.second != 0.0) of_y += back * by_nu * nu.second * d_nu * d_nu.transpose();
   }
+  if (with_tangent) hessian += to_metric_ * of_y * to_metric_;
   out.energy = energy;
   const double half = std::sqrt(0.5);
   Matrix3 T;

@@ -322,7 +322,12 @@ class PressFit {
       const std::size_t begin = samples.size(), end = std::min(begin + batch, fitted_.size());
       std::vector<PressSample> part(end - begin);
       tbb::parallel_for(begin, end, [&](std::size_t i) {
-        part[i - begin] = fit_sample(*scene_, fitted_[i], start, smoothness, options);
+        SampleFitOptions own = options;
+        const ObservedPress& seen = scene_->presses[std::size_t(fitted_[i])];
+        // The misfit of one law for all is no noise: what a press' markers show by themselves is, where that is less.
+        if (options_.noise <= 0.0)
+          own.noise = std::min(noise_, std::max(marker_noise(seen), 1e-3 * seen.greatest_displacement));
+        part[i - begin] = fit_sample(*scene_, fitted_[i], start, smoothness, own);
       });
       for (PressSample& sample : part) {
         PressFitEvent event{"press " + std::to_string(samples.size() + 1), sample.iterations, sample.weight, sample.rms,

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/error.hpp"
 #include "estimation/problem.hpp"
@@ -158,6 +160,38 @@ std::vector<PressPrediction> predict_presses(const PressScene& scene, const std:
   tbb::parallel_for(0, int(predictions.size()),
                     [&](int i) { predictions[std::size_t(i)] = predict_press(scene, i, law, modulus); });
   return predictions;
+}
+
+double marker_noise(const ObservedPress& press) {
+  const int count = int(press.rest.size()) - int(press.has_probe);
+  constexpr int neighbours = 8;
+  std::vector<double> sizes;
+  std::vector<int> order;
+  for (int m = 0; m < count; ++m) {
+    order.resize(std::size_t(count));
+    std::iota(order.begin(), order.end(), 0);
+    const Vector3& at = press.rest[std::size_t(m)];
+    const int near = std::min(neighbours + 1, count);
+    std::ranges::partial_sort(order, order.begin() + near, {},
+                              [&](int i) { return (press.rest[std::size_t(i)] - at).squaredNorm(); });
+    if (near < 5) break;
+    MatrixX A(near - 1, 4), b(near - 1, 3);  // the first is the marker itself
+    for (int k = 1; k < near; ++k) {
+      const auto i = std::size_t(order[std::size_t(k)]);
+      A.row(k - 1) << 1.0, (press.rest[i] - at).transpose();
+      b.row(k - 1) = (press.loaded[i] - press.rest[i]).transpose();
+    }
+    // Markers of one face say nothing about the normal direction: the least change along it.
+    const auto solver = A.completeOrthogonalDecomposition();
+    const VectorX row = solver.pseudoInverse().row(0).transpose();  // of the value at the marker
+    const Vector3 error = press.loaded[std::size_t(m)] - at - b.transpose() * row;
+    const double spread = std::sqrt(1.0 + row.squaredNorm());
+    for (int d = 0; d < 3; ++d) sizes.push_back(std::abs(error[d]) / spread);
+  }
+  if (sizes.empty()) return 0.0;
+  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
+  std::ranges::nth_element(sizes, middle);
+  return 1.4826 * *middle;
 }
 
 double punch_modulus(const PressScene& scene, double poissons_ratio) {

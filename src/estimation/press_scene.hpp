@@ -80,6 +80,11 @@ PressPrediction predict_press(const PressScene& scene, int press, const std::sha
 /// All of them, side by side.
 std::vector<PressPrediction> predict_presses(const PressScene& scene, const std::shared_ptr<const MaterialLaw>& law);
 
+/// Deviation of a coordinate [m] that a press' markers show by themselves, whatever the material: of each marker's
+/// displacement from the affine one of its nearest neighbours, the median over markers. Displacements that bend between
+/// neighbours count as noise, so it is rather too great where markers are few.
+double marker_noise(const ObservedPress& press);
+
 /// A Young's modulus to set out from [Pa]: that of half spaces under flat punches (Sneddon 1965), E = F (1 - nu^2) /
 /// (2 a u), the median of the presses to fit.
 double punch_modulus(const PressScene& scene, double poissons_ratio);

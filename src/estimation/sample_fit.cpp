@@ -1,5 +1,6 @@
 #include "estimation/sample_fit.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -36,7 +37,12 @@ Sparse umbrella(const Body& body) {
 
 struct ElementSmoothness::Factors {
   Sparse A;
-  Eigen::SimplicialLLT<Sparse> factor;
+  // Every element has some seventy neighbours: up to a few thousand elements the factor is full anyway, and full
+  // triangles are solved many columns at a time.
+  static constexpr Eigen::Index most_dense = 4000;
+  Eigen::LLT<MatrixX> dense;
+  Eigen::SimplicialLLT<Sparse> sparse;
+  bool is_dense() const { return A.rows() <= most_dense; }
 };
 
 ElementSmoothness::ElementSmoothness(const Body& body) : factors_(std::make_unique<Factors>()) {
@@ -45,14 +51,25 @@ ElementSmoothness::ElementSmoothness(const Body& body) : factors_(std::make_uniq
   identity.setIdentity();
   factors_->A = Sparse(L.transpose() * L);
   // So that a field that is wrong by a constant everywhere costs little against one that changes between neighbours.
-  factors_->A += 1e-4 * factors_->A.diagonal().mean() * identity;
-  factors_->factor.compute(factors_->A);
+  factors_->A += 1e-7 * factors_->A.diagonal().mean() * identity;
+  if (factors_->is_dense())
+    factors_->dense.compute(MatrixX(factors_->A));
+  else
+    factors_->sparse.compute(factors_->A);
 }
 ElementSmoothness::~ElementSmoothness() = default;
 ElementSmoothness::ElementSmoothness(ElementSmoothness&&) noexcept = default;
 int ElementSmoothness::size() const { return int(factors_->A.rows()); }
 MatrixX ElementSmoothness::times(const MatrixX& x) const { return factors_->A * x; }
-MatrixX ElementSmoothness::solve(const MatrixX& x) const { return factors_->factor.solve(x); }
+MatrixX ElementSmoothness::solve(const MatrixX& x) const {
+  if (factors_->is_dense()) return factors_->dense.solve(x);
+  return factors_->sparse.solve(x);
+}
+MatrixX ElementSmoothness::half_solve(const MatrixX& x) const {
+  if (factors_->is_dense()) return factors_->dense.matrixL().solve(x);
+  const MatrixX permuted = factors_->sparse.permutationP() * x;
+  return factors_->sparse.matrixL().solve(permuted);
+}
 
 double unconstrained_ratio(double nu) { return std::log((nu - least_ratio) / (0.5 - nu)); }
 double ratio_of(double z) { return least_ratio + (0.5 - least_ratio) / (1.0 + std::exp(-z)); }
@@ -216,17 +233,19 @@ class SampleFit {
     return 0.5 * r_.squaredNorm() + 0.5 * gamma * d.dot(smooth(d));
   }
 
-  /// J over the noise, Z = A^-1 J^T, and G = J Z by its eigenvalues.
+  /// J over the noise, and G = J A^-1 J^T by its eigenvalues.
   bool linearise() {
     Equilibrium& equilibrium = body_->equilibrium();
     if (!equilibrium.prepare_derivatives(body_->placement())) return false;
     const auto by = r_.size() < q_.size() ? JacobianBy::Adjoints : JacobianBy::Tangents;
     J_ = sample_jacobian(*body_, mesh_, *law_, by) / options_.noise;
     const Eigen::Index half = q_.size() / 2;
-    Z_.resize(q_.size(), J_.rows());
-    Z_.topRows(half) = smoothness_.solve(J_.leftCols(half).transpose());
-    Z_.bottomRows(half) = smoothness_.solve(J_.rightCols(half).transpose());
-    G_.compute(J_ * Z_);
+    MatrixX G = MatrixX::Zero(J_.rows(), J_.rows());
+    for (const Eigen::Index begin : {Eigen::Index(0), half}) {
+      const MatrixX W = smoothness_.half_solve(J_.middleCols(begin, half).transpose());
+      G.selfadjointView<Eigen::Lower>().rankUpdate(W.transpose());
+    }
+    G_.compute(G);
     return G_.info() == Eigen::Success;
   }
 
@@ -242,7 +261,7 @@ class SampleFit {
       }
       return sum;
     };
-    double low = 1e-7 * top, high = 1e4 * top;
+    double low = 1e-13 * top, high = 1e3 * top;
     if (misfit(low) > aim) return low;
     if (misfit(high) < aim) return high;
     for (int k = 0; k < 60; ++k) {
@@ -253,15 +272,20 @@ class SampleFit {
   }
 
   /// -(J^T J + (1 + damping) gamma A)^-1 (J^T r + gamma A d), d = q - q0, by G alone:
-  /// with g = (1 + damping) gamma, (J^T J + g A)^-1 J^T = Z (G + g I)^-1, and A d moves along the same way.
+  /// with g = (1 + damping) gamma, (J^T J + g A)^-1 J^T = A^-1 J^T (G + g I)^-1, and A d moves along the same way.
   VectorX step_for(double gamma, double damping) const {
     const double g = (1.0 + damping) * gamma, back = gamma / g;
     const VectorX d = q_ - start_;
-    // (J^T J + g A)^-1 gamma A d = back (d - Z (G + g I)^-1 J d)
+    // (J^T J + g A)^-1 gamma A d = back (d - A^-1 J^T (G + g I)^-1 J d)
     const VectorX right = r_ - back * (J_ * d);
     const VectorX turned = G_.eigenvectors().transpose() * right;
     const VectorX scaled = (turned.array() / (G_.eigenvalues().array().max(0.0) + g)).matrix();
-    return -(Z_ * (G_.eigenvectors() * scaled)) - back * d;
+    const VectorX pulled = J_.transpose() * (G_.eigenvectors() * scaled);
+    const Eigen::Index half = d.size() / 2;
+    VectorX step = -back * d;
+    step.head(half) -= smoothness_.solve(pulled.head(half));
+    step.tail(half) -= smoothness_.solve(pulled.tail(half));
+    return step;
   }
 
   const Body& mesh_;
@@ -271,7 +295,7 @@ class SampleFit {
   VectorX q_, start_, r_;
   std::shared_ptr<const LinearLaw> law_;
   std::optional<PressedBody> body_;
-  MatrixX J_, Z_;
+  MatrixX J_;
   Eigen::SelfAdjointEigenSolver<MatrixX> G_;
 };
 

@@ -18,6 +18,8 @@ class ElementSmoothness {
   /// A x, A^-1 x for every column.
   [[nodiscard]] MatrixX times(const MatrixX& x) const;
   [[nodiscard]] MatrixX solve(const MatrixX& x) const;
+  /// R^-1 x for A = R R^T.
+  [[nodiscard]] MatrixX half_solve(const MatrixX& x) const;
 
  private:
   struct Factors;

@@ -150,13 +150,15 @@ class Equilibrium::Solver {
         failure_ = "no equilibrium within " + std::to_string(options_.max_iterations) + " iterations";
         return summary;
       }
-      if (!factorise(z, load, LawElasticity::Stiffness::Exact) &&
-          !factorise(z, load, LawElasticity::Stiffness::Positive) && !factorise_lifted()) {
-        failure_ = "the stiffness is singular: is the object held anywhere?";
-        return summary;
-      }
       right_ = -flat(gradient_);
-      factor_->solve(right_, step_);
+      if (!step_by_last_factor(z, load)) {
+        if (!factorise(z, load, LawElasticity::Stiffness::Exact) &&
+            !factorise(z, load, LawElasticity::Stiffness::Positive) && !factorise_lifted()) {
+          failure_ = "the stiffness is singular: is the object held anywhere?";
+          return summary;
+        }
+        factor_->solve(right_, step_);
+      }
       const double slope = flat(gradient_).dot(step_);
       if (!std::isfinite(slope) || slope >= 0.0) {
         failure_ = "the stiffness is nearly singular";
@@ -273,7 +275,41 @@ class Equilibrium::Solver {
     return 1e-3 * elasticity_->law().small_strain(0).youngs_modulus * size * size;
   }
 
+  /// Newton's step by conjugate gradients with the last factorisation as preconditioner. False where there is none,
+  /// they take too long, or the Hessian is not positive definite along the way. CHOLMOD keeps its factors when the
+  /// matrix changes.
+  bool step_by_last_factor(const Points& z, const Load& load) {
+    constexpr int most = 12;
+    if (!options_.reuse_factor || !has_factor_) return false;
+    assemble(z, load, LawElasticity::Stiffness::Exact);
+    step_.setZero(right_.size());
+    cg_r_ = right_;
+    factor_->solve(cg_r_, cg_z_);
+    cg_p_ = cg_z_;
+    double rz = cg_r_.dot(cg_z_);
+    const double aim = 1e-4 * cg_r_.norm();
+    for (int k = 0; k < most; ++k) {
+      matrix_.multiply(cg_p_, cg_product_);
+      const double curvature = cg_p_.dot(cg_product_);
+      if (!(curvature > 0.0)) return false;
+      const double a = rz / curvature;
+      step_ += a * cg_p_;
+      cg_r_ -= a * cg_product_;
+      if (cg_r_.norm() <= aim) return true;
+      factor_->solve(cg_r_, cg_z_);
+      const double next = cg_r_.dot(cg_z_);
+      cg_p_ = cg_z_ + next / rz * cg_p_;
+      rz = next;
+    }
+    return false;
+  }
+
   bool factorise(const Points& z, const Load& load, LawElasticity::Stiffness which) {
+    assemble(z, load, which);
+    return has_factor_ = factor_->factorise(matrix_);
+  }
+
+  void assemble(const Points& z, const Load& load, LawElasticity::Stiffness which) {
     matrix_.set_zero();
     elasticity_->add_stiffness(which, 1.0, matrix_);
     const bool positive = which == LawElasticity::Stiffness::Positive;
@@ -281,7 +317,6 @@ class Equilibrium::Solver {
     for (const int node : held_) matrix_.constrain(node);
     for (std::size_t c = 0; c < contacts_.size(); ++c)
       if (load.controls[c].kind == ProbeControl::Kind::Position) matrix_.constrain(n() + int(c));
-    return factor_->factorise(matrix_);
   }
 
   void add_contact(const Points& z, const Load& load, std::size_t c, bool positive) {
@@ -371,7 +406,8 @@ class Equilibrium::Solver {
   std::unique_ptr<LinearSolver> factor_;
   std::vector<std::vector<int>> contact_blocks_;
   Points dead_load_, x_, nodal_, gradient_, trial_, response_;
-  VectorX right_, step_;
+  VectorX right_, step_, cg_r_, cg_z_, cg_p_, cg_product_;
+  bool has_factor_ = false;
   Energies energies_;
   std::string failure_;
 };

@@ -34,6 +34,9 @@ struct EquilibriumOptions {
   double tolerance = 1e-9;  ///< of the forces that are left, relative to those that meet, (0, 1)
   int max_iterations = 60;  ///< of Newton's method, a step of the load; >= 1
   int max_halvings = 8;     ///< of the load's steps, where it does not follow
+  /// Keep the last factorisation while conjugate gradients with it solve Newton's system in a few iterations: for many
+  /// equilibria that follow each other closely.
+  bool reuse_factor = false;
 };
 
 /// The object at rest under dead loads and rigid bodies: the minimum of

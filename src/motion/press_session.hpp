@@ -25,7 +25,8 @@ struct PressSessionOptions {
   std::vector<int> held;                 ///< nodes; as many as hold the object
   Points dead_load;                      ///< nodal forces [N]; empty: none
   std::vector<RigidContact> inner = {};  ///< rigid bodies that stay where they are: a skull, a table
-  EquilibriumOptions equilibrium = {};
+  /// A millionth of the forces is left: far below what a picture or a force sensor shows.
+  EquilibriumOptions equilibrium = {.tolerance = 1e-6, .reuse_factor = true};
 };
 
 /// An object and a probe, led interactively: each call goes on from the last equilibrium, extrapolated along its

@@ -53,8 +53,10 @@ TEST(ElementSmoothness, IsItsOwnInverseAndCostsConstantsLittle) {
   const ElementSmoothness smooth(*block.body);
   const VectorX x = VectorX::LinSpaced(smooth.size(), -1.0, 1.0).array().sin();
   EXPECT_LT((smooth.solve(smooth.times(x)) - x).norm(), tolerance(1e-8) * x.norm());
+  EXPECT_NEAR(MatrixX(smooth.half_solve(x)).squaredNorm(), x.dot(VectorX(smooth.solve(x))),
+              tolerance(1e-8) * x.dot(VectorX(smooth.solve(x))));
   const VectorX ones = VectorX::Ones(smooth.size());
-  EXPECT_LT(ones.dot(smooth.times(ones)), 1e-3 * x.dot(smooth.times(x)));
+  EXPECT_LT(ones.dot(VectorX(smooth.times(ones))), 1e-3 * x.dot(VectorX(smooth.times(x))));
 }
 
 TEST(PressSample, FindsAStiffnessThatVariesAndStopsAtTheNoise) {
