@@ -252,7 +252,9 @@ class SampleFit {
   /// Where the linearised model is fitted with gamma, its residual is gamma (gamma I + G)^-1 b, b = r - J (q - q0).
   double choose_weight() const {
     const VectorX b = G_.eigenvectors().transpose() * (r_ - J_ * (q_ - start_));
-    const double aim = double(r_.size()), top = std::max(G_.eigenvalues().maxCoeff(), 1e-300);
+    // No further in one step than the linear model is good for: to a tenth of the squares.
+    const double aim = std::max(double(r_.size()), 0.1 * r_.squaredNorm()),
+                 top = std::max(G_.eigenvalues().maxCoeff(), 1e-300);
     const auto misfit = [&](double gamma) {
       double sum = 0.0;
       for (Eigen::Index k = 0; k < b.size(); ++k) {

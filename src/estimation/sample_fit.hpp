@@ -47,7 +47,8 @@ struct PressSample {
 /// Levenberg-Marquardt. The Jacobian (appendix, but with the rotations' derivatives, at the exact equilibrium) comes by
 /// the adjoint of each measured coordinate, or the tangent of each unknown, whichever are fewer. With A the smoothness,
 /// steps follow from the matrix J A^-1 J^T of measurements alone. gamma is the greatest weight at which the linearised
-/// misfit is what noise makes (discrepancy principle), anew in every iteration; where none is, the least that is tried.
+/// misfit is what noise makes (discrepancy principle), or a tenth of what it was, anew in every iteration; where none
+/// is, the least that is tried.
 /// @param start  law of one E and one nu, which the field is smooth about
 PressSample fit_sample(const PressScene& scene, int press, const SmallStrainModuli& start,
                        const ElementSmoothness& smoothness, const SampleFitOptions& options);
