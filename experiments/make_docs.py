@@ -8,6 +8,7 @@ import sys
 
 from bar_page import bar, dinosaur
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
+from material_curves_page import material_curves
 from oracle_tracking_page import clouds
 from page import IMAGES, ROOT, judged, machine, percent, results, table, with_truth
 from real_tracks_page import real_tracks
@@ -422,6 +423,8 @@ SECTIONS = [
      "Another simulator's bars again: from the motion that the tracker finds, in turns with it (Wang et al. 2015, section 3), and from the points themselves by surface constraints (Weiss et al. 2020).", clouds),
     ("Real objects that are followed", "real-tracks",
      "Real: a knobbly ball, a plush dog and two cloths, moved by hands and a robot; rest surfaces made of their own frames. `pliant track`, with no choice of ours.", real_tracks),
+    ("Stress-strain curves", "material-curves",
+     "Real: tension of silicones, several modes of loading of rubbers, a gel and brain tissue, and a shoe's foam. One cube each, fitted with the law and the parameters of presses.", material_curves),
     ("Memory of long recordings", "memory", "A torus that bounces for ten seconds, with about 2,400 nodes; long steps and few iterations.", memory),
 ]
 

@@ -11,7 +11,8 @@ namespace {
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double greatest_poissons_ratio = 0.4999;
-constexpr double small_ratio = 0.03;  // stiffness of an added term against the first
+constexpr double least_exponent = 0.1, largest_exponent = 100.0;  // in size
+constexpr double small_ratio = 0.03;                              // stiffness of an added term against the first
 
 /// dP for a change of F, by a law's tangent in its frame.
 Matrix3 stress_change(const PointStress& at, const Matrix3& dF) {
@@ -70,27 +71,29 @@ bool find_free_stretch(const MaterialLaw& law, int e, const Cube& cube, double& 
   for (int d = 0; d < 3; ++d)
     if (cube.free[d] == 0.0) volume *= cube.led(d, d);
   x = -std::log(volume) / cube.free.sum();
-  double low = -farthest, high = farthest, g = 0.0, h = 0.0, last = x;
+  double low = -farthest, high = farthest, g = 0.0, h = 0.0, last = x, slope_before = 0.0;
   for (int k = 0; k < most; ++k) {
     law.stress(e, cube.at(x), true, s);
-    if (!slopes(cube, x, s, g, h)) {  // too far: halfway back
+    if (!slopes(cube, x, s, g, h)) {  // too far
       if (k == 0) return false;
+      (x > last ? high : low) = x;
       x = 0.5 * (x + last);
       continue;
     }
-    last = x;
     (g < 0.0 ? low : high) = x;
-    // The force of the law's own stiffness that is left, beside what a change of the last digits makes.
+    last = x;
+    // On the steep side of an exponential Newton's steps are short: halve the bracket where they gain too little.
+    const bool slow = k > 0 && std::abs(g) > 0.25 * std::abs(slope_before) && high - low < 2.0 * longest;
+    slope_before = g;
     const double step = h > 0.0 ? -g / h : g < 0.0 ? longest : -longest;
-    if (g == 0.0 || (h > 0.0 && std::abs(step) < 1e-14)) return true;
+    if (g == 0.0 || (h > 0.0 && std::abs(step) < 1e-14) || high - low < 1e-14) return true;
     double next = x + std::clamp(step, -longest, longest);
-    if (next <= low || next >= high) next = 0.5 * (low + high);
+    if (slow || next <= low || next >= high) next = 0.5 * (low + high);
     if (std::abs(next - x) <= 4e-16 * std::max(1.0, std::abs(x))) return true;
-    if (high - low < 1e-13) return true;
     if (next < 1.0 - farthest) return false;  // the side shrinks to nothing: the linear law, stretched too far
     x = next;
   }
-  return std::abs(g) <= 1e-8 * std::abs(h);
+  return false;
 }
 
 /// The test's stress, and by what it changes with P and F.
@@ -196,11 +199,15 @@ std::shared_ptr<const Body> unit_element() {
   return std::make_shared<Body>(make_body(make_tet_mesh(nodes, {{0, 1, 2, 3}})));
 }
 
-ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio) {
+ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
+                              bool positive_exponents) {
   const ParameterSet set = press_parameters(*unit_element(), {"youngs_modulus"}, terms, youngs_modulus);
   std::vector<Parameter> parameters = set.parameters();
   VectorX theta = set.reference();
   for (Parameter& p : parameters) {
+    // Curves tell an exponent's sign themselves.
+    if (p.name.starts_with("exponent"))
+      p.lower = positive_exponents ? least_exponent : -largest_exponent, p.upper = largest_exponent;
     if (p.name != "poisson_ratio") continue;
     p.upper = greatest_poissons_ratio;
     p.estimated = !poissons_ratio;
@@ -224,6 +231,11 @@ int CurveObjective::point_count() const {
 CostEvaluation CurveObjective::run(const VectorX& p, bool with_derivatives) {
   CostEvaluation result;
   const VectorX theta = parameters_.to_theta(p);
+  for (const Parameter& q : parameters_.parameters())
+    if (q.transform == Transform::Shift && !(theta[q.theta_index] >= q.lower && theta[q.theta_index] <= q.upper)) {
+      result.failure = q.name + " leaves its bounds";
+      return result;
+    }
   const auto law = press_law(*body_, layout_, theta);
   MatrixX by_p;
   if (with_derivatives) {
@@ -287,15 +299,16 @@ double secant_modulus(const std::vector<MaterialTest>& tests) {
 }
 
 /// Starts of a law with so many terms, from the one with fewer, which may be empty.
-std::vector<VectorX> starts_of(const PressTheta& layout, const VectorX& reference, const VectorX& before) {
+std::vector<VectorX> starts_of(const PressTheta& layout, const VectorX& reference, const VectorX& before,
+                               bool positive_exponents) {
   std::vector<VectorX> starts;
   if (layout.terms == 0) return {reference};
   const int added = layout.terms - 1;
-  const double sign = added % 2 == 0 ? 1.0 : -1.0;
-  for (const double exponent : {1.2, 3.0, 7.0, 15.0, 30.0}) {
+  for (const double exponent : {1.2, 3.0, 7.0, 15.0, 30.0, -1.2, -3.0, -7.0, -15.0, -30.0}) {
+    if (positive_exponents && exponent < 0.0) continue;
     VectorX theta = reference;
     if (added > 0) theta.head(before.size()) = before;
-    theta[layout.exponent(added)] = sign * exponent;
+    theta[layout.exponent(added)] = exponent;
     if (added > 0) theta[layout.ratio(added)] = small_ratio;
     starts.push_back(theta);
   }
@@ -308,17 +321,20 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
   CurveFit best;
   best.bic = std::numeric_limits<double>::infinity();
   VectorX before;
-  int without_gain = 0;
+  bool falls = true;
   const double modulus = secant_modulus(tests);
   OptimiserOptions optimiser;
   optimiser.max_iterations = options.max_iterations;
   optimiser.step_tolerance = 1e-6, optimiser.cost_tolerance = 1e-8;
-  for (int terms = std::min(1, options.max_terms); terms <= options.max_terms && without_gain < 2; ++terms) {
+  for (int terms = std::min(1, options.max_terms); terms <= options.max_terms && falls; ++terms) {
     CurveFit fit;
     fit.layout = {1, terms};
-    CurveObjective objective(tests, terms, curve_parameters(terms, modulus, options.poissons_ratio), options.noise);
+    CurveObjective objective(tests, terms,
+                             curve_parameters(terms, modulus, options.poissons_ratio, options.positive_exponents),
+                             options.noise);
     double least = std::numeric_limits<double>::infinity();
-    for (const VectorX& start : starts_of(fit.layout, objective.parameters().reference(), before)) {
+    for (const VectorX& start :
+         starts_of(fit.layout, objective.parameters().reference(), before, options.positive_exponents)) {
       const OptimiserSummary run = minimise(objective, objective.parameters().to_unconstrained(start), optimiser);
       if (!run.succeeded) fit.failure = run.reason;
       if (!run.succeeded || !(run.evaluation.cost < least)) continue;
@@ -328,8 +344,7 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
     }
     if (!fit.succeeded) {
       if (best.failure.empty()) best.failure = fit.failure;
-      ++without_gain;
-      continue;
+      break;
     }
     before = fit.theta;
     (void)objective.evaluate(objective.parameters().to_unconstrained(fit.theta));
@@ -338,12 +353,8 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
     fit.law = press_law(*unit_element(), fit.layout, fit.theta);
     std::vector<CurveFit::Tried> tried = best.tried;
     tried.push_back({terms, fit.bic, std::sqrt(mean)});
-    if (fit.bic < best.bic) {
-      best = fit;
-      without_gain = 0;
-    } else {
-      ++without_gain;
-    }
+    falls = fit.bic < best.bic;
+    if (falls) best = fit;
     best.tried = std::move(tried);
   }
   return best;

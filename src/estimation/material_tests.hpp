@@ -68,8 +68,10 @@ double relative_rms(const MaterialTest& test, const std::vector<double>& predict
 std::shared_ptr<const Body> unit_element();
 
 /// `press_parameters` of one element, for materials that hardly change their volume too.
-/// @param poissons_ratio  known; nothing: estimated, up to 0.4999
-ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio);
+/// @param poissons_ratio      known; nothing: estimated, up to 0.4999
+/// @param positive_exponents  else they may have any sign
+ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
+                              bool positive_exponents = false);
 
 /// Cost of stress-strain curves: half the squares of simulated less measured stress over `noise` times the curve's
 /// greatest stress, so that curves count by their points, not by their units; and the priors. Parameters and law are
@@ -104,8 +106,11 @@ class CurveObjective : public CostFunction {
 struct CurveFitOptions {
   int max_terms = 4;                     ///< of Ogden's law; 0: the linear law
   std::optional<double> poissons_ratio;  ///< known; nothing: estimated
-  double noise = 0.01;                   ///< as of `CurveObjective`
-  int max_iterations = 200;              ///< of each start
+  /// Exponents are positive. Pulled along one axis alone, a term with a negative exponent -a does what one with a / 2
+  /// does, by the sides' stretch; pulled along two it is another material by far.
+  bool positive_exponents = false;
+  double noise = 0.01;       ///< as of `CurveObjective`
+  int max_iterations = 200;  ///< of each start
 };
 
 /// A material that was fitted to curves.
@@ -123,9 +128,8 @@ struct CurveFit {
   std::vector<Tried> tried;  ///< of each number of terms, the best of its starts
 };
 
-/// Fits one term from several exponents, then adds terms one by one, each from several exponents and small beside what
-/// was there, while Schwarz' criterion (BIC) falls; after a term that does not lower it one more is tried, for its
-/// exponent has the other sign.
+/// Fits one term from several exponents, then adds terms one by one, each from several exponents of both signs and
+/// small beside what was there, while Schwarz' criterion (BIC) falls.
 CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOptions& options = {});
 
 }  // namespace pliant
