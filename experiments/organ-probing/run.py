@@ -17,7 +17,8 @@ SETS = {"pig_liver_20150826_region1": 4.00e-3, "pig_liver_20150826_v2_region1": 
         "meat0904_region4": 3.16e-3, "probingRAL2018_T1": 3.16e-3, "region_small_balls": 3.16e-3}  # radius of the ball [m]
 # Assumed: a block of 40 x 40 x 20 mm that its ground holds, finer where it is touched.
 BLOCK = {"half_edges": [0.0016, 0.0034, 0.0075, 0.02], "depth_edges": [0.0016, 0.0034, 0.0075, 0.02]}
-FINE = {"half_edges": [0.0008, 0.0016, 0.0026, 0.0042, 0.0075, 0.02], "depth_edges": [0.0008, 0.0017, 0.003, 0.006, 0.02]}
+# Of what is simulated as the truth.
+FINER = {"half_edges": [0.001, 0.0022, 0.004, 0.0085, 0.02], "depth_edges": [0.001, 0.0024, 0.006, 0.02]}
 POISSONS_RATIO = 0.45  # assumed
 DEPTHS = 6             # of a curve, evenly up to the greatest
 LEAST_FORCE = 0.1      # [N] at the end; probes below have met nothing
@@ -132,7 +133,7 @@ def second_radius(program, work):
     """No data have two balls on one object. Simulated: another law on a finer mesh, fitted at 4 mm, predicted at 2 and 8."""
     truth = [1500.0, 3.0, 0.40, 600.0, -12.0, 0.40, 300.0, 18.0, 0.40]
     depths = [0.0005, 0.001, 0.0015, 0.002]
-    made = ask(program, work, "truth", {"task": "predict", "block": FINE, "parameters": truth, "others": [{"radius": r, "depths": depths} for r in (0.004, 0.002, 0.008)]})
+    made = ask(program, work, "truth", {"task": "predict", "block": FINER, "parameters": truth, "others": [{"radius": r, "depths": depths} for r in (0.004, 0.002, 0.008)]})
     first = made["others"][0]["forces"]
     rows = []
     for terms in (0, 1, 2):
