@@ -74,7 +74,7 @@ def slab_pokes():
             table(["moduli", "moduli [kPa]", "fitted pokes: rms", "other pokes: rms", "their deepest force: median error", "90 % below", "time [min]"], rows) + SLAB_WORDS + f"\nMeasured on {machine(figures)}.\n")
 
 
-SLAB_WORDS = ("\nRms over each poke's own greatest force. The elements are about as wide as twice the contact, so the moduli are effective ones of this mesh and tip; that the tip's shape is not known makes them so in any case.\n")
+SLAB_WORDS = ("\nA field of stiffness predicts the other pokes hardly better than one modulus: the fitted pokes get better, the worst of the others too, the middle one does not. The slab's thickness and where it is touched say as little. Rms over each poke's own greatest force. The elements are about as wide as twice the contact, so the moduli are effective ones of this mesh and tip; that the tip's shape is not known makes them so in any case.\n")
 
 
 def skin():
