@@ -69,12 +69,12 @@ def slab_pokes():
     depths = " and ".join(f"{1e3 * d:g}" for d in figures["depths"])
     return (f"Touch is where a level force turns into a growing parabola, by least squares: {-figures['touch']:.1f} mm above the scan in the middle of the {figures['used']} pokes (of {figures['pokes']}) that go far enough to be compared; the scan is raised by that. The body is what lies between it and the table, "
             f"{1e6 * figures['volume']:.0f} cm³, {figures['nodes']} nodes of quadratic tetrahedra, held by the table. Assumed: a round tip of {1e3 * figures['tip_radius']:g} mm, no friction, Poisson's ratio {figures['poisson_ratio']}. Compared: forces {depths} mm behind the touch, "
-            f"less that before it. One poke in {figures['one_in']} is fitted, with the linear law, by one modulus or by {figures['fits'][-1]['controls']} at control points (weights by inverse square distance). How force grows with depth is not fitted: each poke is an equilibrium of its own, and these took what time there was.\n\n" +
+            f"less that before it. One poke in {figures['one_in']} is fitted, with the linear law, by one modulus or by {figures['fits'][-1]['controls']} at control points (weights by inverse square distance). How force grows with depth is not fitted.\n\n" +
             "![Forces of the slab, measured and simulated](images/slab-poke-map.png)\n\n" +
             table(["moduli", "moduli [kPa]", "fitted pokes: rms", "other pokes: rms", "their deepest force: median error", "90 % below", "time [min]"], rows) + SLAB_WORDS + f"\nMeasured on {machine(figures)}.\n")
 
 
-SLAB_WORDS = ("\nA field of stiffness predicts the other pokes hardly better than one modulus: the fitted pokes get better, the worst of the others too, the middle one does not. The slab's thickness and where it is touched say as little. Rms over each poke's own greatest force. The elements are about as wide as twice the contact, so the moduli are effective ones of this mesh and tip; that the tip's shape is not known makes them so in any case.\n")
+SLAB_WORDS = ("\nA field of stiffness predicts the other pokes hardly better than one modulus: the fitted pokes get better, the worst of the others too, the middle one does not. Rms over each poke's own greatest force. The elements are about as wide as twice the contact, so the moduli are effective ones of this mesh and tip; that the tip's shape is not known makes them so in any case.\n")
 
 
 def skin():
@@ -109,5 +109,5 @@ def skin():
             table(["fitted to", "law", "E x thickness [N/m]", "exponents, stiffness ratio", "force, first half", f"force, {1e3 * figures['split']:.1f} to 3.8 mm", "force, 5 to 8 mm", "displacement, first half", "displacement, second half"], rows) + SKIN_WORDS + f"\nMeasured on {machine(figures)}.\n")
 
 
-SKIN_WORDS = ("\nThe displacements between the pads are not reproduced by an even sheet: skin near the pads strains more, and between them less, than any of these. Where the rim is held, the sheet behind the pulled pad is pressed together and buckles at about 3 mm: the force drops, and what is predicted beyond says nothing of skin, which lies on something. "
+SKIN_WORDS = ("\nThe displacements between the pads are not reproduced by an even sheet: skin near the pads strains more, and between them less, than any of these. Where the rim is held, the sheet behind the pulled pad is pressed together, and beyond 3 mm the force drops: it buckles, most likely (not looked at), and what is predicted beyond says nothing of skin, which lies on something. "
               "The stiffening beyond 7 mm is in no curve's first half and is not predicted. A misfit of the displacements as large as this leaves exponents to what the model lacks: they are no material's.\n")
