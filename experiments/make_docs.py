@@ -8,10 +8,12 @@ import sys
 
 from bar_page import bar, dinosaur
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
+from material_curves_page import material_curves
 from oracle_tracking_page import clouds
 from page import IMAGES, ROOT, judged, machine, percent, results, table, with_truth
 from real_tracks_page import real_tracks
 from silicone_beam_page import silicone_beam
+from touched_page import organ_probing, skin, slab_pokes
 from tracking_page import swinging
 
 PAGE, PLOT = ROOT / "docs/experiments.md", IMAGES / "torus-sweep.svg"
@@ -422,6 +424,13 @@ SECTIONS = [
      "Another simulator's bars again: from the motion that the tracker finds, in turns with it (Wang et al. 2015, section 3), and from the points themselves by surface constraints (Weiss et al. 2020).", clouds),
     ("Real objects that are followed", "real-tracks",
      "Real: a knobbly ball, a plush dog and two cloths, moved by hands and a robot; rest surfaces made of their own frames. `pliant track`, with no choice of ours.", real_tracks),
+    ("Stress-strain curves", "material-curves",
+     "Real: tension of silicones, several modes of loading of rubbers, a gel and brain tissue, and a shoe's foam. One cube each, fitted with the law and the parameters of presses.", material_curves),
+    ("Balls pushed into organs and phantoms", "organ-probing",
+     "Real: force over depth at hundreds of places of pig liver, meat and two phantoms. One law an object, the other probes, greater depths and another ball predicted.", organ_probing),
+    ("A slab that is poked all over", "slab-poke-map",
+     "Real: a soft slab on a table, scanned from above by a depth camera and poked along its normals at 90 places.", slab_pokes),
+    ("Skin between two pads", "skin-dic", "Real: points on healthy skin followed by a camera while one pad is pulled, and the pad's force.", skin),
     ("Memory of long recordings", "memory", "A torus that bounces for ten seconds, with about 2,400 nodes; long steps and few iterations.", memory),
 ]
 

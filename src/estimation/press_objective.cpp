@@ -29,9 +29,9 @@ VectorX shares(const PressTheta& layout, const VectorX& theta) {
   return share / share.sum();
 }
 
-/// dq / dtheta of one element's parameters q (rows as the law has them), for its own modulus in the place of the
-/// control moduli: columns ln E, nu, then the law's shape as in theta.
-MatrixX table_derivative(const PressTheta& layout, const VectorX& theta, double E) {
+}  // namespace
+
+MatrixX press_table_derivative(const PressTheta& layout, const VectorX& theta, double E) {
   const double nu = theta[layout.poissons_ratio()];
   if (layout.terms == 0) {
     MatrixX by = MatrixX::Zero(2, 2);
@@ -54,8 +54,6 @@ MatrixX table_derivative(const PressTheta& layout, const VectorX& theta, double 
   }
   return by;
 }
-
-}  // namespace
 
 ParameterSet press_parameters(const Body& body, const std::vector<std::string>& modulus_names, int terms,
                               double youngs_modulus) {
@@ -197,7 +195,7 @@ void PressObjective::add_press(std::size_t i, const MatrixX& by_p, bool with_der
   body.equilibrium().elasticity().for_parameter_derivatives(
       [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
         const double E = std::exp(log_modulus(*scene_->body, e, layout_, theta_));
-        const MatrixX by = by_q * table_derivative(layout_, theta_, E);
+        const MatrixX by = by_q * press_table_derivative(layout_, theta_, E);
         for (std::size_t a = 0; a < nodes.size(); ++a) {
           const auto at = 3 * Eigen::Index(a);
           for (int k = 0; k < layout_.controls; ++k)

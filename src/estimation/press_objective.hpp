@@ -26,6 +26,10 @@ ParameterSet press_parameters(const Body& body, const std::vector<std::string>& 
 /// The law of all elements for theta.
 std::shared_ptr<const TabulatedLaw> press_law(const Body& body, const PressTheta& layout, const VectorX& theta);
 
+/// dq / dtheta of one element's parameters q (rows as the law has them), for its own modulus E [Pa] in the place of the
+/// control moduli: columns ln E, nu, then the law's shape as in theta.
+MatrixX press_table_derivative(const PressTheta& layout, const VectorX& theta, double E);
+
 struct PressObjectiveOptions {
   double noise = 0.0;          ///< deviation of a coordinate [m], > 0
   double outlier_scale = 0.0;  ///< residuals beyond this many deviations count less (pseudo-Huber), > 0

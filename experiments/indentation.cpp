@@ -1,0 +1,144 @@
+#include "indentation.hpp"
+
+#include <cmath>
+
+namespace pliant {
+
+namespace {
+
+constexpr double contact_stiffness = 3.0;  // times that of a disc's glue
+constexpr double smoothing = 0.01;         // of the ball's radius
+constexpr double reach = 2.5;              // radii from the touched point within which the ball may meet the surface
+
+RigidContact ball_on(const Body& body, const Indentation& indentation, double modulus) {
+  const ContactSamples all = boundary_samples(body, 6);
+  ContactSamples near;
+  double edge = 0.0;
+  for (std::size_t i = 0; i < all.rest.size(); ++i)
+    if ((all.rest[i] - indentation.touch).norm() < reach * indentation.radius) {
+      near.rest.push_back(all.rest[i]);
+      near.area.push_back(all.area[i]);
+      edge += 6.0 * std::sqrt(2.0 * all.area[i]);
+    }
+  if (near.rest.empty()) throw std::invalid_argument("a ball touches nothing");
+  edge /= double(near.rest.size());
+  return RigidContact::sliding(
+      body, near, rigid_ball(indentation.touch + indentation.radius * indentation.normal, indentation.radius),
+      contact_stiffness * glued_stiffness(modulus, edge), smoothing * indentation.radius);
+}
+
+std::vector<RigidContact> one(RigidContact contact) {
+  std::vector<RigidContact> contacts;
+  contacts.push_back(std::move(contact));
+  return contacts;
+}
+
+}  // namespace
+
+Indenter::Indenter(std::shared_ptr<const Body> body, const std::vector<int>& held, const Indentation& indentation,
+                   std::shared_ptr<const MaterialLaw> law, double modulus)
+    : body_(body),
+      indentation_(indentation),
+      equilibrium_(body, std::move(law), held, one(ball_on(*body, indentation, modulus)),
+                   EquilibriumOptions{.tolerance = 1e-7}),
+      placements_(indentation.depths.size()) {}
+
+bool Indenter::solve(std::size_t depth) {
+  ProbeControl control;
+  control.kind = ProbeControl::Kind::Position;
+  control.translation = -indentation_.depths[depth] * indentation_.normal;
+  equilibrium_.set_control(0, control);
+  Placement& placement = placements_[depth];
+  if (placement.nodes.size() > 0 && equilibrium_.solve(placement).converged) return true;
+  placement = depth > 0 && placements_[depth - 1].nodes.size() > 0 ? placements_[depth - 1] : equilibrium_.rest();
+  const bool solved = equilibrium_.solve(placement).converged;
+  if (!solved) placement = {};
+  return solved;
+}
+
+double Indenter::force(std::size_t depth) const {
+  return -indentation_.normal.dot(equilibrium_.contact_force(0, placements_[depth]));
+}
+
+/// The force on the object is -sum grad psi(x - u). With u kept it changes with the nodes, and they with the law.
+bool Indenter::derivatives(std::size_t depth, const PressTheta& layout, const VectorX& theta, VectorX& by_theta) {
+  const Placement& placement = placements_[depth];
+  if (!equilibrium_.prepare_derivatives(placement)) return false;
+  const RigidContact& contact = equilibrium_.contact(0);
+  const int n = body_->node_count();
+  Points by_nodes = Points::Zero(n + 1, 3), of_nodes = Points::Zero(n, 3);
+  for (int i = 0; i < contact.points().point_count(); ++i) {
+    const Vector3 y =
+        contact.points().position(i, placement.nodes) - Vector3(placement.translations.row(0).transpose());
+    contact.points().add_transpose(i, contact.potential(i, y, false).hessian * indentation_.normal, of_nodes);
+  }
+  by_nodes.topRows(n) = of_nodes;
+  const Points adjoint = equilibrium_.response(by_nodes);
+  by_theta = VectorX::Zero(layout.size());
+  const ModulusField& field = body_->modulus;
+  equilibrium_.elasticity().for_parameter_derivatives(
+      [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
+        VectorX along = VectorX::Zero(by_q.cols());
+        for (std::size_t a = 0; a < nodes.size(); ++a)
+          along -= by_q.middleRows<3>(3 * Eigen::Index(a)).transpose() * adjoint.row(nodes[a]).transpose();
+        double log_modulus = std::log(field.relative[std::size_t(e)]);
+        for (int k = 0; k < field.controls; ++k)
+          log_modulus += (field.controls == 1 ? 1.0 : field.weights(e, k)) * std::log(theta[k]);
+        const VectorX change = press_table_derivative(layout, theta, std::exp(log_modulus)).transpose() * along;
+        for (int k = 0; k < field.controls; ++k)
+          by_theta[k] += (field.controls == 1 ? 1.0 : field.weights(e, k)) / theta[k] * change[0];
+        by_theta.tail(layout.size() - layout.controls) += change.tail(change.size() - 1);
+      });
+  return true;
+}
+
+IndentationObjective::IndentationObjective(std::shared_ptr<const Body> body, const std::vector<int>& held,
+                                           std::vector<Indentation> indentations, const PressTheta& layout,
+                                           ParameterSet parameters)
+    : body_(std::move(body)),
+      indentations_(std::move(indentations)),
+      layout_(layout),
+      parameters_(std::move(parameters)) {
+  const auto law = press_law(*body_, layout_, parameters_.reference());
+  const double modulus = mean_modulus(*body_, *law);
+  for (const Indentation& indentation : indentations_) indenters_.emplace_back(body_, held, indentation, law, modulus);
+}
+
+CostEvaluation IndentationObjective::run(const VectorX& p, bool with_derivatives) {
+  CostEvaluation result;
+  const VectorX theta = parameters_.to_theta(p);
+  const auto law = press_law(*body_, layout_, theta);
+  const MatrixX by_p = with_derivatives ? parameters_.jacobian(p) : MatrixX();
+  VectorX gradient, by_theta;
+  MatrixX curvature;
+  result.cost = parameters_.prior(p, with_derivatives ? &gradient : nullptr, with_derivatives ? &curvature : nullptr);
+  forces_.assign(indentations_.size(), {});
+  for (std::size_t i = 0; i < indentations_.size(); ++i) {
+    const Indentation& seen = indentations_[i];
+    indenters_[i].set_law(law);
+    for (std::size_t d = 0; d < seen.depths.size(); ++d) {
+      if (!indenters_[i].solve(d)) {
+        result.failure = indenters_[i].failure();
+        return result;
+      }
+      const double force = indenters_[i].force(d), r = (force - seen.forces[d]) / seen.noise;
+      forces_[i].push_back(force);
+      result.cost += 0.5 * r * r;
+      ++result.steps;
+      if (!with_derivatives) continue;
+      if (!indenters_[i].derivatives(d, layout_, theta, by_theta)) {
+        result.failure = "the equilibrium is not stable";
+        return result;
+      }
+      const VectorX J = by_p.transpose() * by_theta / seen.noise;
+      gradient += r * J;
+      curvature += J * J.transpose();
+    }
+  }
+  if (with_derivatives) result.gradient = gradient, result.gauss_newton = curvature;
+  result.succeeded = std::isfinite(result.cost);
+  if (!result.succeeded) result.failure = "the cost is not finite";
+  return result;
+}
+
+}  // namespace pliant

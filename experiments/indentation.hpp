@@ -1,0 +1,66 @@
+#pragma once
+
+#include <vector>
+
+#include "estimation/press_objective.hpp"
+
+namespace pliant {
+
+/// A ball that is pushed into an object, and the force that was measured.
+struct Indentation {
+  Vector3 touch;               ///< on the undeformed surface [m]
+  Vector3 normal;              ///< out of the object, unit
+  double radius = 0.0;         ///< of the ball [m]
+  std::vector<double> depths;  ///< along the normal, growing [m]
+  std::vector<double> forces;  ///< along the normal [N], as many
+  double noise = 0.0;          ///< deviation of a force [N], > 0
+};
+
+/// Balls on one body, each by itself: equilibria with the ball led by position.
+class Indenter {
+ public:
+  /// @param modulus  [Pa] about which contacts are stiff
+  Indenter(std::shared_ptr<const Body> body, const std::vector<int>& held, const Indentation& indentation,
+           std::shared_ptr<const MaterialLaw> law, double modulus);
+
+  void set_law(std::shared_ptr<const MaterialLaw> law) { equilibrium_.set_law(std::move(law)); }
+  /// To equilibrium at one depth, from where it was last or from the depth before. False: `failure` says why.
+  bool solve(std::size_t depth);
+  const std::string& failure() const { return equilibrium_.failure(); }
+  /// Along the normal, on the ball [N].
+  double force(std::size_t depth) const;
+  /// d force / d theta at the last solved depth.
+  bool derivatives(std::size_t depth, const PressTheta& layout, const VectorX& theta, VectorX& by_theta);
+
+ private:
+  std::shared_ptr<const Body> body_;
+  Indentation indentation_;
+  Equilibrium equilibrium_;
+  std::vector<Placement> placements_;
+};
+
+/// Cost of indentations: half the squares of simulated less measured force over its deviation; and the priors.
+class IndentationObjective : public CostFunction {
+ public:
+  IndentationObjective(std::shared_ptr<const Body> body, const std::vector<int>& held,
+                       std::vector<Indentation> indentations, const PressTheta& layout, ParameterSet parameters);
+
+  const ParameterSet& parameters() const override { return parameters_; }
+  [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override { return run(p, false); }
+  [[nodiscard]] CostEvaluation linearise(const VectorX& p) override { return run(p, true); }
+  [[nodiscard]] CostEvaluation gradient(const VectorX& p) override { return run(p, true); }
+  /// Of the last evaluation [N], a vector an indentation.
+  const std::vector<std::vector<double>>& forces() const { return forces_; }
+
+ private:
+  CostEvaluation run(const VectorX& p, bool with_derivatives);
+
+  std::shared_ptr<const Body> body_;
+  std::vector<Indentation> indentations_;
+  PressTheta layout_;
+  ParameterSet parameters_;
+  std::vector<Indenter> indenters_;
+  std::vector<std::vector<double>> forces_;
+};
+
+}  // namespace pliant

@@ -1,0 +1,162 @@
+// A block under a ball: fits a law to forces over depths and predicts other depths and balls, as JSON on stdout.
+//   pliant_probing request=FILE
+// The file: {"task": "fit" | "predict" | "check", "block": {"half_width": L, "thickness": L, "half_edges": [...],
+//   "depth_edges": [...]} [m] (edges: where cells end, from the touched point), "radius": R [m], "depths": [... m],
+//   "forces": [... N], "terms": N, "poisson_ratio": nu, "parameters": [...] (predict: of the law, (mu, exponent, nu) a
+//   term), "others": [{"radius", "depths"}]}
+
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "choices.hpp"
+#include "estimation/optimiser.hpp"
+#include "indentation.hpp"
+
+namespace pliant {
+namespace {
+
+using nlohmann::json;
+using Numbers = std::vector<double>;
+
+constexpr double relative_noise = 0.02;  // of the greatest force
+
+/// Cells around the origin, under the plane z = 0, finer near the origin; quadratic tetrahedra.
+std::shared_ptr<const Body> make_block(const json& j) {
+  const Numbers side = j.at("half_edges"), down = j.at("depth_edges");
+  const int half = int(side.size()), deep = int(down.size());
+  Box box;
+  box.extend(Vector3(-half, -half, -deep));
+  box.extend(Vector3(half, half, 0));
+  TetMesh mesh = make_tet_box(box, {2 * half, 2 * half, deep}, false);
+  const auto place = [](const Numbers& edges, double cells) {
+    const int n = int(std::lround(std::abs(cells)));
+    return n == 0 ? 0.0 : std::copysign(edges[std::size_t(n - 1)], cells);
+  };
+  Points nodes = mesh.nodes;
+  for (Eigen::Index n = 0; n < nodes.rows(); ++n)
+    nodes.row(n) << place(side, nodes(n, 0)), place(side, nodes(n, 1)), place(down, nodes(n, 2));
+  return std::make_shared<Body>(make_body(with_mid_nodes(make_tet_mesh(std::move(nodes), std::move(mesh.tets)))));
+}
+
+Indentation push(double radius, const Numbers& depths, const Numbers& forces) {
+  Indentation indentation{Vector3::Zero(), Vector3::UnitZ(), radius, depths, forces, 1.0};
+  double greatest = 0.0;
+  for (const double f : forces) greatest = std::max(greatest, std::abs(f));
+  if (greatest > 0.0) indentation.noise = relative_noise * greatest;
+  return indentation;
+}
+
+/// Hertz: the median of the moduli that the points say.
+double hertz_modulus(const Indentation& seen, double nu) {
+  Numbers moduli;
+  for (std::size_t i = 0; i < seen.depths.size(); ++i)
+    if (seen.forces[i] > 0.0)
+      moduli.push_back(0.75 * seen.forces[i] * (1.0 - nu * nu) /
+                       (std::sqrt(seen.radius) * std::pow(seen.depths[i], 1.5)));
+  if (moduli.empty()) throw std::invalid_argument("no force is positive");
+  std::ranges::nth_element(moduli, moduli.begin() + std::ptrdiff_t(moduli.size() / 2));
+  return moduli[moduli.size() / 2];
+}
+
+class Experiment {
+ public:
+  explicit Experiment(const Choices& choices) {
+    std::ifstream file(choices.at("request"));
+    if (!file) throw std::invalid_argument("cannot read " + choices.at("request"));
+    request_ = json::parse(file);
+    body_ = make_block(request_.at("block"));
+    const double bottom = body_->nodes.col(2).minCoeff();
+    for (int n = 0; n < body_->node_count(); ++n)
+      if (body_->nodes(n, 2) < 0.999 * bottom) held_.push_back(n);
+  }
+
+  json run() {
+    json report = {{"nodes", body_->node_count()}, {"elements", body_->element_count()}};
+    const auto begin = std::chrono::steady_clock::now();
+    if (request_.at("task") == "predict") {
+      const Numbers q = request_.at("parameters");
+      MatrixX table(body_->element_count(), Eigen::Index(q.size()));
+      for (std::size_t k = 0; k < q.size(); ++k) table.col(Eigen::Index(k)).setConstant(q[k]);
+      others(q.size() == 2 ? std::shared_ptr<const MaterialLaw>(std::make_shared<LinearLaw>(table))
+                           : std::make_shared<OgdenLaw>(table),
+             report);
+    } else {
+      fit(report);
+    }
+    report["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return report;
+  }
+
+ private:
+  void fit(json& report) {
+    const Indentation seen = push(request_.at("radius"), request_.at("depths"), request_.at("forces"));
+    const int terms = request_.at("terms");
+    const double nu = request_.at("poisson_ratio"), start = hertz_modulus(seen, nu);
+    report["hertz_modulus"] = start;
+    ParameterSet parameters = press_parameters(*body_, {"youngs_modulus"}, terms, start);
+    VectorX theta = parameters.reference();
+    const PressTheta layout{1, terms};
+    theta[layout.poissons_ratio()] = nu;
+    parameters.set_reference(theta);
+    parameters.set_estimated("poisson_ratio", false);
+    IndentationObjective objective(body_, held_, {seen}, layout, parameters);
+    const VectorX p = parameters.to_unconstrained(theta);
+    if (request_.at("task") == "check") {
+      report["derivative_errors"] = check(objective, p);
+      return;
+    }
+    OptimiserOptions options;
+    options.max_iterations = 15;
+    const OptimiserSummary summary = minimise(objective, p, options);
+    report["succeeded"] = summary.succeeded, report["reason"] = summary.reason;
+    report["iterations"] = summary.iterations, report["evaluations"] = summary.evaluations;
+    if (!summary.succeeded) return;
+    const VectorX found = parameters.to_theta(summary.p);
+    report["theta"] = Numbers(found.begin(), found.end());
+    const auto law = press_law(*body_, layout, found);
+    const VectorX q = law->table().row(0);
+    report["parameters"] = Numbers(q.begin(), q.end());
+    (void)objective.evaluate(summary.p);
+    report["fitted"] = objective.forces()[0];
+    others(law, report);
+  }
+
+  /// Central differences against the gradient, relative.
+  static json check(IndentationObjective& objective, const VectorX& p) {
+    json errors = json::array();
+    const CostEvaluation at = objective.linearise(p);
+    if (!at.succeeded) throw std::runtime_error(at.failure);
+    for (Eigen::Index k = 0; k < p.size(); ++k) {
+      const double h = 1e-4;
+      const double up = objective.evaluate(p + h * VectorX::Unit(p.size(), k)).cost;
+      const double down = objective.evaluate(p - h * VectorX::Unit(p.size(), k)).cost;
+      errors.push_back(std::abs((up - down) / (2.0 * h) / at.gradient[k] - 1.0));
+    }
+    return errors;
+  }
+
+  void others(const std::shared_ptr<const MaterialLaw>& law, json& report) {
+    for (const json& other : request_.value("others", json::array())) {
+      const Numbers depths = other.at("depths");
+      const Indentation pushed = push(other.at("radius"), depths, Numbers(depths.size(), 0.0));
+      Indenter indenter(body_, held_, pushed, law, mean_modulus(*body_, *law));
+      json forces = json::array();
+      for (std::size_t d = 0; d < depths.size(); ++d)
+        forces.push_back(indenter.solve(d) ? json(indenter.force(d)) : json());
+      report["others"].push_back({{"radius", pushed.radius}, {"depths", depths}, {"forces", forces}});
+    }
+  }
+
+  json request_;
+  std::shared_ptr<const Body> body_;
+  std::vector<int> held_;
+};
+
+}  // namespace
+}  // namespace pliant
+
+int main(int argc, char** argv) {
+  return pliant::run_experiment<pliant::Experiment>("pliant_probing", argc, argv, {{"request", ""}});
+}

@@ -1,0 +1,363 @@
+#include "estimation/material_tests.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace pliant {
+
+namespace {
+
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+constexpr double greatest_poissons_ratio = 0.4999;
+constexpr double least_exponent = 0.1, largest_exponent = 100.0;  // in size
+constexpr double small_ratio = 0.03;                              // stiffness of an added term against the first
+
+/// dP for a change of F, by a law's tangent in its frame.
+Matrix3 stress_change(const PointStress& at, const Matrix3& dF) {
+  const Matrix3 in_frame = at.left.transpose() * dF * at.right;
+  Matrix3 change;
+  Eigen::Map<Eigen::Matrix<double, 9, 1>>(change.data()).noalias() =
+      at.tangent * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(in_frame.data());
+  return at.left * change * at.right.transpose();
+}
+
+/// A cube whose sides that are free share one stretch, exp(x).
+struct Cube {
+  Matrix3 led;   // F but for the free sides, which are zero; without shear
+  Vector3 free;  // 1 where a side is free
+  Matrix3 at(double x) const {
+    Matrix3 F = led;
+    F.diagonal() += std::exp(x) * free;
+    return F;
+  }
+};
+
+Cube cube_of(const MaterialTest& test, std::size_t i) {
+  const double l = test.stretch[i];
+  switch (test.mode) {
+    case TestMode::Uniaxial:
+      return {Vector3(l, 0.0, 0.0).asDiagonal(), {0.0, 1.0, 1.0}};
+    case TestMode::PureShear:
+      return {Vector3(l, 1.0, 0.0).asDiagonal(), {0.0, 0.0, 1.0}};
+    case TestMode::Equibiaxial:
+      return {Vector3(l, l, 0.0).asDiagonal(), {0.0, 0.0, 1.0}};
+    case TestMode::Biaxial:
+      return {Vector3(l, test.second[i], 0.0).asDiagonal(), {0.0, 0.0, 1.0}};
+    case TestMode::SimpleShear:
+      return {Vector3(test.prestretch, 0.0, 0.0).asDiagonal(), {0.0, 1.0, 1.0}};
+    case TestMode::ConfinedUniaxial:
+      break;
+  }
+  return {Vector3(l, 1.0, 1.0).asDiagonal(), Vector3::Zero()};
+}
+
+/// Slope of the energy by x and the slope's own, at the law's answer `s`. False where they are not finite.
+bool slopes(const Cube& cube, double x, const PointStress& s, double& g, double& h) {
+  const double side = std::exp(x);
+  const Matrix3 direction = cube.free.asDiagonal();
+  g = side * s.P.cwiseProduct(direction).sum();
+  h = g + side * side * stress_change(s, direction).cwiseProduct(direction).sum();
+  return std::isfinite(s.energy) && std::isfinite(g) && std::isfinite(h);
+}
+
+/// The free stretch's logarithm. `s` is the law's answer there.
+bool find_free_stretch(const MaterialLaw& law, int e, const Cube& cube, double& x, PointStress& s) {
+  constexpr int most = 200;
+  constexpr double longest = 0.5, farthest = 12.0;
+  // Of a material that keeps its volume.
+  double volume = 1.0;
+  for (int d = 0; d < 3; ++d)
+    if (cube.free[d] == 0.0) volume *= cube.led(d, d);
+  x = -std::log(volume) / cube.free.sum();
+  double low = -farthest, high = farthest, g = 0.0, h = 0.0, last = x, slope_before = 0.0;
+  for (int k = 0; k < most; ++k) {
+    law.stress(e, cube.at(x), true, s);
+    if (!slopes(cube, x, s, g, h)) {  // too far
+      if (k == 0) return false;
+      (x > last ? high : low) = x;
+      x = 0.5 * (x + last);
+      continue;
+    }
+    (g < 0.0 ? low : high) = x;
+    last = x;
+    // On the steep side of an exponential Newton's steps are short: halve the bracket where they gain too little.
+    const bool slow = k > 0 && std::abs(g) > 0.25 * std::abs(slope_before) && high - low < 2.0 * longest;
+    slope_before = g;
+    const double step = h > 0.0 ? -g / h : g < 0.0 ? longest : -longest;
+    if (g == 0.0 || (h > 0.0 && std::abs(step) < 1e-14) || high - low < 1e-14) return true;
+    double next = x + std::clamp(step, -longest, longest);
+    if (slow || next <= low || next >= high) next = 0.5 * (low + high);
+    if (std::abs(next - x) <= 4e-16 * std::max(1.0, std::abs(x))) return true;
+    if (next < 1.0 - farthest) return false;  // the side shrinks to nothing: the linear law, stretched too far
+    x = next;
+  }
+  return false;
+}
+
+/// The test's stress, and by what it changes with P and F.
+double measured(const MaterialTest& test, const Matrix3& F, const Matrix3& P, Matrix3& by_P, Matrix3& by_F) {
+  by_P.setZero(), by_F.setZero();
+  if (test.measure == StressMeasure::CauchyDifference) {
+    const double J = F.determinant();
+    const Matrix3 cauchy = P * F.transpose() / J;
+    const double difference = cauchy(0, 0) - cauchy(1, 1);
+    by_P.row(0) = F.row(0) / J, by_P.row(1) = -F.row(1) / J;
+    by_F.row(0) = P.row(0) / J, by_F.row(1) = -P.row(1) / J;
+    by_F -= difference * F.inverse().transpose();
+    return difference;
+  }
+  const int row = test.measure == StressMeasure::Second ? 1 : 0;
+  const int column = test.mode == TestMode::SimpleShear && row == 0 ? 1 : row;
+  by_P(row, column) = 1.0;
+  return P(row, column);
+}
+
+}  // namespace
+
+double MaterialTest::greatest_stress() const {
+  double greatest = 0.0;
+  for (const double s : stress) greatest = std::max(greatest, std::abs(s));
+  return greatest;
+}
+
+void check_test(const MaterialTest& test) {
+  const auto refuse = [&](const char* what) { throw std::invalid_argument(test.name + ": " + what); };
+  if (test.stretch.empty() || test.stretch.size() != test.stress.size())
+    refuse("a test has as many stresses as stretches, at least one");
+  if (test.mode == TestMode::Biaxial && test.second.size() != test.stretch.size())
+    refuse("a biaxial test has a second stretch a point");
+  const auto finite = [](double v) { return std::isfinite(v); };
+  const auto positive = [](double v) { return std::isfinite(v) && v > 0.0; };
+  if (!std::ranges::all_of(test.stress, finite)) refuse("stresses must be finite");
+  if (test.mode == TestMode::SimpleShear ? !std::ranges::all_of(test.stretch, finite) || !positive(test.prestretch)
+                                         : !std::ranges::all_of(test.stretch, positive))
+    refuse("stretches must be positive and shears finite");
+  if (test.mode == TestMode::Biaxial && !std::ranges::all_of(test.second, positive))
+    refuse("stretches must be positive");
+  if (test.greatest_stress() == 0.0) refuse("all stresses are zero");
+}
+
+TestPoint solve_test(const MaterialLaw& law, int element, const MaterialTest& test, std::size_t i,
+                     bool with_derivatives) {
+  TestPoint point;
+  const Cube cube = cube_of(test, i);
+  const bool has_free = cube.free.sum() > 0.0;
+  double x = 0.0;
+  PointStress free_state;
+  if (has_free && !find_free_stretch(law, element, cube, x, free_state)) return point;
+  point.F = cube.at(x);
+  if (test.mode == TestMode::SimpleShear) point.F(0, 1) = test.stretch[i];
+  PointStress s;
+  law.stress(element, point.F, with_derivatives, s);
+  if (!std::isfinite(s.energy)) return point;
+  point.P = s.P;
+  Matrix3 by_P, by_F;
+  point.stress = measured(test, point.F, point.P, by_P, by_F);
+  point.found = std::isfinite(point.stress);
+  if (!with_derivatives || !point.found) return point;
+  const std::size_t parameters = law.parameter_names().size();
+  std::vector<Matrix3> by_q(parameters), free_by_q(parameters);
+  law.parameter_derivatives(element, point.F, by_q);
+  point.by_parameters.resize(Eigen::Index(parameters));
+  // One more of x changes the free sides by their stretch, and the stress with them.
+  double by_x = 0.0, g = 0.0, h = 1.0;
+  if (has_free) {
+    const Matrix3 dF = (std::exp(x) * cube.free).asDiagonal();
+    by_x = by_P.cwiseProduct(stress_change(s, dF)).sum() + by_F.cwiseProduct(dF).sum();
+    slopes(cube, x, free_state, g, h);
+    law.parameter_derivatives(element, cube.at(x), free_by_q);
+    for (std::size_t k = 0; k < parameters; ++k)
+      point.by_parameters[Eigen::Index(k)] = -by_x / h * free_by_q[k].cwiseProduct(dF).sum();
+  } else {
+    point.by_parameters.setZero();
+  }
+  for (std::size_t k = 0; k < parameters; ++k) point.by_parameters[Eigen::Index(k)] += by_P.cwiseProduct(by_q[k]).sum();
+  return point;
+}
+
+std::vector<double> predict_test(const MaterialLaw& law, const MaterialTest& test) {
+  std::vector<double> stresses;
+  for (std::size_t i = 0; i < test.stretch.size(); ++i) {
+    const TestPoint point = solve_test(law, 0, test, i);
+    stresses.push_back(point.found ? point.stress : not_a_number);
+  }
+  return stresses;
+}
+
+double relative_rms(const MaterialTest& test, const std::vector<double>& predicted) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < predicted.size(); ++i)
+    sum += (predicted[i] - test.stress[i]) * (predicted[i] - test.stress[i]);
+  return std::sqrt(sum / double(predicted.size())) / test.greatest_stress();
+}
+
+std::shared_ptr<const Body> unit_element() {
+  Points nodes(4, 3);
+  nodes << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1;
+  return std::make_shared<Body>(make_body(make_tet_mesh(nodes, {{0, 1, 2, 3}})));
+}
+
+ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
+                              bool positive_exponents) {
+  const ParameterSet set = press_parameters(*unit_element(), {"youngs_modulus"}, terms, youngs_modulus);
+  std::vector<Parameter> parameters = set.parameters();
+  VectorX theta = set.reference();
+  for (Parameter& p : parameters) {
+    // Curves tell an exponent's sign themselves.
+    if (p.name.starts_with("exponent"))
+      p.lower = positive_exponents ? least_exponent : -largest_exponent, p.upper = largest_exponent;
+    if (p.name != "poisson_ratio") continue;
+    p.upper = greatest_poissons_ratio;
+    p.estimated = !poissons_ratio;
+    if (poissons_ratio) theta[p.theta_index] = *poissons_ratio;
+  }
+  return {std::move(parameters), std::move(theta)};
+}
+
+CurveObjective::CurveObjective(std::vector<MaterialTest> tests, int terms, ParameterSet parameters, double noise)
+    : tests_(std::move(tests)), layout_{1, terms}, parameters_(std::move(parameters)), noise_(noise) {
+  if (tests_.empty() || !(noise_ > 0.0)) throw std::invalid_argument("curves need a test and a noise above zero");
+  for (const MaterialTest& test : tests_) check_test(test);
+}
+
+int CurveObjective::point_count() const {
+  std::size_t count = 0;
+  for (const MaterialTest& test : tests_) count += test.stretch.size();
+  return int(count);
+}
+
+CostEvaluation CurveObjective::run(const VectorX& p, bool with_derivatives) {
+  CostEvaluation result;
+  const VectorX theta = parameters_.to_theta(p);
+  for (const Parameter& q : parameters_.parameters())
+    if (q.transform == Transform::Shift && !(theta[q.theta_index] >= q.lower && theta[q.theta_index] <= q.upper)) {
+      result.failure = q.name + " leaves its bounds";
+      return result;
+    }
+  const auto law = press_law(*body_, layout_, theta);
+  MatrixX by_p;
+  if (with_derivatives) {
+    // press_table_derivative's first column is by ln E, theta's first number is E.
+    MatrixX by_theta = press_table_derivative(layout_, theta, theta[0]);
+    by_theta.col(0) /= theta[0];
+    by_p = by_theta * parameters_.jacobian(p);
+  }
+  VectorX gradient;
+  MatrixX curvature;
+  result.cost = parameters_.prior(p, with_derivatives ? &gradient : nullptr, with_derivatives ? &curvature : nullptr);
+  sum_squares_ = 0.0;
+  for (std::size_t t = 0; t < tests_.size(); ++t) {
+    const MaterialTest& test = tests_[t];
+    const double greatest = test.greatest_stress(), inverse = 1.0 / (noise_ * greatest);
+    FrameFit fit;
+    fit.frame = int(t);
+    fit.independent = double(test.stretch.size());
+    if (with_derivatives) {
+      fit.gradient = VectorX::Zero(by_p.cols());
+      fit.gauss_newton = MatrixX::Zero(by_p.cols(), by_p.cols());
+    }
+    for (std::size_t i = 0; i < test.stretch.size(); ++i) {
+      const TestPoint point = solve_test(*law, 0, test, i, with_derivatives);
+      if (!point.found) {
+        result.failure = test.name + ": no state without stress on the free faces";
+        return result;
+      }
+      const double r = inverse * (point.stress - test.stress[i]);
+      fit.cost += 0.5 * r * r;
+      if (!with_derivatives) continue;
+      const VectorX J = inverse * (by_p.transpose() * point.by_parameters);
+      fit.gradient += r * J;
+      fit.gauss_newton += J * J.transpose();
+    }
+    sum_squares_ += 2.0 * fit.cost * noise_ * noise_;
+    result.cost += fit.cost;
+    ++result.steps;
+    if (with_derivatives) gradient += fit.gradient, curvature += fit.gauss_newton;
+    result.frames.push_back(std::move(fit));
+  }
+  if (with_derivatives) result.gradient = gradient, result.gauss_newton = curvature;
+  result.succeeded = std::isfinite(result.cost) && (!with_derivatives || gradient.allFinite());
+  if (!result.succeeded) result.failure = "the cost is not finite";
+  return result;
+}
+
+namespace {
+
+/// A modulus to set out from: the median of the points' secants, as if all were stretched along one axis.
+double secant_modulus(const std::vector<MaterialTest>& tests) {
+  std::vector<double> secants;
+  for (const MaterialTest& test : tests)
+    for (std::size_t i = 0; i < test.stretch.size(); ++i) {
+      const double strain = test.mode == TestMode::SimpleShear ? test.stretch[i] / 3.0 : test.stretch[i] - 1.0;
+      if (std::abs(strain) > 1e-3 && test.stress[i] / strain > 0.0) secants.push_back(test.stress[i] / strain);
+    }
+  if (secants.empty()) throw std::invalid_argument("no stress of the curves has the sign of its strain");
+  std::ranges::nth_element(secants, secants.begin() + std::ptrdiff_t(secants.size() / 2));
+  return secants[secants.size() / 2];
+}
+
+/// Starts of a law with so many terms, from the one with fewer, which may be empty.
+std::vector<VectorX> starts_of(const PressTheta& layout, const VectorX& reference, const VectorX& before,
+                               bool positive_exponents) {
+  std::vector<VectorX> starts;
+  if (layout.terms == 0) return {reference};
+  const int added = layout.terms - 1;
+  for (const double exponent : {1.2, 3.0, 7.0, 15.0, 30.0, -1.2, -3.0, -7.0, -15.0, -30.0}) {
+    if (positive_exponents && exponent < 0.0) continue;
+    VectorX theta = reference;
+    if (added > 0) theta.head(before.size()) = before;
+    theta[layout.exponent(added)] = exponent;
+    if (added > 0) theta[layout.ratio(added)] = small_ratio;
+    starts.push_back(theta);
+  }
+  return starts;
+}
+
+}  // namespace
+
+CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOptions& options) {
+  CurveFit best;
+  best.bic = std::numeric_limits<double>::infinity();
+  VectorX before;
+  bool falls = true;
+  const double modulus = secant_modulus(tests);
+  OptimiserOptions optimiser;
+  optimiser.max_iterations = options.max_iterations;
+  optimiser.step_tolerance = 1e-6, optimiser.cost_tolerance = 1e-8;
+  for (int terms = std::min(1, options.max_terms); terms <= options.max_terms && falls; ++terms) {
+    CurveFit fit;
+    fit.layout = {1, terms};
+    CurveObjective objective(tests, terms,
+                             curve_parameters(terms, modulus, options.poissons_ratio, options.positive_exponents),
+                             options.noise);
+    double least = std::numeric_limits<double>::infinity();
+    for (const VectorX& start :
+         starts_of(fit.layout, objective.parameters().reference(), before, options.positive_exponents)) {
+      const OptimiserSummary run = minimise(objective, objective.parameters().to_unconstrained(start), optimiser);
+      if (!run.succeeded) fit.failure = run.reason;
+      if (!run.succeeded || !(run.evaluation.cost < least)) continue;
+      least = run.evaluation.cost;
+      fit.theta = objective.parameters().to_theta(run.p);
+      fit.succeeded = true;
+    }
+    if (!fit.succeeded) {
+      if (best.failure.empty()) best.failure = fit.failure;
+      break;
+    }
+    before = fit.theta;
+    (void)objective.evaluate(objective.parameters().to_unconstrained(fit.theta));
+    const double n = objective.point_count(), mean = std::max(objective.sum_squares() / n, 1e-30);
+    fit.bic = n * std::log(mean) + objective.parameters().dimension() * std::log(n);
+    fit.law = press_law(*unit_element(), fit.layout, fit.theta);
+    std::vector<CurveFit::Tried> tried = best.tried;
+    tried.push_back({terms, fit.bic, std::sqrt(mean)});
+    falls = fit.bic < best.bic;
+    if (falls) best = fit;
+    best.tried = std::move(tried);
+  }
+  return best;
+}
+
+}  // namespace pliant

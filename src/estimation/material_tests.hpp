@@ -1,0 +1,135 @@
+#pragma once
+
+#include <optional>
+
+#include "estimation/optimiser.hpp"
+#include "estimation/press_objective.hpp"
+
+namespace pliant {
+
+/// How a cube of a material is deformed. Stretches stand along the axes; faces that nothing leads carry no stress.
+enum class TestMode {
+  Uniaxial,          ///< stretch along x; y and z free
+  PureShear,         ///< stretch along x, y kept, z free: a wide strip between clamps
+  Equibiaxial,       ///< the same stretch along x and y, z free
+  Biaxial,           ///< stretch along x, `second` along y, z free
+  SimpleShear,       ///< F_xy is the shear; before it the cube is stretched along x by `prestretch`, y and z free, and
+                     ///< they stay what they were then
+  ConfinedUniaxial,  ///< stretch along x; y and z kept
+};
+
+/// Which stress a curve holds [Pa].
+enum class StressMeasure {
+  First,             ///< nominal: P_xx, of a shear P_xy
+  Second,            ///< nominal: P_yy
+  CauchyDifference,  ///< sigma_xx - sigma_yy
+};
+
+/// A measured curve: stress over stretch or shear.
+struct MaterialTest {
+  std::string name;
+  TestMode mode = TestMode::Uniaxial;
+  StressMeasure measure = StressMeasure::First;
+  std::vector<double> stretch;  ///< [-], > 0; of a simple shear the shear, of any sign
+  std::vector<double> stress;   ///< [Pa], as many
+  std::vector<double> second;   ///< Biaxial: the stretches along y, as many
+  double prestretch = 1.0;      ///< SimpleShear: along x
+
+  double greatest_stress() const;  ///< [Pa], of any sign
+};
+
+/// Throws std::invalid_argument where lengths differ, a number is not finite, a stretch not positive, or nothing of the
+/// curve differs from zero.
+void check_test(const MaterialTest& test);
+
+/// The cube at one point of a test.
+struct TestPoint {
+  bool found = false;     ///< false: the law has no state in which the free faces carry no stress, or none was found
+  Matrix3 F;              ///< deformation gradient
+  Matrix3 P;              ///< nominal stress [Pa]
+  double stress = 0.0;    ///< by the test's measure [Pa]
+  VectorX by_parameters;  ///< d stress / dq of the law's parameters, where asked for
+};
+
+/// The homogeneous deformation at a point of a test. The free stretch minimises the energy: Newton's method on its
+/// logarithm, which keeps to where a bracket has the root. Derivatives follow by the implicit function theorem.
+/// @param element  of the law
+TestPoint solve_test(const MaterialLaw& law, int element, const MaterialTest& test, std::size_t point,
+                     bool with_derivatives = false);
+
+/// A law's stresses over a whole test [Pa]; not a number where no state was found.
+std::vector<double> predict_test(const MaterialLaw& law, const MaterialTest& test);
+
+/// Root mean square of predicted less measured stress over the test's greatest stress. Not a number where `predicted`
+/// holds one.
+double relative_rms(const MaterialTest& test, const std::vector<double>& predicted);
+
+/// The body of one tetrahedron whose law the curves determine.
+std::shared_ptr<const Body> unit_element();
+
+/// `press_parameters` of one element, for materials that hardly change their volume too.
+/// @param poissons_ratio      known; nothing: estimated, up to 0.4999
+/// @param positive_exponents  else they may have any sign
+ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
+                              bool positive_exponents = false);
+
+/// Cost of stress-strain curves: half the squares of simulated less measured stress over `noise` times the curve's
+/// greatest stress, so that curves count by their points, not by their units; and the priors. Parameters and law are
+/// those of presses, of one element. Each curve is one "frame" of the evaluation.
+class CurveObjective : public CostFunction {
+ public:
+  /// @param terms  of Ogden's law; 0: the linear law
+  /// @param noise  deviation of a stress, relative to its curve's greatest, > 0
+  /// Throws std::invalid_argument where there is no test or one is not as `check_test` wants it.
+  CurveObjective(std::vector<MaterialTest> tests, int terms, ParameterSet parameters, double noise);
+
+  const ParameterSet& parameters() const override { return parameters_; }
+  [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override { return run(p, false); }
+  [[nodiscard]] CostEvaluation linearise(const VectorX& p) override { return run(p, true); }
+  [[nodiscard]] CostEvaluation gradient(const VectorX& p) override { return run(p, true); }
+
+  int point_count() const;
+  /// Residuals' squares of the last evaluation, over each curve's greatest stress.
+  double sum_squares() const { return sum_squares_; }
+
+ private:
+  CostEvaluation run(const VectorX& p, bool with_derivatives);
+
+  std::vector<MaterialTest> tests_;
+  PressTheta layout_;
+  ParameterSet parameters_;
+  double noise_;
+  double sum_squares_ = 0.0;
+  std::shared_ptr<const Body> body_ = unit_element();
+};
+
+struct CurveFitOptions {
+  int max_terms = 4;                     ///< of Ogden's law; 0: the linear law
+  std::optional<double> poissons_ratio;  ///< known; nothing: estimated
+  /// Exponents are positive. Pulled along one axis alone, a term with a negative exponent -a does what one with a / 2
+  /// does, by the sides' stretch; pulled along two it is another material by far.
+  bool positive_exponents = false;
+  double noise = 0.01;       ///< as of `CurveObjective`
+  int max_iterations = 200;  ///< of each start
+};
+
+/// A material that was fitted to curves.
+struct CurveFit {
+  bool succeeded = false;
+  std::string failure;
+  PressTheta layout;
+  VectorX theta;
+  std::shared_ptr<const TabulatedLaw> law;  ///< of one element
+  double bic = 0.0;                         ///< n ln(sum of squares / n) + k ln n
+  struct Tried {
+    int terms;
+    double bic, rms;  ///< rms of all residuals, over each curve's greatest stress
+  };
+  std::vector<Tried> tried;  ///< of each number of terms, the best of its starts
+};
+
+/// Fits one term from several exponents, then adds terms one by one, each from several exponents of both signs and
+/// small beside what was there, while Schwarz' criterion (BIC) falls.
+CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOptions& options = {});
+
+}  // namespace pliant
