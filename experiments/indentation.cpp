@@ -83,11 +83,12 @@ bool Indenter::derivatives(std::size_t depth, const PressTheta& layout, const Ve
           along -= by_q.middleRows<3>(3 * Eigen::Index(a)).transpose() * adjoint.row(nodes[a]).transpose();
         double log_modulus = std::log(field.relative[std::size_t(e)]);
         for (int k = 0; k < field.controls; ++k)
-          log_modulus += (field.controls == 1 ? 1.0 : field.weights(e, k)) * std::log(theta[k]);
+          log_modulus += (field.controls == 1 ? 1.0 : field.weights(e, k)) * std::log(theta[layout.modulus(k)]);
         const VectorX change = press_table_derivative(layout, theta, std::exp(log_modulus)).transpose() * along;
         for (int k = 0; k < field.controls; ++k)
-          by_theta[k] += (field.controls == 1 ? 1.0 : field.weights(e, k)) / theta[k] * change[0];
-        by_theta.tail(layout.size() - layout.controls) += change.tail(change.size() - 1);
+          by_theta[layout.modulus(k)] +=
+              (field.controls == 1 ? 1.0 : field.weights(e, k)) / theta[layout.modulus(k)] * change[0];
+        by_theta.segment(1, change.size() - 1) += change.tail(change.size() - 1);
       });
   return true;
 }
