@@ -20,7 +20,7 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double outlier_scale = 6.0;  // deviations
-constexpr std::array field_sizes = {4, 8, 16};
+constexpr std::array field_sizes = {4, 8, 16, 32};
 constexpr double needed_evidence = 3.0;  // e^3 to 1
 
 double median(std::vector<double> values) {
@@ -251,18 +251,19 @@ class PressFit {
     std::vector<int> sizes(field_sizes.begin(), field_sizes.end());
     if (options_.control_points > 1) sizes = {options_.control_points};
     for (const int size : sizes) {
-      if (stop() || !fit_field(size)) return;
+      if (stop()) return;
+      fit_field(size);  // a layer may need many points before any of them tells it from the next
     }
   }
 
-  bool fit_field(int size) {
+  void fit_field(int size) {
     const Estimate before = *best_;
     const double noise = noise_;
     ControlledField field;
     try {
       field = harmonic_field(*before.scene->body, farthest_points(*before.scene->body, size));
     } catch (const InputError&) {
-      return false;  // more points than the mesh has places for
+      return;  // more points than the mesh has places for
     }
     auto scene = std::make_shared<PressScene>(*before.scene);
     scene->body = with_field(*before.scene->body, field.field);
@@ -290,7 +291,6 @@ class PressFit {
       best_ = next;
     else
       noise_ = noise;
-    return tried.kept && !interrupted_;
   }
 
   /// Whether a step from where the coarser field is promises any evidence.

@@ -12,6 +12,9 @@ namespace pliant {
 namespace {
 
 constexpr double least_ratio = -0.5;
+/// The misfit aimed at is a little above what noise makes: that is itself a matter of chance, and the last of it would
+/// be bought by wild fields.
+constexpr double slack = 1.2;
 
 using Sparse = Eigen::SparseMatrix<double>;
 
@@ -182,7 +185,7 @@ class SampleFit {
         return result;
       }
       const VectorX last = q_;
-      const double gamma = choose_weight(), cost = cost_of(gamma);
+      const double gamma = std::max(choose_weight(), 1e-3 * result.weight), cost = cost_of(gamma);
       VectorX step = step_for(gamma, damping);
       const double longest = step.cwiseAbs().maxCoeff();
       if (longest > 1.0) step /= longest;  // a factor of e at most
@@ -190,11 +193,17 @@ class SampleFit {
       const bool solved = solve(q_);
       is_new = solved && cost_of(gamma) < cost;
       result.weight = gamma;
-      if (getenv("SF")) fprintf(stderr, "it %d gamma %.3g damping %.3g cost %.5g -> %d %.5g step %.3g misfit %.4g of %ld\n", result.iterations, gamma, damping, cost, solved, cost_of(gamma), step.cwiseAbs().maxCoeff(), r_.squaredNorm(), r_.size());
+      if (getenv("SF"))
+        fprintf(stderr, "it %d gamma %.3g damping %.3g cost %.5g -> %d %.5g step %.3g misfit %.4g of %ld\n",
+                result.iterations, gamma, damping, cost, solved, cost_of(gamma), step.cwiseAbs().maxCoeff(),
+                r_.squaredNorm(), r_.size());
       if (is_new) {
         rejected = 0;
         damping *= 0.3;
-        if (step.cwiseAbs().maxCoeff() < options_.step_tolerance) result.converged = true;
+        const bool is_at_noise = r_.squaredNorm() < 1.1 * slack * double(r_.size());
+        if (step.cwiseAbs().maxCoeff() < options_.step_tolerance ||
+            (is_at_noise && cost - cost_of(gamma) < 0.02 * cost))
+          result.converged = true;
       } else {
         q_ = last;
         damping = std::max(0.3, 5.0 * damping);
@@ -254,7 +263,7 @@ class SampleFit {
   double choose_weight() const {
     const VectorX b = G_.eigenvectors().transpose() * (r_ - J_ * (q_ - start_));
     // No further in one step than the linear model is good for: to a tenth of the squares.
-    const double aim = std::max(double(r_.size()), 0.1 * r_.squaredNorm()),
+    const double aim = std::max(slack * double(r_.size()), 0.1 * r_.squaredNorm()),
                  top = std::max(G_.eigenvalues().maxCoeff(), 1e-300);
     const auto misfit = [&](double gamma) {
       double sum = 0.0;

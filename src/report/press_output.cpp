@@ -126,7 +126,9 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   fit.converged = outcome.converged, fit.interrupted = outcome.interrupted, fit.reason = outcome.reason;
   fit.notes = outcome.notes;
   for (const TriedLaw& tried : outcome.tried) {
-    const std::string form = tried.terms == 0 ? "a linear law" : fmt::format("Ogden's law of {} terms", tried.terms);
+    const std::string form = tried.terms == 0
+                                 ? "a linear law"
+                                 : fmt::format("Ogden's law of {} term{}", tried.terms, tried.terms == 1 ? "" : "s");
     const std::string field = tried.controls > 1 ? fmt::format(" with {} moduli", tried.controls) : "";
     fit.notes.push_back(std::isfinite(tried.evidence)
                             ? fmt::format("{}{}: {}, ln of the evidence for it {:.1f}", form, field,
@@ -148,7 +150,10 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   recording.discretisation.control_points = outcome.control_points;
   recording.theta = outcome.theta;
   fit.recordings.push_back(std::move(recording));
-  return make_result(std::vector<RecordedCapture>{{capture, {}}}, fit, facts);
+  Result result = make_result(std::vector<RecordedCapture>{{capture, {}}}, fit, facts);
+  // Where the fit began was another form of the law.
+  for (ParameterResult& parameter : result.parameters) parameter.start.reset();
+  return result;
 }
 
 Model make_model(const Capture& capture, const PressFitOutcome& outcome) {
