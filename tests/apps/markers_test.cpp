@@ -34,7 +34,7 @@ TEST(Markers, PhotographsBecomeACaptureThatIsFine) {
 
   // A probe that is longer than stated is not found, in no press: nothing is written.
   std::string text = read_file(folder / "session/markers.toml");
-  const std::string apart = "dots_apart = 0.06";
+  const std::string apart = "dots_apart = 0.05";
   ASSERT_NE(text.find(apart), std::string::npos);
   text.replace(text.find(apart), apart.size(), "dots_apart = 0.08");
   folder.write("session/markers.toml", text);
