@@ -153,6 +153,44 @@ RecordingResult score_held_out(const RecordedCapture& held_out, const FitOutcome
   return result;
 }
 
+/// Where the fit in the output folder begins: where an interrupted one was, or anew.
+template <class State>
+State begun(const Arguments& arguments, const FitOptions& options, const std::string& key,
+            State (*read)(const fs::path&, const std::string&), Log& log) {
+  const fs::path out = arguments.out, state_file = out / "state.json";
+  State state;
+  if (arguments.resume) {
+    if (!fs::exists(state_file))
+      throw InputError({{state_file},
+                        "there is no interrupted fit to resume",
+                        "the state that an interrupted fit leaves",
+                        "leave out --resume"});
+    state = read(state_file, key);
+    log.line("resuming the fit in " + out.string());
+  } else {
+    fs::remove(state_file);
+  }
+  write_file(out / "fit.toml", to_toml(options));
+  return state;
+}
+
+int ended_without_result(const std::string& reason, bool interrupted, const fs::path& out, Log& log) {
+  log.line("the fit ended without a result: " + reason);
+  write_file(out / "log.txt", log.text());
+  return interrupted ? WasInterrupted : NotConverged;
+}
+
+/// Says how to go on with an interrupted fit, or drops its state.
+int ended(bool converged, bool interrupted, const std::string& words, const fs::path& out) {
+  if (interrupted) {
+    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out.string()
+              << " --resume\n";
+    return WasInterrupted;
+  }
+  fs::remove(out / "state.json");
+  return converged ? Fine : NotConverged;
+}
+
 /// Whether a capture's presses are what there is to fit.
 bool is_of_presses(const Capture& capture) { return !capture.presses.empty() && capture.times.empty(); }
 
@@ -193,19 +231,7 @@ int run_presses(const Arguments& arguments, const FitOptions& options, const Cap
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const fs::path out = arguments.out, state_file = out / "state.json";
   const std::string key = capture.sha256 + "\n" + to_toml(options);
-  PressFitState state;
-  if (arguments.resume) {
-    if (!fs::exists(state_file))
-      throw InputError({{state_file},
-                        "there is no interrupted fit to resume",
-                        "the state that an interrupted fit leaves",
-                        "leave out --resume"});
-    state = read_press_state(state_file, key);
-    log.line("resuming the fit in " + out.string());
-  } else {
-    fs::remove(state_file);
-  }
-  write_file(out / "fit.toml", to_toml(options));
+  PressFitState state = begun(arguments, options, key, read_press_state, log);
   PressFitMonitor monitor;
   monitor.on_event = [&](const PressFitEvent& event) { log.live(describe(event)); };
   monitor.on_state = [&](const PressFitState& s) { write_press_state(state_file, s, key); };
@@ -213,24 +239,14 @@ int run_presses(const Arguments& arguments, const FitOptions& options, const Cap
   const PressFitOutcome outcome = fit_presses(capture, press_options(options), monitor, std::move(state));
   log.clear_live();
   if (outcome.interrupted && !fs::exists(state_file)) write_press_state(state_file, {}, key);
-  if (!outcome.succeeded) {
-    log.line("the fit ended without a result: " + outcome.reason);
-    write_file(out / "log.txt", log.text());
-    return outcome.interrupted ? WasInterrupted : NotConverged;
-  }
+  if (!outcome.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
   const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
   const Result result = make_result(capture, outcome, facts);
   write_press_output(out, capture, outcome, result, facts, show_progress);
   log.line(outcome.reason);
   write_file(out / "log.txt", log.text());
   print_result(result, outcome, out, seconds());
-  if (outcome.interrupted) {
-    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out.string()
-              << " --resume\n";
-    return WasInterrupted;
-  }
-  fs::remove(state_file);
-  return outcome.converged ? Fine : NotConverged;
+  return ended(outcome.converged, outcome.interrupted, words, out);
 }
 
 int run(const Arguments& arguments) {
@@ -255,8 +271,17 @@ int run(const Arguments& arguments) {
 
   Log log;
   log.line("pliant " PLIANT_VERSION " fit " + words);
-  if (recordings.size() == 1 && !held_out && is_of_presses(recordings.front().capture))
+  if (is_of_presses(recordings.front().capture)) {
+    const auto refuse = [&](const char* what, const char* advice) {
+      throw InputError({{recordings.front().capture.file}, what, "a fit of one capture's presses", advice});
+    };
+    if (recordings.size() > 1) refuse("presses beside other recordings", "put all presses into one capture");
+    if (held_out) refuse("presses and --hold-out", "give a press role = \"test\"");
+    if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
+    if (!options.parameters.empty())
+      refuse("choices about single parameters, which fits of presses do not know", "leave them out");
     return run_presses(arguments, options, recordings.front().capture, words, log);
+  }
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
   const auto read = [&](RecordedCapture& recording) {
@@ -269,19 +294,7 @@ int run(const Arguments& arguments) {
 
   const std::string key = fingerprint + to_toml(options);
   const fs::path state_file = out / "state.json";
-  FitState state;
-  if (arguments.resume) {
-    if (!fs::exists(state_file))
-      throw InputError({{state_file},
-                        "there is no interrupted fit to resume",
-                        "the state that an interrupted fit leaves",
-                        "leave out --resume"});
-    state = read_fit_state(state_file, key);
-    log.line("resuming the fit in " + out.string());
-  } else {
-    fs::remove(state_file);
-  }
-  write_file(out / "fit.toml", to_toml(options));
+  FitState state = begun(arguments, options, key, read_fit_state, log);
 
   FitMonitor monitor;
   monitor.on_event = [&](const FitEvent& event) { log.live(describe(event, seconds())); };
@@ -290,11 +303,7 @@ int run(const Arguments& arguments) {
   const FitOutcome outcome = fit(recordings, options, monitor, std::move(state));
   log.clear_live();
   if (outcome.interrupted && !fs::exists(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
-  if (!outcome.evaluation.succeeded) {
-    log.line("the fit ended without a result: " + outcome.reason);
-    write_file(out / "log.txt", log.text());
-    return outcome.interrupted ? WasInterrupted : NotConverged;
-  }
+  if (!outcome.evaluation.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
   RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
   Result result = make_result(recordings, outcome, facts);
   if (held_out && !outcome.interrupted) result.held_out = score_held_out(*held_out, outcome, options, monitor);
@@ -304,13 +313,7 @@ int run(const Arguments& arguments) {
   log.line(outcome.reason);
   write_file(out / "log.txt", log.text());
   print_result(result, outcome, out, seconds());
-  if (outcome.interrupted) {
-    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out.string()
-              << " --resume\n";
-    return WasInterrupted;
-  }
-  fs::remove(state_file);
-  return outcome.converged ? Fine : NotConverged;
+  return ended(outcome.converged, outcome.interrupted, words, out);
 }
 
 std::string key_help() {

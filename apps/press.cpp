@@ -85,6 +85,11 @@ int run(const Arguments& arguments) {
   return Fine;
 }
 
+constexpr const char* footer = R"(Examples:
+  pliant press out/foam/model.toml --contact 0,0.1,0 --force 0,-20,0 --radius 0.03 --out out/pressed
+  pliant press out/foam/model.toml --contact 0,0.1,0 --move 0,-0.02,0 --probe ball --steps 20 --out out/pressed
+The probe begins where it touches the surface at rest; each step is an equilibrium.)";
+
 }  // namespace
 
 void add_press(CLI::App& app, int& exit_code) {
@@ -117,6 +122,7 @@ void add_press(CLI::App& app, int& exit_code) {
   command->add_option("--surface", arguments->surface, "a finer mesh of the same object that follows along")
       ->type_name("FILE");
   command->add_option("--out,-o", arguments->out, "folder for the deformed meshes and surfaces")->type_name("DIR");
+  command->footer(footer);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

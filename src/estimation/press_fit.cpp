@@ -99,7 +99,7 @@ class PressFit {
     ParameterSet parameters;
     VectorX theta;
     CostEvaluation evaluation;
-    double noise = 0.0;
+    double start_cost = 0.0, noise = 0.0;
     std::vector<Vector3> points;
     bool converged = false;
     std::string reason;
@@ -128,7 +128,7 @@ class PressFit {
   std::optional<Estimate> minimised(const PressTheta& layout, std::shared_ptr<const PressScene> scene,
                                     const std::vector<Vector3>& points, const VectorX& theta,
                                     const std::string& stage) {
-    Estimate e{layout, scene, parameters_of(layout, scene, points), theta, {}, noise_, points, false, {}};
+    Estimate e{layout, scene, parameters_of(layout, scene, points), theta, {}, 0.0, noise_, points, false, {}};
     PressObjective objective(scene, fitted_, layout, e.parameters, {noise_, outlier_scale});
     OptimiserOptions o;
     o.max_iterations = options_.max_iterations;
@@ -154,6 +154,8 @@ class PressFit {
       outcome_.notes.push_back(stage + ": " + s.reason);
       return std::nullopt;
     }
+    const CostEvaluation begin = objective.evaluate(e.parameters.to_unconstrained(theta));
+    if (begin.succeeded) e.start_cost = begin.cost;
     e.theta = e.parameters.to_theta(s.p);
     e.evaluation = objective.linearise(s.p);
     e.noise = noise_;
@@ -197,8 +199,9 @@ class PressFit {
     if (const auto* done = done_before(layout.terms, layout.controls)) {
       if (done->theta.size() == 0) return std::nullopt;
       noise_ = done->noise;
-      Estimate e{layout,           scene, parameters_of(layout, scene, points), done->theta, {}, noise_, points, true,
-                 "finished before"};
+      Estimate e{
+          layout,           scene, parameters_of(layout, scene, points), done->theta, {}, 0.0, noise_, points, true,
+          "finished before"};
       PressObjective objective(scene, fitted_, layout, e.parameters, {noise_, outlier_scale});
       e.evaluation = objective.linearise(e.parameters.to_unconstrained(done->theta));
       if (!e.evaluation.succeeded) return std::nullopt;
@@ -210,7 +213,6 @@ class PressFit {
   bool fit_first(int terms) {
     const PressTheta layout{scene_->body->modulus.controls, terms};
     const VectorX start = parameters_of(layout, scene_, {}).reference();
-    outcome_.start_theta = start;
     best_ = estimate(layout, scene_, {}, start, terms == 0 ? "linear" : "1 term");
     if (!best_) {
       outcome_.reason = outcome_.notes.empty() ? "the start cannot be evaluated" : outcome_.notes.back();
@@ -361,6 +363,7 @@ class PressFit {
     outcome_.parameters.set_reference(e.theta);
     outcome_.evaluation = e.evaluation;
     outcome_.noise = e.noise;
+    outcome_.start_cost = e.start_cost;
     outcome_.control_points = e.points;
     outcome_.converged = e.converged && !interrupted_;
     outcome_.reason = interrupted_ ? "interrupted" : e.reason;

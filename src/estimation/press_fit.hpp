@@ -67,11 +67,11 @@ struct PressFitOutcome {
   std::shared_ptr<const PressScene> scene;
   std::shared_ptr<const MaterialLaw> law;
   PressTheta layout;
-  ParameterSet parameters;          ///< with the reference at the estimate
-  VectorX theta, start_theta, std;  ///< std of each unconstrained number
+  ParameterSet parameters;  ///< with the reference at the estimate
+  VectorX theta, std;       ///< std of each unconstrained number
   MatrixX covariance, correlation;
   CostEvaluation evaluation;
-  double start_cost = 0.0, noise = 0.0;  ///< [-], [m]
+  double start_cost = 0.0, noise = 0.0;  ///< where this form of the law began, with that noise [-]; [m]
   std::vector<Vector3> control_points;
   std::vector<TriedLaw> tried;
   std::vector<PressFitEvent> history;

@@ -151,7 +151,7 @@ TEST_P(Law, ClosedPathsOfStrainTakeAndGiveNoWork) {
 
 INSTANTIATE_TEST_SUITE_P(All, Law, ::testing::ValuesIn(laws()), [](const auto& c) { return c.param.name; });
 
-TEST(OgdenLaw, PullsLessAndLessOfNothingFromItsTerms) {
+TEST(OgdenLaw, HasTheStressOfAUniaxialStretchByHand) {
   // Uniaxial stretch of one term with nu = 0: P = 2 mu / a (l^(a-1) - 1/l), by hand.
   MatrixX q(1, 3);
   q << 1000.0, 4.0, 0.0;
