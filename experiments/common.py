@@ -186,3 +186,15 @@ def median(values):
 
 def log_uniform(random, low, high):
     return math.exp(random.uniform(math.log(low), math.log(high)))
+
+
+def pyplot():
+    """Matplotlib's pyplot that draws into files; None, with a line said, where it is not installed."""
+    try:
+        import matplotlib
+        matplotlib.use("Agg")
+        import matplotlib.pyplot
+    except ImportError:
+        print("matplotlib is not installed: no picture")
+        return None
+    return matplotlib.pyplot

@@ -8,12 +8,11 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "choices.hpp"
 #include "estimation/material_tests.hpp"
+#include "request.hpp"
 
 namespace pliant {
 namespace {
@@ -54,9 +53,7 @@ json or_null(double value) { return std::isfinite(value) ? json(value) : json();
 class Experiment {
  public:
   explicit Experiment(const Choices& choices) {
-    std::ifstream file(choices.at("request"));
-    if (!file) throw std::invalid_argument("cannot read " + choices.at("request"));
-    request_ = json::parse(file);
+    request_ = read_request(choices);
     for (const json& test : request_.at("tests")) tests_.push_back(read_test(test));
   }
 

@@ -7,12 +7,11 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "choices.hpp"
 #include "estimation/optimiser.hpp"
 #include "indentation.hpp"
+#include "request.hpp"
 
 namespace pliant {
 namespace {
@@ -63,9 +62,7 @@ double hertz_modulus(const Indentation& seen, double nu) {
 class Experiment {
  public:
   explicit Experiment(const Choices& choices) {
-    std::ifstream file(choices.at("request"));
-    if (!file) throw std::invalid_argument("cannot read " + choices.at("request"));
-    request_ = json::parse(file);
+    request_ = read_request(choices);
     body_ = make_block(request_.at("block"));
     const double bottom = body_->nodes.col(2).minCoeff();
     for (int n = 0; n < body_->node_count(); ++n)

@@ -11,12 +11,11 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "choices.hpp"
 #include "estimation/optimiser.hpp"
 #include "estimation/press_objective.hpp"
+#include "request.hpp"
 
 namespace pliant {
 namespace {
@@ -183,9 +182,7 @@ class SheetObjective : public CostFunction {
 class Experiment {
  public:
   explicit Experiment(const Choices& choices) {
-    std::ifstream file(choices.at("request"));
-    if (!file) throw std::invalid_argument("cannot read " + choices.at("request"));
-    request_ = json::parse(file);
+    request_ = read_request(choices);
     auto sheet = std::make_shared<Sheet>();
     const double cell = request_.at("cell"), thickness = request_.at("thickness"), fixed = request_.at("fixed_pad");
     const int behind = request_.at("cells").at(0), beside = request_.at("cells").at(1);

@@ -7,14 +7,13 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "choices.hpp"
 #include "elasticity/modulus_field.hpp"
 #include "estimation/optimiser.hpp"
 #include "geometry/primitives.hpp"
 #include "indentation.hpp"
+#include "request.hpp"
 
 namespace pliant {
 namespace {
@@ -68,9 +67,7 @@ std::optional<Vector3> first_met(const Body& body, const Vector3& point, const V
 class Experiment {
  public:
   explicit Experiment(const Choices& choices) {
-    std::ifstream file(choices.at("request"));
-    if (!file) throw std::invalid_argument("cannot read " + choices.at("request"));
-    request_ = json::parse(file);
+    request_ = read_request(choices);
     std::vector<Vector3> cloud;
     for (const json& p : request_.at("cloud")) cloud.push_back(vector_of(p));
     const TriangleMesh surface = extruded(cloud, request_.at("table"), request_.at("raise"));

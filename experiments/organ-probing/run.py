@@ -145,12 +145,8 @@ def second_radius(program, work):
 
 
 def draw(drawn):
-    try:
-        import matplotlib
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
-    except ImportError:
-        print("matplotlib is not installed: no picture")
+    plt = common.pyplot()
+    if not plt:
         return
     figure, panels = plt.subplots(2, 3, figsize=(15, 8.5))
     for panel, (name, d) in zip(panels.flat, drawn.items()):

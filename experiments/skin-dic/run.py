@@ -84,12 +84,8 @@ def main():
 
 
 def draw(figures, curve):
-    try:
-        import matplotlib
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
-    except ImportError:
-        print("matplotlib is not installed: no picture")
+    plt = common.pyplot()
+    if not plt:
         return
     figure, panels = plt.subplots(1, 2, figsize=(14, 5))
     pad = [1e3 * s["pad"] for s in figures["steps"]]

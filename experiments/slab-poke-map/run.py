@@ -119,12 +119,8 @@ def errors(pokes, forces, of_fitted):
 
 
 def draw(pokes, fits):
-    try:
-        import matplotlib
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
-    except ImportError:
-        print("matplotlib is not installed: no picture")
+    plt = common.pyplot()
+    if not plt:
         return
     figure, panels = plt.subplots(1, 3, figsize=(16, 5))
     last = [p["forces"][-1] for p in pokes]
