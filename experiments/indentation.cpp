@@ -75,20 +75,15 @@ bool Indenter::derivatives(std::size_t depth, const PressTheta& layout, const Ve
   by_nodes.topRows(n) = of_nodes;
   const Points adjoint = equilibrium_.response(by_nodes);
   by_theta = VectorX::Zero(layout.size());
-  const ModulusField& field = body_->modulus;
   equilibrium_.elasticity().for_parameter_derivatives(
       [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
         VectorX along = VectorX::Zero(by_q.cols());
         for (std::size_t a = 0; a < nodes.size(); ++a)
           along -= by_q.middleRows<3>(3 * Eigen::Index(a)).transpose() * adjoint.row(nodes[a]).transpose();
-        double log_modulus = std::log(field.relative[std::size_t(e)]);
-        for (int k = 0; k < field.controls; ++k)
-          log_modulus += (field.controls == 1 ? 1.0 : field.weights(e, k)) * std::log(theta[layout.modulus(k)]);
-        const VectorX change = press_table_derivative(layout, theta, std::exp(log_modulus)).transpose() * along;
-        for (int k = 0; k < field.controls; ++k)
-          by_theta[layout.modulus(k)] +=
-              (field.controls == 1 ? 1.0 : field.weights(e, k)) / theta[layout.modulus(k)] * change[0];
-        by_theta.segment(1, change.size() - 1) += change.tail(change.size() - 1);
+        const VectorX own = element_theta(*body_, layout, theta, e);
+        const VectorX change = press_table_derivative(layout.terms, own).transpose() * along;
+        for (const auto& [number, at, share] : element_theta_shares(*body_, layout, theta, own, e))
+          by_theta[at] += share * change[number];
       });
   return true;
 }

@@ -92,12 +92,10 @@ class Experiment {
     const int terms = request_.at("terms");
     const double nu = request_.at("poisson_ratio"), start = hertz_modulus(seen, nu);
     report["hertz_modulus"] = start;
-    ParameterSet parameters = press_parameters(*body_, {"youngs_modulus"}, terms, start);
-    VectorX theta = parameters.reference();
     const PressTheta layout{1, terms};
-    theta[layout.poissons_ratio()] = nu;
-    parameters.set_reference(theta);
-    parameters.set_estimated("poisson_ratio", false);
+    ParameterSet parameters = press_parameters(layout, {"youngs_modulus"}, start);
+    parameters.fix("poisson_ratio", nu);
+    const VectorX theta = parameters.reference();
     IndentationObjective objective(body_, held_, {seen}, layout, parameters);
     const VectorX p = parameters.to_unconstrained(theta);
     if (request_.at("task") == "check") {

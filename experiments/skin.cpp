@@ -138,7 +138,7 @@ class SheetObjective : public CostFunction {
     std::vector<Points> changes(std::size_t(count), Points::Zero(nodes.rows(), 3));  // of dW/dx
     equilibrium_.elasticity().for_parameter_derivatives(
         [&](int, std::span<const int> of, const Eigen::Ref<const MatrixX>& by_q) {
-          MatrixX by = by_q * press_table_derivative(layout_, theta, theta[0]);
+          MatrixX by = by_q * press_table_derivative(layout_.terms, theta);
           by.col(0) /= theta[0];
           for (std::size_t a = 0; a < of.size(); ++a)
             for (int k = 0; k < count; ++k)
@@ -224,11 +224,9 @@ class Experiment {
     const auto begin = std::chrono::steady_clock::now();
     const int terms = request_.at("terms");
     const PressTheta layout{1, terms};
-    ParameterSet parameters = press_parameters(*sheet_->body, {"youngs_modulus"}, terms, request_.at("start_modulus"));
-    VectorX theta = parameters.reference();
-    theta[layout.poissons_ratio()] = request_.at("poisson_ratio");
-    parameters.set_reference(theta);
-    parameters.set_estimated("poisson_ratio", false);
+    ParameterSet parameters = press_parameters(layout, {"youngs_modulus"}, request_.at("start_modulus"));
+    parameters.fix("poisson_ratio", request_.at("poisson_ratio"));
+    const VectorX theta = parameters.reference();
     SheetObjective objective(sheet_, layout, parameters, false);
     const VectorX p = parameters.to_unconstrained(theta);
     json report = {{"nodes", sheet_->body->node_count()}, {"elements", sheet_->body->element_count()}};

@@ -111,11 +111,9 @@ class Experiment {
     }
     const int terms = request_.at("terms");
     const PressTheta layout{controls, terms};
-    ParameterSet parameters = press_parameters(*body, names, terms, request_.at("start_modulus"));
-    VectorX theta = parameters.reference();
-    theta[layout.poissons_ratio()] = request_.at("poisson_ratio");
-    parameters.set_reference(theta);
-    parameters.set_estimated("poisson_ratio", false);
+    ParameterSet parameters = press_parameters(layout, names, request_.at("start_modulus"));
+    parameters.fix("poisson_ratio", request_.at("poisson_ratio"));
+    const VectorX theta = parameters.reference();
     std::vector<Indentation> fitted;
     for (std::size_t i = 0; i < pokes_.size(); ++i)
       if (meets_[i] && request_.at("pokes")[i].at("fitted")) fitted.push_back(pokes_[i]);

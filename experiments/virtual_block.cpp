@@ -1,17 +1,24 @@
 // Captures of a virtual block of three layers of non-linear materials (after section 6 of Bickel 2009): 1,800
 // tetrahedra, 48 presses by a disc of 20 mm and 12 test presses by one of 30 mm, markers with and without noise.
-// usage: pliant_virtual_block OUT SEED
+// usage: pliant_virtual_block OUT SEED ogden|fung
+// ogden: each layer has Ogden's law of two terms; a fit of zones can find it exactly (an inverse crime).
+// fung: each layer stiffens exponentially (Fung 1967), which is no law that pliant fits.
 // Writes OUT/00, OUT/10, OUT/20, OUT/30 (noise in percent of each marker's own displacement), the same mesh in all, and
 // truth.csv beside each press: markers without noise.
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 #include <random>
 
 #include "base/files.hpp"
 #include "capture/markers.hpp"
+#include "elasticity/polar.hpp"
 #include "estimation/press_scene.hpp"
 #include "model/vtu.hpp"
 #include "motion/press_session.hpp"
@@ -30,15 +37,63 @@ TetMesh block() {
   return make_tet_box(box, {10, 3, 10}, false);
 }
 
-/// Three layers; each of two terms with Poisson's ratios of their own, which no law that is fitted here has.
-std::shared_ptr<const MaterialLaw> layers(const Body& body) {
+/// 0, 1, 2 from below.
+int layer_of(const Body& body, int e) {
+  double y = 0.0;
+  for (const int n : body.element(e)) y += 0.25 * body.nodes(n, 1);
+  return std::clamp(int(3.0 * y / size.y()), 0, 2);
+}
+
+/// Fung's exponential energy (1967) of the strain e = S - I in the rotated frame:
+///   W = E / (2 b) (exp(b q) - 1),   q = (2 mu e . e + lambda tr(e)^2) / E.
+class FungLaw : public MaterialLaw {
+ public:
+  struct Layer {
+    double youngs_modulus, poissons_ratio, b;
+  };
+  FungLaw(const Body& body, const std::array<Layer, 3>& layers) {
+    for (int e = 0; e < body.element_count(); ++e) layers_.push_back(layers[std::size_t(layer_of(body, e))]);
+  }
+  std::string name() const override { return "fung"; }
+  int element_count() const override { return int(layers_.size()); }
+  SmallStrainModuli small_strain(int e) const override {
+    return {layers_[std::size_t(e)].youngs_modulus, layers_[std::size_t(e)].poissons_ratio};
+  }
+  void stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const override {
+    if (!(F.determinant() > 0.0)) {
+      out.energy = std::numeric_limits<double>::infinity();
+      return;
+    }
+    const auto [E, nu, b] = layers_[std::size_t(e)];
+    const double lambda = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), mu = E / (2.0 * (1.0 + nu));
+    const Matrix3 strain = polar_decomposition(F).S - Matrix3::Identity();
+    Matrix3 linear = 2.0 * mu * strain;
+    linear.diagonal().array() += lambda * strain.trace();
+    const double q = linear.cwiseProduct(strain).sum() / E, stiffening = std::exp(b * q);
+    out.energy = E / (2.0 * b) * std::expm1(b * q);
+    Matrix9 C = 2.0 * mu * Matrix9::Identity();
+    for (const int i : {0, 4, 8})
+      for (const int j : {0, 4, 8}) C(i, j) += lambda;
+    const Eigen::Map<const Eigen::Matrix<double, 9, 1>> T(linear.data());
+    C = (stiffening * (C + 2.0 * b / E * T * T.transpose())).eval();
+    set_strain_stress(F, stiffening * linear, with_tangent ? &C : nullptr, out);
+  }
+
+ private:
+  std::vector<Layer> layers_;
+};
+
+std::shared_ptr<const MaterialLaw> layers(const Body& body, const std::string& law) {
+  if (law == "fung") {
+    constexpr std::array<FungLaw::Layer, 3> three = {{{12e3, 0.25, 4.0}, {4e3, 0.1, 8.0}, {7.5e3, 0.3, 15.0}}};
+    return std::make_shared<FungLaw>(body, three);
+  }
   MatrixX q(body.element_count(), 6);
   for (int e = 0; e < body.element_count(); ++e) {
-    double y = 0.0;
-    for (const int n : body.element(e)) y += 0.25 * body.nodes(n, 1);
-    if (y < size.y() / 3)
+    const int layer = layer_of(body, e);
+    if (layer == 0)
       q.row(e) << 3500.0, 4.0, 0.30, 1500.0, -6.0, 0.10;
-    else if (y < 2 * size.y() / 3)
+    else if (layer == 1)
       q.row(e) << 1200.0, 10.0, 0.15, 600.0, -9.0, 0.05;
     else
       q.row(e) << 2500.0, 3.0, 0.35, 400.0, -14.0, 0.20;
@@ -99,12 +154,12 @@ std::string text_of(const Vector3& v) {
 }  // namespace
 
 int main(int count, char** arguments) {
-  if (count != 3) return std::fprintf(stderr, "usage: %s OUT SEED\n", arguments[0]), 2;
+  if (count != 4) return std::fprintf(stderr, "usage: %s OUT SEED ogden|fung\n", arguments[0]), 2;
   const fs::path out = arguments[1];
   const unsigned seed = unsigned(std::atoi(arguments[2]));
   std::mt19937 random(seed);
   const auto body = std::make_shared<Body>(make_body(block()));
-  const auto law = layers(*body);
+  const auto law = layers(*body, arguments[3]);
   const MarkerPositions rest = markers();
   const std::vector<Pressing> all = presses(random);
   PressSessionOptions options;

@@ -280,4 +280,13 @@ std::unique_ptr<LawElasticity> LawElasticity::make(std::shared_ptr<const Body> b
   throw std::invalid_argument("material laws are for tetrahedra");
 }
 
+double mean_modulus(const Body& body, const MaterialLaw& law) {
+  double sum = 0.0, volume = 0.0;
+  for (int e = 0; e < body.element_count(); ++e) {
+    sum += body.element_volume[std::size_t(e)] * law.small_strain(e).youngs_modulus;
+    volume += body.element_volume[std::size_t(e)];
+  }
+  return sum / volume;
+}
+
 }  // namespace pliant

@@ -63,4 +63,7 @@ class LawElasticity : public Elasticity {
 /// S - I of F = R S, as xx, yy, zz, xy, xz, yz.
 Strain6 biot_strain(const Matrix3& F);
 
+/// Volume-weighted mean of the small-strain Young's moduli of a law [Pa].
+double mean_modulus(const Body& body, const MaterialLaw& law);
+
 }  // namespace pliant

@@ -52,31 +52,41 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
                         const MatrixX& carried) {
   const std::vector<Eigen::Index> rows = modulus_rows(parameters);
   if (Eigen::Index(rows.size()) != carried.rows() || carried.rows() <= carried.cols()) return 0.0;
+  const MatrixX own = contrasts_to(carried);
+  MatrixX contrasts = MatrixX::Zero(own.rows(), p.size());
+  contrasts(Eigen::all, rows) = own;
+  const MatrixX covariance =
+      parameters.joint_precision().completeOrthogonalDecomposition().pseudoInverse();  // of contrasts
+  return log_bayes_factor(evaluation, parameters, p, contrasts, own * covariance * own.transpose());
+}
+
+double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
+                        const MatrixX& contrasts, const MatrixX& prior) {
   // The field's prior belongs to the hypotheses, not to the estimate; a trace of it stays for where nothing is seen.
   constexpr double trace = 1e-4;
-  const MatrixX& precision = parameters.joint_precision();
   MatrixX H = evaluation.gauss_newton;
   VectorX g = evaluation.gradient;
-  H(rows, rows) -= (1.0 - trace) * precision;
-  g(rows) -= (1.0 - trace) * precision * p(rows);
+  if (const MatrixX& precision = parameters.joint_precision(); precision.size() > 0) {
+    const std::vector<Eigen::Index> rows = modulus_rows(parameters);
+    H(rows, rows) -= (1.0 - trace) * precision;
+    g(rows) -= (1.0 - trace) * precision * p(rows);
+  }
   const VectorX scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // pulls and dampings differ by 1e10
   const MatrixX inverse =
       scale.asDiagonal() *
       MatrixX(scale.asDiagonal() * H * scale.asDiagonal()).ldlt().solve(MatrixX::Identity(H.rows(), H.cols())) *
       scale.asDiagonal();
-  const MatrixX contrasts = contrasts_to(carried);
-  const MatrixX by_gradient = contrasts * inverse(rows, Eigen::all);
-  const VectorX d = contrasts * p(rows) - by_gradient * g;
+  const MatrixX by_gradient = contrasts * inverse;
+  const VectorX d = contrasts * p - by_gradient * g;
 
   const double explained = 0.5 * evaluation.independent_observations();  // the cost of residuals that are noise
   const double left = std::max(evaluation.cost - 0.5 * g.dot(inverse * g), 0.0) / evaluation.cost;  // after the step
   const double noise = std::max(1.0, left * evaluation.cost / explained);
   VectorX mean = VectorX::Zero(g.size());
   for (const FrameFit& frame : evaluation.frames) mean += frame.gradient / double(evaluation.frames.size());
-  const MatrixX V = noise * contrasts * inverse(rows, rows) * contrasts.transpose() +
+  const MatrixX V = noise * by_gradient * contrasts.transpose() +
                     left * by_gradient * gradient_scatter(evaluation, mean) * by_gradient.transpose();
-  const MatrixX covariance = precision.completeOrthogonalDecomposition().pseudoInverse();  // of contrasts
-  const MatrixX both = V + contrasts * covariance * contrasts.transpose();
+  const MatrixX both = V + prior;
   return 0.5 * (d.dot(V.ldlt().solve(d)) - d.dot(both.ldlt().solve(d)) + log_determinant(V) - log_determinant(both));
 }
 

@@ -29,6 +29,13 @@ MatrixX field_precision(const std::vector<Vector3>& points, double length, doubl
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& carried);
 
+/// The same about any contrasts of p: the coarser hypothesis is that they vanish, under the finer one they are
+/// N(0, P). The parameters' joint prior counts as part of the hypotheses, their own priors do not.
+/// @param contrasts  rows x dimension of p
+/// @param prior      P, rows x rows
+double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
+                        const MatrixX& contrasts, const MatrixX& prior);
+
 /// Covariance of the sum of the frames' gradients about their mean, by how they scatter; neighbouring frames may be
 /// correlated (Newey and West 1987).
 /// @param mean  of a frame's gradient; empty: zero, as at an estimate

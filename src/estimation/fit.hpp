@@ -76,6 +76,7 @@ struct FitOptions {
   /// Of presses with known force.
   PressMaterial material = PressMaterial::Ogden;
   int law_terms = 0;              ///< of Ogden's law, 1..3; 0: as many as the presses support
+  int law_zones = 0;              ///< with a law of their own each, 1..12; 0: as many as the presses support
   double marker_noise = 0.0;      ///< of a coordinate [m]; 0: what the residuals say
   double basis_tolerance = 0.02;  ///< of a sampled material's stress, > 0
   int basis_samples = 12;         ///< of a sampled material, an element, >= 1

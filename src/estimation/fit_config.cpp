@@ -209,6 +209,8 @@ const std::vector<Entry>& entries() {
           "each press interpolated in strain space",
           press_materials, &FitOptions::material),
       integer_entry("law_terms", "0..3", "of Ogden's law; 0: as many as the presses support", &FitOptions::law_terms),
+      integer_entry("law_zones", "0..12", "with a law of their own each; 0: as many as the presses support; 1: none",
+                    &FitOptions::law_zones),
       real_entry("marker_noise", "m", ">= 0", "of a marker's coordinate under a press; 0: what the residuals say",
                  &FitOptions::marker_noise),
       real_entry("basis_tolerance", "", "> 0", "of stress, relative to the greatest, in a sampled material",

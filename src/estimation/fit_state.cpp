@@ -147,7 +147,7 @@ FitState to_state(const Json& json) {
 
 namespace {
 
-constexpr const char* press_format = "press-fit-state/1";
+constexpr const char* press_format = "press-fit-state/2";
 
 Json from_matrix(const MatrixX& m) {
   return {{"rows", m.rows()}, {"values", std::vector<double>(m.data(), m.data() + m.size())}};
@@ -184,11 +184,26 @@ PressSample to_sample(const Json& json) {
   return s;
 }
 
+Json from_cuts(const std::vector<ZoneCut>& cuts) {
+  Json json = Json::array();
+  for (const ZoneCut& cut : cuts) json.push_back({cut.zone, int(cut.by), cut.at});
+  return json;
+}
+std::vector<ZoneCut> to_cuts(const Json& json) {
+  std::vector<ZoneCut> cuts;
+  for (const Json& c : json)
+    cuts.push_back({c.at(0).get<int>(), ZoneCut::By(c.at(1).get<int>()), c.at(2).get<double>()});
+  return cuts;
+}
+
 Json to_json(const PressFitState& state) {
   Json json = {{"done", Json::array()}, {"samples", Json::array()}};
   for (const PressFitState::Done& d : state.done)
-    json["done"].push_back({{"terms", d.terms},
-                            {"controls", d.controls},
+    json["done"].push_back({{"terms", d.layout.terms},
+                            {"controls", d.layout.controls},
+                            {"laws", d.layout.laws},
+                            {"own_ratios", d.layout.own_ratios},
+                            {"cuts", from_cuts(d.cuts)},
                             {"theta", from_vector(d.theta)},
                             {"cost", from_cost(d.cost)},
                             {"against", from_cost(-d.evidence)},
@@ -197,20 +212,27 @@ Json to_json(const PressFitState& state) {
   for (const PressSample& s : state.samples) json["samples"].push_back(from_sample(s));
   json["under_way"] = {{"iterations", state.under_way.iterations},
                        {"p", from_vector(state.under_way.p)},
-                       {"memory", from_vector(state.under_way.memory)}};
+                       {"memory", from_vector(state.under_way.memory)},
+                       {"cuts", from_cuts(state.cuts)}};
   return json;
 }
 
 PressFitState to_press_state(const Json& json) {
   PressFitState state;
   for (const Json& d : json.at("done"))
-    state.done.push_back({d.at("terms").get<int>(), d.at("controls").get<int>(), to_vector(d.at("theta")),
-                          to_cost(d.at("cost")), -to_cost(d.at("against")), d.at("noise").get<double>(),
+    state.done.push_back({{d.at("controls").get<int>(), d.at("terms").get<int>(), d.at("laws").get<int>(),
+                           d.at("own_ratios").get<bool>()},
+                          to_cuts(d.at("cuts")),
+                          to_vector(d.at("theta")),
+                          to_cost(d.at("cost")),
+                          -to_cost(d.at("against")),
+                          d.at("noise").get<double>(),
                           d.at("kept").get<bool>()});
   for (const Json& s : json.at("samples")) state.samples.push_back(to_sample(s));
   const Json& under_way = json.at("under_way");
   state.under_way = {under_way.at("iterations").get<int>(), to_vector(under_way.at("p")),
                      to_vector(under_way.at("memory"))};
+  state.cuts = to_cuts(under_way.at("cuts"));
   return state;
 }
 

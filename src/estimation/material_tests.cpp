@@ -201,19 +201,17 @@ std::shared_ptr<const Body> unit_element() {
 
 ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
                               bool positive_exponents) {
-  const ParameterSet set = press_parameters(*unit_element(), {"youngs_modulus"}, terms, youngs_modulus);
-  std::vector<Parameter> parameters = set.parameters();
-  VectorX theta = set.reference();
-  for (Parameter& p : parameters) {
+  const ParameterSet set = press_parameters({1, terms}, {"youngs_modulus"}, youngs_modulus);
+  std::vector<Parameter> list = set.parameters();
+  for (Parameter& p : list) {
     // Curves tell an exponent's sign themselves.
     if (p.name.starts_with("exponent"))
       p.lower = positive_exponents ? least_exponent : -largest_exponent, p.upper = largest_exponent;
-    if (p.name != "poisson_ratio") continue;
-    p.upper = greatest_poissons_ratio;
-    p.estimated = !poissons_ratio;
-    if (poissons_ratio) theta[p.theta_index] = *poissons_ratio;
+    if (p.name == "poisson_ratio") p.upper = greatest_poissons_ratio;
   }
-  return {std::move(parameters), std::move(theta)};
+  ParameterSet parameters(std::move(list), set.reference());
+  if (poissons_ratio) parameters.fix("poisson_ratio", *poissons_ratio);
+  return parameters;
 }
 
 CurveObjective::CurveObjective(std::vector<MaterialTest> tests, int terms, ParameterSet parameters, double noise)
@@ -240,7 +238,7 @@ CostEvaluation CurveObjective::run(const VectorX& p, bool with_derivatives) {
   MatrixX by_p;
   if (with_derivatives) {
     // press_table_derivative's first column is by ln E, theta's first number is E.
-    MatrixX by_theta = press_table_derivative(layout_, theta, theta[0]);
+    MatrixX by_theta = press_table_derivative(layout_.terms, theta);
     by_theta.col(0) /= theta[0];
     by_p = by_theta * parameters_.jacobian(p);
   }
@@ -309,7 +307,7 @@ std::vector<VectorX> starts_of(const PressTheta& layout, const VectorX& referenc
     VectorX theta = reference;
     if (added > 0) theta.head(before.size()) = before;
     theta[layout.exponent(added)] = exponent;
-    if (added > 0) theta[layout.ratio(added)] = small_ratio;
+    if (added > 0) theta[layout.stiffness_ratio(added)] = small_ratio;
     starts.push_back(theta);
   }
   return starts;

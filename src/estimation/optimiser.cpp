@@ -5,6 +5,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <numeric>
 #include <vector>
 #ifdef PLIANT_WITH_NLOPT
 #include <nlopt.hpp>
@@ -82,6 +83,23 @@ class Run {
   const std::function<bool(const Iteration&)>& on_iteration_;
 };
 
+/// -H^-1 g over the numbers that can move: one that lies at its bound and is pushed outwards takes no part, so that the
+/// others go where they would with it fixed.
+VectorX step_within_bounds(const Run& run, const MatrixX& H) {
+  const VectorX &p = run.summary.p, &g = run.summary.evaluation.gradient;
+  std::vector<Eigen::Index> free(std::size_t(p.size()));
+  std::iota(free.begin(), free.end(), 0);
+  for (;;) {
+    VectorX step = VectorX::Zero(p.size());
+    step(free) = -MatrixX(H(free, free)).ldlt().solve(VectorX(g(free)));
+    const VectorX moved = run.clamp(p + step) - p;
+    const auto is_blocked = [&](Eigen::Index i) {
+      return step[i] != 0.0 && std::abs(moved[i]) < 1e-9 * std::abs(step[i]);
+    };
+    if (std::erase_if(free, is_blocked) == 0 || free.empty()) return free.empty() ? VectorX::Zero(p.size()) : step;
+  }
+}
+
 void levenberg_marquardt(Run& run, const OptimiserOptions& options, const VectorX& memory) {
   OptimiserSummary& s = run.summary;
   double lambda = memory.size() > 0 ? memory[0] : 1e-2;
@@ -89,9 +107,15 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
     const MatrixX& H = s.evaluation.gauss_newton;
     const VectorX& g = s.evaluation.gradient;
     const double floor = 1e-9 * std::max(H.trace() / double(H.rows()), 1e-300);
-    MatrixX damped = H;
-    damped.diagonal() += lambda * H.diagonal().cwiseMax(floor);
-    VectorX step = -damped.ldlt().solve(g);
+    const auto step_with = [&](double damping) {
+      MatrixX damped = H;
+      damped.diagonal() += damping * H.diagonal().cwiseMax(floor);
+      return step_within_bounds(run, damped);
+    };
+    VectorX step = step_with(lambda);
+    if (options.damps_long_steps)
+      for (double more = std::max(lambda, 1e-8); step.cwiseAbs().maxCoeff() > options.max_step && more < 1e4;)
+        step = step_with(more *= 2.0);
     const double longest = step.cwiseAbs().maxCoeff();
     if (longest > options.max_step) step *= options.max_step / longest;
     const VectorX trial = run.clamp(s.p + step);

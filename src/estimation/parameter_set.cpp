@@ -36,6 +36,13 @@ void ParameterSet::set_estimated(const std::string& name, bool estimated) {
   parameters_[std::size_t(found - parameters_.data())].estimated = estimated;
 }
 
+void ParameterSet::fix(const std::string& name, double value) {
+  set_estimated(name, false);
+  const Parameter& parameter = *find(name);
+  reference_[parameter.theta_index] = value;
+  for (const int other : parameter.also) reference_[other] = value;
+}
+
 void ParameterSet::set_joint_prior(const std::vector<std::string>& names, MatrixX precision) {
   joint_.clear();
   for (const std::string& name : names) {

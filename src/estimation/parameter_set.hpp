@@ -52,6 +52,8 @@ class ParameterSet {
   const Parameter* find(const std::string& name) const;
   /// Chooses whether a parameter is estimated. Throws std::invalid_argument for an unknown name.
   void set_estimated(const std::string& name, bool estimated);
+  /// Leaves a scalar at a value, wherever it stands. Throws std::invalid_argument for an unknown name.
+  void fix(const std::string& name, double value);
   const VectorX& reference() const { return reference_; }
   void set_reference(const VectorX& theta) { reference_ = theta; }
   /// A normal prior on the logarithms of several positive scalars together, beside their own priors: about zero, or,

@@ -22,6 +22,8 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double outlier_scale = 6.0;  // deviations
 constexpr std::array field_sizes = {4, 8, 16, 32};
 constexpr double needed_evidence = 3.0;  // e^3 to 1
+constexpr int most_zones = 8, most_passes = 4, brief_iterations = 8;
+constexpr double least_gain = 0.03;  // of the squares of the residuals, by a zone more
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
@@ -41,15 +43,26 @@ std::shared_ptr<const Body> with_field(const Body& body, ModulusField field) {
   return copy;
 }
 
-/// The estimate with one term more, which begins small.
+/// Sum of the squares of all residuals [m^2].
+double squares_of(const CostEvaluation& evaluation) {
+  double sum = 0.0;
+  for (const FrameFit& f : evaluation.frames) sum += f.track_sum_squares;
+  return sum;
+}
+
+/// The estimate with one term more in each law, which begins small.
 VectorX with_term(const PressTheta& from, const VectorX& theta) {
-  const PressTheta to{from.controls, from.terms + 1};
+  const PressTheta to{from.controls, from.terms + 1, from.laws, from.own_ratios};
   VectorX more = VectorX::Zero(to.size());
-  more.head(2 + from.shapes()) = theta.head(2 + from.shapes());
-  more.tail(from.controls - 1) = theta.tail(from.controls - 1);
-  // The second term has the other sign, the third stiffens more than the first.
-  more[to.exponent(to.terms - 1)] = to.terms % 2 == 0 ? -6.0 : 10.0;
-  more[to.ratio(to.terms - 1)] = 0.2;
+  const int added = to.terms - 1;
+  for (int k = 0; k < to.controls; ++k) more[to.modulus(k)] = theta[from.modulus(k)];
+  for (int law = 0; law < to.laws; ++law) {
+    more.segment(to.poissons_ratio(law), from.law_size()) = theta.segment(from.poissons_ratio(law), from.law_size());
+    // The second term has the other sign, the third stiffens more than the first.
+    more[to.exponent(added, law)] = added == 1 ? -6.0 : 10.0;
+    more[to.stiffness_ratio(added, law)] = 0.2;
+    more[to.poissons_ratio_of(added, law)] = theta[from.poissons_ratio(law)];
+  }
   return more;
 }
 
@@ -84,9 +97,13 @@ class PressFit {
     const int first = is_linear ? 0 : options_.material == PressMaterial::Sampled ? 1 : std::max(1, options_.terms);
     if (!fit_first(is_linear ? 0 : std::min(first, 1))) return finish();
     if (options_.material == PressMaterial::Ogden) {
-      for (int terms = 2; terms <= (options_.terms > 0 ? options_.terms : 3); ++terms)
-        if (!fit_more_terms(terms)) break;
-      if (!interrupted_ && !regions_) fit_fields();
+      fit_terms(2);
+      if (regions_)
+        fit_laws_of_regions();
+      else
+        fit_zones();
+      fit_terms(3);  // an object of several materials looks like one of more terms
+      if (!regions_ && best_->layout.laws == 1) fit_fields();
     }
     if (!interrupted_ && options_.material == PressMaterial::Sampled) fit_samples();
     return finish();
@@ -101,8 +118,17 @@ class PressFit {
     CostEvaluation evaluation;
     double start_cost = 0.0, noise = 0.0;
     std::vector<Vector3> points;
+    std::vector<ZoneCut> cuts;
     bool converged = false;
     std::string reason;
+  };
+  enum class Effort { Full, Brief };  // brief: the noise stays, a few iterations
+  /// A form of the law before it is fitted.
+  struct Form {
+    PressTheta layout;
+    std::shared_ptr<const PressScene> scene;
+    std::vector<Vector3> points = {};  // of a field
+    std::vector<ZoneCut> cuts = {};    // of zones
   };
 
   std::vector<std::string> names(int controls) const {
@@ -112,12 +138,12 @@ class PressFit {
     return all;
   }
 
-  ParameterSet parameters_of(const PressTheta& layout, const std::shared_ptr<const PressScene>& scene,
-                             const std::vector<Vector3>& points) const {
-    ParameterSet set = press_parameters(*scene->body, names(layout.controls), layout.terms, start_modulus());
-    if (!points.empty())
-      set.set_joint_prior(names(layout.controls),
-                          field_precision(points, scene->body->size(), options_.modulus_variation));
+  ParameterSet parameters_of(const Form& form) const {
+    const int controls = form.layout.controls;
+    ParameterSet set = zone_parameters(form.layout, names(controls), start_modulus(), options_.modulus_variation);
+    if (!form.points.empty())
+      set.set_joint_prior(names(controls),
+                          field_precision(form.points, form.scene->body->size(), options_.modulus_variation));
     return set;
   }
   double start_modulus() const { return 2.0 * punch_modulus(*scene_, 0.3); }
@@ -125,39 +151,43 @@ class PressFit {
   bool stop() { return interrupted_ = interrupted_ || (monitor_.interrupted && monitor_.interrupted()); }
 
   /// Minimises from theta; with the noise of its own residuals in the end. Nothing where it cannot be evaluated.
-  std::optional<Estimate> minimised(const PressTheta& layout, std::shared_ptr<const PressScene> scene,
-                                    const std::vector<Vector3>& points, const VectorX& theta,
-                                    const std::string& stage) {
-    Estimate e{layout, scene, parameters_of(layout, scene, points), theta, {}, 0.0, noise_, points, false, {}};
-    PressObjective objective(scene, fitted_, layout, e.parameters, {noise_, outlier_scale});
+  std::optional<Estimate> minimised(const Form& form, const VectorX& theta, const std::string& stage,
+                                    Effort effort = Effort::Full) {
+    Estimate e = begun(form, theta);
+    std::optional<PressObjective> objective;
     OptimiserOptions o;
-    o.max_iterations = options_.max_iterations;
-    OptimiserState from = state_.under_way;
-    state_.under_way = {};
+    const bool keeps_noise = effort == Effort::Brief || options_.noise > 0.0;
+    o.max_iterations = effort == Effort::Brief ? brief_iterations : options_.max_iterations;
+    o.damps_long_steps = true;
+    OptimiserState from = std::exchange(state_.under_way, {});
+    state_.cuts = form.cuts;
     if (from.p.size() != e.parameters.dimension()) from = {0, e.parameters.to_unconstrained(theta), {}};
     OptimiserSummary s;
     // Twice where the noise is not given: weights of outliers follow from it.
-    for (int round = 0; round < (options_.noise > 0.0 ? 1 : 2) && !interrupted_; ++round) {
-      s = minimise(objective, from, o, [&](const Iteration& i) {
+    for (int round = 0; round < (keeps_noise ? 1 : 2) && !interrupted_; ++round) {
+      objective.emplace(objective_of(e));
+      s = minimise(*objective, from, o, [&](const Iteration& i) {
         state_.under_way = i.state();
-        report(stage, i.number, i.cost, objective, e.parameters.to_theta(i.p), layout);
+        report(stage, i.number, i.cost, *objective, e.parameters.to_theta(i.p), form.layout);
         if (monitor_.on_state) monitor_.on_state(state_);
         return !stop();
       });
       if (!s.succeeded) break;
-      if (options_.noise <= 0.0) noise_ = robust_deviation(objective.residuals(), 1e-6 * scene->body->size());
-      objective.set_options({noise_, outlier_scale});
+      e.parameters.set_reference(e.parameters.to_theta(s.p));
+      if (!keeps_noise) noise_ = robust_deviation(objective->residuals(), 1e-6 * scene_->body->size());
+      objective->set_options({noise_, outlier_scale});
       from = {0, s.p, {}};
     }
     state_.under_way = {};
+    state_.cuts.clear();
     if (!s.succeeded) {
       outcome_.notes.push_back(stage + ": " + s.reason);
       return std::nullopt;
     }
-    const CostEvaluation begin = objective.evaluate(e.parameters.to_unconstrained(theta));
+    const CostEvaluation begin = objective->evaluate(e.parameters.to_unconstrained(theta));
     if (begin.succeeded) e.start_cost = begin.cost;
     e.theta = e.parameters.to_theta(s.p);
-    e.evaluation = objective.linearise(s.p);
+    e.evaluation = objective->linearise(s.p);
     e.noise = noise_;
     e.converged = s.converged;
     e.reason = s.reason;
@@ -179,73 +209,189 @@ class PressFit {
     outcome_.history.push_back(event);
   }
 
+  Estimate begun(const Form& form, const VectorX& theta) const {
+    Estimate e{form.layout, form.scene, parameters_of(form), theta, {}, 0.0, noise_, form.points, form.cuts, false, {}};
+    e.parameters.set_reference(theta);  // contact is as stiff as the law there asks for
+    return e;
+  }
+  PressObjective objective_of(const Estimate& e) const {
+    return {e.scene, fitted_, e.layout, e.parameters, {noise_, outlier_scale}};
+  }
+
   /// What an interrupted fit had done of this form, if anything.
-  const PressFitState::Done* done_before(int terms, int controls) const {
-    const auto it =
-        std::ranges::find_if(state_.done, [&](const auto& d) { return d.terms == terms && d.controls == controls; });
+  const PressFitState::Done* done_before(const PressTheta& layout) const {
+    const auto it = std::ranges::find(state_.done, layout, &PressFitState::Done::layout);
     return it == state_.done.end() ? nullptr : &*it;
   }
 
-  void keep_state(const Estimate* e, const TriedLaw& tried) {
+  /// Keeps the estimate as the best, where it is that, and writes down that it was tried.
+  void conclude(std::optional<Estimate> next, const TriedLaw& tried, double noise_before,
+                const std::vector<ZoneCut>& cuts = {}) {
     outcome_.tried.push_back(tried);
-    if (interrupted_ || done_before(tried.terms, tried.controls)) return;
-    state_.done.push_back(
-        {tried.terms, tried.controls, e ? e->theta : VectorX(), tried.cost, tried.evidence, noise_, tried.kept});
-    if (monitor_.on_state) monitor_.on_state(state_);
+    if (!interrupted_ && !done_before(tried.layout)) {
+      state_.done.push_back(
+          {tried.layout, cuts, next ? next->theta : VectorX(), tried.cost, tried.evidence, noise_, tried.kept});
+      if (monitor_.on_state) monitor_.on_state(state_);
+    }
+    if (tried.kept)
+      best_ = std::move(next);
+    else
+      noise_ = noise_before;
   }
 
-  std::optional<Estimate> estimate(const PressTheta& layout, const std::shared_ptr<const PressScene>& scene,
-                                   const std::vector<Vector3>& points, const VectorX& start, const std::string& stage) {
-    if (const auto* done = done_before(layout.terms, layout.controls)) {
-      if (done->theta.size() == 0) return std::nullopt;
-      noise_ = done->noise;
-      Estimate e{
-          layout,           scene, parameters_of(layout, scene, points), done->theta, {}, 0.0, noise_, points, true,
-          "finished before"};
-      PressObjective objective(scene, fitted_, layout, e.parameters, {noise_, outlier_scale});
-      e.evaluation = objective.linearise(e.parameters.to_unconstrained(done->theta));
-      if (!e.evaluation.succeeded) return std::nullopt;
-      return e;
-    }
-    return minimised(layout, scene, points, start, stage);
+  std::optional<Estimate> estimate(const Form& form, const VectorX& start, const std::string& stage) {
+    const auto* done = done_before(form.layout);
+    if (!done) return minimised(form, start, stage);
+    if (done->theta.size() == 0) return std::nullopt;
+    noise_ = done->noise;
+    Estimate e = begun(form, done->theta);
+    e.converged = true;
+    e.reason = "finished before";
+    e.evaluation = objective_of(e).linearise(e.parameters.to_unconstrained(done->theta));
+    if (!e.evaluation.succeeded) return std::nullopt;
+    return e;
   }
 
   bool fit_first(int terms) {
-    const PressTheta layout{scene_->body->modulus.controls, terms};
-    const VectorX start = parameters_of(layout, scene_, {}).reference();
-    best_ = estimate(layout, scene_, {}, start, terms == 0 ? "linear" : "1 term");
-    if (!best_) {
+    const Form form{{scene_->body->modulus.controls, terms}, scene_};
+    auto first = estimate(form, parameters_of(form).reference(), terms == 0 ? "linear" : "1 term");
+    if (!first) {
       outcome_.reason = outcome_.notes.empty() ? "the start cannot be evaluated" : outcome_.notes.back();
       return false;
     }
-    keep_state(&*best_, {terms, layout.controls, best_->evaluation.cost, infinite, true});
+    const TriedLaw tried{form.layout, first->evaluation.cost, infinite, true};
+    conclude(std::move(first), tried, noise_);
     return !interrupted_;
   }
 
-  bool fit_more_terms(int terms) {
-    const Estimate before = *best_;
+  /// More terms, or Poisson's ratios of their own for them. False where that is not kept.
+  bool fit_freer(const PressTheta& layout, const VectorX& start, const std::string& stage) {
     const double noise = noise_;
-    const PressTheta layout{before.layout.controls, terms};
-    const auto next =
-        estimate(layout, before.scene, {}, with_term(before.layout, before.theta), std::to_string(terms) + " terms");
-    TriedLaw tried{terms, layout.controls, next ? next->evaluation.cost : infinite, -infinite, false};
+    const Form form{layout, best_->scene, best_->points, best_->cuts};
+    auto next = estimate(form, start, stage);
+    TriedLaw tried{layout, next ? next->evaluation.cost : infinite, -infinite, false};
     if (next) {
       // Half the BIC by residuals whose deviation is unknown: n/2 ln(sum r^2) + k/2 ln n.
       const double n = next->evaluation.independent_observations();
-      const auto squares = [](const Estimate& e) {
-        double sum = 0.0;
-        for (const FrameFit& f : e.evaluation.frames) sum += f.track_sum_squares;
-        return sum;
-      };
-      tried.evidence = 0.5 * n * std::log(squares(before) / squares(*next)) - 0.5 * 2.0 * std::log(n);
-      tried.kept = options_.terms > 0 || tried.evidence > needed_evidence;
+      const auto more = double(next->parameters.dimension() - best_->parameters.dimension());
+      tried.evidence =
+          0.5 * n * std::log(squares_of(best_->evaluation) / squares_of(next->evaluation)) - 0.5 * more * std::log(n);
+      tried.kept = (options_.terms > 0 && layout.terms > best_->layout.terms) || tried.evidence > needed_evidence;
     }
-    keep_state(next ? &*next : nullptr, tried);
-    if (tried.kept)
-      best_ = next;
-    else
-      noise_ = noise;
+    conclude(std::move(next), tried, noise, form.cuts);
     return tried.kept && !interrupted_;
+  }
+
+  void fit_terms(int most) {
+    if (options_.terms > 0) most = std::min(most, options_.terms);
+    while (best_->layout.terms < most && !stop()) {
+      PressTheta layout = best_->layout;
+      ++layout.terms;
+      const std::string stage = std::to_string(layout.terms) + " terms";
+      if (!fit_freer(layout, with_term(best_->layout, best_->theta), stage)) break;
+      if (layout.own_ratios || stop()) continue;
+      layout.own_ratios = true;
+      fit_freer(layout, best_->theta, stage + " apart");
+    }
+  }
+
+  std::shared_ptr<const PressScene> with_zones(const std::vector<ZoneCut>& cuts) const {
+    auto scene = std::make_shared<PressScene>(*scene_);
+    const std::vector<int> zone_of = zones_after(zone_coordinates(*scene_->body), cuts);
+    scene->body = with_field(*scene_->body, zone_field(scene_->body->modulus, zone_of, int(cuts.size()) + 1));
+    return scene;
+  }
+
+  void fit_zones() {
+    const int most = options_.zones > 0 ? options_.zones : options_.control_points > 1 ? 1 : most_zones;
+    for (int zones = 2; zones <= most; ++zones)
+      if (stop() || !fit_zone(zones)) return;
+  }
+
+  /// One zone more than there are. False where that is not kept.
+  bool fit_zone(int zones) {
+    const bool is_chosen = options_.zones > 0;
+    const PressTheta layout{zones, best_->layout.terms, zones, best_->layout.own_ratios};
+    std::optional<PromisedCut> promised;
+    std::vector<ZoneCut> cuts = best_->cuts;
+    const PressFitState::Done* done = done_before(layout);
+    if (done && !done->cuts.empty()) {
+      cuts = done->cuts;
+    } else if (done) {
+      return false;
+    } else if (state_.under_way.p.size() > 0 && int(state_.cuts.size()) == zones - 1) {
+      cuts = state_.cuts;
+    } else {
+      PressObjective objective = objective_of(*best_);
+      promised = most_promising_cut(objective, *best_->scene, best_->layout, best_->theta, best_->cuts,
+                                    options_.modulus_variation);
+      if (promised) cuts.push_back(promised->cut);
+      if (!promised || (!is_chosen && promised->evidence < needed_evidence)) {
+        conclude({}, {layout, infinite, promised ? promised->evidence : -infinite, false}, noise_);
+        return false;
+      }
+    }
+    const double noise = noise_;
+    const int from = cuts.back().zone;
+    auto next = estimate({layout, with_zones(cuts), {}, cuts}, with_zone(best_->layout, best_->theta, from),
+                         std::to_string(zones) + " zones");
+    TriedLaw tried{layout, infinite, -infinite, false};
+    if (next) {
+      if (!done) move_cuts(*next);
+      cuts = next->cuts;
+      tried.cost = next->evaluation.cost;
+      tried.evidence = zone_evidence(next->evaluation, next->parameters, next->parameters.to_unconstrained(next->theta),
+                                     layout, from, options_.modulus_variation);
+      tried.kept = is_chosen || (tried.evidence > needed_evidence &&
+                                 squares_of(next->evaluation) < (1.0 - least_gain) * squares_of(best_->evaluation));
+    }
+    conclude(std::move(next), tried, noise, cuts);
+    return tried.kept;
+  }
+
+  /// Moves cuts one after the other to where they fit better, as long as that gains something.
+  void move_cuts(Estimate& e) {
+    const std::string stage = std::to_string(e.layout.controls) + " zones";
+    bool any = false;
+    for (int pass = 0, gained = 1; pass < most_passes && gained > 0; ++pass) {
+      gained = 0;
+      for (std::size_t c = 0; c < e.cuts.size() && !stop(); ++c) {
+        PressObjective objective = objective_of(e);
+        const auto move = best_move(objective, *e.scene, e.layout, e.theta, e.cuts, c, options_.modulus_variation);
+        if (!move || move->gain < needed_evidence) continue;
+        Form form{e.layout, nullptr, {}, e.cuts};
+        form.cuts[c].at = move->at;
+        form.scene = with_zones(form.cuts);
+        auto moved = minimised(form, e.theta, stage, Effort::Brief);
+        if (moved && moved->evaluation.cost < e.evaluation.cost - needed_evidence) e = std::move(*moved), ++gained;
+      }
+      any = any || gained > 0;
+    }
+    if (!any || interrupted_) return;
+    if (auto converged = minimised({e.layout, e.scene, {}, e.cuts}, e.theta, stage)) e = std::move(*converged);
+  }
+
+  /// A law of its own for each region, against one shape of the law for all.
+  void fit_laws_of_regions() {
+    if (options_.zones == 1 || stop()) return;
+    const double noise = noise_;
+    const int count = best_->layout.controls;
+    const PressTheta layout{count, best_->layout.terms, count, best_->layout.own_ratios};
+    VectorX start = VectorX::Zero(layout.size());
+    for (int k = 0; k < count; ++k) {
+      start[layout.modulus(k)] = best_->theta[best_->layout.modulus(k)];
+      start.segment(layout.poissons_ratio(k), layout.law_size()) = best_->theta.segment(1, layout.law_size());
+    }
+    auto next = estimate({layout, best_->scene}, start, "a law a region");
+    TriedLaw tried{layout, infinite, -infinite, false};
+    if (next) {
+      tried.cost = next->evaluation.cost;
+      tried.evidence =
+          own_laws_evidence(next->evaluation, next->parameters, next->parameters.to_unconstrained(next->theta), layout,
+                            options_.modulus_variation);
+      tried.kept = options_.zones > 1 || tried.evidence > needed_evidence;
+    }
+    conclude(std::move(next), tried, noise);
   }
 
   void fit_fields() {
@@ -259,28 +405,28 @@ class PressFit {
   }
 
   void fit_field(int size) {
-    const Estimate before = *best_;
     const double noise = noise_;
     ControlledField field;
     try {
-      field = harmonic_field(*before.scene->body, farthest_points(*before.scene->body, size));
+      field = harmonic_field(*best_->scene->body, farthest_points(*best_->scene->body, size));
     } catch (const InputError&) {
       return;  // more points than the mesh has places for
     }
-    auto scene = std::make_shared<PressScene>(*before.scene);
-    scene->body = with_field(*before.scene->body, field.field);
-    const PressTheta layout{size, before.layout.terms};
-    const MatrixX carried = carried_over(*scene->body, before.scene->body->modulus, scene->body->modulus);
-    VectorX start = VectorX::Zero(layout.size()), logs{before.layout.controls};
-    start.head(2 + layout.shapes()) = before.theta.head(2 + layout.shapes());
-    for (int k = 0; k < before.layout.controls; ++k) logs[k] = std::log(before.theta[before.layout.modulus(k)]);
+    auto scene = std::make_shared<PressScene>(*best_->scene);
+    scene->body = with_field(*best_->scene->body, field.field);
+    const PressTheta layout{size, best_->layout.terms, 1, best_->layout.own_ratios};
+    const Form form{layout, scene, field.points};
+    const MatrixX carried = carried_over(*scene->body, best_->scene->body->modulus, scene->body->modulus);
+    VectorX start = VectorX::Zero(layout.size()), logs{best_->layout.controls};
+    start.head(1 + layout.law_size()) = best_->theta.head(1 + layout.law_size());
+    for (int k = 0; k < best_->layout.controls; ++k) logs[k] = std::log(best_->theta[best_->layout.modulus(k)]);
     const VectorX moduli = (carried * logs).array().exp();
     for (int k = 0; k < size; ++k) start[layout.modulus(k)] = moduli[k];
-    TriedLaw tried{layout.terms, size, infinite, -infinite, false};
+    TriedLaw tried{layout, infinite, -infinite, false};
     std::optional<Estimate> next;
     const bool is_chosen = options_.control_points > 1;
-    if (is_chosen || done_before(layout.terms, size) || promises(layout, scene, field.points, start, carried, tried)) {
-      next = estimate(layout, scene, field.points, start, std::to_string(size) + " control points");
+    if (is_chosen || done_before(layout) || promises(form, start, carried, tried)) {
+      next = estimate(form, start, std::to_string(size) + " control points");
       if (next) {
         tried.cost = next->evaluation.cost;
         tried.evidence = log_bayes_factor(next->evaluation, next->parameters,
@@ -288,23 +434,18 @@ class PressFit {
         tried.kept = is_chosen || tried.evidence > needed_evidence;
       }
     }
-    keep_state(next ? &*next : nullptr, tried);
-    if (tried.kept)
-      best_ = next;
-    else
-      noise_ = noise;
+    conclude(std::move(next), tried, noise);
   }
 
   /// Whether a step from where the coarser field is promises any evidence.
-  bool promises(const PressTheta& layout, const std::shared_ptr<const PressScene>& scene,
-                const std::vector<Vector3>& points, const VectorX& start, const MatrixX& carried, TriedLaw& tried) {
-    const ParameterSet set = parameters_of(layout, scene, points);
-    PressObjective objective(scene, fitted_, layout, set, {noise_, outlier_scale});
-    const VectorX p = set.to_unconstrained(start);
+  bool promises(const Form& form, const VectorX& start, const MatrixX& carried, TriedLaw& tried) {
+    const Estimate e = begun(form, start);
+    PressObjective objective = objective_of(e);
+    const VectorX p = e.parameters.to_unconstrained(start);
     const CostEvaluation evaluation = objective.linearise(p);
     if (!evaluation.succeeded) return false;
     tried.cost = evaluation.cost;
-    tried.evidence = log_bayes_factor(evaluation, set, p, carried);
+    tried.evidence = log_bayes_factor(evaluation, e.parameters, p, carried);
     return tried.evidence > 0.0;
   }
 
@@ -365,6 +506,7 @@ class PressFit {
     outcome_.noise = e.noise;
     outcome_.start_cost = e.start_cost;
     outcome_.control_points = e.points;
+    outcome_.cuts = e.cuts;
     outcome_.converged = e.converged && !interrupted_;
     outcome_.reason = interrupted_ ? "interrupted" : e.reason;
     outcome_.covariance = parameter_covariance(e.evaluation);
@@ -395,6 +537,8 @@ class PressFit {
 std::string PressFitOptions::validate() const {
   if (!(cells >= 2.0 && cells <= 64.0)) return "cells must lie in 2..64";
   if (terms < 0 || terms > 3) return "law_terms must lie in 1..3, or be 0: as many as the presses support";
+  if (zones < 0 || zones > 12) return "law_zones must lie in 1..12, or be 0: as many as the presses support";
+  if (zones > 1 && control_points > 1) return "law_zones and control_points cannot both be chosen";
   if (control_points < 0 || control_points > 500) return "control_points must lie in 1..500, or be auto";
   if (!(modulus_variation > 0.0 && modulus_variation <= 10.0)) return "modulus_variation must lie in (0, 10]";
   if (!(noise >= 0.0)) return "marker_noise must not be negative";
@@ -409,6 +553,7 @@ PressFitOptions press_options(const FitOptions& options) {
   o.cells = options.cells;
   o.quadratic = options.element == ElementKind::QuadraticTetrahedron;
   o.terms = options.law_terms;
+  o.zones = options.law_zones;
   o.control_points = std::max(0, options.control_points);
   o.modulus_variation = options.modulus_variation;
   o.noise = options.marker_noise;

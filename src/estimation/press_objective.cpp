@@ -10,30 +10,81 @@ namespace pliant {
 
 namespace {
 
-/// ln E of an element by those of the control moduli.
-double log_modulus(const Body& body, int e, const PressTheta& layout, const VectorX& theta) {
-  const ModulusField& field = body.modulus;
-  double log = std::log(field.relative[std::size_t(e)]);
-  if (field.controls == 1) return log + std::log(theta[layout.modulus(0)]);
-  for (int k = 0; k < field.controls; ++k) log += field.weights(e, k) * std::log(theta[layout.modulus(k)]);
-  return log;
-}
 double weight_of(const Body& body, int e, int control) {
   return body.modulus.controls == 1 ? 1.0 : body.modulus.weights(e, control);
 }
 
-/// mu_i / mu of each term.
-VectorX shares(const PressTheta& layout, const VectorX& theta) {
-  VectorX share = VectorX::Ones(layout.terms);
-  for (int i = 1; i < layout.terms; ++i) share[i] = theta[layout.ratio(i)];
-  return share / share.sum();
+/// Ogden's law of one element by its own theta: terms share the shear modulus, and its E is that at rest.
+struct OgdenShares {
+  VectorX share;              // mu_i / mu
+  VectorX bulk;               // b_i = nu_i / (1 - 2 nu_i)
+  double nu = 0.0, mu = 0.0;  // of all terms together, at rest
+  double mean_bulk = 0.0;     // sum of share times bulk
+};
+OgdenShares ogden_shares(const PressTheta& layout, const VectorX& own) {
+  OgdenShares s;
+  s.share = VectorX::Ones(layout.terms);
+  s.bulk.resize(layout.terms);
+  for (int i = 0; i < layout.terms; ++i) {
+    if (i > 0) s.share[i] = own[layout.stiffness_ratio(i)];
+    const double nu = own[layout.poissons_ratio_of(i, 0)];
+    s.bulk[i] = nu / (1.0 - 2.0 * nu);
+  }
+  s.share /= s.share.sum();
+  s.mean_bulk = s.share.dot(s.bulk);
+  s.nu = s.mean_bulk / (1.0 + 2.0 * s.mean_bulk);
+  s.mu = own[0] / (2.0 * (1.0 + s.nu));
+  return s;
 }
 
 }  // namespace
 
-MatrixX press_table_derivative(const PressTheta& layout, const VectorX& theta, double E) {
-  const double nu = theta[layout.poissons_ratio()];
-  if (layout.terms == 0) {
+VectorX element_theta(const Body& body, const PressTheta& layout, const VectorX& theta, int e) {
+  VectorX own = VectorX::Zero(1 + layout.law_size());
+  double log = std::log(body.modulus.relative[std::size_t(e)]);
+  for (int k = 0; k < layout.controls; ++k)
+    if (const double w = weight_of(body, e, k); w != 0.0) log += w * std::log(theta[layout.modulus(k)]);
+  own[0] = std::exp(log);
+  if (layout.laws == 1) {
+    own.tail(layout.law_size()) = theta.segment(1, layout.law_size());
+    return own;
+  }
+  const PressTheta single = layout.of_element();
+  for (int k = 0; k < layout.controls; ++k) {
+    const double w = weight_of(body, e, k);
+    if (w == 0.0) continue;
+    VectorX law = theta.segment(layout.poissons_ratio(k), layout.law_size());
+    for (int i = 1; i < layout.terms; ++i)
+      law[single.stiffness_ratio(i) - 1] = std::log(law[single.stiffness_ratio(i) - 1]);
+    own.tail(layout.law_size()) += w * law;
+  }
+  for (int i = 1; i < layout.terms; ++i) own[single.stiffness_ratio(i)] = std::exp(own[single.stiffness_ratio(i)]);
+  return own;
+}
+
+std::vector<ThetaShare> element_theta_shares(const Body& body, const PressTheta& layout, const VectorX& theta,
+                                             const VectorX& own, int e) {
+  std::vector<ThetaShare> shares;
+  for (int k = 0; k < layout.controls; ++k) {
+    const double w = weight_of(body, e, k);
+    if (w == 0.0) continue;
+    shares.push_back({0, layout.modulus(k), w / theta[layout.modulus(k)]});
+    if (layout.laws == 1) continue;
+    for (int s = 1; s <= layout.law_size(); ++s) {
+      const bool is_ratio = s >= 4 && s % 3 == 1;
+      const int at = layout.poissons_ratio(k) + s - 1;
+      shares.push_back({s, at, is_ratio ? w * own[s] / theta[at] : w});
+    }
+  }
+  if (layout.laws == 1)
+    for (int s = 1; s <= layout.law_size(); ++s) shares.push_back({s, s, 1.0});
+  return shares;
+}
+
+MatrixX press_table_derivative(int terms, const VectorX& own) {
+  const PressTheta layout{1, terms};
+  if (terms == 0) {
+    const double E = own[0], nu = own[layout.poissons_ratio()];
     MatrixX by = MatrixX::Zero(2, 2);
     const LambdaAlpha p = lambda_alpha({E, nu});
     by(0, 0) = p.lambda, by(1, 0) = p.alpha;
@@ -41,23 +92,27 @@ MatrixX press_table_derivative(const PressTheta& layout, const VectorX& theta, d
     by(1, 1) = p.lambda + nu * by(0, 1);
     return by;
   }
-  const VectorX share = shares(layout, theta);
-  const double mu = E / (2.0 * (1.0 + nu));
-  MatrixX by = MatrixX::Zero(3 * layout.terms, 2 + layout.shapes());
-  for (int i = 0; i < layout.terms; ++i) {
-    by(3 * i, 0) = mu * share[i];
-    by(3 * i, 1) = -mu * share[i] / (1.0 + nu);
+  const OgdenShares o = ogden_shares(layout, own);
+  const double mu_by_bulk = -o.mu / (1.0 + o.nu) / std::pow(1.0 + 2.0 * o.mean_bulk, 2);
+  MatrixX by = MatrixX::Zero(3 * terms, layout.size());
+  for (int i = 0; i < terms; ++i) {
+    by(3 * i, 0) = o.mu * o.share[i];
     by(3 * i + 1, layout.exponent(i)) = 1.0;
-    by(3 * i + 2, 1) = 1.0;
-    for (int j = 1; j < layout.terms; ++j)
-      by(3 * i, layout.ratio(j)) = mu * share[j] / theta[layout.ratio(j)] * ((i == j) - share[i]);
+    by(3 * i + 2, layout.poissons_ratio_of(i, 0)) = 1.0;
+    for (int j = 0; j < terms; ++j) {
+      const double nu = own[layout.poissons_ratio_of(j, 0)], bulk_by_nu = 1.0 / std::pow(1.0 - 2.0 * nu, 2);
+      by(3 * i, layout.poissons_ratio_of(j, 0)) = o.share[i] * mu_by_bulk * o.share[j] * bulk_by_nu;
+      if (j == 0) continue;
+      const int ratio = layout.stiffness_ratio(j);
+      by(3 * i, ratio) = o.share[j] / own[ratio] *
+                         (o.mu * ((i == j) - o.share[i]) + o.share[i] * mu_by_bulk * (o.bulk[j] - o.mean_bulk));
+    }
   }
   return by;
 }
 
-ParameterSet press_parameters(const Body& body, const std::vector<std::string>& modulus_names, int terms,
+ParameterSet press_parameters(const PressTheta& layout, const std::vector<std::string>& modulus_names,
                               double youngs_modulus) {
-  const PressTheta layout{body.modulus.controls, terms};
   if (int(modulus_names.size()) != layout.controls) throw std::invalid_argument("a name a control modulus is needed");
   VectorX theta = VectorX::Zero(layout.size());
   std::vector<Parameter> parameters;
@@ -75,34 +130,47 @@ ParameterSet press_parameters(const Body& body, const std::vector<std::string>& 
   for (int k = 0; k < layout.controls; ++k)
     add(modulus_names[std::size_t(k)], "Pa", Transform::Logarithm, layout.modulus(k), youngs_modulus,
         1e-4 * youngs_modulus, 1e4 * youngs_modulus, none);
-  add("poisson_ratio", "1", Transform::LogitHalf, layout.poissons_ratio(), 0.3, 0.01, 0.495, 2.0);
-  for (int i = 0; i < terms; ++i) {
-    const std::string number = "@" + std::to_string(i + 1);
-    // Negative exponents stiffen in compression, great ones in tension; which of them do follows from the presses.
-    const double sign = i % 2 == 0 ? 1.0 : -1.0, size = i < 2 ? 3.0 : 12.0;
-    add("exponent" + number, "1", Transform::Shift, layout.exponent(i), sign * size, -60.0, 60.0, none);
-    parameters.back().scale = 4.0;
-    parameters.back().prior_mean /= 4.0;
-    parameters.back().prior_std = 3.0;
-    if (i > 0)
-      add("stiffness_ratio" + number, "1", Transform::Logarithm, layout.ratio(i), i < 2 ? 1.0 : 0.1, 1e-6, 1e3, 3.0);
+  for (int law = 0; law < layout.laws; ++law) {
+    const std::string& owner = modulus_names[std::size_t(law)];
+    const std::string place =
+        layout.laws == 1 || owner.find('@') == std::string::npos ? "" : owner.substr(owner.find('@'));
+    add("poisson_ratio" + place, "1", Transform::LogitHalf, layout.poissons_ratio(law), 0.3, 0.01, 0.495, 2.0);
+    for (int i = 1; i < layout.terms; ++i) {
+      theta[layout.poissons_ratio_of(i, law)] = 0.3;
+      if (!layout.own_ratios) parameters.back().also.push_back(layout.poissons_ratio_of(i, law));
+    }
+    for (int i = 0; i < layout.terms; ++i) {
+      const std::string number = "_" + std::to_string(i + 1) + place;
+      // Negative exponents stiffen in compression, great ones in tension; which of them do follows from the presses.
+      const double sign = i % 2 == 0 ? 1.0 : -1.0, size = i < 2 ? 3.0 : 12.0;
+      add("exponent" + number, "1", Transform::Shift, layout.exponent(i, law), sign * size, -60.0, 60.0, none);
+      parameters.back().scale = 4.0;
+      parameters.back().prior_mean /= 4.0;
+      parameters.back().prior_std = 3.0;
+      if (i > 0)
+        add("stiffness_ratio" + number, "1", Transform::Logarithm, layout.stiffness_ratio(i, law), i < 2 ? 1.0 : 0.1,
+            1e-6, 1e3, 3.0);
+      if (i > 0 && layout.own_ratios)
+        add("poisson_ratio" + number, "1", Transform::LogitHalf, layout.poissons_ratio_of(i, law), 0.3, 0.01, 0.495,
+            2.0);
+    }
   }
   return {std::move(parameters), std::move(theta)};
 }
 
 std::shared_ptr<const TabulatedLaw> press_law(const Body& body, const PressTheta& layout, const VectorX& theta) {
-  const double nu = theta[layout.poissons_ratio()];
+  const PressTheta single = layout.of_element();
   MatrixX table(body.element_count(), layout.terms == 0 ? 2 : 3 * layout.terms);
-  const VectorX share = layout.terms == 0 ? VectorX() : shares(layout, theta);
   for (int e = 0; e < body.element_count(); ++e) {
-    const double E = std::exp(log_modulus(body, e, layout, theta));
+    const VectorX own = element_theta(body, layout, theta, e);
     if (layout.terms == 0) {
-      const LambdaAlpha p = lambda_alpha({E, nu});
+      const LambdaAlpha p = lambda_alpha({own[0], own[single.poissons_ratio()]});
       table.row(e) << p.lambda, p.alpha;
       continue;
     }
+    const OgdenShares o = ogden_shares(single, own);
     for (int i = 0; i < layout.terms; ++i)
-      table.row(e).segment<3>(3 * i) << E / (2.0 * (1.0 + nu)) * share[i], theta[layout.exponent(i)], nu;
+      table.row(e).segment<3>(3 * i) << o.mu * o.share[i], own[single.exponent(i)], own[single.poissons_ratio_of(i, 0)];
   }
   if (layout.terms == 0) return std::make_shared<LinearLaw>(std::move(table));
   return std::make_shared<OgdenLaw>(std::move(table));
@@ -119,6 +187,13 @@ PressObjective::PressObjective(std::shared_ptr<const PressScene> scene, std::vec
   const auto law = press_law(*scene_->body, layout_, parameters_.reference());
   const double modulus = mean_modulus(*scene_->body, *law);
   for (const int press : presses_) bodies_.emplace_back(*scene_, press, law, modulus);
+}
+
+void PressObjective::set_form(std::shared_ptr<const PressScene> scene, const PressTheta& layout,
+                              ParameterSet parameters) {
+  scene_ = std::move(scene);
+  layout_ = layout;
+  parameters_ = std::move(parameters);
 }
 
 std::vector<double> PressObjective::residuals() const {
@@ -194,17 +269,11 @@ void PressObjective::add_press(std::size_t i, const MatrixX& by_p, bool with_der
   std::vector<Points> forces(std::size_t(layout_.size()), Points::Zero(rows, 3));
   body.equilibrium().elasticity().for_parameter_derivatives(
       [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
-        const double E = std::exp(log_modulus(*scene_->body, e, layout_, theta_));
-        const MatrixX by = by_q * press_table_derivative(layout_, theta_, E);
-        for (std::size_t a = 0; a < nodes.size(); ++a) {
-          const auto at = 3 * Eigen::Index(a);
-          for (int k = 0; k < layout_.controls; ++k)
-            if (const double w = weight_of(*scene_->body, e, k); w != 0.0)
-              forces[std::size_t(layout_.modulus(k))].row(nodes[a]) -=
-                  w / theta_[layout_.modulus(k)] * by.col(0).segment<3>(at).transpose();
-          for (int s = 1; s < 2 + layout_.shapes(); ++s)
-            forces[std::size_t(s)].row(nodes[a]) -= by.col(s).segment<3>(at).transpose();
-        }
+        const VectorX own = element_theta(*scene_->body, layout_, theta_, e);
+        const MatrixX by = by_q * press_table_derivative(layout_.terms, own);
+        for (const auto& [number, at, share] : element_theta_shares(*scene_->body, layout_, theta_, own, e))
+          for (std::size_t a = 0; a < nodes.size(); ++a)
+            forces[std::size_t(at)].row(nodes[a]) -= share * by.col(number).segment<3>(3 * Eigen::Index(a)).transpose();
       });
   MatrixX by_theta(residuals.size(), layout_.size());
   for (int k = 0; k < layout_.size(); ++k) {

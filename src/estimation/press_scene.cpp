@@ -207,13 +207,4 @@ double punch_modulus(const PressScene& scene, double poissons_ratio) {
   return moduli[moduli.size() / 2];
 }
 
-double mean_modulus(const Body& body, const MaterialLaw& law) {
-  double sum = 0.0, volume = 0.0;
-  for (int e = 0; e < body.element_count(); ++e) {
-    sum += body.element_volume[std::size_t(e)] * law.small_strain(e).youngs_modulus;
-    volume += body.element_volume[std::size_t(e)];
-  }
-  return sum / volume;
-}
-
 }  // namespace pliant

@@ -89,7 +89,4 @@ double marker_noise(const ObservedPress& press);
 /// (2 a u), the median of the presses to fit.
 double punch_modulus(const PressScene& scene, double poissons_ratio);
 
-/// Volume-weighted mean of the small-strain Young's moduli of a law [Pa].
-double mean_modulus(const Body& body, const MaterialLaw& law);
-
 }  // namespace pliant

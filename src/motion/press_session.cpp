@@ -21,7 +21,7 @@ Vector3 axis_at(const Body& body, const ProbeOptions& probe) {
 
 std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, const ProbeOptions& probe,
                                       const std::vector<RigidContact>& inner) {
-  const double E = law.small_strain(0).youngs_modulus, edge = mean_edge(body);
+  const double E = mean_modulus(body, law), edge = mean_edge(body);
   std::vector<RigidContact> contacts;
   if (probe.kind == ProbeKind::GluedDisc) {
     const ContactSamples disc = disc_samples(body, probe.centre, probe.radius);

@@ -126,15 +126,20 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   fit.converged = outcome.converged, fit.interrupted = outcome.interrupted, fit.reason = outcome.reason;
   fit.notes = outcome.notes;
   for (const TriedLaw& tried : outcome.tried) {
-    const std::string form = tried.terms == 0
-                                 ? "a linear law"
-                                 : fmt::format("Ogden's law of {} term{}", tried.terms, tried.terms == 1 ? "" : "s");
-    const std::string field = tried.controls > 1 ? fmt::format(" with {} moduli", tried.controls) : "";
+    const PressTheta& l = tried.layout;
+    const std::string form = l.terms == 0 ? "a linear law"
+                                          : fmt::format("Ogden's law of {} term{}{}", l.terms, l.terms == 1 ? "" : "s",
+                                                        l.own_ratios ? " with Poisson's ratios of their own" : "");
+    const std::string field = l.laws > 1       ? fmt::format(", one for each of {} zones", l.laws)
+                              : l.controls > 1 ? fmt::format(" with {} moduli", l.controls)
+                                               : "";
     fit.notes.push_back(std::isfinite(tried.evidence)
                             ? fmt::format("{}{}: {}, ln of the evidence for it {:.1f}", form, field,
                                           tried.kept ? "kept" : "not kept", tried.evidence)
                             : fmt::format("{}{}: {}", form, field, tried.kept ? "tried first" : "not fitted"));
   }
+  for (std::size_t c = 0; c < outcome.cuts.size(); ++c)
+    fit.notes.push_back(fmt::format("Zones: {}.", describe(outcome.cuts[c], int(c) + 1)));
   fit.notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * outcome.noise));
   if (outcome.sampled) {
     double least = std::numeric_limits<double>::infinity(), most = 0.0;
