@@ -11,6 +11,7 @@ from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
 from material_curves_page import material_curves
 from oracle_tracking_page import clouds
 from page import IMAGES, ROOT, judged, machine, percent, results, table, with_truth
+from presses_page import presses
 from real_tracks_page import real_tracks
 from silicone_beam_page import silicone_beam
 from touched_page import organ_probing, skin, slab_pokes
@@ -424,6 +425,8 @@ SECTIONS = [
      "Another simulator's bars again: from the motion that the tracker finds, in turns with it (Wang et al. 2015, section 3), and from the points themselves by surface constraints (Weiss et al. 2020).", clouds),
     ("Real objects that are followed", "real-tracks",
      "Real: a knobbly ball, a plush dog and two cloths, moved by hands and a robot; rest surfaces made of their own frames. `pliant track`, with no choice of ours.", real_tracks),
+    ("Presses with known force", None,
+     "Simulated: blocks that are pressed at many places by a disc with a known force, markers on their surface followed. The material is fitted to most presses and predicts the others (Bickel et al. 2009).", presses),
     ("Stress-strain curves", "material-curves",
      "Real: tension of silicones, several modes of loading of rubbers, a gel and brain tissue, and a shoe's foam. One cube each, fitted with the law and the parameters of presses.", material_curves),
     ("Balls pushed into organs and phantoms", "organ-probing",
@@ -454,7 +457,8 @@ def page():
     text = ("# Experiments\n\nWhat pliant reaches, beside the paper's figures where there are any. This page is made from the "
             "`results.json` of each experiment by `experiments/make_docs.py`; nothing here is typed by hand.\n")
     for title, name, about, section in SECTIONS:
-        text += f"\n## {title}\n\n{about}\n\n    python3 experiments/{name}/run.py build/release/apps/pliant\n\n{section()}"
+        command = f"    python3 experiments/{name}/run.py build/release/apps/pliant\n\n" if name else ""
+        text += f"\n## {title}\n\n{about}\n\n{command}{section()}"
     return text + sensors()
 
 

@@ -1,4 +1,4 @@
-"""Small plots as SVG: lines over logarithmic axes, and heat maps. Standard library only."""
+"""Small plots as SVG: lines over logarithmic axes, heat maps, and marks over even axes. Standard library only."""
 import math
 
 COLOURS = ("#1f5fa8", "#b5401f", "#3a8a3a", "#7a4fa0", "#a07800", "#4a4a4a")
@@ -76,6 +76,48 @@ class Panel:
             self.parts.append(f'<line x1="{at_x - 6:.1f}" x2="{at_x + 6:.1f}" y1="{at_y - dy:.1f}" y2="{at_y + dy:.1f}" stroke="#fff" stroke-width="4"/>')
         for dy in (-6, 6):
             self.parts.append(f'<line x1="{at_x - 6:.1f}" x2="{at_x + 6:.1f}" y1="{at_y - dy:.1f}" y2="{at_y + dy:.1f}" stroke="#c00" stroke-width="2"/>')
+
+
+class EvenPanel(Panel):
+    """A frame in which values stand as they are, from zero on each axis."""
+
+    def __init__(self, left, top, width, height, x_most, y_most):
+        super().__init__(left, top, width, height, (0.0, x_most), (0.0, y_most))
+
+    def x(self, value):
+        return self.left + self.width * value / self.x_range[1]
+
+    def y(self, value):
+        return self.top + self.height * (1.0 - value / self.y_range[1])
+
+    def axes(self, x_label, y_label):
+        bottom, right, middle = self.top + self.height, self.left + self.width, self.top + self.height / 2
+        for value in even_ticks(self.x_range[1]):
+            x = self.x(value)
+            self.parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{bottom}" y2="{bottom + 5}" stroke="#666"/>'
+                              f'<text x="{x:.1f}" y="{bottom + 19}" text-anchor="middle">{value:g}</text>')
+        for value in even_ticks(self.y_range[1]):
+            y = self.y(value)
+            self.parts.append(f'<line x1="{self.left}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" stroke="#eee"/>'
+                              f'<text x="{self.left - 8}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>')
+        self.parts.append(f'<rect x="{self.left}" y="{self.top}" width="{self.width}" height="{self.height}" fill="none" stroke="#999"/>'
+                          f'<text x="{(self.left + right) / 2:.0f}" y="{bottom + 38}" text-anchor="middle">{x_label}</text>'
+                          f'<text transform="translate({self.left - 42} {middle:.0f}) rotate(-90)" text-anchor="middle">{y_label}</text>')
+
+    def mark(self, x, y, colour, filled=True):
+        self.parts.append(f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="3.5" fill="{colour if filled else "none"}" stroke="{colour}" stroke-width="1.5"/>')
+
+    def key(self, number, colour, label):
+        """The name of a colour of marks, in the upper left corner."""
+        x, y = self.left + 16, self.top + 20 + 17 * number
+        self.parts.append(f'<circle cx="{x}" cy="{y - 4}" r="3.5" fill="{colour}" stroke="{colour}"/><text x="{x + 12}" y="{y}">{label}</text>')
+
+
+def even_ticks(most):
+    """Round values from zero to `most`, four to ten of them."""
+    step = 10.0**math.floor(math.log10(most / 4.0))
+    step *= max(m for m in (1, 2, 5) if m * step <= most / 4.0)
+    return [step * k for k in range(math.floor(most / step + 1e-9) + 1)]
 
 
 def shade(share):

@@ -66,17 +66,18 @@ class FungLaw : public MaterialLaw {
     }
     const auto [E, nu, b] = layers_[std::size_t(e)];
     const double lambda = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), mu = E / (2.0 * (1.0 + nu));
-    const Matrix3 strain = polar_decomposition(F).S - Matrix3::Identity();
+    const Polar polar = polar_decomposition(F);
+    const Matrix3 strain = polar.S - Matrix3::Identity();
     Matrix3 linear = 2.0 * mu * strain;
     linear.diagonal().array() += lambda * strain.trace();
     const double q = linear.cwiseProduct(strain).sum() / E, stiffening = std::exp(b * q);
     out.energy = E / (2.0 * b) * std::expm1(b * q);
-    Matrix9 C = 2.0 * mu * Matrix9::Identity();
-    for (const int i : {0, 4, 8})
-      for (const int j : {0, 4, 8}) C(i, j) += lambda;
-    const Eigen::Map<const Eigen::Matrix<double, 9, 1>> T(linear.data());
+    Matrix6 C = 2.0 * mu * Matrix6::Identity();
+    C.topLeftCorner<3, 3>().array() += lambda;
+    Strain6 T;  // in Mandel's components, as C
+    T << linear(0, 0), linear(1, 1), linear(2, 2), std::sqrt(2.0) * Vector3(linear(0, 1), linear(0, 2), linear(1, 2));
     C = (stiffening * (C + 2.0 * b / E * T * T.transpose())).eval();
-    set_strain_stress(F, stiffening * linear, with_tangent ? &C : nullptr, out);
+    set_strain_stress(polar, stiffening * linear, with_tangent ? &C : nullptr, out);
   }
 
  private:

@@ -1,29 +1,20 @@
+#!/usr/bin/env python3
 """The virtual block of Bickel 2009, section 6: noise in the markers against the error of the fitted material.
 
-    python3 experiments/virtual-block/run.py OUT [--pliant PROGRAM] [--make PROGRAM]
+    python3 experiments/virtual-block/run.py OUT [--pliant PROGRAM] [--make PROGRAM] [--laws ogden fung]
 
-Every noise level is fitted with each material; errors are those of all presses (fitted and test) against markers
-without noise, root mean square over the greatest displacement of the press, averaged over presses.
-"""
-
+For each law of the true material every noise level is fitted with each material. Errors are those of all presses (fitted
+and test) against markers without noise: root mean square over the greatest displacement of the press, averaged over
+presses. Figures are written after each fit; those of fits that are not asked for stay. Standard library only."""
 import argparse
-import csv
-import json
 import pathlib
 import subprocess
 import sys
 import time
 
-import numpy as np
-
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-import common  # noqa: E402
-
-
-def positions(path):
-    with open(path) as file:
-        return {row["id"]: np.array([float(row[k]) for k in "xyz"]) for row in csv.DictReader(file)}
+import common
 
 
 def truth_capture(capture):
@@ -37,44 +28,67 @@ def truth_capture(capture):
     return path.parent
 
 
-def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--pliant", default=str(common.DEFAULT_PROGRAM))
-    parser.add_argument("--make", default="build/release/experiments/pliant_virtual_block")
-    parser.add_argument("--seed", default="1")
-    parser.add_argument("--noise", nargs="*", default=["00", "10", "20", "30"])
-    parser.add_argument("--materials", nargs="*", default=["ogden", "sampled", "linear"])
-    arguments = parser.parse_args()
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    subprocess.run([arguments.make, str(arguments.out), arguments.seed], check=True)
+def fit(program, capture, out, material):
+    """Seconds, and the exit code, of a fit whose output goes to OUT.log."""
+    begin = time.monotonic()
+    with open(out.with_suffix(".log"), "w") as log:
+        code = subprocess.run([str(program), "fit", str(capture), "--out", str(out), "--set", f"material={material}"],
+                              stdout=log, stderr=log, check=False).returncode
+    return time.monotonic() - begin, code
+
+
+def judged(program, out, judge):
+    """Mean and greatest relative errors of the presses by their role, against markers without noise."""
+    common.run(program, "evaluate", out / "model.toml", judge, "-o", out / "evaluation.json", allowed=(0, 3))
+    presses = common.read(out / "evaluation.json")["presses"]
+    entry = {"no_equilibrium": sum(p["relative_error"] is None for p in presses)}
+    for role in ("fit", "test"):
+        errors = [p["relative_error"] for p in presses if p["role"] == role and p["relative_error"] is not None]
+        entry[role] = sum(errors) / len(errors) if errors else None
+        entry[f"{role}_max"] = max(errors, default=None)
+        entry[f"{role}_presses"] = len(errors)
+    return entry
+
+
+def stored():
+    """Figures of earlier fits; nothing of files of another layout."""
     file = HERE / "results.json"
-    results = json.loads(file.read_text()) if file.exists() else {}
-    for noise in arguments.noise:
-        capture = arguments.out / noise
-        judge = truth_capture(capture)
-        for material in arguments.materials:
-            out = arguments.out / f"{material}-{noise}"
-            begin = time.time()
-            with open(arguments.out / f"{material}-{noise}.log", "w") as log:
-                subprocess.run([arguments.pliant, "fit", str(capture), "--out", str(out), "--set",
-                                f"material={material}"], stdout=log, stderr=log, check=False)
-            seconds = time.time() - begin
-            evaluation = out / "evaluation.json"
-            subprocess.run([arguments.pliant, "evaluate", str(out / "model.toml"), str(judge), "-o", str(evaluation)],
-                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
-            presses = json.loads(evaluation.read_text())["presses"]
-            entry = {"seconds": round(seconds, 1)}
-            for role in ("fit", "test"):
-                errors = [p["relative_error"] for p in presses if p["role"] == role and p["relative_error"] is not None]
-                entry[role] = float(np.mean(errors))
-                entry[f"{role}_presses"] = len(errors)
-            if material == "sampled":
-                notes = json.loads((out / "result.json").read_text())["notes"]
-                entry["notes"] = [n for n in notes if "samples an element" in n]
-            results.setdefault(noise, {})[material] = entry
-            print(noise, material, entry, flush=True)
-            file.write_text(json.dumps(results, indent=1) + "\n")
+    return common.read(file).get("laws", {}) if file.exists() else {}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=pathlib.Path, help="folder for captures and fits")
+    parser.add_argument("--pliant", type=pathlib.Path, default=common.DEFAULT_PROGRAM)
+    parser.add_argument("--make", type=pathlib.Path, default=common.ROOT / "build/release/experiments/pliant_virtual_block")
+    parser.add_argument("--seed", default="1")
+    parser.add_argument("--laws", nargs="*", default=["ogden", "fung"], help="of the true material")
+    parser.add_argument("--noise", nargs="*", default=["00", "10", "20", "30"], help="percent")
+    parser.add_argument("--materials", nargs="*", default=["ogden", "sampled", "linear"], help="that are fitted")
+    arguments = parser.parse_args()
+    failed = []
+    for law in arguments.laws:
+        folder = arguments.out / law
+        folder.mkdir(parents=True, exist_ok=True)
+        subprocess.run([str(arguments.make), str(folder), arguments.seed, law], check=True)
+        for noise in arguments.noise:
+            judge = truth_capture(folder / noise)
+            for material in arguments.materials:
+                out = folder / f"{material}-{noise}"
+                seconds, code = fit(arguments.pliant, folder / noise, out, material)
+                if code not in (0, 3):
+                    failed.append(f"{out}.log")
+                    print(law, noise, material, f"returned {code}: see {out}.log", flush=True)
+                    continue
+                notes = common.read(out / "result.json").get("notes", [])
+                entry = {"seconds": round(seconds, 1), "converged": code == 0, **judged(arguments.pliant, out, judge),
+                         "notes": notes, "zones": [n for n in notes if n.startswith("Zones:")]}
+                laws = stored()  # anew: another run may have written since
+                laws.setdefault(law, {}).setdefault(noise, {})[material] = entry
+                print(law, noise, material, entry, flush=True)
+                common.write_results(__file__, {"laws": laws})
+    if failed:
+        sys.exit("these fits failed: " + ", ".join(failed))
 
 
 if __name__ == "__main__":

@@ -25,33 +25,76 @@ SmallStrainModuli moduli_of(const LambdaAlpha& p) {
   return {p.lambda * (1.0 + nu) * (1.0 - 2.0 * nu), nu};
 }
 
+namespace {
+
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+/// vee(A - A^T); vee(T S - S T) is that of A = T S.
+Vector3 twice_axis(const Matrix3& A) { return {A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1)}; }
+
+const double root_half = std::sqrt(0.5);
+
+/// Mandel's components of the symmetric part.
+Strain6 mandel_of(const Matrix3& A) {
+  Strain6 m;
+  m << A(0, 0), A(1, 1), A(2, 2), root_half * (A(0, 1) + A(1, 0)), root_half * (A(0, 2) + A(2, 0)),
+      root_half * (A(1, 2) + A(2, 1));
+  return m;
+}
+Matrix3 symmetric_of(const Strain6& m) {
+  Matrix3 A;
+  A << m[0], root_half * m[3], root_half * m[4],  //
+      root_half * m[3], m[1], root_half * m[5],   //
+      root_half * m[4], root_half * m[5], m[2];
+  return A;
+}
+
+}  // namespace
+
 /// R^T dF = [w]x S + dS with (tr(S) I - S) w = vee(skew part). So Z = R^T P, whose work must be that of T alone, has
 /// the symmetric part T and a skew part [a]x such that Z S is symmetric: (tr(S) I - S) a = -vee(T S - S T), which
-/// vanishes where T has the axes of S, as it does in isotropic materials.
-void set_strain_stress(const Matrix3& F, const Matrix3& T, const Matrix9* C, PointStress& out) {
-  const Polar polar = polar_decomposition(F);
-  const Matrix3& S = polar.S;
-  const auto vee = [](const Matrix3& skew) { return Vector3(skew(2, 1), skew(0, 2), skew(1, 0)); };
-  const Vector3 a = -(polar.rate_inverse * vee(T * S - S * T));
+/// vanishes where T has the axes of S, as it does in isotropic materials. With A = R^T dF, w = M A and dS = D A,
+///   R^T dP = [w]x Z + D^T C D A - [Q (vee(T dS - dS T) + tr(dS) a - dS a)]x,   Q = (tr(S) I - S)^-1.
+void set_strain_stress(const Polar& polar, const Matrix3& T, const Matrix6* C, PointStress& out) {
+  const Matrix3 &S = polar.S, &Q = polar.rate_inverse;
+  const Vector3 a = -(Q * twice_axis(T * S));
   const Matrix3 Z = T + cross_matrix(a);
   out.P = polar.R * Z;
   if (!C) return;
   out.left = polar.R;
   out.right.setIdentity();
-  for (int j = 0; j < 3; ++j)
-    for (int i = 0; i < 3; ++i) {
-      Matrix3 change = Matrix3::Zero();
-      change(i, j) = 1.0;
-      const Matrix3 W = cross_matrix(polar.rate_inverse * vee(change - change.transpose()));
-      Matrix3 dS = change - W * S;
-      dS = (0.5 * (dS + dS.transpose())).eval();
-      Matrix3 dT;
-      Eigen::Map<Eigen::Matrix<double, 9, 1>>(dT.data()).noalias() =
-          *C * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dS.data());
-      const Vector3 da = -(polar.rate_inverse * (vee(dT * S - S * dT + T * dS - dS * T) + dS.trace() * a - dS * a));
-      const Matrix3 dP = W * Z + dT + cross_matrix(da);
-      out.tangent.col(i + 3 * j) = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dP.data());
-    }
+  Eigen::Matrix<double, 3, 9> M = Eigen::Matrix<double, 3, 9>::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 2) % 3, j = (k + 1) % 3;  // A(i, j) - A(j, i) turns about axis k
+    M.col(i + 3 * j) = Q.col(k);
+    M.col(j + 3 * i) = -Q.col(k);
+  }
+  Eigen::Matrix<double, 6, 3> turned;   // of S, by each axis
+  Eigen::Matrix<double, 9, 3> along_Z;  // [w]x Z
+  for (int k = 0; k < 3; ++k) {
+    const Matrix3 turn = cross_matrix(Vector3::Unit(k));
+    turned.col(k) = mandel_of(turn * S);
+    const Matrix3 z = turn * Z;
+    along_Z.col(k) = Eigen::Map<const Vector9>(z.data());
+  }
+  Eigen::Matrix<double, 6, 9> D = Eigen::Matrix<double, 6, 9>::Zero();
+  D(0, 0) = D(1, 4) = D(2, 8) = 1.0;
+  D(3, 1) = D(3, 3) = D(4, 2) = D(4, 6) = D(5, 5) = D(5, 7) = root_half;
+  D.noalias() -= turned * M;
+  Eigen::Matrix<double, 3, 6> rate;  // of a by dS at the same T
+  for (int c = 0; c < 6; ++c) {
+    const Matrix3 dS = symmetric_of(Strain6::Unit(c));
+    rate.col(c) = twice_axis(T * dS) + dS.trace() * a - dS * a;
+  }
+  const Eigen::Matrix<double, 3, 9> da = -Q * (rate * D);
+  const Eigen::Matrix<double, 6, 9> CD = *C * D;
+  out.tangent.noalias() = D.transpose() * CD;
+  out.tangent.noalias() += along_Z * M;
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 2) % 3, j = (k + 1) % 3;
+    out.tangent.row(i + 3 * j) += da.row(k);
+    out.tangent.row(j + 3 * i) -= da.row(k);
+  }
 }
 
 // ---- linear
@@ -74,10 +117,9 @@ void LinearLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& 
     out.P = polar.R * T;
     return;
   }
-  Matrix9 C = twice_mu * Matrix9::Identity();
-  for (const int i : {0, 4, 8})
-    for (const int j : {0, 4, 8}) C(i, j) += alpha;
-  set_strain_stress(F, T, &C, out);
+  Matrix6 C = twice_mu * Matrix6::Identity();
+  C.topLeftCorner<3, 3>().array() += alpha;
+  set_strain_stress(polar, T, &C, out);
 }
 
 void LinearLaw::parameter_derivatives(int, const Matrix3& F, std::span<Matrix3> out) const {

@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "base/types.hpp"
+#include "elasticity/polar.hpp"
 
 namespace pliant {
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
 /// Symmetric strains or stresses as xx, yy, zz, xy, xz, yz (Bickel 2009, section 3.2): tensor components, no factor 2.
 using Strain6 = Eigen::Matrix<double, 6, 1>;
 
@@ -103,10 +105,10 @@ class OgdenLaw : public TabulatedLaw {
   void check(const MatrixX& table) const override;
 };
 
-/// Tangent of an energy of the strain e = S - I in the frame of R, F = R S: out.P and, where asked for, out.tangent
-/// from
+/// Stress and, where asked for, tangent of an energy of the strain e = S - I in the frame of R, F = R S.
 /// @param T  dW/de [Pa], symmetric
-/// @param C  d2W/de2 by tensor components (dT = C : de), 9 x 9 of the symmetric pairs; may be null
-void set_strain_stress(const Matrix3& F, const Matrix3& T, const Matrix9* C, PointStress& out);
+/// @param C  d2W/de2 [Pa] in Mandel's components (xx, yy, zz, sqrt 2 xy, sqrt 2 xz, sqrt 2 yz), symmetric; null: stress
+///           alone
+void set_strain_stress(const Polar& polar, const Matrix3& T, const Matrix6* C, PointStress& out);
 
 }  // namespace pliant

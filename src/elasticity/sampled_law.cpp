@@ -15,7 +15,6 @@ namespace pliant {
 namespace {
 
 using Vector2 = Eigen::Vector2d;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 /// The kernel's tip is rounded at this strain, so that it has a second derivative.
 constexpr double tip = 1e-3;
@@ -93,7 +92,8 @@ Eigen::Vector2d SampledLaw::interpolated(int e, const Strain6& strain) const {
 void SampledLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
   const Element& element = elements_[std::size_t(e)];
   const StrainSamples& given = element.given;
-  const Matrix3 S = polar_decomposition(F).S;
+  const Polar polar = polar_decomposition(F);
+  const Matrix3& S = polar.S;
   Vector6 m;
   m << S(0, 0) - 1.0, S(1, 1) - 1.0, S(2, 2) - 1.0, S(0, 1), S(0, 2), S(1, 2);
   m = mandel(m);
@@ -151,12 +151,7 @@ void SampledLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress&
   T << gradient[0], half * gradient[3], half * gradient[4],  //
       half * gradient[3], gradient[1], half * gradient[5],   //
       half * gradient[4], half * gradient[5], gradient[2];
-  if (!with_tangent) return set_strain_stress(F, T, nullptr, out);
-  Eigen::Matrix<double, 6, 9> pairs = Eigen::Matrix<double, 6, 9>::Zero();  // tensor, column by column, to m
-  pairs(0, 0) = pairs(1, 4) = pairs(2, 8) = 1.0;
-  pairs(3, 1) = pairs(3, 3) = pairs(4, 2) = pairs(4, 6) = pairs(5, 5) = pairs(5, 7) = half;
-  const Matrix9 C = pairs.transpose() * hessian * pairs;
-  set_strain_stress(F, T, &C, out);
+  set_strain_stress(polar, T, with_tangent ? &hessian : nullptr, out);
 }
 
 SmallStrainModuli SampledLaw::small_strain(int e) const {

@@ -232,6 +232,13 @@ std::string presses_csv(const PressFitOutcome& outcome) {
   return text;
 }
 
+std::string basis_csv(const SampledMaterial& material) {
+  std::string text = "samples an element,relative error of stress\n";
+  for (std::size_t i = 0; i < material.error_by_size.size(); ++i)
+    text += fmt::format("{},{:.6g}\n", i + 1, material.error_by_size[i]);
+  return text;
+}
+
 ConvergenceHistory history_of(const PressFitOutcome& outcome) {
   ConvergenceHistory history{{"youngs_modulus", "marker_rms"}, {"Pa", "m"}, {}};
   for (const PressFitEvent& e : outcome.history)
@@ -265,6 +272,7 @@ void write_press_output(const fs::path& folder, const Capture& capture, const Pr
   save_model(folder, make_model(capture, outcome));
   write_convergence(folder / "convergence.csv", history);
   write_file(folder / "presses.csv", presses_csv(outcome));
+  if (outcome.sampled) write_file(folder / "basis.csv", basis_csv(*outcome.sampled));
   write_deformed(folder, outcome, progress);
   ReportData report;
   report.title = capture.name;

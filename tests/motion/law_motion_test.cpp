@@ -1,0 +1,103 @@
+// Bodies of a material law in motion: a bar of 0.4 x 0.1 x 0.1 m, held at one end and let go with a velocity.
+#include "elasticity/law_elasticity.hpp"
+#include "elasticity/sampled_law.hpp"
+#include "motion/simulation.hpp"
+#include "support/bodies.hpp"
+
+namespace pliant {
+namespace {
+
+constexpr double modulus = 2e4, nu = 0.3, density = 100.0;
+
+std::shared_ptr<const MaterialLaw> ogden(const Body& body) {
+  // Two terms of one Poisson's ratio, together of the modulus above at rest.
+  MatrixX q(body.element_count(), 6);
+  const double mu = modulus / (2.0 * (1.0 + nu));
+  q.rowwise() = (Eigen::RowVectorXd(6) << 0.6 * mu, 9.0, nu, 0.4 * mu, -7.0, nu).finished();
+  return std::make_shared<OgdenLaw>(q);
+}
+
+/// Twice as stiff where it is strained by a tenth.
+std::shared_ptr<const MaterialLaw> sampled(const Body& body) {
+  std::vector<MaterialSample> samples(4);
+  for (int k = 0; k < 4; ++k) {
+    MaterialSample& s = samples[std::size_t(k)];
+    s.strains.resize(body.element_count(), 6);
+    for (int e = 0; e < body.element_count(); ++e) {
+      for (int i = 0; i < 6; ++i) s.strains(e, i) = 0.04 * k * std::sin(1.0 + e + 3.1 * i + 7.3 * k);
+      s.p.push_back(lambda_alpha({modulus * (1.0 + 10.0 * s.strains.row(e).norm()), nu}));
+    }
+  }
+  return sample_material(samples, {1e-6, 4}).law;
+}
+
+struct LetGo {
+  double greatest_change = 0.0;  ///< of all energy, relative to what there was at the start
+  double least_kinetic = 1.0;    ///< part of it
+  Points last;
+};
+
+/// @param speed  of all that is not held, along the bar and across [m/s]
+LetGo let_go(const std::shared_ptr<const Body>& body, const std::shared_ptr<const MaterialLaw>& law, double speed,
+             double dt) {
+  SimulationOptions options;
+  for (int f = 0; f <= 20; ++f) options.times.push_back(5e-3 * f);
+  options.max_dt = dt;
+  options.newmark_theta = 0.5;
+  options.law = law;
+  options.integrator = Integrator::Newton;
+  options.newton.tolerance = 1e-10;
+  options.holds = {Hold{[](const Vector3& p) { return p.x() < -0.199; }}};
+  VectorX theta = VectorX::Zero(theta::size(0));
+  theta[theta::youngs_modulus] = modulus;
+  theta[theta::poissons_ratio] = nu;
+  theta[theta::density] = density;
+  theta.segment<3>(theta::linear_velocity) = speed * Vector3(1.0, 0.5, 0.0);
+  Simulation simulation(body, options);
+  LetGo result;
+  double first = 0.0;
+  const auto elasticity = law ? LawElasticity::make(body, law) : nullptr;
+  const RolloutSummary summary = simulation.run(theta, [&](int frame, const State& state, auto) {
+    if (frame + 1 == int(options.times.size())) result.last = state.x;
+    if (!elasticity) return true;
+    Points momentum = Points::Zero(state.v.rows(), 3);
+    body->add_mass_product(density, state.v, momentum);
+    const double kinetic = 0.5 * momentum.cwiseProduct(state.v).sum();
+    const double energy = kinetic + elasticity->evaluate(state.x, false);
+    if (frame == 1) first = energy;  // what is held stands still from the first step on
+    if (frame < 1) return true;
+    result.greatest_change = std::max(result.greatest_change, std::abs(energy / first - 1.0));
+    result.least_kinetic = std::min(result.least_kinetic, kinetic / first);
+    return true;
+  });
+  EXPECT_TRUE(summary.succeeded) << summary.failure;
+  return result;
+}
+
+struct LawMotion : ::testing::TestWithParam<std::shared_ptr<const MaterialLaw> (*)(const Body&)> {
+  std::shared_ptr<const Body> body = test::tet_body({0.4, 0.1, 0.1}, {8, 2, 2}, false, 0.1);
+  std::shared_ptr<const MaterialLaw> law = GetParam()(*body);
+};
+
+TEST_P(LawMotion, OfGreatAmplitudeKeepsItsEnergyAsStepsShrink) {
+  const LetGo coarse = let_go(body, law, 2.0, 2.5e-3), fine = let_go(body, law, 2.0, 0.625e-3);
+  EXPECT_LT(fine.least_kinetic, 0.3) << "most of the energy must have been stored in between";
+  EXPECT_LT(fine.greatest_change, 0.02);
+  EXPECT_LT(fine.greatest_change, 0.25 * coarse.greatest_change);
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, LawMotion, ::testing::Values(&ogden, &sampled),
+                         [](const auto& c) { return c.param == &ogden ? "Ogden" : "Sampled"; });
+
+TEST(LawMotionSmall, IsThatOfItsModuliAtRest) {
+  const auto body = test::tet_body({0.4, 0.1, 0.1}, {8, 2, 2}, false, 0.1);
+  const double speed = 1e-3;
+  const Points by_law = let_go(body, ogden(*body), speed, 2.5e-3).last,
+               by_moduli = let_go(body, nullptr, speed, 2.5e-3).last;
+  const double moved = (by_moduli - body->nodes).norm();
+  ASSERT_GT(moved, 0.0);
+  EXPECT_LT((by_law - by_moduli).norm(), 0.01 * moved);
+}
+
+}  // namespace
+}  // namespace pliant
