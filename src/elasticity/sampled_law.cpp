@@ -15,6 +15,7 @@ namespace pliant {
 namespace {
 
 using Vector2 = Eigen::Vector2d;
+using Columns6 = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 /// The kernel's tip is rounded at this strain, so that it has a second derivative.
 constexpr double tip = 1e-3;
@@ -182,12 +183,173 @@ MatrixX basis(const std::vector<Strain6>& points, const std::vector<Strain6>& ce
   return B;
 }
 
+/// Stress of `SampledLaw`, dW/de in Mandel's components, at a strain m.
+/// @param by_lambda, by_nu  6 x (1 + centres): its derivatives by what is added to lambda (nu): constant, then weights
+Strain6 path_stress(const StrainSamples& s, const std::vector<Strain6>& centres, const Matrix6& L, const Strain6& m,
+                    Columns6& by_lambda, Columns6& by_nu) {
+  const auto count = Eigen::Index(centres.size());
+  by_lambda.setZero(6, 1 + count);
+  by_nu.setZero(6, 1 + count);
+  const Strain6 y = L * m;
+  const double square = m.squaredNorm(), trace = m.head<3>().sum(), slope = trace * trace - 2.0 * square;
+  Strain6 ones = Strain6::Zero();
+  ones.head<3>().setOnes();
+  Strain6 stress = Strain6::Zero();
+  VectorX kernel(1 + count);
+  Columns6 along(6, 1 + count);  // t L d kernel / dy
+  kernel[0] = 1.0;
+  along.col(0).setZero();
+  for (const GaussPoint& g : path) {
+    Vector2 value = s.constant;
+    Strain6 m_lambda = Strain6::Zero(), m_nu = Strain6::Zero();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Strain6 d = g.t * y - centres[std::size_t(i)];
+      kernel[i + 1] = std::sqrt(d.squaredNorm() + tip * tip);
+      const Strain6 back = L * d;
+      along.col(i + 1) = g.t / kernel[i + 1] * back;
+      const Vector2& w = s.weights[std::size_t(i)];
+      value += w * kernel[i + 1];
+      m_lambda += w[0] * along.col(i + 1);
+      m_nu += w[1] * along.col(i + 1);
+    }
+    const Bounded lambda = bounded_lambda(s, value[0]), nu = bounded_nu(s, value[1]);
+    const double weight = g.weight * g.t, of_lambda = (1.0 - 2.0 * nu.value) * square + nu.value * trace * trace;
+    const Strain6 linear = 2.0 * ((1.0 - 2.0 * nu.value) * m + nu.value * trace * ones),
+                  turning = 2.0 * (trace * ones - 2.0 * m);
+    stress +=
+        weight * (lambda.value * linear + of_lambda * lambda.first * m_lambda + lambda.value * slope * nu.first * m_nu);
+    by_lambda +=
+        weight *
+        ((lambda.first * linear + of_lambda * lambda.second * m_lambda + lambda.first * slope * nu.first * m_nu) *
+             kernel.transpose() +
+         of_lambda * lambda.first * along);
+    by_nu += weight * ((lambda.value * nu.first * turning + slope * nu.first * lambda.first * m_lambda +
+                        lambda.value * slope * nu.second * m_nu) *
+                           kernel.transpose() +
+                       lambda.value * slope * nu.first * along);
+  }
+  return stress;
+}
+
+/// Weights with which the energy's own stress comes closest to the samples', by Levenberg-Marquardt from those that
+/// interpolate p: where stiffness depends on the direction of strains, the energy's stress is not E(p(e)) e.
+class StressFit {
+ public:
+  StressFit(const ElementSamples& samples, const Matrix6& to_metric, double ridge, double greatest_stress,
+            StrainSamples& law)
+      : samples_(samples), L_(to_metric), ridge_(ridge), unit_(greatest_stress), law_(law) {
+    for (const Strain6& strain : law.strains) centres_.push_back(L_ * mandel(strain));
+    for (std::size_t i = 0; i < samples.strains.size(); ++i) {
+      const Strain6 m = mandel(samples.strains[i]);
+      Strain6 stress = samples.p[i][0] * (1.0 - 2.0 * samples.p[i][1]) * m;
+      stress.head<3>().array() += samples.p[i][0] * samples.p[i][1] * m.head<3>().sum();
+      strains_.push_back(m);
+      stresses_.push_back(stress);
+    }
+    start_ = interpolated_at_rest();
+  }
+
+  /// Returns the sum of squares that is left, relative to the greatest stress.
+  double run() {
+    VectorX residuals;
+    MatrixX J;
+    double cost = linearise(residuals, J), damping = 1e-3;
+    for (int iteration = 0; iteration < 10; ++iteration) {
+      MatrixX H = J.transpose() * J;
+      H.diagonal() *= 1.0 + damping;
+      const VectorX step = -H.ldlt().solve(J.transpose() * residuals);
+      const StrainSamples before = law_;
+      add(step);
+      VectorX next_residuals;
+      MatrixX next_J;
+      const double next = linearise(next_residuals, next_J);
+      if (next < cost) {
+        const bool is_done = cost - next < 1e-3 * cost;
+        cost = next, residuals = std::move(next_residuals), J = std::move(next_J);
+        damping *= 0.2;
+        if (is_done) break;
+      } else {
+        law_ = before;
+        damping = 10.0 * std::max(damping, 1e-3);
+      }
+    }
+    return residuals.head(6 * Eigen::Index(strains_.size())).squaredNorm();
+  }
+
+ private:
+  Vector2 interpolated_at_rest() const {
+    Vector2 p = law_.constant;
+    for (std::size_t i = 0; i < centres_.size(); ++i)
+      p += law_.weights[i] * std::sqrt(centres_[i].squaredNorm() + tip * tip);
+    return p;
+  }
+  /// lambda's constant and weights but the first, then nu's times the stiffness at rest; weights sum to nothing.
+  void add(const VectorX& step) {
+    const Eigen::Index half = step.size() / 2;
+    for (const int k : {0, 1}) {
+      const double unit = k == 0 ? 1.0 : 1.0 / start_[0];
+      law_.constant[k] += unit * step[k * half];
+      for (Eigen::Index i = 1; i < half; ++i) {
+        law_.weights[std::size_t(i)][k] += unit * step[k * half + i];
+        law_.weights[0][k] -= unit * step[k * half + i];
+      }
+    }
+  }
+  /// Columns of constant and weights as `add` changes them.
+  template <class Columns>
+  static MatrixX tied(const Columns& of) {
+    MatrixX columns(of.rows(), of.cols() - 1);
+    columns.col(0) = of.col(0);
+    columns.rightCols(columns.cols() - 1) = of.rightCols(of.cols() - 2).colwise() - of.col(1);
+    return columns;
+  }
+  double linearise(VectorX& residuals, MatrixX& J) const {
+    const auto count = Eigen::Index(strains_.size()), half = Eigen::Index(centres_.size());
+    residuals.setZero(6 * count + 2 + 2 * half);
+    J.setZero(residuals.size(), 2 * half);
+    Columns6 by_lambda, by_nu;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto k = std::size_t(i);
+      residuals.segment<6>(6 * i) =
+          (path_stress(law_, centres_, L_, strains_[k], by_lambda, by_nu) - stresses_[k]) / unit_;
+      J.block(6 * i, 0, 6, half) = tied(by_lambda) / unit_;
+      J.block(6 * i, half, 6, half) = tied(by_nu) / (unit_ * start_[0]);
+    }
+    // At rest as the smallest strains say; and small weights where samples nearly coincide.
+    const Vector2 off = interpolated_at_rest() - start_;
+    MatrixX kernel(1, 1 + half);
+    kernel(0, 0) = 1.0;
+    for (Eigen::Index i = 0; i < half; ++i)
+      kernel(0, 1 + i) = std::sqrt(centres_[std::size_t(i)].squaredNorm() + tip * tip);
+    const double at_rest = 0.3 * largest() / unit_;
+    residuals[6 * count] = at_rest * off[0], residuals[6 * count + 1] = at_rest * start_[0] * off[1];
+    J.block(6 * count, 0, 1, half) = at_rest * tied(kernel);
+    J.block(6 * count + 1, half, 1, half) = at_rest * tied(kernel);
+    for (Eigen::Index i = 1; i < half; ++i)
+      for (const int k : {0, 1}) {
+        const Eigen::Index row = 6 * count + 2 + k * half + i;
+        residuals[row] = ridge_ / unit_ * law_.weights[std::size_t(i)][k] * (k == 0 ? 1.0 : start_[0]);
+        J(row, k * half + i) = ridge_ / unit_;
+      }
+    return residuals.squaredNorm();
+  }
+  double largest() const { return std::max(*std::ranges::max_element(samples_.size), 1e-12); }
+
+  const ElementSamples& samples_;
+  const Matrix6& L_;
+  double ridge_, unit_;
+  StrainSamples& law_;
+  std::vector<Strain6> centres_, strains_, stresses_;
+  Vector2 start_;
+};
+
 struct Selection {
   StrainSamples samples;
+  double square_misfit = 0.0;        // of the energy's stress, summed over the element's samples
   std::vector<double> square_error;  // summed over the element's samples, with 1, 2, ... in the basis
 };
 
-Selection select(const ElementSamples& s, const BasisOptions& options) {
+Selection select(const ElementSamples& s, const Matrix6& to_metric, const BasisOptions& options) {
   const std::size_t n = s.y.size();
   // Zero strain first: the mean of the smallest strains, a fifth of all, by how much each tells.
   std::vector<std::size_t> order(n);
@@ -219,6 +381,7 @@ Selection select(const ElementSamples& s, const BasisOptions& options) {
   }
   values.row(Eigen::Index(n)) = start.transpose();
   weight[Eigen::Index(n)] = 0.3 * largest;
+  constexpr double ridge = 0.02;
   std::vector<Strain6> centres = {Strain6::Zero()}, strains = {Strain6::Zero()};
   std::vector<bool> is_taken(n, false);
   MatrixX coefficients;
@@ -229,7 +392,7 @@ Selection select(const ElementSamples& s, const BasisOptions& options) {
     MatrixX system(B.rows() + m, m), right(B.rows() + m, 2);
     system << weight.asDiagonal() * B, MatrixX::Zero(m, m);
     right << weight.asDiagonal() * values, MatrixX::Zero(m, 2);
-    for (Eigen::Index k = 1; k < m; ++k) system(B.rows() + k, k) = 0.02 * largest * largest;
+    for (Eigen::Index k = 1; k < m; ++k) system(B.rows() + k, k) = ridge * largest * largest;
     coefficients = system.colPivHouseholderQr().solve(right);
     const MatrixX error = B * coefficients - values;
     std::size_t worst = n;
@@ -255,6 +418,9 @@ Selection select(const ElementSamples& s, const BasisOptions& options) {
     sum += selection.samples.weights.back();
   }
   selection.samples.weights[0] = -sum;
+  if (greatest_stress > 0.0)
+    selection.square_misfit =
+        StressFit(s, to_metric, ridge * largest * largest, greatest_stress, selection.samples).run();
   return selection;
 }
 
@@ -277,7 +443,7 @@ SampledMaterial sample_material(const std::vector<MaterialSample>& samples, cons
       const LambdaAlpha& p = sample.p[std::size_t(e)];
       own.p.emplace_back(p.lambda, p.alpha / p.lambda);
     }
-    selections[std::size_t(e)] = select(own, options);
+    selections[std::size_t(e)] = select(own, to_metric, options);
   });
   SampledMaterial material;
   std::vector<StrainSamples> elements;
@@ -286,10 +452,13 @@ SampledMaterial sample_material(const std::vector<MaterialSample>& samples, cons
     for (const Selection& s : selections) sum += s.square_error[std::min(size, s.square_error.size() - 1)];
     material.error_by_size.push_back(std::sqrt(sum / double(count) / double(samples.size())));
   }
+  double misfit = 0.0;
   for (Selection& s : selections) {
+    misfit += s.square_misfit;
     material.mean_samples += double(s.samples.strains.size()) / double(count);
     elements.push_back(std::move(s.samples));
   }
+  material.stress_misfit = std::sqrt(misfit / double(count) / double(samples.size()));
   material.law = std::make_shared<SampledLaw>(std::move(elements), metric_nu);
   return material;
 }

@@ -68,13 +68,15 @@ struct SampledMaterial {
   std::shared_ptr<const SampledLaw> law;
   double mean_samples = 0.0;          ///< of an element
   std::vector<double> error_by_size;  ///< relative stress error with 1, 2, ... samples an element, root mean square
-                                      ///< over elements and deformations
+                                      ///< over elements and deformations: of E(p(e)) e
+  double stress_misfit = 0.0;         ///< the same of the law's own stress in the end
 };
 
 /// Chooses, element by element, few of the samples that reproduce all of them (section 4.2): first zero strain with the
 /// mean stiffness of the smallest strains, then the one that is worst, until none is worse than the tolerance; with
-/// each, the weights that fit all samples best. Samples count by their strain: an error of stress is what matters.
-/// Throws std::invalid_argument where there are no samples.
+/// each, the weights that fit all samples best. Samples count by their strain: an error of stress is what matters. In
+/// the end the weights are those with which the stress of the law's energy comes closest to all samples'. Throws
+/// std::invalid_argument where there are no samples.
 SampledMaterial sample_material(const std::vector<MaterialSample>& samples, const BasisOptions& options = {});
 
 }  // namespace pliant
