@@ -251,7 +251,8 @@ void write_marker_positions(const fs::path& path, const MarkerPositions& markers
   write_file(path, [&](std::ostream& stream) {
     stream << header_of_positions << '\n';
     for (std::size_t i = 0; i < markers.ids.size(); ++i)
-      write_row(stream, markers.ids[i], markers.positions.row(Eigen::Index(i)));
+      if (const auto row = Eigen::Index(i); markers.positions.row(row).allFinite())
+        write_row(stream, markers.ids[i], markers.positions.row(row));
   });
 }
 

@@ -25,8 +25,9 @@ struct StrainSamples {
 /// material is strained alone, stress is exactly E(p(e)) e.
 /// Within the samples' range p is as interpolated; beyond it lambda levels off between half the least and twice the
 /// greatest sampled one, and nu within (-1, 1/2): the material never turns soft beyond what was seen by more than that,
-/// e . stress > 0 for every strain, and lambda_min |e|^2 <= 2 W <= lambda_max |e|^2 in the norm above (for constant
-/// nu). Nothing here can be estimated: it is made from fits (`sample_material`).
+/// e . stress > 0 for every strain but for the error of the rule by which the integral is taken (five Gauss points),
+/// and lambda_min |e|^2 <= 2 W <= lambda_max |e|^2 in the norm above (for constant nu). Nothing here can be estimated:
+/// it is made from fits (`sample_material`).
 class SampledLaw : public MaterialLaw {
  public:
   /// @param metric_nu  Poisson's ratio of the norm of strains

@@ -193,10 +193,6 @@ class SampleFit {
       const bool solved = solve(q_);
       is_new = solved && cost_of(gamma) < cost;
       result.weight = gamma;
-      if (getenv("SF"))
-        fprintf(stderr, "it %d gamma %.3g damping %.3g cost %.5g -> %d %.5g step %.3g misfit %.4g of %ld\n",
-                result.iterations, gamma, damping, cost, solved, cost_of(gamma), step.cwiseAbs().maxCoeff(),
-                r_.squaredNorm(), r_.size());
       if (is_new) {
         rejected = 0;
         damping *= 0.3;

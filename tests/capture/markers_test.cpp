@@ -50,6 +50,13 @@ TEST_F(MarkerFiles, PositionsComeBack) {
   EXPECT_EQ(read.positions, markers.positions);
 }
 
+TEST_F(MarkerFiles, PlacesThatNobodySawAreNotWritten) {
+  MarkerPositions markers{{"a", "b"}, points({{1, 2, 3}, {4, 5, 6}})};
+  markers.positions(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  write_marker_positions(folder / "a.csv", markers);
+  EXPECT_THAT(read_marker_positions(folder / "a.csv").ids, ElementsAre("b"));
+}
+
 TEST_F(MarkerFiles, ATrackIsMatchedById) {
   const MarkerSet set = read("frame,id,x,y,z\n2,tip 1,1,2,3\n0,3,4,5,6\n2,3,7,8,9\n");
   EXPECT_THAT(set.ids, ElementsAre("3", "tip 1"));

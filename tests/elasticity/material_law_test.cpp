@@ -231,6 +231,41 @@ TEST(SampledLaw, IsPassiveAndBoundedFarFromItsSamples) {
   }
 }
 
+/// Stress of Ogden's law under uniaxial strain of each axis, as the stiffness (lambda, nu) that explains it: a material
+/// whose stiffness depends on the direction of strain, and which has an energy.
+TEST(SampledLaw, HasAnEnergyWhoseStressMeetsTheSamples) {
+  MatrixX q(1, 3);
+  q << 3000.0, -5.0, 0.2;
+  const OgdenLaw ogden(q);
+  std::vector<MaterialSample> samples;
+  std::vector<Matrix3> deformations, stresses;
+  for (const double strain : {-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2})
+    for (int axis = 0; axis < 3; ++axis) {
+      Matrix3 F = Matrix3::Identity();
+      F(axis, axis) += strain;
+      PointStress at;
+      ogden.stress(0, F, false, at);
+      // In the linear law T_axis = lambda (1 - nu) e, T_side = lambda nu e.
+      const double along = at.P(axis, axis) / strain, side = at.P((axis + 1) % 3, (axis + 1) % 3) / strain;
+      MaterialSample sample;
+      sample.strains = MatrixX::Zero(1, 6);
+      sample.strains(0, axis) = strain;
+      sample.p.push_back({along + side, side});
+      samples.push_back(std::move(sample));
+      deformations.push_back(F);
+      stresses.push_back(at.P);
+    }
+  const SampledMaterial material = sample_material(samples, {1e-3, 21});
+  double greatest = 0.0;
+  for (const Matrix3& P : stresses) greatest = std::max(greatest, P.norm());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    PointStress own;
+    material.law->stress(0, deformations[i], false, own);
+    EXPECT_LT((own.P - stresses[i]).norm(), 0.005 * greatest) << i;
+  }
+  EXPECT_LT(material.stress_misfit, 0.002);
+}
+
 TEST(SampledLaw, ErrorFallsAsTheBasisGrows) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
