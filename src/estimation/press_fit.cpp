@@ -287,6 +287,7 @@ class PressFit {
     while (best_->layout.terms < most && !stop()) {
       PressTheta layout = best_->layout;
       ++layout.terms;
+      if (std::ranges::find(outcome_.tried, layout, &TriedLaw::layout) != outcome_.tried.end()) break;
       const std::string stage = std::to_string(layout.terms) + " terms";
       if (!fit_freer(layout, with_term(best_->layout, best_->theta), stage)) break;
       if (layout.own_ratios || stop()) continue;

@@ -146,8 +146,9 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
     for (const PressSample& s : outcome.samples) least = std::min(least, s.weight), most = std::max(most, s.weight);
     fit.notes.push_back(fmt::format(
         "The sampled material has {:.1f} samples an element, from {} presses; the weight of smoothness was chosen by "
-        "the noise in each, between {:.3g} and {:.3g}. Its stress misses that of the presses' own fields by {:.1f} % of "
-        "the greatest, root mean square. The parameters above are those of the law that it is smooth about.",
+        "the noise in each, between {:.3g} and {:.3g}. Its stress misses that of the presses' own fields by "
+        "{:.1f} % of the greatest, root mean square. The parameters above are those of the law that it is smooth "
+        "about.",
         outcome.sampled->mean_samples, outcome.samples.size(), least, most, 100.0 * outcome.sampled->stress_misfit));
   }
   RecordingOutcome recording;
