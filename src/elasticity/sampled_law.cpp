@@ -249,7 +249,7 @@ class StressFit {
     start_ = interpolated_at_rest();
   }
 
-  /// Returns the sum of squares that is left, relative to the greatest stress.
+  /// Returns the sum of the squares of stresses' errors that are left, relative to the greatest stress of a sample.
   double run() {
     VectorX residuals;
     MatrixX J;
@@ -273,7 +273,9 @@ class StressFit {
         damping = 10.0 * std::max(damping, 1e-3);
       }
     }
-    return residuals.head(6 * Eigen::Index(strains_.size())).squaredNorm();
+    double greatest = 0.0;
+    for (const Strain6& stress : stresses_) greatest = std::max(greatest, stress.squaredNorm());
+    return residuals.head(6 * Eigen::Index(strains_.size())).squaredNorm() * unit_ * unit_ / greatest;
   }
 
  private:

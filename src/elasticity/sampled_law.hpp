@@ -70,7 +70,8 @@ struct SampledMaterial {
   double mean_samples = 0.0;          ///< of an element
   std::vector<double> error_by_size;  ///< relative stress error with 1, 2, ... samples an element, root mean square
                                       ///< over elements and deformations: of E(p(e)) e
-  double stress_misfit = 0.0;         ///< the same of the law's own stress in the end
+  double stress_misfit = 0.0;         ///< of the law's own stress in the end, relative to the greatest of the element's
+                                      ///< samples by the tensors' norms, root mean square likewise
 };
 
 /// Chooses, element by element, few of the samples that reproduce all of them (section 4.2): first zero strain with the

@@ -201,7 +201,7 @@ VectorX with_zone(const PressTheta& from, const VectorX& theta, int zone) {
 VectorX law_contrast_deviations(const PressTheta& layout, double modulus_variation) {
   VectorX deviation = VectorX::Ones(1 + layout.law_freedom());  // of an exponent's: its scale
   deviation[0] = modulus_variation;
-  for (int i = 1; i < layout.terms; ++i) deviation[(layout.own_ratios ? 3 : 2) * i + 1] = modulus_variation;
+  for (int i = 1; i < layout.terms; ++i) deviation[layout.own_ratios ? 3 * i + 1 : 2 * i + 2] = modulus_variation;
   return deviation;
 }
 

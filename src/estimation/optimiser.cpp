@@ -83,21 +83,23 @@ class Run {
   const std::function<bool(const Iteration&)>& on_iteration_;
 };
 
-/// -H^-1 g over the numbers that can move: one that lies at its bound and is pushed outwards takes no part, so that the
-/// others go where they would with it fixed.
+/// -H^-1 g over the numbers that can move: those that lie at a bound and are pushed outwards take no part, so that the
+/// others go where they would with these fixed. What pushes itself goes first: another may be pushed by that alone.
 VectorX step_within_bounds(const Run& run, const MatrixX& H) {
   const VectorX &p = run.summary.p, &g = run.summary.evaluation.gradient;
   std::vector<Eigen::Index> free(std::size_t(p.size()));
   std::iota(free.begin(), free.end(), 0);
-  for (;;) {
+  while (!free.empty()) {
     VectorX step = VectorX::Zero(p.size());
     step(free) = -MatrixX(H(free, free)).ldlt().solve(VectorX(g(free)));
     const VectorX moved = run.clamp(p + step) - p;
     const auto is_blocked = [&](Eigen::Index i) {
       return step[i] != 0.0 && std::abs(moved[i]) < 1e-9 * std::abs(step[i]);
     };
-    if (std::erase_if(free, is_blocked) == 0 || free.empty()) return free.empty() ? VectorX::Zero(p.size()) : step;
+    const auto pushes_itself = [&](Eigen::Index i) { return is_blocked(i) && g[i] * step[i] < 0.0; };
+    if (std::erase_if(free, pushes_itself) == 0 && std::erase_if(free, is_blocked) == 0) return step;
   }
+  return VectorX::Zero(p.size());
 }
 
 void levenberg_marquardt(Run& run, const OptimiserOptions& options, const VectorX& memory) {

@@ -22,8 +22,8 @@ struct OptimiserOptions {
   /// Most that any unconstrained number moves in one iteration (a factor of two), > 0; Nelder-Mead's first simplex has
   /// edges of half of it.
   double max_step = 0.7;
-  /// How Levenberg-Marquardt keeps to that: by more damping in that step, so that numbers that the data hardly tell do
-  /// not hold up the others, or by a shorter step in the same direction.
+  /// How Levenberg-Marquardt keeps to that: by more damping in that step, so that combinations of numbers that the data
+  /// hardly tell do not hold up what they do, or by a shorter step in the same direction.
   bool damps_long_steps = false;
 };
 

@@ -23,7 +23,7 @@ constexpr double outlier_scale = 6.0;  // deviations
 constexpr std::array field_sizes = {4, 8, 16, 32};
 constexpr double needed_evidence = 3.0;  // e^3 to 1
 constexpr int most_zones = 8, most_passes = 4, brief_iterations = 8;
-constexpr double least_gain = 0.03;  // of the squares of the residuals, by a zone more
+constexpr double least_gain = 0.03;  // by a zone more, of the squares of the residuals
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
@@ -153,35 +153,37 @@ class PressFit {
   /// Minimises from theta; with the noise of its own residuals in the end. Nothing where it cannot be evaluated.
   std::optional<Estimate> minimised(const Form& form, const VectorX& theta, const std::string& stage,
                                     Effort effort = Effort::Full) {
+    const bool is_brief = effort == Effort::Brief;
     Estimate e = begun(form, theta);
     std::optional<PressObjective> objective;
     OptimiserOptions o;
-    const bool keeps_noise = effort == Effort::Brief || options_.noise > 0.0;
-    o.max_iterations = effort == Effort::Brief ? brief_iterations : options_.max_iterations;
+    o.max_iterations = is_brief ? brief_iterations : options_.max_iterations;
     o.damps_long_steps = true;
-    OptimiserState from = std::exchange(state_.under_way, {});
-    state_.cuts = form.cuts;
+    OptimiserState from;
+    if (!is_brief) from = std::exchange(state_.under_way, {}), state_.cuts = form.cuts;
     if (from.p.size() != e.parameters.dimension()) from = {0, e.parameters.to_unconstrained(theta), {}};
     OptimiserSummary s;
-    // Twice where the noise is not given: weights of outliers follow from it.
-    for (int round = 0; round < (keeps_noise ? 1 : 2) && !interrupted_; ++round) {
-      objective.emplace(objective_of(e));
-      s = minimise(*objective, from, o, [&](const Iteration& i) {
-        state_.under_way = i.state();
-        report(stage, i.number, i.cost, *objective, e.parameters.to_theta(i.p), form.layout);
-        if (monitor_.on_state) monitor_.on_state(state_);
+    // Twice: contact is as stiff, and outliers weigh as little, as the law and the noise at the beginning say.
+    for (int round = 0; round < (is_brief ? 1 : 2) && !interrupted_; ++round) {
+      std::optional<PressObjective> next(objective_of(e));
+      const OptimiserSummary done = minimise(*next, from, o, [&](const Iteration& i) {
+        report(stage, i.number, i.cost, *next, e.parameters.to_theta(i.p), form.layout);
+        if (!is_brief) keep_under_way(i.state(), form.cuts);
         return !stop();
       });
+      if (round > 0 && !done.succeeded) break;  // the first round stands
+      s = done;
+      objective.emplace(std::move(*next));
       if (!s.succeeded) break;
       e.parameters.set_reference(e.parameters.to_theta(s.p));
-      if (!keeps_noise) noise_ = robust_deviation(objective->residuals(), 1e-6 * scene_->body->size());
+      if (!is_brief && options_.noise <= 0.0)
+        noise_ = robust_deviation(objective->residuals(), 1e-6 * scene_->body->size());
       objective->set_options({noise_, outlier_scale});
       from = {0, s.p, {}};
     }
-    state_.under_way = {};
-    state_.cuts.clear();
+    if (!is_brief) state_.under_way = {}, state_.cuts.clear();
     if (!s.succeeded) {
-      outcome_.notes.push_back(stage + ": " + s.reason);
+      if (!is_brief) outcome_.notes.push_back(stage + ": " + s.reason);
       return std::nullopt;
     }
     const CostEvaluation begin = objective->evaluate(e.parameters.to_unconstrained(theta));
@@ -193,6 +195,12 @@ class PressFit {
     e.reason = s.reason;
     if (!e.evaluation.succeeded) return std::nullopt;
     return e;
+  }
+
+  void keep_under_way(OptimiserState state, const std::vector<ZoneCut>& cuts) {
+    state_.under_way = std::move(state);
+    state_.cuts = cuts;
+    if (monitor_.on_state) monitor_.on_state(state_);
   }
 
   void report(const std::string& stage, int iteration, double cost, const PressObjective& objective,
@@ -319,6 +327,7 @@ class PressFit {
     if (done && !done->cuts.empty()) {
       cuts = done->cuts;
     } else if (done) {
+      outcome_.tried.push_back({layout, done->cost, done->evidence, done->kept});
       return false;
     } else if (state_.under_way.p.size() > 0 && int(state_.cuts.size()) == zones - 1) {
       cuts = state_.cuts;
@@ -353,6 +362,9 @@ class PressFit {
   /// Moves cuts one after the other to where they fit better, as long as that gains something.
   void move_cuts(Estimate& e) {
     const std::string stage = std::to_string(e.layout.controls) + " zones";
+    const double start_cost = e.start_cost;
+    const auto keep = [&] { keep_under_way({0, e.parameters.to_unconstrained(e.theta), {}}, e.cuts); };
+    keep();
     bool any = false;
     for (int pass = 0, gained = 1; pass < most_passes && gained > 0; ++pass) {
       gained = 0;
@@ -364,12 +376,22 @@ class PressFit {
         form.cuts[c].at = move->at;
         form.scene = with_zones(form.cuts);
         auto moved = minimised(form, e.theta, stage, Effort::Brief);
-        if (moved && moved->evaluation.cost < e.evaluation.cost - needed_evidence) e = std::move(*moved), ++gained;
+        if (interrupted_ || !moved || moved->evaluation.cost > e.evaluation.cost - needed_evidence) continue;
+        e = std::move(*moved);
+        keep();
+        ++gained;
       }
       any = any || gained > 0;
     }
-    if (!any || interrupted_) return;
-    if (auto converged = minimised({e.layout, e.scene, {}, e.cuts}, e.theta, stage)) e = std::move(*converged);
+    if (interrupted_) return;  // to be gone on with
+    if (any) {
+      if (auto converged = minimised({e.layout, e.scene, {}, e.cuts}, e.theta, stage))
+        e = std::move(*converged);
+      else
+        noise_ = e.noise;
+    }
+    e.start_cost = start_cost;
+    state_.under_way = {}, state_.cuts.clear();
   }
 
   /// A law of its own for each region, against one shape of the law for all.
@@ -426,6 +448,8 @@ class PressFit {
     TriedLaw tried{layout, infinite, -infinite, false};
     std::optional<Estimate> next;
     const bool is_chosen = options_.control_points > 1;
+    if (const auto* done = done_before(layout); done && done->theta.size() == 0)
+      tried.cost = done->cost, tried.evidence = done->evidence;
     if (is_chosen || done_before(layout) || promises(form, start, carried, tried)) {
       next = estimate(form, start, std::to_string(size) + " control points");
       if (next) {

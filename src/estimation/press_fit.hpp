@@ -55,8 +55,9 @@ struct PressFitState {
 };
 
 struct PressFitEvent {
-  std::string stage;  ///< "1 term", "2 terms", "8 control points", "press 3"
-  int iteration = 0;
+  /// "linear", "1 term", "2 terms", "2 terms apart", "3 zones", "a law a region", "8 control points", "press 3"
+  std::string stage;
+  int iteration = 0;                    ///< begins again where noise or cuts change; of cuts that are only tried too
   double cost = 0.0, marker_rms = 0.0;  ///< [-], [m]
   double youngs_modulus = 0.0;          ///< [Pa], the mean
 };
@@ -90,12 +91,12 @@ struct PressFitOutcome {
 
 /// Estimates an object's material from presses with known force: Ogden's law of one term from the stiffness of a punch
 /// on a half space, more terms, and Poisson's ratios of their own for them, as long as the Bayesian information
-/// criterion falls; then zones of laws of their own, cut one after the other where that promises most, or, where a
-/// capture names regions, a law for each of them; and where no zone is kept, control points of Young's modulus: as long
-/// as their evidence supports them
-/// (`log_bayes_factor`). The noise is what the residuals say, robustly. For a sampled material the law of one term is
-/// what each press's field is smooth about. Throws InputError where the capture has no presses to fit or cannot be
-/// fitted.
+/// criterion falls; then zones of laws of their own, cut one after the other where that promises most, as long as the
+/// evidence supports them (`log_bayes_factor`) and each takes three per cent off the squares of the residuals, or,
+/// where a capture names regions, a law for each of them; and where no zone is kept, control points of Young's modulus
+/// by their evidence. The noise is what the residuals say, robustly. For a sampled material the law of one term is what
+/// each press's field is smooth about.
+/// Throws InputError where the capture has no presses to fit or cannot be fitted.
 PressFitOutcome fit_presses(const Capture& capture, const PressFitOptions& options, const PressFitMonitor& monitor = {},
                             PressFitState resume = {});
 

@@ -130,13 +130,15 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
     const std::string form = l.terms == 0 ? "a linear law"
                                           : fmt::format("Ogden's law of {} term{}{}", l.terms, l.terms == 1 ? "" : "s",
                                                         l.own_ratios ? " with Poisson's ratios of their own" : "");
-    const std::string field = l.laws > 1       ? fmt::format(", one for each of {} zones", l.laws)
-                              : l.controls > 1 ? fmt::format(" with {} moduli", l.controls)
-                                               : "";
+    const std::string field =
+        l.laws > 1       ? fmt::format(", one for each of {} {}", l.laws, capture.regions.empty() ? "zones" : "regions")
+        : l.controls > 1 ? fmt::format(" with {} moduli", l.controls)
+                         : "";
+    const char* verdict = tried.kept ? "kept" : std::isfinite(tried.cost) ? "not kept" : "not fitted";
     fit.notes.push_back(std::isfinite(tried.evidence)
-                            ? fmt::format("{}{}: {}, ln of the evidence for it {:.1f}", form, field,
-                                          tried.kept ? "kept" : "not kept", tried.evidence)
-                            : fmt::format("{}{}: {}", form, field, tried.kept ? "tried first" : "not fitted"));
+                            ? fmt::format("{}{}: {}, ln of the evidence for it {:.1f}{}", form, field, verdict,
+                                          tried.evidence, std::isfinite(tried.cost) ? "" : " by what a step promises")
+                            : fmt::format("{}{}: {}", form, field, tried.kept ? "tried first" : verdict));
   }
   for (std::size_t c = 0; c < outcome.cuts.size(); ++c)
     fit.notes.push_back(fmt::format("Zones: {}.", describe(outcome.cuts[c], int(c) + 1)));

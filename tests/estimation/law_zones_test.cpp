@@ -57,9 +57,22 @@ TEST_F(TwoLayers, AreFoundByTheCutThatPromisesMost) {
   ASSERT_TRUE(best.succeeded) << best.reason;
   const auto cut = most_promising_cut(objective, *scene, one, set.to_theta(best.p), {}, 1.5);
   ASSERT_TRUE(cut);
+  EXPECT_EQ(cut->cut.zone, 0);
   EXPECT_EQ(cut->cut.by, By::Y);
-
+  EXPECT_LT(std::abs(cut->cut.at - border), 0.04) << "of 0.1 m; moving it does the rest";
   EXPECT_GT(cut->evidence, 10.0);
+}
+
+TEST(LawZones, ContrastsKnowWhichNumberIsWhich) {
+  for (const PressTheta& layout : {PressTheta{1, 0}, PressTheta{1, 1}, PressTheta{1, 3}, PressTheta{1, 3, 1, true}}) {
+    const std::vector<std::string> names = press_parameters(layout, {"youngs_modulus"}, 5000.0).coordinate_names();
+    const VectorX deviation = law_contrast_deviations(layout, 7.0);
+    ASSERT_EQ(deviation.size(), Eigen::Index(names.size()));
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const bool is_stiffness = names[i].starts_with("youngs_modulus") || names[i].starts_with("stiffness_ratio");
+      EXPECT_EQ(deviation[Eigen::Index(i)], is_stiffness ? 7.0 : 1.0) << names[i];
+    }
+  }
 }
 
 TEST_F(TwoLayers, DrawACutToTheirBorder) {

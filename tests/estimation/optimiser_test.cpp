@@ -187,6 +187,67 @@ TEST_P(BaselineOptimiser, GoesOnFromAnyIterationAlongTheSamePath) {
 
 #ifdef PLIANT_WITH_NLOPT
 
+/// x^T H x / 2 - b x of numbers between -1 and 1.
+class BoundedQuadratic : public CostFunction {
+ public:
+  BoundedQuadratic(MatrixX H, VectorX b) : H_(std::move(H)), b_(std::move(b)) {
+    std::vector<Parameter> list;
+    for (int i = 0; i < b_.size(); ++i)
+      list.push_back({std::string(1, char('x' + i)), "1", Transform::Shift, i, 1.0, -1.0, 1.0, true});
+    set_ = ParameterSet(std::move(list), VectorX::Zero(b_.size()));
+  }
+  const ParameterSet& parameters() const override { return set_; }
+  CostEvaluation evaluate(const VectorX& x) override {
+    CostEvaluation e;
+    e.succeeded = true;
+    e.cost = 10.0 + 0.5 * x.dot(H_ * x) - b_.dot(x);
+    e.gradient = H_ * x - b_;
+    e.gauss_newton = H_;
+    return e;
+  }
+  CostEvaluation linearise(const VectorX& x) override { return evaluate(x); }
+  CostEvaluation gradient(const VectorX& x) override { return evaluate(x); }
+
+ private:
+  MatrixX H_;
+  VectorX b_;
+  ParameterSet set_;
+};
+
+TEST(LevenbergMarquardt, ANumberAtItsBoundDoesNotHoldUpTheOthers) {
+  // The first wants to go to 1000; the second's minimum with the first at 1 is 0.5.
+  const MatrixX H = (MatrixX(2, 2) << 1e-3, 0.0, 0.0, 1.0).finished();
+  BoundedQuadratic cost(H, Eigen::Vector2d(1.0, 0.5));
+  const OptimiserSummary s = minimise(cost, Eigen::Vector2d(1.0, -1.0), {});
+  EXPECT_EQ(s.p[0], 1.0);
+  EXPECT_NEAR(s.p[1], 0.5, 1e-3);
+  EXPECT_LE(s.iterations, 10);
+}
+
+TEST(LevenbergMarquardt, WhatOnlyAnotherNumberPushesOutwardsIsLetIn) {
+  const MatrixX H = (MatrixX(2, 2) << 1.0, -0.9, -0.9, 1.0).finished();
+  const Eigen::Vector2d at(1.0, 1.0), pull(0.55, -0.4);
+  BoundedQuadratic cost(H, H * at + pull);
+  const OptimiserSummary s = minimise(cost, at, {});
+  EXPECT_EQ(s.p[0], 1.0);
+  EXPECT_NEAR(s.p[1], 0.6, 1e-3);
+}
+
+TEST(LevenbergMarquardt, DampingOfLongStepsLetsWhatIsKnownArrive) {
+  // Of two numbers the sum is known, 0.4; their difference hardly is, and asks for a step of a hundred.
+  const MatrixX H = (MatrixX(2, 2) << 1.0, 1.0 - 1e-6, 1.0 - 1e-6, 1.0).finished();
+  BoundedQuadratic cost(H, H * Eigen::Vector2d(50.2, -49.8));
+  OptimiserOptions options;
+  options.max_iterations = 1;
+  options.max_step = 0.5;
+  const auto sum_after = [&](bool damps) {
+    options.damps_long_steps = damps;
+    return minimise(cost, {0, VectorX::Zero(2), VectorX::Constant(1, 1e-8)}, options).p.sum();
+  };
+  EXPECT_LT(sum_after(false), 0.01);
+  EXPECT_NEAR(sum_after(true), 0.4, 0.02);
+}
+
 TEST(NelderMead, FindsTheMinimumThatLevenbergAndMarquardtFind) {
   const test::Recording recording = test::torus_recording(cell_size, 6, 1, 1e-3, 1, 40, 0.0, 1.0, 1e-10);
   const ParameterSet set =

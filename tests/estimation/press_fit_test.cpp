@@ -101,6 +101,29 @@ TEST_F(PressedLayers, AFitIsResumedWhereItWasInterrupted) {
   EXPECT_THROW(read_press_state(folder / "state.json", "another key"), InputError);
 }
 
+TEST_F(PressedLayers, AnInterruptionWhileCutsMoveKeepsTheEstimate) {
+  PressFitOptions options;
+  options.zones = 2;
+  options.terms = 1;
+  const PressFitOutcome whole = fit_presses(capture, options);
+  ASSERT_TRUE(whole.succeeded) << whole.reason;
+  // The stage's iterations begin again for the second round, and then for the first cut that is tried elsewhere.
+  int begun = 0, seen = 0;
+  PressFitState left;
+  PressFitMonitor monitor;
+  monitor.on_event = [&](const PressFitEvent& e) { begun += e.stage == "2 zones" && e.iteration == 1; };
+  monitor.on_state = [&](const PressFitState& state) { left = state, ++seen; };
+  monitor.interrupted = [&] { return begun == 3; };
+  const PressFitOutcome part = fit_presses(capture, options, monitor);
+  ASSERT_TRUE(part.interrupted) << "no cut was tried elsewhere: the test would prove nothing";
+  EXPECT_EQ(left.cuts.size(), 1u);
+  EXPECT_GT(left.under_way.p.size(), 0);
+  const PressFitOutcome resumed = fit_presses(capture, options, {}, left);
+  ASSERT_TRUE(resumed.succeeded) << resumed.reason;
+  EXPECT_EQ(resumed.cuts, whole.cuts);
+  EXPECT_NEAR(resumed.evaluation.cost, whole.evaluation.cost, 1e-3 * whole.evaluation.cost);
+}
+
 TEST_F(PressedLayers, AreSampledPressByPress) {
   PressFitOptions options;
   options.material = PressMaterial::Sampled;
