@@ -80,13 +80,21 @@ def one_law(law, words, levels):
 def basis_growth():
     """Error of stress of the sampled material by its samples an element, where results hold it."""
     figures = results("virtual-block") or {}
-    found = [[law, f"{int(noise)} %", *(share(e) for e in fits["sampled"]["error_by_size"])] for law, levels in figures.get("laws", {}).items() for noise, fits in levels.items()
+    found = [(law, int(noise), fits["sampled"]["error_by_size"]) for law, levels in figures.get("laws", {}).items() for noise, fits in levels.items()
              if fits.get("sampled", {}).get("error_by_size")]
     if not found:
         return ""
-    most = max(map(len, found))
-    return ("\nError of stress of the sampled material by the number of samples of an element (Bickel 2009, section 4.2):\n\n" +
-            table(["truth", "noise", *map(str, range(1, most - 1))], [row + [""] * (most - len(row)) for row in found]))
+    most = max(len(errors) for _, _, errors in found)
+    panel = plots.EvenPanel(70, 20, 540, 260, most + 0.5, 108 * max(max(errors) for _, _, errors in found))
+    panel.axes("samples an element, at the most", "error of stress [%]")
+    for (law, noise, errors), colour in zip(found, plots.COLOURS):
+        for size, error in enumerate(errors, 1):
+            panel.mark(size, 100 * error, colour)
+    plots.write(IMAGES / "basis-growth.svg", 640, 330, panel.parts)
+    return ("\nThe basis of the sampled material while it grows (Bickel 2009, section 4.2): the error of the stress E(p(e)) e over all elements and presses, root mean square, relative to the greatest stress of the element. "
+            "Zero strain is the first sample; the second, the one that was worst, takes most off.\n\n![Error of stress by the number of samples](images/basis-growth.svg)\n\n" +
+            table(["truth, noise", *map(str, range(1, most + 1))],
+                  [[f"{law}, {noise} %", *(share(e) for e in errors), *[""] * (most - len(errors))] for law, noise, errors in found]))
 
 
 def oracle_press():

@@ -47,6 +47,9 @@ def judged(program, out, judge):
         entry[role] = sum(errors) / len(errors) if errors else None
         entry[f"{role}_max"] = max(errors, default=None)
         entry[f"{role}_presses"] = len(errors)
+    basis = out / "basis.csv"
+    if basis.exists():
+        entry["error_by_size"] = [float(line.split(",")[1]) for line in basis.read_text().splitlines()[1:]]
     return entry
 
 
