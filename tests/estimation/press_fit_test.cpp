@@ -33,6 +33,19 @@ struct PressedLayers : ::testing::Test {
     capture = read_capture(write_press_capture(folder.path(), block.scene(presses, law, 1e-4), 1));
   }
 
+  static PressFitOptions of_two_zones() {
+    PressFitOptions options;
+    options.zones = 2;
+    options.terms = 1;
+    return options;
+  }
+  static void expect_same(const PressFitOutcome& resumed, const PressFitOutcome& whole) {
+    ASSERT_TRUE(resumed.succeeded) << resumed.reason;
+    EXPECT_EQ(resumed.cuts, whole.cuts);
+    EXPECT_NEAR(resumed.evaluation.cost, whole.evaluation.cost, 1e-3 * whole.evaluation.cost);
+  }
+
+  const PressFitOptions two_zones = of_two_zones();
   TemporaryFolder folder;
   PressedBlock block{{5, 4, 5}};
   ZoneCut border{0, ZoneCut::By::Y, 1e-3};  // cells are 25 mm high
@@ -71,10 +84,7 @@ TEST_F(PressedLayers, OfOneLawEachWhereTheCaptureNamesThem) {
 }
 
 TEST_F(PressedLayers, AFitIsResumedWhereItWasInterrupted) {
-  PressFitOptions options;
-  options.zones = 2;
-  options.terms = 1;
-  const PressFitOutcome whole = fit_presses(capture, options);
+  const PressFitOutcome whole = fit_presses(capture, two_zones);
   ASSERT_TRUE(whole.succeeded) << whole.reason;
   for (const char* stage : {"1 term", "2 zones"}) {
     PressFitState left;
@@ -83,7 +93,7 @@ TEST_F(PressedLayers, AFitIsResumedWhereItWasInterrupted) {
     monitor.on_event = [&](const PressFitEvent& event) { came = came || event.stage == stage; };
     monitor.on_state = [&](const PressFitState& state) { left = state; };
     monitor.interrupted = [&] { return came; };
-    const PressFitOutcome part = fit_presses(capture, options, monitor);
+    const PressFitOutcome part = fit_presses(capture, two_zones, monitor);
     EXPECT_TRUE(part.interrupted);
     EXPECT_TRUE(part.predictions.empty());
     write_press_state(folder / "state.json", left, "key");
@@ -91,37 +101,30 @@ TEST_F(PressedLayers, AFitIsResumedWhereItWasInterrupted) {
     monitor = {};
     monitor.on_event = [&](const PressFitEvent& event) { events += event.stage == "1 term"; };
     const PressFitOutcome resumed =
-        fit_presses(capture, options, monitor, read_press_state(folder / "state.json", "key"));
-    ASSERT_TRUE(resumed.succeeded) << resumed.reason;
+        fit_presses(capture, two_zones, monitor, read_press_state(folder / "state.json", "key"));
     EXPECT_EQ(events > 0, std::string(stage) == "1 term") << "what is done is not done again";
-    EXPECT_EQ(resumed.cuts, whole.cuts);
-    EXPECT_NEAR(resumed.evaluation.cost, whole.evaluation.cost, 1e-3 * whole.evaluation.cost);
+    expect_same(resumed, whole);
     EXPECT_LT((resumed.theta.array() / whole.theta.array() - 1.0).abs().maxCoeff(), 0.02);
   }
   EXPECT_THROW(read_press_state(folder / "state.json", "another key"), InputError);
 }
 
 TEST_F(PressedLayers, AnInterruptionWhileCutsMoveKeepsTheEstimate) {
-  PressFitOptions options;
-  options.zones = 2;
-  options.terms = 1;
-  const PressFitOutcome whole = fit_presses(capture, options);
+  const PressFitOutcome whole = fit_presses(capture, two_zones);
   ASSERT_TRUE(whole.succeeded) << whole.reason;
   // The stage's iterations begin again for the second round, and then for the first cut that is tried elsewhere.
-  int begun = 0, seen = 0;
+  int begun = 0;
   PressFitState left;
   PressFitMonitor monitor;
   monitor.on_event = [&](const PressFitEvent& e) { begun += e.stage == "2 zones" && e.iteration == 1; };
-  monitor.on_state = [&](const PressFitState& state) { left = state, ++seen; };
+  monitor.on_state = [&](const PressFitState& state) { left = state; };
   monitor.interrupted = [&] { return begun == 3; };
-  const PressFitOutcome part = fit_presses(capture, options, monitor);
+  const PressFitOutcome part = fit_presses(capture, two_zones, monitor);
   ASSERT_TRUE(part.interrupted) << "no cut was tried elsewhere: the test would prove nothing";
   EXPECT_EQ(left.cuts.size(), 1u);
   EXPECT_GT(left.under_way.p.size(), 0);
-  const PressFitOutcome resumed = fit_presses(capture, options, {}, left);
-  ASSERT_TRUE(resumed.succeeded) << resumed.reason;
-  EXPECT_EQ(resumed.cuts, whole.cuts);
-  EXPECT_NEAR(resumed.evaluation.cost, whole.evaluation.cost, 1e-3 * whole.evaluation.cost);
+  const PressFitOutcome resumed = fit_presses(capture, two_zones, {}, left);
+  expect_same(resumed, whole);
 }
 
 TEST_F(PressedLayers, AreSampledPressByPress) {
