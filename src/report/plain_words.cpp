@@ -137,6 +137,10 @@ std::string spoken_name(const std::string& name) {
   const size_t at = name.find('@');
   const std::string base = name.substr(0, at), region = at == std::string::npos ? "" : " (" + name.substr(at + 1) + ")";
   if (const auto found = spoken.find(base); found != spoken.end()) return found->second + region;
+  const size_t number = base.find_last_not_of("0123456789") + 1;  // of a law's term: "poisson_ratio_2"
+  if (number > 0 && number < base.size() && base[number - 1] == '_')
+    if (const auto found = spoken.find(base.substr(0, number - 1)); found != spoken.end())
+      return found->second + " " + base.substr(number) + region;
   std::string words = base;
   std::replace(words.begin(), words.end(), '_', ' ');
   if (!words.empty() && words[0] >= 'a' && words[0] <= 'z') words[0] = char(words[0] - 'a' + 'A');
@@ -170,7 +174,14 @@ std::vector<std::string> plain_sentences(const ReportData& data) {
   std::vector<std::string> sentences{agreement_sentence(data)};
   for (const ParameterResult& p : data.result.parameters) sentences.push_back(trust_sentence(p));
   for (const ParameterResult& p : data.result.parameters) sentences.push_back(discretisation_sentence(p));
-  for (const CorrelationResult& c : data.result.identifiability) sentences.push_back(correlation_sentence(c));
+  constexpr int most_pairs = 6;  // the strongest come first, and the page has them all in a table
+  int pairs = 0;
+  for (const CorrelationResult& c : data.result.identifiability) {
+    const std::string sentence = correlation_sentence(c);
+    if (!sentence.empty() && pairs++ < most_pairs) sentences.push_back(sentence);
+  }
+  if (pairs > most_pairs)
+    sentences.push_back(fmt::format("{} more pairs of parameters are hard to tell apart.", pairs - most_pairs));
   sentences.push_back(starts_sentence(data.result));
   sentences.push_back(given_sentence(data.result));
   for (const std::string& note : data.result.notes) sentences.push_back(note);

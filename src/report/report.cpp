@@ -419,8 +419,9 @@ std::string usage(const ReportData& data) {
   return "<p>The model stands beside this page: <code>" + model +
          "</code> with its volume mesh and surface. All numbers are SI.</p>\n<pre>"
          "# predict another recording with this model and compare\npliant evaluate " +
-         model + " OTHER_CAPTURE\n\n# repeat this fit\npliant fit " + escape_html(capture) +
-         " --out OUT</pre>\n<p>The simulated motion opens in ParaView: <code>trajectory.pvd</code>. "
+         model + " OTHER_CAPTURE\n\n# repeat this fit\npliant fit " + escape_html(capture) + " --out OUT</pre>\n<p>" +
+         (data.presses.empty() ? "The simulated motion opens in ParaView: <code>trajectory.pvd</code>. "
+                               : "The object under each press opens in ParaView: <code>presses.pvd</code>. ") +
          "The figures of this page are in <code>result.json</code> and <code>convergence.csv</code>.</p>\n";
 }
 

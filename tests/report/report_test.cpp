@@ -90,6 +90,12 @@ ReportData example(int width, int height) {
   return data;
 }
 
+TEST(PlainWords, TermsOfALawAreSpokenLikeTheWhole) {
+  EXPECT_EQ(spoken_name("poisson_ratio"), "Poisson's ratio");
+  EXPECT_EQ(spoken_name("poisson_ratio_2@top"), "Poisson's ratio 2 (top)");
+  EXPECT_EQ(spoken_name("exponent_2"), "Exponent 2");
+}
+
 TEST(Report, ShowsLoadsThatWereKeptApart) {
   ReportData data = example(8, 5);
   EXPECT_THAT(report_html(data), Not(HasSubstr("Under hung weights")));
