@@ -7,9 +7,9 @@
 #include "base/error.hpp"
 #include "capture/markers.hpp"
 #include "commands.hpp"
-#include "report/fit_output.hpp"
-#include "report/prediction.hpp"
-#include "report/press_output.hpp"
+#include "output/fit_output.hpp"
+#include "output/prediction.hpp"
+#include "output/press_output.hpp"
 
 namespace pliant::apps {
 

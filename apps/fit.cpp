@@ -15,8 +15,8 @@
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
-#include "report/fit_output.hpp"
-#include "report/press_output.hpp"
+#include "output/fit_output.hpp"
+#include "output/press_output.hpp"
 #include "report/report.hpp"
 
 namespace pliant::apps {

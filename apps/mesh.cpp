@@ -9,8 +9,8 @@
 #include "base/files.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
-#include "geometry/tet_mesh.hpp"
 #include "geometry/volume_mesh.hpp"
+#include "mesh/tet_mesh.hpp"
 #include "model/vtu.hpp"
 #include "speech.hpp"
 

@@ -12,7 +12,7 @@
 #include "estimation/problem.hpp"
 #include "geometry/mesh_io.hpp"
 #include "motion/press_session.hpp"
-#include "report/press_output.hpp"
+#include "output/press_output.hpp"
 
 namespace pliant::apps {
 

@@ -11,7 +11,7 @@
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/load_free.hpp"
-#include "report/fit_output.hpp"
+#include "output/fit_output.hpp"
 #include "report/picture.hpp"
 
 namespace pliant::apps {

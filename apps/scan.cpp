@@ -10,11 +10,11 @@
 #include "base/files.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/point_cloud.hpp"
-#include "capture/rest_scan.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
-#include "geometry/ray_scene.hpp"
+#include "rays/ray_scene.hpp"
 #include "report/picture.hpp"
+#include "scan/rest_scan.hpp"
 #include "speech.hpp"
 
 namespace pliant::apps {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "commands.hpp"
-#include "report/fit_output.hpp"
+#include "output/fit_output.hpp"
 
 namespace pliant::apps {
 

@@ -7,9 +7,10 @@
 
 #include "base/error.hpp"
 #include "capture/region.hpp"
-#include "capture/scene.hpp"
 #include "commands.hpp"
+#include "meshing/mesh_distance.hpp"
 #include "motion/simulation.hpp"
+#include "synthesis/scene.hpp"
 
 namespace pliant::apps {
 

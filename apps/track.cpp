@@ -9,7 +9,7 @@
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/followed.hpp"
-#include "report/track_output.hpp"
+#include "output/track_output.hpp"
 
 namespace pliant::apps {
 

@@ -1,17 +1,17 @@
-# cmake --install: the program, the rooms' libraries and headers, and a package that find_package(pliant) finds.
+# cmake --install: the program, the modules' libraries and headers, and a package that find_package(pliant) finds.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-get_property(rooms GLOBAL PROPERTY PLIANT_ROOMS)
+get_property(modules GLOBAL PROPERTY PLIANT_MODULES)
 add_library(pliant_library INTERFACE)
 add_library(pliant::pliant ALIAS pliant_library)
-list(TRANSFORM rooms PREPEND pliant_ OUTPUT_VARIABLE room_targets)
-target_link_libraries(pliant_library INTERFACE ${room_targets})
+list(TRANSFORM modules PREPEND pliant_ OUTPUT_VARIABLE module_targets)
+target_link_libraries(pliant_library INTERFACE ${module_targets})
 set_target_properties(pliant_library PROPERTIES EXPORT_NAME pliant)
 
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pliant)
 install(TARGETS pliant RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS pliant_library ${room_targets} EXPORT pliantTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS pliant_library ${module_targets} EXPORT pliantTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pliant FILES_MATCHING PATTERN "*.hpp")
 install(EXPORT pliantTargets NAMESPACE pliant:: DESTINATION ${package_folder})
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/docs/licences.md DESTINATION ${CMAKE_INSTALL_DOCDIR})

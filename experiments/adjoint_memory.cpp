@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "geometry/primitives.hpp"
+#include "meshing/mesh_distance.hpp"
 #include "motion/simulation.hpp"
 
 int main(int argc, char** argv) {
@@ -34,6 +35,7 @@ int main(int argc, char** argv) {
         [](int, const State& state, Points& x_bar) { x_bar += 1e-3 * state.x; }, theta_bar);
     if (!summary.succeeded) return 1;
     const std::size_t all = std::size_t(frames + 1) * 6 * sizeof(double) * std::size_t(body->node_count());
-    std::printf("%d,%d,%zu,%zu,%zu\n", frames, body->node_count(), options.memory_budget, all, simulation.peak_state_bytes());
+    std::printf("%d,%d,%zu,%zu,%zu\n", frames, body->node_count(), options.memory_budget, all,
+                simulation.peak_state_bytes());
   }
 }

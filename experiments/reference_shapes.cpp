@@ -26,9 +26,9 @@
 #include <stdexcept>
 
 #include "choices.hpp"
-#include "geometry/signed_distance.hpp"
-#include "geometry/tet_mesh.hpp"
 #include "held_objects.hpp"
+#include "mesh/tet_mesh.hpp"
+#include "meshing/mesh_distance.hpp"
 #include "motion/reference_shape.hpp"
 #include "motion/simulation.hpp"
 #include "report/picture.hpp"

@@ -6,7 +6,7 @@
 
 #include "elasticity/modulus_field.hpp"
 #include "geometry/primitives.hpp"
-#include "geometry/tet_mesh.hpp"
+#include "mesh/tet_mesh.hpp"
 
 namespace pliant {
 

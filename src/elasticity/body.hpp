@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "elasticity/hex_element.hpp"
-#include "geometry/hex_grid.hpp"
-#include "geometry/tet_mesh.hpp"
+#include "mesh/hex_grid.hpp"
+#include "mesh/tet_mesh.hpp"
 #include "solvers/block_matrix.hpp"
 
 namespace pliant {

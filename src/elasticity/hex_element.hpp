@@ -1,7 +1,7 @@
 #pragma once
 
 #include "elasticity/parameters.hpp"
-#include "geometry/hex_grid.hpp"
+#include "mesh/hex_grid.hpp"
 
 namespace pliant {
 

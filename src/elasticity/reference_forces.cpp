@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "geometry/tet_shape.hpp"
+#include "mesh/tet_shape.hpp"
 
 namespace pliant {
 

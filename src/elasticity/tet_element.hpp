@@ -1,7 +1,7 @@
 #pragma once
 
 #include "elasticity/parameters.hpp"
-#include "geometry/tet_shape.hpp"
+#include "mesh/tet_shape.hpp"
 
 namespace pliant {
 

@@ -8,6 +8,7 @@
 #include "capture/markers.hpp"
 #include "capture/region.hpp"
 #include "elasticity/modulus_field.hpp"
+#include "meshing/mesh_distance.hpp"
 
 namespace pliant {
 

@@ -42,14 +42,6 @@ class SignedDistance {
   std::vector<float> values_;
 };
 
-/// Signed distance of a closed, outward oriented mesh, by OpenVDB.
-/// @param spacing  of the distance grid [m]
-/// @param margin   how far outside the mesh's box the grid reaches [m]; distances are cut off a little beyond it,
-/// inside
-///                 and outside, which keeps the work in a band around the surface
-/// Throws InputError where the mesh encloses no grid point.
-SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double margin);
-
 template <class Function>
 SignedDistance::SignedDistance(const Box& box, double spacing, Function&& function) {
   allocate(box, spacing);

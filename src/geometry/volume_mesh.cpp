@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "geometry/raw_cells.hpp"
-#include "geometry/tet_shape.hpp"
+#include "mesh/tet_shape.hpp"
 
 namespace pliant {
 

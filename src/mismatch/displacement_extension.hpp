@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "geometry/hex_grid.hpp"
+#include "mesh/hex_grid.hpp"
 
 namespace pliant {
 

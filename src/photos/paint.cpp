@@ -17,10 +17,10 @@
 #include "base/files.hpp"
 #include "capture/markers.hpp"
 #include "capture/toml_facts.hpp"
-#include "geometry/look_at.hpp"
+#include "rays/look_at.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
-#include "geometry/ray_scene.hpp"
+#include "rays/ray_scene.hpp"
 
 namespace pliant {
 

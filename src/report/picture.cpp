@@ -10,8 +10,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "geometry/look_at.hpp"
-#include "geometry/ray_scene.hpp"
+#include "rays/look_at.hpp"
+#include "rays/ray_scene.hpp"
 
 namespace pliant {
 

@@ -9,7 +9,7 @@
 
 #include "capture/capture.hpp"
 #include "capture/observe.hpp"
-#include "geometry/ray_scene.hpp"
+#include "rays/ray_scene.hpp"
 #include "mismatch/point_tracks.hpp"
 #include "motion/simulation.hpp"
 #include "tracking/correspondence.hpp"

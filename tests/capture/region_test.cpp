@@ -1,6 +1,6 @@
 #include "capture/region.hpp"
 
-#include "surface/meshes.hpp"
+#include "geometry/meshes.hpp"
 
 namespace pliant {
 namespace {

@@ -9,7 +9,7 @@
 #include "capture/image_io.hpp"
 #include "capture/point_cloud.hpp"
 #include "geometry/mesh_io.hpp"
-#include "surface/meshes.hpp"
+#include "geometry/meshes.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant::test {

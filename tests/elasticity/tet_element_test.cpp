@@ -4,7 +4,7 @@
 #include <map>
 #include <random>
 
-#include "geometry/tet_mesh.hpp"
+#include "mesh/tet_mesh.hpp"
 #include "support/bodies.hpp"
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"

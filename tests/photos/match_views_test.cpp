@@ -8,7 +8,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "geometry/look_at.hpp"
+#include "rays/look_at.hpp"
 
 namespace pliant::test {
 namespace {

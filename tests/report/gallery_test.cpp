@@ -1,7 +1,7 @@
 #include "report/gallery.hpp"
 
 #include "geometry/primitives.hpp"
-#include "geometry/ray_scene.hpp"
+#include "rays/ray_scene.hpp"
 
 namespace pliant {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "geometry/primitives.hpp"
-#include "geometry/ray_scene.hpp"
+#include "rays/ray_scene.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant {

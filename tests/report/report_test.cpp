@@ -4,7 +4,7 @@
 #include <cstdlib>
 
 #include "geometry/primitives.hpp"
-#include "geometry/ray_scene.hpp"
+#include "rays/ray_scene.hpp"
 #include "report/picture.hpp"
 #include "support/load_errors.hpp"
 #include "temporary_folder.hpp"

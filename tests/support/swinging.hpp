@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "geometry/look_at.hpp"
+#include "rays/look_at.hpp"
 #include "tracking/tracker.hpp"
 
 namespace pliant::test {

@@ -1,0 +1,625 @@
+#include "output/fit_output.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <tuple>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+#include "elasticity/corotated.hpp"
+#include "elasticity/element_moduli.hpp"
+#include "elasticity/law_elasticity.hpp"
+#include "model/vtu.hpp"
+#include "report/gallery.hpp"
+#include "output/prediction.hpp"
+#include "output/press_output.hpp"
+#include "report/report.hpp"
+#include "output/track_output.hpp"
+
+namespace pliant {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+ParameterValue value_of(const Parameter& p, const VectorX& theta) {
+  if (p.transform == Transform::PlanePosition)
+    return PlaneValue{theta.segment<3>(p.theta_index), theta.segment<3>(p.theta_index + 3)};
+  if (!p.is_scalar()) return Vector3(theta.segment<3>(p.theta_index));
+  return theta[p.theta_index];
+}
+
+/// Standard deviation of a value from that of its unconstrained numbers, by the transform's derivative.
+ParameterValue std_of(const Parameter& p, const VectorX& std, const MatrixX& jacobian, int at) {
+  if (p.is_scalar()) return std::abs(jacobian(p.theta_index, at)) * std[at];
+  const MatrixX spread = jacobian.middleCols(at, p.dimension()) * std.segment(at, p.dimension()).asDiagonal();
+  const auto row_norm = [&](int row) {
+    return Vector3(spread.row(row).norm(), spread.row(row + 1).norm(), spread.row(row + 2).norm());
+  };
+  if (p.transform != Transform::PlanePosition) return row_norm(p.theta_index);
+  return PlaneValue{row_norm(p.theta_index), row_norm(p.theta_index + 3)};
+}
+
+std::map<std::string, double> scalars_of(const ParameterSet& parameters, const VectorX& theta) {
+  std::map<std::string, double> values;
+  for (const Parameter& p : parameters.parameters()) {
+    if (p.is_scalar()) {
+      values[p.name] = theta[p.theta_index];
+    } else {
+      for (int d = 0; d < 3; ++d) values[p.name + "." + "xyz"[d]] = theta[p.theta_index + d];
+      if (p.transform == Transform::PlanePosition)
+        for (int d = 0; d < 3; ++d) values[p.name + ".normal." + "xyz"[d]] = theta[p.theta_index + 3 + d];
+    }
+  }
+  return values;
+}
+
+/// Of what was estimated.
+std::map<std::string, double> estimates_of(const ParameterSet& parameters, const VectorX& theta) {
+  std::map<std::string, double> values = scalars_of(parameters, theta);
+  for (const Parameter& p : parameters.parameters())
+    if (!p.estimated)
+      std::erase_if(values, [&](const auto& v) { return v.first.substr(0, v.first.find('.')) == p.name; });
+  return values;
+}
+
+void add_resolutions(Result& result, const FitOutcome& outcome) {
+  for (const RefinedEstimate& e : outcome.refinement.estimates) {
+    ResolutionResult r{e.cells, e.steps,     e.elements, estimates_of(outcome.parameters, e.theta),
+                       {},      e.converged, e.reason};
+    if (std::isfinite(e.cost)) r.cost = e.cost;
+    result.resolutions.push_back(std::move(r));
+  }
+}
+
+void add_correlations(Result& result, const FitOutcome& outcome) {
+  if (outcome.correlation.size() == 0) return;
+  const auto names = outcome.parameters.coordinate_names();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      result.identifiability.push_back({{names[j], names[i]}, outcome.correlation(Eigen::Index(i), Eigen::Index(j))});
+  std::stable_sort(result.identifiability.begin(), result.identifiability.end(),
+                   [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
+}
+
+ConvergenceHistory history_of(const FitOutcome& outcome) {
+  ConvergenceHistory history;
+  std::vector<const Parameter*> shown;
+  for (const Parameter& p : outcome.parameters.parameters())
+    if (p.is_scalar() && (p.estimated || p.name == "youngs_modulus")) shown.push_back(&p);
+  for (const Parameter* p : shown) history.parameters.push_back(p->name), history.units.push_back(p->unit);
+  for (const FitEvent& e : outcome.history) {
+    ConvergenceRow row{e.start, e.iteration, e.stage, e.cost, e.damping, {}};
+    for (const Parameter* p : shown) row.parameters.push_back(e.theta[p->theta_index]);
+    history.rows.push_back(std::move(row));
+  }
+  // Starts, and the values of a scan, are worked on side by side: their order must not depend on the threads.
+  const auto place = [](const ConvergenceRow& row) {
+    const int stage = row.stage == "motion" ? 0 : row.stage == "scan" ? 1 : 2;
+    return std::tuple(row.start, stage, stage == 1 ? row.iteration : 0);
+  };
+  std::stable_sort(history.rows.begin(), history.rows.end(),
+                   [&](const auto& a, const auto& b) { return place(a) < place(b); });
+  return history;
+}
+
+std::vector<double> six(const Matrix3& m) { return {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(1, 2), m(0, 2)}; }
+
+VtuCell vtu_cell(ElementKind kind) {
+  switch (kind) {
+    case ElementKind::Tetrahedron:
+      return VtuCell::Tetrahedron;
+    case ElementKind::QuadraticTetrahedron:
+      return VtuCell::QuadraticTetrahedron;
+    case ElementKind::Hexahedron:
+      break;
+  }
+  return VtuCell::Hexahedron;
+}
+
+}  // namespace
+
+VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& parameters, const State& state,
+                   Elasticity& elasticity) {
+  const Body& body = *shared;
+  VtuGrid grid;
+  grid.kind = vtu_cell(body.kind);
+  auto* by_law = dynamic_cast<LawElasticity*>(&elasticity);
+  ElementModuli modulus(shared);
+  if (!by_law) modulus.set_parameters(parameters);
+  grid.points = state.x;
+  VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}},
+      stress{"stress [Pa]", 6, {}};
+  const Points u = state.x - body.reference_positions();
+  displacement.values.assign(u.data(), u.data() + u.size());
+  velocity.values.assign(state.v.data(), state.v.data() + state.v.size());
+  elasticity.linearise(state.x);
+  const UnitLame c = unit_lame(parameters[theta::poissons_ratio]);
+  for (int e = 0; e < body.element_count(); ++e) {
+    const auto cell = to_vtk_order(grid.kind, body.element(e));
+    grid.connectivity.insert(grid.connectivity.end(), cell.begin(), cell.end());
+    const Polar& polar = elasticity.rotation(e);
+    const Matrix3 in_body = polar.S - Matrix3::Identity();
+    const Matrix3 in_world = polar.R * in_body * polar.R.transpose();
+    const Matrix3 sigma =
+        by_law ? by_law->cauchy_stress(e)
+               : Matrix3(modulus[e] * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world));
+    for (const double v : six(in_world)) strain.values.push_back(v);
+    for (const double v : six(sigma)) stress.values.push_back(v);
+  }
+  grid.point_data = {std::move(displacement), std::move(velocity)};
+  grid.cell_data = {std::move(strain), std::move(stress)};
+  return grid;
+}
+
+namespace {
+
+/// What was observed in a frame, and how far it lies from the simulated surface; points outside the band are left out.
+void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, const Discretisation& d,
+                      const Points& nodes) {
+  std::vector<SurfaceObservation> points;
+  for (const Vector3& p : seen) points.push_back({p, 1.0});
+  if (!d.mismatch.surface) return;
+  const auto matches = d.mismatch.surface->match(points, nodes);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (matches[i].cell < 0) continue;
+    frame.points.push_back(points[i].position);
+    frame.residuals.push_back(matches[i].distance / matches[i].stretch);
+  }
+}
+
+std::vector<Plane> planes_of(const Capture& capture, const VectorX& theta) {
+  std::vector<Plane> planes = capture.planes;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    planes[i].point = theta.segment<3>(theta::plane_point(int(i)));
+    planes[i].normal = theta.segment<3>(theta::plane_normal(int(i)));
+  }
+  return planes;
+}
+
+/// A frame's points where the estimate has them.
+std::vector<Vector3> corrected_points(const ObservedFrame& seen, const Capture& capture, const Discretisation& d,
+                                      const VectorX& theta) {
+  std::vector<Vector3> points = seen.points;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const int sensor = seen.camera[i] < 0 ? int(capture.depth.size()) : seen.camera[i];
+    const int at = theta::sensor(sensor, d.simulation.planes, d.simulation.pulls);
+    points[i] =
+        SensorCorrection(d.mismatch.centre, theta.segment<SensorCorrection::size>(at)).apply(points[i], seen.view[i]);
+  }
+  return points;
+}
+
+/// A few of the fitted frames that tell the story, simulated with the estimate and drawn over what was observed.
+Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutcome& outcome) {
+  const Capture& capture = recorded_capture.capture;
+  const Discretisation& d = outcome.discretisation;
+  Gallery gallery;
+  gallery.triangles = capture.surface->triangles;
+  gallery.planes = planes_of(capture, outcome.theta);
+  if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
+  gallery.up = capture.up;
+  gallery.width = 480, gallery.height = 400;
+  const auto& fitted = outcome.evaluation.frames;
+  std::vector<int> told;
+  for (const int i : spread_frames(0, int(fitted.size()) - 1, 6)) told.push_back(fitted[std::size_t(i)].frame);
+  if (told.empty()) return gallery;
+  const Embedding embedding(*d.body, capture.surface->vertices);
+  const double start = capture.times[std::size_t(capture.start_frame)];
+  Simulation simulation(d.body, d.simulation);
+  simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
+    if (!std::ranges::binary_search(told, frame)) return true;
+    const int recorded = frame + capture.start_frame;
+    GalleryFrame drawn{recorded, capture.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
+    const auto seen = std::ranges::find(recorded_capture.observed, recorded, &ObservedFrame::frame);
+    if (seen != recorded_capture.observed.end())
+      add_observations(drawn, corrected_points(*seen, capture, d, outcome.theta), d, state.x);
+    gallery.frames.push_back(std::move(drawn));
+    return frame < told.back();
+  });
+  return gallery;
+}
+
+void add_pictures(ReportData& report, const Gallery& gallery) {
+  if (gallery.frames.empty()) return;
+  report.residual_range = residual_range(all_residuals(gallery));
+  report.pictures = draw_gallery(gallery, report.residual_range);
+}
+
+/// A stage's name for people.
+std::string spoken_stage(const std::string& stage) {
+  static const std::map<std::string, std::string> names = {{"motion", "motion at the start"},
+                                                           {"coarse", "coarse grid"},
+                                                           {"fine, wide band", "fine grid, outliers kept"},
+                                                           {"fine", "fine grid"}};
+  const auto it = names.find(stage);
+  return it == names.end() ? stage : it->second;
+}
+
+/// The convergence that the page draws: the scan's trials are no iterations.
+ConvergenceHistory drawn_history(ConvergenceHistory history) {
+  std::erase_if(history.rows, [](const ConvergenceRow& row) { return row.stage == "scan"; });
+  for (ConvergenceRow& row : history.rows) row.stage = spoken_stage(row.stage);
+  return history;
+}
+
+VectorX model_theta(const Model& model, const Vector3& gravity, int sensors) {
+  const int planes = int(model.planes.size()), pulls = int(model.initial.pulls.size());
+  VectorX theta = VectorX::Zero(theta::size(planes, 1, pulls, sensors));
+  for (int k = 0; k < pulls; ++k) theta.segment<3>(theta::pull(k, planes)) = model.initial.pulls[std::size_t(k)];
+  theta[theta::youngs_modulus] = model.youngs_modulus;
+  theta[theta::poissons_ratio] = model.poisson_ratio;
+  theta[theta::mass_damping] = model.mass_damping;
+  theta[theta::stiffness_damping] = model.stiffness_damping;
+  theta[theta::density] = model.density;
+  theta.segment<3>(theta::gravity) = gravity;
+  theta.segment<3>(theta::linear_velocity) = model.initial.linear_velocity;
+  theta.segment<3>(theta::angular_velocity) = model.initial.angular_velocity;
+  for (int i = 0; i < int(model.planes.size()); ++i) {
+    theta.segment<3>(theta::plane_point(i)) = model.planes[i].point;
+    theta.segment<3>(theta::plane_normal(i)) = model.planes[i].normal;
+  }
+  return theta;
+}
+
+/// A model as the capture that it would have been fitted to: the same scene builder serves both.
+Capture as_capture(const Model& model) {
+  Capture capture;
+  capture.name = model.name;
+  capture.surface = model.surface;
+  capture.mass = model.mass;
+  capture.gravity = model.gravity;
+  capture.planes = model.planes;
+  capture.fixed = model.fixed;
+  capture.weights = model.weights;
+  capture.initial = model.initial;
+  capture.is_static = model.frames == 0;
+  if (capture.is_static) capture.times = {0.0};
+  for (int f = 0; f < model.frames; ++f) capture.times.push_back(f / model.frame_rate);
+  capture.start_frame = model.start_frame;
+  return capture;
+}
+
+/// Of ln E of the first recording's control moduli; zero where one is not estimated, empty where nothing is known.
+MatrixX log_modulus_covariance(const FitOutcome& outcome) {
+  if (outcome.covariance.size() == 0) return {};
+  const int controls = outcome.recordings.front().discretisation.body->modulus.controls;
+  const Eigen::Index size = outcome.recordings.front().theta.size();
+  std::vector<int> coordinate(std::size_t(controls), -1);
+  int at = 0;
+  for (const Parameter& p : outcome.parameters.parameters()) {
+    if (!p.estimated) continue;
+    for (int k = 0; k < controls; ++k)
+      if (p.theta_index == theta::modulus(k, controls, size)) coordinate[std::size_t(k)] = at;
+    at += p.dimension();
+  }
+  MatrixX covariance = MatrixX::Zero(controls, controls);
+  for (int i = 0; i < controls; ++i)
+    for (int j = 0; j < controls; ++j)
+      if (const int a = coordinate[std::size_t(i)], b = coordinate[std::size_t(j)]; a >= 0 && b >= 0)
+        covariance(i, j) = outcome.covariance(a, b);
+  return covariance;
+}
+
+ModulusStatistics modulus_statistics(const FitOutcome& outcome) {
+  const RecordingOutcome& first = outcome.recordings.front();
+  return modulus_statistics(first.discretisation.body, first.theta, log_modulus_covariance(outcome));
+}
+
+/// The field over the object, and its mean where the control points' parameters leave that out.
+void add_modulus_field(Result& result, const FitOutcome& outcome) {
+  const RecordingOutcome& first = outcome.recordings.front();
+  const int controls = first.discretisation.body->modulus.controls;
+  if (controls == 1 && outcome.fields.empty()) return;
+  FieldResult field{"youngs_modulus", {}, "model.vtu"};
+  for (const TriedField& t : outcome.fields) {
+    TriedFieldResult tried{t.control_points, t.estimated, {}, {}};
+    if (std::isfinite(t.cost)) tried.cost = t.cost;
+    if (std::isfinite(t.log_bayes_factor)) tried.log_bayes_factor = t.log_bayes_factor;
+    field.tried.push_back(tried);
+  }
+  const MatrixX covariance = log_modulus_covariance(outcome);
+  const std::vector<Vector3>& points = first.discretisation.control_points;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double value = first.theta[theta::modulus(int(k), controls, first.theta.size())];
+    ControlPoint point{points[k], value, {}};
+    if (covariance.size() > 0) point.std = value * std::sqrt(covariance(Eigen::Index(k), Eigen::Index(k)));
+    field.control_points.push_back(point);
+  }
+  result.fields.push_back(std::move(field));
+  if (result.find("youngs_modulus")) return;
+  const ModulusStatistics statistics = modulus_statistics(outcome);
+  ParameterResult mean{"youngs_modulus", statistics.mean, "Pa", {}, {}, true};
+  if (covariance.size() > 0) mean.std = statistics.mean_std;
+  result.parameters.insert(result.parameters.begin(), std::move(mean));
+}
+
+}  // namespace
+
+SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
+  SurfaceErrors errors;
+  double max = 0.0;
+  for (const FrameFit& f : evaluation.frames) {
+    errors.error.points += f.points + f.tracks;
+    max = std::max(max, f.max_distance);
+    if (f.points > 0)
+      errors.frames.push_back(
+          {f.frame, std::sqrt(f.sum_squares / f.points), std::sqrt(f.sum_noise_squares / f.points), f.points});
+  }
+  const bool has_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
+  const bool has_tracks = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.tracks > 0; });
+  if (has_surface) {
+    errors.error.surface_rms = evaluation.surface_rms();
+    errors.error.surface_median = evaluation.surface_median();
+    errors.error.surface_max = max;
+  }
+  if (has_tracks) errors.error.marker_rms = evaluation.track_rms();
+  return errors;
+}
+
+namespace {
+
+TrackingResult tracking_result(const TrackingOutcome& outcome) {
+  TrackingResult result{outcome.keeps_loop ? "tracked motion" : "points", outcome.why, {}, {}, {}};
+  for (const TrackingRound& r : outcome.rounds)
+    result.rounds.push_back(
+        {r.youngs_modulus, r.theta[theta::youngs_modulus], r.surface_rms, r.fit_rms, r.confidence, r.lost});
+  const auto held_out = [](const std::optional<HeldOutFrames>& h) -> std::optional<HeldOutFramesResult> {
+    if (!h) return std::nullopt;
+    HeldOutFramesResult r{h->frames, {}, {}};
+    if (h->succeeded) r.cost = h->cost, r.surface_rms = h->surface_rms;
+    return r;
+  };
+  result.loop = held_out(outcome.loop), result.direct = held_out(outcome.direct);
+  return result;
+}
+
+}  // namespace
+
+Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome, const RunFacts& facts) {
+  const Capture& capture = recordings.front().capture;
+  Result result;
+  result.software.version = facts.version;
+  result.software.commit = facts.commit;
+  result.capture = {capture.name, capture.sha256};
+  const bool has_std = outcome.std.size() > 0;
+  const Refinement& refinement = outcome.refinement;
+  const bool repeated = refinement.estimates.size() > 1;
+  const MatrixX jacobian =
+      has_std || repeated ? outcome.parameters.jacobian(outcome.parameters.to_unconstrained(outcome.theta)) : MatrixX();
+  int at = 0;
+  for (const Parameter& p : outcome.parameters.parameters()) {
+    ParameterResult r{p.name, value_of(p, outcome.theta), p.unit, {}, {}, p.estimated};
+    if (p.estimated) {
+      r.start = value_of(p, outcome.start_theta);
+      if (has_std) r.std = std_of(p, outcome.std, jacobian, at);
+      if (refinement.mesh_error.size() > 0) r.mesh_error = std_of(p, refinement.mesh_error, jacobian, at);
+      if (refinement.step_error.size() > 0) r.step_error = std_of(p, refinement.step_error, jacobian, at);
+      if (repeated) r.extrapolated = value_of(p, outcome.parameters.to_theta(refinement.extrapolated));
+      at += p.dimension();
+    }
+    result.parameters.push_back(std::move(r));
+  }
+  add_modulus_field(result, outcome);
+  result.error = surface_errors(outcome.evaluation).error;
+  for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
+    result.recordings.push_back({recordings[r].capture.name, recordings[r].capture.sha256,
+                                 surface_errors(outcome.recordings[r].evaluation).error});
+  result.cost = {outcome.start_cost, outcome.final_cost};
+  add_correlations(result, outcome);
+  for (const FitStart& s : outcome.starts) {
+    StartResult r{scalars_of(outcome.parameters, s.start),
+                  scalars_of(outcome.parameters, s.final),
+                  {},
+                  s.iterations,
+                  s.converged,
+                  s.reason};
+    if (std::isfinite(s.cost)) r.cost = s.cost;
+    result.starts.push_back(std::move(r));
+  }
+  add_resolutions(result, outcome);
+  result.time.wall_seconds = facts.wall_seconds;
+  result.time.forward_steps = outcome.forward_steps;
+  if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
+  if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
+  result.notes = outcome.notes;
+  if (outcome.tracking) result.tracking = tracking_result(*outcome.tracking);
+  return result;
+}
+
+Model make_model(const Capture& capture, const FitOutcome& outcome) {
+  const RecordingOutcome& first = outcome.recordings.front();
+  Discretisation free = first.discretisation;
+  free.body = first.rest_body;
+  return make_model(capture, free, first.theta, modulus_statistics(outcome), outcome.cells);
+}
+
+Model make_model(const Capture& capture, const Discretisation& d, const VectorX& t, const ModulusStatistics& modulus,
+                 double cells) {
+  Model model;
+  model.name = capture.name;
+  model.surface = *capture.surface;
+  model.youngs_modulus = modulus.mean;
+  model.poisson_ratio = t[theta::poissons_ratio];
+  model.mass_damping = t[theta::mass_damping];
+  model.stiffness_damping = t[theta::stiffness_damping];
+  model.mass = t[theta::density] * enclosed_volume(*capture.surface);
+  if (d.body->kind != ElementKind::Hexahedron) {  // the scan may have been taken under load
+    const Points free = Embedding(*d.body, capture.surface->vertices).positions(d.body->reference_positions());
+    for (Eigen::Index v = 0; v < free.rows(); ++v) model.surface.vertices[std::size_t(v)] = free.row(v).transpose();
+  }
+  model.density = model.mass / enclosed_volume(model.surface);
+  model.gravity = theta::vector_at(t, theta::gravity);
+  model.planes = capture.planes;
+  for (std::size_t i = 0; i < model.planes.size(); ++i) {
+    model.planes[i].point = t.segment<3>(theta::plane_point(int(i)));
+    model.planes[i].normal = t.segment<3>(theta::plane_normal(int(i)));
+    model.planes[i].known = true;
+  }
+  model.fixed = capture.fixed;
+  model.weights = capture.weights;
+  model.initial = capture.initial;
+  model.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
+  model.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);
+  model.initial.known = true;
+  for (int k = 0; k < d.simulation.pulls; ++k)
+    model.initial.pulls.push_back(theta::vector_at(t, theta::pull(k, d.simulation.planes)));
+  model.cell_size = object_size(capture) / cells;
+  if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
+    model.cell_size = grid->cell_size;
+    model.grid_origin = grid->origin;
+  }
+  if (!capture.is_static) {
+    model.frames = capture.frame_count();
+    model.frame_rate = (capture.frame_count() - 1) / (capture.times.back() - capture.times.front());
+    model.start_frame = capture.start_frame;
+    model.substeps = std::max(1, int(std::ceil(1.0 / (model.frame_rate * d.simulation.max_dt) - 1e-9)));
+  }
+  model.theta = d.simulation.newmark_theta;
+  model.contact_stiffness = d.simulation.contact.stiffness;
+  model.contact_smoothing = d.simulation.contact.smoothing;
+  model.volume.nodes = d.body->reference_positions();
+  model.volume.kind = vtu_cell(d.body->kind);
+  model.volume.connectivity = d.body->connectivity;
+  for (int e = 0; e < d.body->element_count(); ++e) {
+    model.volume.youngs_modulus.push_back(modulus.value[e]);
+    if (modulus.mean_std > 0.0) model.volume.youngs_modulus_std.push_back(modulus.std[e]);
+    model.volume.poisson_ratio.push_back(model.poisson_ratio);
+    const bool is_cell = d.body->kind == ElementKind::Hexahedron;
+    model.volume.fill.push_back(is_cell ? d.body->element_volume[std::size_t(e)] / std::pow(model.cell_size, 3) : 1.0);
+  }
+  return model;
+}
+
+namespace {
+
+/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's
+/// modulus where the volume mesh has as many elements.
+std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* distance) {
+  const ModelVolume& volume = model.volume;
+  Body body;
+  if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
+    body = make_body(make_hex_grid(*distance, bounding_box(model.surface), model.cell_size));
+  } else {
+    const auto points = std::size_t(corner_count(volume.kind));
+    std::vector<std::array<int, 4>> tets;
+    std::vector<std::array<int, 6>> mid_nodes;
+    for (std::size_t i = 0; i < volume.connectivity.size(); i += points) {
+      std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i), 4, tets.emplace_back().begin());
+      if (points == 10)
+        std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i) + 4, 6, mid_nodes.emplace_back().begin());
+    }
+    body = make_body(make_tet_mesh(volume.nodes, std::move(tets), std::move(mid_nodes)));
+  }
+  if (volume.youngs_modulus.size() == body.modulus.relative.size())
+    for (std::size_t e = 0; e < volume.youngs_modulus.size(); ++e)
+      body.modulus.relative[e] = volume.youngs_modulus[e] / model.youngs_modulus;
+  return std::make_shared<Body>(std::move(body));
+}
+
+}  // namespace
+
+std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, nullptr); }
+
+ModelScene make_scene(const Model& model) {
+  const CaptureScene scene = make_scene(model, as_capture(model));
+  SimulationOptions options = scene.discretisation.simulation;
+  if (model.frame_rate > 0.0) options.max_dt = 1.0 / (model.frame_rate * model.substeps) * (1.0 + 1e-9);
+  return {scene.discretisation.distance, scene.discretisation.body, options, scene.theta};
+}
+
+CaptureScene make_scene(const Model& model, const Capture& capture) {
+  CaptureScene scene;
+  const auto distance = capture_distance(capture, 0.15);
+  Model situated = model;
+  situated.planes = capture.planes;
+  situated.initial = capture.initial;
+  if (capture.initial.released && !capture.initial.release_of && capture.initial.pulls.empty()) {
+    if (model.initial.pulls.empty())
+      throw InputError({{capture.file},
+                        "the object is released, and the model knows no pose before a release",
+                        "the model of a fit to this recording",
+                        "let `pliant fit --hold-out` find the pose and score the rest"});
+    situated.initial.pulls = model.initial.pulls;
+  }
+  const Vector3 gravity = capture.gravity.value_or(model.gravity.value_or(-9.81 * capture.up));
+  scene.theta = model_theta(situated, gravity, int(sensor_names(capture).size()));
+  SimulationOptions settings;
+  settings.newmark_theta = model.theta;
+  Resolution resolution;
+  resolution.cells = object_size(capture) / model.cell_size;
+  resolution.pulls = int(situated.initial.pulls.size());
+  const auto body = body_of(model, distance.get());
+  if (model.law) settings.law = make_law(*model.law, body->element_count());
+  resolution.element = body->kind;
+  scene.discretisation =
+      discretise(capture, distance, body, resolution, scene.theta, settings, tracked_points(capture).rest);
+  if (model.contact_stiffness > 0.0)
+    scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
+  const double dt = 1.0 / (model.frame_rate * model.substeps);
+  if (model.frame_rate > 0.0) scene.discretisation.simulation.max_dt = dt * (1.0 + 1e-9);
+  return scene;
+}
+
+RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Body> body,
+                                const SimulationOptions& options, const VectorX& parameters,
+                                const std::function<bool(int, int)>& progress) {
+  std::vector<PvdEntry> entries;
+  const auto elasticity = scene_elasticity(body, options);
+  elasticity->set_parameters(parameters);
+  Simulation simulation(body, options);
+  const RolloutSummary summary = simulation.run(parameters, [&](int frame, const State& state, auto) {
+    char name[32];
+    std::snprintf(name, sizeof name, "frames/%06d.vtu", frame);
+    write_vtu(folder / name, frame_grid(body, parameters, state, *elasticity), VtuPrecision::Single);
+    entries.push_back({options.times[std::size_t(frame)] - options.times.front(), name});
+    return !progress || progress(frame + 1, simulation.frame_count());
+  });
+  write_pvd(folder / "trajectory.pvd", entries);
+  return summary;
+}
+
+void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
+                      const Result& result, const RunFacts& facts,
+                      const std::function<void(const char*, int, int)>& progress) {
+  const auto tell = [&](const char* what, int done, int total) {
+    if (progress) progress(what, done, total);
+  };
+  const Capture& capture = recordings.front().capture;
+  const RecordingOutcome& first = outcome.recordings.front();
+  ReportData report;
+  report.title = capture.name;
+  report.result = result;
+  const ConvergenceHistory history = history_of(outcome);
+  report.convergence = drawn_history(history);
+  write_result(folder / "result.json", report.result);
+  write_convergence(folder / "convergence.csv", history);
+  save_model(folder, make_model(capture, outcome));
+  write_trajectory(folder, first.discretisation.body, first.discretisation.simulation, first.theta,
+                   [&](int done, int total) { return tell("trajectory", done, total), true; });
+  report.capture_path = facts.capture_path;
+  for (const auto& f : surface_errors(first.evaluation).frames) {
+    const int frame = f.frame + capture.start_frame;
+    report.residuals.push_back({frame, capture.times[std::size_t(frame)], f.rms, f.points, f.noise});
+  }
+  tell("loads", 0, 1);
+  report.loads = predict_loads(capture, {first.discretisation, first.theta});
+  std::erase_if(report.loads, [](const LoadError& load) { return load.role != "test"; });
+  tell("loads", 1, 1);
+  if (outcome.correlation.size() > 0)
+    report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
+  tell("pictures", 0, 1);
+  add_pictures(report, gallery_of(recordings.front(), first));
+  tell("pictures", 1, 1);
+  write_report(folder / "report.html", report);
+  if (!outcome.tracking) return;
+  for (std::size_t i = 0; i < outcome.tracking->tracks.size(); ++i) {
+    const std::string name = recordings.size() == 1 ? "track" : "track-" + std::to_string(i + 1);
+    write_track(folder / name, recordings[i].capture, recordings[i].observed, *outcome.tracking->tracks[i],
+                outcome.recordings[i].theta, true, progress);
+  }
+}
+
+}  // namespace pliant

@@ -1,0 +1,170 @@
+#include "synthesis/synthesis.hpp"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "base/files.hpp"
+#include "capture/toml_facts.hpp"
+#include "geometry/mesh_io.hpp"
+#include "rays/ray_scene.hpp"
+
+namespace pliant {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uint64_t scan_image = 0x7363616eu;  // the counter of the scan's noise
+
+std::string image_name(const SyntheticCamera& camera, int frame) {
+  return fmt::format("{}/{:06}.png", camera.name, frame);
+}
+std::string mask_name(const SyntheticCamera& camera, int frame) {
+  return fmt::format("{}/mask_{:06}.png", camera.name, frame);
+}
+std::string vertices_name(size_t region) { return fmt::format("fixed_{}.txt", region); }
+
+void check(const Synthesis& s) {
+  const auto require = [](bool good, const char* what) {
+    if (!good) throw std::invalid_argument(std::string("write_synthetic_capture: ") + what);
+  };
+  require(!s.rest.vertices.empty() && !s.trajectory.empty(), "a surface and at least one frame are needed");
+  for (const Points& frame : s.trajectory)
+    require(size_t(frame.rows()) == s.rest.vertices.size() && frame.allFinite(),
+            "a frame does not fit the surface, or is not finite");
+  require(s.mass.has_value() != s.density.has_value(), "exactly one of mass and density is needed");
+  require(!s.cameras.empty(), "at least one camera is needed");
+  require(s.frame_rate > 0.0 && s.start_frame >= 0 && s.start_frame < int(s.trajectory.size()),
+          "the timing makes no sense");
+  for (const SyntheticCamera& camera : s.cameras)
+    require(!camera.name.empty() && camera.every >= 1 && camera.depth_scale > 0.0 && camera.sensor.validate().empty(),
+            "a camera has no name, or settings out of range");
+}
+
+// The visible square of a plane around the object.
+TriangleMesh patch(const SceneryPlane& scenery, const Vector3& centre) {
+  const Vector3& n = scenery.plane.normal;
+  const Vector3 middle = centre - n.dot(centre - scenery.plane.point) * n;
+  const Vector3 a = scenery.half_size * n.unitOrthogonal(), b = n.cross(a);
+  return {{middle - a - b, middle + a - b, middle + a + b, middle - a + b}, {{0, 1, 2}, {0, 2, 3}}};
+}
+
+RayScene scene_of(const Synthesis& s, const Points& frame) {
+  RayScene scene;
+  scene.add(frame, s.rest.triangles);
+  const Box box = bounding_box(s.rest);
+  for (const SceneryPlane& scenery : s.planes)
+    if (scenery.half_size > 0.0) scene.add(patch(scenery, 0.5 * (box.min + box.max)));
+  return scene;
+}
+
+TriangleMesh scanned(const Synthesis& s) {
+  TriangleMesh mesh = s.rest;
+  const std::vector<Vector3> normals = vertex_normals(mesh);
+  if (s.scan_noise > 0.0)
+    for (size_t i = 0; i < mesh.vertices.size(); ++i)
+      mesh.vertices[i] += s.scan_noise * counter_normal(s.seed, scan_image, 0, i) * normals[i];
+  return mesh;
+}
+
+// A typical reading's deviation: at the object's distance, with the steps' rounding.
+double typical_noise(const Synthesis& s, const SyntheticCamera& camera) {
+  const Box box = bounding_box(s.rest);
+  const double depth = camera.camera.project(0.5 * (box.min + box.max)).z();
+  const double step = std::max(camera.sensor.step, 1.0 / camera.depth_scale);
+  return std::sqrt(std::pow(camera.sensor.noise(depth), 2) + step * step / 12.0);
+}
+
+void write_camera(std::ostream& out, const Synthesis& s, const SyntheticCamera& camera) {
+  const PinholeCamera& c = camera.camera;
+  out << "[[depth]]\nname = " << toml_text(camera.name) << "\nwidth = " << c.width << "\nheight = " << c.height;
+  for (const auto& [key, value] : {std::pair{"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}})
+    out << "\n" << key << " = " << toml_text(value);
+  out << "\ncamera_to_world = " << toml_text(c.camera_to_world) << "\nimages = " << toml_text(camera.name + "/%06d.png")
+      << "\nmasks = " << toml_text(camera.name + "/mask_%06d.png")
+      << "\ndepth_scale = " << toml_text(camera.depth_scale) << "\nevery = " << camera.every
+      << "\nnoise = " << fmt::format("{:.3g}", typical_noise(s, camera)) << "   # m\n\n";
+}
+
+std::string capture_toml(const Synthesis& s) {
+  std::ostringstream out;
+  out << "# A synthetic recording; its truth is in truth.json.\nformat = \"capture/1\"\nname = " << toml_text(s.name)
+      << "\n\n[object]\nsurface = \"rest.ply\"\n";
+  if (s.mass) out << "mass = " << toml_text(*s.mass) << "   # kg\n";
+  if (s.density) out << "density = " << toml_text(*s.density) << "   # kg/m^3\n";
+  out << "\n[world]\ngravity = " << toml_text(s.gravity) << "   # m/s^2\n";
+  if (s.gravity.norm() == 0.0) out << "up = [0.0, 1.0, 0.0]\n";
+  out << "\n[timing]\nframe_rate = " << toml_text(s.frame_rate) << "\nframe_count = " << s.trajectory.size()
+      << "\nstart_frame = " << s.start_frame << "\n\n";
+  write_toml(out, s.initial);
+  for (const SceneryPlane& scenery : s.planes) write_toml(out, scenery.plane);
+  for (size_t i = 0; i < s.fixed.size(); ++i) write_toml(out, s.fixed[i], vertices_name(i));
+  for (const SyntheticCamera& camera : s.cameras) write_camera(out, s, camera);
+  return std::move(out).str();
+}
+
+nlohmann::ordered_json vector_json(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
+
+std::string truth_json(const Synthesis& s) {
+  nlohmann::ordered_json json{{"format", "synth-truth/1"}, {"name", s.name}, {"seed", s.seed}};
+  json["parameters"] = nlohmann::ordered_json::object();
+  for (const TrueParameter& p : s.truth) {
+    const auto* number = std::get_if<double>(&p.value);
+    json["parameters"][p.name] = {
+        {"value", number ? nlohmann::ordered_json(*number) : vector_json(std::get<Vector3>(p.value))},
+        {"unit", p.unit}};
+  }
+  json["scan_noise"] = s.scan_noise;
+  if (s.write_trajectory) json["trajectory"] = "truth/%06d.ply";
+  return json.dump(2) + "\n";
+}
+
+void write_facts(const fs::path& folder, const Synthesis& s) {
+  write_mesh(folder / "rest.ply", scanned(s));
+  for (size_t i = 0; i < s.fixed.size(); ++i)
+    if (const auto* vertices = std::get_if<RegionVertices>(&s.fixed[i].region))
+      write_file(folder / vertices_name(i), fmt::format("{}\n", fmt::join(vertices->indices, "\n")));
+  write_file(folder / "truth.json", truth_json(s));
+}
+
+void write_frame(const fs::path& folder, const Synthesis& s, int frame) {
+  const RayScene scene = scene_of(s, s.trajectory[frame]);
+  for (size_t k = 0; k < s.cameras.size(); ++k) {
+    const SyntheticCamera& camera = s.cameras[k];
+    if (frame % camera.every != 0) continue;
+    const SensedFrame seen = sense(scene, 0, camera.camera, camera.sensor, camera.depth_scale, s.seed, int(k), frame);
+    write_png(folder / image_name(camera, frame), seen.depth);
+    write_png(folder / mask_name(camera, frame), seen.mask);
+  }
+  if (!s.write_trajectory) return;
+  TriangleMesh mesh{{}, s.rest.triangles};
+  for (Eigen::Index i = 0; i < s.trajectory[frame].rows(); ++i) mesh.vertices.emplace_back(s.trajectory[frame].row(i));
+  write_mesh(folder / fmt::format("truth/{:06}.ply", frame), mesh);
+}
+
+}  // namespace
+
+void write_synthetic_capture(const fs::path& folder, const Synthesis& synthesis,
+                             const std::function<void(int, int)>& progress) {
+  check(synthesis);
+  write_facts(folder, synthesis);
+  std::mutex lock;
+  int done = 0;
+  const int frames = int(synthesis.trajectory.size());
+  tbb::parallel_for(0, frames, [&](int frame) {
+    write_frame(folder, synthesis, frame);
+    const std::lock_guard guard(lock);
+    ++done;
+    if (progress) progress(done, frames);
+  });
+  write_file(folder / "capture.toml", capture_toml(synthesis));  // last: a folder with it is whole
+}
+
+}  // namespace pliant
