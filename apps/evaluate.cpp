@@ -28,7 +28,7 @@ bool evaluate_frames(const Capture& capture, const CaptureScene& scene, const Ob
   objective_options.last_frame =
       scene.discretisation.simulation.times.empty() ? 0 : int(scene.discretisation.simulation.times.size()) - 1;
   Objective objective(scene.discretisation.mismatch, scene.discretisation.body, scene.discretisation.simulation, seen,
-                      ParameterSet({}, scene.theta), objective_options);
+                      ParameterSet(scene.layout, {}, scene.theta), objective_options);
   const CostEvaluation evaluation = objective.evaluate(VectorX(0));
   if (!evaluation.succeeded) {
     std::cerr << "pliant: the simulation stopped: " << evaluation.failure << "\n";

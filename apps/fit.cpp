@@ -31,7 +31,6 @@ struct Arguments {
   std::string out, config, held_out;
   std::vector<std::string> settings;
   int threads = 0, refine = 0;
-  std::optional<unsigned> seed;
   bool resume = false;
 };
 
@@ -79,14 +78,15 @@ std::string with_prefix(double value, const char* unit) {
 }
 
 std::string describe(const FitEvent& event, double seconds) {
+  static const MotionLayout blocks;  // every motion has these blocks in the same places
   char head[160];
   std::snprintf(head, sizeof head, "%-15s start %d  iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
                 event.start + 1, event.iteration, event.cost, 1e3 * event.surface_rms);
   std::string text = head;
-  text += "  E " + with_prefix(event.theta[theta::youngs_modulus], "Pa");
-  text += "  nu " + with_prefix(event.theta[theta::poissons_ratio], "1");
-  text += "  damping " + with_prefix(event.theta[theta::mass_damping], "1/s") + ", " +
-          with_prefix(event.theta[theta::stiffness_damping], "s");
+  text += "  E " + with_prefix(event.theta[blocks.youngs_moduli.front()], "Pa");
+  text += "  nu " + with_prefix(event.theta[blocks.poissons_ratio], "1");
+  text += "  damping " + with_prefix(event.theta[blocks.mass_damping], "1/s") + ", " +
+          with_prefix(event.theta[blocks.stiffness_damping], "s");
   if (event.fraction_done > 0.02) {
     char left[40];
     std::snprintf(left, sizeof left, "  about %.0f s left",
@@ -101,7 +101,6 @@ FitOptions read_options(const Arguments& arguments) {
   if (!arguments.config.empty()) read_fit_options(arguments.config, options);
   for (const std::string& assignment : arguments.settings) set_fit_option(options, assignment);
   if (arguments.refine > 0) options.refine = arguments.refine;
-  if (arguments.seed) options.seed = *arguments.seed;
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{arguments.config}, wrong, "", "see `pliant fit --help`"});
   return options;
@@ -191,8 +190,11 @@ int ended(bool converged, bool interrupted, const std::string& words, const fs::
   return converged ? Fine : NotConverged;
 }
 
-/// Whether a capture's presses are what there is to fit.
-bool is_of_presses(const Capture& capture) { return !capture.presses.empty() && capture.times.empty(); }
+/// Whether a capture's presses are all that there is to fit.
+bool is_of_presses(const Capture& capture) {
+  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
+  return !capture.presses.empty() && capture.times.empty() && !has_loads;
+}
 
 std::string describe(const PressFitEvent& event) {
   char text[160];
@@ -236,8 +238,9 @@ int run_presses(const Arguments& arguments, const FitOptions& options, const Cap
   monitor.on_event = [&](const PressFitEvent& event) { log.live(describe(event)); };
   monitor.on_state = [&](const PressFitState& s) { write_press_state(state_file, s, key); };
   monitor.interrupted = [] { return is_interrupted(); };
-  const PressFitOutcome outcome = fit_presses(capture, press_options(options), monitor, std::move(state));
+  PressFitOutcome outcome = fit_presses(capture, press_options(options), monitor, std::move(state));
   log.clear_live();
+  for (std::string& note : unused_choices(options, false, true)) outcome.notes.push_back(std::move(note));
   if (outcome.interrupted && !fs::exists(state_file)) write_press_state(state_file, {}, key);
   if (!outcome.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
   const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
@@ -277,6 +280,9 @@ int run(const Arguments& arguments) {
     };
     if (recordings.size() > 1) refuse("presses beside other recordings", "put all presses into one capture");
     if (held_out) refuse("presses and --hold-out", "give a press role = \"test\"");
+    if (options.element == ElementKind::Hexahedron)
+      refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
+             "leave out element, or choose tetrahedra or quadratic_tetrahedra");
     if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
     if (!options.parameters.empty())
       refuse("choices about single parameters, which fits of presses do not know", "leave them out");
@@ -300,8 +306,11 @@ int run(const Arguments& arguments) {
   monitor.on_event = [&](const FitEvent& event) { log.live(describe(event, seconds())); };
   monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
   monitor.interrupted = [] { return is_interrupted(); };
-  const FitOutcome outcome = fit(recordings, options, monitor, std::move(state));
+  FitOutcome outcome = fit(recordings, options, monitor, std::move(state));
   log.clear_live();
+  const bool has_presses = std::ranges::any_of(
+      recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
+  for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
   if (outcome.interrupted && !fs::exists(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
   if (!outcome.evaluation.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
   RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
@@ -359,7 +368,6 @@ void add_fit(CLI::App& app, int& exit_code) {
       ->type_name("N");
   command->add_option("--threads", arguments->threads, "most threads to use; all processors where left out")
       ->check(CLI::PositiveNumber);
-  command->add_option("--seed", arguments->seed, "of everything random; the same seed gives the same result");
   command->add_flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
   command->footer(key_help());
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

@@ -71,7 +71,7 @@ int run(const Arguments& arguments) {
     const State state{session.nodes(), Points::Zero(session.nodes().rows(), 3)};
     const std::filesystem::path folder = arguments.out;
     write_vtu(folder / (std::string(name) + ".vtu"),
-              frame_grid(body, VectorX::Zero(theta::size(0)), state, *elasticity), VtuPrecision::Single);
+              frame_grid(*body, state, *elasticity), VtuPrecision::Single);
     TriangleMesh deformed = fine;
     const Points positions = follower.positions(session.nodes());
     for (std::size_t v = 0; v < deformed.vertices.size(); ++v)

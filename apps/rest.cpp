@@ -95,14 +95,14 @@ int run(const Arguments& arguments) {
   resolution.cells = options.cells;
   resolution.field = {options.controls(), options.control_weights};
   const int controls = capture.regions.empty() ? options.controls() : int(capture.regions.size()) + 1;
-  ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.surface), controls);
-  apply_overrides(parameters, options);
-  const VectorX theta = parameters.reference();
+  CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.surface), controls);
+  apply_overrides(parameters.set, options);
+  const VectorX theta = parameters.set.reference();
   const auto begin = std::chrono::steady_clock::now();
-  const LoadFree found = find_load_free(capture, resolution, theta);
+  const LoadFree found = find_load_free(capture, resolution, parameters.blocks, theta);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const fs::path out = arguments.out;
-  const double modulus = theta[theta::youngs_modulus];
+  const double modulus = theta[parameters.blocks.motion.youngs_moduli.front()];
   const nlohmann::json facts = facts_of(found, modulus, size, seconds);
   fs::create_directories(out);
   write_file(out / "rest.json", facts.dump(2) + "\n");
@@ -119,7 +119,7 @@ int run(const Arguments& arguments) {
   std::cout << "  forces balance to " << found.shape.residual << " of the load; the object sags by " << 1e3 * found.sag
             << " mm (" << 100.0 * found.sag / size << " % of its size)\n  sagging again it comes to within "
             << 1e3 * found.re_sag_error << " mm of the scan\n";
-  const ModulusStatistics moduli = modulus_statistics(found.scene.body, theta, MatrixX());
+  const ModulusStatistics moduli = modulus_statistics(found.scene.body, parameters.blocks.motion, theta, MatrixX());
   save_model(out, make_model(capture, found.scene, theta, moduli, options.cells));
   write_png(out / "rest.png", overlay(capture, found));
   std::cout << "Look at " << (out / "rest.png").string() << "; the model with its load-free shape is "

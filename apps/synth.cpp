@@ -28,24 +28,24 @@ std::shared_ptr<const Body> body_of(const Scene& scene) {
   return std::make_shared<Body>(make_body(make_hex_grid(distance, box, scene.cell_size)));
 }
 
-VectorX theta_of(const Scene& scene) {
-  VectorX theta = VectorX::Zero(theta::size(int(scene.planes.size())));
-  theta[theta::youngs_modulus] = scene.youngs_modulus;
-  theta[theta::poissons_ratio] = scene.poisson_ratio;
-  theta[theta::mass_damping] = scene.mass_damping;
-  theta[theta::stiffness_damping] = scene.stiffness_damping;
-  theta[theta::density] = scene.true_density();
-  theta.segment<3>(theta::gravity) = scene.gravity;
-  theta.segment<3>(theta::linear_velocity) = scene.initial.linear_velocity;
-  theta.segment<3>(theta::angular_velocity) = scene.initial.angular_velocity;
-  for (int i = 0; i < int(scene.planes.size()); ++i) {
-    theta.segment<3>(theta::plane_point(i)) = scene.planes[i].plane.point;
-    theta.segment<3>(theta::plane_normal(i)) = scene.planes[i].plane.normal;
+VectorX theta_of(const Scene& scene, const MotionLayout& blocks) {
+  VectorX theta = blocks.zero();
+  theta[blocks.youngs_moduli.front()] = scene.youngs_modulus;
+  theta[blocks.poissons_ratio] = scene.poisson_ratio;
+  theta[blocks.mass_damping] = scene.mass_damping;
+  theta[blocks.stiffness_damping] = scene.stiffness_damping;
+  theta[blocks.density] = scene.true_density();
+  theta.segment<3>(blocks.gravity) = scene.gravity;
+  theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
+  theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
+  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
+    theta.segment<3>(blocks.planes[i].point) = scene.planes[i].plane.point;
+    theta.segment<3>(blocks.planes[i].normal) = scene.planes[i].plane.normal;
   }
   return theta;
 }
 
-SimulationOptions options_of(const Scene& scene, const Body& body) {
+SimulationOptions options_of(const Scene& scene, const MotionBlocks& blocks, const Body& body) {
   SimulationOptions options;
   for (int i = 0; i < scene.frames - scene.start_frame; ++i) options.times.push_back(i / scene.frame_rate);
   options.max_dt = 1.0 / (scene.frame_rate * scene.substeps);
@@ -53,7 +53,7 @@ SimulationOptions options_of(const Scene& scene, const Body& body) {
   options.contact = default_contact(body, scene.true_density() * body.volume(), scene.gravity.norm());
   if (scene.contact_stiffness > 0.0) options.contact.stiffness = scene.contact_stiffness;
   if (scene.contact_smoothing > 0.0) options.contact.smoothing = scene.contact_smoothing;
-  options.planes = int(scene.planes.size());
+  options.blocks = blocks;
   for (const FixedRegion& fixed : scene.fixed) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
     options.holds.push_back({[region = fixed.region](const Vector3& point) { return contains(region, point); },
@@ -66,13 +66,14 @@ std::vector<Points> simulate(const Scene& scene) {
   const std::shared_ptr<const Body> body = body_of(scene);
   const Embedding embedding(*body, scene.surface.vertices);
   std::vector<Points> frames(size_t(scene.start_frame), vertex_points(scene.surface));
-  Simulation simulation(body, options_of(scene, *body));
+  const MotionLayout blocks({.planes = int(scene.planes.size())});
+  Simulation simulation(body, options_of(scene, blocks, *body));
   const auto on_frame = [&](int, const State& state, std::span<const State>) {
     frames.push_back(embedding.positions(state.x));
     show_progress("simulated", int(frames.size()), scene.frames);
     return !is_interrupted();
   };
-  const RolloutSummary summary = simulation.run(theta_of(scene), on_frame);
+  const RolloutSummary summary = simulation.run(theta_of(scene, blocks), on_frame);
   stop_if_interrupted();
   if (!summary.succeeded)
     throw std::runtime_error("the simulation stopped in frame " + std::to_string(frames.size()) + ": " +

@@ -65,7 +65,7 @@ int run(const Arguments& arguments) {
   std::cout << capture.name << "\n";
   report_track(found, seconds);
   for (const std::string& note : notes) std::cout << "  note: " << note << "\n";
-  write_track(arguments.out, capture, observed, found, theta, !arguments.no_pictures, show_progress);
+  write_track(arguments.out, capture, observed, found, recording.recording().blocks.motion, theta, !arguments.no_pictures, show_progress);
   if (!arguments.points.empty()) {
     std::vector<Vector3> rest;
     for (Eigen::Index i = 0; i < follow_these.positions.rows(); ++i)

@@ -16,14 +16,16 @@ int main(int argc, char** argv) {
   const TriangleMesh ball = make_sphere(0.05, 3);
   const SignedDistance distance = signed_distance(ball, 0.002, 0.02);
   const auto body = std::make_shared<Body>(make_body(make_hex_grid(distance, bounding_box(ball), 0.02)));
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 5000.0;
-  theta[theta::poissons_ratio] = 0.3;
-  theta[theta::density] = 100.0;
-  theta[theta::gravity + 1] = -9.81;
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 5000.0);
+  theta[layout.poissons_ratio] = 0.3;
+  theta[layout.density] = 100.0;
+  theta.segment<3>(layout.gravity) = Vector3(0.0, -9.81, 0.0);
   std::printf("frames,nodes,budget_bytes,all_states_bytes,peak_state_bytes\n");
   for (int frames = 25; frames <= 6400; frames *= 2) {
     SimulationOptions options;
+    options.blocks = layout;
     for (int f = 0; f <= frames; ++f) options.times.push_back(f * 1e-3);
     options.max_dt = 1.001e-3;
     options.contact = default_contact(*body, 0.05, 9.81);

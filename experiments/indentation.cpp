@@ -61,7 +61,7 @@ double Indenter::force(std::size_t depth) const {
 }
 
 /// The force on the object is -sum grad psi(x - u). With u kept it changes with the nodes, and they with the law.
-bool Indenter::derivatives(std::size_t depth, const PressTheta& layout, const VectorX& theta, VectorX& by_theta) {
+bool Indenter::derivatives(std::size_t depth, const LawLayout& layout, const VectorX& theta, VectorX& by_theta) {
   const Placement& placement = placements_[depth];
   if (!equilibrium_.prepare_derivatives(placement)) return false;
   const RigidContact& contact = equilibrium_.contact(0);
@@ -80,16 +80,13 @@ bool Indenter::derivatives(std::size_t depth, const PressTheta& layout, const Ve
         VectorX along = VectorX::Zero(by_q.cols());
         for (std::size_t a = 0; a < nodes.size(); ++a)
           along -= by_q.middleRows<3>(3 * Eigen::Index(a)).transpose() * adjoint.row(nodes[a]).transpose();
-        const VectorX own = element_theta(*body_, layout, theta, e);
-        const VectorX change = press_table_derivative(layout.terms, own).transpose() * along;
-        for (const auto& [number, at, share] : element_theta_shares(*body_, layout, theta, own, e))
-          by_theta[at] += share * change[number];
+        by_theta += law_parameters_by_theta(*body_, layout, theta, e).transpose() * along;
       });
   return true;
 }
 
 IndentationObjective::IndentationObjective(std::shared_ptr<const Body> body, const std::vector<int>& held,
-                                           std::vector<Indentation> indentations, const PressTheta& layout,
+                                           std::vector<Indentation> indentations, const LawLayout& layout,
                                            ParameterSet parameters)
     : body_(std::move(body)),
       indentations_(std::move(indentations)),

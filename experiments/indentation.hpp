@@ -30,7 +30,7 @@ class Indenter {
   /// Along the normal, on the ball [N].
   double force(std::size_t depth) const;
   /// d force / d theta at the last solved depth.
-  bool derivatives(std::size_t depth, const PressTheta& layout, const VectorX& theta, VectorX& by_theta);
+  bool derivatives(std::size_t depth, const LawLayout& layout, const VectorX& theta, VectorX& by_theta);
 
  private:
   std::shared_ptr<const Body> body_;
@@ -43,7 +43,7 @@ class Indenter {
 class IndentationObjective : public CostFunction {
  public:
   IndentationObjective(std::shared_ptr<const Body> body, const std::vector<int>& held,
-                       std::vector<Indentation> indentations, const PressTheta& layout, ParameterSet parameters);
+                       std::vector<Indentation> indentations, const LawLayout& layout, ParameterSet parameters);
 
   const ParameterSet& parameters() const override { return parameters_; }
   [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override { return run(p, false); }
@@ -57,7 +57,7 @@ class IndentationObjective : public CostFunction {
 
   std::shared_ptr<const Body> body_;
   std::vector<Indentation> indentations_;
-  PressTheta layout_;
+  LawLayout layout_;
   ParameterSet parameters_;
   std::vector<Indenter> indenters_;
   std::vector<std::vector<double>> forces_;

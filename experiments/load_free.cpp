@@ -30,7 +30,7 @@ constexpr double youngs_moduli[] = {2.4e6, 8e5};  // of the held half and of the
 constexpr double rho = 600.0, nu = 0.35, mass_damping = 0.3, stiffness_damping = 0.003;
 constexpr double rate = 60.0;
 constexpr int frames = 46;
-const int theta_size = theta::size(0, 2);
+const MotionLayout layout({.moduli = 2});
 
 std::vector<Hold> hold() {
   return {{[](const Vector3& p) { return p.x() < 1e-6; }}};
@@ -54,20 +54,21 @@ Body make_bar(int cells, const Points* corners = nullptr) {
 }
 
 VectorX make_theta(double held, double free) {
-  VectorX theta = VectorX::Zero(theta_size);
-  theta[theta::modulus(0, 2, theta_size)] = held;
-  theta[theta::modulus(1, 2, theta_size)] = free;
-  theta[theta::poissons_ratio] = nu;
-  theta[theta::mass_damping] = mass_damping;
-  theta[theta::stiffness_damping] = stiffness_damping;
-  theta[theta::density] = rho;
-  theta.segment<3>(theta::gravity) = Vector3(0.0, 0.0, -9.81);
-  theta.segment<3>(theta::linear_velocity) = Vector3(0.0, 0.5, 0.6);
+  VectorX theta = layout.zero();
+  theta[layout.youngs_moduli[0]] = held;
+  theta[layout.youngs_moduli[1]] = free;
+  theta[layout.poissons_ratio] = nu;
+  theta[layout.mass_damping] = mass_damping;
+  theta[layout.stiffness_damping] = stiffness_damping;
+  theta[layout.density] = rho;
+  theta.segment<3>(layout.gravity) = Vector3(0.0, 0.0, -9.81);
+  theta.segment<3>(layout.linear_velocity) = Vector3(0.0, 0.5, 0.6);
   return theta;
 }
 
 SimulationOptions scene_of(double steps_per_frame) {
   SimulationOptions options;
+  options.blocks = layout;
   for (int f = 0; f < frames; ++f) options.times.push_back(f / rate);
   options.max_dt = (1.0 + 1e-9) / (rate * steps_per_frame);
   options.holds = hold();
@@ -141,10 +142,10 @@ Recorded record(int cells, double noise) {
 
 ParameterSet parameters_from(double held, double free) {
   std::vector<Parameter> list;
-  for (int k = 0; k < 2; ++k)
+  for (std::size_t k = 0; k < 2; ++k)
     list.push_back(
-        {k == 0 ? "held" : "free", "Pa", Transform::Logarithm, theta::modulus(k, 2, theta_size), 1.0, 1e3, 1e10, true});
-  return {std::move(list), make_theta(held, free)};
+        {k == 0 ? "held" : "free", "Pa", Transform::Logarithm, layout.youngs_moduli[k], 1.0, 1e3, 1e10, true});
+  return {layout.layout(), std::move(list), make_theta(held, free)};
 }
 
 Objective objective_of(const Recorded& recorded, const ParameterSet& parameters, bool scan_sags, int last_frame) {
@@ -186,8 +187,8 @@ json compare(const Recorded& recorded) {
                   {"evaluations", evaluations}, {"seconds", seconds}};
       if (s.succeeded) {
         run["cost"] = s.evaluation.cost;
-        run["errors"] = {theta[theta::modulus(0, 2, theta_size)] / youngs_moduli[0] - 1.0,
-                         theta[theta::modulus(1, 2, theta_size)] / youngs_moduli[1] - 1.0};
+        run["errors"] = {theta[layout.youngs_moduli[0]] / youngs_moduli[0] - 1.0,
+                         theta[layout.youngs_moduli[1]] / youngs_moduli[1] - 1.0};
         if (scheme.front() != 's') {
           SimulationOptions own = scene_of(4);
           own.scan_sags = true;

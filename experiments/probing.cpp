@@ -92,8 +92,8 @@ class Experiment {
     const int terms = request_.at("terms");
     const double nu = request_.at("poisson_ratio"), start = hertz_modulus(seen, nu);
     report["hertz_modulus"] = start;
-    const PressTheta layout{1, terms};
-    ParameterSet parameters = press_parameters(layout, {"youngs_modulus"}, start);
+    const LawLayout layout({1, terms});
+    ParameterSet parameters = law_parameters(layout, start);
     parameters.fix("poisson_ratio", nu);
     const VectorX theta = parameters.reference();
     IndentationObjective objective(body_, held_, {seen}, layout, parameters);

@@ -39,6 +39,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double density = 1000.0;  // [kg/m^3]
+const MotionLayout layout;
 
 const Choices standard_choices = {{"object", "beam"},
                                   {"cell_size", "0.02"},
@@ -79,6 +80,7 @@ Points sagged(const TetMesh& mesh, const std::vector<double>& mass, const std::v
   SimulationOptions options;
   options.times = {0.0};
   options.is_static = true;
+  options.blocks = layout;
   options.newton.tolerance = 1e-12;
   const Points nodes = body.nodes;
   const double close = 1e-9 * body.size();
@@ -110,11 +112,11 @@ TriangleMesh moved(const TriangleMesh& surface, const Points& vertices) {
 class Experiment {
  public:
   explicit Experiment(Choices choices) : choices_(std::move(choices)), object_(make_held_object(text("object"))) {
-    theta_ = VectorX::Zero(theta::size(0));
-    theta_[theta::youngs_modulus] = real("youngs_modulus");
-    theta_[theta::poissons_ratio] = real("poissons_ratio");
-    theta_[theta::density] = density;
-    theta_.segment<3>(theta::gravity) = Vector3(0.0, -9.81, 0.0);
+    theta_ = layout.zero();
+    layout.set_moduli(theta_, real("youngs_modulus"));
+    theta_[layout.poissons_ratio] = real("poissons_ratio");
+    theta_[layout.density] = density;
+    theta_.segment<3>(layout.gravity) = Vector3(0.0, -9.81, 0.0);
   }
 
   json run() {
@@ -177,7 +179,7 @@ class Experiment {
     scanned_ = std::make_shared<Body>(make_body(mesh));
     held_ = held_nodes(*scanned_, {object_.held});
     weighed_ = theta_;
-    weighed_[theta::density] *= known_->volume() / scanned_->volume();
+    weighed_[layout.density] *= known_->volume() / scanned_->volume();
   }
 
   json find(const std::string& name) {
@@ -192,11 +194,11 @@ class Experiment {
       options.tolerance = real("tolerance");
     }
     options.virtual_step = real("virtual_step"), options.virtual_damping = real("virtual_damping");
-    const Points load = scan_load(*scanned_, weighed_, {});
+    const Points load = scan_load(*scanned_, layout, weighed_, {});
     VectorX theta = weighed_;
-    if (text("task") == "refuse") theta[theta::youngs_modulus] /= real("softer");
+    if (text("task") == "refuse") layout.scale_moduli(theta, 1.0 / real("softer"));
     double begin = processor_seconds();
-    ReferenceShapeSolver solver(scanned_, held_, options);
+    ReferenceShapeSolver solver(scanned_, held_, layout, options);
     const ReferenceShape shape = solver.find(theta, load);
     json row = {{"found", shape.found},
                 {"residual", shape.residual},
@@ -214,10 +216,10 @@ class Experiment {
 
   /// What is named as the smallest modulus that carries the load, and whether it and a slightly smaller one do.
   json check_least(ReferenceShapeSolver& solver, const VectorX& theta, const Points& load, double carried) const {
-    json row = {{"named", theta[theta::youngs_modulus] / carried}};
+    json row = {{"named", theta[layout.youngs_moduli[0]] / carried}};
     for (const double share : {0.95, 1.0}) {
       VectorX near = theta;
-      near[theta::youngs_modulus] *= share / carried;
+      layout.scale_moduli(near, share / carried);
       const double begin = processor_seconds();
       const ReferenceShape shape = solver.find(near, load);
       row["near"].push_back({{"share", share}, {"found", shape.found}, {"seconds", processor_seconds() - begin}});

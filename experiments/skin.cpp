@@ -40,7 +40,7 @@ struct Sheet {
 
 class SheetObjective : public CostFunction {
  public:
-  SheetObjective(std::shared_ptr<const Sheet> sheet, const PressTheta& layout, ParameterSet parameters, bool all)
+  SheetObjective(std::shared_ptr<const Sheet> sheet, const LawLayout& layout, ParameterSet parameters, bool all)
       : sheet_(std::move(sheet)),
         layout_(layout),
         parameters_(std::move(parameters)),
@@ -137,9 +137,8 @@ class SheetObjective : public CostFunction {
     const int count = layout_.size();
     std::vector<Points> changes(std::size_t(count), Points::Zero(nodes.rows(), 3));  // of dW/dx
     equilibrium_.elasticity().for_parameter_derivatives(
-        [&](int, std::span<const int> of, const Eigen::Ref<const MatrixX>& by_q) {
-          MatrixX by = by_q * press_table_derivative(layout_.terms, theta);
-          by.col(0) /= theta[0];
+        [&](int e, std::span<const int> of, const Eigen::Ref<const MatrixX>& by_q) {
+          const MatrixX by = by_q * law_parameters_by_theta(*sheet_->body, layout_, theta, e);
           for (std::size_t a = 0; a < of.size(); ++a)
             for (int k = 0; k < count; ++k)
               changes[std::size_t(k)].row(of[a]) += by.col(k).segment<3>(3 * Eigen::Index(a)).transpose();
@@ -172,7 +171,7 @@ class SheetObjective : public CostFunction {
   }
 
   std::shared_ptr<const Sheet> sheet_;
-  PressTheta layout_;
+  LawLayout layout_;
   ParameterSet parameters_;
   bool all_;  ///< steps that are not fitted are simulated, too
   Equilibrium equilibrium_;
@@ -223,8 +222,8 @@ class Experiment {
   json run() const {
     const auto begin = std::chrono::steady_clock::now();
     const int terms = request_.at("terms");
-    const PressTheta layout{1, terms};
-    ParameterSet parameters = press_parameters(layout, {"youngs_modulus"}, request_.at("start_modulus"));
+    const LawLayout layout({1, terms});
+    ParameterSet parameters = law_parameters(layout, request_.at("start_modulus"));
     parameters.fix("poisson_ratio", request_.at("poisson_ratio"));
     const VectorX theta = parameters.reference();
     SheetObjective objective(sheet_, layout, parameters, false);

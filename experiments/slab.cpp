@@ -102,16 +102,10 @@ class Experiment {
   json fit(int controls) const {
     const auto begin = std::chrono::steady_clock::now();
     auto body = std::make_shared<Body>(body_);
-    std::vector<std::string> names = {"youngs_modulus"};
-    if (controls > 1) {
-      const ControlledField field = inverse_distance_field(*body, farthest_points(*body, controls));
-      body->modulus = field.field;
-      names.clear();
-      for (int k = 1; k <= controls; ++k) names.push_back("youngs_modulus@" + std::to_string(k));
-    }
+    if (controls > 1) body->modulus = inverse_distance_field(*body, farthest_points(*body, controls)).field;
     const int terms = request_.at("terms");
-    const PressTheta layout{controls, terms};
-    ParameterSet parameters = press_parameters(layout, names, request_.at("start_modulus"));
+    const LawLayout layout({controls, terms});
+    ParameterSet parameters = law_parameters(layout, request_.at("start_modulus"));
     parameters.fix("poisson_ratio", request_.at("poisson_ratio"));
     const VectorX theta = parameters.reference();
     std::vector<Indentation> fitted;

@@ -1,7 +1,7 @@
 // The cost of a recording and its derivative over Young's modulus, as CSV on stdout.
 //   pliant_sweep CAPTURE CELLS FROM TO COUNT [NAME=VALUE]...
-// FROM and TO [Pa] are spaced evenly by logarithm; NAME=VALUE sets another parameter of result.json, a scalar. Columns: E
-// [Pa], cost, its derivative by E [1/Pa] by the adjoint and by tangents, and rms distance [m].
+// FROM and TO [Pa] are spaced evenly by logarithm; NAME=VALUE sets another parameter of result.json, a scalar. Columns:
+// E [Pa], cost, its derivative by E [1/Pa] by the adjoint and by tangents, and rms distance [m].
 
 #include <cmath>
 #include <cstdio>
@@ -22,15 +22,15 @@ void set_scalar(ParameterSet& parameters, const std::string& assignment) {
   if (equals == std::string::npos || !p || p->dimension() != 1)
     throw std::invalid_argument("\"" + assignment + "\" is not the value of a scalar parameter");
   VectorX theta = parameters.reference();
-  theta[p->theta_index] = std::atof(assignment.c_str() + equals + 1);
+  theta[p->at] = std::atof(assignment.c_str() + equals + 1);
   parameters.set_reference(theta);
 }
 
-ParameterSet only_youngs_modulus(const Capture& capture, int argc, char** argv) {
-  ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.surface));
-  for (int i = 6; i < argc; ++i) set_scalar(parameters, argv[i]);
-  const std::vector<Parameter> all = parameters.parameters();
-  for (const Parameter& p : all) parameters.set_estimated(p.name, p.name == "youngs_modulus");
+CaptureParameters only_youngs_modulus(const Capture& capture, int argc, char** argv) {
+  CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.surface));
+  for (int i = 6; i < argc; ++i) set_scalar(parameters.set, argv[i]);
+  const std::vector<Parameter> all = parameters.set.parameters();
+  for (const Parameter& p : all) parameters.set.set_estimated(p.name, is_modulus(p));
   return parameters;
 }
 
@@ -42,12 +42,13 @@ int run(int argc, char** argv) {
   const double from = std::atof(argv[3]), to = std::atof(argv[4]);
   const int count = std::atoi(argv[5]);
   const Capture capture = read_capture(argv[1]);
-  const auto observations = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observe(capture)));
-  ParameterSet parameters = only_youngs_modulus(capture, argc, argv);
+  const auto observations =
+      std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observe(capture)));
+  const auto [parameters, blocks] = only_youngs_modulus(capture, argc, argv);
   Resolution resolution;
   resolution.cells = std::atof(argv[2]);
   const Discretisation scene =
-      discretise(capture, capture_distance(capture, resolution.band), resolution, parameters.reference());
+      discretise(capture, capture_distance(capture, resolution.band), resolution, blocks, parameters.reference());
   ObjectiveOptions options;
   options.outlier_scale = 0.12 * object_size(capture);
   options.last_frame = int(scene.simulation.times.size()) - 1;
@@ -56,7 +57,7 @@ int run(int argc, char** argv) {
   for (int i = 0; i < count; ++i) {
     const double modulus = from * std::pow(to / from, count > 1 ? double(i) / (count - 1) : 0.0);
     VectorX theta = parameters.reference();
-    theta[theta::youngs_modulus] = modulus;
+    blocks.motion.set_moduli(theta, modulus);
     const VectorX p = parameters.to_unconstrained(theta);
     const CostEvaluation adjoint = objective.gradient(p), tangent = objective.linearise(p);
     if (!adjoint.succeeded || !tangent.succeeded) {
@@ -73,9 +74,7 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace pliant
 
-int main(int argc, char** argv) try {
-  return pliant::run(argc, argv);
-} catch (const std::exception& error) {
+int main(int argc, char** argv) try { return pliant::run(argc, argv); } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 2;
 }

@@ -51,7 +51,7 @@ struct Tracking {
     for (std::string factor; std::getline(moduli, factor, ',');) tracks.push_back(follow(recorded, std::stod(factor)));
     return {{"choices", choices},
             {"size", swing.size},
-            {"youngs_modulus", swing.theta[theta::youngs_modulus]},
+            {"youngs_modulus", swing.theta[swing.layout.youngs_moduli[0]]},
             {"true_nodes", swing.truth->node_count()},
             {"nodes", swing.body->node_count()},
             {"elements", swing.body->element_count()},
@@ -65,7 +65,7 @@ struct Tracking {
 
   json follow(const test::SwingRecording& recorded, double factor) const {
     VectorX theta = swing.theta;
-    theta[theta::youngs_modulus] *= factor;
+    swing.layout.scale_moduli(theta, factor);
     const auto begin = std::chrono::steady_clock::now();
     const Track track = recorded.track(swing, theta);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -34,6 +34,7 @@
 #include "estimation/modal_start.hpp"
 #include "estimation/objective.hpp"
 #include "estimation/optimiser.hpp"
+#include "estimation/recordings.hpp"
 #include "tracked_objects.hpp"
 
 namespace pliant {
@@ -99,17 +100,32 @@ TrackedObject make_object(const Choices& choices, int controls) {
   throw std::invalid_argument("\"" + choices.at("object") + "\" is not an object; see experiments/tracks.cpp");
 }
 
-VectorX make_theta(const StartingMotion& motion, const VectorX& moduli, double mass_damping, double stiffness_damping) {
-  const int m = int(moduli.size());
-  VectorX theta = VectorX::Zero(theta::size(0, m));
-  for (int k = 0; k < m; ++k) theta[theta::modulus(k, m, theta.size())] = moduli[k];
-  theta[theta::poissons_ratio] = poissons_ratio;
-  theta[theta::mass_damping] = mass_damping;
-  theta[theta::stiffness_damping] = stiffness_damping;
-  theta[theta::density] = rho;
-  theta.segment<3>(theta::linear_velocity) = motion.linear;
-  theta.segment<3>(theta::angular_velocity) = motion.angular;
+struct Material {
+  VectorX moduli;
+  double mass_damping, stiffness_damping;
+};
+
+/// Writes the parameters of a motion into its blocks.
+void set_motion(const MotionBlocks& blocks, const StartingMotion& motion, const Material& material, VectorX& theta) {
+  for (std::size_t k = 0; k < blocks.youngs_moduli.size(); ++k)
+    theta[blocks.youngs_moduli[k]] = material.moduli[Eigen::Index(k)];
+  theta[blocks.poissons_ratio] = poissons_ratio;
+  theta[blocks.mass_damping] = material.mass_damping;
+  theta[blocks.stiffness_damping] = material.stiffness_damping;
+  theta[blocks.density] = rho;
+  theta.segment<3>(blocks.linear_velocity) = motion.linear;
+  theta.segment<3>(blocks.angular_velocity) = motion.angular;
+}
+VectorX make_theta(const MotionLayout& layout, const StartingMotion& motion, const Material& material) {
+  VectorX theta = layout.zero();
+  set_motion(layout, motion, material, theta);
   return theta;
+}
+
+/// Of motions of one object, each with its own start.
+JointLayout joined(const MotionLayout& one, std::size_t motions) {
+  const CaptureParameters parameters{ParameterSet(one.layout(), {}, one.zero()), {one, {}}};
+  return join(std::vector(motions, parameters), true);
 }
 
 class Experiment {
@@ -118,7 +134,9 @@ class Experiment {
       : choices_(std::move(choices)),
         controls_(integer("controls")),
         object_(make_object(choices_, controls_)),
+        layout_({.moduli = controls_}),
         body_(object_.body) {
+    options_.blocks = layout_;
     const std::vector<double> moduli = numbers(choices_.at("moduli"));
     truth_ = Eigen::Map<const VectorX>(moduli.data(), Eigen::Index(moduli.size()));
     if (truth_.size() != 1 && truth_.size() != controls_)
@@ -173,6 +191,8 @@ class Experiment {
     const TrackedObject truth = make_object(choices_, int(truth_.size()));
     SimulationOptions options = options_;
     options.max_dt /= integer("truth_steps");
+    const MotionLayout layout({.moduli = int(truth_.size())});
+    options.blocks = layout;
     std::mt19937 random(7);
     for (std::size_t m = 0; m < object_.motions.size(); ++m) {
       const StartingMotion& motion = object_.motions[m];
@@ -180,7 +200,7 @@ class Experiment {
       auto frames = std::make_shared<std::vector<FrameObservations>>();
       double farthest = 0.0;
       Simulation simulation(truth.body, options);
-      const VectorX theta = make_theta(motion, truth_, alpha, beta);
+      const VectorX theta = make_theta(layout, motion, {truth_, alpha, beta});
       const RolloutSummary summary =
           simulation.run(theta, MatrixX(theta.size(), 0), last, [&](int frame, const State& state, auto) {
             farthest = std::max(farthest, (state.x - body_->nodes).rowwise().norm().maxCoeff());
@@ -209,7 +229,8 @@ class Experiment {
   /// Of one thread, in the last of the motions: a step, a step of the reverse sweep, a factorisation and a solve.
   json time_steps() const {
     Simulation simulation(body_, options_);
-    const VectorX theta = make_theta(object_.motions.back(), mean_modulus() * VectorX::Ones(controls_), alpha, beta);
+    const VectorX theta =
+        make_theta(layout_, object_.motions.back(), {mean_modulus() * VectorX::Ones(controls_), alpha, beta});
     const int last = std::min(15, integer("frames") - 1);
     double begin = wall_seconds();
     const RolloutSummary summary =
@@ -230,10 +251,10 @@ class Experiment {
 
   json time_solver(const VectorX& theta) const {
     std::vector<std::unique_ptr<ForceTerm>> terms;
-    terms.push_back(make_elasticity(body_));
+    terms.push_back(make_elasticity(body_, layout_));
     StepOptions step_options;
     step_options.dt = options_.max_dt, step_options.newmark_theta = options_.newmark_theta;
-    Stepper stepper(body_, std::move(terms), step_options);
+    Stepper stepper(body_, std::move(terms), layout_, step_options);
     stepper.hold(held_);
     stepper.set_parameters(theta);
     if (!stepper.prepare({body_->nodes, Points::Zero(body_->node_count(), 3)}))
@@ -294,8 +315,8 @@ class Experiment {
     for (const FrameObservations& frame : *observations_[motion]) tracked.frames[frame.frame] = frame.tracks;
     ModalStartOptions options;
     options.curve_samples = integer("curve_samples");
-    const VectorX theta = make_theta(object_.motions[motion], moduli_, 0.0, 0.0);
-    return modal_start(body_, theta, held_, tracked, options_.times, options);
+    const VectorX theta = make_theta(layout_, object_.motions[motion], {moduli_, 0.0, 0.0});
+    return modal_start(body_, layout_, theta, held_, tracked, options_.times, options);
   }
 
   static std::vector<double> list(const VectorX& values) { return {values.begin(), values.end()}; }
@@ -346,26 +367,24 @@ class Experiment {
   Objective objective(int last_frame, VectorX& start) const {
     std::vector<ObservedMotion> recordings;
     const auto tracks = std::make_shared<PointTracks>(*body_, rest_);
+    const JointLayout joint = joined(layout_, object_.motions.size());
+    start = VectorX::Zero(joint.layout.size());
     for (std::size_t r = 0; r < object_.motions.size(); ++r) {
-      const VectorX theta = make_theta(object_.motions[r], moduli_, mass_damping_, stiffness_damping_);
+      set_motion(joint.blocks[r].motion, object_.motions[r], {moduli_, mass_damping_, stiffness_damping_}, start);
       ObservedMotion motion{{nullptr, tracks}, body_, options_, observations_[r], {}};
+      motion.simulation.blocks = joint.blocks[r].motion;
       motion.options.outlier_scale = 10.0 * object_.size;  // squares, as in the paper
       motion.options.last_frame = last_frame;
       recordings.push_back(std::move(motion));
-      start.conservativeResize(start.size() + theta.size());
-      start.tail(theta.size()) = theta;
     }
-    const int size = int(start.size()) / int(object_.motions.size());
+    const MotionBlocks& shared = joint.blocks.front().motion;
     std::vector<Parameter> list;
-    const auto add = [&](const std::string& name, const char* unit, int index, double lower, double upper) {
-      list.push_back({name, unit, Transform::Logarithm, index, 1.0, lower, upper, true});
-      for (int r = 1; r < int(object_.motions.size()); ++r) list.back().also.push_back(r * size + index);
-    };
-    for (int k = 0; k < controls_; ++k)
-      add("youngs_modulus@" + std::to_string(k + 1), "Pa", theta::modulus(k, controls_, size), least_modulus, 1e9);
-    add("mass_damping", "1/s", theta::mass_damping, 1e-5, 1e2);
-    add("stiffness_damping", "s", theta::stiffness_damping, 1e-6, 1.0);
-    return {std::move(recordings), ParameterSet(std::move(list), start)};
+    for (std::size_t k = 0; k < shared.youngs_moduli.size(); ++k)
+      list.push_back({"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm, shared.youngs_moduli[k],
+                      1.0, least_modulus, 1e9, true});
+    list.push_back({"mass_damping", "1/s", Transform::Logarithm, shared.mass_damping, 1.0, 1e-5, 1e2, true});
+    list.push_back({"stiffness_damping", "s", Transform::Logarithm, shared.stiffness_damping, 1.0, 1e-6, 1.0, true});
+    return {std::move(recordings), ParameterSet(joint.layout, std::move(list), start)};
   }
 
   /// From few frames to all: where simulation and truth have not yet drifted apart by half a swing, valleys are wide.
@@ -424,7 +443,7 @@ class Experiment {
     json out = json::array();
     for (std::size_t i = 0; i < parameters.parameters().size(); ++i) {
       const Parameter& parameter = parameters.parameters()[i];
-      const double value = found[parameter.theta_index], is = truth[Eigen::Index(i)];
+      const double value = found[parameter.at], is = truth[Eigen::Index(i)];
       out.push_back({{"name", parameter.name}, {"value", value}, {"truth", is}, {"relative_error", value / is - 1.0}});
     }
     return out;
@@ -443,13 +462,14 @@ class Experiment {
     const VectorX found = parameters.to_theta(p), truth = true_values();
     double worst = 0.0;
     for (int k = 0; k < controls_; ++k)
-      worst = std::max(worst, std::abs(found[parameters.parameters()[std::size_t(k)].theta_index] / truth[k] - 1.0));
+      worst = std::max(worst, std::abs(found[parameters.parameters()[std::size_t(k)].at] / truth[k] - 1.0));
     return worst;
   }
 
   Choices choices_;
   int controls_;
   TrackedObject object_;
+  MotionLayout layout_;
   std::shared_ptr<const Body> body_;
   SimulationOptions options_;
   std::vector<int> held_;

@@ -13,6 +13,8 @@
 namespace pliant {
 namespace {
 
+const MotionLayout layout;
+
 struct Scan {
   std::shared_ptr<const Body> known, scanned;
   std::vector<int> held;
@@ -25,12 +27,13 @@ Scan sagging_box(const Vector3& extent, Eigen::Vector3i cells, bool is_quadratic
   Box box;
   box.extend(Vector3::Zero()), box.extend(extent);
   scan.known = std::make_shared<Body>(make_body(make_tet_box(box, cells, is_quadratic)));
-  scan.theta = VectorX::Zero(theta::size(0));
-  scan.theta[theta::youngs_modulus] = youngs_modulus;
-  scan.theta[theta::poissons_ratio] = 0.3;
-  scan.theta[theta::density] = 1000.0;
-  scan.theta.segment<3>(theta::gravity) = Vector3(0.0, 0.0, -9.81);
+  scan.theta = layout.zero();
+  layout.set_moduli(scan.theta, youngs_modulus);
+  scan.theta[layout.poissons_ratio] = 0.3;
+  scan.theta[layout.density] = 1000.0;
+  scan.theta.segment<3>(layout.gravity) = Vector3(0.0, 0.0, -9.81);
   SimulationOptions options;
+  options.blocks = layout;
   options.times = {0.0};
   options.is_static = true;
   options.newton.tolerance = 1e-10;
@@ -68,10 +71,10 @@ void find(benchmark::State& state, MakeScan make, ReferenceScheme scheme, bool i
   options.scheme = scheme;
   options.tolerance = 1e-8;
   options.max_iterations = 400;
-  const Points load = scan_load(*scan.scanned, scan.theta, {});
+  const Points load = scan_load(*scan.scanned, layout, scan.theta, {});
   ReferenceShape shape;
   for (auto _ : state) {
-    ReferenceShapeSolver solver(scan.scanned, scan.held, options);
+    ReferenceShapeSolver solver(scan.scanned, scan.held, layout, options);
     shape = solver.find(scan.theta, load);
     benchmark::DoNotOptimize(shape.X.data());
   }

@@ -43,15 +43,16 @@ struct Motion {
   static constexpr int before = 4, steps = 8;
 
   std::shared_ptr<const Body> body;
+  MotionBlocks blocks;
   std::unique_ptr<Stepper> stepper;
   VectorX theta;
   std::vector<State> states;   // at the start of each step, and at the end of the last
   std::vector<Points> deltas;  // of each step
 
-  Motion(std::shared_ptr<const Body> of, std::vector<std::unique_ptr<ForceTerm>> terms, VectorX parameters,
-         const StepOptions& options, const std::vector<int>& held, const Vector3& velocity)
-      : body(std::move(of)), theta(std::move(parameters)) {
-    stepper = std::make_unique<Stepper>(body, std::move(terms), options);
+  Motion(std::shared_ptr<const Body> of, std::vector<std::unique_ptr<ForceTerm>> terms, const MotionBlocks& at,
+         VectorX parameters, const StepOptions& options, const std::vector<int>& held, const Vector3& velocity)
+      : body(std::move(of)), blocks(at), theta(std::move(parameters)) {
+    stepper = std::make_unique<Stepper>(body, std::move(terms), blocks, options);
     stepper->set_parameters(theta);
     stepper->hold(held);
     State state = {body->reference_positions(), Points::Zero(body->node_count(), 3)};
@@ -86,16 +87,18 @@ StepOptions step_options(double dt, Integrator integrator) {
 
 /// Dropped, in the middle of an impact, at the default step of the fit.
 Motion impact(const std::shared_ptr<const Body>& body, Integrator integrator) {
-  VectorX theta = test::torus_scene(0.04, 2).theta;
+  const MotionLayout layout({.planes = 1});
+  const PlaneBlock& plane = layout.planes.front();
+  VectorX theta = test::torus_values(layout);
   const double lowest = body->nodes.col(1).minCoeff();
-  theta.segment<3>(theta::plane_point(0)) = Vector3(0, lowest + 0.3 * body->grid().cell_size, 0);
-  theta.segment<3>(theta::plane_normal(0)) = Vector3::UnitY();
+  theta.segment<3>(plane.point) = Vector3(0, lowest + 0.3 * body->grid().cell_size, 0);
+  theta.segment<3>(plane.normal) = Vector3::UnitY();
   std::vector<std::unique_ptr<ForceTerm>> terms;
-  terms.push_back(make_elasticity(body));
-  terms.push_back(std::make_unique<Gravity>(*body));
-  terms.push_back(
-      std::make_unique<PlaneContact>(body, 0, default_contact(*body, theta[theta::density] * body->volume(), 9.81)));
-  return {body, std::move(terms), theta, step_options(default_time_step(*body, 9.81), integrator),
+  terms.push_back(make_elasticity(body, layout));
+  terms.push_back(std::make_unique<Gravity>(*body, layout));
+  terms.push_back(std::make_unique<PlaneContact>(body, plane,
+                                                 default_contact(*body, theta[layout.density] * body->volume(), 9.81)));
+  return {body, std::move(terms), layout, theta, step_options(default_time_step(*body, 9.81), integrator),
           {},   {0.0, -1.5, 0.0}};
 }
 Motion torus(Integrator integrator) { return impact(test::torus_body(0.1, 0.04, 0.0178), integrator); }
@@ -111,20 +114,21 @@ Motion swinging_bar(Integrator integrator, double dt) {
   box.extend(Vector3::Zero());
   box.extend(Vector3(1.0, 0.25, 0.25));
   const auto body = std::make_shared<Body>(make_body(make_tet_box(box, {20, 5, 5}, false)));
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 1e6;
-  theta[theta::poissons_ratio] = 0.4;
-  theta[theta::mass_damping] = 0.1;
-  theta[theta::stiffness_damping] = 0.001;
-  theta[theta::density] = 1000.0;
-  theta.segment<3>(theta::gravity) = Vector3(0.0, -9.81, 0.0);
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 1e6);
+  theta[layout.poissons_ratio] = 0.4;
+  theta[layout.mass_damping] = 0.1;
+  theta[layout.stiffness_damping] = 0.001;
+  theta[layout.density] = 1000.0;
+  theta.segment<3>(layout.gravity) = Vector3(0.0, -9.81, 0.0);
   std::vector<std::unique_ptr<ForceTerm>> terms;
-  terms.push_back(make_elasticity(body));
-  terms.push_back(std::make_unique<Gravity>(*body));
+  terms.push_back(make_elasticity(body, layout));
+  terms.push_back(std::make_unique<Gravity>(*body, layout));
   std::vector<int> held;
   for (int n = 0; n < body->node_count(); ++n)
     if (body->nodes(n, 0) < 1e-6) held.push_back(n);
-  return {body, std::move(terms), theta, step_options(dt, integrator), held, Vector3::Zero()};
+  return {body, std::move(terms), layout, theta, step_options(dt, integrator), held, Vector3::Zero()};
 }
 Motion bar(Integrator integrator) { return swinging_bar(integrator, 0.01); }
 Motion bar_long_steps(Integrator integrator) { return swinging_bar(integrator, 1.0 / 30.0); }
@@ -195,10 +199,10 @@ void linear_solve(benchmark::State& state, MakeMotion make, SolverOptions option
 /// Rotations and the elastic matrix.
 void assembly(benchmark::State& state, MakeMotion make) {
   const Motion motion = make(Integrator::Lagged);
-  const auto elasticity = make_elasticity(motion.body);
+  const auto elasticity = make_elasticity(motion.body, motion.blocks);
   VectorX theta = VectorX::Zero(motion.theta.size());
-  theta[theta::youngs_modulus] = 1e5;
-  theta[theta::poissons_ratio] = 0.35;
+  motion.blocks.set_moduli(theta, 1e5);
+  theta[motion.blocks.poissons_ratio] = 0.35;
   elasticity->set_parameters(theta);
   BlockMatrix matrix(motion.body->pattern);
   for (auto _ : state) {

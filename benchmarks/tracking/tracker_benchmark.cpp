@@ -205,7 +205,7 @@ void spring_step(benchmark::State& state) {
   const Correspondence c = expect(s.samples(level, frame), s.shares(level), {view.points, view.noise}, mixture(0.03));
   std::vector<std::unique_ptr<ForceTerm>> terms = scene_forces(s.swing.body, s.swing.scene);
   auto springs = std::make_unique<PointSprings>(*s.swing.body, s.samples_in_body);
-  const double mass = s.swing.theta[theta::density] * s.swing.body->volume();
+  const double mass = s.swing.theta[s.swing.layout.density] * s.swing.body->volume();
   const double stiffness = 1000.0 * mass * s.swing.options.rate * s.swing.options.rate;
   springs->set(c.precision * (stiffness / c.precision.sum()), c.target,
                Points::Zero(s.samples_in_body.point_count(), 3), 1.0);
@@ -213,7 +213,7 @@ void spring_step(benchmark::State& state) {
   StepOptions options;
   options.dt = 1.0 / s.swing.options.rate;
   options.newmark_theta = 0.999;
-  Stepper stepper(s.swing.body, std::move(terms), options);
+  Stepper stepper(s.swing.body, std::move(terms), s.swing.layout, options);
   stepper.hold(eliminated_nodes(*s.swing.body, s.swing.scene));
   stepper.set_parameters(s.swing.theta);
   const Points start = s.swing.true_nodes(frame);

@@ -23,7 +23,7 @@ auto node(const Eigen::MatrixBase<Derived>& v, int a) {
 template <int N>
 class CorotatedElasticity : public Elasticity {
  public:
-  explicit CorotatedElasticity(std::shared_ptr<const Body> body);
+  CorotatedElasticity(std::shared_ptr<const Body> body, const MaterialBlocks& material);
 
   void set_parameters(const VectorX& theta) override;
   void linearise(const Points& lag) override;
@@ -38,6 +38,7 @@ class CorotatedElasticity : public Elasticity {
   void add_reference_tangent(const Points& d_reference, Points& force) override;
   void add_reference_adjoint(const Points& w, Points& reference_bar) override;
   double energy(const Points& z) const override;
+  Matrix3 cauchy_stress(int element) const override;
 
  private:
   using Vector = Eigen::Matrix<double, 3 * N, 1>;
@@ -52,6 +53,7 @@ class CorotatedElasticity : public Elasticity {
   void take_reference();
 
   std::shared_ptr<const Body> body_;
+  MaterialBlocks material_;
   ElementModuli modulus_;
   double poissons_ratio_ = -2.0;
   LocalStiffness<N> stiffness_;
@@ -63,8 +65,12 @@ class CorotatedElasticity : public Elasticity {
 };
 
 template <int N>
-CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body)
-    : body_(std::move(body)), modulus_(body_), stiffness_(body_), blocks_(element_blocks(*body_)) {
+CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body, const MaterialBlocks& material)
+    : body_(std::move(body)),
+      material_(material),
+      modulus_(body_, material),
+      stiffness_(body_),
+      blocks_(element_blocks(*body_)) {
   polar_.resize(std::size_t(body_->element_count()));
   gradients_.resize(polar_.size());
   reference_.resize(polar_.size());
@@ -84,10 +90,18 @@ void CorotatedElasticity<N>::set_parameters(const VectorX& parameters) {
   std::ranges::fill(polar_, Polar{});
   modulus_.set_parameters(parameters);
   if (by_reference_) by_reference_->set_parameters(parameters);
-  const double nu = parameters[theta::poissons_ratio];
+  const double nu = parameters[material_.poissons_ratio];
   if (nu == poissons_ratio_) return;
   poissons_ratio_ = nu;
   stiffness_.set_poissons_ratio(nu);
+}
+
+template <int N>
+Matrix3 CorotatedElasticity<N>::cauchy_stress(int e) const {
+  const UnitLame c = unit_lame(poissons_ratio_);
+  const Matrix3 in_body = polar_[e].S - Matrix3::Identity();
+  const Matrix3 in_world = polar_[e].R * in_body * polar_[e].R.transpose();
+  return modulus_[e] * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world);
 }
 
 template <int N>
@@ -96,7 +110,7 @@ void CorotatedElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
   stiffness_ = LocalStiffness<N>(body_);
   poissons_ratio_ = -2.0;
   take_reference();
-  if (!by_reference_) by_reference_ = ReferenceForces::make(body_);
+  if (!by_reference_) by_reference_ = ReferenceForces::make(body_, material_);
 }
 
 template <int N>
@@ -192,7 +206,7 @@ template <int N>
 void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
                                                const VectorX& d_theta, Points& force) {
   modulus_.set_change(d_theta);
-  const double d_nu = d_theta[theta::poissons_ratio];
+  const double d_nu = d_theta[material_.poissons_ratio];
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
     const auto g = gradients(e);
@@ -236,16 +250,16 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
       lag_bar.row(nodes[a]).noalias() += (ER * v.cross(g_a)).transpose();
     }
     modulus_.add_log_adjoint(e, -E * products.work);
-    theta_bar[theta::poissons_ratio] -= E * products.d_work;
+    theta_bar[material_.poissons_ratio] -= E * products.d_work;
   }
   modulus_.end_adjoint(theta_bar);
 }
 
 }  // namespace
 
-std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body) {
+std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks) {
   return with_node_count(
-      *body, [&]<int N>() -> std::unique_ptr<Elasticity> { return std::make_unique<CorotatedElasticity<N>>(body); });
+      *body, [&]<int N>() -> std::unique_ptr<Elasticity> { return std::make_unique<CorotatedElasticity<N>>(body, blocks); });
 }
 
 }  // namespace pliant

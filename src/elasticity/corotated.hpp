@@ -20,6 +20,8 @@ class Elasticity : public ForceTerm {
 
   /// Elastic energy [J] of the positions with the rotations of the lag point.
   virtual double energy(const Points& z) const = 0;
+  /// Mean Cauchy stress of an element at the lag point [Pa].
+  virtual Matrix3 cauchy_stress(int element) const = 0;
   /// Of the lag point.
   const Polar& rotation(int element) const { return polar_[std::size_t(element)]; }
 
@@ -27,7 +29,8 @@ class Elasticity : public ForceTerm {
   std::vector<Polar> polar_;
 };
 
-/// The elasticity of any kind of body.
-std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body);
+/// The elasticity of any kind of body, its parameters in these blocks.
+/// Throws std::invalid_argument where there is not one block for each control of the body's field of moduli.
+std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks);
 
 }  // namespace pliant

@@ -2,15 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace pliant {
+
+ElementModuli::ElementModuli(std::shared_ptr<const Body> body, const MaterialBlocks& blocks)
+    : body_(std::move(body)), blocks_(blocks.youngs_moduli) {
+  if (int(blocks_.size()) != body_->modulus.controls)
+    throw std::invalid_argument("a body of " + std::to_string(body_->modulus.controls) + " control moduli and " +
+                                std::to_string(blocks_.size()) + " parameter blocks for them");
+}
 
 void ElementModuli::set_parameters(const VectorX& parameters) {
   const ModulusField& field = body_->modulus;
   const Eigen::Map<const VectorX> relative(field.relative.data(), Eigen::Index(field.relative.size()));
   controls_.resize(field.controls);
-  for (int k = 0; k < field.controls; ++k)
-    controls_[k] = parameters[theta::modulus(k, field.controls, parameters.size())];
+  for (int k = 0; k < field.controls; ++k) controls_[k] = parameters[blocks_[std::size_t(k)]];
   if (is_homogeneous())
     values_ = controls_[0] * relative;
   else
@@ -20,7 +27,7 @@ void ElementModuli::set_parameters(const VectorX& parameters) {
 void ElementModuli::set_change(const VectorX& d_theta) {
   const int m = body_->modulus.controls;
   VectorX d_log(m);
-  for (int k = 0; k < m; ++k) d_log[k] = d_theta[theta::modulus(k, m, d_theta.size())] / controls_[k];
+  for (int k = 0; k < m; ++k) d_log[k] = d_theta[blocks_[std::size_t(k)]] / controls_[k];
   uniform_change_ = d_log[0];
   if (m > 1) log_change_.noalias() = body_->modulus.weights * d_log;
 }
@@ -28,16 +35,16 @@ void ElementModuli::set_change(const VectorX& d_theta) {
 void ElementModuli::end_adjoint(VectorX& theta_bar) const {
   const int m = body_->modulus.controls;
   if (m == 1) {
-    theta_bar[theta::youngs_modulus] += log_bar_[0] / controls_[0];
+    theta_bar[blocks_.front()] += log_bar_[0] / controls_[0];
     return;
   }
   const VectorX bar = body_->modulus.weights.transpose() * log_bar_;
-  for (int k = 0; k < m; ++k) theta_bar[theta::modulus(k, m, theta_bar.size())] += bar[k] / controls_[k];
+  for (int k = 0; k < m; ++k) theta_bar[blocks_[std::size_t(k)]] += bar[k] / controls_[k];
 }
 
-ModulusStatistics modulus_statistics(const std::shared_ptr<const Body>& body, const VectorX& theta,
-                                     const MatrixX& log_covariance) {
-  ElementModuli moduli(body);
+ModulusStatistics modulus_statistics(const std::shared_ptr<const Body>& body, const MaterialBlocks& blocks,
+                                     const VectorX& theta, const MatrixX& log_covariance) {
+  ElementModuli moduli(body, blocks);
   moduli.set_parameters(theta);
   const int elements = body->element_count(), controls = body->modulus.controls;
   ModulusStatistics s;

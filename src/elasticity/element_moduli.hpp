@@ -1,14 +1,15 @@
 #pragma once
 
 #include "elasticity/body.hpp"
-#include "elasticity/parameters.hpp"
+#include "parameters/motion_blocks.hpp"
 
 namespace pliant {
 
-/// Young's modulus of every element out of theta, with its derivatives (`ModulusField`).
+/// Young's modulus of every element out of a parameter vector, with its derivatives (`ModulusField`).
 class ElementModuli {
  public:
-  explicit ElementModuli(std::shared_ptr<const Body> body) : body_(std::move(body)) {}
+  /// Throws std::invalid_argument where there is not one block for each control of the body's field.
+  ElementModuli(std::shared_ptr<const Body> body, const MaterialBlocks& blocks);
 
   void set_parameters(const VectorX& theta);
   double operator[](int element) const { return values_[std::size_t(element)]; }  ///< [Pa]
@@ -27,6 +28,7 @@ class ElementModuli {
   bool is_homogeneous() const { return body_->modulus.controls == 1; }
 
   std::shared_ptr<const Body> body_;
+  std::vector<ParameterHandle> blocks_;  // of the control moduli
   VectorX controls_, values_, log_change_, log_bar_;
   double uniform_change_ = 0.0;
 };
@@ -38,7 +40,7 @@ struct ModulusStatistics {
 };
 
 /// @param log_covariance  of ln E_k of the control moduli; m x m, or empty: nothing is known, deviations are zero
-ModulusStatistics modulus_statistics(const std::shared_ptr<const Body>& body, const VectorX& theta,
-                                     const MatrixX& log_covariance);
+ModulusStatistics modulus_statistics(const std::shared_ptr<const Body>& body, const MaterialBlocks& blocks,
+                                     const VectorX& theta, const MatrixX& log_covariance);
 
 }  // namespace pliant

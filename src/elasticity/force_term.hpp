@@ -1,6 +1,5 @@
 #pragma once
 
-#include "elasticity/parameters.hpp"
 #include "solvers/block_matrix.hpp"
 
 namespace pliant {
@@ -23,7 +22,7 @@ class ForceTerm {
   virtual Lag lag() const = 0;
   virtual At at() const = 0;
 
-  /// Takes the term's own parameters out of theta (elasticity/parameters.hpp).
+  /// Takes the term's own parameters out of a parameter vector, by the handles that it was made with.
   virtual void set_parameters(const VectorX& theta) = 0;
   /// Fixes the lag point; the calls below refer to it.
   virtual void linearise(const Points& lag) = 0;

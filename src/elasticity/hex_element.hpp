@@ -1,6 +1,7 @@
 #pragma once
 
-#include "elasticity/parameters.hpp"
+#include "base/types.hpp"
+#include "elasticity/lame.hpp"
 #include "mesh/hex_grid.hpp"
 
 namespace pliant {

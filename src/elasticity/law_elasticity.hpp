@@ -44,8 +44,6 @@ class LawElasticity : public Elasticity {
   using VisitDerivatives =
       std::function<void(int element, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& derivatives)>;
   virtual void for_parameter_derivatives(const VisitDerivatives& visit) const = 0;
-  /// Mean over an element's points of the Cauchy stress there [Pa].
-  virtual Matrix3 cauchy_stress(int element) const = 0;
   /// Mean over each element's points of S - I, F = R S, there; elements x 6.
   virtual MatrixX strains() const = 0;
 

@@ -20,13 +20,6 @@ constexpr double same_eigenvalue = 1e-9;  // relative: far above what the iterat
 /// mode of all but hair-thin bars, and far enough above zero that K + s M of a free body keeps ten digits.
 constexpr double relative_shift = 1e-3;
 
-double lowest_modulus(const Body& body, const VectorX& parameters) {
-  double lowest = parameters[theta::youngs_modulus];
-  for (int k = 1; k < body.modulus.controls; ++k)
-    lowest = std::min(lowest, parameters[theta::modulus(k, body.modulus.controls, parameters.size())]);
-  return lowest;
-}
-
 /// Signs are free: the largest component is made positive, so that the same input gives the same shape.
 void fix_sign(Points& shape) {
   Eigen::Index row = 0, column = 0;
@@ -98,8 +91,12 @@ class ModalAnalysis::Inverse {
   std::vector<Points> known_momentum_;  // M phi
 };
 
-ModalAnalysis::ModalAnalysis(std::shared_ptr<const Body> body, std::vector<int> held)
-    : body_(std::move(body)), held_(std::move(held)), elasticity_(make_elasticity(body_)), matrix_(body_->pattern) {
+ModalAnalysis::ModalAnalysis(std::shared_ptr<const Body> body, const MotionBlocks& blocks, std::vector<int> held)
+    : body_(std::move(body)),
+      blocks_(blocks),
+      held_(std::move(held)),
+      elasticity_(make_elasticity(body_, blocks)),
+      matrix_(body_->pattern) {
   std::ranges::sort(held_);
   held_.erase(std::unique(held_.begin(), held_.end()), held_.end());
   for (const int node : held_)
@@ -129,14 +126,14 @@ Points ModalAnalysis::scatter(const double* x) const {
 
 Points ModalAnalysis::mass_product(const VectorX& parameters, const Points& x) const {
   Points out = Points::Zero(x.rows(), 3);
-  body_->add_mass_product(parameters[theta::density], x, out);
+  body_->add_mass_product(parameters[blocks_.density], x, out);
   for (const int node : held_) out.row(node).setZero();
   return out;
 }
 
 bool ModalAnalysis::factorise(const VectorX& parameters) {
-  const double density = parameters[theta::density];
-  shift_ = relative_shift * lowest_modulus(*body_, parameters) / (density * std::pow(body_->size(), 2));
+  const double density = parameters[blocks_.density];
+  shift_ = relative_shift * blocks_.moduli(parameters).minCoeff() / (density * std::pow(body_->size(), 2));
   elasticity_->set_parameters(parameters);
   elasticity_->linearise(body_->reference_positions());
   matrix_.set_zero();
@@ -184,7 +181,7 @@ Modes ModalAnalysis::lowest(const VectorX& parameters, int count) {
                       std::to_string(count) + " modes of " + std::to_string(unknowns) + " unknowns",
                       "from 1 to half as many modes as unknowns",
                       "ask for fewer, or use smaller elements"});
-  if (!(parameters[theta::density] > 0.0))
+  if (!(parameters[blocks_.density] > 0.0))
     throw InputError({{}, "a density that is not positive", "kg/m^3 > 0", "set the density or the object's mass"});
   Modes found;
   if (!factorise(parameters)) return found.failure = "the stiffness matrix cannot be factorised", found;
@@ -215,13 +212,14 @@ MatrixX ModalAnalysis::modulus_derivatives(const VectorX& parameters, const Mode
     Points lag_bar = Points::Zero(shape.rows(), 3), z_bar = lag_bar;
     VectorX theta_bar = VectorX::Zero(parameters.size());
     elasticity_->add_force_adjoint(moved, shape, lag_bar, z_bar, theta_bar);
-    for (int k = 0; k < controls; ++k) derivatives(i, k) = -theta_bar[theta::modulus(k, controls, parameters.size())];
+    for (int k = 0; k < controls; ++k) derivatives(i, k) = -theta_bar[blocks_.youngs_moduli[std::size_t(k)]];
   }
   return derivatives;
 }
 
-Modes modes(std::shared_ptr<const Body> body, const VectorX& parameters, const std::vector<int>& held, int count) {
-  return ModalAnalysis(std::move(body), held).lowest(parameters, count);
+Modes modes(std::shared_ptr<const Body> body, const MotionBlocks& blocks, const VectorX& parameters,
+            const std::vector<int>& held, int count) {
+  return ModalAnalysis(std::move(body), blocks, held).lowest(parameters, count);
 }
 
 }  // namespace pliant

@@ -33,7 +33,7 @@ class ModalAnalysis {
  public:
   /// @param held  nodes that do not move, in any order
   /// Throws InputError where a held node is not one of the body's.
-  ModalAnalysis(std::shared_ptr<const Body> body, std::vector<int> held);
+  ModalAnalysis(std::shared_ptr<const Body> body, const MotionBlocks& blocks, std::vector<int> held);
 
   const Body& body() const { return *body_; }
   const std::vector<int>& held() const { return held_; }
@@ -62,6 +62,7 @@ class ModalAnalysis {
   Points scatter(const double* x) const;
 
   std::shared_ptr<const Body> body_;
+  MotionBlocks blocks_;
   std::vector<int> held_, free_;
   std::unique_ptr<Elasticity> elasticity_;
   BlockMatrix matrix_;  // K + s M, held nodes' rows and columns those of the identity
@@ -70,6 +71,7 @@ class ModalAnalysis {
 };
 
 /// The lowest modes of one body, once.
-Modes modes(std::shared_ptr<const Body> body, const VectorX& theta, const std::vector<int>& held, int count);
+Modes modes(std::shared_ptr<const Body> body, const MotionBlocks& blocks, const VectorX& theta,
+            const std::vector<int>& held, int count);
 
 }  // namespace pliant

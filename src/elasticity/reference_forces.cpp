@@ -14,7 +14,7 @@ namespace {
 template <int N>
 class TetReferenceForces : public ReferenceForces {
  public:
-  explicit TetReferenceForces(std::shared_ptr<const Body> body);
+  TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material);
 
   void set_parameters(const VectorX& theta) override;
   bool linearise(const Points& X, const Points& p, const Points& z) override;
@@ -54,6 +54,7 @@ class TetReferenceForces : public ReferenceForces {
   ByNode tangent(int e, const Nodes& d_reference) const;
 
   std::shared_ptr<const Body> body_;
+  ParameterHandle poissons_ratio_;
   ElementModuli modulus_;
   UnitLame lame_{};
   std::array<Nodes, points> derivatives_;
@@ -65,8 +66,8 @@ class TetReferenceForces : public ReferenceForces {
 };
 
 template <int N>
-TetReferenceForces<N>::TetReferenceForces(std::shared_ptr<const Body> body)
-    : body_(std::move(body)), modulus_(body_), blocks_(element_blocks(*body_)) {
+TetReferenceForces<N>::TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material)
+    : body_(std::move(body)), poissons_ratio_(material.poissons_ratio), modulus_(body_, material), blocks_(element_blocks(*body_)) {
   // Mid nodes move on their own: curved elements need the rule that integrates their gradients exactly.
   const auto rule = tet_quadrature(N == 4 ? 0 : 5);
   for (int q = 0; q < points; ++q) {
@@ -85,7 +86,7 @@ TetReferenceForces<N>::TetReferenceForces(std::shared_ptr<const Body> body)
 template <int N>
 void TetReferenceForces<N>::set_parameters(const VectorX& theta) {
   modulus_.set_parameters(theta);
-  lame_ = unit_lame(theta[theta::poissons_ratio]);
+  lame_ = unit_lame(theta[poissons_ratio_]);
 }
 
 template <int N>
@@ -214,12 +215,12 @@ void TetReferenceForces<N>::add_adjoint(const Points& w, Points& reference_bar) 
 
 }  // namespace
 
-std::unique_ptr<ReferenceForces> ReferenceForces::make(std::shared_ptr<const Body> body) {
+std::unique_ptr<ReferenceForces> ReferenceForces::make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks) {
   switch (body->kind) {
     case ElementKind::Tetrahedron:
-      return std::make_unique<TetReferenceForces<4>>(std::move(body));
+      return std::make_unique<TetReferenceForces<4>>(std::move(body), blocks);
     case ElementKind::QuadraticTetrahedron:
-      return std::make_unique<TetReferenceForces<10>>(std::move(body));
+      return std::make_unique<TetReferenceForces<10>>(std::move(body), blocks);
     case ElementKind::Hexahedron:
       break;
   }

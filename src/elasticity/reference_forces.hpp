@@ -13,7 +13,7 @@ namespace pliant {
 class ReferenceForces {
  public:
   /// Throws std::invalid_argument for a body of hexahedra.
-  static std::unique_ptr<ReferenceForces> make(std::shared_ptr<const Body> body);
+  static std::unique_ptr<ReferenceForces> make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks);
   virtual ~ReferenceForces() = default;
 
   virtual void set_parameters(const VectorX& theta) = 0;

@@ -31,22 +31,10 @@ FitOptions with_controls(FitOptions options, int count) {
   return options;
 }
 
-/// Theta of all recordings with the moduli of another field.
-VectorX changed(const VectorX& theta, const std::vector<int>& shared, const MatrixX& moduli) {
-  const auto from = int(moduli.cols()), to = int(moduli.rows());
-  VectorX out(theta.size() + Eigen::Index(shared.size()) * (to - from));
-  Eigen::Index read = 0, written = 0;
-  for (const int common : shared) {  // of a recording's own theta
-    const VectorX own = theta.segment(read, common + from - 1);
-    VectorX logs(from), other(common + to - 1);
-    for (int k = 0; k < from; ++k) logs[k] = std::log(own[theta::modulus(k, from, own.size())]);
-    const VectorX values = (moduli * logs).array().exp();
-    other.head(common) = own.head(common);
-    for (int k = 0; k < to; ++k) other[theta::modulus(k, to, other.size())] = values[k];
-    out.segment(written, other.size()) = other;
-    read += own.size(), written += other.size();
-  }
-  return out;
+/// A parameter vector with the moduli of another field: ln E_to = M ln E_from.
+VectorX changed(const JointLayout& from, const VectorX& theta, const JointLayout& to, const MatrixX& M) {
+  const VectorX logs = from.blocks.front().motion.moduli(theta).array().log();
+  return with_moduli(from, theta, to, (M * logs).array().exp());
 }
 
 class FieldChoice {
@@ -112,11 +100,11 @@ class FieldChoice {
     const Recordings recordings(recordings_, with_controls(options_, count), unused);
     const Grid grid = recordings.grid(options_.cells, options_.steps);
     const Body& body = *grid.recording.front().body;
-    std::vector<int> shared;
-    for (const Recording& r : recordings.all()) shared.push_back(r.theta_size - (count - 1));
     const MatrixX moduli = carried_over(body, field_of(body, best().control_points), body.modulus);
-    const auto change = [&](VectorX& theta) { theta = changed(theta, shared, moduli); };
+    const JointLayout before = layout_of(best().control_points), after = layout_of(count);
+    const auto change = [&](VectorX& theta) { theta = changed(before, theta, after, moduli); };
     FitState begin = *choice_.state;
+    begin.controls = count;
     VectorX theta = begin.refined.front().theta;
     begin.refined.clear();
     change(theta);
@@ -138,12 +126,12 @@ class FieldChoice {
     FitState::Fine& fine = *begin.fine;
     fine.stage = std::max(0, fine.stage - (begin.corrected && !begin.corrected->parameters.empty() ? 2 : 1));
     if (const Parameter* nu = parameters.find("poisson_ratio"); nu->estimated) {
-      const double start = recordings.parameters().reference()[nu->theta_index];
-      fine.reference[nu->theta_index] = start;
-      for (const int other : nu->also) fine.reference[other] = start;
+      fine.reference[nu->at] = recordings.parameters().reference()[nu->at];
     }
     return begin;
   }
+
+  JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }
 
   ModulusField field_of(const Body& body, int count) const {
     return control_field(body, recordings_.front().capture, {count, options_.control_weights}).field;
@@ -216,13 +204,12 @@ class FieldChoice {
     outcome.fields = choice_.tried;
     outcome.history.clear();
     const Body& body = *outcome.recordings.front().discretisation.body;
-    std::vector<int> shared;
-    for (const RecordingOutcome& r : outcome.recordings)
-      shared.push_back(int(r.theta.size()) - (body.modulus.controls - 1));
+    const JointLayout layout = layout_of(body.modulus.controls);
     for (auto& [count, events] : histories_) {
+      const JointLayout own = layout_of(count);
       const MatrixX moduli = carried_over(body, field_of(body, count), body.modulus);
       for (FitEvent& event : events) {
-        event.theta = changed(event.theta, shared, moduli);
+        event.theta = changed(own, event.theta, layout, moduli);
         outcome.history.push_back(std::move(event));
       }
     }

@@ -11,18 +11,6 @@ namespace {
 
 double log_determinant(const MatrixX& positive) { return positive.ldlt().vectorD().array().abs().log().sum(); }
 
-/// Rows of p that hold moduli.
-std::vector<Eigen::Index> modulus_rows(const ParameterSet& parameters) {
-  std::vector<Eigen::Index> rows;
-  Eigen::Index at = 0;
-  for (const Parameter& p : parameters.parameters()) {
-    if (!p.estimated) continue;
-    if (p.name.starts_with("youngs_modulus")) rows.push_back(at);
-    at += p.dimension();
-  }
-  return rows;
-}
-
 /// Orthonormal rows that span what is orthogonal to a matrix's columns.
 MatrixX contrasts_to(const MatrixX& columns) {
   const Eigen::HouseholderQR<MatrixX> qr(columns);
@@ -50,7 +38,7 @@ MatrixX field_precision(const std::vector<Vector3>& points, double length, doubl
 
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& carried) {
-  const std::vector<Eigen::Index> rows = modulus_rows(parameters);
+  const std::vector<Eigen::Index> rows = parameters.joint_coordinates();
   if (Eigen::Index(rows.size()) != carried.rows() || carried.rows() <= carried.cols()) return 0.0;
   const MatrixX own = contrasts_to(carried);
   MatrixX contrasts = MatrixX::Zero(own.rows(), p.size());
@@ -67,7 +55,7 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
   MatrixX H = evaluation.gauss_newton;
   VectorX g = evaluation.gradient;
   if (const MatrixX& precision = parameters.joint_precision(); precision.size() > 0) {
-    const std::vector<Eigen::Index> rows = modulus_rows(parameters);
+    const std::vector<Eigen::Index> rows = parameters.joint_coordinates();
     H(rows, rows) -= (1.0 - trace) * precision;
     g(rows) -= (1.0 - trace) * precision * p(rows);
   }

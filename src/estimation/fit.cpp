@@ -47,7 +47,7 @@ class Fit {
   VectorX pulled_on(const Grid& grid, const VectorX& theta) {
     ParameterSet pulls = run_.parameters;
     for (const Parameter& p : run_.parameters.parameters())
-      pulls.set_estimated(p.name, p.estimated && p.name.starts_with("pull@"));
+      pulls.set_estimated(p.name, p.estimated && FitRun::is_pull(p));
     if (pulls.dimension() == 0) return theta;
     VectorX best = theta;
     double least = std::numeric_limits<double>::infinity();
@@ -128,7 +128,7 @@ class Fit {
       if (now.optimiser.p.size() == 0) now.optimiser = FitRun::start_of(parameters);
       Objective objective = run_.recordings.objective(run_.fine, parameters, stage.band,
                                                       [&](const Recording& r) { return r.horizon(stage.horizon); });
-      s = run_.optimise(objective, now.optimiser, stage.name, index, run_.outcome.interrupted ? 1 : stage.iterations,
+      s = run_.optimise(objective, now.optimiser, StageKind::Fine, stage.name, index, run_.outcome.interrupted ? 1 : stage.iterations,
                         counter, stage.from, stage.to, [&](const OptimiserState& optimiser) {
                           if (run_.outcome.interrupted)
                             return;  // a last look at what was reached is no state to go on from
@@ -153,7 +153,7 @@ class Fit {
 
   /// What was not estimated and spoils the recordings, as their residuals at the estimate show.
   void find_corrections(const VectorX& theta, double cost) {
-    run_.state.corrected = {{}, "", cost, theta[theta::youngs_modulus]};
+    run_.state.corrected = {{}, "", cost, theta[run_.recordings.material().youngs_moduli.front()]};
     std::vector<std::string> chosen;
     for (const auto& [name, change] : run_.options.parameters) chosen.push_back(name);
     const std::vector<Correction> possible = possible_corrections(run_.parameters, chosen);
@@ -210,7 +210,7 @@ class Fit {
       const std::string name = spacing.cells == run_.options.cells ? in_three_digits(spacing.steps) + " x steps"
                                                                    : in_three_digits(spacing.cells) + " cells";
       OptimiserSummary repeated = run_.optimise(
-          objective, goes_on ? run_.state.fine->optimiser : FitRun::start_of(parameters), name, index,
+          objective, goes_on ? run_.state.fine->optimiser : FitRun::start_of(parameters), StageKind::Fine, name, index,
           run_.options.max_iterations, counter, from, from + run_.work(spacing), [&](const OptimiserState& optimiser) {
             run_.state.fine = {stage, parameters.reference(), optimiser};
             run_.save_state();
@@ -236,11 +236,8 @@ class Fit {
 
   /// Starts run side by side; their history is told in an order that does not depend on who was faster.
   void sort_history() {
-    const auto rank = [](const FitEvent& e) {
-      return e.stage == "motion" ? 0 : e.stage == "scan" ? 1 : e.stage == "coarse" ? 2 : 3;
-    };
     std::ranges::stable_sort(run_.outcome.history, {},
-                             [&](const FitEvent& e) { return std::tuple(rank(e), e.start, e.iteration); });
+                             [](const FitEvent& e) { return std::tuple(e.kind, e.start, e.iteration); });
   }
 
   void finish(ParameterSet& parameters, OptimiserSummary& s) {
@@ -258,10 +255,9 @@ class Fit {
     }
     run_.outcome.evaluation = std::move(s.evaluation);
     for (std::size_t r = 0; r < run_.recordings.all().size(); ++r) {
-      const VectorX own = run_.recordings.all()[r].own(run_.outcome.theta);
-      run_.outcome.recordings.push_back(
-          {run_.fine.recording[r], own, run_.outcome.evaluation.of_recording(int(r)),
-           Simulation(run_.fine.recording[r].body, run_.fine.recording[r].simulation).rest_body(own)});
+      const Discretisation& d = run_.fine.recording[r];
+      run_.outcome.recordings.push_back({d, run_.outcome.theta, run_.outcome.evaluation.of_recording(int(r)),
+                                         Simulation(d.body, d.simulation).rest_body(run_.outcome.theta)});
     }
     if (run_.outcome.evaluation.succeeded && parameters.dimension() > 0) {
       run_.outcome.covariance = parameter_covariance(run_.outcome.evaluation);
@@ -330,10 +326,10 @@ FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOp
   fixed.cells = fitted.cells, fixed.refine = 1;
   fixed.control_points = fitted.recordings.front().discretisation.body->modulus.controls;
   for (const Parameter& p : fitted.parameters.parameters()) {
-    if (!is_material(p)) continue;
+    if (!is_of_object(p)) continue;
     FitOptions::Override& change = fixed.parameters[p.name];
     change.estimated = false;
-    if (p.name != "density" || p.estimated) change.start = VectorX::Constant(1, fitted.theta[p.theta_index]);
+    if (p.name != "density" || p.estimated) change.start = VectorX::Constant(1, fitted.theta[p.at]);
   }
   std::vector<RecordedCapture> one;
   one.push_back(std::move(held_out));

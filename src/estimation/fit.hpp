@@ -80,7 +80,6 @@ struct FitOptions {
   double marker_noise = 0.0;      ///< of a coordinate [m]; 0: what the residuals say
   double basis_tolerance = 0.02;  ///< of a sampled material's stress, > 0
   int basis_samples = 12;         ///< of a sampled material, an element, >= 1
-  unsigned seed = 0;
   /// By parameter name: a start value (a number, or three), and whether it is estimated.
   struct Override {
     std::optional<VectorX> start;
@@ -93,9 +92,18 @@ struct FitOptions {
   std::string validate() const;
 };
 
+/// What a step of a fit belongs to.
+enum class StageKind {
+  Motion,  ///< the motion or pose at the start
+  Scan,    ///< a trial of one Young's modulus: no iteration
+  Coarse,  ///< a start that is followed on the coarse grid
+  Fine,    ///< the estimate on the full grid, and its repetitions
+};
+
 /// A step of the fit, for progress and convergence.csv.
 struct FitEvent {
-  std::string stage;  ///< "motion", "scan", "coarse", "fine", "18 cells"
+  StageKind kind = StageKind::Fine;
+  std::string stage;  ///< for people: "motion", "scan", "coarse", "fine", "18 cells", "round 2: fine"
   int start = 0;      ///< which start
   int iteration = 0;
   double cost = 0.0, damping = 0.0, surface_rms = 0.0;
@@ -129,10 +137,12 @@ struct TrackingRound {
   double change = 0.0;          ///< of ln E by the estimate, the greatest of all moduli
   bool lost = false;            ///< in some frame
   VectorX theta;                ///< estimated
+  int controls = 1;             ///< control moduli of `theta`
 };
 
 /// Where a fit stands, to go on after an interruption.
 struct FitState {
+  int controls = 1;  ///< control moduli of the parameter vectors below
   /// Young's modulus and cost; infinite where it cannot be simulated. One alone: that of the swing that was seen.
   std::vector<std::pair<double, double>> scan;
   std::optional<VectorX> motion;  ///< theta after the first stage
@@ -199,14 +209,14 @@ struct TrackingOutcome {
 /// One of the recordings of a fit, at the solution.
 struct RecordingOutcome {
   Discretisation discretisation;
-  VectorX theta;                          ///< its own part
+  VectorX theta;                          ///< of all recordings; its own blocks are `discretisation.simulation.blocks`
   CostEvaluation evaluation;              ///< its own frames
   std::shared_ptr<const Body> rest_body;  ///< the body where it is free of load
 };
 
 struct FitOutcome {
   ParameterSet parameters;     ///< as used, with the reference at the solution
-  VectorX theta, start_theta;  ///< of all recordings, one after the other
+  VectorX theta, start_theta;  ///< of all recordings, by the layout of `parameters`
   VectorX std;                 ///< of each unconstrained coordinate
   MatrixX covariance, correlation;
   double start_cost = 0.0, final_cost = 0.0;

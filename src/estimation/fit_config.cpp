@@ -217,7 +217,6 @@ const std::vector<Entry>& entries() {
                  &FitOptions::basis_tolerance),
       integer_entry("basis_samples", ">= 1", "of an element in a sampled material, at most",
                     &FitOptions::basis_samples),
-      integer_entry("seed", "", "of everything random", &FitOptions::seed),
   };
   return all;
 }
@@ -297,6 +296,10 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
   if (equals == std::string::npos || equals == 0)
     throw InputError({{}, "\"" + assignment + "\"", "key=value", "for example --set cells=16"});
   const std::string key = assignment.substr(0, equals), value = assignment.substr(equals + 1);
+  if (key == "seed") {  // older programs wrote it into fit.toml
+    if (value == "0") return;
+    throw InputError({{}, "seed is \"" + value + "\"", "no seed: nothing in a fit is random", "leave it out"});
+  }
   if (const Entry* entry = find_entry(key)) {
     if (const auto expected = entry->read(options, value))
       throw InputError({{}, key + " is \"" + value + "\"", *expected, ""});
@@ -360,6 +363,28 @@ void read_fit_options(const std::filesystem::path& path, FitOptions& options) {
   if (!problems.empty()) throw InputError(std::move(problems));
 }
 
+std::vector<std::string> unused_choices(const FitOptions& options, bool has_motion, bool has_presses) {
+  static const std::set<std::string> of_laws = {"material", "law_terms", "law_zones", "basis_tolerance", "basis_samples"};
+  static const std::set<std::string> of_presses = {"cells",    "element",        "control_points", "modulus_variation",
+                                                   "material", "max_iterations", "marker_noise",   "law_terms",
+                                                   "law_zones", "basis_tolerance", "basis_samples"};
+  std::vector<std::string> notes;
+  const FitOptions standard;
+  for (const Entry& e : entries()) {
+    const std::string& name = e.key.name;
+    if (e.write(options) == e.write(standard)) continue;
+    const char* why = nullptr;
+    if (has_motion && of_laws.contains(name))
+      why = has_presses ? "where an object moves, its law is linear" : "it concerns presses with known force";
+    else if (has_motion && !has_presses && name == "marker_noise")
+      why = "it concerns presses with known force";
+    else if (!has_motion && !of_presses.contains(name))
+      why = "it concerns objects that move or hang";
+    if (why) notes.push_back("The choice " + name + " = " + e.write(options) + " was not used: " + why + ".");
+  }
+  return notes;
+}
+
 std::string to_toml(const FitOptions& options) {
   std::ostringstream out;
   out << "# Choices of a fit; `pliant fit CAPTURE --config THIS` repeats them.\n";
@@ -388,7 +413,8 @@ std::string to_toml(const FitOptions& options) {
 
 namespace {
 
-void change_parameter(Parameter& parameter, const FitOptions::Override& change, VectorX& theta) {
+void change_parameter(Parameter& parameter, const FitOptions::Override& change, const ParameterLayout& layout,
+                      VectorX& theta) {
   if (change.start) {
     const int numbers = parameter.is_scalar() ? 1 : 3;
     if (change.start->size() != numbers || parameter.transform == Transform::PlanePosition)
@@ -399,8 +425,7 @@ void change_parameter(Parameter& parameter, const FitOptions::Override& change, 
                         ""});
     if (parameter.transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
       throw InputError({{}, "the start of " + parameter.name + " is not positive", "a number above 0", ""});
-    theta.segment(parameter.theta_index, numbers) = *change.start;
-    for (const int other : parameter.also) theta[other] = (*change.start)[0];
+    theta.segment(parameter.at.first, numbers) = *change.start;
     if (parameter.transform == Transform::Direction) parameter.origin = *change.start;
   }
   if (change.estimated) parameter.estimated = *change.estimated;
@@ -409,7 +434,7 @@ void change_parameter(Parameter& parameter, const FitOptions::Override& change, 
   if (!change.start) return;
   Parameter alone = parameter;
   alone.estimated = true;
-  parameter.prior_mean = ParameterSet({std::move(alone)}, theta).to_unconstrained(theta);
+  parameter.prior_mean = ParameterSet(layout, {std::move(alone)}, theta).to_unconstrained(theta);
 }
 
 }  // namespace
@@ -460,9 +485,9 @@ void apply_overrides(ParameterSet& parameters, const FitOptions& options) {
           meant.push_back(&p);
     if (meant.empty())
       throw InputError({{}, "there is no parameter \"" + name + "\" in this recording", "", "see `pliant fit --help`"});
-    for (Parameter* p : meant) change_parameter(*p, change, theta);
+    for (Parameter* p : meant) change_parameter(*p, change, parameters.layout(), theta);
   }
-  parameters = ParameterSet(std::move(list), std::move(theta));
+  parameters = ParameterSet(parameters.layout(), std::move(list), std::move(theta));
 }
 
 }  // namespace pliant

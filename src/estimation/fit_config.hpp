@@ -30,6 +30,11 @@ void apply_overrides(ParameterSet& parameters, const FitOptions& options);
 /// Reads a configuration (TOML) over the options. Throws InputError with every problem found and its place.
 void read_fit_options(const std::filesystem::path& path, FitOptions& options);
 
+/// A sentence for each choice that differs from the standard and that a fit of what the captures hold does not ask for.
+/// @param has_motion   whether it compares motions or equilibria of the object
+/// @param has_presses  whether it compares presses with known force
+std::vector<std::string> unused_choices(const FitOptions& options, bool has_motion, bool has_presses);
+
 /// The options as TOML that `read_fit_options` reads back.
 std::string to_toml(const FitOptions& options);
 

@@ -30,17 +30,19 @@ FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& fit_opti
       recordings(std::move(recorded), options, outcome.notes),
       parameters(recordings.parameters()),
       coarse(recordings.grid(options.coarse_cells, options.steps)),
-      fine(recordings.grid(options.cells, options.steps)) {}
+      fine(recordings.grid(options.cells, options.steps)) {
+  state.controls = recordings.controls();
+}
 
 ParameterSet FitRun::fixed_at(const VectorX& theta) const {
   std::vector<Parameter> list = parameters.parameters();
   for (Parameter& p : list) p.estimated = false;
-  return {std::move(list), theta};
+  return {parameters.layout(), std::move(list), theta};
 }
 
 VectorX FitRun::without_pulls(VectorX theta) const {
   for (const Parameter& p : parameters.parameters())
-    if (p.estimated && p.name.starts_with("pull@")) theta.segment<3>(p.theta_index) = p.scale * p.prior_mean;
+    if (p.estimated && is_pull(p)) theta.segment<3>(p.at) = p.scale * p.prior_mean;
   return theta;
 }
 
@@ -51,7 +53,7 @@ void FitRun::emit(FitEvent event) {
   outcome.history.push_back(std::move(event));
 }
 
-OptimiserSummary FitRun::optimise(Objective& objective, const OptimiserState& from, const std::string& stage, int start,
+OptimiserSummary FitRun::optimise(Objective& objective, const OptimiserState& from, StageKind kind, const std::string& stage, int start,
                                   int iterations, int& counter, double done_from, double done_to,
                                   const std::function<void(const OptimiserState&)>& on_state) {
   OptimiserOptions o;
@@ -64,7 +66,7 @@ OptimiserSummary FitRun::optimise(Objective& objective, const OptimiserState& fr
     ++counter;
     if (on_state) on_state(i.state());
     const double part = double(counter - first) / iterations;
-    emit({stage, start, counter, i.cost, i.damping, i.surface_rms, objective.parameters().to_theta(i.p),
+    emit({kind, stage, start, counter, i.cost, i.damping, i.surface_rms, objective.parameters().to_theta(i.p),
           done_from + (done_to - done_from) * std::min(1.0, part)});
     return !interrupted();
   });

@@ -22,6 +22,8 @@ struct FitRun {
   ParameterSet fixed_at(const VectorX& theta) const;
   /// With the pulls that hold a released object as they are expected beforehand.
   VectorX without_pulls(VectorX theta) const;
+  /// Whether a parameter is a force that holds a released object until it is let go.
+  static bool is_pull(const Parameter& p) { return p.role == Role::Initial && p.is_auxiliary; }
   static OptimiserState start_of(const ParameterSet& parameters) {
     return {0, parameters.to_unconstrained(parameters.reference()), {}};
   }
@@ -35,7 +37,7 @@ struct FitRun {
 
   /// One minimisation, told as iterations from `counter` on, which it moves on; from any thread.
   /// @param on_state  after each iteration; may be empty
-  OptimiserSummary optimise(Objective& objective, const OptimiserState& from, const std::string& stage, int start,
+  OptimiserSummary optimise(Objective& objective, const OptimiserState& from, StageKind kind, const std::string& stage, int start,
                             int iterations, int& counter, double done_from, double done_to,
                             const std::function<void(const OptimiserState&)>& on_state = {});
 

@@ -1,7 +1,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -43,6 +42,8 @@ class StartFinder {
     run_.recordings.set_moduli(theta, youngs_modulus * relative_moduli_);
   }
 
+  double first_modulus(const VectorX& theta) const { return theta[run_.recordings.material().youngs_moduli.front()]; }
+
   void set_reference(const VectorX& theta) { run_.parameters.set_reference(theta); }
 
   /// How the object moves or is held at the start, from the first frames, at a middling stiffness.
@@ -54,9 +55,7 @@ class StartFinder {
     ParameterSet motion = run_.parameters;
     bool any = false;
     for (const Parameter& p : run_.parameters.parameters()) {
-      constexpr std::array of_the_start = {"pull@", "linear_velocity", "angular_velocity", "gravity"};
-      const bool moves =
-          p.estimated && std::ranges::any_of(of_the_start, [&](const char* name) { return p.name.starts_with(name); });
+      const bool moves = p.estimated && (p.role == Role::Initial || p.role == Role::Load);
       motion.set_estimated(p.name, moves);
       any = any || moves;
     }
@@ -67,7 +66,7 @@ class StartFinder {
       const auto horizon = [&](const Recording& r) { return r.is_released() ? 0 : std::max(2, r.last_frame / part); };
       Objective objective = run_.recordings.objective(run_.coarse, motion, run_.options.wide_band, horizon);
       const OptimiserSummary s =
-          run_.optimise(objective, FitRun::start_of(motion), "motion", 0, 12, counter, 0.0, 0.05);
+          run_.optimise(objective, FitRun::start_of(motion), StageKind::Motion, "motion", 0, 12, counter, 0.0, 0.05);
       if (s.succeeded) motion.set_reference(motion.to_theta(s.p));
       if (run_.interrupted()) return;
     }
@@ -101,7 +100,7 @@ class StartFinder {
   /// Moduli of regions and control points begin where the object's own does, but for those that the user has given.
   void spread_start() {
     VectorX theta = run_.parameters.reference();
-    const double own = theta[theta::youngs_modulus];
+    const double own = first_modulus(theta);
     const std::vector<std::string> names = modulus_names(run_.recordings.front().capture, controls_);
     for (int k = 0; k < controls_; ++k) relative_moduli_[k] = given_start(names[std::size_t(k)]).value_or(own) / own;
     set_all_moduli(theta, own);
@@ -114,8 +113,8 @@ class StartFinder {
     for (std::size_t i = 0; i < run_.recordings.all().size(); ++i) {
       const Discretisation& d = run_.coarse.recording[i];
       if (!d.simulation.scan_sags) continue;
-      const VectorX own = run_.recordings.all()[i].own(run_.parameters.reference());
-      modulus = std::max(modulus, carrying_modulus(d.body, d.simulation, own, [this] { return run_.interrupted(); }));
+      modulus = std::max(modulus, carrying_modulus(d.body, d.simulation, run_.parameters.reference(),
+                                                   [this] { return run_.interrupted(); }));
     }
     if (modulus == 0.0) return;
     carrying_modulus_ = modulus;
@@ -134,25 +133,23 @@ class StartFinder {
       run_.state.motion.reset();
       estimate_initial_motion();
       if (run_.interrupted()) return false;
-      run_.state.scan = {{run_.parameters.reference()[theta::youngs_modulus], 0.0}};
+      run_.state.scan = {{first_modulus(run_.parameters.reference()), 0.0}};
       run_.state.motion = run_.parameters.reference();
       run_.save_state();
     }
     if (run_.state.scan.size() != 1) return false;
-    const VectorX own = run_.recordings.front().own(run_.parameters.reference());
-    for (int k = 0; k < controls_; ++k)
-      relative_moduli_[k] = own[theta::modulus(k, controls_, own.size())] / own[theta::youngs_modulus];
-    start_moduli_ = {own[theta::youngs_modulus]};
+    const VectorX moduli = run_.recordings.material().moduli(run_.parameters.reference());
+    relative_moduli_ = moduli / moduli[0];
+    start_moduli_ = {moduli[0]};
     set_all_moduli(run_.outcome.start_theta, start_moduli_.front());
     return true;
   }
 
   /// The first modulus of a swing whose modes about rest are known, where its weight changes them.
   std::optional<double> with_weight(const Discretisation& d, const Recording& r, const VectorX& theta) const {
-    const VectorX own = r.own(theta);
-    if (theta::vector_at(own, theta::gravity).isZero()) return std::nullopt;
+    if (r.blocks.motion.gravity.vector(theta).isZero()) return std::nullopt;
     Simulation simulation(d.body, d.simulation);
-    const auto start = swing_start(simulation, own, controls_, *r.observations);
+    const auto start = swing_start(simulation, theta, *r.observations);
     return start ? std::optional(start->youngs_modulus) : std::nullopt;
   }
 
@@ -172,7 +169,7 @@ class StartFinder {
         ModalStartOptions o;
         o.first_frame = r.capture.start_frame;
         o.curve_samples = 0;
-        const ModalStart start = modal_start(d.body, r.own(theta), held, r.tracked, r.capture.times, o);
+        const ModalStart start = modal_start(d.body, r.blocks.motion, theta, held, r.tracked, r.capture.times, o);
         if (!start.found) continue;
         take_dampings(start);
         relative_moduli_ = start.moduli / start.moduli[0];
@@ -186,7 +183,7 @@ class StartFinder {
         return true;
       }
       Simulation simulation(d.body, d.simulation);
-      const auto start = swing_start(simulation, r.own(theta), controls_, *r.observations);
+      const auto start = swing_start(simulation, theta, *r.observations);
       if (!start) continue;
       set_all_moduli(theta, start->youngs_modulus);
       set_reference(theta);
@@ -205,8 +202,7 @@ class StartFinder {
       const auto change = run_.options.parameters.find(name);
       const Parameter* p = run_.parameters.find(name);
       if (value <= 0.0 || !p->estimated || (change != run_.options.parameters.end() && change->second.start)) return;
-      theta[p->theta_index] = std::clamp(value, p->lower, p->upper);
-      for (const int other : p->also) theta[other] = theta[p->theta_index];
+      theta[p->at] = std::clamp(value, p->lower, p->upper);
     };
     take("mass_damping", start.mass_damping);
     take("stiffness_damping", start.stiffness_damping);
@@ -216,9 +212,10 @@ class StartFinder {
   /// Young's modulus over decades of the stress under the object's own weight.
   void scan() {
     const VectorX theta = run_.parameters.reference();
-    const double g = std::max(theta::vector_at(theta, theta::gravity).norm(), 0.1);
+    const MotionBlocks& blocks = run_.recordings.front().blocks.motion;
+    const double g = std::max(blocks.gravity.vector(theta).norm(), 0.1);
     const double stress =
-        carrying_modulus_ > 0.0 ? 0.25 * carrying_modulus_ : theta[theta::density] * g * run_.recordings.front().size;
+        carrying_modulus_ > 0.0 ? 0.25 * carrying_modulus_ : theta[blocks.density] * g * run_.recordings.front().size;
     const int per_decade = run_.options.scan_per_decade * (run_.swings() ? 2 : 1);
     const int count = 4 * per_decade + 1;
     if (int(run_.state.scan.size()) != count) {
@@ -227,14 +224,14 @@ class StartFinder {
       const auto try_value = [&](int i) {
         VectorX trial = theta;
         set_all_moduli(trial, stress * std::pow(10.0, double(i) / per_decade));
-        run_.state.scan[std::size_t(i)] = {trial[theta::youngs_modulus], std::numeric_limits<double>::infinity()};
+        run_.state.scan[std::size_t(i)] = {first_modulus(trial), std::numeric_limits<double>::infinity()};
         if (run_.interrupted()) return;
         Objective objective = run_.recordings.objective(
             run_.coarse, run_.fixed_at(trial), run_.options.wide_band,
             [&](const Recording& r) { return run_.swings() ? r.horizon(growing_horizon().front()) : r.last_frame; });
         const CostEvaluation e = objective.evaluate(VectorX(0));
         if (e.succeeded) run_.state.scan[std::size_t(i)].second = e.cost;
-        run_.emit({"scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
+        run_.emit({StageKind::Scan, "scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
       };
       if (run_.recordings.all_static())
         scan_downwards(count, try_value);
@@ -279,7 +276,7 @@ class StartFinder {
 
   void follow_starts() {
     if (run_.outcome.interrupted) return;
-    if (!scanned_) start_moduli_ = {run_.parameters.reference()[theta::youngs_modulus]};
+    if (!scanned_) start_moduli_ = {first_modulus(run_.parameters.reference())};
     const std::size_t count = start_moduli_.size();
     if (run_.state.starts.size() == count) {
       run_.outcome.starts = run_.state.starts;
@@ -313,7 +310,7 @@ class StartFinder {
       const double from = 0.15 + 0.3 * (part < 1.0 ? 0.0 : 0.4);
       Objective objective = run_.recordings.objective(run_.coarse, parameters, run_.options.wide_band,
                                                       [&](const Recording& r) { return r.horizon(part); });
-      const OptimiserSummary s = run_.optimise(objective, FitRun::start_of(parameters), "coarse", index, last ? 10 : 5,
+      const OptimiserSummary s = run_.optimise(objective, FitRun::start_of(parameters), StageKind::Coarse, "coarse", index, last ? 10 : 5,
                                                counter, from, from + 0.15);
       start.iterations += s.iterations;
       start.converged = s.converged;

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/6";
+constexpr const char* format = "fit-state/7";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -58,7 +58,8 @@ Json from_tracking(const FitState::Tracking& tracking) {
                               {"fit_rms", r.fit_rms},
                               {"change", r.change},
                               {"lost", r.lost},
-                              {"theta", from_vector(r.theta)}});
+                              {"theta", from_vector(r.theta)},
+                              {"controls", r.controls}});
   if (tracking.loop) json["loop"] = to_json(*tracking.loop);
   if (tracking.direct) json["direct"] = to_json(*tracking.direct);
   return json;
@@ -71,14 +72,16 @@ FitState::Tracking to_tracking(const Json& json) {
   for (const Json& r : json.at("rounds"))
     tracking.rounds.push_back({r.at("youngs_modulus").get<double>(), r.at("surface_rms").get<double>(),
                                r.at("confidence").get<double>(), r.at("fit_rms").get<double>(),
-                               r.at("change").get<double>(), r.at("lost").get<bool>(), to_vector(r.at("theta"))});
+                               r.at("change").get<double>(), r.at("lost").get<bool>(), to_vector(r.at("theta")),
+                               r.at("controls").get<int>()});
   if (json.contains("loop")) tracking.loop = std::make_shared<FitState>(to_state(json["loop"]));
   if (json.contains("direct")) tracking.direct = std::make_shared<FitState>(to_state(json["direct"]));
   return tracking;
 }
 
 Json to_json(const FitState& state) {
-  Json json = {{"scan", Json::array()}, {"starts", Json::array()}, {"notes", state.notes}};
+  Json json = {
+      {"controls", state.controls}, {"scan", Json::array()}, {"starts", Json::array()}, {"notes", state.notes}};
   for (const auto& [modulus, cost] : state.scan) json["scan"].push_back({modulus, from_cost(cost)});
   for (const FitStart& s : state.starts)
     json["starts"].push_back({{"start", from_vector(s.start)},
@@ -116,6 +119,7 @@ Json to_json(const FitState& state) {
 
 FitState to_state(const Json& json) {
   FitState state;
+  state.controls = json.at("controls").get<int>();
   for (const Json& entry : json.at("scan")) state.scan.emplace_back(entry.at(0).get<double>(), to_cost(entry.at(1)));
   for (const Json& s : json.at("starts"))
     state.starts.push_back({to_vector(s.at("start")), to_vector(s.at("final")), to_cost(s.at("start_cost")),
@@ -147,7 +151,7 @@ FitState to_state(const Json& json) {
 
 namespace {
 
-constexpr const char* press_format = "press-fit-state/2";
+constexpr const char* press_format = "press-fit-state/3";
 
 Json from_matrix(const MatrixX& m) {
   return {{"rows", m.rows()}, {"values", std::vector<double>(m.data(), m.data() + m.size())}};
@@ -199,10 +203,10 @@ std::vector<ZoneCut> to_cuts(const Json& json) {
 Json to_json(const PressFitState& state) {
   Json json = {{"done", Json::array()}, {"samples", Json::array()}};
   for (const PressFitState::Done& d : state.done)
-    json["done"].push_back({{"terms", d.layout.terms},
-                            {"controls", d.layout.controls},
-                            {"laws", d.layout.laws},
-                            {"own_ratios", d.layout.own_ratios},
+    json["done"].push_back({{"terms", d.form.terms},
+                            {"controls", d.form.controls},
+                            {"laws", d.form.laws},
+                            {"own_ratios", d.form.own_ratios},
                             {"cuts", from_cuts(d.cuts)},
                             {"theta", from_vector(d.theta)},
                             {"cost", from_cost(d.cost)},

@@ -22,7 +22,7 @@ FollowedRecording::FollowedRecording(RecordedCapture recorded, const FitOptions&
     : observed_(recorded.observed),
       recordings_({recorded}, for_following(recorded.capture, options), notes),
       grid_(recordings_.grid(options.cells, options.steps)),
-      start_(recordings_.front().own(recordings_.parameters().reference())) {
+      start_(recordings_.parameters().reference()) {
   const auto given = options.parameters.find("youngs_modulus");
   if (given == options.parameters.end() || !given->second.start) stiffen();
 }
@@ -30,12 +30,11 @@ FollowedRecording::FollowedRecording(RecordedCapture recorded, const FitOptions&
 void FollowedRecording::stiffen() {
   constexpr double sag_of_size = 0.005;
   const Discretisation& d = grid_.recording.front();
-  const LinearStatics statics(d.body, held_nodes(*d.body, d.simulation.holds), start_);
+  const LinearStatics statics(d.body, held_nodes(*d.body, d.simulation.holds), d.simulation.blocks, start_);
   if (!statics.is_held()) return;
-  const double sag = statics.greatest_displacement(scan_load(*d.body, start_, d.simulation.weights));
-  const int controls = d.body->modulus.controls;
+  const double sag = statics.greatest_displacement(scan_load(*d.body, d.simulation.blocks, start_, d.simulation.weights));
   const double factor = std::max(1.0, sag / (sag_of_size * recording().size));
-  for (int k = 0; k < controls; ++k) start_[theta::modulus(k, controls, start_.size())] *= factor;
+  d.simulation.blocks.scale_moduli(start_, factor);
 }
 
 Track FollowedRecording::follow(const VectorX& theta, const std::function<bool(int, int)>& progress,

@@ -23,6 +23,8 @@ class FollowedRecording {
   /// what is too stiff is drawn to where it was seen.
   const VectorX& start() const { return start_; }
   const Recording& recording() const { return recordings_.front(); }
+  /// Where a parameter vector of this recording alone has its Young's moduli and Poisson's ratio.
+  const MaterialBlocks& material() const { return recordings_.material(); }
   /// @param theta     of this recording
   /// @param progress  frames done and their total; false stops. May be empty
   [[nodiscard]] Track follow(const VectorX& theta, const std::function<bool(int, int)>& progress = {},

@@ -19,33 +19,17 @@ constexpr double least_share = 0.02;  // of the volume, in either part of a cut
 constexpr std::array by_all = {ZoneCut::By::X, ZoneCut::By::Y, ZoneCut::By::Z, ZoneCut::By::Depth};
 constexpr std::array by_names = {"x", "y", "z", "depth"};
 
-/// Where number s of law k stands in p: moduli first, then the laws one after the other.
-Eigen::Index place(const PressTheta& layout, int law, int s) {
-  return s == 0 ? law : layout.controls + law * layout.law_freedom() + s - 1;
-}
-
-std::vector<std::string> zone_names(int zones) {
-  std::vector<std::string> names;
-  for (int k = 1; k <= zones; ++k) names.push_back("youngs_modulus@" + std::to_string(k));
-  return names;
+/// Where the numbers of a law stand in p.
+std::vector<Eigen::Index> places(const ParameterSet& set, const LawLayout& layout, int law) {
+  std::vector<Eigen::Index> all;
+  for (const ParameterHandle& number : layout.numbers(law)) all.push_back(set.coordinate(number));
+  return all;
 }
 
 /// Precision of ln E of zones about their mean, whatever that is.
 MatrixX zone_precision(int zones, double modulus_variation) {
   return (MatrixX::Identity(zones, zones) - MatrixX::Constant(zones, zones, 1.0 / zones)) /
          (modulus_variation * modulus_variation);
-}
-
-/// theta of many laws, law k as law `like[k]` of another theta.
-VectorX spread(const PressTheta& from, const VectorX& theta, const std::vector<int>& like) {
-  const PressTheta to{int(like.size()), from.terms, int(like.size()), from.own_ratios};
-  VectorX all = VectorX::Zero(to.size());
-  for (int k = 0; k < to.controls; ++k) {
-    all[to.modulus(k)] = theta[from.modulus(like[std::size_t(k)])];
-    all.segment(to.poissons_ratio(k), to.law_size()) =
-        theta.segment(from.poissons_ratio(from.laws == 1 ? 0 : like[std::size_t(k)]), from.law_size());
-  }
-  return all;
 }
 
 /// Parts that no division of a body in zones cuts: numbers of elements with the same zone in each.
@@ -65,34 +49,33 @@ std::vector<int> common_parts(const std::vector<std::vector<int>>& divisions) {
 class PartDerivatives {
  public:
   /// @param zone_of   that theta is of; part_of: finer
-  PartDerivatives(PressObjective& objective, const PressScene& scene, const PressTheta& layout, const VectorX& theta,
+  PartDerivatives(PressObjective& objective, const PressScene& scene, const LawLayout& layout, const VectorX& theta,
                   const std::vector<int>& zone_of, std::vector<int> part_of)
       : part_of_(std::move(part_of)) {
     const int parts = 1 + *std::ranges::max_element(part_of_);
-    layout_ = {parts, layout.terms, parts, layout.own_ratios};
+    layout_ = LawLayout({parts, layout.form().terms, parts, layout.form().own_ratios});
     std::vector<int> zone(std::size_t(parts), 0);
     for (std::size_t e = 0; e < part_of_.size(); ++e) zone[std::size_t(part_of_[e])] = zone_of[e];
-    auto parted = std::make_shared<PressScene>(scene);
     auto body = std::make_shared<Body>(*scene.body);
     body->modulus = zone_field(body->modulus, part_of_, parts);
-    parted->body = body;
-    ParameterSet set = press_parameters(layout_, zone_names(parts), theta[0]);
-    std::vector<Parameter> list = set.parameters();
+    std::vector<Parameter> list = law_parameters(layout_, theta[layout.modulus(0)]).parameters();
     for (Parameter& p : list) p.prior_std = std::numeric_limits<double>::infinity();  // it is that of the zones
-    set = ParameterSet(std::move(list), spread(layout, theta, zone));
-    p_ = set.to_unconstrained(set.reference());
-    objective.set_form(parted, layout_, set);
+    set_ = ParameterSet(layout_.layout(), std::move(list), carry_law(layout, theta, layout_, zone));
+    p_ = set_.to_unconstrained(set_.reference());
+    objective.set_form(body, layout_, set_);
     fine_ = objective.linearise(p_);
   }
   bool succeeded() const { return fine_.succeeded; }
 
   /// The cost and its derivatives at p of `set`, the laws of `zones` zones, by the linear model.
-  CostEvaluation of_division(const std::vector<int>& zone_of, const PressTheta& layout, const ParameterSet& set,
+  CostEvaluation of_division(const std::vector<int>& zone_of, const LawLayout& layout, const ParameterSet& set,
                              const VectorX& p) const {
     std::vector<Eigen::Index> target(std::size_t(p_.size()));
-    for (std::size_t e = 0; e < zone_of.size(); ++e)
-      for (int s = 0; s <= layout.law_freedom(); ++s)
-        target[std::size_t(place(layout_, part_of_[e], s))] = place(layout, zone_of[e], s);
+    for (std::size_t part = 0; part < std::size_t(layout_.form().laws); ++part) {
+      const auto element = std::size_t(std::ranges::find(part_of_, int(part)) - part_of_.begin());
+      const auto fine = places(set_, layout_, int(part)), coarse = places(set, layout, zone_of[element]);
+      for (std::size_t s = 0; s < fine.size(); ++s) target[std::size_t(fine[s])] = coarse[s];
+    }
     const VectorX moved = p(target) - p_;
     const auto summed = [&](const VectorX& gradient) {
       VectorX sum = VectorX::Zero(p.size());
@@ -124,7 +107,8 @@ class PartDerivatives {
 
  private:
   std::vector<int> part_of_;
-  PressTheta layout_;
+  LawLayout layout_;
+  ParameterSet set_;
   VectorX p_;
   CostEvaluation fine_;
 };
@@ -191,66 +175,76 @@ ModulusField zone_field(const ModulusField& before, const std::vector<int>& zone
   return field;
 }
 
-VectorX with_zone(const PressTheta& from, const VectorX& theta, int zone) {
-  std::vector<int> like;
-  for (int k = 0; k < from.controls; ++k) like.push_back(k);
-  like.push_back(zone);
-  return spread(from, theta, like);
+LawForm with_zone(const LawForm& form) {
+  return {form.controls + 1, form.terms, form.controls + 1, form.own_ratios};
 }
 
-VectorX law_contrast_deviations(const PressTheta& layout, double modulus_variation) {
-  VectorX deviation = VectorX::Ones(1 + layout.law_freedom());  // of an exponent's: its scale
-  deviation[0] = modulus_variation;
-  for (int i = 1; i < layout.terms; ++i) deviation[layout.own_ratios ? 3 * i + 1 : 2 * i + 2] = modulus_variation;
-  return deviation;
+VectorX with_zone(const LawLayout& from, const VectorX& theta, const LawLayout& to, int zone) {
+  std::vector<int> like;
+  for (int k = 0; k < from.form().controls; ++k) like.push_back(k);
+  like.push_back(zone);
+  return carry_law(from, theta, to, like);
+}
+
+VectorX law_contrast_deviations(const LawForm& form, double modulus_variation) {
+  std::vector<double> deviations = {modulus_variation, 1.0};  // of ln E; of Poisson's ratio
+  for (int i = 0; i < form.terms; ++i) {
+    deviations.push_back(1.0);  // of an exponent: its scale
+    if (i > 0) deviations.push_back(modulus_variation);
+    if (i > 0 && form.own_ratios) deviations.push_back(1.0);
+  }
+  return Eigen::Map<const VectorX>(deviations.data(), Eigen::Index(deviations.size()));
 }
 
 double zone_evidence(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
-                     const PressTheta& layout, int cut_from, double modulus_variation) {
-  const VectorX deviation = law_contrast_deviations(layout, modulus_variation);
+                     const LawLayout& layout, int cut_from, double modulus_variation) {
+  const VectorX deviation = law_contrast_deviations(layout.form(), modulus_variation);
   MatrixX contrasts = MatrixX::Zero(deviation.size(), p.size());
-  for (int s = 0; s < deviation.size(); ++s) {
-    contrasts(s, place(layout, layout.controls - 1, s)) = 1.0;
-    contrasts(s, place(layout, cut_from, s)) = -1.0;
+  const auto last = places(parameters, layout, layout.form().controls - 1), first = places(parameters, layout, cut_from);
+  for (Eigen::Index s = 0; s < deviation.size(); ++s) {
+    contrasts(s, last[std::size_t(s)]) = 1.0;
+    contrasts(s, first[std::size_t(s)]) = -1.0;
   }
   const MatrixX spread = deviation.array().square().matrix().asDiagonal();
   return log_bayes_factor(evaluation, parameters, p, contrasts, spread);
 }
 
 double own_laws_evidence(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
-                         const PressTheta& layout, double modulus_variation) {
-  const VectorX deviation = law_contrast_deviations(layout, modulus_variation);
-  const int numbers = layout.law_freedom(), others = layout.laws - 1;
+                         const LawLayout& layout, double modulus_variation) {
+  const VectorX deviation = law_contrast_deviations(layout.form(), modulus_variation);
+  const Eigen::Index numbers = deviation.size() - 1, others = layout.form().laws - 1;  // the moduli are free anyway
   MatrixX contrasts = MatrixX::Zero(others * numbers, p.size()),
           spread = MatrixX::Zero(others * numbers, others * numbers);
+  const auto first = places(parameters, layout, 0);
   // Laws scatter about a common mean: differences from the first share what that does.
-  for (int law = 1; law <= others; ++law)
-    for (int s = 1; s <= numbers; ++s) {
-      const Eigen::Index row = Eigen::Index(law - 1) * numbers + s - 1;
-      contrasts(row, place(layout, law, s)) = 1.0;
-      contrasts(row, place(layout, 0, s)) = -1.0;
-      for (int other = 1; other <= others; ++other)
-        spread(row, Eigen::Index(other - 1) * numbers + s - 1) =
-            deviation[s] * deviation[s] * (other == law ? 1.0 : 0.5);
+  for (Eigen::Index law = 1; law <= others; ++law) {
+    const auto own = places(parameters, layout, int(law));
+    for (Eigen::Index s = 1; s <= numbers; ++s) {
+      const Eigen::Index row = (law - 1) * numbers + s - 1;
+      contrasts(row, own[std::size_t(s)]) = 1.0;
+      contrasts(row, first[std::size_t(s)]) = -1.0;
+      for (Eigen::Index other = 1; other <= others; ++other)
+        spread(row, (other - 1) * numbers + s - 1) = deviation[s] * deviation[s] * (other == law ? 1.0 : 0.5);
     }
+  }
   return log_bayes_factor(evaluation, parameters, p, contrasts, spread);
 }
 
-ParameterSet zone_parameters(const PressTheta& layout, const std::vector<std::string>& names, double youngs_modulus,
-                             double modulus_variation) {
-  ParameterSet set = press_parameters(layout, names, youngs_modulus);
-  if (layout.laws > 1) set.set_joint_prior(names, zone_precision(layout.controls, modulus_variation));
+ParameterSet zone_parameters(const LawLayout& layout, double youngs_modulus, double modulus_variation) {
+  ParameterSet set = law_parameters(layout, youngs_modulus);
+  if (layout.form().laws > 1)
+    set.set_joint_prior(layout.modulus_names(), zone_precision(layout.form().controls, modulus_variation));
   return set;
 }
 
 std::optional<PromisedCut> most_promising_cut(PressObjective& objective, const PressScene& scene,
-                                              const PressTheta& layout, const VectorX& theta,
+                                              const LawLayout& layout, const VectorX& theta,
                                               const std::vector<ZoneCut>& cuts, double modulus_variation) {
   const MatrixX coordinates = zone_coordinates(*scene.body);
   const int zones = int(cuts.size()) + 1;
   const std::vector<int> zone_of = zones_after(coordinates, cuts);
-  const PressTheta finer{zones + 1, layout.terms, zones + 1, layout.own_ratios};
-  const ParameterSet set = zone_parameters(finer, zone_names(zones + 1), theta[0], modulus_variation);
+  const LawLayout finer({zones + 1, layout.form().terms, zones + 1, layout.form().own_ratios});
+  const ParameterSet set = zone_parameters(finer, theta[layout.modulus(0)], modulus_variation);
   std::optional<PromisedCut> best;
   for (const ZoneCut::By by : by_all) {
     std::vector<ZoneCut> tried;
@@ -268,7 +262,7 @@ std::optional<PromisedCut> most_promising_cut(PressObjective& objective, const P
     const PartDerivatives parts(objective, scene, layout, theta, zone_of, common_parts(divisions));
     if (!parts.succeeded()) continue;
     for (std::size_t i = 0; i < tried.size(); ++i) {
-      const VectorX p = set.to_unconstrained(with_zone(layout, theta, tried[i].zone));
+      const VectorX p = set.to_unconstrained(with_zone(layout, theta, finer, tried[i].zone));
       const CostEvaluation coarse = parts.of_division(divisions[i + 1], finer, set, p);
       const double evidence = zone_evidence(coarse, set, p, finer, tried[i].zone, modulus_variation);
       if (!best || evidence > best->evidence) best = {tried[i], evidence};
@@ -277,7 +271,7 @@ std::optional<PromisedCut> most_promising_cut(PressObjective& objective, const P
   return best;
 }
 
-std::optional<PromisedMove> best_move(PressObjective& objective, const PressScene& scene, const PressTheta& layout,
+std::optional<PromisedMove> best_move(PressObjective& objective, const PressScene& scene, const LawLayout& layout,
                                       const VectorX& theta, const std::vector<ZoneCut>& cuts, std::size_t moved,
                                       double modulus_variation) {
   const MatrixX coordinates = zone_coordinates(*scene.body);
@@ -298,7 +292,7 @@ std::optional<PromisedMove> best_move(PressObjective& objective, const PressScen
   if (tried.empty()) return std::nullopt;
   const PartDerivatives parts(objective, scene, layout, theta, zone_of, common_parts(divisions));
   if (!parts.succeeded()) return std::nullopt;
-  const ParameterSet set = zone_parameters(layout, zone_names(zones), theta[0], modulus_variation);
+  const ParameterSet set = zone_parameters(layout, theta[layout.modulus(0)], modulus_variation);
   const VectorX p = set.to_unconstrained(theta);
   const auto promised_cost = [&](const std::vector<int>& division) {
     const CostEvaluation e = parts.of_division(division, layout, set, p);

@@ -46,16 +46,13 @@ double carrying_modulus(const std::shared_ptr<const Body>& body, const Simulatio
   ReferenceShapeOptions options;
   options.by_parts = false;
   options.max_iterations = 30;
-  ReferenceShapeSolver shape(body, held, options);
-  const Points load = scan_load(*body, theta, scene.weights);
-  const int controls = body->modulus.controls;
-  const auto scale = [&](double factor) {
-    for (int k = 0; k < controls; ++k) theta[theta::modulus(k, controls, theta.size())] *= factor;
-  };
-  const LinearStatics statics(body, held, theta);
+  ReferenceShapeSolver shape(body, held, scene.blocks, options);
+  const Points load = scan_load(*body, scene.blocks, theta, scene.weights);
+  const auto scale = [&](double factor) { scene.blocks.scale_moduli(theta, factor); };
+  const LinearStatics statics(body, held, scene.blocks, theta);
   if (statics.is_held()) scale(statics.greatest_displacement(load) / (sag_of_size * body->size()));
   for (int i = 0; i < most_doublings; ++i, scale(2.0)) {
-    if ((interrupted && interrupted()) || shape.find(theta, load).found) return theta[theta::youngs_modulus];
+    if ((interrupted && interrupted()) || shape.find(theta, load).found) return theta[scene.blocks.youngs_moduli.front()];
   }
   throw InputError({{},
                     "no material holds up the scan of the sagging object",
@@ -63,8 +60,8 @@ double carrying_modulus(const std::shared_ptr<const Body>& body, const Simulatio
                     "check mass, gravity, [[fixed]] and the scan"});
 }
 
-LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const VectorX& theta,
-                        const ReferenceShapeOptions& options) {
+LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const CaptureBlocks& blocks,
+                        const VectorX& theta, const ReferenceShapeOptions& options) {
   if (resolution.element == ElementKind::Hexahedron)
     throw InputError({{capture.file},
                       "hexahedra have no shape free of load but their grid",
@@ -75,14 +72,14 @@ LoadFree find_load_free(const Capture& capture, const Resolution& resolution, co
         {{capture.file}, "nothing holds the object while it sags", "a [[fixed]] region", "name what holds it"});
   const Capture still = at_rest(capture);
   const auto distance = capture_distance(still, resolution.band);
-  const Discretisation scanned = discretise(still, distance, resolution, theta);
+  const Discretisation scanned = discretise(still, distance, resolution, blocks, theta);
   const Body& body = *scanned.body;
   LoadFree found;
-  ReferenceShapeSolver solver(scanned.body, held_nodes(body, scanned.simulation.holds), options);
-  found.shape = solver.find(theta, scan_load(body, theta, scanned.simulation.weights));
+  ReferenceShapeSolver solver(scanned.body, held_nodes(body, scanned.simulation.holds), blocks.motion, options);
+  found.shape = solver.find(theta, scan_load(body, blocks.motion, theta, scanned.simulation.weights));
   const Points& scan = body.scanned_positions();
   const auto free = std::make_shared<Body>(with_reference(body, found.shape.X));
-  found.scene = discretise(still, distance, free, resolution, theta);
+  found.scene = discretise(still, distance, free, resolution, blocks, theta);
   found.scene.control_points = scanned.control_points;
   found.surface = *still.surface;
   const Points vertices = Embedding(*free, still.surface->vertices).positions(found.shape.X);

@@ -18,10 +18,11 @@ struct LoadFree {
 /// Finds it for a material, and lets it sag again.
 /// @param capture     that names what holds the object; nothing of it moves here
 /// @param resolution  of tetrahedra
-/// @param theta       of the capture at rest: `default_parameters` of `at_rest`
+/// @param blocks      of the capture at rest: `default_parameters` of `at_rest`
+/// @param theta       by those blocks
 /// Throws InputError where nothing holds the object, or the resolution is one of hexahedra.
-LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const VectorX& theta,
-                        const ReferenceShapeOptions& options = {});
+LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const CaptureBlocks& blocks,
+                        const VectorX& theta, const ReferenceShapeOptions& options = {});
 
 /// A Young's modulus [Pa] that holds the scan of a sagging object up: the one by which linear elasticity lets it sag by
 /// half its size, or, where that gives way, the first that does not as it is doubled again and again.

@@ -201,84 +201,70 @@ std::shared_ptr<const Body> unit_element() {
 
 ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
                               bool positive_exponents) {
-  const ParameterSet set = press_parameters({1, terms}, {"youngs_modulus"}, youngs_modulus);
+  const ParameterSet set = law_parameters(LawLayout({1, terms}), youngs_modulus);
   std::vector<Parameter> list = set.parameters();
   for (Parameter& p : list) {
     // Curves tell an exponent's sign themselves.
-    if (p.name.starts_with("exponent"))
+    if (p.transform == Transform::Shift)
       p.lower = positive_exponents ? least_exponent : -largest_exponent, p.upper = largest_exponent;
-    if (p.name == "poisson_ratio") p.upper = greatest_poissons_ratio;
+    if (p.transform == Transform::LogitHalf) p.upper = greatest_poissons_ratio;
   }
-  ParameterSet parameters(std::move(list), set.reference());
+  ParameterSet parameters(set.layout(), std::move(list), set.reference());
   if (poissons_ratio) parameters.fix("poisson_ratio", *poissons_ratio);
   return parameters;
 }
 
-CurveObjective::CurveObjective(std::vector<MaterialTest> tests, int terms, ParameterSet parameters, double noise)
-    : tests_(std::move(tests)), layout_{1, terms}, parameters_(std::move(parameters)), noise_(noise) {
-  if (tests_.empty() || !(noise_ > 0.0)) throw std::invalid_argument("curves need a test and a noise above zero");
-  for (const MaterialTest& test : tests_) check_test(test);
+CurveTrial::CurveTrial(MaterialTest test, int number, const LawLayout& layout, double noise,
+                       const ParameterSet& parameters)
+    : test_(std::move(test)), number_(number), layout_(layout), noise_(noise) {
+  if (!(noise_ > 0.0)) throw std::invalid_argument("curves need a noise above zero");
+  check_test(test_);
+  for (const Parameter& p : parameters.parameters())
+    if (p.transform == Transform::Shift) bounded_.push_back(p);
 }
 
-int CurveObjective::point_count() const {
-  std::size_t count = 0;
-  for (const MaterialTest& test : tests_) count += test.stretch.size();
-  return int(count);
-}
-
-CostEvaluation CurveObjective::run(const VectorX& p, bool with_derivatives) {
+CostEvaluation CurveTrial::run(const VectorX& theta, const MatrixX& directions) {
   CostEvaluation result;
-  const VectorX theta = parameters_.to_theta(p);
-  for (const Parameter& q : parameters_.parameters())
-    if (q.transform == Transform::Shift && !(theta[q.theta_index] >= q.lower && theta[q.theta_index] <= q.upper)) {
-      result.failure = q.name + " leaves its bounds";
-      return result;
-    }
+  for (const Parameter& p : bounded_)
+    if (!(theta[p.at] >= p.lower && theta[p.at] <= p.upper))
+      return result.failure = p.name + " leaves its bounds", result;
   const auto law = press_law(*body_, layout_, theta);
-  MatrixX by_p;
-  if (with_derivatives) {
-    // press_table_derivative's first column is by ln E, theta's first number is E.
-    MatrixX by_theta = press_table_derivative(layout_.terms, theta);
-    by_theta.col(0) /= theta[0];
-    by_p = by_theta * parameters_.jacobian(p);
+  const Eigen::Index n = directions.cols();
+  const MatrixX by_p = n > 0 ? MatrixX(law_parameters_by_theta(*body_, layout_, theta, 0) * directions) : MatrixX();
+  const double inverse = 1.0 / (noise_ * test_.greatest_stress());
+  FrameFit fit;
+  fit.frame = number_;
+  fit.independent = double(test_.stretch.size());
+  if (n > 0) fit.gradient = VectorX::Zero(n), fit.gauss_newton = MatrixX::Zero(n, n);
+  for (std::size_t i = 0; i < test_.stretch.size(); ++i) {
+    const TestPoint point = solve_test(*law, 0, test_, i, n > 0);
+    if (!point.found) return result.failure = test_.name + ": no state without stress on the free faces", result;
+    const double r = inverse * (point.stress - test_.stress[i]);
+    fit.cost += 0.5 * r * r;
+    if (n == 0) continue;
+    const VectorX J = inverse * (by_p.transpose() * point.by_parameters);
+    fit.gradient += r * J;
+    fit.gauss_newton += J * J.transpose();
   }
-  VectorX gradient;
-  MatrixX curvature;
-  result.cost = parameters_.prior(p, with_derivatives ? &gradient : nullptr, with_derivatives ? &curvature : nullptr);
-  sum_squares_ = 0.0;
-  for (std::size_t t = 0; t < tests_.size(); ++t) {
-    const MaterialTest& test = tests_[t];
-    const double greatest = test.greatest_stress(), inverse = 1.0 / (noise_ * greatest);
-    FrameFit fit;
-    fit.frame = int(t);
-    fit.independent = double(test.stretch.size());
-    if (with_derivatives) {
-      fit.gradient = VectorX::Zero(by_p.cols());
-      fit.gauss_newton = MatrixX::Zero(by_p.cols(), by_p.cols());
-    }
-    for (std::size_t i = 0; i < test.stretch.size(); ++i) {
-      const TestPoint point = solve_test(*law, 0, test, i, with_derivatives);
-      if (!point.found) {
-        result.failure = test.name + ": no state without stress on the free faces";
-        return result;
-      }
-      const double r = inverse * (point.stress - test.stress[i]);
-      fit.cost += 0.5 * r * r;
-      if (!with_derivatives) continue;
-      const VectorX J = inverse * (by_p.transpose() * point.by_parameters);
-      fit.gradient += r * J;
-      fit.gauss_newton += J * J.transpose();
-    }
-    sum_squares_ += 2.0 * fit.cost * noise_ * noise_;
-    result.cost += fit.cost;
-    ++result.steps;
-    if (with_derivatives) gradient += fit.gradient, curvature += fit.gauss_newton;
-    result.frames.push_back(std::move(fit));
-  }
-  if (with_derivatives) result.gradient = gradient, result.gauss_newton = curvature;
-  result.succeeded = std::isfinite(result.cost) && (!with_derivatives || gradient.allFinite());
-  if (!result.succeeded) result.failure = "the cost is not finite";
+  result.cost = fit.cost;
+  result.steps = 1;
+  result.frames.push_back(std::move(fit));
+  result.succeeded = true;
   return result;
+}
+
+CostEvaluation CurveTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
+  CostEvaluation result = run(theta, MatrixX::Identity(theta.size(), theta.size()));
+  if (result.succeeded) theta_bar = result.frames.front().gradient;
+  return result;
+}
+
+Objective curve_objective(const std::vector<MaterialTest>& tests, int terms, ParameterSet parameters, double noise) {
+  if (tests.empty()) throw std::invalid_argument("curves need a test");
+  std::vector<std::unique_ptr<Trial>> trials;
+  for (const MaterialTest& test : tests)
+    trials.push_back(std::make_unique<CurveTrial>(test, int(trials.size()), LawLayout({1, terms}), noise, parameters));
+  return {std::move(trials), std::move(parameters)};
 }
 
 namespace {
@@ -297,15 +283,15 @@ double secant_modulus(const std::vector<MaterialTest>& tests) {
 }
 
 /// Starts of a law with so many terms, from the one with fewer, which may be empty.
-std::vector<VectorX> starts_of(const PressTheta& layout, const VectorX& reference, const VectorX& before,
-                               bool positive_exponents) {
+std::vector<VectorX> starts_of(const LawLayout& layout, const VectorX& reference, const LawLayout& fewer,
+                               const VectorX& before, bool positive_exponents) {
   std::vector<VectorX> starts;
-  if (layout.terms == 0) return {reference};
-  const int added = layout.terms - 1;
+  if (layout.form().terms == 0) return {reference};
+  const int added = layout.form().terms - 1;
   for (const double exponent : {1.2, 3.0, 7.0, 15.0, 30.0, -1.2, -3.0, -7.0, -15.0, -30.0}) {
     if (positive_exponents && exponent < 0.0) continue;
     VectorX theta = reference;
-    if (added > 0) theta.head(before.size()) = before;
+    if (added > 0) theta = carry_law(fewer, before, layout, {0});
     theta[layout.exponent(added)] = exponent;
     if (added > 0) theta[layout.stiffness_ratio(added)] = small_ratio;
     starts.push_back(theta);
@@ -319,6 +305,7 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
   CurveFit best;
   best.bic = std::numeric_limits<double>::infinity();
   VectorX before;
+  LawLayout fewer;
   bool falls = true;
   const double modulus = secant_modulus(tests);
   OptimiserOptions optimiser;
@@ -326,13 +313,13 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
   optimiser.step_tolerance = 1e-6, optimiser.cost_tolerance = 1e-8;
   for (int terms = std::min(1, options.max_terms); terms <= options.max_terms && falls; ++terms) {
     CurveFit fit;
-    fit.layout = {1, terms};
-    CurveObjective objective(tests, terms,
-                             curve_parameters(terms, modulus, options.poissons_ratio, options.positive_exponents),
-                             options.noise);
+    fit.layout = LawLayout({1, terms});
+    Objective objective = curve_objective(
+        tests, terms, curve_parameters(terms, modulus, options.poissons_ratio, options.positive_exponents),
+        options.noise);
     double least = std::numeric_limits<double>::infinity();
     for (const VectorX& start :
-         starts_of(fit.layout, objective.parameters().reference(), before, options.positive_exponents)) {
+         starts_of(fit.layout, objective.parameters().reference(), fewer, before, options.positive_exponents)) {
       const OptimiserSummary run = minimise(objective, objective.parameters().to_unconstrained(start), optimiser);
       if (!run.succeeded) fit.failure = run.reason;
       if (!run.succeeded || !(run.evaluation.cost < least)) continue;
@@ -344,9 +331,11 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
       if (best.failure.empty()) best.failure = fit.failure;
       break;
     }
-    before = fit.theta;
-    (void)objective.evaluate(objective.parameters().to_unconstrained(fit.theta));
-    const double n = objective.point_count(), mean = std::max(objective.sum_squares() / n, 1e-30);
+    before = fit.theta, fewer = fit.layout;
+    const CostEvaluation at = objective.evaluate(objective.parameters().to_unconstrained(fit.theta));
+    double squares = 0.0;  // over each curve's greatest stress
+    for (const FrameFit& curve : at.frames) squares += 2.0 * curve.cost * options.noise * options.noise;
+    const double n = at.independent_observations(), mean = std::max(squares / n, 1e-30);
     fit.bic = n * std::log(mean) + objective.parameters().dimension() * std::log(n);
     fit.law = press_law(*unit_element(), fit.layout, fit.theta);
     std::vector<CurveFit::Tried> tried = best.tried;

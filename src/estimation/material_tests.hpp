@@ -3,7 +3,8 @@
 #include <optional>
 
 #include "estimation/optimiser.hpp"
-#include "estimation/press_objective.hpp"
+#include "estimation/objective.hpp"
+#include "estimation/press_law.hpp"
 
 namespace pliant {
 
@@ -67,41 +68,39 @@ double relative_rms(const MaterialTest& test, const std::vector<double>& predict
 /// The body of one tetrahedron whose law the curves determine.
 std::shared_ptr<const Body> unit_element();
 
-/// `press_parameters` of one element, for materials that hardly change their volume too.
+/// `law_parameters` of one element, for materials that hardly change their volume too.
 /// @param poissons_ratio      known; nothing: estimated, up to 0.4999
 /// @param positive_exponents  else they may have any sign
 ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
                               bool positive_exponents = false);
 
-/// Cost of stress-strain curves: half the squares of simulated less measured stress over `noise` times the curve's
-/// greatest stress, so that curves count by their points, not by their units; and the priors. Parameters and law are
-/// those of presses, of one element. Each curve is one "frame" of the evaluation.
-class CurveObjective : public CostFunction {
+/// A stress-strain curve of a material: half the squares of simulated less measured stress over `noise` times the curve's
+/// greatest stress, so that curves count by their points, not by their units. The law is that of one element.
+class CurveTrial : public Trial {
  public:
-  /// @param terms  of Ogden's law; 0: the linear law
-  /// @param noise  deviation of a stress, relative to its curve's greatest, > 0
-  /// Throws std::invalid_argument where there is no test or one is not as `check_test` wants it.
-  CurveObjective(std::vector<MaterialTest> tests, int terms, ParameterSet parameters, double noise);
+  /// @param number  what the evaluation's frame calls it
+  /// @param layout  of one control and one law
+  /// @param noise   standard deviation of a stress, relative to the curve's greatest, > 0
+  /// @param parameters  whose exponents keep to their bounds: what lies beyond cannot be simulated
+  /// Throws std::invalid_argument where the test is not as `check_test` wants it, or the noise is not positive.
+  CurveTrial(MaterialTest test, int number, const LawLayout& layout, double noise, const ParameterSet& parameters);
 
-  const ParameterSet& parameters() const override { return parameters_; }
-  [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override { return run(p, false); }
-  [[nodiscard]] CostEvaluation linearise(const VectorX& p) override { return run(p, true); }
-  [[nodiscard]] CostEvaluation gradient(const VectorX& p) override { return run(p, true); }
-
-  int point_count() const;
-  /// Residuals' squares of the last evaluation, over each curve's greatest stress.
-  double sum_squares() const { return sum_squares_; }
+  [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
+  [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
 
  private:
-  CostEvaluation run(const VectorX& p, bool with_derivatives);
-
-  std::vector<MaterialTest> tests_;
-  PressTheta layout_;
-  ParameterSet parameters_;
+  MaterialTest test_;
+  int number_;
+  LawLayout layout_;
   double noise_;
-  double sum_squares_ = 0.0;
+  std::vector<Parameter> bounded_;
   std::shared_ptr<const Body> body_ = unit_element();
 };
+
+/// The objective of stress-strain curves.
+/// @param terms  of Ogden's law; 0: the linear law
+/// Throws std::invalid_argument where there is no test.
+Objective curve_objective(const std::vector<MaterialTest>& tests, int terms, ParameterSet parameters, double noise);
 
 struct CurveFitOptions {
   int max_terms = 4;                     ///< of Ogden's law; 0: the linear law
@@ -109,7 +108,7 @@ struct CurveFitOptions {
   /// Exponents are positive. Pulled along one axis alone, a term with a negative exponent -a does what one with a / 2
   /// does, by the sides' stretch; pulled along two it is another material by far.
   bool positive_exponents = false;
-  double noise = 0.01;       ///< as of `CurveObjective`
+  double noise = 0.01;       ///< as of `CurveTrial`
   int max_iterations = 200;  ///< of each start
 };
 
@@ -117,7 +116,7 @@ struct CurveFitOptions {
 struct CurveFit {
   bool succeeded = false;
   std::string failure;
-  PressTheta layout;
+  LawLayout layout;
   VectorX theta;
   std::shared_ptr<const TabulatedLaw> law;  ///< of one element
   double bic = 0.0;                         ///< n ln(sum of squares / n) + k ln n

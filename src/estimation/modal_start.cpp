@@ -36,8 +36,9 @@ struct MatchedTone {
 /// The body's vibrations, rigid motions left out, for several ln E.
 class Vibrations {
  public:
-  Vibrations(std::shared_ptr<const Body> body, const VectorX& parameters, const std::vector<int>& held, int count)
-      : analysis_(std::move(body), held), theta_(parameters), skipped_(held.empty() ? rigid_motions : 0) {
+  Vibrations(std::shared_ptr<const Body> body, const MotionBlocks& blocks, const VectorX& parameters,
+             const std::vector<int>& held, int count)
+      : analysis_(std::move(body), blocks, held), blocks_(blocks), theta_(parameters), skipped_(held.empty() ? rigid_motions : 0) {
     const int half = 3 * (analysis_.body().node_count() - int(analysis_.held().size())) / 2;
     count_ = std::min(count, half - skipped_);
     solved_ = std::min(count_ + spare_modes, half - skipped_);
@@ -52,7 +53,7 @@ class Vibrations {
 
   /// False where the modes cannot be found.
   bool solve(const VectorX& log_moduli) {
-    for (int k = 0; k < controls(); ++k) theta_[theta::modulus(k, controls(), theta_.size())] = std::exp(log_moduli[k]);
+    for (int k = 0; k < controls(); ++k) theta_[blocks_.youngs_moduli[std::size_t(k)]] = std::exp(log_moduli[k]);
     all_ = analysis_.lowest(theta_, skipped_ + solved_);
     return all_.converged;
   }
@@ -61,7 +62,7 @@ class Vibrations {
   MatrixX log_derivatives() {
     MatrixX d = analysis_.modulus_derivatives(theta_, all_).bottomRows(solved_);
     for (int i = 0; i < solved_; ++i) d.row(i) *= 0.5 / all_.squared_frequencies[skipped_ + i];
-    for (int k = 0; k < controls(); ++k) d.col(k) *= theta_[theta::modulus(k, controls(), theta_.size())];
+    for (int k = 0; k < controls(); ++k) d.col(k) *= theta_[blocks_.youngs_moduli[std::size_t(k)]];
     return d;
   }
   std::vector<Points> shapes() const {
@@ -98,6 +99,7 @@ class Vibrations {
 
  private:
   ModalAnalysis analysis_;
+  MaterialBlocks blocks_;
   VectorX theta_;
   int skipped_, count_ = 0, solved_ = 0;
   Modes all_;
@@ -403,12 +405,12 @@ void validate(const ModalStartOptions& options) {
 
 }  // namespace
 
-ModalStart modal_start(std::shared_ptr<const Body> body, const VectorX& parameters, const std::vector<int>& held,
-                       const TrackedPoints& tracked, const std::vector<double>& times,
+ModalStart modal_start(std::shared_ptr<const Body> body, const MotionBlocks& blocks, const VectorX& parameters,
+                       const std::vector<int>& held, const TrackedPoints& tracked, const std::vector<double>& times,
                        const ModalStartOptions& options) {
   validate(options);
   const TrackedMotion motion = make_motion(*body, tracked, times, options.first_frame, held.empty());
-  Vibrations vibrations(std::move(body), parameters, held, options.modes);
+  Vibrations vibrations(std::move(body), blocks, parameters, held, options.modes);
   const Bounds bounds{std::log(options.least_modulus), std::log(options.most_modulus)};
   ModalStart start;
   start.largest_rotation = motion.largest_rotation();

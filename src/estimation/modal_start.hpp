@@ -72,8 +72,8 @@ struct ModalStart {
 /// @param held     nodes that do not move; none: rigid motion is taken out of the points' first
 /// @param tracked  frames number `times`; frames without observations are left out
 /// Throws InputError for options and arguments that cannot be. Where nothing oscillates the result says so.
-ModalStart modal_start(std::shared_ptr<const Body> body, const VectorX& theta, const std::vector<int>& held,
-                       const TrackedPoints& tracked, const std::vector<double>& times,
+ModalStart modal_start(std::shared_ptr<const Body> body, const MotionBlocks& blocks, const VectorX& theta,
+                       const std::vector<int>& held, const TrackedPoints& tracked, const std::vector<double>& times,
                        const ModalStartOptions& options = {});
 
 }  // namespace pliant

@@ -1,14 +1,12 @@
 #include "estimation/notes.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 namespace pliant {
 
 namespace {
-
-/// Not of interest to a user one by one: forces that stand for whoever held the object, and parts of a scan's error.
-bool is_auxiliary(const std::string& name) { return name.starts_with("pull@") || name.starts_with("scan_correction@"); }
 
 std::string spoken(std::string name) {
   for (char& c : name)
@@ -18,7 +16,11 @@ std::string spoken(std::string name) {
 
 void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
   if (capture.mass || capture.density) return;
-  if (capture.initial.release_of)
+  const bool hangs = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
+  if (hangs)
+    outcome.notes.push_back(
+        "Neither mass nor density is known: both pascals and the density follow from the weights of [[load]].");
+  else if (capture.initial.release_of)
     outcome.notes.push_back(
         "Neither mass nor density is known: both pascals and the density follow from the weight that was released.");
   else
@@ -30,9 +32,10 @@ void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
 
 void say_what_is_inseparable(FitOutcome& outcome) {
   const auto names = outcome.parameters.coordinate_names();
+  const auto parameters = outcome.parameters.coordinate_parameters();
   for (std::size_t i = 0; i < names.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      if (is_auxiliary(names[i]) || is_auxiliary(names[j])) continue;
+      if (parameters[i]->is_auxiliary || parameters[j]->is_auxiliary) continue;
       const double r = outcome.correlation(Eigen::Index(i), Eigen::Index(j));
       if (std::abs(r) < 0.9) continue;
       char text[64];
@@ -46,7 +49,7 @@ void say_what_is_assumed(FitOutcome& outcome) {
   int at = 0;
   for (const Parameter& p : outcome.parameters.parameters()) {
     if (!p.estimated) continue;
-    if (!is_auxiliary(p.name) && std::isfinite(p.prior_std) &&
+    if (!p.is_auxiliary && std::isfinite(p.prior_std) &&
         outcome.std.segment(at, p.dimension()).maxCoeff() > 0.7 * p.prior_std)
       outcome.notes.push_back("The recording says little about " + spoken(p.name) +
                               ": its value is close to what was assumed beforehand.");
@@ -59,8 +62,9 @@ void say_if_starts_disagree(FitOutcome& outcome) {
   for (const FitStart& s : outcome.starts) least = std::min(least, s.cost);
   for (const FitStart& s : outcome.starts) {
     if (!(s.cost < 1.5 * least)) continue;  // a start that fits far worse is no rival
-    low = std::min(low, s.final[theta::youngs_modulus]);
-    high = std::max(high, s.final[theta::youngs_modulus]);
+    const double modulus = s.final[outcome.recordings.front().discretisation.simulation.blocks.youngs_moduli.front()];
+    low = std::min(low, modulus);
+    high = std::max(high, modulus);
   }
   if (high > 1.25 * low) {
     char text[160];

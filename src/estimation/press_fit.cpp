@@ -50,18 +50,22 @@ double squares_of(const CostEvaluation& evaluation) {
   return sum;
 }
 
+/// Every control and law as it is.
+std::vector<int> as_they_are(const LawForm& form) {
+  std::vector<int> like;
+  for (int k = 0; k < form.controls; ++k) like.push_back(k);
+  return like;
+}
+
 /// The estimate with one term more in each law, which begins small.
-VectorX with_term(const PressTheta& from, const VectorX& theta) {
-  const PressTheta to{from.controls, from.terms + 1, from.laws, from.own_ratios};
-  VectorX more = VectorX::Zero(to.size());
-  const int added = to.terms - 1;
-  for (int k = 0; k < to.controls; ++k) more[to.modulus(k)] = theta[from.modulus(k)];
-  for (int law = 0; law < to.laws; ++law) {
-    more.segment(to.poissons_ratio(law), from.law_size()) = theta.segment(from.poissons_ratio(law), from.law_size());
+VectorX with_term(const LawLayout& from, const VectorX& theta, const LawLayout& to) {
+  VectorX more = carry_law(from, theta, to, as_they_are(to.form()));
+  const int added = to.form().terms - 1;
+  for (int law = 0; law < to.form().laws; ++law) {
     // The second term has the other sign, the third stiffens more than the first.
     more[to.exponent(added, law)] = added == 1 ? -6.0 : 10.0;
     more[to.stiffness_ratio(added, law)] = 0.2;
-    more[to.poissons_ratio_of(added, law)] = theta[from.poissons_ratio(law)];
+    more[to.poissons_ratio(added, law)] = theta[from.poissons_ratio(0, law)];
   }
   return more;
 }
@@ -103,7 +107,7 @@ class PressFit {
       else
         fit_zones();
       fit_terms(3);  // an object of several materials looks like one of more terms
-      if (!regions_ && best_->layout.laws == 1) fit_fields();
+      if (!regions_ && best_->layout.form().laws == 1) fit_fields();
     }
     if (!interrupted_ && options_.material == PressMaterial::Sampled) fit_samples();
     return finish();
@@ -111,7 +115,7 @@ class PressFit {
 
  private:
   struct Estimate {
-    PressTheta layout;
+    LawLayout layout;
     std::shared_ptr<const PressScene> scene;
     ParameterSet parameters;
     VectorX theta;
@@ -125,24 +129,20 @@ class PressFit {
   enum class Effort { Full, Brief };  // brief: the noise stays, a few iterations
   /// A form of the law before it is fitted.
   struct Form {
-    PressTheta layout;
+    LawLayout layout;
     std::shared_ptr<const PressScene> scene;
     std::vector<Vector3> points = {};  // of a field
     std::vector<ZoneCut> cuts = {};    // of zones
   };
 
-  std::vector<std::string> names(int controls) const {
-    if (regions_ || controls == 1) return modulus_names(capture_, controls);
-    std::vector<std::string> all;
-    for (int k = 0; k < controls; ++k) all.push_back("youngs_modulus@" + std::to_string(k + 1));
-    return all;
+  LawLayout layout_of(const LawForm& form) const {
+    return LawLayout(form, regions_ ? modulus_names(capture_, form.controls) : std::vector<std::string>{});
   }
 
   ParameterSet parameters_of(const Form& form) const {
-    const int controls = form.layout.controls;
-    ParameterSet set = zone_parameters(form.layout, names(controls), start_modulus(), options_.modulus_variation);
+    ParameterSet set = zone_parameters(form.layout, start_modulus(), options_.modulus_variation);
     if (!form.points.empty())
-      set.set_joint_prior(names(controls),
+      set.set_joint_prior(form.layout.modulus_names(),
                           field_precision(form.points, form.scene->body->size(), options_.modulus_variation));
     return set;
   }
@@ -166,7 +166,7 @@ class PressFit {
     // Twice: contact is as stiff, and outliers weigh as little, as the law and the noise at the beginning say.
     for (int round = 0; round < (is_brief ? 1 : 2) && !interrupted_; ++round) {
       std::optional<PressObjective> next(objective_of(e));
-      const OptimiserSummary done = minimise(*next, from, o, [&](const Iteration& i) {
+      const OptimiserSummary done = minimise(next->cost(), from, o, [&](const Iteration& i) {
         report(stage, i.number, i.cost, *next, e.parameters.to_theta(i.p), form.layout);
         if (!is_brief) keep_under_way(i.state(), form.cuts);
         return !stop();
@@ -204,14 +204,15 @@ class PressFit {
   }
 
   void report(const std::string& stage, int iteration, double cost, const PressObjective& objective,
-              const VectorX& theta, const PressTheta& layout) {
+              const VectorX& theta, const LawLayout& layout) {
     PressFitEvent event{stage, iteration, cost, 0.0, 0.0};
     const std::vector<double> residuals = objective.residuals();
     double sum = 0.0;
     for (const double r : residuals) sum += r * r;
     event.marker_rms = std::sqrt(3.0 * sum / double(std::max<std::size_t>(residuals.size(), 1)));
     double log = 0.0;
-    for (int k = 0; k < layout.controls; ++k) log += std::log(theta[layout.modulus(k)]) / layout.controls;
+    const int controls = layout.form().controls;
+    for (int k = 0; k < controls; ++k) log += std::log(theta[layout.modulus(k)]) / controls;
     event.youngs_modulus = std::exp(log);
     if (monitor_.on_event) monitor_.on_event(event);
     outcome_.history.push_back(event);
@@ -227,8 +228,8 @@ class PressFit {
   }
 
   /// What an interrupted fit had done of this form, if anything.
-  const PressFitState::Done* done_before(const PressTheta& layout) const {
-    const auto it = std::ranges::find(state_.done, layout, &PressFitState::Done::layout);
+  const PressFitState::Done* done_before(const LawForm& form) const {
+    const auto it = std::ranges::find(state_.done, form, &PressFitState::Done::form);
     return it == state_.done.end() ? nullptr : &*it;
   }
 
@@ -236,9 +237,9 @@ class PressFit {
   void conclude(std::optional<Estimate> next, const TriedLaw& tried, double noise_before,
                 const std::vector<ZoneCut>& cuts = {}) {
     outcome_.tried.push_back(tried);
-    if (!interrupted_ && !done_before(tried.layout)) {
+    if (!interrupted_ && !done_before(tried.form)) {
       state_.done.push_back(
-          {tried.layout, cuts, next ? next->theta : VectorX(), tried.cost, tried.evidence, noise_, tried.kept});
+          {tried.form, cuts, next ? next->theta : VectorX(), tried.cost, tried.evidence, noise_, tried.kept});
       if (monitor_.on_state) monitor_.on_state(state_);
     }
     if (tried.kept)
@@ -248,7 +249,7 @@ class PressFit {
   }
 
   std::optional<Estimate> estimate(const Form& form, const VectorX& start, const std::string& stage) {
-    const auto* done = done_before(form.layout);
+    const auto* done = done_before(form.layout.form());
     if (!done) return minimised(form, start, stage);
     if (done->theta.size() == 0) return std::nullopt;
     noise_ = done->noise;
@@ -261,30 +262,30 @@ class PressFit {
   }
 
   bool fit_first(int terms) {
-    const Form form{{scene_->body->modulus.controls, terms}, scene_};
+    const Form form{layout_of({scene_->body->modulus.controls, terms}), scene_};
     auto first = estimate(form, parameters_of(form).reference(), terms == 0 ? "linear" : "1 term");
     if (!first) {
       outcome_.reason = outcome_.notes.empty() ? "the start cannot be evaluated" : outcome_.notes.back();
       return false;
     }
-    const TriedLaw tried{form.layout, first->evaluation.cost, infinite, true};
+    const TriedLaw tried{form.layout.form(), first->evaluation.cost, infinite, true};
     conclude(std::move(first), tried, noise_);
     return !interrupted_;
   }
 
   /// More terms, or Poisson's ratios of their own for them. False where that is not kept.
-  bool fit_freer(const PressTheta& layout, const VectorX& start, const std::string& stage) {
+  bool fit_freer(const LawLayout& layout, const VectorX& start, const std::string& stage) {
     const double noise = noise_;
     const Form form{layout, best_->scene, best_->points, best_->cuts};
     auto next = estimate(form, start, stage);
-    TriedLaw tried{layout, next ? next->evaluation.cost : infinite, -infinite, false};
+    TriedLaw tried{layout.form(), next ? next->evaluation.cost : infinite, -infinite, false};
     if (next) {
       // Half the BIC by residuals whose deviation is unknown: n/2 ln(sum r^2) + k/2 ln n.
       const double n = next->evaluation.independent_observations();
       const auto more = double(next->parameters.dimension() - best_->parameters.dimension());
       tried.evidence =
           0.5 * n * std::log(squares_of(best_->evaluation) / squares_of(next->evaluation)) - 0.5 * more * std::log(n);
-      tried.kept = (options_.terms > 0 && layout.terms > best_->layout.terms) || tried.evidence > needed_evidence;
+      tried.kept = (options_.terms > 0 && layout.form().terms > best_->layout.form().terms) || tried.evidence > needed_evidence;
     }
     conclude(std::move(next), tried, noise, form.cuts);
     return tried.kept && !interrupted_;
@@ -292,15 +293,17 @@ class PressFit {
 
   void fit_terms(int most) {
     if (options_.terms > 0) most = std::min(most, options_.terms);
-    while (best_->layout.terms < most && !stop()) {
-      PressTheta layout = best_->layout;
-      ++layout.terms;
-      if (std::ranges::find(outcome_.tried, layout, &TriedLaw::layout) != outcome_.tried.end()) break;
-      const std::string stage = std::to_string(layout.terms) + " terms";
-      if (!fit_freer(layout, with_term(best_->layout, best_->theta), stage)) break;
-      if (layout.own_ratios || stop()) continue;
-      layout.own_ratios = true;
-      fit_freer(layout, best_->theta, stage + " apart");
+    while (best_->layout.form().terms < most && !stop()) {
+      LawForm form = best_->layout.form();
+      ++form.terms;
+      if (std::ranges::find(outcome_.tried, form, &TriedLaw::form) != outcome_.tried.end()) break;
+      const std::string stage = std::to_string(form.terms) + " terms";
+      const LawLayout layout = layout_of(form);
+      if (!fit_freer(layout, with_term(best_->layout, best_->theta, layout), stage)) break;
+      if (form.own_ratios || stop()) continue;
+      form.own_ratios = true;
+      const LawLayout apart = layout_of(form);
+      fit_freer(apart, carry_law(best_->layout, best_->theta, apart, as_they_are(form)), stage + " apart");
     }
   }
 
@@ -320,14 +323,15 @@ class PressFit {
   /// One zone more than there are. False where that is not kept.
   bool fit_zone(int zones) {
     const bool is_chosen = options_.zones > 0;
-    const PressTheta layout{zones, best_->layout.terms, zones, best_->layout.own_ratios};
+    const LawForm form{zones, best_->layout.form().terms, zones, best_->layout.form().own_ratios};
+    const LawLayout layout = layout_of(form);
     std::optional<PromisedCut> promised;
     std::vector<ZoneCut> cuts = best_->cuts;
-    const PressFitState::Done* done = done_before(layout);
+    const PressFitState::Done* done = done_before(form);
     if (done && !done->cuts.empty()) {
       cuts = done->cuts;
     } else if (done) {
-      outcome_.tried.push_back({layout, done->cost, done->evidence, done->kept});
+      outcome_.tried.push_back({form, done->cost, done->evidence, done->kept});
       return false;
     } else if (state_.under_way.p.size() > 0 && int(state_.cuts.size()) == zones - 1) {
       cuts = state_.cuts;
@@ -337,15 +341,15 @@ class PressFit {
                                     options_.modulus_variation);
       if (promised) cuts.push_back(promised->cut);
       if (!promised || (!is_chosen && promised->evidence < needed_evidence)) {
-        conclude({}, {layout, infinite, promised ? promised->evidence : -infinite, false}, noise_);
+        conclude({}, {form, infinite, promised ? promised->evidence : -infinite, false}, noise_);
         return false;
       }
     }
     const double noise = noise_;
     const int from = cuts.back().zone;
-    auto next = estimate({layout, with_zones(cuts), {}, cuts}, with_zone(best_->layout, best_->theta, from),
+    auto next = estimate({layout, with_zones(cuts), {}, cuts}, with_zone(best_->layout, best_->theta, layout, from),
                          std::to_string(zones) + " zones");
-    TriedLaw tried{layout, infinite, -infinite, false};
+    TriedLaw tried{layout.form(), infinite, -infinite, false};
     if (next) {
       if (!done) move_cuts(*next);
       cuts = next->cuts;
@@ -361,7 +365,7 @@ class PressFit {
 
   /// Moves cuts one after the other to where they fit better, as long as that gains something.
   void move_cuts(Estimate& e) {
-    const std::string stage = std::to_string(e.layout.controls) + " zones";
+    const std::string stage = std::to_string(e.layout.form().controls) + " zones";
     const double start_cost = e.start_cost;
     const auto keep = [&] { keep_under_way({0, e.parameters.to_unconstrained(e.theta), {}}, e.cuts); };
     keep();
@@ -398,15 +402,11 @@ class PressFit {
   void fit_laws_of_regions() {
     if (options_.zones == 1 || stop()) return;
     const double noise = noise_;
-    const int count = best_->layout.controls;
-    const PressTheta layout{count, best_->layout.terms, count, best_->layout.own_ratios};
-    VectorX start = VectorX::Zero(layout.size());
-    for (int k = 0; k < count; ++k) {
-      start[layout.modulus(k)] = best_->theta[best_->layout.modulus(k)];
-      start.segment(layout.poissons_ratio(k), layout.law_size()) = best_->theta.segment(1, layout.law_size());
-    }
+    const LawForm& one = best_->layout.form();
+    const LawLayout layout = layout_of({one.controls, one.terms, one.controls, one.own_ratios});
+    const VectorX start = carry_law(best_->layout, best_->theta, layout, as_they_are(layout.form()));
     auto next = estimate({layout, best_->scene}, start, "a law a region");
-    TriedLaw tried{layout, infinite, -infinite, false};
+    TriedLaw tried{layout.form(), infinite, -infinite, false};
     if (next) {
       tried.cost = next->evaluation.cost;
       tried.evidence =
@@ -437,20 +437,21 @@ class PressFit {
     }
     auto scene = std::make_shared<PressScene>(*best_->scene);
     scene->body = with_field(*best_->scene->body, field.field);
-    const PressTheta layout{size, best_->layout.terms, 1, best_->layout.own_ratios};
+    const LawForm& before = best_->layout.form();
+    const LawLayout layout = layout_of({size, before.terms, 1, before.own_ratios});
     const Form form{layout, scene, field.points};
     const MatrixX carried = carried_over(*scene->body, best_->scene->body->modulus, scene->body->modulus);
-    VectorX start = VectorX::Zero(layout.size()), logs{best_->layout.controls};
-    start.head(1 + layout.law_size()) = best_->theta.head(1 + layout.law_size());
-    for (int k = 0; k < best_->layout.controls; ++k) logs[k] = std::log(best_->theta[best_->layout.modulus(k)]);
+    VectorX start = carry_law(best_->layout, best_->theta, layout, std::vector<int>(std::size_t(size), 0));
+    VectorX logs{before.controls};
+    for (int k = 0; k < before.controls; ++k) logs[k] = std::log(best_->theta[best_->layout.modulus(k)]);
     const VectorX moduli = (carried * logs).array().exp();
     for (int k = 0; k < size; ++k) start[layout.modulus(k)] = moduli[k];
-    TriedLaw tried{layout, infinite, -infinite, false};
+    TriedLaw tried{layout.form(), infinite, -infinite, false};
     std::optional<Estimate> next;
     const bool is_chosen = options_.control_points > 1;
-    if (const auto* done = done_before(layout); done && done->theta.size() == 0)
+    if (const auto* done = done_before(layout.form()); done && done->theta.size() == 0)
       tried.cost = done->cost, tried.evidence = done->evidence;
-    if (is_chosen || done_before(layout) || promises(form, start, carried, tried)) {
+    if (is_chosen || done_before(layout.form()) || promises(form, start, carried, tried)) {
       next = estimate(form, start, std::to_string(size) + " control points");
       if (next) {
         tried.cost = next->evaluation.cost;

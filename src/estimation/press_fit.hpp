@@ -32,7 +32,7 @@ PressFitOptions press_options(const FitOptions& options);
 
 /// One form of the law that was fitted.
 struct TriedLaw {
-  PressTheta layout;
+  LawForm form;
   double cost = 0.0;      ///< infinite where it cannot be fitted
   double evidence = 0.0;  ///< for it against the best before: fall of half the BIC for terms, ln of the Bayes factor
                           ///< for zones and control points
@@ -42,7 +42,7 @@ struct TriedLaw {
 /// Where a fit of presses stands, to go on after an interruption.
 struct PressFitState {
   struct Done {
-    PressTheta layout;
+    LawForm form;
     std::vector<ZoneCut> cuts;
     VectorX theta;
     double cost = 0.0, evidence = 0.0, noise = 0.0;
@@ -71,7 +71,7 @@ struct PressFitMonitor {
 struct PressFitOutcome {
   std::shared_ptr<const PressScene> scene;
   std::shared_ptr<const MaterialLaw> law;
-  PressTheta layout;
+  LawLayout layout;
   ParameterSet parameters;  ///< with the reference at the estimate
   VectorX theta, std;       ///< std of each unconstrained number
   MatrixX covariance, correlation;

@@ -45,21 +45,9 @@ ObservedPress observe_press(const Capture& capture, std::size_t i) {
 }
 
 RigidContact contact_of(const PressScene& scene, const Press& press, double youngs_modulus) {
-  const Body& body = *scene.body;
-  const ContactSamples disc = disc_samples(body, press.contact_centre, press.contact_radius);
-  if (disc.rest.empty())
-    throw InputError({{},
-                      fmt::format("the disc at ({:.4g}, {:.4g}, {:.4g}) m touches nothing of the object",
-                                  press.contact_centre.x(), press.contact_centre.y(), press.contact_centre.z()),
-                      "`contact.centre` on the surface at rest",
-                      "correct the press in capture.toml"});
-  const double stiffness = glued_stiffness(youngs_modulus, mean_edge(body));
-  if (press.glued) return RigidContact::glued(body, disc, stiffness);
-  const Vector3 axis = press.probe ? press.probe->normal : press.force.normalized();
-  return RigidContact::sliding(
-      body, boundary_samples(body, 4),
-      rigid_punch(press.contact_centre, axis, press.contact_radius, 0.05 * press.contact_radius), stiffness,
-      0.005 * press.contact_radius);
+  ProbeOptions probe{press.glued ? ProbeKind::GluedDisc : ProbeKind::Punch, press.contact_centre, press.contact_radius,
+                     press.probe ? press.probe->normal : press.force.normalized()};
+  return probe_contact(*scene.body, probe, youngs_modulus);
 }
 
 ProbeControl control_of(const Press& press) {

@@ -6,7 +6,7 @@
 
 #include "capture/capture.hpp"
 #include "capture/markers.hpp"
-#include "estimation/parameter_set.hpp"
+#include "parameters/parameter_set.hpp"
 #include "motion/equilibrium.hpp"
 
 namespace pliant {

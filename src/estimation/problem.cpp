@@ -34,21 +34,30 @@ std::function<bool(const Vector3&)> region_test(const TriangleMesh& mesh, const 
   };
 }
 
-void add_scalar(std::vector<Parameter>& parameters, const char* name, const char* unit, Transform transform, int index,
-                double lower, double upper, double prior_mean, double prior_std, bool estimated, double scale = 1.0) {
-  Parameter p{name, unit, transform, index, scale, lower, upper, estimated};
+/// Of a scalar: its block gives name and unit.
+Parameter scalar(const ParameterLayout& layout, const ParameterHandle& at, Transform transform, double lower,
+                 double upper, double prior_mean, double prior_std, bool estimated, double scale = 1.0) {
+  const ParameterBlock& block = layout.block_of(at);
+  Parameter p{block.name, block.unit, transform, at, scale, lower, upper, estimated};
   p.prior_std = prior_std;
   p.prior_mean = VectorX::Constant(1, prior_mean);
-  parameters.push_back(std::move(p));
+  return p;
 }
 
-void add_vector(std::vector<Parameter>& parameters, const std::string& name, const char* unit, Transform transform,
-                int index, double scale, const Vector3& prior_mean, double prior_std, bool estimated) {
-  Parameter p{name, unit, transform, index, scale};
+Parameter vector(const ParameterLayout& layout, const ParameterHandle& at, double scale, const Vector3& prior_mean,
+                 double prior_std, bool estimated) {
+  const ParameterBlock& block = layout.block_of(at);
+  Parameter p{block.name, block.unit, Transform::Vector, at, scale};
   p.estimated = estimated;
   p.prior_std = prior_std;
   p.prior_mean = prior_mean;
-  parameters.push_back(std::move(p));
+  return p;
+}
+
+/// Whether forces are known that anchor pascals: a weight that is let go, or weights that hang while the object is seen.
+bool has_known_forces(const Capture& capture) {
+  return capture.initial.release_of.has_value() ||
+         std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
 }
 
 Vector3 centre_of(const TriangleMesh& surface) {
@@ -123,12 +132,12 @@ std::vector<Hold> held_regions(const std::vector<FixedRegion>& regions, const Tr
 std::vector<Hold> held_regions(const Capture& capture) { return held_regions(capture.fixed, *capture.surface); }
 
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
-                          const Resolution& resolution, const VectorX& parameters, const SimulationOptions& settings,
-                          const std::vector<Vector3>& tracked) {
+                          const Resolution& resolution, const CaptureBlocks& blocks, const VectorX& parameters,
+                          const SimulationOptions& settings, const std::vector<Vector3>& tracked) {
   std::vector<Vector3> control_points;
   auto body = make_body_of(capture, *distance, resolution, control_points);
   Discretisation d =
-      discretise(capture, std::move(distance), std::move(body), resolution, parameters, settings, tracked);
+      discretise(capture, std::move(distance), std::move(body), resolution, blocks, parameters, settings, tracked);
   d.control_points = std::move(control_points);
   return d;
 }
@@ -160,20 +169,22 @@ ShapeField shape_field(const Capture& capture, const Resolution& resolution) {
 }  // namespace
 
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
-                          std::shared_ptr<const Body> body, const Resolution& resolution, const VectorX& parameters,
-                          const SimulationOptions& settings, const std::vector<Vector3>& tracked) {
+                          std::shared_ptr<const Body> body, const Resolution& resolution, const CaptureBlocks& blocks,
+                          const VectorX& parameters, const SimulationOptions& settings,
+                          const std::vector<Vector3>& tracked) {
   Discretisation d;
   d.distance = std::move(distance);
   d.body = std::move(body);
   const double size = object_size(capture);
-  if (!capture.depth.empty() || !capture.clouds.empty())
+  const bool any_surface = std::ranges::any_of(capture.loads, [](const Load& l) { return l.cloud || !l.images.empty(); });
+  if (!capture.depth.empty() || !capture.clouds.empty() || any_surface)
     d.mismatch.surface =
         std::make_shared<SurfaceConstraints>(d.body, d.distance, resolution.band * size, size / resolution.cells);
   if (!tracked.empty()) d.mismatch.tracks = std::make_shared<PointTracks>(*d.body, tracked);
   d.simulation = settings;
   d.simulation.is_static = capture.is_static;
   d.simulation.times.assign(capture.times.begin() + capture.start_frame, capture.times.end());
-  const double gravity = std::max(theta::vector_at(parameters, theta::gravity).norm(), 0.1);
+  const double gravity = std::max(blocks.motion.gravity.vector(parameters).norm(), 0.1);
   d.simulation.max_dt = default_time_step(*d.body, gravity);
   d.simulation.scan_sags = capture.shape_is == ShapeIs::Static && !d.body->is_free_elsewhere();
   // What hangs and touches nothing moves smoothly; its elements are quadratic, and its steps dear.
@@ -182,15 +193,14 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
     d.simulation.max_dt =
         std::max(d.simulation.max_dt, 0.125 * (times.back() - times.front()) / double(times.size() - 1));
   d.simulation.max_dt /= resolution.steps;
-  d.simulation.planes = int(capture.planes.size());
-  d.simulation.pulls = pull_count(capture, resolution);
-  d.simulation.sensors = int(sensor_names(capture).size());
+  d.simulation.blocks = blocks.motion;
+  d.mismatch.sensors = blocks.sensors;
   d.mismatch.centre = centre_of(*capture.surface);
-  d.simulation.contact = default_contact(*d.body, parameters[theta::density] * d.body->volume(), gravity);
+  d.simulation.contact = default_contact(*d.body, parameters[blocks.motion.density] * d.body->volume(), gravity);
   for (const Weight& weight : capture.weights) d.simulation.weights.push_back({weight.at, weight.mass});
   if (const auto& weight = capture.initial.release_of; weight && capture.initial.released)
     d.simulation.released_weights.push_back({weight->at, weight->mass});
-  d.simulation.pull_points = pull_points(capture, d.simulation.pulls);
+  d.simulation.pull_points = pull_points(capture, int(blocks.motion.pulls.size()));
   d.simulation.shape = shape_field(capture, resolution);
   d.simulation.holds = held_regions(capture);
   return d;
@@ -222,89 +232,81 @@ std::vector<std::string> modulus_names(const Capture& capture, int controls) {
   return names;
 }
 
-void set_moduli(VectorX& theta, int controls, double youngs_modulus) {
-  for (int k = 0; k < controls; ++k) theta[theta::modulus(k, controls, theta.size())] = youngs_modulus;
-}
-
-ParameterSet default_parameters(const Capture& capture, double volume, int controls, int pulls, int shapes) {
+CaptureParameters default_parameters(const Capture& capture, double volume, int controls, int pulls, int shapes) {
   const double size = object_size(capture);
   const double gravity = capture.gravity ? capture.gravity->norm() : gravity_guess;
   const double density = capture.mass ? *capture.mass / volume : capture.density ? *capture.density : density_guess;
   const double time = std::sqrt(size / std::max(gravity, 0.1));   // of a fall through the object's own size
   const double stress = density * std::max(gravity, 0.1) * size;  // under its own weight
 
-  const int planes = int(capture.planes.size());
-  const std::vector<std::string> sensors = sensor_names(capture);
-  VectorX theta = VectorX::Zero(theta::size(planes, controls, pulls, int(sensors.size()), shapes));
-  set_moduli(theta, controls, 20.0 * stress);
-  theta[theta::poissons_ratio] = 0.35;
-  theta[theta::mass_damping] = 0.05 / time;
-  theta[theta::stiffness_damping] = 0.02 * time;
-  theta[theta::density] = density;
-  theta.segment<3>(theta::gravity) = capture.gravity.value_or(-gravity_guess * capture.up);
-  theta.segment<3>(theta::linear_velocity) = capture.initial.linear_velocity;
-  theta.segment<3>(theta::angular_velocity) = capture.initial.angular_velocity;
+  ParameterLayout layout;
+  CaptureBlocks blocks;
+  blocks.motion = add_motion_blocks(
+      layout, {.moduli = controls, .planes = int(capture.planes.size()), .pulls = pulls, .scan_corrections = shapes},
+      modulus_names(capture, controls));
+  for (const std::string& sensor : sensor_names(capture)) blocks.sensors.push_back(add_sensor_blocks(layout, sensor));
+  const MotionBlocks& m = blocks.motion;
+  VectorX theta = VectorX::Zero(layout.size());
+  m.set_moduli(theta, 20.0 * stress);
+  theta[m.poissons_ratio] = 0.35;
+  theta[m.mass_damping] = 0.05 / time;
+  theta[m.stiffness_damping] = 0.02 * time;
+  theta[m.density] = density;
+  theta.segment<3>(m.gravity) = capture.gravity.value_or(-gravity_guess * capture.up);
+  theta.segment<3>(m.linear_velocity) = capture.initial.linear_velocity;
+  theta.segment<3>(m.angular_velocity) = capture.initial.angular_velocity;
 
   std::vector<Parameter> p;
   // Priors are wide: they say what soft solids are like and only matter where the recording says nothing.
-  const std::vector<std::string> names = modulus_names(capture, controls);
-  for (int k = 0; k < controls; ++k)
-    add_scalar(p, names[std::size_t(k)].c_str(), "Pa", Transform::Logarithm, theta::modulus(k, controls, theta.size()),
-               1e-2 * stress, 1e8 * stress, std::log(theta[theta::youngs_modulus]),
-               std::numeric_limits<double>::infinity(), true);
-  add_scalar(p, "poisson_ratio", "1", Transform::LogitHalf, theta::poissons_ratio, 0.02, 0.495, std::log(0.35 / 0.15),
-             0.5, true);
-  add_scalar(p, "mass_damping", "1/s", Transform::Logarithm, theta::mass_damping, 1e-4 / time, 20.0 / time,
-             std::log(theta[theta::mass_damping]), 1.5, !capture.is_static);
-  add_scalar(p, "stiffness_damping", "s", Transform::Logarithm, theta::stiffness_damping, 1e-5 * time, 2.0 * time,
-             std::log(theta[theta::stiffness_damping]), 1.5, !capture.is_static);
-  add_scalar(p, "density", "kg/m^3", Transform::Logarithm, theta::density, 0.1, 3e4, std::log(density), 0.5,
-             !capture.mass && !capture.density && capture.initial.release_of.has_value());
+  for (const ParameterHandle& modulus : m.youngs_moduli)
+    p.push_back(scalar(layout, modulus, Transform::Logarithm, 1e-2 * stress, 1e8 * stress, std::log(theta[modulus]),
+                       std::numeric_limits<double>::infinity(), true));
+  p.push_back(scalar(layout, m.poissons_ratio, Transform::LogitHalf, 0.02, 0.495, std::log(0.35 / 0.15), 0.5, true));
+  p.push_back(scalar(layout, m.mass_damping, Transform::Logarithm, 1e-4 / time, 20.0 / time,
+                     std::log(theta[m.mass_damping]), 1.5, !capture.is_static));
+  p.push_back(scalar(layout, m.stiffness_damping, Transform::Logarithm, 1e-5 * time, 2.0 * time,
+                     std::log(theta[m.stiffness_damping]), 1.5, !capture.is_static));
+  p.push_back(scalar(layout, m.density, Transform::Logarithm, 0.1, 3e4, std::log(density), 0.5,
+                     !capture.mass && !capture.density && has_known_forces(capture)));
   if (capture.gravity) {  // its length is known better than how the world's axes stand
-    Parameter direction{"gravity", "m/s^2", Transform::Direction, theta::gravity};
-    direction.prior_std = 0.05;
+    Parameter direction = vector(layout, m.gravity, 1.0, Vector3::Zero(), 0.05, false);
+    direction.transform = Transform::Direction;
     direction.prior_mean = VectorX::Zero(2);
     direction.origin = *capture.gravity;
     p.push_back(std::move(direction));
   } else {
-    add_vector(p, "gravity", "m/s^2", Transform::Vector, theta::gravity, 1.0, theta.segment<3>(theta::gravity), 10.0,
-               true);
+    p.push_back(vector(layout, m.gravity, 1.0, m.gravity.vector(theta), 10.0, true));
   }
   const double speed = std::sqrt(gravity * size);
   const bool moves = !capture.initial.known && !capture.is_static;
-  add_vector(p, "linear_velocity", "m/s", Transform::Vector, theta::linear_velocity, speed,
-             theta.segment<3>(theta::linear_velocity) / speed, 3.0, moves);
-  add_vector(p, "angular_velocity", "rad/s", Transform::Vector, theta::angular_velocity, 1.0 / time,
-             theta.segment<3>(theta::angular_velocity) * time, 3.0, moves);
-  for (int i = 0; i < int(capture.planes.size()); ++i) {
-    theta.segment<3>(theta::plane_point(i)) = capture.planes[i].point;
-    theta.segment<3>(theta::plane_normal(i)) = capture.planes[i].normal;
-    const std::string name = i == 0 ? "plane" : "plane_" + std::to_string(i + 1);
-    Parameter plane{name, "", Transform::PlanePosition, theta::plane_point(i), size};
-    plane.estimated = !capture.planes[i].known;
-    plane.prior_std = 0.2;
-    plane.prior_mean = VectorX::Zero(3);
-    plane.origin = theta.segment<6>(theta::plane_point(i));
+  p.push_back(vector(layout, m.linear_velocity, speed, m.linear_velocity.vector(theta) / speed, 3.0, moves));
+  p.push_back(vector(layout, m.angular_velocity, 1.0 / time, m.angular_velocity.vector(theta) * time, 3.0, moves));
+  for (std::size_t i = 0; i < m.planes.size(); ++i) {
+    theta.segment<3>(m.planes[i].point) = capture.planes[i].point;
+    theta.segment<3>(m.planes[i].normal) = capture.planes[i].normal;
+    Parameter plane = vector(layout, m.planes[i].whole(), size, Vector3::Zero(), 0.2, !capture.planes[i].known);
+    plane.transform = Transform::PlanePosition;
+    plane.origin = theta.segment<6>(m.planes[i].whole());
     p.push_back(std::move(plane));
   }
-  for (int k = 0; k < std::min(pulls, int(capture.initial.pulls.size())); ++k)
-    theta.segment<3>(theta::pull(k, planes)) = capture.initial.pulls[std::size_t(k)];
-  for (int k = 0; k < pulls; ++k)
-    add_vector(p, "pull@" + std::to_string(k + 1), "1", Transform::Vector, theta::pull(k, planes), 1.0, Vector3::Zero(),
-               0.5, true);
-  for (int k = 0; k < int(sensors.size()); ++k) {
-    const int at = theta::sensor(k, planes, pulls);
-    const std::string& sensor = sensors[std::size_t(k)];
-    if (k < int(capture.depth.size()))
-      add_scalar(p, ("range_error@" + sensor).c_str(), "m", Transform::Shift, at, -0.2, 0.2, 0.0,
-                 range_error_std / size, false, size);
-    add_vector(p, "sensor_turn@" + sensor, "rad", Transform::Vector, at + 1, 1.0, Vector3::Zero(), 0.05, false);
-    add_vector(p, "sensor_shift@" + sensor, "m", Transform::Vector, at + 4, size, Vector3::Zero(), 0.05, false);
+  for (std::size_t k = 0; k < m.pulls.size(); ++k) {
+    if (k < capture.initial.pulls.size()) theta.segment<3>(m.pulls[k]) = capture.initial.pulls[k];
+    p.push_back(vector(layout, m.pulls[k], 1.0, Vector3::Zero(), 0.5, true));
+    p.back().is_auxiliary = true;
   }
-  for (int k = 0; k < shapes; ++k)
-    add_vector(p, "scan_correction@" + std::to_string(k + 1), "1", Transform::Vector,
-               theta::shape(k, planes, pulls, int(sensors.size())), 1.0, Vector3::Zero(), 1.0, true);
-  return {std::move(p), std::move(theta)};
+  for (std::size_t k = 0; k < blocks.sensors.size(); ++k) {
+    const SensorBlocks& sensor = blocks.sensors[k];
+    if (k < capture.depth.size())
+      p.push_back(scalar(layout, sensor.range_error, Transform::Shift, -0.2, 0.2, 0.0, range_error_std / size, false,
+                         size));
+    p.push_back(vector(layout, sensor.turn, 1.0, Vector3::Zero(), 0.05, false));
+    p.push_back(vector(layout, sensor.shift, size, Vector3::Zero(), 0.05, false));
+  }
+  for (const ParameterHandle& correction : m.scan_corrections) {
+    p.push_back(vector(layout, correction, 1.0, Vector3::Zero(), 1.0, true));
+    p.back().is_auxiliary = true;
+  }
+  return {ParameterSet(std::move(layout), std::move(p), std::move(theta)), std::move(blocks)};
 }
 
 TrackedPoints tracked_points(const Capture& capture) {

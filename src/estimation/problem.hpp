@@ -59,26 +59,41 @@ std::vector<Hold> held_regions(const Capture& capture);
 /// Those of a model, say.
 std::vector<Hold> held_regions(const std::vector<FixedRegion>& fixed, const TriangleMesh& surface);
 
-/// Body, scene and mismatch of a capture. `theta` gives the weight and gravity that contact is scaled by.
+/// Where the parameters of a capture stand in a vector.
+struct CaptureBlocks {
+  MotionBlocks motion;
+  std::vector<SensorBlocks> sensors;
+};
+
+/// Body, scene and mismatch of a capture.
+/// @param theta  its density and gravity are what contact is scaled by
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
-                          const Resolution& resolution, const VectorX& theta, const SimulationOptions& settings = {},
-                          const std::vector<Vector3>& tracked = {});
+                          const Resolution& resolution, const CaptureBlocks& blocks, const VectorX& theta,
+                          const SimulationOptions& settings = {}, const std::vector<Vector3>& tracked = {});
 
 /// The same around a body that is there already.
 Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDistance> distance,
-                          std::shared_ptr<const Body> body, const Resolution& resolution, const VectorX& theta,
-                          const SimulationOptions& settings = {}, const std::vector<Vector3>& tracked = {});
+                          std::shared_ptr<const Body> body, const Resolution& resolution, const CaptureBlocks& blocks,
+                          const VectorX& theta, const SimulationOptions& settings = {},
+                          const std::vector<Vector3>& tracked = {});
+
+/// The parameters of a capture, and where they stand in a vector.
+struct CaptureParameters {
+  ParameterSet set;
+  CaptureBlocks blocks;
+};
 
 /// All parameters of a capture with their start values, bounds and priors. What the capture leaves unknown is
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
 /// it does not give; density only where it is unknown and the object is released from under a known weight.
-/// @param volume    of the object [m^3], for the density that belongs to a mass
 /// Corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") are there and not
 /// estimated.
+/// @param volume    of the object [m^3], for the density that belongs to a mass
 /// @param controls  control moduli of the body: `modulus_names` tells what they are called
 /// @param pulls     that hold a released object: "pull@1", ... (see `Pull`)
 /// @param shapes    of the scan's correction: "scan_correction@1", ... (see `ShapeField`)
-ParameterSet default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0, int shapes = 0);
+CaptureParameters default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0,
+                                     int shapes = 0);
 
 /// What corrections of sensors apply to: each depth camera by its name, "clouds" and "markers".
 std::vector<std::string> sensor_names(const Capture& capture);
@@ -89,9 +104,6 @@ int pull_count(const Capture& capture, const Resolution& resolution);
 /// "youngs_modulus" alone; with regions followed by "youngs_modulus@name" of each; with control points
 /// "youngs_modulus@1", "youngs_modulus@2", ...
 std::vector<std::string> modulus_names(const Capture& capture, int controls);
-
-/// Sets every control modulus of a theta [Pa].
-void set_moduli(VectorX& theta, int controls, double youngs_modulus);
 
 /// Points of the object that the capture's [[markers]] follow.
 struct TrackedPoints {

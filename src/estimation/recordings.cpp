@@ -2,20 +2,31 @@
 
 #include "base/error.hpp"
 #include "capture/find_plane.hpp"
+#include "capture/markers.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
+#include "estimation/press_trial.hpp"
 
 namespace pliant {
 
 namespace {
+
+bool is_fitted(const std::string& role) { return role == "fit"; }
+
+bool has_fitted_loads(const Capture& capture) {
+  return std::ranges::any_of(capture.loads, [](const Load& load) { return is_fitted(load.role); });
+}
 
 void require_fittable(const Capture& capture) {
   const auto refuse = [&](const std::string& found, const std::string& advice) {
     throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
   };
   if (!capture.surface) refuse("there is no scan of the object at rest", "add [object] surface");
-  if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty())
+  if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty() && !has_fitted_loads(capture))
     refuse("there are no depth cameras, no clouds and no markers", "");
+  if (has_fitted_loads(capture) && capture.fixed.empty() && capture.planes.empty())
+    refuse("weights hang from the object, but nothing holds it",
+           "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
   if (capture.is_static && capture.fixed.empty() && capture.planes.empty())
     refuse("the recording is static, but nothing holds the object",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
@@ -27,6 +38,30 @@ void require_fittable(const Capture& capture) {
            "add the [[fixed]] region where it stays held");
   if (!capture.is_static && capture.frame_count() - capture.start_frame < 2)
     refuse("fewer than two frames follow start_frame", "record longer");
+}
+
+/// What was seen under a load, as the one frame of a recording.
+LoadCase load_case(const Capture& capture, const Load& load, int points) {
+  LoadCase one{load, {}, {}};
+  std::vector<ObservedFrame> seen;
+  if (load.markers) {
+    const MarkerSet markers = read_marker_pair(*load.markers_rest, *load.markers);
+    const double noise = 1e-3 * object_size(capture);
+    const int sensor = int(sensor_names(capture).size());  // beyond those whose errors are estimated
+    for (int m = 0; m < markers.marker_count(); ++m) {
+      one.tracked.rest.push_back(markers.rest.row(m).transpose());
+      if (markers.is_seen(0, m))
+        one.tracked.frames[capture.start_frame].push_back({m, markers.frames[0].row(m).transpose(), noise, sensor});
+    }
+  } else {
+    ObserveOptions options;
+    options.max_points_per_frame = points;
+    seen.push_back(observe_load(capture, load, options).seen);
+    seen.back().frame = capture.start_frame;
+  }
+  one.observations =
+      std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, seen, one.tracked));
+  return one;
 }
 
 /// Puts planes that are only roughly known where the depth images show them. Returns the numbers of those found.
@@ -48,44 +83,98 @@ std::vector<int> take_planes_from_images(Capture& capture) {
 /// part of the object's size, and as many radians.
 constexpr double seen_plane_std = 0.003;
 
-void trust_planes_seen(ParameterSet& parameters, const std::vector<int>& planes) {
-  std::vector<Parameter> list = parameters.parameters();
+void trust_planes_seen(CaptureParameters& parameters, const std::vector<int>& planes) {
+  std::vector<Parameter> list = parameters.set.parameters();
   for (Parameter& p : list)
     for (const int plane : planes)
-      if (p.theta_index == theta::plane_point(plane)) p.prior_std = seen_plane_std;
-  parameters = ParameterSet(std::move(list), parameters.reference());
+      if (p.at == parameters.blocks.motion.planes[std::size_t(plane)].whole()) p.prior_std = seen_plane_std;
+  parameters.set = ParameterSet(parameters.set.layout(), std::move(list), parameters.set.reference());
 }
 
-/// The recordings' parameters side by side, those of the material once.
-ParameterSet joined(const std::vector<ParameterSet>& sets) {
+bool is_shared(const ParameterBlock& block, bool shares_density) {
+  return block.role == Role::Material || block.role == Role::Damping ||
+         (block.role == Role::Inertia && shares_density);
+}
+
+std::string suffix(std::size_t recording) { return recording == 0 ? "" : "[" + std::to_string(recording + 1) + "]"; }
+
+/// Recordings of one object share a density where it is estimated or the user says something about it. Otherwise each
+/// follows from its own capture's mass and scan.
+bool shares_density(const std::vector<CaptureParameters>& recordings, const FitOptions& options) {
+  const Parameter& density = *recordings.front().set.find("density");
+  return density.estimated || options.parameters.contains(density.name);
+}
+
+/// The parameters of recordings in one vector, those of the object once.
+ParameterSet joined(const std::vector<CaptureParameters>& recordings, const JointLayout& joint) {
   std::vector<Parameter> list;
-  Eigen::Index size = 0;
-  for (const ParameterSet& set : sets) size += set.reference().size();
-  VectorX theta(size);
-  int offset = 0;
-  for (std::size_t r = 0; r < sets.size(); ++r) {
-    theta.segment(offset, sets[r].reference().size()) = sets[r].reference();
-    for (Parameter p : sets[r].parameters()) {
-      p.theta_index += offset;
-      const auto same = std::ranges::find(list, p.name, &Parameter::name);
-      if (is_material(p) && same != list.end()) {
-        same->also.push_back(p.theta_index);
-        if (p.name != "density") theta[p.theta_index] = theta[same->theta_index];
-        continue;
-      }
-      if (r > 0) p.name += "[" + std::to_string(r + 1) + "]";
+  VectorX theta = VectorX::Zero(joint.layout.size());
+  for (std::size_t r = recordings.size(); r-- > 0;) {  // the first one's values for what is shared
+    const ParameterSet& own = recordings[r].set;
+    for (std::size_t b = 0; b < own.layout().blocks().size(); ++b) {
+      const ParameterHandle from = own.layout().handle(b), to = joint.layout.at(joint.name_of(own.layout().blocks()[b].name, r));
+      theta.segment(to.first, to.size) = own.reference().segment(from.first, from.size);
+    }
+  }
+  for (std::size_t r = 0; r < recordings.size(); ++r)
+    for (Parameter p : recordings[r].set.parameters()) {
+      if (r > 0 && is_of_object(p)) continue;
+      p.name = joint.name_of(p.name, r);
+      p.at = joint.layout.at(p.name);
       list.push_back(std::move(p));
     }
-    offset += int(sets[r].reference().size());
-  }
-  return {std::move(list), std::move(theta)};
+  return {joint.layout, std::move(list), std::move(theta)};
 }
 
 }  // namespace
 
-bool is_material(const Parameter& p) {
-  return p.name.starts_with("youngs_modulus") || p.name == "poisson_ratio" || p.name == "mass_damping" ||
-         p.name == "stiffness_damping" || p.name == "density";
+std::string JointLayout::name_of(const std::string& block, std::size_t recording) const {
+  return layout.contains(block + suffix(recording)) ? block + suffix(recording) : block;
+}
+
+VectorX JointLayout::part(const VectorX& theta, std::size_t recording) const {
+  const ParameterLayout& alone = own[recording];
+  return carry(layout, theta, alone, VectorX::Zero(alone.size()),
+               [&](const std::string& name) { return name_of(name, recording); });
+}
+
+JointLayout join(const std::vector<CaptureParameters>& recordings, bool shares_density) {
+  JointLayout joint;
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    const ParameterLayout& own = recordings[r].set.layout();
+    for (ParameterBlock block : own.blocks()) {
+      if (r > 0 && is_shared(block, shares_density)) continue;
+      block.name += suffix(r);
+      joint.layout.add(std::move(block));
+    }
+    joint.own.push_back(own);
+    const auto there = [&](const ParameterHandle& handle) -> ParameterHandle {
+      const std::string& name = own.block_of(handle).name;
+      const ParameterHandle block = joint.layout.at(joint.name_of(name, r));
+      return {block.first + handle.first - own.at(name).first, handle.size};
+    };
+    CaptureBlocks blocks{recordings[r].blocks.motion.moved(there), {}};
+    for (const SensorBlocks& sensor : recordings[r].blocks.sensors) blocks.sensors.push_back(sensor.moved(there));
+    joint.blocks.push_back(std::move(blocks));
+  }
+  return joint;
+}
+
+JointLayout joint_layout(const std::vector<RecordedCapture>& recordings, const FitOptions& options, int controls) {
+  std::vector<CaptureParameters> parameters;
+  Resolution resolution;
+  resolution.pulls = options.pull_points;
+  for (const RecordedCapture& r : recordings)
+    parameters.push_back(
+        default_parameters(r.capture, 1.0, controls, pull_count(r.capture, resolution), options.scan_points));
+  return join(parameters, shares_density(parameters, options));
+}
+
+VectorX with_moduli(const JointLayout& from, const VectorX& theta, const JointLayout& to, const VectorX& moduli) {
+  VectorX changed = carry(from.layout, theta, to.layout, VectorX::Zero(to.layout.size()));
+  const std::vector<ParameterHandle>& there = to.blocks.front().motion.youngs_moduli;
+  for (std::size_t k = 0; k < there.size(); ++k) changed[there[k]] = moduli[Eigen::Index(k)];
+  return changed;
 }
 
 int Recording::horizon(double part) const {
@@ -97,26 +186,25 @@ int Recording::horizon(double part) const {
 Recordings::Recordings(std::vector<RecordedCapture> recorded, const FitOptions& options,
                        std::vector<std::string>& notes)
     : options_(options) {
-  std::vector<ParameterSet> sets;
+  std::vector<CaptureParameters> parameters;
   for (RecordedCapture& r : recorded) {
     all_.emplace_back();
-    sets.push_back(make_ready(std::move(r), all_.back(), notes));
+    parameters.push_back(make_ready(std::move(r), all_.back(), notes));
   }
-  parameters_ = joined(sets);
+  const JointLayout joint = join(parameters, shares_density(parameters, options_));
+  parameters_ = joined(parameters, joint);
   apply_overrides(parameters_, options_);
-  int offset = 0;
-  for (std::size_t r = 0; r < sets.size(); ++r) {
-    all_[r].theta_offset = offset;
-    all_[r].theta_size = int(sets[r].reference().size());
-    offset += all_[r].theta_size;
-  }
+  for (std::size_t r = 0; r < all_.size(); ++r) all_[r].blocks = joint.blocks[r];
 }
 
 /// Everything of a recording that needs no parameters; returns those.
-ParameterSet Recordings::make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes) {
+CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes) {
   recording.capture = std::move(recorded.capture);
   Capture& capture = recording.capture;
   require_fittable(capture);
+  if (capture.times.empty()) capture.times = {0.0}, capture.is_static = true;  // loads and presses alone
+  for (const Load& load : capture.loads)
+    if (is_fitted(load.role)) recording.loads.push_back(load_case(capture, load, options_.points_per_frame));
   const std::vector<int> planes_seen = take_planes_from_images(capture);
   for (const int plane : planes_seen)
     notes.push_back("Plane " + std::to_string(plane + 1) +
@@ -124,7 +212,7 @@ ParameterSet Recordings::make_ready(RecordedCapture recorded, Recording& recordi
   recording.tracked = recorded.followed ? std::move(*recorded.followed) : tracked_points(capture);
   recording.observations = std::make_shared<std::vector<FrameObservations>>(
       frame_observations(capture, recorded.observed, recording.tracked));
-  if (recording.observations->empty())
+  if (recording.observations->empty() && recording.loads.empty())
     throw InputError({{capture.file},
                       "no frame shows any point of the object",
                       "depth images or clouds that see it",
@@ -137,10 +225,11 @@ ParameterSet Recordings::make_ready(RecordedCapture recorded, Recording& recordi
                       "name the same materials in every recording of the object"});
   controls_ = controls;
   recording.size = object_size(capture);
-  recording.last_frame =
-      std::min(int(capture.times.size()) - capture.start_frame - 1, recording.observations->back().frame);
+  if (!recording.observations->empty())
+    recording.last_frame =
+        std::min(int(capture.times.size()) - capture.start_frame - 1, recording.observations->back().frame);
   recording.distance = capture_distance(capture, widest_band());
-  ParameterSet parameters =
+  CaptureParameters parameters =
       default_parameters(capture, enclosed_volume(*capture.surface), controls_,
                          pull_count(capture, resolution(0.0, options_.steps)), options_.scan_points);
   trust_planes_seen(parameters, planes_seen);
@@ -176,11 +265,84 @@ Grid Recordings::grid(double cells, double steps) const {
   settings.solver.tolerance = options_.solver_tolerance;
   settings.hold_strongly = options_.hold_strongly;
   settings.integrator = options_.integrator;
-  Grid grid{cells, steps, {}};
-  for (const Recording& r : all_)
-    grid.recording.push_back(discretise(r.capture, r.distance, resolution(cells, steps), r.own(parameters_.reference()),
-                                        settings, r.tracked.rest));
+  Grid grid{cells, steps, {}, {}};
+  for (const Recording& r : all_) {
+    grid.recording.push_back(discretise(r.capture, r.distance, resolution(cells, steps), r.blocks,
+                                        parameters_.reference(), settings, r.tracked.rest));
+    grid.presses.push_back(press_scene(r, grid.recording.back(), cells));
+  }
   return grid;
+}
+
+/// The presses of a recording around its own body, or, where that is of hexahedra, around one of tetrahedra as large.
+std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recording, const Discretisation& d,
+                                                          double cells) const {
+  const Capture& capture = recording.capture;
+  if (!std::ranges::any_of(capture.presses, [](const Press& p) { return is_fitted(p.role); })) return nullptr;
+  auto body = d.body;
+  if (body->kind == ElementKind::Hexahedron) {
+    Resolution tetrahedra = resolution(cells, 1.0);
+    tetrahedra.element = ElementKind::Tetrahedron;
+    std::vector<Vector3> control_points;
+    body = make_body_of(capture, *recording.distance, tetrahedra, control_points);
+  }
+  return std::make_shared<PressScene>(make_press_scene(capture, std::move(body)));
+}
+
+Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters, double band,
+                                const std::function<int(const Recording&)>& last_frame) const {
+  std::vector<std::unique_ptr<Trial>> trials;
+  // How the motion begins says nothing about what stands still.
+  const std::vector<const Parameter*> estimated = parameters.coordinate_parameters();
+  const bool has_statics =
+      estimated.empty() || std::ranges::any_of(estimated, [](const Parameter* p) { return is_of_object(*p); });
+  std::vector<ObjectiveOptions> options;
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    const Recording& r = all_[i];
+    const Discretisation& d = grid.recording[i];
+    ObjectiveOptions o;
+    o.outlier_scale = band * r.size;
+    o.last_frame = std::min(r.last_frame, last_frame(r));
+    options.push_back(o);
+    trials.push_back(std::make_unique<MotionTrial>(
+        ObservedMotion{d.mismatch, d.body, d.simulation, r.observations, o}, int(i)));
+  }
+  for (std::size_t i = 0; i < all_.size() && has_statics; ++i) {
+    add_loads(all_[i], grid.recording[i], options[i], trials);
+    if (grid.presses[i]) add_presses(all_[i], grid.presses[i], parameters, trials);
+  }
+  return {std::move(trials), with_field_prior(parameters, grid)};
+}
+
+void Recordings::add_loads(const Recording& recording, const Discretisation& d, ObjectiveOptions options,
+                           std::vector<std::unique_ptr<Trial>>& trials) const {
+  for (const LoadCase& load : recording.loads) {
+    ObservedMotion at_rest{d.mismatch, d.body, d.simulation, load.observations, options};
+    at_rest.simulation.is_static = true;
+    at_rest.simulation.times = {0.0};
+    at_rest.simulation.weights.push_back({load.load.at, load.load.mass});
+    at_rest.simulation.released_weights.clear();
+    at_rest.options.last_frame = 0;
+    at_rest.mismatch.tracks =
+        load.tracked.rest.empty() ? nullptr : std::make_shared<PointTracks>(*d.body, load.tracked.rest);
+    trials.push_back(std::make_unique<MotionTrial>(std::move(at_rest), int(trials.size())));
+  }
+}
+
+void Recordings::add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
+                             const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const {
+  constexpr double outlier_scale = 6.0, least_noise = 1e-4;  // deviations; times the object's size
+  const auto material =
+      std::make_shared<PressedMaterial>(scene->body, LawLayout::linear(recording.blocks.motion));
+  for (std::size_t i = 0; i < scene->presses.size(); ++i) {
+    const ObservedPress& seen = scene->presses[i];
+    if (!is_fitted(seen.role)) continue;
+    const double noise = options_.marker_noise > 0.0
+                             ? options_.marker_noise
+                             : std::max(marker_noise(seen), least_noise * recording.size);
+    trials.push_back(std::make_unique<PressTrial>(scene, int(i), material, parameters.reference(),
+                                                  PressTrialOptions{noise, outlier_scale}, int(trials.size())));
+  }
 }
 
 ParameterSet Recordings::with_field_prior(ParameterSet parameters, const Grid& grid) const {
@@ -192,11 +354,7 @@ ParameterSet Recordings::with_field_prior(ParameterSet parameters, const Grid& g
 }
 
 void Recordings::set_moduli(VectorX& theta, const VectorX& moduli) const {
-  for (const Recording& r : all_) {
-    VectorX own = r.own(theta);
-    for (int k = 0; k < controls_; ++k) own[theta::modulus(k, controls_, own.size())] = moduli[k];
-    theta.segment(r.theta_offset, r.theta_size) = own;
-  }
+  for (int k = 0; k < controls_; ++k) theta[material().youngs_moduli[std::size_t(k)]] = moduli[k];
 }
 
 }  // namespace pliant

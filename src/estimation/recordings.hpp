@@ -1,15 +1,24 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "estimation/fit.hpp"
+#include "estimation/press_scene.hpp"
 
 namespace pliant {
 
-/// One of the recordings of a fit: what was seen, and where its own part of theta stands.
+/// The object at rest under a weight, and what was seen of it then.
+struct LoadCase {
+  Load load;
+  TrackedPoints tracked;  ///< markers
+  std::shared_ptr<const std::vector<FrameObservations>> observations;  ///< of one frame
+};
+
+/// One of the recordings of a fit: what was seen, and where its parameters stand in the vector of all.
 struct Recording {
   Capture capture;
   TrackedPoints tracked;
@@ -17,9 +26,9 @@ struct Recording {
   std::shared_ptr<const SignedDistance> distance;
   double size = 0.0;  ///< of the object [m]
   int last_frame = 0;
-  int theta_offset = 0, theta_size = 0;
+  CaptureBlocks blocks;
+  std::vector<LoadCase> loads;  ///< those that are fitted
 
-  VectorX own(const VectorX& theta) const { return theta.segment(theta_offset, theta_size); }
   bool is_released() const { return capture.initial.released; }
   /// The last frame of a part of the recording, (0, 1]. A flying object shows no stiffness in its first third; one that
   /// swings shows it at once.
@@ -30,6 +39,8 @@ struct Recording {
 struct Grid {
   double cells = 0.0, steps = 0.0;        ///< as in `Resolution`
   std::vector<Discretisation> recording;  ///< of each
+  /// Presses of each recording around a body of tetrahedra; null where it has none that are fitted.
+  std::vector<std::shared_ptr<const PressScene>> presses;
 };
 
 /// The recordings of one object side by side: they share its material, and each has its own start, planes and sensors.
@@ -58,31 +69,29 @@ class Recordings {
 
   [[nodiscard]] Grid grid(double cells, double steps) const;
 
+  /// The objective of the recordings' motions and, where parameters of the object are estimated or none are, of their
+  /// loads and presses.
   /// @param band        outlier scale, times the object's size
   /// @param last_frame  of each recording that is compared
-  template <class LastFrame>
   [[nodiscard]] Objective objective(const Grid& grid, const ParameterSet& parameters, double band,
-                                    LastFrame&& last_frame) const {
-    std::vector<ObservedMotion> motions;
-    for (std::size_t i = 0; i < all_.size(); ++i) {
-      const Recording& r = all_[i];
-      const Discretisation& d = grid.recording[i];
-      ObjectiveOptions o;
-      o.outlier_scale = band * r.size;
-      o.last_frame = std::min(r.last_frame, last_frame(r));
-      motions.push_back({d.mismatch, d.body, d.simulation, r.observations, o});
-    }
-    return {std::move(motions), with_field_prior(parameters, grid)};
-  }
+                                    const std::function<int(const Recording&)>& last_frame) const;
   /// The parameters with the prior of their moduli at the grid's control points, if it has any.
   [[nodiscard]] ParameterSet with_field_prior(ParameterSet parameters, const Grid& grid) const;
 
-  /// Every recording's moduli [Pa], as many as controls.
+  /// Where the moduli stand in theta, and Poisson's ratio: the same of all recordings.
+  const MaterialBlocks& material() const { return front().blocks.motion; }
+  /// Sets the moduli [Pa], as many as controls.
   void set_moduli(VectorX& theta, const VectorX& moduli) const;
 
  private:
-  ParameterSet make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes);
+  CaptureParameters make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes);
   Resolution resolution(double cells, double steps) const;
+  std::shared_ptr<const PressScene> press_scene(const Recording& recording, const Discretisation& d,
+                                                double cells) const;
+  void add_loads(const Recording& recording, const Discretisation& d, ObjectiveOptions options,
+                 std::vector<std::unique_ptr<Trial>>& trials) const;
+  void add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
+                   const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const;
   double widest_band() const;
 
   FitOptions options_;
@@ -91,7 +100,28 @@ class Recordings {
   ParameterSet parameters_;
 };
 
-/// Whether a parameter is what all recordings of one object have in common.
-bool is_material(const Parameter& parameter);
+/// Where the parameters of several recordings of one object stand in one vector: blocks of the object once, those of each
+/// recording's own start, planes and sensors each for itself, with "[2]" and so on after their names from the second
+/// recording.
+struct JointLayout {
+  ParameterLayout layout;
+  std::vector<ParameterLayout> own;   ///< of each recording by itself
+  std::vector<CaptureBlocks> blocks;  ///< of each recording, in `layout`
+
+  /// What a block of a recording's own layout is called in `layout`.
+  std::string name_of(const std::string& block, std::size_t recording) const;
+  /// The vector of one recording by itself.
+  VectorX part(const VectorX& theta, std::size_t recording) const;
+};
+
+/// Joins the layouts of recordings.
+/// @param shares_density  whether they have one density; else each has that of its own capture
+JointLayout join(const std::vector<CaptureParameters>& recordings, bool shares_density);
+
+/// The layout of the parameters that a fit of these recordings with so many control moduli has.
+JointLayout joint_layout(const std::vector<RecordedCapture>& recordings, const FitOptions& options, int controls);
+
+/// A vector of one layout as one of another with other control moduli [Pa].
+VectorX with_moduli(const JointLayout& from, const VectorX& theta, const JointLayout& to, const VectorX& moduli);
 
 }  // namespace pliant

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/parameter_set.hpp"
+#include "parameters/parameter_set.hpp"
 
 namespace pliant {
 

@@ -82,7 +82,7 @@ Path simulated_path(Simulation& simulation, const VectorX& theta) {
 
 }  // namespace
 
-std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters, int controls,
+std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters,
                                       const std::vector<FrameObservations>& seen) {
   const Path path = seen_path(seen, simulation.options().times);
   if (path.points.empty()) return std::nullopt;
@@ -101,9 +101,9 @@ std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters
                          : fails             ? 3.0
                          : round == 0        ? 10.0
                                              : 0.1;
-    for (int k = 0; k < controls; ++k) parameters[theta::modulus(k, controls, parameters.size())] *= ratio;
+    simulation.options().blocks.scale_moduli(parameters, ratio);
     if (simulated && !fails && std::abs(std::log(ratio)) < std::log(near_enough))
-      return SwingStart{parameters[theta::youngs_modulus], *observed / (2.0 * std::numbers::pi)};
+      return SwingStart{parameters[simulation.options().blocks.youngs_moduli.front()], *observed / (2.0 * std::numbers::pi)};
   }
   return std::nullopt;
 }

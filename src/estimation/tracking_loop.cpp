@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 #include <utility>
 
 #include "base/error.hpp"
 #include "estimation/followed.hpp"
+#include "estimation/recordings.hpp"
 
 namespace pliant {
 
@@ -49,7 +49,6 @@ class TrackingLoop {
       left_.tracking.reset();
     }
     for (const RecordedCapture& r : all_) split(r);
-    shared_ = shared_sizes(all_, options_);
     for (const RecordedCapture& r : is_both_ ? training_ : all_) followed_.emplace_back(r, options_, notes_);
   }
 
@@ -83,32 +82,32 @@ class TrackingLoop {
     monitor_.on_state(state);
   }
 
-  /// Theta of all recordings where nothing is known yet.
-  VectorX known_at_first() const {
-    Eigen::Index size = 0, at = 0;
-    for (const FollowedRecording& r : followed_) size += r.start().size();
-    VectorX theta(size);
-    for (const FollowedRecording& r : followed_) {
-      theta.segment(at, r.start().size()) = r.start();
-      at += r.start().size();
-    }
-    return theta;
+  JointLayout layout_of(int controls) const { return joint_layout(all_, options_, controls); }
+  /// Control moduli that the object is followed with.
+  int followed_controls() const { return int(followed_.front().material().youngs_moduli.size()); }
+
+  /// Each recording's own parameters where nothing is known yet.
+  std::vector<VectorX> known_at_first() const {
+    std::vector<VectorX> parts;
+    for (const FollowedRecording& r : followed_) parts.push_back(r.start());
+    return parts;
   }
 
-  /// An estimate with the moduli that the object is followed with.
-  VectorX to_follow_with(const VectorX& theta) const {
-    return with_controls(theta, int(followed_.front().start().size() - shared_.front()) + 1);
+  /// Each recording's own parameters of an estimate, with the moduli that the object is followed with.
+  std::vector<VectorX> to_follow_with(const VectorX& theta, int controls) const {
+    const JointLayout layout = layout_of(followed_controls());
+    const VectorX all = with_controls(theta, controls, followed_controls());
+    std::vector<VectorX> parts;
+    for (std::size_t i = 0; i < all_.size(); ++i) parts.push_back(layout.part(all, i));
+    return parts;
   }
 
-  /// Follows all recordings with their parts of the estimate. False, with the tracks before, where it was interrupted.
-  [[nodiscard]] bool follow(const std::vector<FollowedRecording>& recordings, const VectorX& theta) {
+  /// Follows all recordings with their own parameters. False, with the tracks before, where it was interrupted.
+  [[nodiscard]] bool follow(const std::vector<FollowedRecording>& recordings, const std::vector<VectorX>& own) {
     std::vector<std::shared_ptr<const Track>> tracks;
-    const VectorX all = to_follow_with(theta);
-    Eigen::Index at = 0;
-    for (const FollowedRecording& r : recordings) {
-      const VectorX own = all.segment(at, r.start().size());
-      at += own.size();
-      tracks.push_back(std::make_shared<Track>(r.follow(own, [this](int, int) { return !interrupted(); })));
+    for (std::size_t i = 0; i < recordings.size(); ++i) {
+      tracks.push_back(
+          std::make_shared<Track>(recordings[i].follow(own[i], [this](int, int) { return !interrupted(); })));
       if (interrupted()) return false;
     }
     tracks_ = std::move(tracks);
@@ -136,9 +135,10 @@ class TrackingLoop {
     return followed;
   }
 
-  TrackingRound described(const VectorX& theta) const {
+  /// @param own  the first recording's parameters that it was followed with
+  TrackingRound described(const VectorX& own) const {
     TrackingRound round;
-    round.youngs_modulus = to_follow_with(theta)[theta::youngs_modulus];
+    round.youngs_modulus = own[followed_.front().material().youngs_moduli.front()];
     round.confidence = 1.0;
     double squares = 0.0, points = 0.0;
     for (const auto& track : tracks_) {
@@ -170,7 +170,7 @@ class TrackingLoop {
     FitOutcome outcome = fit(recordings, options, monitor, std::move(from));
     for (FitEvent& event : outcome.history) {
       event.stage = name + ": " + event.stage;
-      history_.push_back(event);
+      history_.emplace_back(controls_of(outcome), event);
     }
     forward_steps_ += outcome.forward_steps;
     return outcome;
@@ -191,54 +191,35 @@ class TrackingLoop {
     return state;
   }
 
-  /// Sizes of the recordings' parts of a theta of a homogeneous object.
-  static std::vector<Eigen::Index> shared_sizes(const std::vector<RecordedCapture>& recordings, FitOptions options) {
-    options.control_points = 1;
-    std::vector<Eigen::Index> sizes;
-    for (const RecordedCapture& r : recordings) {
-      const int controls = r.capture.regions.empty() ? 1 : int(r.capture.regions.size()) + 1;
-      Resolution pulls;
-      pulls.pulls = options.pull_points;
-      sizes.push_back(default_parameters(r.capture, 1.0, controls, pull_count(r.capture, pulls), options.scan_points)
-                          .reference()
-                          .size() -
-                      (controls - 1));
-    }
-    return sizes;
+  /// A parameter vector of all recordings with another number of control moduli: their mean in the logarithm where it
+  /// differs.
+  VectorX with_controls(const VectorX& theta, int before, int after) const {
+    if (before == after) return theta;
+    const JointLayout from = layout_of(before);
+    double mean = 0.0;
+    for (const double modulus : from.blocks.front().motion.moduli(theta)) mean += std::log(modulus) / before;
+    return with_moduli(from, theta, layout_of(after), VectorX::Constant(after, std::exp(mean)));
   }
-  int controls_of(const VectorX& theta) const {
-    const Eigen::Index shared = std::accumulate(shared_.begin(), shared_.end(), Eigen::Index(0));
-    return 1 + int((theta.size() - shared) / Eigen::Index(shared_.size()));
-  }
-  /// A theta of all recordings with another number of control moduli: their mean in the logarithm where it differs.
-  VectorX with_controls(const VectorX& theta, int controls) const {
-    const int before = controls_of(theta);
-    if (before == controls) return theta;
-    VectorX changed(theta.size() + Eigen::Index(shared_.size()) * (controls - before));
-    Eigen::Index from = 0, to = 0;
-    for (const Eigen::Index shared : shared_) {
-      const VectorX own = theta.segment(from, shared + before - 1);
-      changed.segment(to, shared) = own.head(shared);
-      auto there = changed.segment(to, shared + controls - 1);
-      double mean = 0.0;
-      for (int k = 0; k < before; ++k) mean += std::log(own[theta::modulus(k, before, own.size())]) / before;
-      for (int k = 0; k < controls; ++k) there[theta::modulus(k, controls, there.size())] = std::exp(mean);
-      from += own.size(), to += there.size();
-    }
-    return changed;
+  /// Control moduli of an estimate.
+  static int controls_of(const FitOutcome& outcome) {
+    return outcome.recordings.front().discretisation.body->modulus.controls;
   }
 
   /// How many control points there are is chosen once.
-  FitOptions with_chosen_controls(FitOptions options, const VectorX& theta) const {
-    if (options.control_points == FitOptions::automatic) options.control_points = controls_of(theta);
+  static FitOptions with_chosen_controls(FitOptions options, int controls) {
+    if (options.control_points == FitOptions::automatic) options.control_points = controls;
     return options;
   }
 
   /// The modulus that a user gives is the one to track with: how fast the tracked motion is tells a better one to begin
   /// its fit.
-  static FitOptions without_start(FitOptions options) {
-    for (auto& [name, change] : options.parameters)
-      if (name.starts_with("youngs_modulus") && change.estimated.value_or(true)) change.start.reset();
+  FitOptions without_start(FitOptions options) const {
+    const std::vector<ParameterBlock> blocks = layout_of(options.controls()).layout.blocks();
+    for (auto& [name, change] : options.parameters) {
+      const auto block = std::ranges::find(blocks, name, &ParameterBlock::name);
+      const bool is_modulus = name == "youngs_modulus" || (block != blocks.end() && block->role == Role::Material && block->unit == "Pa");
+      if (is_modulus && change.estimated.value_or(true)) change.start.reset();
+    }
     return options;
   }
 
@@ -256,24 +237,30 @@ class TrackingLoop {
   bool loop() {
     const std::vector<RecordedCapture>& recordings = is_both_ ? training_ : all_;
     const bool is_first = state_.rounds.empty();
-    VectorX theta = is_first ? known_at_first() : state_.rounds.back().theta;
-    FitOptions options = without_start(is_first ? options_ : with_chosen_controls(options_, theta));
+    int controls = is_first ? followed_controls() : state_.rounds.back().controls;
+    VectorX theta = is_first ? VectorX() : state_.rounds.back().theta;
+    FitOptions options = without_start(is_first ? options_ : with_chosen_controls(options_, controls));
     FitState from = std::exchange(left_, {});
     bool is_resumed = !from.scan.empty() || from.motion || from.fine;
     while (int(state_.rounds.size()) < options_.tracking_rounds) {
       const int round = int(state_.rounds.size());
-      if (!follow(followed_, theta)) return stop(std::move(outcome_));
-      TrackingRound described_round = described(theta);
+      const std::vector<VectorX> own = theta.size() == 0 ? known_at_first() : to_follow_with(theta, controls);
+      if (!follow(followed_, own)) return stop(std::move(outcome_));
+      TrackingRound described_round = described(own.front());
       if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
       is_resumed = false;
       outcome_ = fit_once(followed_captures(recordings), options, std::exchange(from, {}),
                           "round " + std::to_string(round + 1), share(round), share(round + 1));
       if (outcome_->interrupted || !outcome_->evaluation.succeeded) return false;
-      options = without_start(with_chosen_controls(options_, outcome_->theta));
-      described_round.theta = outcome_->theta;
-      described_round.fit_rms = outcome_->evaluation.track_rms();
-      described_round.change = change(theta, outcome_->theta);
+      const VectorX moduli_before = theta.size() == 0
+                                        ? followed_.front().material().moduli(own.front())
+                                        : layout_of(controls).blocks.front().motion.moduli(theta);
+      controls = controls_of(*outcome_);
       theta = outcome_->theta;
+      options = without_start(with_chosen_controls(options_, controls));
+      described_round.theta = theta, described_round.controls = controls;
+      described_round.fit_rms = outcome_->evaluation.track_rms();
+      described_round.change = change(moduli_before, layout_of(controls).blocks.front().motion.moduli(theta));
       state_.loop = std::make_shared<FitState>(concluded(*outcome_));
       state_.rounds.push_back(std::move(described_round));
       save({});
@@ -287,21 +274,21 @@ class TrackingLoop {
 
   /// All rounds were done before an interruption. False where there was another one.
   bool resume_loop() {
-    const VectorX& theta = state_.rounds.back().theta;
-    if (!follow(followed_, theta)) return stop({});
+    const TrackingRound& round = state_.rounds.back();
+    if (!follow(followed_, to_follow_with(round.theta, round.controls))) return stop({});
     outcome_ = fit_once(followed_captures(is_both_ ? training_ : all_),
-                        with_chosen_controls(without_start(options_), theta), *state_.loop, "rounds", 0.5, 0.5);
+                        with_chosen_controls(without_start(options_), round.controls), *state_.loop, "rounds", 0.5,
+                        0.5);
     return true;
   }
 
-  /// Of ln E by an estimate, the greatest of all moduli.
-  double change(const VectorX& before, const VectorX& after) const {
-    const int controls = controls_of(after);
-    const VectorX from = with_controls(before, controls);
+  /// Of ln E by an estimate, the greatest of all moduli; by their mean in the logarithm where there were fewer or more.
+  static double change(const VectorX& before, const VectorX& after) {
+    const VectorX logs = before.array().log();
     double greatest = 0.0;
-    for (int k = 0; k < controls; ++k) {
-      const int at = theta::modulus(k, controls, shared_.front() + controls - 1);
-      greatest = std::max(greatest, std::abs(std::log(after[at] / from[at])));
+    for (Eigen::Index k = 0; k < after.size(); ++k) {
+      const double from = before.size() == after.size() ? logs[k] : logs.mean();
+      greatest = std::max(greatest, std::abs(std::log(after[k]) - from));
     }
     return greatest;
   }
@@ -328,7 +315,7 @@ class TrackingLoop {
     double squares = 0.0, points = 0.0;
     score.succeeded = true;
     for (std::size_t i = 0; i < all_.size(); ++i) {
-      const CostEvaluation e = predicted(outcome.recordings[i], held_out_[i]);
+      const CostEvaluation e = predicted(outcome, i, held_out_[i]);
       score.succeeded = score.succeeded && e.succeeded;
       score.cost += e.cost;
       for (const FrameFit& f : e.frames) squares += f.sum_squares, points += f.points, ++score.frames;
@@ -338,14 +325,15 @@ class TrackingLoop {
   }
 
   /// How an estimate fits points that were seen.
-  CostEvaluation predicted(const RecordingOutcome& estimate, const RecordedCapture& seen) const {
+  CostEvaluation predicted(const FitOutcome& outcome, std::size_t recording, const RecordedCapture& seen) const {
+    const RecordingOutcome& estimate = outcome.recordings[recording];
     const Discretisation& d = estimate.discretisation;
     ObjectiveOptions o;
     o.outlier_scale = options_.fine_band * object_size(seen.capture);
     o.last_frame = int(d.simulation.times.size()) - 1;
     const auto observations =
         std::make_shared<std::vector<FrameObservations>>(frame_observations(seen.capture, seen.observed, {}));
-    return Objective(d.mismatch, d.body, d.simulation, observations, ParameterSet({}, estimate.theta), o)
+    return Objective(d.mismatch, d.body, d.simulation, observations, ParameterSet(outcome.parameters.layout(), {}, outcome.theta), o)
         .evaluate(VectorX(0));
   }
 
@@ -354,11 +342,11 @@ class TrackingLoop {
     const std::shared_ptr<const FitState> best = state_.keeps_loop ? state_.loop : state_.direct;
     const VectorX& theta = best->refined.front().theta;
     FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
-    options = with_chosen_controls(std::move(options), theta);
+    options = with_chosen_controls(std::move(options), best->controls);
     std::vector<FollowedRecording> all;
     std::vector<std::string> ignored;
     for (const RecordedCapture& r : all_) all.emplace_back(r, options_, ignored);
-    if (!follow(all, theta)) {
+    if (!follow(all, to_follow_with(theta, best->controls))) {
       stop(std::move(state_.keeps_loop ? outcome_ : direct_));
       return told(std::move(*outcome_));
     }
@@ -375,9 +363,11 @@ class TrackingLoop {
 
   /// With all that was done on the way; the agreement is that with the points.
   FitOutcome told(FitOutcome outcome) {
-    if (outcome.theta.size() > 0)
-      for (FitEvent& event : history_) event.theta = with_controls(event.theta, controls_of(outcome.theta));
-    outcome.history = std::move(history_);
+    outcome.history.clear();
+    for (auto& [controls, event] : history_) {
+      if (outcome.theta.size() > 0) event.theta = with_controls(event.theta, controls, controls_of(outcome));
+      outcome.history.push_back(std::move(event));
+    }
     outcome.forward_steps = forward_steps_;
     result_.rounds = state_.rounds;
     result_.keeps_loop = state_.keeps_loop;
@@ -397,7 +387,7 @@ class TrackingLoop {
   void agree_with_points(FitOutcome& outcome) const {
     std::vector<FrameFit> frames;
     for (std::size_t i = 0; i < all_.size(); ++i) {
-      CostEvaluation e = predicted(outcome.recordings[i], all_[i]);
+      CostEvaluation e = predicted(outcome, i, all_[i]);
       if (!e.succeeded) return;
       for (FrameFit& f : e.frames) {
         f.recording = int(i);
@@ -432,7 +422,6 @@ class TrackingLoop {
   bool is_both_;
   std::vector<RecordedCapture> training_, held_out_;
   std::vector<FollowedRecording> followed_;
-  std::vector<Eigen::Index> shared_;  // see `shared_sizes`
   std::vector<std::string> notes_;    // of reading the recordings, which the fits tell too
   FitState::Tracking state_;
   FitState left_;     // by an interruption
@@ -440,7 +429,7 @@ class TrackingLoop {
   std::vector<std::shared_ptr<const Track>> tracks_;
   std::optional<FitOutcome> outcome_, direct_;
   TrackingOutcome result_;
-  std::vector<FitEvent> history_;
+  std::vector<std::pair<int, FitEvent>> history_;  // with the number of control moduli
   long long forward_steps_ = 0;
 };
 

@@ -36,4 +36,34 @@ SensorCorrection::Jacobian SensorCorrection::jacobian(const Vector3& point, cons
   return J;
 }
 
+MatrixX SensorBlocks::rows(const MatrixX& parameters) const {
+  MatrixX own(SensorCorrection::size, parameters.cols());
+  own << parameters.row(range_error), parameters.middleRows<3>(turn), parameters.middleRows<3>(shift);
+  return own;
+}
+
+SensorCorrection::Values SensorBlocks::values(const VectorX& theta) const {
+  SensorCorrection::Values values;
+  values << theta[range_error], theta.segment<3>(turn), theta.segment<3>(shift);
+  return values;
+}
+
+void SensorBlocks::add(const SensorCorrection::Values& values, VectorX& theta) const {
+  theta[range_error] += values[0];
+  theta.segment<3>(turn) += values.segment<3>(1);
+  theta.segment<3>(shift) += values.tail<3>();
+}
+
+SensorBlocks SensorBlocks::moved(const std::function<ParameterHandle(const ParameterHandle&)>& there) const {
+  return {there(range_error), there(turn), there(shift)};
+}
+
+SensorBlocks add_sensor_blocks(ParameterLayout& layout, const std::string& name) {
+  SensorBlocks blocks;
+  blocks.range_error = layout.add({"range_error@" + name, "m", 1, Role::Sensor});
+  blocks.turn = layout.add({"sensor_turn@" + name, "rad", 3, Role::Sensor});
+  blocks.shift = layout.add({"sensor_shift@" + name, "m", 3, Role::Sensor});
+  return blocks;
+}
+
 }  // namespace pliant

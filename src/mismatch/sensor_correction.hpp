@@ -1,6 +1,9 @@
 #pragma once
 
-#include "elasticity/parameters.hpp"
+#include <functional>
+#include <string>
+
+#include "parameters/layout.hpp"
 
 namespace pliant {
 
@@ -26,5 +29,25 @@ class SensorCorrection {
   double range_error_;
   Matrix3 rotation_;
 };
+
+/// Where the correction of one sensor stands in a parameter vector.
+struct SensorBlocks {
+  ParameterHandle range_error;  ///< [m]
+  ParameterHandle turn;         ///< 3, [rad]
+  ParameterHandle shift;        ///< 3, [m]
+
+  std::vector<ParameterHandle> all() const { return {range_error, turn, shift}; }
+  /// The sensor's rows of a matrix with one row a parameter: `SensorCorrection::size` of them.
+  MatrixX rows(const MatrixX& parameters) const;
+  SensorCorrection::Values values(const VectorX& theta) const;
+  /// theta += values
+  void add(const SensorCorrection::Values& values, VectorX& theta) const;
+  /// The same blocks of another layout, where `there` says.
+  SensorBlocks moved(const std::function<ParameterHandle(const ParameterHandle&)>& there) const;
+};
+
+/// Appends the blocks of a sensor's correction: "range_error@name", "sensor_turn@name", "sensor_shift@name".
+/// Throws std::invalid_argument where they are there already.
+SensorBlocks add_sensor_blocks(ParameterLayout& layout, const std::string& name);
 
 }  // namespace pliant

@@ -2,15 +2,16 @@
 
 namespace pliant {
 
-Gravity::Gravity(const Body& body) {
+Gravity::Gravity(const Body& body, const MotionBlocks& blocks)
+    : density_block_(blocks.density), gravity_block_(blocks.gravity) {
   Points ones = Points::Ones(body.node_count(), 3), sum = Points::Zero(body.node_count(), 3);
   body.add_mass_product(1.0, ones, sum);
   nodal_volume_ = sum.col(0);
 }
 
 void Gravity::set_parameters(const VectorX& parameters) {
-  density_ = parameters[theta::density];
-  gravity_ = theta::vector_at(parameters, theta::gravity);
+  density_ = parameters[density_block_];
+  gravity_ = gravity_block_.vector(parameters);
 }
 
 void Gravity::add_force(const Points&, Points& force) {
@@ -18,17 +19,18 @@ void Gravity::add_force(const Points&, Points& force) {
 }
 
 void Gravity::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
-  const Vector3 change = d_theta[theta::density] * gravity_ + density_ * theta::vector_at(d_theta, theta::gravity);
+  const Vector3 change = d_theta[density_block_] * gravity_ + density_ * gravity_block_.vector(d_theta);
   force.noalias() += nodal_volume_ * change.transpose();
 }
 
 void Gravity::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
   const Vector3 sum = w.transpose() * nodal_volume_;
-  theta_bar[theta::density] += gravity_.dot(sum);
-  theta_bar.segment<3>(theta::gravity) += density_ * sum;
+  theta_bar[density_block_] += gravity_.dot(sum);
+  theta_bar.segment<3>(gravity_block_) += density_ * sum;
 }
 
-HungWeights::HungWeights(const Body& body, const std::vector<HungWeight>& weights) {
+HungWeights::HungWeights(const Body& body, const std::vector<HungWeight>& weights, const ParameterHandle& gravity)
+    : gravity_block_(gravity) {
   std::vector<Vector3> at;
   for (const HungWeight& weight : weights) {
     at.push_back(weight.at);
@@ -45,14 +47,14 @@ void HungWeights::add_force(const Points&, Points& force) {
 void HungWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta,
                                     Points& force) {
   if (!is_active_) return;
-  const Vector3 change = theta::vector_at(d_theta, theta::gravity);
+  const Vector3 change = gravity_block_.vector(d_theta);
   for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * change, force);
 }
 
 void HungWeights::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
   if (!is_active_) return;
   for (int i = 0; i < points_.point_count(); ++i)
-    theta_bar.segment<3>(theta::gravity) += mass_[std::size_t(i)] * points_.position(i, w);
+    theta_bar.segment<3>(gravity_block_) += mass_[std::size_t(i)] * points_.position(i, w);
 }
 
 }  // namespace pliant

@@ -2,13 +2,14 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "parameters/motion_blocks.hpp"
 
 namespace pliant {
 
 /// Weight: f = rho M1 g.
 class Gravity : public ForceTerm {
  public:
-  explicit Gravity(const Body& body);
+  Gravity(const Body& body, const MotionBlocks& blocks);
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
   void set_parameters(const VectorX& theta) override;
@@ -20,6 +21,7 @@ class Gravity : public ForceTerm {
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
 
  private:
+  ParameterHandle density_block_, gravity_block_;
   VectorX nodal_volume_;  // M1 summed over columns [m^3]
   double density_ = 0.0;
   Vector3 gravity_ = Vector3::Zero();
@@ -34,14 +36,15 @@ struct HungWeight {
 /// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is the stepper's (`Stepper::carry`).
 class HungWeights : public ForceTerm {
  public:
-  HungWeights(const Body& body, const std::vector<HungWeight>& weights);
+  /// @param gravity  3, [m/s^2]
+  HungWeights(const Body& body, const std::vector<HungWeight>& weights, const ParameterHandle& gravity);
   const Embedding& points() const { return points_; }
   const std::vector<double>& masses() const { return mass_; }
   /// Nothing hangs while it is not active.
   void set_active(bool active) { is_active_ = active; }
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
-  void set_parameters(const VectorX& theta) override { gravity_ = theta::vector_at(theta, theta::gravity); }
+  void set_parameters(const VectorX& theta) override { gravity_ = gravity_block_.vector(theta); }
   void linearise(const Points&) override {}
   void add_force(const Points& z, Points& force) override;
   void add_matrix(double, BlockMatrix&) override {}
@@ -50,6 +53,7 @@ class HungWeights : public ForceTerm {
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
 
  private:
+  ParameterHandle gravity_block_;
   Embedding points_;
   std::vector<double> mass_;
   Vector3 gravity_ = Vector3::Zero();

@@ -44,11 +44,6 @@ std::shared_ptr<const BlockPattern> with_rigid_bodies(const Body& body, const st
 
 }  // namespace
 
-double glued_stiffness(double youngs_modulus, double edge) { return 10.0 * youngs_modulus / edge; }
-
-/// A regular tetrahedron of edge a has the volume a^3 / (6 sqrt 2).
-double mean_edge(const Body& body) { return std::cbrt(6.0 * std::sqrt(2.0) * body.volume() / body.element_count()); }
-
 class Equilibrium::Solver {
  public:
   Solver(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law, std::vector<int> held,

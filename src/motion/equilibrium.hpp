@@ -89,12 +89,4 @@ class Equilibrium {
   std::unique_ptr<Solver> solver_;
 };
 
-/// Stiffness [Pa/m] of a disc's glue on elements of some edge [m]. Faces that a disc covers in part would follow it as a
-/// whole were it much stiffer, as if it were wider by about half an edge, or held what is held; softer by much, the disc
-/// would sink in. At ten times the stiffness of a layer of elements both are small.
-double glued_stiffness(double youngs_modulus, double edge);
-
-/// Mean edge of a body's tetrahedra [m], as if they were regular.
-double mean_edge(const Body& body);
-
 }  // namespace pliant

@@ -69,8 +69,9 @@ std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds) {
   return nodes;
 }
 
-FixedRegions::FixedRegions(std::shared_ptr<const Body> body, const std::vector<Hold>& holds, double penalty)
-    : body_(std::move(body)), holds_(holds), modulus_(body_) {
+FixedRegions::FixedRegions(std::shared_ptr<const Body> body, const std::vector<Hold>& holds,
+                           const MaterialBlocks& blocks, double penalty)
+    : body_(std::move(body)), holds_(holds), poissons_ratio_(blocks.poissons_ratio), modulus_(body_, blocks) {
   const double h = body_->grid().cell_size;
   for (const auto& [key, samples] : collect(*body_, holds)) {
     HeldCell held{key.second, key.first, Matrix24::Zero(), Matrix24::Zero(), {}, {}};
@@ -96,7 +97,7 @@ FixedRegions::FixedRegions(std::shared_ptr<const Body> body, const std::vector<H
 
 void FixedRegions::set_parameters(const VectorX& parameters) {
   modulus_.set_parameters(parameters);
-  const UnitLame c = unit_lame(parameters[theta::poissons_ratio]);
+  const UnitLame c = unit_lame(parameters[poissons_ratio_]);
   for (HeldCell& held : cells_) {
     held.K = c.lambda * held.K_lambda + c.mu * held.K_mu;
     held.dK = c.d_lambda * held.K_lambda + c.d_mu * held.K_mu;
@@ -149,7 +150,7 @@ void FixedRegions::add_force_tangent(const Points& z, const Points&, const Point
     const Vector24 u = displacement(held, z);
     const Vector24 df =
         -modulus_[held.cell] * (modulus_.log_change(held.cell) * (held.K * u) + held.K * rotated_back(held, d_z) +
-                                d_theta[theta::poissons_ratio] * (held.dK * u));
+                                d_theta[poissons_ratio_] * (held.dK * u));
     for (int a = 0; a < 8; ++a) force.row(cell[a]) += (holds_[held.hold].rotation * df.segment<3>(3 * a)).transpose();
   }
 }
@@ -164,7 +165,7 @@ void FixedRegions::add_force_adjoint(const Points& z, const Points& w, Points&, 
     for (int a = 0; a < 8; ++a)
       z_bar.row(cell[a]) -= E * (holds_[held.hold].rotation * Kc.segment<3>(3 * a)).transpose();
     modulus_.add_log_adjoint(held.cell, -E * Kc.dot(u));
-    theta_bar[theta::poissons_ratio] -= E * c.dot(held.dK * u);
+    theta_bar[poissons_ratio_] -= E * c.dot(held.dK * u);
   }
   modulus_.end_adjoint(theta_bar);
 }

@@ -29,7 +29,8 @@ class FixedRegions : public ForceTerm {
   /// @param penalty  in units of (lambda + 2 mu) / h; large enough that the form stays positive definite on cut cells
   /// The body is one of hexahedra: tetrahedra follow the shape, so their nodes are held themselves.
   /// Throws InputError where a hold contains nothing of the object.
-  FixedRegions(std::shared_ptr<const Body> body, const std::vector<Hold>& holds, double penalty = 40.0);
+  FixedRegions(std::shared_ptr<const Body> body, const std::vector<Hold>& holds, const MaterialBlocks& blocks,
+               double penalty = 40.0);
 
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
@@ -60,6 +61,7 @@ class FixedRegions : public ForceTerm {
   std::shared_ptr<const Body> body_;
   std::vector<Hold> holds_;
   std::vector<HeldCell> cells_;
+  ParameterHandle poissons_ratio_;
   ElementModuli modulus_;
 };
 

@@ -7,9 +7,9 @@
 namespace pliant {
 
 LinearStatics::LinearStatics(const std::shared_ptr<const Body>& body, const std::vector<int>& held,
-                             const VectorX& theta)
+                             const MaterialBlocks& blocks, const VectorX& theta)
     : held_(held), matrix_(body->pattern) {
-  const auto elasticity = make_elasticity(body);
+  const auto elasticity = make_elasticity(body, blocks);
   elasticity->set_parameters(theta);
   elasticity->linearise(body->reference_positions());
   matrix_.set_zero();

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
+#include "parameters/motion_blocks.hpp"
 #include "solvers/linear_solver.hpp"
 
 namespace pliant {
@@ -12,8 +13,9 @@ namespace pliant {
 class LinearStatics {
  public:
   /// @param held   nodes that stay where they are
-  /// @param theta  of the material
-  LinearStatics(const std::shared_ptr<const Body>& body, const std::vector<int>& held, const VectorX& theta);
+  /// @param blocks  of the material in `theta`
+  LinearStatics(const std::shared_ptr<const Body>& body, const std::vector<int>& held, const MaterialBlocks& blocks,
+                const VectorX& theta);
 
   /// Whether the held nodes hold the body; only then are there displacements.
   bool is_held() const { return is_held_; }

@@ -9,7 +9,7 @@ namespace {
 constexpr double reach = 30.0;  // smoothing lengths beyond which the force is below rounding
 }
 
-PlaneContact::PlaneContact(std::shared_ptr<const Body> body, int plane, const ContactOptions& options)
+PlaneContact::PlaneContact(std::shared_ptr<const Body> body, const PlaneBlock& plane, const ContactOptions& options)
     : body_(std::move(body)), plane_(plane), options_(options) {
   if (!(options.stiffness > 0.0) || !(options.smoothing > 0.0))
     throw std::invalid_argument("plane contact needs a positive stiffness and smoothing length");
@@ -21,8 +21,8 @@ PlaneContact::PlaneContact(std::shared_ptr<const Body> body, int plane, const Co
 }
 
 void PlaneContact::set_parameters(const VectorX& parameters) {
-  plane_point_ = theta::vector_at(parameters, theta::plane_point(plane_));
-  normal_ = theta::vector_at(parameters, theta::plane_normal(plane_));
+  plane_point_ = plane_.point.vector(parameters);
+  normal_ = plane_.normal.vector(parameters);
 }
 
 void PlaneContact::linearise(const Points& lag) {
@@ -62,8 +62,8 @@ void PlaneContact::add_matrix(double scale, BlockMatrix& matrix) {
 
 void PlaneContact::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                                      Points& force) {
-  const Vector3 d_point = theta::vector_at(d_theta, theta::plane_point(plane_));
-  const Vector3 d_normal = theta::vector_at(d_theta, theta::plane_normal(plane_));
+  const Vector3 d_point = plane_.point.vector(d_theta);
+  const Vector3 d_normal = plane_.normal.vector(d_theta);
   for (const Active& c : active_) {
     const Vector3 end = embedding_.position(c.point, z);
     const double change = gap(end) - c.gap;
@@ -78,8 +78,8 @@ void PlaneContact::add_force_tangent(const Points& z, const Points& d_lag, const
 
 void PlaneContact::add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
                                      VectorX& theta_bar) {
-  auto point_bar = theta_bar.segment<3>(theta::plane_point(plane_));
-  auto normal_bar = theta_bar.segment<3>(theta::plane_normal(plane_));
+  auto point_bar = theta_bar.segment<3>(plane_.point);
+  auto normal_bar = theta_bar.segment<3>(plane_.normal);
   for (const Active& c : active_) {
     const Vector3 end = embedding_.position(c.point, z);
     const Vector3 force_bar = embedding_.position(c.point, w);

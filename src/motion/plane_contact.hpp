@@ -2,6 +2,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "parameters/motion_blocks.hpp"
 
 namespace pliant {
 
@@ -17,8 +18,7 @@ struct ContactOptions {
 /// stopped in the step in which it happens and stiff contact stays stable.
 class PlaneContact : public ForceTerm {
  public:
-  /// @param plane  which plane of theta
-  PlaneContact(std::shared_ptr<const Body> body, int plane, const ContactOptions& options);
+  PlaneContact(std::shared_ptr<const Body> body, const PlaneBlock& plane, const ContactOptions& options);
 
   Lag lag() const override { return Lag::Contact; }
   At at() const override { return At::Contact; }
@@ -43,7 +43,7 @@ class PlaneContact : public ForceTerm {
   double gap(const Vector3& position) const { return normal_.dot(position - plane_point_); }
 
   std::shared_ptr<const Body> body_;
-  int plane_;
+  PlaneBlock plane_;
   ContactOptions options_;
   Embedding embedding_;
   std::vector<int> blocks_;  // where each element's blocks go in the matrix

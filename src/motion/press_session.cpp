@@ -5,41 +5,15 @@
 #include <cmath>
 #include <numeric>
 
-#include "base/error.hpp"
 #include "motion/body_forces.hpp"
 
 namespace pliant {
 
 namespace {
 
-Vector3 axis_at(const Body& body, const ProbeOptions& probe) {
-  if (probe.axis) return probe.axis->normalized();
-  const auto nearest = std::ranges::min_element(
-      body.surface, {}, [&](const SurfacePoint& p) { return (p.position - probe.centre).squaredNorm(); });
-  return -nearest->normal;
-}
-
 std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, const ProbeOptions& probe,
                                       const std::vector<RigidContact>& inner) {
-  const double E = mean_modulus(body, law), edge = mean_edge(body);
-  std::vector<RigidContact> contacts;
-  if (probe.kind == ProbeKind::GluedDisc) {
-    const ContactSamples disc = disc_samples(body, probe.centre, probe.radius);
-    if (disc.rest.empty())
-      throw InputError({{},
-                        "the probe touches nothing of the object",
-                        "a contact on its surface at rest",
-                        "see where the model's surface.ply lies"});
-    contacts.push_back(RigidContact::glued(body, disc, glued_stiffness(E, edge)));
-  } else {
-    const Vector3 axis = axis_at(body, probe);
-    const auto shape = probe.kind == ProbeKind::Ball
-                           ? rigid_ball(probe.centre - probe.radius * axis, probe.radius)
-                           : rigid_punch(probe.centre, axis, probe.radius, 0.1 * probe.radius);
-    contacts.push_back(RigidContact::sliding(body,
-                                             boundary_samples(body, std::clamp(int(2.0 * edge / probe.radius), 2, 8)),
-                                             shape, 100.0 * E / edge, 0.01 * probe.radius));
-  }
+  std::vector<RigidContact> contacts = {probe_contact(body, probe, mean_modulus(body, law))};
   contacts.insert(contacts.end(), inner.begin(), inner.end());
   return contacts;
 }
@@ -50,7 +24,7 @@ PressSession::PressSession(std::shared_ptr<const Body> body, std::shared_ptr<con
                            const ProbeOptions& probe, const PressSessionOptions& options)
     : probe_(probe),
       equilibrium_(body, law, options.held, contacts_of(*body, *law, probe, options.inner), options.equilibrium) {
-  probe_.axis = axis_at(*body, probe);
+  probe_.axis = probe_axis(*body, probe);
   if (options.dead_load.rows() > 0) equilibrium_.set_dead_load(options.dead_load);
   for (int i = 0; i < equilibrium_.contact_count(); ++i)
     equilibrium_.set_control(i, {ProbeControl::Kind::Position, {}, Vector3::Zero(), {}});
@@ -132,10 +106,11 @@ Points SurfaceFollower::positions(const Points& nodes) const {
 }
 
 Points weight_of(const Body& body, double density, const Vector3& gravity) {
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::density] = density;
-  theta.segment<3>(theta::gravity) = gravity;
-  Gravity term(body);
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  theta[layout.density] = density;
+  theta.segment<3>(layout.gravity) = gravity;
+  Gravity term(body, layout);
   term.set_parameters(theta);
   Points force = Points::Zero(body.node_count(), 3);
   term.add_force(body.nodes, force);

@@ -1,25 +1,9 @@
 #pragma once
 
-#include <optional>
-
 #include "motion/equilibrium.hpp"
+#include "motion/probe_contact.hpp"
 
 namespace pliant {
-
-enum class ProbeKind {
-  GluedDisc,  ///< sticks to the surface that it covers; neither slides nor tilts
-  Punch,      ///< a flat end that slides
-  Ball,       ///< slides
-};
-
-/// A probe that touches the object at rest.
-struct ProbeOptions {
-  ProbeKind kind = ProbeKind::GluedDisc;
-  Vector3 centre = Vector3::Zero();  ///< where it touches the surface [m]
-  double radius = 0.0;               ///< [m], > 0
-  /// Unit, into the object; nothing: against the surface's normal there.
-  std::optional<Vector3> axis;
-};
 
 struct PressSessionOptions {
   std::vector<int> held;                 ///< nodes; as many as hold the object

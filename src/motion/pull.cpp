@@ -24,10 +24,11 @@ VectorX volume_of_nodes(const Body& body) {
 /// Greatest displacement for each column of forces of a body of unit Young's modulus, by linear elasticity from rest.
 VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const std::vector<int>& held,
                                const std::vector<Points>& forces) {
-  VectorX theta = VectorX::Zero(theta::size(0, body->modulus.controls));
-  for (int k = 0; k < body->modulus.controls; ++k) theta[theta::modulus(k, body->modulus.controls, theta.size())] = 1.0;
-  theta[theta::poissons_ratio] = 0.3;
-  const LinearStatics statics(body, held, theta);
+  const MotionLayout layout({.moduli = body->modulus.controls});
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 1.0);
+  theta[layout.poissons_ratio] = 0.3;
+  const LinearStatics statics(body, held, layout, theta);
   if (!statics.is_held())
     throw InputError({{},
                       "nothing holds the object while it is pulled",
@@ -41,8 +42,9 @@ VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const st
 }  // namespace
 
 Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, const std::vector<int>& held,
-           int first_index)
-    : moduli_(body->modulus.controls), first_index_(first_index) {
+           const MotionBlocks& blocks)
+    : pull_blocks_(blocks.pulls), material_(blocks) {
+  if (points.at.size() != pull_blocks_.size()) throw std::invalid_argument("one parameter block a pull is expected");
   const VectorX volume = volume_of_nodes(*body);
   const double reach = width * points.size;
   const auto n = Eigen::Index(points.at.size());
@@ -62,14 +64,14 @@ Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, co
   for (Eigen::Index k = 0; k < n; ++k)
     for (int d = 0; d < 3; ++d) strength_(k, d) = points.size / greatest[3 * k + d];
   pulls_ = Points::Zero(n, 3);
-  moduli_at_.setOnes(moduli_);
+  moduli_at_.setOnes(body->modulus.controls);
 }
 
 void Pull::set_parameters(const VectorX& parameters) {
-  for (int k = 0; k < moduli_; ++k) moduli_at_[k] = parameters[theta::modulus(k, moduli_, parameters.size())];
+  moduli_at_ = material_.moduli(parameters);
   mean_ = std::exp(moduli_at_.array().log().mean());
   for (Eigen::Index k = 0; k < count(); ++k)
-    pulls_.row(k) = strength_.row(k).cwiseProduct(parameters.segment<3>(first_index_ + 3 * k).transpose());
+    pulls_.row(k) = strength_.row(k).cwiseProduct(pull_blocks_[std::size_t(k)].vector(parameters).transpose());
 }
 
 void Pull::add_force(const Points&, Points& force) {
@@ -79,11 +81,12 @@ void Pull::add_force(const Points&, Points& force) {
 void Pull::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
   if (!is_active_) return;
   double d_log_mean = 0.0;
-  for (int k = 0; k < moduli_; ++k)
-    d_log_mean += d_theta[theta::modulus(k, moduli_, d_theta.size())] / (moduli_ * moduli_at_[k]);
+  const VectorX d_moduli = material_.moduli(d_theta);
+  for (Eigen::Index k = 0; k < moduli_at_.size(); ++k)
+    d_log_mean += d_moduli[k] / (double(moduli_at_.size()) * moduli_at_[k]);
   Points change = d_log_mean * pulls_;
   for (Eigen::Index k = 0; k < count(); ++k)
-    change.row(k) += strength_.row(k).cwiseProduct(d_theta.segment<3>(first_index_ + 3 * k).transpose());
+    change.row(k) += strength_.row(k).cwiseProduct(pull_blocks_[std::size_t(k)].vector(d_theta).transpose());
   force.noalias() += mean_ * (spread_ * change);
 }
 
@@ -91,10 +94,10 @@ void Pull::add_force_adjoint(const Points&, const Points& w, Points&, Points&, V
   if (!is_active_) return;
   const Points bar = mean_ * (spread_.transpose() * w);
   const double log_mean_bar = bar.cwiseProduct(pulls_).sum();
-  for (int k = 0; k < moduli_; ++k)
-    theta_bar[theta::modulus(k, moduli_, theta_bar.size())] += log_mean_bar / (moduli_ * moduli_at_[k]);
+  for (Eigen::Index k = 0; k < moduli_at_.size(); ++k)
+    theta_bar[material_.youngs_moduli[std::size_t(k)]] += log_mean_bar / (double(moduli_at_.size()) * moduli_at_[k]);
   for (Eigen::Index k = 0; k < count(); ++k)
-    theta_bar.segment<3>(first_index_ + 3 * k) += bar.row(k).cwiseProduct(strength_.row(k)).transpose();
+    theta_bar.segment<3>(pull_blocks_[std::size_t(k)]) += bar.row(k).cwiseProduct(strength_.row(k)).transpose();
 }
 
 std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const std::vector<Vector3>& held, int count) {

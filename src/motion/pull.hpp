@@ -5,6 +5,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "parameters/motion_blocks.hpp"
 
 namespace pliant {
 
@@ -26,12 +27,12 @@ std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const st
 /// pose hardly depends on how stiff the object is thought to be.
 class Pull : public ForceTerm {
  public:
-  /// @param points       see `far_points`
-  /// @param held         nodes that stay where they are
-  /// @param first_index  of the pulls c_k in theta, three each
+  /// @param points  see `far_points`
+  /// @param held    nodes that stay where they are
+  /// @param blocks  of the pulls c_k, one a point, and of the moduli
   /// Throws InputError where the held nodes do not hold the object.
   Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, const std::vector<int>& held,
-       int first_index);
+       const MotionBlocks& blocks);
 
   /// Nothing pulls while it is not active.
   void set_active(bool active) { is_active_ = active; }
@@ -48,7 +49,8 @@ class Pull : public ForceTerm {
 
  private:
   Eigen::Index count() const { return spread_.cols(); }
-  int moduli_, first_index_;
+  std::vector<ParameterHandle> pull_blocks_;
+  MaterialBlocks material_;
   bool is_active_ = true;
   MatrixX spread_;     // n x k: w_k(X_n) V_n [m^3]
   Points strength_;    // k x 3: 1 / s_k [1/m]

@@ -32,12 +32,13 @@ std::string percent(double share) {
 }  // namespace
 
 ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held,
-                                           const ReferenceShapeOptions& options)
+                                           const MotionBlocks& blocks, const ReferenceShapeOptions& options)
     : body_(std::move(body)),
       held_(std::move(held)),
+      blocks_(blocks),
       scan_(body_->scanned_positions()),
       options_(options),
-      forces_(ReferenceForces::make(body_)),
+      forces_(ReferenceForces::make(body_, blocks)),
       solver_(body_->pattern),
       turning_(body_, options.solver),
       jacobian_(body_->pattern),
@@ -174,7 +175,7 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
 
 bool ReferenceShapeSolver::holds_still(const VectorX& theta, const Points& X) {
   const auto reference = std::make_shared<Body>(with_reference(*body_, X));
-  const auto elasticity = make_elasticity(reference);
+  const auto elasticity = make_elasticity(reference, blocks_);
   elasticity->set_parameters(theta);
   elasticity->linearise(scan_);
   matrix_.set_zero();
@@ -192,7 +193,7 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
   std::ranges::fill(turn_, Matrix3::Identity());
   metric_.set_zero();
   if (options_.scheme == ReferenceScheme::VirtualForce)
-    add_mass(theta[theta::density], metric_);
+    add_mass(theta[blocks_.density], metric_);
   else
     forces_->add_matrix(1.0, metric_);  // the stiffness: in the scan nothing is strained
   constrain(metric_);
@@ -274,13 +275,14 @@ Points ReferenceShapeSolver::adjoint(const Points& X_bar) {
   return force_bar;
 }
 
-Points scan_load(const Body& body, const VectorX& theta, const std::vector<HungWeight>& weights) {
+Points scan_load(const Body& body, const MotionBlocks& blocks, const VectorX& theta,
+                 const std::vector<HungWeight>& weights) {
   Points load = Points::Zero(body.node_count(), 3);
-  Gravity gravity(body);
+  Gravity gravity(body, blocks);
   gravity.set_parameters(theta);
   gravity.add_force(body.scanned_positions(), load);
   if (!weights.empty()) {
-    HungWeights hung(body, weights);
+    HungWeights hung(body, weights, blocks.gravity);
     hung.set_parameters(theta);
     hung.add_force(body.scanned_positions(), load);
   }

@@ -50,8 +50,9 @@ class ReferenceShapeSolver {
  public:
   /// @param body  of tetrahedra, as scanned
   /// @param held  nodes that something else holds, at least three
+  /// @param blocks  of material and density in the parameter vectors below
   /// Throws std::invalid_argument for a body of hexahedra, and InputError where fewer nodes are held.
-  ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held,
+  ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held, const MotionBlocks& blocks,
                        const ReferenceShapeOptions& options = {});
 
   /// Where the nodes truly were when they were scanned, n x 3 [m], if not where the body has them. Held ones are to
@@ -96,6 +97,7 @@ class ReferenceShapeSolver {
 
   std::shared_ptr<const Body> body_;
   std::vector<int> held_;
+  MotionBlocks blocks_;
   Points scan_;
   ReferenceShapeOptions options_;
   std::unique_ptr<ReferenceForces> forces_;
@@ -107,6 +109,7 @@ class ReferenceShapeSolver {
 };
 
 /// Weight and hung weights at the nodes of the scan [N], n x 3.
-Points scan_load(const Body& body, const VectorX& theta, const std::vector<HungWeight>& weights);
+Points scan_load(const Body& body, const MotionBlocks& blocks, const VectorX& theta,
+                 const std::vector<HungWeight>& weights);
 
 }  // namespace pliant

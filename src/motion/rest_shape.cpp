@@ -63,30 +63,33 @@ MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector
 }
 
 RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
-                     const std::vector<HungWeight>& weights, MatrixX basis, int first_index)
+                     const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks)
     : body_(std::move(body)),
       free_(body_),
       held_(held),
       sags_(sags),
       basis_(std::move(basis)),
-      first_index_(first_index),
+      blocks_(blocks),
       scan_(body_->scanned_positions()) {
   if (body_->kind == ElementKind::Hexahedron)
     throw std::invalid_argument("hexahedra are regular where they are free of load");
+  if (basis_.cols() != Eigen::Index(blocks_.scan_corrections.size()))
+    throw std::invalid_argument("one parameter block a correction of the scan is expected");
   if (!sags_) return;
   ReferenceShapeOptions options;
   options.by_parts = false;
   options.max_iterations = most_iterations;
-  solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, options);
-  elasticity_ = make_elasticity(body_);
-  terms_.push_back(std::make_unique<Gravity>(*body_));
-  if (!weights.empty()) terms_.push_back(std::make_unique<HungWeights>(*body_, weights));
+  solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, blocks_, options);
+  elasticity_ = make_elasticity(body_, blocks_);
+  terms_.push_back(std::make_unique<Gravity>(*body_, blocks_));
+  if (!weights.empty()) terms_.push_back(std::make_unique<HungWeights>(*body_, weights, blocks_.gravity));
 }
 
 Points RestShape::scan_tangent(const VectorX& d_theta) const {
-  const Eigen::Index k = basis_.cols();
-  const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>> zeta(d_theta.data() + first_index_, 3, k);
-  return basis_ * zeta.transpose();
+  Points zeta(basis_.cols(), 3);
+  for (Eigen::Index k = 0; k < zeta.rows(); ++k)
+    zeta.row(k) = blocks_.scan_corrections[std::size_t(k)].vector(d_theta).transpose();
+  return basis_ * zeta;
 }
 
 std::string RestShape::find(const VectorX& theta) {
@@ -143,9 +146,9 @@ void RestShape::adjoint(const Points& scan_bar, const Points& reference_bar, Vec
   } else {
     bar += reference_bar;
   }
-  const Eigen::Index k = basis_.cols();
-  Eigen::Map<Eigen::Matrix<double, 3, Eigen::Dynamic>>(theta_bar.data() + first_index_, 3, k) +=
-      (basis_.transpose() * bar).transpose();
+  const Points zeta_bar = basis_.transpose() * bar;
+  for (Eigen::Index k = 0; k < zeta_bar.rows(); ++k)
+    theta_bar.segment<3>(blocks_.scan_corrections[std::size_t(k)]) += zeta_bar.row(k).transpose();
 }
 
 }  // namespace pliant

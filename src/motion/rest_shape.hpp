@@ -28,13 +28,13 @@ MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector
 /// equilibrium (Wang 2015, eq. 7), and depends on all of its material and load too. With the derivatives of both.
 class RestShape {
  public:
-  /// @param body        as scanned, of tetrahedra
-  /// @param held        nodes that stay where the scan has them
-  /// @param sags        whether the scan was taken under gravity and these weights
-  /// @param basis       see `shape_basis`; no columns: the scan is exact
-  /// @param first_index of the correction in theta
+  /// @param body    as scanned, of tetrahedra
+  /// @param held    nodes that stay where the scan has them
+  /// @param sags    whether the scan was taken under gravity and these weights
+  /// @param basis   see `shape_basis`; no columns: the scan is exact
+  /// @param blocks  of the correction, one a column of the basis, and of material and load
   RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
-            const std::vector<HungWeight>& weights, MatrixX basis, int first_index);
+            const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks);
 
   /// Finds them for theta, from those found before. Empty, or why there are none.
   [[nodiscard]] std::string find(const VectorX& theta);
@@ -55,7 +55,7 @@ class RestShape {
   std::vector<int> held_;
   bool sags_;
   MatrixX basis_;
-  int first_index_;
+  MotionBlocks blocks_;
   std::unique_ptr<ReferenceShapeSolver> solver_;   // where it sags
   std::unique_ptr<Elasticity> elasticity_;         // likewise
   std::vector<std::unique_ptr<ForceTerm>> terms_;  // what acts on the scan but elasticity

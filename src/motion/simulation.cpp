@@ -32,26 +32,26 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   auto elastic = scene_elasticity(body, options);
   elasticity = elastic.get();
   terms.push_back(std::move(elastic));
-  terms.push_back(std::make_unique<Gravity>(*body));
-  for (int plane = 0; plane < options.planes; ++plane)
+  terms.push_back(std::make_unique<Gravity>(*body, options.blocks));
+  for (const PlaneBlock& plane : options.blocks.planes)
     terms.push_back(std::make_unique<PlaneContact>(body, plane, options.contact));
-  if (!options.weights.empty()) terms.push_back(std::make_unique<HungWeights>(*body, options.weights));
+  if (!options.weights.empty()) terms.push_back(std::make_unique<HungWeights>(*body, options.weights, options.blocks.gravity));
   if (!options.released_weights.empty()) {
-    auto weights = std::make_unique<HungWeights>(*body, options.released_weights);
+    auto weights = std::make_unique<HungWeights>(*body, options.released_weights, options.blocks.gravity);
     let_go = weights.get();
     let_go->set_active(false);
     terms.push_back(std::move(weights));
   }
   if (!options.holds.empty() && !holds_strongly(*body, options)) {
-    auto regions = std::make_unique<FixedRegions>(body, options.holds);
+    auto regions = std::make_unique<FixedRegions>(body, options.holds, options.blocks);
     fixed = regions.get();
     terms.push_back(std::move(regions));
   }
-  if (options.pulls > 0) {
+  if (!options.blocks.pulls.empty()) {
     const std::vector<int> held = held_nodes(*body, options.holds);
     PullPoints points = options.pull_points;
-    if (points.at.empty()) points = far_nodes(*body, held, options.pulls);
-    auto pulling = std::make_unique<Pull>(body, points, held, theta::pull(0, options.planes));
+    if (points.at.empty()) points = far_nodes(*body, held, int(options.blocks.pulls.size()));
+    auto pulling = std::make_unique<Pull>(body, points, held, options.blocks);
     pull = pulling.get();
     pull->set_active(false);
     terms.push_back(std::move(pulling));
@@ -64,7 +64,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(std::move(body)),
       options_(std::move(options)),
-      stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_),
+      stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_), options_.blocks,
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
                 options_.rotation_prediction, options_.solver, options_.law ? Integrator::Newton : options_.integrator,
                 options_.newton}),
@@ -75,15 +75,14 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     stepper_.anchor(held_nodes(*body_, options_.holds));
   }
   if (!options_.weights.empty()) {
-    const HungWeights hung(*body_, options_.weights);
+    const HungWeights hung(*body_, options_.weights, options_.blocks.gravity);
     stepper_.carry(hung.points(), hung.masses());
   }
   prepare_holds();
   if (options_.scan_sags || !options_.shape.points.empty()) {
     const std::vector<int> held = held_nodes(*body_, options_.holds);
     shape_ = std::make_unique<RestShape>(body_, held, options_.scan_sags, options_.weights,
-                                         shape_basis(*body_, options_.shape, held),
-                                         theta::shape(0, options_.planes, options_.pulls, options_.sensors));
+                                         shape_basis(*body_, options_.shape, held), options_.blocks);
   }
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->scanned_positions().rowwise() - body_->centre_of_mass().transpose();
@@ -132,8 +131,8 @@ bool Simulation::shape_tangents(const MatrixX& directions, ShapeChange& change, 
 }
 
 Points Simulation::velocities(const VectorX& parameters) const {
-  const Vector3 linear = theta::vector_at(parameters, theta::linear_velocity);
-  const Matrix3 spin = cross_matrix(theta::vector_at(parameters, theta::angular_velocity));
+  const Vector3 linear = options_.blocks.linear_velocity.vector(parameters);
+  const Matrix3 spin = cross_matrix(options_.blocks.angular_velocity.vector(parameters));
   return (lever_ * spin.transpose()).rowwise() + linear.transpose();
 }
 
@@ -169,10 +168,10 @@ std::vector<State> Simulation::start_tangents(const State& start, const MatrixX&
 }
 
 bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& theta_bar) {
-  theta_bar.segment<3>(theta::linear_velocity) += bar.v.colwise().sum().transpose();
+  theta_bar.segment<3>(options_.blocks.linear_velocity) += bar.v.colwise().sum().transpose();
   for (Eigen::Index n = 0; n < bar.v.rows(); ++n) {
     const Vector3 lever = lever_.row(n), v_bar = bar.v.row(n);
-    theta_bar.segment<3>(theta::angular_velocity) += lever.cross(v_bar);
+    theta_bar.segment<3>(options_.blocks.angular_velocity) += lever.cross(v_bar);
   }
   if (starts_held()) {
     hold_start(true);
@@ -243,8 +242,8 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
   while (done < 1.0) {
     const double share = std::min(1.0, done + stride);
     VectorX part = parameters;
-    part.segment<3>(theta::gravity) *= share;
-    part.segment(theta::pull(0, options_.planes), 3 * options_.pulls) *= share;
+    part.segment<3>(options_.blocks.gravity) *= share;
+    for (const ParameterHandle& pull : options_.blocks.pulls) part.segment<3>(pull) *= share;
     Points x = state.x;
     stepper_.set_parameters(part);
     move_holds(done, share, x);
@@ -285,7 +284,7 @@ bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary
 }
 
 RolloutSummary Simulation::run(const VectorX& parameters, const OnFrame& on_frame) {
-  return run(parameters, MatrixX(theta_size(), 0), frame_count() - 1, on_frame);
+  return run(parameters, MatrixX(parameters.size(), 0), frame_count() - 1, on_frame);
 }
 
 RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directions, int last_frame,
@@ -338,7 +337,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
                                        VectorX& theta_bar) {
   RolloutSummary summary;
   if (!set_parameters(parameters, summary)) return summary;
-  theta_bar.setZero(theta_size());
+  theta_bar.setZero(parameters.size());
   reference_bar_ = Points::Zero(rest_.rows(), 3);
   Points* const reference_bar = follows_shape() ? &reference_bar_ : nullptr;
   if (options_.is_static) {
@@ -419,13 +418,13 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body,
                                              const SimulationOptions& options) {
   if (options.law) return LawElasticity::make(body, options.law);
-  return make_elasticity(body);
+  return make_elasticity(body, options.blocks);
 }
 
 std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,
                                                      const SimulationOptions& options) {
   SimulationOptions without_pulls = options;
-  without_pulls.pulls = 0;
+  without_pulls.blocks.pulls.clear();
   without_pulls.released_weights.clear();
   Elasticity* elasticity = nullptr;
   FixedRegions* fixed = nullptr;

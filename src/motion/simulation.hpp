@@ -27,15 +27,14 @@ struct SimulationOptions {
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
   ContactOptions contact;
-  int planes = 0;  ///< in theta
-  int pulls = 0;   ///< in theta: the motion starts at rest in the equilibrium under these (see `Pull`); 0: in the
-                   ///< reference pose
-  PullPoints pull_points;                    ///< as many as pulls; none: nodes of the body far from what is held
-  std::vector<HungWeight> released_weights;  ///< likewise of the equilibrium at the start, and gone from then on
-  int sensors = 0;                           ///< in theta; they play no part in the motion
-  bool scan_sags = false;   ///< the body stands in its scan as gravity and weights hold it; where it is free of load
-                            ///< follows from theta. Tetrahedra only
-  ShapeField shape;         ///< how the scan may err, likewise
+  /// Where the parameter vectors of the motion have what it depends on: obstacles are its planes, and where it has
+  /// pulls the motion starts at rest in the equilibrium under them (see `Pull`).
+  MotionBlocks blocks = MotionLayout();
+  PullPoints pull_points;  ///< where the pulls act, one a block; none: nodes of the body far from what is held
+  std::vector<HungWeight> released_weights;  ///< hung from the object at the start's equilibrium, and gone afterwards
+  bool scan_sags = false;   ///< the body stands in its scan as gravity and weights hold it; its stress-free reference
+                            ///< follows from the parameters. Tetrahedra only
+  ShapeField shape;         ///< how the scan may err: one point a block of scan corrections. Tetrahedra only
   std::vector<Hold> holds;  ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
@@ -62,10 +61,6 @@ class Simulation {
   const Body& body() const { return *body_; }
   const SimulationOptions& options() const { return options_; }
   int frame_count() const { return int(options_.times.size()); }
-  int theta_size() const {
-    return theta::size(options_.planes, body_->modulus.controls, options_.pulls, options_.sensors,
-                       int(options_.shape.points.size()));
-  }
 
   /// From now on the object is free of load where it is for this theta, whatever theta is: derivatives leave that out
   /// too. Returns why it cannot, or nothing.
@@ -77,7 +72,7 @@ class Simulation {
   /// Called at each frame, also the first, with the state and its tangents; false ends the run there (as a success).
   using OnFrame = std::function<bool(int frame, const State& state, std::span<const State> tangents)>;
 
-  /// @param directions  theta_size x p: changes of theta whose tangents are carried along; may have no columns
+  /// @param directions  theta.size() x p: changes of theta whose tangents are carried along; may have no columns
   /// @param last_frame  where to stop (inclusive)
   RolloutSummary run(const VectorX& theta, const MatrixX& directions, int last_frame, const OnFrame& on_frame);
   RolloutSummary run(const VectorX& theta, const OnFrame& on_frame);

@@ -8,8 +8,14 @@
 namespace pliant {
 
 Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<ForceTerm>> terms,
-                 const StepOptions& options)
-    : body_(std::move(body)), terms_(std::move(terms)), options_(options), matrix_(body_->pattern) {
+                 const MotionBlocks& blocks, const StepOptions& options)
+    : body_(std::move(body)),
+      terms_(std::move(terms)),
+      mass_damping_block_(blocks.mass_damping),
+      stiffness_damping_block_(blocks.stiffness_damping),
+      density_block_(blocks.density),
+      options_(options),
+      matrix_(body_->pattern) {
   if (!(options.dt > 0.0)) throw std::invalid_argument("the time step must be positive");
   if (!(options.newmark_theta >= 0.5 && options.newmark_theta < 1.0))
     throw std::invalid_argument("Newmark's theta must lie in [0.5, 1)");
@@ -28,9 +34,9 @@ Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<F
 }
 
 void Stepper::set_parameters(const VectorX& parameters) {
-  mass_damping_ = parameters[theta::mass_damping];
-  stiffness_damping_ = parameters[theta::stiffness_damping];
-  density_ = parameters[theta::density];
+  mass_damping_ = parameters[mass_damping_block_];
+  stiffness_damping_ = parameters[stiffness_damping_block_];
+  density_ = parameters[density_block_];
   adjoint_solutions_ = 0;
   for (auto& term : terms_) term->set_parameters(parameters);
 }
@@ -301,7 +307,7 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
                       const Points* d_reference) {
   const Scheme s = scheme();
   const double dt = options_.dt, t = options_.newmark_theta;
-  const double d_beta = d_theta[theta::stiffness_damping];
+  const double d_beta = d_theta[stiffness_damping_block_];
   set_points_at(s, start.x, delta);
   d_blended_ = change.x + d_beta / dt * delta;
   for (const auto lag : all_lags) d_lag_[std::size_t(lag)] = change.x + s.prediction[std::size_t(lag)] * change.v;
@@ -315,9 +321,9 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
   }
   d_force_ *= dt;
   mass_part_ = density_ / t * change.v;
-  mass_part_ += d_theta[theta::density] / t * start.v;
+  mass_part_ += d_theta[density_block_] / t * start.v;
   mass_part_ -=
-      (d_theta[theta::density] * (1.0 / (t * dt) + mass_damping_) + density_ * d_theta[theta::mass_damping]) * delta;
+      (d_theta[density_block_] * (1.0 / (t * dt) + mass_damping_) + density_ * d_theta[mass_damping_block_]) * delta;
   body_->add_mass_product(1.0, mass_part_, d_force_);
   add_carried(1.0 / t, change.v, d_force_);
   clear_held(d_force_);
@@ -358,8 +364,8 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   mass_part_.setZero();
   body_->add_mass_product(1.0, w_, mass_part_);
   const double w_m_delta = mass_part_.cwiseProduct(delta).sum();
-  theta_bar[theta::mass_damping] -= density_ * w_m_delta;
-  theta_bar[theta::density] +=
+  theta_bar[mass_damping_block_] -= density_ * w_m_delta;
+  theta_bar[density_block_] +=
       mass_part_.cwiseProduct(start.v).sum() / t - (1.0 / (t * dt) + mass_damping_) * w_m_delta;
 
   bar.v = -(1.0 - t) / t * bar.v + density_ / t * mass_part_;
@@ -372,7 +378,7 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
     term->add_force_adjoint(points_at_[at], w_, lag_bar_[std::size_t(term->lag())], bar_at_[at], theta_bar);
     if (reference_bar) term->add_reference_adjoint(w_, *reference_bar);
   }
-  theta_bar[theta::stiffness_damping] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
+  theta_bar[stiffness_damping_block_] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
   for (const Points& p : bar_at_) bar.x += p;
   for (const auto lag : all_lags) {
     bar.x += lag_bar_[std::size_t(lag)];

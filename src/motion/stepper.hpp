@@ -7,6 +7,7 @@
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
 #include "motion/turning_step.hpp"
+#include "parameters/motion_blocks.hpp"
 #include "solvers/general_solver.hpp"
 #include "solvers/linear_solver.hpp"
 
@@ -58,7 +59,9 @@ struct StepOptions {
 class Stepper {
  public:
   /// Terms may share data; they belong to this stepper and are used by one thread.
-  Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<ForceTerm>> terms, const StepOptions& options);
+  /// @param blocks  of dampings and density
+  Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<ForceTerm>> terms, const MotionBlocks& blocks,
+          const StepOptions& options);
 
   const StepOptions& options() const { return options_; }
   /// For frames that are not equally far apart.
@@ -148,6 +151,7 @@ class Stepper {
 
   std::shared_ptr<const Body> body_;
   std::vector<std::unique_ptr<ForceTerm>> terms_;
+  ParameterHandle mass_damping_block_, stiffness_damping_block_, density_block_;
   StepOptions options_;
   std::vector<int> held_, anchors_;
   std::unique_ptr<TurningStep> turning_;

@@ -26,31 +26,31 @@ namespace fs = std::filesystem;
 
 ParameterValue value_of(const Parameter& p, const VectorX& theta) {
   if (p.transform == Transform::PlanePosition)
-    return PlaneValue{theta.segment<3>(p.theta_index), theta.segment<3>(p.theta_index + 3)};
-  if (!p.is_scalar()) return Vector3(theta.segment<3>(p.theta_index));
-  return theta[p.theta_index];
+    return PlaneValue{theta.segment<3>(p.at), theta.segment<3>(p.at.first + 3)};
+  if (!p.is_scalar()) return Vector3(theta.segment<3>(p.at));
+  return theta[p.at];
 }
 
 /// Standard deviation of a value from that of its unconstrained numbers, by the transform's derivative.
 ParameterValue std_of(const Parameter& p, const VectorX& std, const MatrixX& jacobian, int at) {
-  if (p.is_scalar()) return std::abs(jacobian(p.theta_index, at)) * std[at];
+  if (p.is_scalar()) return std::abs(jacobian(p.at.first, at)) * std[at];
   const MatrixX spread = jacobian.middleCols(at, p.dimension()) * std.segment(at, p.dimension()).asDiagonal();
-  const auto row_norm = [&](int row) {
+  const auto row_norm = [&](Eigen::Index row) {
     return Vector3(spread.row(row).norm(), spread.row(row + 1).norm(), spread.row(row + 2).norm());
   };
-  if (p.transform != Transform::PlanePosition) return row_norm(p.theta_index);
-  return PlaneValue{row_norm(p.theta_index), row_norm(p.theta_index + 3)};
+  if (p.transform != Transform::PlanePosition) return row_norm(p.at);
+  return PlaneValue{row_norm(p.at), row_norm(p.at.first + 3)};
 }
 
 std::map<std::string, double> scalars_of(const ParameterSet& parameters, const VectorX& theta) {
   std::map<std::string, double> values;
   for (const Parameter& p : parameters.parameters()) {
     if (p.is_scalar()) {
-      values[p.name] = theta[p.theta_index];
+      values[p.name] = theta[p.at];
     } else {
-      for (int d = 0; d < 3; ++d) values[p.name + "." + "xyz"[d]] = theta[p.theta_index + d];
+      for (int d = 0; d < 3; ++d) values[p.name + "." + "xyz"[d]] = theta[p.at.first + d];
       if (p.transform == Transform::PlanePosition)
-        for (int d = 0; d < 3; ++d) values[p.name + ".normal." + "xyz"[d]] = theta[p.theta_index + 3 + d];
+        for (int d = 0; d < 3; ++d) values[p.name + ".normal." + "xyz"[d]] = theta[p.at.first + 3 + d];
     }
   }
   return values;
@@ -84,24 +84,25 @@ void add_correlations(Result& result, const FitOutcome& outcome) {
                    [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
 }
 
-ConvergenceHistory history_of(const FitOutcome& outcome) {
+/// @param with_trials  whether the trials of a scan are among the rows: they are no iterations
+ConvergenceHistory history_of(const FitOutcome& outcome, bool with_trials) {
   ConvergenceHistory history;
   std::vector<const Parameter*> shown;
   for (const Parameter& p : outcome.parameters.parameters())
     if (p.is_scalar() && (p.estimated || p.name == "youngs_modulus")) shown.push_back(&p);
   for (const Parameter* p : shown) history.parameters.push_back(p->name), history.units.push_back(p->unit);
-  for (const FitEvent& e : outcome.history) {
+  // Starts, and the values of a scan, are worked on side by side: their order must not depend on the threads.
+  std::vector<FitEvent> events = outcome.history;
+  std::ranges::stable_sort(events, {}, [](const FitEvent& e) {
+    const int stage = std::min(int(e.kind), int(StageKind::Coarse));
+    return std::tuple(e.start, stage, e.kind == StageKind::Scan ? e.iteration : 0);
+  });
+  for (const FitEvent& e : events) {
+    if (e.kind == StageKind::Scan && !with_trials) continue;
     ConvergenceRow row{e.start, e.iteration, e.stage, e.cost, e.damping, {}};
-    for (const Parameter* p : shown) row.parameters.push_back(e.theta[p->theta_index]);
+    for (const Parameter* p : shown) row.parameters.push_back(e.theta[p->at]);
     history.rows.push_back(std::move(row));
   }
-  // Starts, and the values of a scan, are worked on side by side: their order must not depend on the threads.
-  const auto place = [](const ConvergenceRow& row) {
-    const int stage = row.stage == "motion" ? 0 : row.stage == "scan" ? 1 : 2;
-    return std::tuple(row.start, stage, stage == 1 ? row.iteration : 0);
-  };
-  std::stable_sort(history.rows.begin(), history.rows.end(),
-                   [&](const auto& a, const auto& b) { return place(a) < place(b); });
   return history;
 }
 
@@ -121,14 +122,18 @@ VtuCell vtu_cell(ElementKind kind) {
 
 }  // namespace
 
-VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& parameters, const State& state,
-                   Elasticity& elasticity) {
-  const Body& body = *shared;
+std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks, const VectorX& theta) {
+  std::vector<Plane> planes = capture.planes;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    planes[i].point = blocks.planes[i].point.vector(theta);
+    planes[i].normal = blocks.planes[i].normal.vector(theta);
+  }
+  return planes;
+}
+
+VtuGrid frame_grid(const Body& body, const State& state, Elasticity& elasticity) {
   VtuGrid grid;
   grid.kind = vtu_cell(body.kind);
-  auto* by_law = dynamic_cast<LawElasticity*>(&elasticity);
-  ElementModuli modulus(shared);
-  if (!by_law) modulus.set_parameters(parameters);
   grid.points = state.x;
   VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}},
       stress{"stress [Pa]", 6, {}};
@@ -136,18 +141,13 @@ VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& par
   displacement.values.assign(u.data(), u.data() + u.size());
   velocity.values.assign(state.v.data(), state.v.data() + state.v.size());
   elasticity.linearise(state.x);
-  const UnitLame c = unit_lame(parameters[theta::poissons_ratio]);
   for (int e = 0; e < body.element_count(); ++e) {
     const auto cell = to_vtk_order(grid.kind, body.element(e));
     grid.connectivity.insert(grid.connectivity.end(), cell.begin(), cell.end());
     const Polar& polar = elasticity.rotation(e);
     const Matrix3 in_body = polar.S - Matrix3::Identity();
-    const Matrix3 in_world = polar.R * in_body * polar.R.transpose();
-    const Matrix3 sigma =
-        by_law ? by_law->cauchy_stress(e)
-               : Matrix3(modulus[e] * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world));
-    for (const double v : six(in_world)) strain.values.push_back(v);
-    for (const double v : six(sigma)) stress.values.push_back(v);
+    for (const double v : six(polar.R * in_body * polar.R.transpose())) strain.values.push_back(v);
+    for (const double v : six(elasticity.cauchy_stress(e))) stress.values.push_back(v);
   }
   grid.point_data = {std::move(displacement), std::move(velocity)};
   grid.cell_data = {std::move(strain), std::move(stress)};
@@ -170,24 +170,14 @@ void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, con
   }
 }
 
-std::vector<Plane> planes_of(const Capture& capture, const VectorX& theta) {
-  std::vector<Plane> planes = capture.planes;
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    planes[i].point = theta.segment<3>(theta::plane_point(int(i)));
-    planes[i].normal = theta.segment<3>(theta::plane_normal(int(i)));
-  }
-  return planes;
-}
-
 /// A frame's points where the estimate has them.
 std::vector<Vector3> corrected_points(const ObservedFrame& seen, const Capture& capture, const Discretisation& d,
                                       const VectorX& theta) {
   std::vector<Vector3> points = seen.points;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const int sensor = seen.camera[i] < 0 ? int(capture.depth.size()) : seen.camera[i];
-    const int at = theta::sensor(sensor, d.simulation.planes, d.simulation.pulls);
-    points[i] =
-        SensorCorrection(d.mismatch.centre, theta.segment<SensorCorrection::size>(at)).apply(points[i], seen.view[i]);
+    const SensorBlocks& blocks = d.mismatch.sensors[std::size_t(sensor)];
+    points[i] = SensorCorrection(d.mismatch.centre, blocks.values(theta)).apply(points[i], seen.view[i]);
   }
   return points;
 }
@@ -198,7 +188,7 @@ Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutco
   const Discretisation& d = outcome.discretisation;
   Gallery gallery;
   gallery.triangles = capture.surface->triangles;
-  gallery.planes = planes_of(capture, outcome.theta);
+  gallery.planes = planes_at(capture, d.simulation.blocks, outcome.theta);
   if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
   gallery.up = capture.up;
   gallery.width = 480, gallery.height = 400;
@@ -228,40 +218,52 @@ void add_pictures(ReportData& report, const Gallery& gallery) {
   report.pictures = draw_gallery(gallery, report.residual_range);
 }
 
-/// A stage's name for people.
+/// A stage's name for people; what stands before a colon is kept.
 std::string spoken_stage(const std::string& stage) {
   static const std::map<std::string, std::string> names = {{"motion", "motion at the start"},
                                                            {"coarse", "coarse grid"},
-                                                           {"fine, wide band", "fine grid, outliers kept"},
+                                                           {"fine, wide band", "fine grid, wide outlier scale"},
                                                            {"fine", "fine grid"}};
-  const auto it = names.find(stage);
-  return it == names.end() ? stage : it->second;
+  const auto colon = stage.rfind(": ");
+  const std::size_t own = colon == std::string::npos ? 0 : colon + 2;
+  const auto it = names.find(stage.substr(own));
+  return it == names.end() ? stage : stage.substr(0, own) + it->second;
 }
 
-/// The convergence that the page draws: the scan's trials are no iterations.
-ConvergenceHistory drawn_history(ConvergenceHistory history) {
-  std::erase_if(history.rows, [](const ConvergenceRow& row) { return row.stage == "scan"; });
+/// The convergence that the page draws.
+ConvergenceHistory drawn_history(const FitOutcome& outcome) {
+  ConvergenceHistory history = history_of(outcome, false);
   for (ConvergenceRow& row : history.rows) row.stage = spoken_stage(row.stage);
   return history;
 }
 
-VectorX model_theta(const Model& model, const Vector3& gravity, int sensors) {
+/// A model's parameters, and where they stand.
+struct ModelParameters {
+  ParameterLayout layout;
+  CaptureBlocks blocks;
+  VectorX theta;
+};
+ModelParameters model_parameters(const Model& model, const Vector3& gravity, const std::vector<std::string>& sensors) {
+  ModelParameters p;
   const int planes = int(model.planes.size()), pulls = int(model.initial.pulls.size());
-  VectorX theta = VectorX::Zero(theta::size(planes, 1, pulls, sensors));
-  for (int k = 0; k < pulls; ++k) theta.segment<3>(theta::pull(k, planes)) = model.initial.pulls[std::size_t(k)];
-  theta[theta::youngs_modulus] = model.youngs_modulus;
-  theta[theta::poissons_ratio] = model.poisson_ratio;
-  theta[theta::mass_damping] = model.mass_damping;
-  theta[theta::stiffness_damping] = model.stiffness_damping;
-  theta[theta::density] = model.density;
-  theta.segment<3>(theta::gravity) = gravity;
-  theta.segment<3>(theta::linear_velocity) = model.initial.linear_velocity;
-  theta.segment<3>(theta::angular_velocity) = model.initial.angular_velocity;
-  for (int i = 0; i < int(model.planes.size()); ++i) {
-    theta.segment<3>(theta::plane_point(i)) = model.planes[i].point;
-    theta.segment<3>(theta::plane_normal(i)) = model.planes[i].normal;
+  p.blocks.motion = add_motion_blocks(p.layout, {.planes = planes, .pulls = pulls});
+  for (const std::string& sensor : sensors) p.blocks.sensors.push_back(add_sensor_blocks(p.layout, sensor));
+  const MotionBlocks& m = p.blocks.motion;
+  VectorX& theta = p.theta = VectorX::Zero(p.layout.size());
+  for (std::size_t k = 0; k < m.pulls.size(); ++k) theta.segment<3>(m.pulls[k]) = model.initial.pulls[k];
+  m.set_moduli(theta, model.youngs_modulus);
+  theta[m.poissons_ratio] = model.poisson_ratio;
+  theta[m.mass_damping] = model.mass_damping;
+  theta[m.stiffness_damping] = model.stiffness_damping;
+  theta[m.density] = model.density;
+  theta.segment<3>(m.gravity) = gravity;
+  theta.segment<3>(m.linear_velocity) = model.initial.linear_velocity;
+  theta.segment<3>(m.angular_velocity) = model.initial.angular_velocity;
+  for (std::size_t i = 0; i < m.planes.size(); ++i) {
+    theta.segment<3>(m.planes[i].point) = model.planes[i].point;
+    theta.segment<3>(m.planes[i].normal) = model.planes[i].normal;
   }
-  return theta;
+  return p;
 }
 
 /// A model as the capture that it would have been fitted to: the same scene builder serves both.
@@ -286,13 +288,13 @@ Capture as_capture(const Model& model) {
 MatrixX log_modulus_covariance(const FitOutcome& outcome) {
   if (outcome.covariance.size() == 0) return {};
   const int controls = outcome.recordings.front().discretisation.body->modulus.controls;
-  const Eigen::Index size = outcome.recordings.front().theta.size();
+  const std::vector<ParameterHandle>& moduli = outcome.recordings.front().discretisation.simulation.blocks.youngs_moduli;
   std::vector<int> coordinate(std::size_t(controls), -1);
   int at = 0;
   for (const Parameter& p : outcome.parameters.parameters()) {
     if (!p.estimated) continue;
     for (int k = 0; k < controls; ++k)
-      if (p.theta_index == theta::modulus(k, controls, size)) coordinate[std::size_t(k)] = at;
+      if (p.at == moduli[std::size_t(k)]) coordinate[std::size_t(k)] = at;
     at += p.dimension();
   }
   MatrixX covariance = MatrixX::Zero(controls, controls);
@@ -305,7 +307,8 @@ MatrixX log_modulus_covariance(const FitOutcome& outcome) {
 
 ModulusStatistics modulus_statistics(const FitOutcome& outcome) {
   const RecordingOutcome& first = outcome.recordings.front();
-  return modulus_statistics(first.discretisation.body, first.theta, log_modulus_covariance(outcome));
+  return modulus_statistics(first.discretisation.body, first.discretisation.simulation.blocks, first.theta,
+                            log_modulus_covariance(outcome));
 }
 
 /// The field over the object, and its mean where the control points' parameters leave that out.
@@ -323,7 +326,7 @@ void add_modulus_field(Result& result, const FitOutcome& outcome) {
   const MatrixX covariance = log_modulus_covariance(outcome);
   const std::vector<Vector3>& points = first.discretisation.control_points;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const double value = first.theta[theta::modulus(int(k), controls, first.theta.size())];
+    const double value = first.theta[first.discretisation.simulation.blocks.youngs_moduli[k]];
     ControlPoint point{points[k], value, {}};
     if (covariance.size() > 0) point.std = value * std::sqrt(covariance(Eigen::Index(k), Eigen::Index(k)));
     field.control_points.push_back(point);
@@ -361,11 +364,11 @@ SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
 
 namespace {
 
-TrackingResult tracking_result(const TrackingOutcome& outcome) {
+TrackingResult tracking_result(const TrackingOutcome& outcome, const MaterialBlocks& material) {
   TrackingResult result{outcome.keeps_loop ? "tracked motion" : "points", outcome.why, {}, {}, {}};
   for (const TrackingRound& r : outcome.rounds)
     result.rounds.push_back(
-        {r.youngs_modulus, r.theta[theta::youngs_modulus], r.surface_rms, r.fit_rms, r.confidence, r.lost});
+        {r.youngs_modulus, r.theta[material.youngs_moduli.front()], r.surface_rms, r.fit_rms, r.confidence, r.lost});
   const auto held_out = [](const std::optional<HeldOutFrames>& h) -> std::optional<HeldOutFramesResult> {
     if (!h) return std::nullopt;
     HeldOutFramesResult r{h->frames, {}, {}};
@@ -425,7 +428,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
   if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
   result.notes = outcome.notes;
-  if (outcome.tracking) result.tracking = tracking_result(*outcome.tracking);
+  if (outcome.tracking) result.tracking = tracking_result(*outcome.tracking, outcome.recordings.front().discretisation.simulation.blocks);
   return result;
 }
 
@@ -438,34 +441,30 @@ Model make_model(const Capture& capture, const FitOutcome& outcome) {
 
 Model make_model(const Capture& capture, const Discretisation& d, const VectorX& t, const ModulusStatistics& modulus,
                  double cells) {
+  const MotionBlocks& blocks = d.simulation.blocks;
   Model model;
   model.name = capture.name;
   model.surface = *capture.surface;
   model.youngs_modulus = modulus.mean;
-  model.poisson_ratio = t[theta::poissons_ratio];
-  model.mass_damping = t[theta::mass_damping];
-  model.stiffness_damping = t[theta::stiffness_damping];
-  model.mass = t[theta::density] * enclosed_volume(*capture.surface);
+  model.poisson_ratio = t[blocks.poissons_ratio];
+  model.mass_damping = t[blocks.mass_damping];
+  model.stiffness_damping = t[blocks.stiffness_damping];
+  model.mass = t[blocks.density] * enclosed_volume(*capture.surface);
   if (d.body->kind != ElementKind::Hexahedron) {  // the scan may have been taken under load
     const Points free = Embedding(*d.body, capture.surface->vertices).positions(d.body->reference_positions());
     for (Eigen::Index v = 0; v < free.rows(); ++v) model.surface.vertices[std::size_t(v)] = free.row(v).transpose();
   }
   model.density = model.mass / enclosed_volume(model.surface);
-  model.gravity = theta::vector_at(t, theta::gravity);
-  model.planes = capture.planes;
-  for (std::size_t i = 0; i < model.planes.size(); ++i) {
-    model.planes[i].point = t.segment<3>(theta::plane_point(int(i)));
-    model.planes[i].normal = t.segment<3>(theta::plane_normal(int(i)));
-    model.planes[i].known = true;
-  }
+  model.gravity = blocks.gravity.vector(t);
+  model.planes = planes_at(capture, blocks, t);
+  for (Plane& plane : model.planes) plane.known = true;
   model.fixed = capture.fixed;
   model.weights = capture.weights;
   model.initial = capture.initial;
-  model.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
-  model.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);
+  model.initial.linear_velocity = blocks.linear_velocity.vector(t);
+  model.initial.angular_velocity = blocks.angular_velocity.vector(t);
   model.initial.known = true;
-  for (int k = 0; k < d.simulation.pulls; ++k)
-    model.initial.pulls.push_back(theta::vector_at(t, theta::pull(k, d.simulation.planes)));
+  for (const ParameterHandle& pull : blocks.pulls) model.initial.pulls.push_back(pull.vector(t));
   model.cell_size = object_size(capture) / cells;
   if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
     model.cell_size = grid->cell_size;
@@ -530,8 +529,13 @@ ModelScene make_scene(const Model& model) {
   return {scene.discretisation.distance, scene.discretisation.body, options, scene.theta};
 }
 
-CaptureScene make_scene(const Model& model, const Capture& capture) {
+CaptureScene make_scene(const Model& model, const Capture& recorded) {
   CaptureScene scene;
+  Capture capture = recorded;
+  if (capture.shape_is == ShapeIs::Static) {  // the model's surface and mesh are free of load already
+    capture.surface = model.surface;
+    capture.shape_is = ShapeIs::Reference;
+  }
   const auto distance = capture_distance(capture, 0.15);
   Model situated = model;
   situated.planes = capture.planes;
@@ -545,7 +549,9 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
     situated.initial.pulls = model.initial.pulls;
   }
   const Vector3 gravity = capture.gravity.value_or(model.gravity.value_or(-9.81 * capture.up));
-  scene.theta = model_theta(situated, gravity, int(sensor_names(capture).size()));
+  const ModelParameters parameters = model_parameters(situated, gravity, sensor_names(capture));
+  scene.layout = parameters.layout;
+  scene.theta = parameters.theta;
   SimulationOptions settings;
   settings.newmark_theta = model.theta;
   Resolution resolution;
@@ -555,7 +561,8 @@ CaptureScene make_scene(const Model& model, const Capture& capture) {
   if (model.law) settings.law = make_law(*model.law, body->element_count());
   resolution.element = body->kind;
   scene.discretisation =
-      discretise(capture, distance, body, resolution, scene.theta, settings, tracked_points(capture).rest);
+      discretise(capture, distance, body, resolution, parameters.blocks, scene.theta, settings,
+                 tracked_points(capture).rest);
   if (model.contact_stiffness > 0.0)
     scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
   const double dt = 1.0 / (model.frame_rate * model.substeps);
@@ -573,7 +580,7 @@ RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Bo
   const RolloutSummary summary = simulation.run(parameters, [&](int frame, const State& state, auto) {
     char name[32];
     std::snprintf(name, sizeof name, "frames/%06d.vtu", frame);
-    write_vtu(folder / name, frame_grid(body, parameters, state, *elasticity), VtuPrecision::Single);
+    write_vtu(folder / name, frame_grid(*body, state, *elasticity), VtuPrecision::Single);
     entries.push_back({options.times[std::size_t(frame)] - options.times.front(), name});
     return !progress || progress(frame + 1, simulation.frame_count());
   });
@@ -592,10 +599,9 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
   ReportData report;
   report.title = capture.name;
   report.result = result;
-  const ConvergenceHistory history = history_of(outcome);
-  report.convergence = drawn_history(history);
+  report.convergence = drawn_history(outcome);
   write_result(folder / "result.json", report.result);
-  write_convergence(folder / "convergence.csv", history);
+  write_convergence(folder / "convergence.csv", history_of(outcome, true));
   save_model(folder, make_model(capture, outcome));
   write_trajectory(folder, first.discretisation.body, first.discretisation.simulation, first.theta,
                    [&](int done, int total) { return tell("trajectory", done, total), true; });
@@ -605,7 +611,7 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     report.residuals.push_back({frame, capture.times[std::size_t(frame)], f.rms, f.points, f.noise});
   }
   tell("loads", 0, 1);
-  report.loads = predict_loads(capture, {first.discretisation, first.theta});
+  report.loads = predict_loads(capture, {first.discretisation, outcome.parameters.layout(), first.theta});
   std::erase_if(report.loads, [](const LoadError& load) { return load.role != "test"; });
   tell("loads", 1, 1);
   if (outcome.correlation.size() > 0)
@@ -618,7 +624,7 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
   for (std::size_t i = 0; i < outcome.tracking->tracks.size(); ++i) {
     const std::string name = recordings.size() == 1 ? "track" : "track-" + std::to_string(i + 1);
     write_track(folder / name, recordings[i].capture, recordings[i].observed, *outcome.tracking->tracks[i],
-                outcome.recordings[i].theta, true, progress);
+                outcome.recordings[i].discretisation.simulation.blocks, outcome.recordings[i].theta, true, progress);
   }
 }
 

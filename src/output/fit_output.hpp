@@ -44,14 +44,17 @@ std::shared_ptr<const Body> model_body(const Model& model);
 /// Throws InputError where the capture has no moving object.
 struct CaptureScene {
   Discretisation discretisation;
+  ParameterLayout layout;
   VectorX theta;
 };
 CaptureScene make_scene(const Model& model, const Capture& capture);
 
 /// A state as cells with displacement, velocity, strain and stress (at the elements' middles, turned into the world).
-/// @param elasticity  of the body, with these parameters; it is left linearised about the state
-VtuGrid frame_grid(const std::shared_ptr<const Body>& body, const VectorX& parameters, const State& state,
-                   Elasticity& elasticity);
+/// @param elasticity  of the body, with its parameters set; it is left linearised about the state
+VtuGrid frame_grid(const Body& body, const State& state, Elasticity& elasticity);
+
+/// A capture's planes where a parameter vector has them.
+std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks, const VectorX& theta);
 
 /// Writes `trajectory.pvd` and `frames/*.vtu`: displacement, velocity, strain and stress of each frame.
 /// @param progress  frames done and their total; false stops

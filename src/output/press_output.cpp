@@ -10,6 +10,7 @@
 #include "base/files.hpp"
 #include "elasticity/law_elasticity.hpp"
 #include "report/report.hpp"
+#include "motion/probe_contact.hpp"
 
 namespace pliant {
 
@@ -126,7 +127,7 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   fit.converged = outcome.converged, fit.interrupted = outcome.interrupted, fit.reason = outcome.reason;
   fit.notes = outcome.notes;
   for (const TriedLaw& tried : outcome.tried) {
-    const PressTheta& l = tried.layout;
+    const LawForm& l = tried.form;
     const std::string form = l.terms == 0 ? "a linear law"
                                           : fmt::format("Ogden's law of {} term{}{}", l.terms, l.terms == 1 ? "" : "s",
                                                         l.own_ratios ? " with Poisson's ratios of their own" : "");
@@ -156,6 +157,9 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   RecordingOutcome recording;
   recording.discretisation.body = outcome.scene->body;
   recording.discretisation.control_points = outcome.control_points;
+  MaterialBlocks& material = recording.discretisation.simulation.blocks;
+  material.youngs_moduli.clear();
+  for (int k = 0; k < outcome.layout.form().controls; ++k) material.youngs_moduli.push_back(outcome.layout.modulus(k));
   recording.theta = outcome.theta;
   fit.recordings.push_back(std::move(recording));
   Result result = make_result(std::vector<RecordedCapture>{{capture, {}}}, fit, facts);
@@ -259,7 +263,7 @@ void write_deformed(const fs::path& folder, const PressFitOutcome& outcome,
     if (!p.succeeded) continue;
     const std::string name = fmt::format("presses/{:03d}.vtu", i + 1);
     const State state{p.placement.nodes, Points::Zero(p.placement.nodes.rows(), 3)};
-    write_vtu(folder / name, frame_grid(outcome.scene->body, outcome.theta, state, *elasticity), VtuPrecision::Single);
+    write_vtu(folder / name, frame_grid(*outcome.scene->body, state, *elasticity), VtuPrecision::Single);
     entries.push_back({double(i + 1), name});
   }
   write_pvd(folder / "presses.pvd", entries);

@@ -74,14 +74,10 @@ std::string to_csv(const Track& track) {
 }
 
 Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& observed, const Track& track,
-                   const VectorX& theta) {
+                   const MotionBlocks& blocks, const VectorX& theta) {
   Gallery gallery;
   gallery.triangles = track.surface.triangles;
-  gallery.planes = capture.planes;
-  for (std::size_t i = 0; i < gallery.planes.size(); ++i) {
-    gallery.planes[i].point = theta.segment<3>(theta::plane_point(int(i)));
-    gallery.planes[i].normal = theta.segment<3>(theta::plane_normal(int(i)));
-  }
+  gallery.planes = planes_at(capture, blocks, theta);
   if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
   gallery.up = capture.up;
   gallery.width = 560, gallery.height = 420;
@@ -140,26 +136,28 @@ std::string page(const Capture& capture, const Track& track, const std::vector<R
 }  // namespace
 
 void write_track(const fs::path& folder, const Capture& capture, const std::vector<ObservedFrame>& observed,
-                 const Track& track, const VectorX& theta, bool with_pictures,
+                 const Track& track, const MotionBlocks& blocks, const VectorX& theta, bool with_pictures,
                  const std::function<void(const char*, int, int)>& progress) {
   fs::create_directories(folder / "frames");
   fs::create_directories(folder / "pictures");
   write_file(folder / "track.json", to_json(track, capture));
   write_file(folder / "track.csv", to_csv(track));
-  const auto elasticity = make_elasticity(track.body);
+  MaterialBlocks material = blocks;  // an estimate may have more control moduli than the body that was followed
+  material.youngs_moduli.resize(std::size_t(track.body->modulus.controls), material.youngs_moduli.front());
+  const auto elasticity = make_elasticity(track.body, material);
   elasticity->set_parameters(theta);
   const std::vector<State> states = states_of(track);
   std::vector<PvdEntry> entries;
   for (std::size_t i = 0; i < states.size(); ++i) {
     const std::string name = fmt::format("frames/{:06d}.vtu", track.frames[i].frame);
-    write_vtu(folder / name, frame_grid(track.body, theta, states[i], *elasticity), VtuPrecision::Single);
+    write_vtu(folder / name, frame_grid(*track.body, states[i], *elasticity), VtuPrecision::Single);
     entries.push_back({track.frames[i].time - track.frames.front().time, name});
     if (progress) progress("written", int(i) + 1, int(states.size()));
   }
   write_pvd(folder / "trajectory.pvd", entries);
   std::vector<ReportPicture> pictures;
   if (with_pictures) {
-    Gallery gallery = gallery_of(capture, observed, track, theta);
+    Gallery gallery = gallery_of(capture, observed, track, blocks, theta);
     std::vector<double> residuals;
     for (const double r : all_residuals(gallery))
       if (std::isfinite(r)) residuals.push_back(r);

@@ -36,8 +36,9 @@ double quantile(std::vector<double> values, double share) {
 }
 
 /// omega^2 [1/s^2] of the slowest vibration that is no rigid motion.
-double slowest_vibration(const std::shared_ptr<const Body>& body, const VectorX& theta, const std::vector<int>& held) {
-  const Modes found = modes(body, theta, held, held.empty() ? 7 : 1);
+double slowest_vibration(const std::shared_ptr<const Body>& body, const MotionBlocks& blocks, const VectorX& theta,
+                         const std::vector<int>& held) {
+  const Modes found = modes(body, blocks, theta, held, held.empty() ? 7 : 1);
   if (!found.converged) throw InputError({{}, "the object's vibrations cannot be found: " + found.failure, "", ""});
   return found.squared_frequencies[found.count() - 1];
 }
@@ -68,7 +69,7 @@ Tracker::Tracker(std::shared_ptr<const Body> body, const SimulationOptions& scen
       cameras_(std::move(cameras)),
       options_(options),
       size_(body_->size()),
-      mass_(theta[theta::density] * body_->volume()),
+      mass_(theta[scene.blocks.density] * body_->volume()),
       noise_(noise),
       typical_(std::max(1, typical)),
       samples_(int(surface_.vertices.size())),
@@ -89,17 +90,17 @@ Tracker::Tracker(std::shared_ptr<const Body> body, const SimulationOptions& scen
   steps.newmark_theta = implicit;
   steps.contact_weight = scene.contact_weight;
   steps.solver = scene.solver;
-  stepper_ = std::make_unique<Stepper>(body_, std::move(terms), steps);
+  stepper_ = std::make_unique<Stepper>(body_, std::move(terms), scene.blocks, steps);
   const std::vector<int> held = held_nodes(*body_, scene.holds);
   stepper_->hold(eliminated_nodes(*body_, scene));
   stepper_->set_parameters(theta);
   is_free_ = held.empty();
-  slowest_ = slowest_vibration(body_, theta, held);
-  pendulum_ = theta::vector_at(theta, theta::gravity).norm() / size_;
+  slowest_ = slowest_vibration(body_, scene.blocks, theta, held);
+  pendulum_ = scene.blocks.gravity.vector(theta).norm() / size_;
   const Points& rest = body_->scanned_positions();
   state_ = {rest, Points::Zero(rest.rows(), 3)};
-  const Vector3 linear = theta::vector_at(theta, theta::linear_velocity);
-  const Matrix3 spin = cross_matrix(theta::vector_at(theta, theta::angular_velocity));
+  const Vector3 linear = scene.blocks.linear_velocity.vector(theta);
+  const Matrix3 spin = cross_matrix(scene.blocks.angular_velocity.vector(theta));
   state_.v = ((rest.rowwise() - body_->centre_of_mass().transpose()) * spin.transpose()).rowwise() + linear.transpose();
   if (!cameras_.empty()) rays_.add(surface_);
 }
@@ -477,7 +478,7 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
     if (const std::string failure = simulation.hold_shape(theta); failure.empty()) {
       result.body = simulation.rest_body(theta);
     } else {
-      own.segment<3>(theta::gravity).setZero();
+      own.segment<3>(scene.blocks.gravity).setZero();
       result.note = "The material is too soft for its scan (" + failure +
                     "): the object was tracked without gravity, as if it were free of load as scanned.";
     }

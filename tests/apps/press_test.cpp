@@ -18,10 +18,11 @@ using testing::HasSubstr;
 TEST(Presses, AreFittedEvaluatedAndPredicted) {
   const TemporaryFolder folder;
   const PressedBlock block;
-  VectorX truth = press_parameters({1, 1}, {"youngs_modulus"}, 8000.0).reference();
-  truth[PressTheta{1, 1}.exponent(0)] = -5.0;
+  const LawLayout layout({1, 1});
+  VectorX truth = law_parameters(layout, 8000.0).reference();
+  truth[layout.exponent(0)] = -5.0;
   const std::string capture = folder / "capture", out = folder / "fit";
-  write_press_capture(capture, block.scene(PressedBlock::presses(), press_law(*block.body, {1, 1}, truth), 1e-4), 1);
+  write_press_capture(capture, block.scene(PressedBlock::presses(), press_law(*block.body, layout, truth), 1e-4), 1);
 
   const ProgramRun check = run_pliant({"check", capture});
   EXPECT_EQ(check.exit_code, 0) << check.err;

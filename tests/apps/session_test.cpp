@@ -58,7 +58,7 @@ class Session : public testing::Test {
   /// A fit of a few seconds.
   static ProgramRun run_fit(const std::string& name, std::vector<std::string> more = {},
                             const std::string& interrupt_at = "") {
-    std::vector<std::string> arguments = {"fit", capture(), "--out", at(name), "--seed", "3"};
+    std::vector<std::string> arguments = {"fit", capture(), "--out", at(name)};
     for (const char* choice : {"cells=8", "coarse_cells=6", "points_per_frame=100", "scan_per_decade=1", "starts=1",
                                "steps=0.4", "max_iterations=40"})
       arguments.insert(arguments.end(), {"--set", choice});

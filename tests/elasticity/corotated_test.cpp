@@ -11,10 +11,10 @@ namespace {
 using test::tolerance;
 
 struct Elastic : ::testing::TestWithParam<test::BodyKind> {
-  Elastic() : body(GetParam().make()), owned(make_elasticity(body)), term(*owned) {
-    theta.setZero(theta::size(0));
-    theta[theta::youngs_modulus] = 3000.0;
-    theta[theta::poissons_ratio] = 0.35;
+  Elastic() : body(GetParam().make()), owned(make_elasticity(body, layout)), term(*owned) {
+    theta = layout.zero();
+    layout.set_moduli(theta, 3000.0);
+    theta[layout.poissons_ratio] = 0.35;
     term.set_parameters(theta);
   }
   Points force(const Points& z) {
@@ -24,6 +24,7 @@ struct Elastic : ::testing::TestWithParam<test::BodyKind> {
   }
   const Points& X() const { return body->reference_positions(); }
 
+  MotionLayout layout;
   std::shared_ptr<const Body> body;
   VectorX theta;
   std::unique_ptr<Elasticity> owned;
@@ -99,7 +100,7 @@ TEST_P(Elastic, UniformStretchHasTheExactEnergy) {
 TEST_P(Elastic, RelativeModulusScalesItsElements) {
   Body varied = *body;
   for (double& m : varied.modulus.relative) m = 2.5;
-  const auto other = make_elasticity(std::make_shared<Body>(varied));
+  const auto other = make_elasticity(std::make_shared<Body>(varied), layout);
   Elasticity& stiffer = *other;
   stiffer.set_parameters(theta);
   const Points z = test::deformed(X(), 0.3);
@@ -136,16 +137,17 @@ TEST_P(Elastic, ControlModuliMixInTheLogarithm) {
   mixed.modulus.controls = 3;
   mixed.modulus.weights = (MatrixX::Random(n, 3).array() + 1.5).matrix();
   for (int e = 0; e < n; ++e) mixed.modulus.weights.row(e) /= mixed.modulus.weights.row(e).sum();
-  ElementModuli moduli(std::make_shared<Body>(mixed));
-  VectorX theta3 = VectorX::Zero(theta::size(2, 3));
+  const MotionLayout layout3({.moduli = 3, .planes = 2});
+  ElementModuli moduli(std::make_shared<Body>(mixed), layout3);
+  VectorX theta3 = layout3.zero();
   const Vector3 controls(1000.0, 4000.0, 9000.0);
-  for (int k = 0; k < 3; ++k) theta3[theta::modulus(k, 3, theta3.size())] = controls[k];
+  for (int k = 0; k < 3; ++k) theta3[layout3.youngs_moduli[std::size_t(k)]] = controls[k];
   moduli.set_parameters(theta3);
   for (int e = 0; e < n; ++e) {
     const double expected = std::exp(mixed.modulus.weights.row(e).dot(controls.array().log().matrix()));
     EXPECT_NEAR(moduli[e], expected, tolerance(1e-12) * expected);
   }
-  theta3.tail(2).setConstant(1000.0);
+  layout3.set_moduli(theta3, 1000.0);
   moduli.set_parameters(theta3);
   for (int e = 0; e < n; ++e)
     EXPECT_NEAR(moduli[e], 1000.0, tolerance(1e-9)) << "equal controls are a homogeneous object";

@@ -10,7 +10,8 @@ namespace {
 
 struct TwoControls {
   std::shared_ptr<const Body> body;
-  VectorX theta = VectorX::Zero(theta::size(0, 2));
+  MotionLayout layout{{.moduli = 2}};
+  VectorX theta = layout.zero();
   MatrixX covariance = MatrixX::Zero(2, 2);
 
   TwoControls() {
@@ -23,8 +24,8 @@ struct TwoControls {
     set(0, 2e4), set(1, 5e5);
     covariance << 0.04, -0.01, -0.01, 0.09;
   }
-  void set(int control, double modulus) { theta[theta::modulus(control, 2, theta.size())] = modulus; }
-  ModulusStatistics statistics() const { return modulus_statistics(body, theta, covariance); }
+  void set(int control, double modulus) { theta[layout.youngs_moduli[std::size_t(control)]] = modulus; }
+  ModulusStatistics statistics() const { return modulus_statistics(body, layout, theta, covariance); }
 };
 
 TEST(ModulusStatistics, DeviationsFollowTheFieldsDerivatives) {
@@ -33,7 +34,7 @@ TEST(ModulusStatistics, DeviationsFollowTheFieldsDerivatives) {
   constexpr double step = 1e-5;
   MatrixX by_log(scene.body->element_count() + 1, 2);
   for (int k = 0; k < 2; ++k) {
-    const double modulus = scene.theta[theta::modulus(k, 2, scene.theta.size())];
+    const double modulus = scene.theta[scene.layout.youngs_moduli[std::size_t(k)]];
     scene.set(k, modulus * std::exp(step));
     const ModulusStatistics above = scene.statistics();
     scene.set(k, modulus * std::exp(-step));
@@ -51,9 +52,10 @@ TEST(ModulusStatistics, DeviationsFollowTheFieldsDerivatives) {
 
 TEST(ModulusStatistics, OneModulusIsItsOwnMean) {
   const auto body = test::box_body(Vector3(0.3, 0.2, 0.2), 0.1);
-  VectorX theta = VectorX::Zero(theta::size(0, 1));
-  theta[theta::youngs_modulus] = 3e4;
-  const ModulusStatistics s = modulus_statistics(body, theta, MatrixX::Constant(1, 1, 0.01));
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 3e4);
+  const ModulusStatistics s = modulus_statistics(body, layout, theta, MatrixX::Constant(1, 1, 0.01));
   EXPECT_NEAR(s.mean, 3e4, 1e-8);
   EXPECT_NEAR(s.mean_std, 3e3, 1e-8);
   EXPECT_NEAR(s.std.minCoeff(), 3e3, 1e-8);

@@ -117,10 +117,11 @@ TEST(LawElasticity, OfTheLinearLawIsCorotatedElasticity) {
   MatrixX q(body->element_count(), 2);
   q.rowwise() = Eigen::RowVector2d(p.lambda, p.alpha);
   const auto by_law = LawElasticity::make(body, std::make_shared<LinearLaw>(q));
-  const auto corotated = make_elasticity(body);
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 3000.0;
-  theta[theta::poissons_ratio] = 0.35;
+  const MotionLayout layout;
+  const auto corotated = make_elasticity(body, layout);
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 3000.0);
+  theta[layout.poissons_ratio] = 0.35;
   corotated->set_parameters(theta);
   const Points x = test::deformed(body->nodes, 0.25);
   Points f = Points::Zero(x.rows(), 3), g = f;

@@ -17,12 +17,15 @@ namespace {
 
 using test::tolerance;
 
+MotionLayout layout_of(const Body& body) { return MotionLayout({.moduli = body.modulus.controls}); }
+
 VectorX material(const Body& body, double youngs_modulus, double poissons_ratio, double density) {
-  VectorX theta = VectorX::Zero(theta::size(0, body.modulus.controls));
+  const MotionLayout layout = layout_of(body);
+  VectorX theta = layout.zero();
   for (int k = 0; k < body.modulus.controls; ++k)
-    theta[theta::modulus(k, body.modulus.controls, theta.size())] = youngs_modulus * (1.0 + 0.7 * k);
-  theta[theta::poissons_ratio] = poissons_ratio;
-  theta[theta::density] = density;
+    theta[layout.youngs_moduli[std::size_t(k)]] = youngs_modulus * (1.0 + 0.7 * k);
+  theta[layout.poissons_ratio] = poissons_ratio;
+  theta[layout.density] = density;
   return theta;
 }
 
@@ -37,7 +40,7 @@ std::vector<int> low_end(const Body& body, double share) {
 
 /// K at rest.
 BlockMatrix stiffness(const std::shared_ptr<const Body>& body, const VectorX& theta) {
-  const auto elasticity = make_elasticity(body);
+  const auto elasticity = make_elasticity(body, layout_of(*body));
   elasticity->set_parameters(theta);
   elasticity->linearise(body->reference_positions());
   BlockMatrix K(body->pattern);
@@ -47,7 +50,7 @@ BlockMatrix stiffness(const std::shared_ptr<const Body>& body, const VectorX& th
 
 /// K and M with held nodes in them.
 std::pair<MatrixX, MatrixX> dense_matrices(const std::shared_ptr<const Body>& body, const VectorX& theta) {
-  const ModalAnalysis free(body, {});
+  const ModalAnalysis free(body, layout_of(*body), {});
   const int n = 3 * body->node_count();
   MatrixX M(n, n);
   for (int i = 0; i < n; ++i) {
@@ -128,7 +131,7 @@ TEST_P(BeamModes, BendAndStretchAsTheorySays) {
   for (const MassKind mass : {MassKind::Consistent, MassKind::Lumped}) {
     const auto body = GetParam().make(mass);
     const VectorX theta = material(*body, modulus, nu, density);
-    ModalAnalysis analysis(body, low_end(*body, 0.0));
+    ModalAnalysis analysis(body, layout_of(*body), low_end(*body, 0.0));
     const Modes modes = analysis.lowest(theta, 10);
     ASSERT_TRUE(modes.converged) << modes.failure;
     // Bendings come in pairs, one a plane, and are the modes that carry momentum across the bar.
@@ -175,7 +178,7 @@ INSTANTIATE_TEST_SUITE_P(
 /// Linear tetrahedra of that size are far too stiff in bending: the tolerance above can tell.
 TEST(BeamModesOfLinearTetrahedra, AreTooHigh) {
   const auto body = test::tet_body({length, edge, edge}, {16, 2, 2}, false, 0.0);
-  const Modes found = modes(body, material(*body, modulus, nu, density), low_end(*body, 0.0), 2);
+  const Modes found = modes(body, layout_of(*body), material(*body, modulus, nu, density), low_end(*body, 0.0), 2);
   EXPECT_GT(std::sqrt(found.squared_frequencies[0]) / theory_bending(1)[0], 1.0 + 3.0 * beam_tolerance);
 }
 
@@ -193,7 +196,7 @@ TEST_P(ModesOf, AreMassOrthonormalAndSolveTheEquation) {
   const VectorX theta = material(*body, 5e4, 0.4, 900.0);
   const BlockMatrix K = stiffness(body, theta);
   for (const double share : {0.0, 0.3}) {
-    ModalAnalysis analysis(body, low_end(*body, share));
+    ModalAnalysis analysis(body, layout_of(*body), low_end(*body, share));
     const Modes modes = analysis.lowest(theta, 8);
     ASSERT_TRUE(modes.converged) << modes.failure;
     ASSERT_EQ(modes.count(), 8);
@@ -221,7 +224,7 @@ TEST_P(ModesOf, AreMassOrthonormalAndSolveTheEquation) {
 TEST_P(ModesOf, AreThoseOfADenseSolver) {
   const auto body = this->body();
   const VectorX theta = material(*body, 5e4, 0.4, 900.0);
-  ModalAnalysis analysis(body, low_end(*body, 0.3));
+  ModalAnalysis analysis(body, layout_of(*body), low_end(*body, 0.3));
   const auto [K, M] = dense_matrices(body, theta);
   std::vector<int> free;
   for (int node = 0; node < body->node_count(); ++node)
@@ -237,13 +240,13 @@ TEST_P(ModesOf, AreThoseOfADenseSolver) {
 TEST_P(ModesOf, ChangeWithTheModuliAsCentralDifferencesDo) {
   const auto body = this->body();
   const VectorX theta = material(*body, 5e4, 0.4, 900.0);
-  ModalAnalysis analysis(body, low_end(*body, 0.3));
+  ModalAnalysis analysis(body, layout_of(*body), low_end(*body, 0.3));
   const Modes modes = analysis.lowest(theta, 5);
   const MatrixX derivatives = analysis.modulus_derivatives(theta, modes);
   ASSERT_EQ(derivatives.cols(), 3);
   VectorX scaled = VectorX::Zero(5);
   for (int k = 0; k < 3; ++k) {
-    const int index = theta::modulus(k, 3, theta.size());
+    const Eigen::Index index = layout_of(*body).youngs_moduli[std::size_t(k)];
     scaled += theta[index] * derivatives.col(k);
     const auto along = [&](double h) -> VectorX {
       VectorX moved = theta;
@@ -260,7 +263,7 @@ TEST_P(ModesOf, ChangeWithTheModuliAsCentralDifferencesDo) {
 TEST_P(ModesOf, BeginWithSixRigidMotionsWhereNothingIsHeld) {
   const auto body = this->body();
   const VectorX theta = material(*body, 5e4, 0.4, 900.0);
-  ModalAnalysis analysis(body, {});
+  ModalAnalysis analysis(body, layout_of(*body), {});
   const Modes modes = analysis.lowest(theta, 9);
   ASSERT_TRUE(modes.converged) << modes.failure;
   for (int i = 0; i < 6; ++i)
@@ -285,7 +288,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, ModesOf, ::testing::ValuesIn(test::body_kinds())
 TEST(RepeatedModes, AreAllFound) {
   const auto body = test::box_body({0.1, 0.1, 0.1}, 0.05);
   const VectorX theta = material(*body, 1e4, 0.3, 1000.0);
-  ModalAnalysis analysis(body, {});
+  ModalAnalysis analysis(body, layout_of(*body), {});
   const auto [K, M] = dense_matrices(body, theta);
   const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixX> dense(K, M, Eigen::EigenvaluesOnly);
   for (const int count : {7, 9, 16, 24}) {
@@ -298,15 +301,16 @@ TEST(RepeatedModes, AreAllFound) {
 
 TEST(ModesThatCannotBe, AreToldInWords) {
   const auto body = test::tet_body({0.2, 0.1, 0.12}, {2, 1, 1}, false);
+  const MotionLayout layout;
   VectorX theta = material(*body, 1e4, 0.3, 1000.0);
-  EXPECT_THAT(test::complaint_of([&] { modes(body, theta, {99}, 1); }), ::testing::HasSubstr("held node 99"));
-  EXPECT_THAT(test::complaint_of([&] { modes(body, theta, {}, 0); }), ::testing::HasSubstr("0 modes"));
-  EXPECT_THAT(test::complaint_of([&] { modes(body, theta, {}, 30); }), ::testing::HasSubstr("of 36 unknowns"));
-  theta[theta::density] = 0.0;
-  EXPECT_THAT(test::complaint_of([&] { modes(body, theta, {}, 1); }), ::testing::HasSubstr("density"));
-  theta[theta::density] = 1.0;
-  theta[theta::youngs_modulus] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(modes(body, theta, {}, 1).converged);
+  EXPECT_THAT(test::complaint_of([&] { modes(body, layout, theta, {99}, 1); }), ::testing::HasSubstr("held node 99"));
+  EXPECT_THAT(test::complaint_of([&] { modes(body, layout, theta, {}, 0); }), ::testing::HasSubstr("0 modes"));
+  EXPECT_THAT(test::complaint_of([&] { modes(body, layout, theta, {}, 30); }), ::testing::HasSubstr("of 36 unknowns"));
+  theta[layout.density] = 0.0;
+  EXPECT_THAT(test::complaint_of([&] { modes(body, layout, theta, {}, 1); }), ::testing::HasSubstr("density"));
+  theta[layout.density] = 1.0;
+  layout.set_moduli(theta, std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(modes(body, layout, theta, {}, 1).converged);
 }
 
 }  // namespace

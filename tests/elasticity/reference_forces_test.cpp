@@ -17,10 +17,10 @@ struct Reference : ::testing::TestWithParam<bool> {
     Body made = *test::tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, GetParam());
     for (std::size_t e = 0; e < made.modulus.relative.size(); e += 2) made.modulus.relative[e] = 3.0;
     body = std::make_shared<Body>(std::move(made));
-    theta.setZero(theta::size(0));
-    theta[theta::youngs_modulus] = 3000.0;
-    theta[theta::poissons_ratio] = 0.35;
-    forces = ReferenceForces::make(body);
+    theta = layout.zero();
+    layout.set_moduli(theta, 3000.0);
+    theta[layout.poissons_ratio] = 0.35;
+    forces = ReferenceForces::make(body, layout);
     forces->set_parameters(theta);
     X = test::deformed(body->nodes, 0.1, 0.2);
     x = test::deformed(body->nodes, 0.25, 1.7);
@@ -32,6 +32,7 @@ struct Reference : ::testing::TestWithParam<bool> {
     forces->add_force(f);
     return f;
   }
+  MotionLayout layout;
   std::shared_ptr<const Body> body;
   VectorX theta;
   std::unique_ptr<ReferenceForces> forces;
@@ -41,7 +42,7 @@ struct Reference : ::testing::TestWithParam<bool> {
 /// The same law as that of the moving body, by other formulas.
 TEST_P(Reference, ForcesAreThoseOfABodyWithThatReference) {
   for (const Points& reference : {body->nodes, X}) {
-    const auto elasticity = make_elasticity(std::make_shared<Body>(with_reference(*body, reference)));
+    const auto elasticity = make_elasticity(std::make_shared<Body>(with_reference(*body, reference)), layout);
     elasticity->set_parameters(theta);
     elasticity->linearise(x);
     Points expected = Points::Zero(x.rows(), 3);
@@ -104,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Tetrahedra, Reference, ::testing::Bool(),
 
 TEST(ReferenceForces, HexahedraTakeNoPart) {
   const auto body = test::box_body(Vector3(0.4, 0.2, 0.2), 0.1);
-  EXPECT_THROW((void)ReferenceForces::make(body), std::invalid_argument);
+  EXPECT_THROW((void)ReferenceForces::make(body, MotionLayout()), std::invalid_argument);
   EXPECT_THROW((void)with_reference(*body, body->nodes), std::invalid_argument);
 }
 

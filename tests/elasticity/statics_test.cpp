@@ -47,10 +47,11 @@ std::vector<bool> boundary_nodes(const Body& body) {
 
 /// Displacements in equilibrium inside, as the field says on the boundary.
 Points displacements(const std::shared_ptr<const Body>& body, double nu, const Field& field) {
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = modulus;
-  theta[theta::poissons_ratio] = nu;
-  const auto elasticity = make_elasticity(body);
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, modulus);
+  theta[layout.poissons_ratio] = nu;
+  const auto elasticity = make_elasticity(body, layout);
   elasticity->set_parameters(theta);
   elasticity->linearise(body->reference_positions());
   BlockMatrix K(body->pattern);

@@ -26,13 +26,13 @@ struct CutString {
     options.newton.tolerance = 1e-13;
     options.holds = {{[](const Vector3& p) { return p.x() < -length + 1e-6; }}};
     options.released_weights = {{Vector3(length, 0, 0), mass}};
-    truth.setZero(theta::size(0));
-    truth[theta::youngs_modulus] = 8e4;
-    truth[theta::poissons_ratio] = 0.35;
-    truth[theta::mass_damping] = 0.5;
-    truth[theta::stiffness_damping] = 2e-3;
-    truth[theta::density] = 700.0;
-    truth.segment<3>(theta::gravity) = Vector3(0, -9.81, 0);
+    options.blocks = layout;
+    layout.set_moduli(truth, 8e4);
+    truth[layout.poissons_ratio] = 0.35;
+    truth[layout.mass_damping] = 0.5;
+    truth[layout.stiffness_damping] = 2e-3;
+    truth[layout.density] = 700.0;
+    truth.segment<3>(layout.gravity) = Vector3(0, -9.81, 0);
     std::vector<Vector3> rest;
     for (int n = 0; n < body->node_count(); ++n) rest.push_back(body->nodes.row(n).transpose());
     tracks = std::make_shared<PointTracks>(*body, rest);
@@ -47,10 +47,11 @@ struct CutString {
     EXPECT_TRUE(summary.succeeded) << summary.failure;
     seen = frames;
     VectorX start = truth;
-    start[theta::youngs_modulus] *= 1.6, start[theta::density] *= 1.3;
+    layout.scale_moduli(start, 1.6), start[layout.density] *= 1.3;
     parameters =
-        ParameterSet({{"youngs_modulus", "Pa", Transform::Logarithm, theta::youngs_modulus, 1.0, 1.0, 1e9, true},
-                      {"density", "kg/m^3", Transform::Logarithm, theta::density, 1.0, 1.0, 1e5, true}},
+        ParameterSet(layout.layout(),
+                     {{"youngs_modulus", "Pa", Transform::Logarithm, layout.youngs_moduli[0], 1.0, 1.0, 1e9, true},
+                      {"density", "kg/m^3", Transform::Logarithm, layout.density, 1.0, 1.0, 1e5, true}},
                      start);
   }
   Objective objective() const {
@@ -67,8 +68,9 @@ struct CutString {
   }
 
   std::shared_ptr<const Body> body;
+  MotionLayout layout;
   SimulationOptions options;
-  VectorX truth;
+  VectorX truth = layout.zero();
   std::shared_ptr<const PointTracks> tracks;
   std::shared_ptr<const std::vector<FrameObservations>> seen;
   ParameterSet parameters;
@@ -84,8 +86,8 @@ TEST(CutString, AnchorsModulusAndDensity) {
       minimise(objective, scene.parameters.to_unconstrained(scene.parameters.reference()), options);
   ASSERT_TRUE(summary.succeeded && summary.converged) << summary.reason;
   const VectorX found = scene.parameters.to_theta(summary.p);
-  EXPECT_NEAR(found[theta::youngs_modulus] / scene.truth[theta::youngs_modulus], 1.0, tolerance(1e-3));
-  EXPECT_NEAR(found[theta::density] / scene.truth[theta::density], 1.0, tolerance(1e-3));
+  for (const ParameterHandle& estimated : {scene.layout.youngs_moduli[0], scene.layout.density})
+    EXPECT_NEAR(found[estimated] / scene.truth[estimated], 1.0, tolerance(1e-3));
   EXPECT_LT(scene.correlation(), 0.95);
   EXPECT_GT(CutString(1e-7).correlation(), 0.99999) << "nothing tells them apart but the weight";
 }
@@ -106,10 +108,10 @@ struct ReleasedCapture : ::testing::Test {
 TEST_F(ReleasedCapture, HasTheWeightAndNoPulls) {
   Resolution resolution;
   EXPECT_EQ(pull_count(capture, resolution), 0);
-  const ParameterSet parameters = default_parameters(capture, 1e-4);
+  const auto [parameters, blocks] = default_parameters(capture, 1e-4);
   const Discretisation d =
-      discretise(capture, capture_distance(capture, resolution.band), resolution, parameters.reference());
-  EXPECT_EQ(d.simulation.pulls, 0);
+      discretise(capture, capture_distance(capture, resolution.band), resolution, blocks, parameters.reference());
+  EXPECT_TRUE(d.simulation.blocks.pulls.empty());
   EXPECT_TRUE(d.simulation.weights.empty()) << "it is gone while the object moves";
   ASSERT_EQ(d.simulation.released_weights.size(), 1u);
   EXPECT_EQ(d.simulation.released_weights[0].mass, 0.02);
@@ -120,7 +122,7 @@ TEST_F(ReleasedCapture, HasTheWeightAndNoPulls) {
 
 TEST_F(ReleasedCapture, EstimatesTheDensityOnlyWhereNobodyKnowsIt) {
   const auto is_estimated = [](const Capture& c) {
-    const ParameterSet parameters = default_parameters(c, 1e-4);
+    const ParameterSet parameters = default_parameters(c, 1e-4).set;
     for (const Parameter& p : parameters.parameters())
       if (p.name == "density") return p.estimated;
     return false;

@@ -65,13 +65,13 @@ struct LinearModel {
     seen << 1.9, 0.2, 1.4;
   }
   static ParameterSet both() {
+    const MotionLayout layout({.moduli = 2});
     std::vector<Parameter> list;
-    for (int k = 0; k < 2; ++k) {
-      list.push_back({"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm,
-                      theta::modulus(k, 2, theta::size(0, 2))});
+    for (const ParameterHandle& modulus : layout.youngs_moduli) {
+      list.push_back({"youngs_modulus@" + std::to_string(list.size() + 1), "Pa", Transform::Logarithm, modulus});
       list.back().estimated = true;
     }
-    return {list, VectorX::Ones(theta::size(0, 2))};
+    return {layout.layout(), list, VectorX::Ones(layout.size())};
   }
   double cost(const VectorX& p) const { return 0.5 * (design * p - seen).squaredNorm(); }
   /// In one frame, of so many observations that the residuals are noise.
@@ -182,12 +182,13 @@ RecordedCapture sagging_bar(double beyond, const Vector3& gravity = {0.0, -9.81,
   capture.clouds = {{{"cloud.ply"}, 1, noise}};
   Capture zoned = capture;
   zoned.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
-  VectorX theta = default_parameters(zoned, enclosed_volume(*capture.surface), 2).reference();
-  theta[theta::modulus(0, 2, theta.size())] = stiff;
-  theta[theta::modulus(1, 2, theta.size())] = beyond;
+  const auto [parameters, blocks] = default_parameters(zoned, enclosed_volume(*capture.surface), 2);
+  VectorX theta = parameters.reference();
+  theta[blocks.motion.youngs_moduli[0]] = stiff;
+  theta[blocks.motion.youngs_moduli[1]] = beyond;
   Resolution resolution;
   resolution.cells = 16.0;
-  const Discretisation d = discretise(zoned, capture_distance(zoned, 0.2), resolution, theta);
+  const Discretisation d = discretise(zoned, capture_distance(zoned, 0.2), resolution, blocks, theta);
   const Embedding embedding(*d.body, capture.surface->vertices);
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -216,16 +217,17 @@ FitOptions quick() {
   return options;
 }
 
-double modulus(const FitOutcome& outcome, int k) {
-  const VectorX& theta = outcome.recordings.front().theta;
-  return theta[theta::modulus(k, outcome.recordings.front().discretisation.body->modulus.controls, theta.size())];
+double modulus(const RecordingOutcome& recording, int k) {
+  return recording.theta[recording.discretisation.simulation.blocks.youngs_moduli[std::size_t(k)]];
 }
+double modulus(const FitOutcome& outcome, int k) { return modulus(outcome.recordings.front(), k); }
 int controls(const FitOutcome& outcome) { return outcome.recordings.front().discretisation.body->modulus.controls; }
 
 /// exp of the mean of ln E over the elements on one side of the middle.
 double mean_beyond(const FitOutcome& outcome, double side) {
   const RecordingOutcome& r = outcome.recordings.front();
-  const ModulusStatistics statistics = modulus_statistics(r.discretisation.body, r.theta, MatrixX());
+  const ModulusStatistics statistics =
+      modulus_statistics(r.discretisation.body, r.discretisation.simulation.blocks, r.theta, MatrixX());
   double sum = 0.0, volume = 0.0;
   for (int e = 0; e < r.discretisation.body->element_count(); ++e) {
     if (side * element_centre(*r.discretisation.body, e).x() < 0.0) continue;
@@ -271,10 +273,7 @@ TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {
   ASSERT_EQ(outcome.recordings.size(), 2u);
   const int count = controls(outcome);
   ASSERT_GT(count, 1);
-  for (int k = 0; k < count; ++k) {
-    const VectorX& other = outcome.recordings[1].theta;
-    EXPECT_EQ(modulus(outcome, k), other[theta::modulus(k, count, other.size())]);
-  }
+  for (int k = 0; k < count; ++k) EXPECT_EQ(modulus(outcome, k), modulus(outcome.recordings[1], k));
 }
 
 /// Interrupted in every kind of fit on the way, written to a file and read back.

@@ -131,12 +131,15 @@ TEST(FitOptions, ValidateNamesWhatIsOutOfRange) {
 
 /// Young's modulus and the range errors of two sensors.
 ParameterSet three_parameters() {
+  ParameterLayout layout;
   std::vector<Parameter> list;
-  list.push_back({"youngs_modulus", "Pa", Transform::Logarithm, theta::youngs_modulus, 1.0, 1.0, 1e9, true});
-  list.push_back({"range_error@left", "m", Transform::Shift, theta::density, 0.01});
-  list.push_back({"range_error@right", "m", Transform::Shift, theta::mass_damping, 0.01});
+  list.push_back(
+      {"youngs_modulus", "Pa", Transform::Logarithm, layout.add({"youngs_modulus", "Pa"}), 1.0, 1.0, 1e9, true});
+  for (const std::string name : {"range_error@left", "range_error@right"})
+    list.push_back({name, "m", Transform::Shift, layout.add({name, "m", 1, Role::Sensor}), 0.01});
   for (Parameter& p : list) p.prior_mean = VectorX::Constant(1, 0.5);
-  return {std::move(list), VectorX::Ones(theta::size(0, 1))};
+  const VectorX ones = VectorX::Ones(layout.size());
+  return {std::move(layout), std::move(list), ones};
 }
 
 ParameterSet overridden(const std::vector<std::string>& assignments) {
@@ -149,7 +152,7 @@ ParameterSet overridden(const std::vector<std::string>& assignments) {
 
 TEST(Overrides, AStartWithTheWidthOfAPriorMovesThePriorThere) {
   const ParameterSet p = overridden({"youngs_modulus=5000", "youngs_modulus.prior_std=0.1"});
-  EXPECT_EQ(p.reference()[theta::youngs_modulus], 5000.0);
+  EXPECT_EQ(p.reference()[p.find("youngs_modulus")->at], 5000.0);
   EXPECT_EQ(p.parameters()[0].prior_std, 0.1);
   EXPECT_DOUBLE_EQ(p.parameters()[0].prior_mean[0], std::log(5000.0));
 }
@@ -172,6 +175,7 @@ TEST(Overrides, RefusesWhatIsNotThere) { EXPECT_THROW(overridden({"range_error@m
 
 FitState some_state() {
   FitState state;
+  state.controls = 3;
   state.scan = {{100.0, 2.5}, {1000.0, std::numeric_limits<double>::infinity()}, {1.0 / 3.0, 1e-300}};
   state.motion = VectorX::LinSpaced(20, -1.0, 3.0) / 7.0;
   FitStart start;
@@ -196,6 +200,7 @@ TEST(FitState, RoundTripsToTheLastBit) {
   const FitState written = some_state();
   write_fit_state(folder / "state.json", written, "key");
   const FitState read = read_fit_state(folder / "state.json", "key");
+  EXPECT_EQ(read.controls, 3);
   EXPECT_EQ(read.scan, written.scan);
   EXPECT_EQ(*read.motion, *written.motion);
   ASSERT_TRUE(read.fine.has_value());

@@ -35,14 +35,14 @@ struct TwoLayers : ::testing::Test {
     const std::vector<int> zone_of = zones_after(coordinates, {{0, By::Y, border}});
     auto layered = std::make_shared<Body>(*block.body);
     layered->modulus = zone_field(block.body->modulus, zone_of, 2);
-    const PressTheta two{2, 1, 2};
-    VectorX truth = with_zone({1, 1}, press_parameters({1, 1}, {"youngs_modulus"}, 9000.0).reference(), 0);
+    VectorX truth = with_zone(one, law_parameters(one, 9000.0).reference(), two, 0);
     truth[two.modulus(1)] = 4000.0;
     truth[two.exponent(0, 1)] = -8.0;
     scene = std::make_shared<PressScene>(
         block.scene(test::PressedBlock::presses(), press_law(*layered, two, truth), noise));
   }
 
+  const LawLayout one{{1, 1}}, two{{2, 1, 2}};
   static constexpr double border = 1e-3, noise = 1e-4;  // of cells of 20 mm
   test::PressedBlock block{{5, 5, 5}};
   MatrixX coordinates;
@@ -50,8 +50,7 @@ struct TwoLayers : ::testing::Test {
 };
 
 TEST_F(TwoLayers, AreFoundByTheCutThatPromisesMost) {
-  const PressTheta one{1, 1};
-  const ParameterSet set = press_parameters(one, {"youngs_modulus"}, 6000.0);
+  const ParameterSet set = law_parameters(one, 6000.0);
   PressObjective objective(scene, {0, 1, 2, 3}, one, set, {noise, 5.0});
   const OptimiserSummary best = minimise(objective, set.to_unconstrained(set.reference()), {});
   ASSERT_TRUE(best.succeeded) << best.reason;
@@ -64,9 +63,9 @@ TEST_F(TwoLayers, AreFoundByTheCutThatPromisesMost) {
 }
 
 TEST(LawZones, ContrastsKnowWhichNumberIsWhich) {
-  for (const PressTheta& layout : {PressTheta{1, 0}, PressTheta{1, 1}, PressTheta{1, 3}, PressTheta{1, 3, 1, true}}) {
-    const std::vector<std::string> names = press_parameters(layout, {"youngs_modulus"}, 5000.0).coordinate_names();
-    const VectorX deviation = law_contrast_deviations(layout, 7.0);
+  for (const LawForm& form : {LawForm{1, 0}, LawForm{1, 1}, LawForm{1, 3}, LawForm{1, 3, 1, true}}) {
+    const std::vector<std::string> names = law_parameters(LawLayout(form), 5000.0).coordinate_names();
+    const VectorX deviation = law_contrast_deviations(form, 7.0);
     ASSERT_EQ(deviation.size(), Eigen::Index(names.size()));
     for (std::size_t i = 0; i < names.size(); ++i) {
       const bool is_stiffness = names[i].starts_with("youngs_modulus") || names[i].starts_with("stiffness_ratio");
@@ -76,13 +75,12 @@ TEST(LawZones, ContrastsKnowWhichNumberIsWhich) {
 }
 
 TEST_F(TwoLayers, DrawACutToTheirBorder) {
-  const PressTheta two{2, 1, 2};
   std::vector<ZoneCut> cuts = {{0, By::Y, -0.03}};
   auto cut_scene = std::make_shared<PressScene>(*scene);
   auto body = std::make_shared<Body>(*scene->body);
   body->modulus = zone_field(body->modulus, zones_after(coordinates, cuts), 2);
   cut_scene->body = body;
-  const ParameterSet set = zone_parameters(two, {"youngs_modulus@1", "youngs_modulus@2"}, 6000.0, 1.5);
+  const ParameterSet set = zone_parameters(two, 6000.0, 1.5);
   PressObjective objective(cut_scene, {0, 1, 2, 3}, two, set, {noise, 5.0});
   const OptimiserSummary best = minimise(objective, set.to_unconstrained(set.reference()), {});
   ASSERT_TRUE(best.succeeded) << best.reason;
@@ -93,8 +91,7 @@ TEST_F(TwoLayers, DrawACutToTheirBorder) {
 }
 
 TEST_F(TwoLayers, AreNotSeenInPressesOfOneMaterial) {
-  const PressTheta one{1, 1};
-  const ParameterSet set = press_parameters(one, {"youngs_modulus"}, 6000.0);
+  const ParameterSet set = law_parameters(one, 6000.0);
   const auto uniform = std::make_shared<PressScene>(
       block.scene(test::PressedBlock::presses(), press_law(*block.body, one, set.reference()), noise, 7));
   PressObjective objective(uniform, {0, 1, 2, 3}, one, set, {noise, 5.0});

@@ -1,4 +1,6 @@
 // Objects whose scan shows them sagging, or shows them only roughly: the shape and the material together.
+#include <utility>
+
 #include "base/error.hpp"
 #include "elasticity/modulus_field.hpp"
 #include "estimation/load_free.hpp"
@@ -27,14 +29,14 @@ struct StruckBar {
     options.times = {0.0};
     options.is_static = true;
     options.max_dt = 1.0 / 120.0 + 1e-9;
-    truth.setZero(theta::size(0, 2));
-    truth[theta::modulus(0, 2, truth.size())] = stiff, truth[theta::modulus(1, 2, truth.size())] = soft;
-    truth[theta::poissons_ratio] = 0.35;
-    truth[theta::mass_damping] = 0.3;
-    truth[theta::stiffness_damping] = 0.002;
-    truth[theta::density] = 600.0;
-    truth.segment<3>(theta::gravity) = Vector3(0, 0, -9.81);
-    truth.segment<3>(theta::linear_velocity) = Vector3(0.0, 0.4, 0.5);
+    options.blocks = layout;
+    set_moduli(truth, stiff, soft);
+    truth[layout.poissons_ratio] = 0.35;
+    truth[layout.mass_damping] = 0.3;
+    truth[layout.stiffness_damping] = 0.002;
+    truth[layout.density] = 600.0;
+    truth.segment<3>(layout.gravity) = Vector3(0, 0, -9.81);
+    truth.segment<3>(layout.linear_velocity) = Vector3(0.0, 0.4, 0.5);
     free = straight->nodes;
     Points there = free;
     if (sags)
@@ -73,27 +75,35 @@ struct StruckBar {
     o.last_frame = int(options.times.size()) - 1;
     return {{nullptr, tracks}, body, options, seen, parameters, o};
   }
-  ParameterSet parameters(double of_stiff, double of_soft, int shapes = 0) const {
-    VectorX theta = VectorX::Zero(theta::size(0, 2, 0, 0, shapes));
-    theta.head(truth.size() - 1) = truth.head(truth.size() - 1);
-    theta[theta::modulus(0, 2, theta.size())] = of_stiff * stiff;
-    theta[theta::modulus(1, 2, theta.size())] = of_soft * soft;
+  /// From now on the scan may err.
+  void correct_scan(const ShapeField& shape) {
+    const MotionLayout before =
+        std::exchange(layout, MotionLayout({.moduli = 2, .scan_corrections = int(shape.points.size())}));
+    truth = carry(before.layout(), truth, layout.layout(), layout.zero());
+    options.blocks = layout;
+    options.shape = shape;
+  }
+  void set_moduli(VectorX& theta, double first, double second) const {
+    theta[layout.youngs_moduli[0]] = first, theta[layout.youngs_moduli[1]] = second;
+  }
+  ParameterSet parameters(double of_stiff, double of_soft) const {
+    VectorX theta = truth;
+    set_moduli(theta, of_stiff * stiff, of_soft * soft);
     std::vector<Parameter> list;
     for (int k = 0; k < 2; ++k)
       list.push_back({"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm,
-                      theta::modulus(k, 2, theta.size()), 1.0, 1.0, 1e9, true});
-    for (int k = 0; k < shapes; ++k) {
-      Parameter p{"scan_correction@" + std::to_string(k + 1), "1", Transform::Vector, theta::shape(k, 0, 0, 0)};
+                      layout.youngs_moduli[std::size_t(k)], 1.0, 1.0, 1e9, true});
+    for (const ParameterHandle& correction : layout.scan_corrections) {
+      Parameter p{layout.layout().block_of(correction).name, "1", Transform::Vector, correction};
       p.estimated = true;
       p.prior_std = 1.0;
       p.prior_mean = VectorX::Zero(3);
       list.push_back(std::move(p));
     }
-    return {std::move(list), theta};
+    return {layout.layout(), std::move(list), theta};
   }
   std::pair<double, double> errors(const VectorX& theta) const {
-    return {theta[theta::modulus(0, 2, theta.size())] / stiff - 1.0,
-            theta[theta::modulus(1, 2, theta.size())] / soft - 1.0};
+    return {theta[layout.youngs_moduli[0]] / stiff - 1.0, theta[layout.youngs_moduli[1]] / soft - 1.0};
   }
   double shape_error(const VectorX& theta) const {
     return (Simulation(body, options).rest_body(theta)->nodes - free).rowwise().norm().maxCoeff() / length;
@@ -101,8 +111,9 @@ struct StruckBar {
 
   std::shared_ptr<const Body> body;
   Points free;
+  MotionLayout layout{{.moduli = 2}};
   SimulationOptions options;
-  VectorX truth;
+  VectorX truth = layout.zero();
   std::shared_ptr<const PointTracks> tracks;
   std::shared_ptr<const std::vector<FrameObservations>> seen;
 };
@@ -158,10 +169,10 @@ TEST(ScanCorrection, IsFoundAlongWithTheMaterial) {
   const ParameterSet rigid = bar.parameters(1.3, 0.8);
   Objective uncorrected = bar.objective(rigid);
   const OptimiserSummary without = minimise(uncorrected, rigid.to_unconstrained(rigid.reference()), patient());
-  bar.options.shape = {{Vector3(0.5 * length, 0, 0), Vector3(0.2 * length, 0, 0), Vector3(-0.1 * length, 0, 0)},
-                       0.02 * length,
-                       0.5 * length};
-  const ParameterSet parameters = bar.parameters(1.3, 0.8, 3);
+  bar.correct_scan({{Vector3(0.5 * length, 0, 0), Vector3(0.2 * length, 0, 0), Vector3(-0.1 * length, 0, 0)},
+                    0.02 * length,
+                    0.5 * length});
+  const ParameterSet parameters = bar.parameters(1.3, 0.8);
   const double before = bar.shape_error(parameters.reference());
   Objective objective = bar.objective(parameters);
   const OptimiserSummary s = minimise(objective, parameters.to_unconstrained(parameters.reference()), patient());
@@ -178,9 +189,9 @@ TEST(CarryingModulus, HoldsTheScanUpFromAnyStart) {
   const StruckBar bar(true);
   for (const double start : {1e2, 1e9}) {
     VectorX theta = bar.truth;
-    for (int k = 0; k < 2; ++k) theta[theta::modulus(k, 2, theta.size())] = start;
+    bar.layout.set_moduli(theta, start);
     const double modulus = carrying_modulus(bar.body, bar.options, theta, {});
-    for (int k = 0; k < 2; ++k) theta[theta::modulus(k, 2, theta.size())] = modulus;
+    bar.layout.set_moduli(theta, modulus);
     Simulation simulation(bar.body, bar.options);
     EXPECT_TRUE(simulation.run(theta, [](int, const State&, auto) { return false; }).succeeded) << modulus;
     EXPECT_GT(modulus, 1e4);
@@ -188,7 +199,7 @@ TEST(CarryingModulus, HoldsTheScanUpFromAnyStart) {
   }
   StruckBar heavy(true);
   VectorX theta = heavy.truth;
-  theta[theta::density] = std::numeric_limits<double>::quiet_NaN();
+  theta[heavy.layout.density] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW((void)carrying_modulus(heavy.body, heavy.options, theta, {}), InputError);
 }
 

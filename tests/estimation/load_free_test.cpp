@@ -26,9 +26,10 @@ LoadFree load_free(const Capture& capture, double youngs_modulus) {
   Resolution resolution;
   resolution.element = ElementKind::QuadraticTetrahedron;
   resolution.cells = 8.0;
-  VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
-  theta[theta::youngs_modulus] = youngs_modulus;
-  return find_load_free(capture, resolution, theta);
+  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.surface));
+  VectorX theta = parameters.reference();
+  blocks.motion.set_moduli(theta, youngs_modulus);
+  return find_load_free(capture, resolution, blocks, theta);
 }
 
 TEST(LoadFree, AScannedBarStoodHigherAndSagsBackIntoItsScan) {
@@ -58,8 +59,8 @@ TEST(LoadFree, WhatCannotBeDoneIsRefused) {
   loose.fixed.clear();
   EXPECT_THROW((void)load_free(loose, 1e6), InputError);
   const Capture capture = scanned_bar();
-  const VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
-  EXPECT_THROW((void)find_load_free(capture, Resolution{}, theta), InputError) << "hexahedra";
+  const CaptureParameters p = default_parameters(capture, enclosed_volume(*capture.surface));
+  EXPECT_THROW((void)find_load_free(capture, Resolution{}, p.blocks, p.set.reference()), InputError) << "hexahedra";
 }
 
 }  // namespace

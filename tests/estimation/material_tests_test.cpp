@@ -140,7 +140,7 @@ TEST(MaterialTests, RecoverAFoamFromCurvesWithoutNoise) {
   options.noise = 1e-4;
   const CurveFit fit = fit_curves(tests, options);
   ASSERT_TRUE(fit.succeeded) << fit.failure;
-  ASSERT_EQ(fit.layout.terms, 2);
+  ASSERT_EQ(fit.layout.form().terms, 2);
   const MatrixX& table = fit.law->table();
   for (std::size_t k = 0; k < foam.size(); ++k)
     EXPECT_NEAR(table(0, Eigen::Index(k)) / foam[k], 1.0, tolerance(2e-3)) << k;
@@ -170,7 +170,7 @@ TEST(MaterialTests, PredictModesThatWereNotFitted) {
       seen.push_back(with_noise(seen_of(*truth, TestMode::Equibiaxial, 1.0, 3.0, 40), options.noise, 2));
     const CurveFit fit = fit_curves(seen, options);
     ASSERT_TRUE(fit.succeeded) << fit.failure;
-    EXPECT_EQ(fit.layout.terms, int(parameters.size()) / 3);
+    EXPECT_EQ(fit.layout.form().terms, int(parameters.size()) / 3);
     for (const auto& [mode, to] : {std::pair{TestMode::PureShear, 4.0}, std::pair{TestMode::Equibiaxial, 2.5},
                                    std::pair{TestMode::SimpleShear, 1.0}}) {
       const MaterialTest other = seen_of(*truth, mode, mode == TestMode::SimpleShear ? 0.0 : 1.0, to, 20);
@@ -187,7 +187,7 @@ TEST(MaterialTests, AddNoTermThatTheCurvesDoNotAskFor) {
   options.poissons_ratio = 0.3;
   const CurveFit fit = fit_curves({seen}, options);
   ASSERT_TRUE(fit.succeeded);
-  EXPECT_EQ(fit.layout.terms, 1);
+  EXPECT_EQ(fit.layout.form().terms, 1);
   EXPECT_EQ(fit.tried.size(), 2u);
 }
 

@@ -35,8 +35,8 @@ struct Swing {
   explicit Swing(const SwingOptions& o) {
     Body soft = o.is_of_hexahedra ? *test::box_body({length, edge, 0.75 * edge}, 0.25 * edge)
                                   : *test::tet_body({length, edge, 0.75 * edge}, {8, 2, 2}, false, 0.0);
-    const int controls = int(o.moduli.size());
-    if (controls == 2) soft.modulus = region_field(soft, {[](const Vector3& p) { return p.x() > 0.0; }}).field;
+    layout = MotionLayout({.moduli = int(o.moduli.size())});
+    if (o.moduli.size() == 2) soft.modulus = region_field(soft, {[](const Vector3& p) { return p.x() > 0.0; }}).field;
     body = std::make_shared<Body>(std::move(soft));
     held = held_nodes(*body, {root()});
     SimulationOptions options;
@@ -45,15 +45,16 @@ struct Swing {
     options.max_dt = 1.0 / 960.0 + 1e-9;
     options.holds = {root()};
     options.hold_strongly = true;
-    truth.setZero(theta::size(0, controls));
-    for (int k = 0; k < controls; ++k) truth[theta::modulus(k, controls, truth.size())] = o.moduli[std::size_t(k)];
-    truth[theta::poissons_ratio] = 0.35;
-    truth[theta::mass_damping] = o.mass_damping;
-    truth[theta::stiffness_damping] = o.stiffness_damping;
-    truth[theta::density] = 1000.0;
-    truth.segment<3>(theta::gravity) = Vector3(0, -o.gravity, 0);
-    truth.segment<3>(theta::linear_velocity) = Vector3(0.0, 0.15, 0.3);
-    truth.segment<3>(theta::angular_velocity) = Vector3(8.0, 0.0, 0.0);
+    options.blocks = layout;
+    truth = layout.zero();
+    for (std::size_t k = 0; k < o.moduli.size(); ++k) truth[layout.youngs_moduli[k]] = o.moduli[k];
+    truth[layout.poissons_ratio] = 0.35;
+    truth[layout.mass_damping] = o.mass_damping;
+    truth[layout.stiffness_damping] = o.stiffness_damping;
+    truth[layout.density] = 1000.0;
+    truth.segment<3>(layout.gravity) = Vector3(0, -o.gravity, 0);
+    truth.segment<3>(layout.linear_velocity) = Vector3(0.0, 0.15, 0.3);
+    truth.segment<3>(layout.angular_velocity) = Vector3(8.0, 0.0, 0.0);
     if (o.follows_nodes)
       for (int n = 0; n < body->node_count(); ++n) tracked.rest.push_back(body->nodes.row(n).transpose());
     else
@@ -82,21 +83,22 @@ struct Swing {
   /// From moduli that are off by a factor each.
   ModalStart start(const std::vector<double>& off, const ModalStartOptions& options = {}) const {
     VectorX wrong = truth;
-    for (std::size_t k = 0; k < off.size(); ++k) wrong[theta::modulus(int(k), int(off.size()), truth.size())] *= off[k];
-    wrong[theta::mass_damping] = wrong[theta::stiffness_damping] = 0.0;
-    return modal_start(body, wrong, held, tracked, times, options);
+    for (std::size_t k = 0; k < off.size(); ++k) wrong[layout.youngs_moduli[k]] *= off[k];
+    wrong[layout.mass_damping] = wrong[layout.stiffness_damping] = 0.0;
+    return modal_start(body, layout, wrong, held, tracked, times, options);
   }
 
   std::shared_ptr<const Body> body;
   std::vector<int> held;
   std::vector<double> times;
+  MotionLayout layout;
   VectorX truth;
   TrackedPoints tracked;
 };
 
 /// How far one modulus is from the true one, in the logarithm.
 double log_error_of(const ModalStart& start, const Swing& swing, int k) {
-  return std::log(start.moduli[k] / swing.truth[theta::modulus(k, int(start.moduli.size()), swing.truth.size())]);
+  return std::log(start.moduli[k] / swing.truth[swing.layout.youngs_moduli[std::size_t(k)]]);
 }
 
 /// The farthest of all.
@@ -153,7 +155,7 @@ TEST(ModalStartOf, ABarIsThatOfAnotherMesh) {
   const Swing swing(o);
   const auto body = test::tet_body({length, edge, 0.75 * edge}, {6, 2, 2}, true, 0.1);
   const std::vector<int> held = held_nodes(*body, {Swing::root()});
-  const ModalStart start = modal_start(body, swing.truth, held, swing.tracked, swing.times);
+  const ModalStart start = modal_start(body, swing.layout, swing.truth, held, swing.tracked, swing.times);
   ASSERT_TRUE(start.found) << start.reason;
   EXPECT_LT(log_error(start, swing), tolerance(0.1));
 }
@@ -261,11 +263,12 @@ TEST(ModalStartOf, WhatCannotBeIsToldInWords) {
 /// A free body that flies, tumbles and vibrates in its own modes.
 TEST(ModalStartOf, AFreeBodyFindsItsModulus) {
   const auto body = test::tet_body({0.2, 0.1, 0.12}, {4, 2, 2}, true);
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 3e4;
-  theta[theta::poissons_ratio] = 0.4;
-  theta[theta::density] = 800.0;
-  const Modes own = modes(body, theta, {}, 9);
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 3e4);
+  theta[layout.poissons_ratio] = 0.4;
+  theta[layout.density] = 800.0;
+  const Modes own = modes(body, layout, theta, {}, 9);
   TrackedPoints tracked;
   for (const double x : {-0.09, -0.03, 0.04, 0.09})
     for (const double y : {-0.04, 0.045})
@@ -283,8 +286,8 @@ TEST(ModalStartOf, AFreeBodyFindsItsModulus) {
     for (int p = 0; p < points.point_count(); ++p)
       tracked.frames[f].push_back({p, R * points.position(p, x) + Vector3(0.4 * t, -4.9 * t * t, 0.1), 1e-4});
   }
-  theta[theta::youngs_modulus] = 1e6;
-  const ModalStart start = modal_start(body, theta, {}, tracked, times);
+  layout.set_moduli(theta, 1e6);
+  const ModalStart start = modal_start(body, layout, theta, {}, tracked, times);
   ASSERT_TRUE(start.found) << start.reason;
   EXPECT_NEAR(start.moduli[0] / 3e4, 1.0, tolerance(0.03));
   EXPECT_LT(start.largest_rotation, 0.3);  // the tumbling is taken out
@@ -304,12 +307,13 @@ Points bent(const Points& rest, double kappa) {
 /// Rotation-strain coordinates grow in proportion to the curvature, however far the bar is bent; displacements do not.
 TEST(RotationStrainCoordinates, AreProportionalToABend) {
   const auto body = test::tet_body({length, edge, edge}, {12, 2, 2}, false, 0.0);
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 1e5;
-  theta[theta::poissons_ratio] = 0.3;
-  theta[theta::density] = 1000.0;
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 1e5);
+  theta[layout.poissons_ratio] = 0.3;
+  theta[layout.density] = 1000.0;
   const Hold root{[](const Vector3& p) { return p.x() < -0.5 * length + 1e-6; }};
-  const Modes found = modes(body, theta, held_nodes(*body, {root}), 6);
+  const Modes found = modes(body, layout, theta, held_nodes(*body, {root}), 6);
   std::vector<Vector3> rest;
   for (int n = 0; n < body->node_count(); ++n) rest.push_back(body->nodes.row(n).transpose());
   const std::vector<double> angles = {0.02, 0.5, 1.0, 2.0};  // of the end [rad]

@@ -14,22 +14,23 @@ constexpr double cell_size = 0.05;
 /// A recording seen from other parameters than those that made it.
 struct Scene {
   explicit Scene(int planes) : recording(test::torus_recording(cell_size, 6, planes, 1e-3)) {
+    const MotionLayout& layout = recording.scene.layout;
     VectorX theta = recording.truth;
-    theta[theta::youngs_modulus] *= 1.4;
-    theta[theta::poissons_ratio] = 0.3;
-    theta[theta::mass_damping] *= 1.5;
-    theta[theta::stiffness_damping] *= 0.7;
-    theta[theta::density] *= 1.1;
-    theta.segment<3>(theta::gravity) += Vector3(0.1, 0.2, -0.1);
-    theta.segment<3>(theta::linear_velocity) += Vector3(0.02, -0.03, 0.04);
-    theta.segment<3>(theta::angular_velocity) += Vector3(-0.2, 0.1, 0.1);
-    if (planes > 0) theta.segment<3>(theta::plane_point(0)) += Vector3(0.0, 2e-3, 0.0);
-    parameters = test::torus_parameters(theta, planes);
+    layout.scale_moduli(theta, 1.4);
+    theta[layout.poissons_ratio] = 0.3;
+    theta[layout.mass_damping] *= 1.5;
+    theta[layout.stiffness_damping] *= 0.7;
+    theta[layout.density] *= 1.1;
+    theta.segment<3>(layout.gravity) += Vector3(0.1, 0.2, -0.1);
+    theta.segment<3>(layout.linear_velocity) += Vector3(0.02, -0.03, 0.04);
+    theta.segment<3>(layout.angular_velocity) += Vector3(-0.2, 0.1, 0.1);
+    for (const PlaneBlock& plane : layout.planes) theta.segment<3>(plane.point) += Vector3(0.0, 2e-3, 0.0);
+    parameters = test::torus_parameters(layout, theta);
     std::vector<Parameter> list = parameters.parameters();
     for (Parameter& q : list) q.estimated = true;
     list[1].prior_std = 0.5;
     list[1].prior_mean = VectorX::Zero(1);
-    parameters = ParameterSet(list, theta);
+    parameters = ParameterSet(layout.layout(), list, theta);
     p = parameters.to_unconstrained(theta);
     p.array() += 0.01;
   }

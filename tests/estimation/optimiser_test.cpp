@@ -18,26 +18,32 @@ ParameterSet estimating(const test::Recording& recording, const std::vector<std:
   return set;
 }
 
-VectorX with_modulus(VectorX theta, double factor) {
-  theta[theta::youngs_modulus] *= factor;
+/// The truth with another modulus.
+VectorX with_modulus(const test::Recording& recording, double factor) {
+  VectorX theta = recording.truth;
+  recording.scene.layout.scale_moduli(theta, factor);
   return theta;
+}
+
+double modulus(const test::Recording& recording, const VectorX& theta) {
+  return theta[recording.scene.layout.youngs_moduli[0]];
 }
 
 double fitted_modulus(const test::Recording& recording, double start_factor, const OptimiserOptions& options,
                       OptimiserSummary* out = nullptr) {
-  const ParameterSet set = estimating(recording, {"youngs_modulus"}, with_modulus(recording.truth, start_factor));
+  const ParameterSet set = estimating(recording, {"youngs_modulus"}, with_modulus(recording, start_factor));
   Objective objective = recording.objective(set, 0.033);
   const OptimiserSummary summary = minimise(objective, set.to_unconstrained(set.reference()), options);
   EXPECT_TRUE(summary.succeeded) << summary.reason;
   EXPECT_LE(summary.evaluation.cost, summary.start_cost);
   if (out) *out = summary;
-  return set.to_theta(summary.p)[theta::youngs_modulus];
+  return modulus(recording, set.to_theta(summary.p));
 }
 
 /// An inverse crime on purpose: the fitting model made the data, so the truth has to come back.
 TEST(LevenbergMarquardt, RecoversTheModulusOfItsOwnModelFromFarOff) {
   const test::Recording recording = test::torus_recording(cell_size, 9, 1, 0.0, 1, 40, 0.0, 1.0, 1e-10);
-  const double truth = recording.truth[theta::youngs_modulus];
+  const double truth = modulus(recording, recording.truth);
   for (const double start : {0.3, 3.0}) {
     OptimiserSummary summary;
     const double found = fitted_modulus(recording, start, {}, &summary);
@@ -52,17 +58,18 @@ TEST(LevenbergMarquardt, RecoversTheModulusOfAFinerModel) {
   test::Recording recording = test::torus_recording(0.0245, 10, 1, 0.5e-3, 2, 40, 0.0163, 0.25, 1e-8);
   recording.scene.options.max_dt *= 0.5;  // about the step and the cells that a fit takes by default
   OptimiserSummary summary;
-  const double found = fitted_modulus(recording, 0.8, {}, &summary) / recording.truth[theta::youngs_modulus];
+  const double found = fitted_modulus(recording, 0.8, {}, &summary) / modulus(recording, recording.truth);
   RecordProperty("ratio", std::to_string(found));
   EXPECT_NEAR(found, 1.0, tolerance(0.05));
 }
 
 TEST(LevenbergMarquardt, RecoversSeveralParametersTogether) {
   const test::Recording recording = test::torus_recording(cell_size, 9, 1, 0.0, 1, 40, 0.0, 1.0, 1e-10);
-  VectorX start = with_modulus(recording.truth, 0.8);
-  start[theta::stiffness_damping] *= 1.5;
-  start.segment<3>(theta::linear_velocity) += Vector3(0.03, -0.03, 0.03);
-  start.segment<3>(theta::plane_point(0)) += Vector3(0.0, 2e-3, 0.0);
+  VectorX start = with_modulus(recording, 0.8);
+  const MotionLayout& layout = recording.scene.layout;
+  start[layout.stiffness_damping] *= 1.5;
+  start.segment<3>(layout.linear_velocity) += Vector3(0.03, -0.03, 0.03);
+  start.segment<3>(layout.planes[0].point) += Vector3(0.0, 2e-3, 0.0);
   const ParameterSet set =
       estimating(recording, {"youngs_modulus", "stiffness_damping", "linear_velocity", "plane"}, start);
   Objective objective = recording.objective(set, 0.033);
@@ -71,8 +78,8 @@ TEST(LevenbergMarquardt, RecoversSeveralParametersTogether) {
   const OptimiserSummary summary = minimise(objective, set.to_unconstrained(start), options);
   ASSERT_TRUE(summary.succeeded);
   const VectorX theta = set.to_theta(summary.p);
-  EXPECT_NEAR(theta[theta::youngs_modulus] / recording.truth[theta::youngs_modulus], 1.0, tolerance(0.05));
-  EXPECT_LT((theta - recording.truth).segment<3>(theta::linear_velocity).norm(), tolerance(0.01));
+  EXPECT_NEAR(modulus(recording, theta) / modulus(recording, recording.truth), 1.0, tolerance(0.05));
+  EXPECT_LT((theta - recording.truth).segment<3>(layout.linear_velocity).norm(), tolerance(0.01));
   EXPECT_LT(summary.evaluation.cost, 0.05 * summary.start_cost);
 }
 
@@ -86,7 +93,7 @@ TEST_P(BaselineOptimiser, LowersTheCostAndComesClose) {
   OptimiserSummary summary;
   const double found = fitted_modulus(recording, 2.0, options, &summary);
   EXPECT_LT(summary.evaluation.cost, 0.1 * summary.start_cost);
-  EXPECT_NEAR(found / recording.truth[theta::youngs_modulus], 1.0, tolerance(0.03));
+  EXPECT_NEAR(found / modulus(recording, recording.truth), 1.0, tolerance(0.03));
   EXPECT_FALSE(summary.reason.empty());
 }
 
@@ -117,7 +124,7 @@ TEST_P(BaselineOptimiser, AStartThatIsNoNumberFailsWithAReason) {
 TEST_P(BaselineOptimiser, BacksOffFromStepsThatCannotBeSimulated) {
   test::Recording recording = test::torus_recording(cell_size, 6, 0, 0.0, 1, 40, 0.0, 1.0, 1e-10);
   recording.scene.options.max_dt = 1.0;  // a step a frame: the stiffness weighs more
-  const VectorX start = with_modulus(recording.truth, 0.25);
+  const VectorX start = with_modulus(recording, 0.25);
   ParameterSet set = estimating(recording, {"youngs_modulus"}, start);
   const VectorX p = set.to_unconstrained(start);
   int allowed = 5;
@@ -146,7 +153,7 @@ TEST_P(BaselineOptimiser, BacksOffFromStepsThatCannotBeSimulated) {
 
 TEST_P(BaselineOptimiser, StopsWhenTold) {
   const test::Recording recording = test::torus_recording(cell_size, 6, 1, 0.0, 1, 40, 0.0, 1.0, 1e-8);
-  const ParameterSet set = estimating(recording, {"youngs_modulus"}, with_modulus(recording.truth, 3.0));
+  const ParameterSet set = estimating(recording, {"youngs_modulus"}, with_modulus(recording, 3.0));
   Objective objective = recording.objective(set);
   OptimiserOptions options;
   options.kind = GetParam();
@@ -163,8 +170,7 @@ TEST_P(BaselineOptimiser, StopsWhenTold) {
 
 TEST_P(BaselineOptimiser, GoesOnFromAnyIterationAlongTheSamePath) {
   const test::Recording recording = test::torus_recording(cell_size, 6, 1, 0.0, 1, 40, 0.0, 1.0, 1e-8);
-  const ParameterSet set =
-      estimating(recording, {"youngs_modulus", "stiffness_damping"}, with_modulus(recording.truth, 3.0));
+  const ParameterSet set = estimating(recording, {"youngs_modulus", "stiffness_damping"}, with_modulus(recording, 3.0));
   OptimiserOptions options;
   options.kind = GetParam();
   options.max_iterations = 6;
@@ -191,10 +197,13 @@ TEST_P(BaselineOptimiser, GoesOnFromAnyIterationAlongTheSamePath) {
 class BoundedQuadratic : public CostFunction {
  public:
   BoundedQuadratic(MatrixX H, VectorX b) : H_(std::move(H)), b_(std::move(b)) {
+    ParameterLayout layout;
     std::vector<Parameter> list;
-    for (int i = 0; i < b_.size(); ++i)
-      list.push_back({std::string(1, char('x' + i)), "1", Transform::Shift, i, 1.0, -1.0, 1.0, true});
-    set_ = ParameterSet(std::move(list), VectorX::Zero(b_.size()));
+    for (int i = 0; i < b_.size(); ++i) {
+      const std::string name(1, char('x' + i));
+      list.push_back({name, "1", Transform::Shift, layout.add({name, "1"}), 1.0, -1.0, 1.0, true});
+    }
+    set_ = ParameterSet(std::move(layout), std::move(list), VectorX::Zero(b_.size()));
   }
   const ParameterSet& parameters() const override { return set_; }
   CostEvaluation evaluate(const VectorX& x) override {
@@ -250,8 +259,7 @@ TEST(LevenbergMarquardt, DampingOfLongStepsLetsWhatIsKnownArrive) {
 
 TEST(NelderMead, FindsTheMinimumThatLevenbergAndMarquardtFind) {
   const test::Recording recording = test::torus_recording(cell_size, 6, 1, 1e-3, 1, 40, 0.0, 1.0, 1e-10);
-  const ParameterSet set =
-      estimating(recording, {"youngs_modulus", "stiffness_damping"}, with_modulus(recording.truth, 1.8));
+  const ParameterSet set = estimating(recording, {"youngs_modulus", "stiffness_damping"}, with_modulus(recording, 1.8));
   OptimiserOptions options;
   options.max_iterations = 200;
   options.cost_tolerance = 1e-10;

@@ -25,8 +25,8 @@ struct PressedLayers : ::testing::Test {
       presses.push_back(more);
     auto layered = std::make_shared<Body>(*block.body);
     layered->modulus = zone_field(block.body->modulus, zones_after(zone_coordinates(*block.body), {border}), 2);
-    const PressTheta two{2, 1, 2};
-    VectorX truth = with_zone({1, 1}, press_parameters({1, 1}, {"youngs_modulus"}, 12000.0).reference(), 0);
+    const LawLayout one({1, 1}), two({2, 1, 2});
+    VectorX truth = with_zone(one, law_parameters(one, 12000.0).reference(), two, 0);
     truth[two.modulus(1)] = 5000.0;
     truth[two.exponent(0, 1)] = -6.0;
     law = press_law(*layered, two, truth);
@@ -76,11 +76,11 @@ TEST_F(PressedLayers, OfOneLawEachWhereTheCaptureNamesThem) {
   folder.write("capture.toml", text);
   const PressFitOutcome fit = fit_presses(read_capture(capture.file), {});
   ASSERT_TRUE(fit.succeeded) << fit.reason;
-  EXPECT_EQ(fit.layout.laws, 2);
+  EXPECT_EQ(fit.layout.form().laws, 2);
   const Parameter* exponent = fit.parameters.find("exponent_1@top");
   ASSERT_TRUE(exponent);
-  EXPECT_NEAR(fit.theta[exponent->theta_index], -6.0, 1.5);
-  EXPECT_NEAR(fit.theta[fit.parameters.find("youngs_modulus@top")->theta_index], 5000.0, 300.0);
+  EXPECT_NEAR(fit.theta[exponent->at], -6.0, 1.5);
+  EXPECT_NEAR(fit.theta[fit.parameters.find("youngs_modulus@top")->at], 5000.0, 300.0);
 }
 
 TEST_F(PressedLayers, AFitIsResumedWhereItWasInterrupted) {
@@ -142,7 +142,8 @@ TEST_F(PressedLayers, AreSampledPressByPress) {
 TEST(PressFit, RefusesACaptureWithoutPressesToFit) {
   const TemporaryFolder folder;
   const PressedBlock block;
-  const auto law = press_law(*block.body, {1, 1}, press_parameters({1, 1}, {"youngs_modulus"}, 9000.0).reference());
+  const LawLayout layout({1, 1});
+  const auto law = press_law(*block.body, layout, law_parameters(layout, 9000.0).reference());
   const Capture capture =
       read_capture(write_press_capture(folder.path(), block.scene({PressedBlock::presses()[0]}, law), 1));
   EXPECT_THROW(fit_presses(capture, {}), InputError);

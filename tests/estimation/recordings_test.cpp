@@ -1,9 +1,11 @@
 // Several recordings in one objective, and sensors that need correction.
-#include "support/recordings.hpp"
+#include "estimation/recordings.hpp"
 
 #include "estimation/corrections.hpp"
 #include "estimation/optimiser.hpp"
+#include "geometry/primitives.hpp"
 #include "support/derivatives.hpp"
+#include "support/recordings.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant {
@@ -14,44 +16,62 @@ using test::tolerance;
 constexpr double outlier_scale = 0.03;
 const Vector3 centre(0.01, 0.02, -0.01);
 
+/// The parameters of a flight that one sensor sees.
+struct OneFlight {
+  ParameterLayout layout;
+  CaptureBlocks blocks{add_motion_blocks(layout, {}), {add_sensor_blocks(layout, "front")}};
+};
+
 /// Two flights of one torus seen by sensors whose range and pose are a little off.
 struct TwoFlights {
   TwoFlights() {
-    VectorX theta;
     for (const unsigned seed : {1u, 2u}) {
       test::Recording r = test::torus_recording(0.05, 5, 0, 1e-3, seed);
-      r.scene.options.sensors = 1;
       for (FrameObservations& frame : *r.observations)
         for (SurfaceObservation& o : frame.points) o.view = (o.position - Vector3(0, 0, 2)).normalized();
       ObservedMotion motion{{r.constraints, nullptr, centre}, r.scene.body, r.scene.options, r.observations, {}};
       motion.options.outlier_scale = outlier_scale;
       motion.options.last_frame = 4;
       motions.push_back(motion);
-      one_theta.setZero(theta::size(0, 1, 0, 1));
-      one_theta.head(r.truth.size()) = r.truth;
-      theta.conservativeResize(theta.size() + one_theta.size());
-      theta.tail(one_theta.size()) = one_theta;
+      one_theta = carry(r.scene.layout.layout(), r.truth, one.layout, VectorX::Zero(one.layout.size()));
     }
-    const int other = int(one_theta.size()), sensor = theta::sensor(0, 0, 0);
-    list = {{"youngs_modulus", "Pa", Transform::Logarithm, theta::youngs_modulus, 1.0, 1.0, 1e7, true}};
-    list[0].also = {other + theta::youngs_modulus};
-    for (const int offset : {0, other}) {
-      const std::string number = offset > 0 ? "[2]" : "";
-      list.push_back({"linear_velocity" + number, "m/s", Transform::Vector, offset + theta::linear_velocity, 0.5});
-      list.push_back({"range_error@front" + number, "m", Transform::Shift, offset + sensor, 0.1});
-      list.push_back({"sensor_turn@front" + number, "rad", Transform::Vector, offset + sensor + 1});
-      list.push_back({"sensor_shift@front" + number, "m", Transform::Vector, offset + sensor + 4, 0.1});
+    const ParameterSet alone(one.layout, {}, one_theta);
+    joint = join({{alone, one.blocks}, {alone, one.blocks}}, true);
+    theta = VectorX::Zero(joint.layout.size());
+    list = {{"youngs_modulus", "Pa", Transform::Logarithm, joint.layout.at("youngs_modulus"), 1.0, 1.0, 1e7, true}};
+    for (const std::size_t r : {0u, 1u}) {
+      for (const ParameterBlock& block : one.layout.blocks()) {
+        const ParameterHandle own = one.layout.at(block.name), at = joint.layout.at(joint.name_of(block.name, r));
+        theta.segment(at, at.size) = one_theta.segment(own, own.size);
+      }
+      const CaptureBlocks& blocks = joint.blocks[r];
+      const SensorBlocks& front = blocks.sensors.front();
+      motions[r].simulation.blocks = blocks.motion;
+      motions[r].mismatch.sensors = blocks.sensors;
+      const std::string number = r > 0 ? "[2]" : "";
+      list.push_back({"linear_velocity" + number, "m/s", Transform::Vector, blocks.motion.linear_velocity, 0.5});
+      list.push_back({"range_error@front" + number, "m", Transform::Shift, front.range_error, 0.1});
+      list.push_back({"sensor_turn@front" + number, "rad", Transform::Vector, front.turn});
+      list.push_back({"sensor_shift@front" + number, "m", Transform::Vector, front.shift, 0.1});
     }
     for (Parameter& q : list) {
       q.estimated = true;
       if (q.name.starts_with("sensor")) q.prior_std = 0.05, q.prior_mean = VectorX::Zero(3);
     }
-    parameters = ParameterSet(list, theta);
+    parameters = ParameterSet(joint.layout, list, theta);
     p = parameters.to_unconstrained(theta);
     for (Eigen::Index i = 0; i < p.size(); ++i) p[i] += 0.02 * std::sin(1.0 + 2.0 * double(i));
   }
-  std::vector<ObservedMotion> motions;
+  /// Of the first flight, at these values.
+  double cost_of_first(const VectorX& at) const {
+    return Objective({motions[0]}, ParameterSet(joint.layout, {}, at)).evaluate(VectorX(0)).cost;
+  }
+
+  OneFlight one;
   VectorX one_theta;
+  std::vector<ObservedMotion> motions;
+  JointLayout joint;
+  VectorX theta;  ///< the truth of both
   std::vector<Parameter> list;
   ParameterSet parameters;
   VectorX p;
@@ -90,13 +110,16 @@ TEST(SeveralRecordings, CostsAddUp) {
   const VectorX theta = scene.parameters.to_theta(scene.p);
   double sum = scene.parameters.prior(scene.p);
   for (std::size_t r = 0; r < 2; ++r) {
-    const VectorX own = r == 0 ? theta.head(theta.size() / 2) : theta.tail(theta.size() / 2);
-    const double cost = Objective({scene.motions[r]}, ParameterSet({}, own)).evaluate(VectorX(0)).cost;
+    ObservedMotion alone = scene.motions[r];
+    alone.simulation.blocks = scene.one.blocks.motion;
+    alone.mismatch.sensors = scene.one.blocks.sensors;
+    const ParameterSet own(scene.one.layout, {}, scene.joint.part(theta, r));
+    const double cost = Objective({alone}, own).evaluate(VectorX(0)).cost;
     EXPECT_NEAR(both.of_recording(int(r)).cost, cost, tolerance(1e-12) * cost);
     sum += cost;
   }
   EXPECT_NEAR(both.cost, sum, tolerance(1e-12) * sum);
-  EXPECT_THROW(Objective(scene.motions, ParameterSet({}, scene.one_theta)), std::invalid_argument);
+  EXPECT_THROW(Objective(scene.motions, ParameterSet(scene.joint.layout, {}, scene.one_theta)), std::invalid_argument);
 }
 
 /// Points that were moved as a bad sensor moves them cost what the true ones cost once the sensor is corrected.
@@ -104,7 +127,7 @@ TEST(Sensors, ACorrectionUndoesTheSensorsError) {
   TwoFlights scene;
   SensorCorrection::Values values;
   values << 0.0, 0.02, -0.01, 0.03, 4e-3, -2e-3, 1e-3;
-  const double before = Objective({scene.motions[0]}, ParameterSet({}, scene.one_theta)).evaluate(VectorX(0)).cost;
+  const double before = scene.cost_of_first(scene.theta);
   auto moved = std::make_shared<std::vector<FrameObservations>>(*scene.motions[0].observations);
   const SensorCorrection wrong(centre, values);
   const Vector3 shift = values.tail<3>(), turn = values.segment<3>(1);
@@ -114,12 +137,11 @@ TEST(Sensors, ACorrectionUndoesTheSensorsError) {
       o.position = centre + R.transpose() * (o.position - centre - shift);
     }
   scene.motions[0].observations = moved;
-  const double spoiled = Objective({scene.motions[0]}, ParameterSet({}, scene.one_theta)).evaluate(VectorX(0)).cost;
+  const double spoiled = scene.cost_of_first(scene.theta);
   EXPECT_GT(spoiled, 2.0 * before);
-  VectorX theta = scene.one_theta;
-  theta.segment<SensorCorrection::size>(theta::sensor(0, 0, 0)) = values;
-  EXPECT_NEAR(Objective({scene.motions[0]}, ParameterSet({}, theta)).evaluate(VectorX(0)).cost, before,
-              tolerance(1e-9) * before);
+  VectorX theta = scene.theta;
+  scene.joint.blocks[0].sensors[0].add(values, theta);
+  EXPECT_NEAR(scene.cost_of_first(theta), before, tolerance(1e-9) * before);
 }
 
 /// What a correction would gain is what minimising the quadratic model with it gains over minimising it without.
@@ -131,12 +153,13 @@ TEST(Corrections, TheScoreTestPredictsTheFallOfAQuadraticCost) {
   e.gauss_newton = A;
   e.gradient.resize(3);
   e.gradient << 0.0, 50.0, -10.0;
-  const auto parameter = [](const char* name, int index) {
-    return Parameter{name, "m", Transform::Shift, index, 1.0, -1.0, 1.0, true};
-  };
-  const ParameterSet parameters(
-      {parameter("youngs_modulus", 0), parameter("range_error@left", 1), parameter("range_error@right", 2)},
-      VectorX::Zero(3));
+  ParameterLayout layout;
+  std::vector<Parameter> list;
+  for (const std::string name : {"youngs_modulus", "range_error@left", "range_error@right"}) {
+    const Role role = list.empty() ? Role::Material : Role::Sensor;
+    list.push_back({name, "m", Transform::Shift, layout.add({name, "m", 1, role}), 1.0, -1.0, 1.0, true});
+  }
+  const ParameterSet parameters(layout, list, VectorX::Zero(3));
   const std::vector<Correction> both = {{"left", {"range_error@left"}}, {"right", {"range_error@right"}}};
   const auto needed = needed_corrections(e, parameters, both, 100.0);
   ASSERT_EQ(needed.size(), 1u) << "beside the first, the second gains too little";
@@ -154,7 +177,7 @@ TEST(Corrections, WhatTheUserDecidedAboutIsLeftAlone) {
   const TwoFlights scene;
   std::vector<Parameter> list = scene.list;
   for (Parameter& p : list) p.estimated = p.name == "youngs_modulus";
-  const ParameterSet none(list, scene.parameters.reference());
+  const ParameterSet none(scene.joint.layout, list, scene.parameters.reference());
   EXPECT_EQ(possible_corrections(none, {}).size(), 4u) << "range and pose of two sensors";
   EXPECT_EQ(possible_corrections(none, {"range_error"}).size(), 2u);
   EXPECT_EQ(possible_corrections(none, {"sensor_turn@front[2]"}).size(), 3u);
@@ -166,7 +189,7 @@ TEST(Corrections, OnlyTheSensorThatStandsElsewhereNeedsCorrection) {
   TwoFlights scene;
   std::vector<Parameter> list = scene.list;
   for (Parameter& p : list) p.estimated = p.name == "youngs_modulus";
-  ParameterSet without(list, scene.parameters.reference());
+  ParameterSet without(scene.joint.layout, list, scene.parameters.reference());
   const auto look = [&](const std::vector<ObservedMotion>& motions) {
     Objective objective(motions, without);
     const OptimiserSummary s = minimise(objective, without.to_unconstrained(without.reference()), {});
@@ -188,6 +211,106 @@ TEST(Corrections, OnlyTheSensorThatStandsElsewhereNeedsCorrection) {
     for (SurfaceObservation& o : frame.points) o.position += Vector3(4e-3, -2e-3, 1e-3);
   scene.motions[1].observations = moved;
   EXPECT_EQ(look(scene.motions), std::vector<std::string>{"the pose of front[2]"});
+}
+
+/// Two captures of one object of two materials over a floor, each seen as clouds.
+struct TwoCaptures : ::testing::Test {
+  TwoCaptures() {
+    Capture capture;
+    capture.surface = make_box(Vector3(0.3, 0.1, 0.1), 0.1);
+    capture.density = 300.0;
+    capture.times = {0.0, 0.1};
+    capture.planes.resize(1);
+    capture.clouds = {{{"cloud.ply"}, 1, 1e-3}};
+    capture.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+    recordings = {{capture, {}}, {capture, {}}};
+  }
+  JointLayout joint(const FitOptions& options = {}) const { return joint_layout(recordings, options, 2); }
+  std::vector<RecordedCapture> recordings;
+};
+
+TEST_F(TwoCaptures, ShareTheMaterialAndHaveTheirOwnStartPlanesAndSensors) {
+  const JointLayout joint = this->joint();
+  for (const std::string shared :
+       {"youngs_modulus", "youngs_modulus@beyond", "poisson_ratio", "mass_damping", "stiffness_damping"}) {
+    EXPECT_TRUE(joint.layout.contains(shared)) << shared;
+    EXPECT_FALSE(joint.layout.contains(shared + "[2]")) << shared;
+  }
+  for (const std::string own : {"gravity", "linear_velocity", "angular_velocity", "plane", "range_error@clouds",
+                                "sensor_turn@clouds", "sensor_shift@clouds"}) {
+    EXPECT_TRUE(joint.layout.contains(own)) << own;
+    EXPECT_TRUE(joint.layout.contains(own + "[2]")) << own;
+  }
+  ASSERT_EQ(joint.blocks.size(), 2u);
+  const CaptureBlocks &first = joint.blocks[0], &second = joint.blocks[1];
+  EXPECT_EQ(first.motion.youngs_moduli, second.motion.youngs_moduli);
+  EXPECT_EQ(first.motion.poissons_ratio, second.motion.poissons_ratio);
+  EXPECT_EQ(first.motion.mass_damping, second.motion.mass_damping);
+  EXPECT_EQ(first.motion.stiffness_damping, second.motion.stiffness_damping);
+  EXPECT_EQ(second.motion.gravity, joint.layout.at("gravity[2]"));
+  EXPECT_EQ(second.motion.linear_velocity, joint.layout.at("linear_velocity[2]"));
+  EXPECT_EQ(second.motion.angular_velocity, joint.layout.at("angular_velocity[2]"));
+  EXPECT_EQ(second.motion.planes[0].whole(), joint.layout.at("plane[2]"));
+  EXPECT_EQ(second.motion.planes[0].normal.first, second.motion.planes[0].point.first + 3);
+  EXPECT_EQ(first.motion.planes[0].whole(), joint.layout.at("plane"));
+  EXPECT_EQ(second.sensors[0].range_error, joint.layout.at("range_error@clouds[2]"));
+  EXPECT_EQ(second.sensors[0].turn, joint.layout.at("sensor_turn@clouds[2]"));
+  EXPECT_EQ(first.sensors[0].shift, joint.layout.at("sensor_shift@clouds"));
+  EXPECT_EQ(joint.layout.size(), 2 * joint.own[0].size() - 5) << "the material's numbers are there once";
+}
+
+TEST_F(TwoCaptures, ShareADensityWhereItIsEstimatedOrTheUserNamesIt) {
+  const auto is_shared = [&](const FitOptions& options = {}) {
+    const JointLayout joint = this->joint(options);
+    EXPECT_EQ(joint.blocks[0].motion.density == joint.blocks[1].motion.density, !joint.layout.contains("density[2]"));
+    return !joint.layout.contains("density[2]");
+  };
+  EXPECT_FALSE(is_shared());
+  FitOptions named;
+  named.parameters["density"].start = VectorX::Constant(1, 250.0);
+  EXPECT_TRUE(is_shared(named));
+  for (RecordedCapture& r : recordings) {
+    r.capture.density.reset();
+    r.capture.initial.released = true;
+    r.capture.initial.release_of = Weight{0.02, Vector3(0.3, 0.0, 0.0)};
+  }
+  EXPECT_TRUE(is_shared()) << "it is estimated";
+}
+
+TEST_F(TwoCaptures, ArePartsOfTheirVector) {
+  const JointLayout joint = this->joint();
+  const VectorX theta = VectorX::LinSpaced(joint.layout.size(), 1.0, joint.layout.size());
+  for (const std::size_t r : {0u, 1u}) {
+    const VectorX part = joint.part(theta, r);
+    ASSERT_EQ(part.size(), joint.own[r].size());
+    for (const ParameterBlock& block : joint.own[r].blocks()) {
+      const ParameterHandle own = joint.own[r].at(block.name), at = joint.layout.at(joint.name_of(block.name, r));
+      EXPECT_EQ(part.segment(own, own.size), theta.segment(at, at.size)) << block.name;
+    }
+  }
+  EXPECT_EQ(joint.name_of("plane", 0), "plane");
+  EXPECT_EQ(joint.name_of("plane", 1), "plane[2]");
+  EXPECT_EQ(joint.name_of("youngs_modulus", 1), "youngs_modulus");
+  EXPECT_THROW((void)joint.part(theta.head(3), 0), std::invalid_argument);
+}
+
+/// A number of control moduli is chosen on the way: all else stays.
+TEST_F(TwoCaptures, KeepAllButTheModuliWhereThereAreOthers) {
+  for (RecordedCapture& r : recordings) r.capture.regions.clear();
+  const JointLayout from = joint_layout(recordings, {}, 2), to = joint_layout(recordings, {}, 3);
+  const VectorX theta = VectorX::LinSpaced(from.layout.size(), 1.0, from.layout.size());
+  const Vector3 moduli(1e3, 2e3, 3e3);
+  const VectorX changed = with_moduli(from, theta, to, moduli);
+  for (std::size_t r = 0; r < 2; ++r) {
+    EXPECT_EQ(to.blocks[r].motion.moduli(changed), moduli);
+    const auto same = [&](const ParameterHandle& before, const ParameterHandle& after) {
+      return theta.segment(before, before.size) == changed.segment(after, after.size);
+    };
+    EXPECT_TRUE(same(from.blocks[r].motion.linear_velocity, to.blocks[r].motion.linear_velocity));
+    EXPECT_TRUE(same(from.blocks[r].motion.planes[0].whole(), to.blocks[r].motion.planes[0].whole()));
+    EXPECT_TRUE(same(from.blocks[r].motion.density, to.blocks[r].motion.density));
+    EXPECT_TRUE(same(from.blocks[r].sensors[0].shift, to.blocks[r].sensors[0].shift));
+  }
 }
 
 }  // namespace

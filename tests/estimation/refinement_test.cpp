@@ -68,7 +68,9 @@ TEST(Refinement, MeshAndStepAreTakenToTheirLimitsTogether) {
     const double p = std::log(1000.0) + 0.3 * std::pow(12.0 / s.cells, 2) + 0.05 / (s.steps * s.steps);
     return RefinedEstimate{s.cells, s.steps, 0, VectorX::Constant(1, std::exp(p)), 0.0, true, ""};
   };
-  const ParameterSet parameters({{"youngs_modulus", "Pa", Transform::Logarithm, 0, 1.0, 1.0, 1e9, true}},
+  ParameterLayout layout;
+  const ParameterHandle modulus = layout.add({"youngs_modulus", "Pa"});
+  const ParameterSet parameters(layout, {{"youngs_modulus", "Pa", Transform::Logarithm, modulus, 1.0, 1.0, 1e9, true}},
                                 VectorX::Constant(1, 1.0));
   std::vector<RefinedEstimate> estimates{estimate({12.0, 1.0})};
   for (const Spacing& s : refined_spacings({12.0, 1.0}, 2, true, true)) estimates.push_back(estimate(s));

@@ -29,13 +29,14 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
   for (int f = 0; f < frames_seen; ++f) capture.times.push_back(f / 30.0);
   capture.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
   capture.clouds = {{{"cloud.ply"}, 1, noise}};
-  VectorX theta = default_parameters(capture, enclosed_volume(*capture.surface)).reference();
-  theta[theta::youngs_modulus] = modulus;
-  theta[theta::mass_damping] = 0.4;
-  theta[theta::stiffness_damping] = 4e-3;
+  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.surface));
+  VectorX theta = parameters.reference();
+  blocks.motion.set_moduli(theta, modulus);
+  theta[blocks.motion.mass_damping] = 0.4;
+  theta[blocks.motion.stiffness_damping] = 4e-3;
   Resolution resolution;
   resolution.cells = 16.0, resolution.steps = 2.0;
-  const Discretisation d = discretise(capture, capture_distance(capture, 0.2), resolution, theta);
+  const Discretisation d = discretise(capture, capture_distance(capture, 0.2), resolution, blocks, theta);
   const Embedding embedding(*d.body, capture.surface->vertices);
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
@@ -67,7 +68,7 @@ FitOptions quick(TrackingUse tracking) {
   return options;
 }
 
-double found(const FitOutcome& outcome) { return outcome.theta[theta::youngs_modulus]; }
+double found(const FitOutcome& outcome) { return outcome.theta[outcome.parameters.find("youngs_modulus")->at]; }
 
 TEST(TrackingLoop, LeadsToTheModulusFromOneTenTimesOff) {
   for (const double wrong : {0.1, 10.0}) {
@@ -215,10 +216,11 @@ TEST(TrackingLoop, GoesOnUntilNoModulusChanges) {
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
   const std::vector<TrackingRound>& rounds = outcome.tracking->rounds;
   ASSERT_EQ(rounds.size(), 2u) << "the modulus beyond has changed, though the first one has not";
+  const ParameterLayout& layout = outcome.parameters.layout();
   double before = wrong * modulus;
   for (const TrackingRound& round : rounds) {
-    EXPECT_EQ(round.theta[theta::youngs_modulus], modulus);
-    const double now = round.theta[theta::modulus(1, 2, round.theta.size())];
+    EXPECT_EQ(round.theta[layout.at("youngs_modulus")], modulus);
+    const double now = round.theta[layout.at("youngs_modulus@beyond")];
     EXPECT_NEAR(round.change, std::abs(std::log(now / before)), 1e-12);
     before = now;
   }
@@ -256,8 +258,8 @@ TEST(SupportedPoints, AreThoseAboutWhichPointsWereSeen) {
   const auto distance = capture_distance(bar.capture, 0.2);
   Resolution resolution;
   resolution.cells = 8.0;
-  const VectorX theta = default_parameters(bar.capture, enclosed_volume(*bar.capture.surface)).reference();
-  track.body = discretise(bar.capture, distance, resolution, theta).body;
+  const CaptureParameters p = default_parameters(bar.capture, enclosed_volume(*bar.capture.surface));
+  track.body = discretise(bar.capture, distance, resolution, p.blocks, p.set.reference()).body;
   track.marks = {Vector3(0.1, 0.0, 0.02), Vector3(-0.1, 0.01, 0.0)};
   TrackedFrame frame;
   frame.nodes = track.body->nodes.rowwise() + Eigen::RowVector3d(0.0, 0.5, 0.0);

@@ -28,14 +28,14 @@ struct SwingingBar {
     options.solver.tolerance = 1e-13;
     options.newton.tolerance = 1e-13;
     options.holds = {{[](const Vector3& p) { return p.x() < -0.1 + 1e-6; }}};
-    truth.setZero(theta::size(0, 3));
+    options.blocks = layout;
     const Vector3 moduli(4e4, 2e4, 6e4);
-    for (int k = 0; k < 3; ++k) truth[theta::modulus(k, 3, truth.size())] = moduli[k];
-    truth[theta::poissons_ratio] = 0.4;
-    truth[theta::mass_damping] = 0.5;
-    truth[theta::stiffness_damping] = 2e-3;
-    truth[theta::density] = 1000.0;
-    truth.segment<3>(theta::gravity) = Vector3(0, -9.81, 0);
+    for (int k = 0; k < 3; ++k) truth[modulus(k)] = moduli[k];
+    truth[layout.poissons_ratio] = 0.4;
+    truth[layout.mass_damping] = 0.5;
+    truth[layout.stiffness_damping] = 2e-3;
+    truth[layout.density] = 1000.0;
+    truth.segment<3>(layout.gravity) = Vector3(0, -9.81, 0);
     std::vector<Vector3> rest;
     for (int n = 0; n < body->node_count(); ++n) rest.push_back(body->nodes.row(n).transpose());
     tracks = std::make_shared<PointTracks>(*body, rest);
@@ -55,15 +55,15 @@ struct SwingingBar {
     observations = frames;
     std::vector<Parameter> list;
     for (int k = 0; k < 3; ++k)
-      list.push_back({"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm,
-                      theta::modulus(k, 3, truth.size()), 1.0, 1.0, 1e9, true});
-    list.push_back({"mass_damping", "1/s", Transform::Logarithm, theta::mass_damping, 1.0, 1e-4, 1e3, !is_static});
+      list.push_back(
+          {"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm, modulus(k), 1.0, 1.0, 1e9, true});
+    list.push_back({"mass_damping", "1/s", Transform::Logarithm, layout.mass_damping, 1.0, 1e-4, 1e3, !is_static});
     list.push_back(
-        {"stiffness_damping", "s", Transform::Logarithm, theta::stiffness_damping, 1.0, 1e-6, 1.0, !is_static});
+        {"stiffness_damping", "s", Transform::Logarithm, layout.stiffness_damping, 1.0, 1e-6, 1.0, !is_static});
     VectorX start = truth;
-    for (int k = 0; k < 3; ++k) start[theta::modulus(k, 3, truth.size())] = 3e4 * (1.0 + 0.3 * k);
-    if (!is_static) start[theta::mass_damping] *= 2.0, start[theta::stiffness_damping] *= 0.4;
-    parameters = ParameterSet(std::move(list), start);
+    for (int k = 0; k < 3; ++k) start[modulus(k)] = 3e4 * (1.0 + 0.3 * k);
+    if (!is_static) start[layout.mass_damping] *= 2.0, start[layout.stiffness_damping] *= 0.4;
+    parameters = ParameterSet(layout.layout(), std::move(list), start);
   }
   Objective objective() const {
     ObjectiveOptions o;
@@ -71,11 +71,13 @@ struct SwingingBar {
     o.last_frame = int(options.times.size()) - 1;
     return {{nullptr, tracks}, body, options, observations, parameters, o};
   }
+  ParameterHandle modulus(int control) const { return layout.youngs_moduli[std::size_t(control)]; }
   VectorX start() const { return parameters.to_unconstrained(parameters.reference()); }
 
   std::shared_ptr<const Body> body;
+  MotionLayout layout{{.moduli = 3}};
   SimulationOptions options;
-  VectorX truth;
+  VectorX truth = layout.zero();
   std::shared_ptr<const PointTracks> tracks;
   std::shared_ptr<const std::vector<FrameObservations>> observations;
   ParameterSet parameters;
@@ -120,7 +122,7 @@ TEST_P(FollowedPoints, LeadBackToTheModuliAndDampings) {
   const VectorX found = bar.parameters.to_theta(summary.p);
   for (const Parameter& p : bar.parameters.parameters())
     if (p.estimated) {
-      EXPECT_NEAR(found[p.theta_index] / bar.truth[p.theta_index], 1.0, tolerance(0.01)) << p.name;
+      EXPECT_NEAR(found[p.at] / bar.truth[p.at], 1.0, tolerance(0.01)) << p.name;
     }
 }
 
@@ -141,8 +143,7 @@ TEST(FollowedPointsWithNoise, LeadToTheModuliWithinTheirDeviations) {
   const VectorX std = 2.0 * H.inverse().diagonal().cwiseSqrt();
   const VectorX found = bar.parameters.to_theta(summary.p);
   for (int k = 0; k < 3; ++k) {
-    const int index = theta::modulus(k, 3, found.size());
-    EXPECT_LT(std::abs(std::log(found[index] / bar.truth[index])), tolerance(3.0 * std[k])) << k;
+    EXPECT_LT(std::abs(std::log(found[bar.modulus(k)] / bar.truth[bar.modulus(k)])), tolerance(3.0 * std[k])) << k;
   }
   EXPECT_LT(std[0], 0.1);
   EXPECT_GT(std[2], 3.0 * std[0]);

@@ -139,11 +139,12 @@ SphereErrors errors_of(HexGrid grid) {
   body->add_mass_product(1.0, X, moment);
   const double volume = 4.0 / 3.0 * pi * std::pow(radius, 3);
   const double inertia = volume * radius * radius / 5.0;  // second moment about a plane through the centre
-  const auto owned = make_elasticity(body);
+  const MotionLayout layout;
+  const auto owned = make_elasticity(body, layout);
   Elasticity& elasticity = *owned;
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 1.0;
-  theta[theta::poissons_ratio] = nu;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 1.0);
+  theta[layout.poissons_ratio] = nu;
   elasticity.set_parameters(theta);
   elasticity.linearise(X);
   Points z = X;
@@ -236,11 +237,12 @@ struct Conditioning {
 
 Conditioning conditioning_of(HexGrid grid) {
   const auto body = std::make_shared<Body>(make_body(std::move(grid)));
-  const auto owned = make_elasticity(body);
+  const MotionLayout layout;
+  const auto owned = make_elasticity(body, layout);
   Elasticity& elasticity = *owned;
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 1.0;
-  theta[theta::poissons_ratio] = 0.3;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 1.0);
+  theta[layout.poissons_ratio] = 0.3;
   elasticity.set_parameters(theta);
   elasticity.linearise(body->reference_positions());
   BlockMatrix A(body->pattern);

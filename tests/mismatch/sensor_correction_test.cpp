@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
@@ -49,6 +51,40 @@ TEST_P(AtTurn, JacobianMatchesCentralDifferences) {
 }
 
 INSTANTIATE_TEST_SUITE_P(FromNoneToALot, AtTurn, ::testing::Values(0.0, 1e-5, 1e-3, 1.0, 5.0));
+
+struct TwoSensors : ::testing::Test {
+  ParameterLayout layout;
+  SensorBlocks left = add_sensor_blocks(layout, "left"), right = add_sensor_blocks(layout, "right");
+};
+
+TEST_F(TwoSensors, HaveBlocksOfTheirOwn) {
+  EXPECT_EQ(layout.size(), 2 * SensorCorrection::size);
+  EXPECT_EQ(right.range_error, layout.at("range_error@right"));
+  EXPECT_EQ(right.turn, layout.at("sensor_turn@right"));
+  EXPECT_EQ(right.shift, layout.at("sensor_shift@right"));
+  for (const ParameterHandle& block : left.all()) EXPECT_EQ(layout.block_of(block).role, Role::Sensor);
+  EXPECT_THROW(add_sensor_blocks(layout, "left"), std::invalid_argument);
+}
+
+TEST_F(TwoSensors, ReadAndAddTheirValuesInTheOrderOfTheCorrection) {
+  VectorX theta = VectorX::Zero(layout.size());
+  right.add(somewhere(), theta);
+  right.add(somewhere(), theta);
+  EXPECT_EQ(right.values(theta), 2.0 * somewhere());
+  EXPECT_EQ(left.values(theta), SensorCorrection::Values::Zero());
+  EXPECT_EQ(theta[layout.at("range_error@right")], 2.0 * somewhere()[0]);
+  EXPECT_EQ(right.rows(theta), theta.tail(SensorCorrection::size)) << "rows of a matrix likewise";
+}
+
+TEST_F(TwoSensors, MoveWithTheirLayout) {
+  ParameterLayout after;
+  after.add({"before", "1", 5});
+  const SensorBlocks expected = add_sensor_blocks(after, "left");
+  const SensorBlocks moved = left.moved([](const ParameterHandle& handle) {
+    return ParameterHandle{handle.first + 5, handle.size};
+  });
+  EXPECT_EQ(moved.all(), expected.all());
+}
 
 }  // namespace
 }  // namespace pliant

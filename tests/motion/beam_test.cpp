@@ -23,16 +23,17 @@ enum class Clamp { Strong, Nitsche };
 struct Beam {
   Beam(double cell, Clamp clamp, double nu, HexFormulation formulation = HexFormulation::IncompatibleModes)
       : body(test::box_body(Vector3(length, edge, edge), cell, {formulation, MassKind::Consistent})), K(body->pattern) {
-    VectorX theta = VectorX::Zero(theta::size(0));
-    theta[theta::youngs_modulus] = modulus;
-    theta[theta::poissons_ratio] = nu;
+    const MotionLayout layout;
+    VectorX theta = layout.zero();
+    layout.set_moduli(theta, modulus);
+    theta[layout.poissons_ratio] = nu;
     const Hold root{[](const Vector3& p) { return p.x() < near_root; }};
-    const auto elasticity = make_elasticity(body);
+    const auto elasticity = make_elasticity(body, layout);
     elasticity->set_parameters(theta);
     elasticity->linearise(body->reference_positions());
     elasticity->add_matrix(1.0, K);
     if (clamp == Clamp::Nitsche) {
-      FixedRegions fixed(body, {root});
+      FixedRegions fixed(body, {root}, layout);
       fixed.set_parameters(theta);
       fixed.add_matrix(1.0, K);
     } else {
@@ -179,10 +180,11 @@ TEST(Clamps, HoldInADisplacedPose) {
   Hold hold{[](const Vector3& p) { return p.x() < near_root; }};
   hold.rotation = Eigen::AngleAxisd(1.1, Vector3(1, 2, 3).normalized()).toRotationMatrix();
   hold.translation = Vector3(0.3, -0.1, 0.2);
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = modulus;
-  theta[theta::poissons_ratio] = 0.3;
-  FixedRegions fixed(body, {hold});
+  const MotionLayout layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, modulus);
+  theta[layout.poissons_ratio] = 0.3;
+  FixedRegions fixed(body, {hold}, layout);
   fixed.set_parameters(theta);
   const Points& X = body->reference_positions();
   const Points moved = (X * hold.rotation.transpose()).rowwise() + hold.translation.transpose();

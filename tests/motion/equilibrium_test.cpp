@@ -15,14 +15,14 @@ using namespace test::hanging;
 TEST(Equilibrium, SmallDeflectionsFollowBeamTheory) {
   for (const auto& body : {quadratic_bar(), hex_bar()}) {
     Hanging bar(body);
-    bar.theta.segment<3>(theta::gravity) *= 1e-3;
+    bar.theta.segment<3>(bar.layout.gravity) *= 1e-3;
     EXPECT_NEAR(-bar.tip(bar.positions(bar.theta)).z() / bar.slender_deflection(0.3), 1.0, tolerance(0.02));
   }
 }
 
 TEST(Equilibrium, ForcesBalance) {
   Hanging bar(quadratic_bar());
-  bar.theta[theta::youngs_modulus] = 3e5;
+  bar.layout.set_moduli(bar.theta, 3e5);
   const Points x = bar.positions(bar.theta);
   EXPECT_LT(bar.tip(x).z(), -0.3 * length) << "a large deflection";
   // The potential cannot be lowered: the residual's own convergence is tested by Newton's method, so look from outside.
@@ -33,7 +33,7 @@ TEST(Equilibrium, ForcesBalance) {
 TEST(Equilibrium, TurnedClampTurnsTheBody) {
   for (const auto& body : {quadratic_bar(16, 1), hex_bar()}) {
     Hanging bar(body);
-    bar.theta.segment<3>(theta::gravity).setZero();
+    bar.theta.segment<3>(bar.layout.gravity).setZero();
     const Matrix3 R = Eigen::AngleAxisd(2.5, Vector3(1, 2, -1).normalized()).toRotationMatrix();
     bar.options.holds[0].rotation = R;
     bar.options.holds[0].translation = Vector3(0.3, 0.1, -0.2);
@@ -44,7 +44,7 @@ TEST(Equilibrium, TurnedClampTurnsTheBody) {
 
 TEST(Equilibrium, TwistedBarShortensNothingAndTwistsEvenly) {
   Hanging bar(quadratic_bar(16, 2));
-  bar.theta.segment<3>(theta::gravity).setZero();
+  bar.theta.segment<3>(bar.layout.gravity).setZero();
   const double angle = std::numbers::pi / 2;
   bar.options.holds.push_back({[](const Vector3& p) { return p.x() > 0.5 * length - 1e-6; },
                                Eigen::AngleAxisd(angle, Vector3::UnitX()).toRotationMatrix(), Vector3::Zero()});
@@ -66,20 +66,21 @@ TEST(Equilibrium, SaysWhenTheMaterialCannotHoldItselfUp) {
   EXPECT_NE(summary.failure.find("no equilibrium"), std::string::npos);
 }
 
-class EquilibriumDerivatives : public ::testing::TestWithParam<std::tuple<int, bool>> {};
+/// A number of the parameter vector of a bar over a plane, and whether the bar is of hexahedra.
+class EquilibriumDerivatives : public ::testing::TestWithParam<std::tuple<Eigen::Index, bool>> {};
 
 TEST_P(EquilibriumDerivatives, TangentAndAdjointMatchCentralDifferences) {
   const auto [index, hexahedra] = GetParam();
   Hanging bar(hexahedra ? test::box_body({length, edge, edge}, edge) : quadratic_bar(8, 1));
   bar.options.weights = {{Vector3(0.5 * length, 0.0, 0.0), 0.02}};
-  bar.options.planes = 1;
-  VectorX theta = VectorX::Zero(theta::size(1));
-  theta.head(theta::size(0)) = bar.theta;
-  theta.segment<3>(theta::plane_normal(0)) = Vector3(0.1, 0.05, 1.0).normalized();
-  theta.segment<3>(theta::plane_point(0)) = Vector3(0.0, 0.0, -0.12);  // the end lies on it
+  bar.set_blocks({.planes = 1});
+  VectorX& theta = bar.theta;
+  theta.segment<3>(bar.layout.planes[0].normal) = Vector3(0.1, 0.05, 1.0).normalized();
+  theta.segment<3>(bar.layout.planes[0].point) = Vector3(0.0, 0.0, -0.12);  // the end lies on it
   bar.options.contact = {2e6, 5e-4};
   VectorX direction = VectorX::Zero(theta.size());
-  direction[index] = index < theta::first_plane ? std::max(std::abs(theta[index]), 1.0) : 0.01;
+  const bool is_of_plane = bar.layout.layout().block_of({int(index), 1}).role == Role::Obstacle;
+  direction[index] = is_of_plane ? 0.01 : std::max(std::abs(theta[index]), 1.0);
   Simulation simulation(bar.body, bar.options);
   VectorX tangent;
   const RolloutSummary summary = simulation.run(
@@ -101,11 +102,13 @@ TEST_P(EquilibriumDerivatives, TangentAndAdjointMatchCentralDifferences) {
   EXPECT_NEAR(theta_bar.dot(direction), by_tangent, tolerance(1e-8) * weight.norm() * tangent.norm());
 }
 
+const MotionLayout over_plane({.planes = 1});
+
 INSTANTIATE_TEST_SUITE_P(Parameters, EquilibriumDerivatives,
-                         ::testing::Combine(::testing::Values(int(theta::youngs_modulus), int(theta::poissons_ratio),
-                                                              int(theta::density), theta::gravity + 1,
-                                                              theta::gravity + 2, theta::plane_point(0) + 2,
-                                                              theta::plane_normal(0)),
+                         ::testing::Combine(::testing::Values(over_plane.youngs_moduli[0], over_plane.poissons_ratio,
+                                                              over_plane.density, over_plane.gravity + 1,
+                                                              over_plane.gravity + 2, over_plane.planes[0].point + 2,
+                                                              over_plane.planes[0].normal),
                                             ::testing::Bool()));
 
 }  // namespace

@@ -15,14 +15,20 @@ using test::Family;
 using test::ForceTerms;
 using test::pulls;
 using test::tolerance;
+using Handles = std::vector<ParameterHandle>;
 
-std::vector<int> range(int first, int count) {
-  std::vector<int> all;
-  for (int i = 0; i < count; ++i) all.push_back(first + i);
+Handles of_material(const MotionBlocks& blocks) {
+  Handles all = blocks.youngs_moduli;
+  return all.push_back(blocks.poissons_ratio), all;
+}
+Handles of_plane(const MotionBlocks& blocks) { return {blocks.planes[1].whole()}; }
+Handles of_pulls(const MotionBlocks& blocks) {
+  Handles all = blocks.pulls;
+  all.insert(all.end(), blocks.youngs_moduli.begin(), blocks.youngs_moduli.end());
   return all;
 }
-
-const int first_of_more_moduli = theta::pull(pulls, 2);
+Handles of_weight(const MotionBlocks& blocks) { return {blocks.density, blocks.gravity}; }
+Handles of_gravity(const MotionBlocks& blocks) { return {blocks.gravity}; }
 
 std::shared_ptr<const Body> small_torus() { return test::torus_body(0.1, 0.04, 0.05); }
 
@@ -34,28 +40,27 @@ std::shared_ptr<const Body> with_three_moduli(Body body) {
 }
 
 std::vector<Family> families() {
-  std::vector<int> gravity = range(theta::gravity, 3);
-  gravity.push_back(theta::density);
-  const auto elastic = [](std::string name, std::function<std::shared_ptr<const Body>()> body,
-                          std::vector<int> parameters) {
-    return Family{std::move(name),      std::move(body), [](auto of) { return make_elasticity(of); }, true, true,
-                  std::move(parameters)};
+  const auto elastic = [](std::string name, std::function<std::shared_ptr<const Body>()> body) {
+    return Family{std::move(name),
+                  std::move(body),
+                  [](auto of, const MotionBlocks& blocks) { return make_elasticity(of, blocks); },
+                  true,
+                  true,
+                  of_material};
   };
   std::vector<Family> list;
+  for (const test::BodyKind& kind : test::body_kinds()) list.push_back(elastic("ElasticityOf" + kind.name, kind.make));
   for (const test::BodyKind& kind : test::body_kinds())
-    list.push_back(elastic("ElasticityOf" + kind.name, kind.make, {theta::youngs_modulus, theta::poissons_ratio}));
-  for (const test::BodyKind& kind : test::body_kinds())
-    list.push_back(
-        elastic("ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); },
-                {theta::youngs_modulus, theta::poissons_ratio, first_of_more_moduli, first_of_more_moduli + 1}));
+    list.push_back(elastic("ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); }));
   const auto box = [](bool quadratic) {
     return [quadratic] { return test::tet_body({0.24, 0.1, 0.24}, {3, 2, 3}, quadratic); };
   };
-  const auto contact = [](auto body) { return std::make_unique<PlaneContact>(body, 1, ContactOptions{2e5, 0.01}); };
-  list.push_back({"PlaneContactOfTetrahedra", box(false), contact, true, true, range(theta::plane_point(1), 6)});
-  list.push_back(
-      {"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, range(theta::plane_point(1), 6)});
-  const auto pull = [](auto body) {
+  const auto contact = [](auto body, const MotionBlocks& blocks) {
+    return std::make_unique<PlaneContact>(body, blocks.planes[1], ContactOptions{2e5, 0.01});
+  };
+  list.push_back({"PlaneContactOfTetrahedra", box(false), contact, true, true, of_plane});
+  list.push_back({"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, of_plane});
+  const auto pull = [](auto body, const MotionBlocks& blocks) {
     std::vector<int> held;
     std::vector<Vector3> all, there;
     for (int n = 0; n < body->node_count(); ++n) {
@@ -64,38 +69,32 @@ std::vector<Family> families() {
       held.push_back(n);
       there.push_back(all.back());
     }
-    return std::make_unique<Pull>(body, PullPoints{far_points(all, there, pulls), body->size()}, held,
-                                  theta::pull(0, 2));
+    return std::make_unique<Pull>(body, PullPoints{far_points(all, there, pulls), body->size()}, held, blocks);
   };
-  list.push_back({"Pull", box(true), pull, false, false, [] {
-                    std::vector<int> all = range(theta::pull(0, 2), 3 * pulls);
-                    return all.push_back(theta::youngs_modulus), all;
-                  }()});
-  list.push_back({"PullOfThreeModuli", [] { return with_three_moduli(*small_torus()); }, pull, false, false,
-                  [] {
-                    std::vector<int> all = range(theta::pull(0, 2), 3 * pulls + 2);
-                    return all.push_back(theta::youngs_modulus), all;
-                  }()});
+  list.push_back({"Pull", box(true), pull, false, false, of_pulls});
+  list.push_back({"PullOfThreeModuli", [] { return with_three_moduli(*small_torus()); }, pull, false, false, of_pulls});
   const std::vector<Family> others = {
-      {"Gravity", small_torus, [](auto body) { return std::make_unique<Gravity>(*body); }, false, false, gravity},
+      {"Gravity", small_torus,
+       [](auto body, const MotionBlocks& blocks) { return std::make_unique<Gravity>(*body, blocks); }, false, false,
+       of_weight},
       {"HungWeights", small_torus,
-       [](auto body) {
+       [](auto body, const MotionBlocks& blocks) {
          return std::make_unique<HungWeights>(
-             *body, std::vector<HungWeight>{{Vector3(0.1, 0.0, 0.01), 0.2}, {Vector3(-0.12, 0.01, 0.0), 0.05}});
+             *body, std::vector<HungWeight>{{Vector3(0.1, 0.0, 0.01), 0.2}, {Vector3(-0.12, 0.01, 0.0), 0.05}},
+             blocks.gravity);
        },
-       false, false, range(theta::gravity, 3)},
-      {"PlaneContact", small_torus, contact, true, true, range(theta::plane_point(1), 6)},
-      {"FixedRegions",
-       small_torus,
-       [](auto body) {
+       false, false, of_gravity},
+      {"PlaneContact", small_torus, contact, true, true, of_plane},
+      {"FixedRegions", small_torus,
+       [](auto body, const MotionBlocks& blocks) {
          const Matrix3 R = Eigen::AngleAxisd(0.8, Vector3(1, -1, 2).normalized()).toRotationMatrix();
          return std::make_unique<FixedRegions>(
-             body, std::vector<Hold>{{[](const Vector3& p) { return p.x() > 0.07; }, R, Vector3(0.02, 0.01, -0.03)},
-                                     {[](const Vector3& p) { return p.z() < -0.08; }}});
+             body,
+             std::vector<Hold>{{[](const Vector3& p) { return p.x() > 0.07; }, R, Vector3(0.02, 0.01, -0.03)},
+                               {[](const Vector3& p) { return p.z() < -0.08; }}},
+             blocks);
        },
-       false,
-       true,
-       {theta::youngs_modulus, theta::poissons_ratio}}};
+       false, true, of_material}};
   list.insert(list.end(), others.begin(), others.end());
   return list;
 }
@@ -106,13 +105,14 @@ INSTANTIATE_TEST_SUITE_P(All, ForceTerms, ::testing::ValuesIn(families()),
 /// The battery's contact sees both sides of the switch, and pulls nowhere.
 TEST(PlaneContact, PushesOutwardsOnBothSidesOfItsSwitch) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
-  PlaneContact contact(body, 0, {2e5, 0.001});
-  VectorX theta = VectorX::Zero(theta::size(1));
-  theta.segment<3>(theta::plane_normal(0)) = Vector3::UnitY();
+  const MotionLayout layout({.planes = 1});
+  PlaneContact contact(body, layout.planes[0], {2e5, 0.001});
+  VectorX theta = layout.zero();
+  theta.segment<3>(layout.planes[0].normal) = Vector3::UnitY();
   const Points& X = body->reference_positions();
   double last = 0.0;
   for (const double height : {-0.1, -0.045, -0.035, -0.02, 0.0}) {
-    theta.segment<3>(theta::plane_point(0)) = Vector3(0, height, 0);
+    theta.segment<3>(layout.planes[0].point) = Vector3(0, height, 0);
     contact.set_parameters(theta);
     contact.linearise(X);
     Points f = Points::Zero(X.rows(), 3);
@@ -130,21 +130,23 @@ TEST(PlaneContact, PushesOutwardsOnBothSidesOfItsSwitch) {
 
 TEST(PlaneContact, RefusesNoStiffness) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
-  EXPECT_THROW(PlaneContact(body, 0, {0.0, 0.01}), std::invalid_argument);
-  EXPECT_THROW(PlaneContact(body, 0, {1.0, 0.0}), std::invalid_argument);
+  const MotionLayout layout({.planes = 1});
+  EXPECT_THROW(PlaneContact(body, layout.planes[0], {0.0, 0.01}), std::invalid_argument);
+  EXPECT_THROW(PlaneContact(body, layout.planes[0], {1.0, 0.0}), std::invalid_argument);
 }
 
 TEST(FixedRegions, RefusesARegionBesideTheObject) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
-  EXPECT_ANY_THROW(FixedRegions(body, {{[](const Vector3& p) { return p.x() > 1.0; }}}));
+  EXPECT_ANY_THROW(FixedRegions(body, {{[](const Vector3& p) { return p.x() > 1.0; }}}, MotionLayout()));
 }
 
 TEST(Gravity, PullsWithTheWeight) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
-  Gravity gravity(*body);
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::density] = 80.0;
-  theta.segment<3>(theta::gravity) = Vector3(1, -2, 3);
+  const MotionLayout layout;
+  Gravity gravity(*body, layout);
+  VectorX theta = layout.zero();
+  theta[layout.density] = 80.0;
+  theta.segment<3>(layout.gravity) = Vector3(1, -2, 3);
   gravity.set_parameters(theta);
   Points f = Points::Zero(body->node_count(), 3);
   gravity.add_force(body->reference_positions(), f);

@@ -25,11 +25,11 @@ struct WeightedBar : ::testing::TestWithParam<std::tuple<ElementKind, Integrator
     options.newton.tolerance = 1e-13;
     options.solver.kind = SolverKind::Simplicial;
     options.weights = {{Vector3(0.5 * length, 0.01, 0.5 * edge), 0.3}};  // off the nodes
-    theta.setZero(theta::size(0));
-    theta[theta::youngs_modulus] = 1e5;
-    theta[theta::poissons_ratio] = 0.3;
-    theta[theta::density] = 500.0;  // 0.25 kg
-    theta.segment<3>(theta::gravity) << 0.4, -0.3, -9.81;
+    options.blocks = layout;
+    layout.set_moduli(theta, 1e5);
+    theta[layout.poissons_ratio] = 0.3;
+    theta[layout.density] = 500.0;  // 0.25 kg
+    theta.segment<3>(layout.gravity) << 0.4, -0.3, -9.81;
   }
   void clamp() {
     options.holds = {{[](const Vector3& p) { return p.x() < -0.5 * length + 1e-6; }}};
@@ -50,8 +50,9 @@ struct WeightedBar : ::testing::TestWithParam<std::tuple<ElementKind, Integrator
   }
 
   std::shared_ptr<const Body> body;
+  MotionLayout layout;
   SimulationOptions options;
-  VectorX theta;
+  VectorX theta = layout.zero();
 };
 
 /// What falls freely feels no weight: the body stays in shape only where a hung mass is as inert as it is heavy.
@@ -59,7 +60,7 @@ TEST_P(WeightedBar, FallsFreelyInShape) {
   const VectorX x = last_positions(theta);
   const double t = options.times.back();
   const Points expected =
-      body->reference_positions().rowwise() + (0.5 * t * t * theta::vector_at(theta, theta::gravity)).transpose();
+      body->reference_positions().rowwise() + (0.5 * t * t * layout.gravity.vector(theta)).transpose();
   EXPECT_LT((as_points(x) - expected).cwiseAbs().maxCoeff(), tolerance(1e-11));
 }
 
@@ -69,9 +70,9 @@ TEST_P(WeightedBar, SwingsAsItsDeflectionSays) {
   clamp();
   const Vector3 at(0.5 * length, 0.0, 0.0);  // on the axis: off it the weight would swing lengthwise too
   options.weights = {{at, 0.3}};
-  theta.segment<3>(theta::gravity) << 0.0, 0.0, -9.81;
-  theta[theta::youngs_modulus] = 1e7;
-  theta[theta::density] = 0.6;
+  theta.segment<3>(layout.gravity) << 0.0, 0.0, -9.81;
+  layout.set_moduli(theta, 1e7);
+  theta[layout.density] = 0.6;
   options.is_static = true;
   const double deflection = at.z() - height(last_positions(theta), at);
   ASSERT_GT(deflection, 1e-4);
@@ -89,8 +90,8 @@ TEST_P(WeightedBar, SwingsAsItsDeflectionSays) {
 
 TEST_P(WeightedBar, DerivativesMatchDifferencesAndEachOther) {
   clamp();
-  theta[theta::mass_damping] = 0.7;
-  theta[theta::stiffness_damping] = 0.002;
+  theta[layout.mass_damping] = 0.7;
+  theta[layout.stiffness_damping] = 0.002;
   const int last = int(options.times.size()) - 1;
   Simulation simulation(body, options);
   const Points weight = test::deformed(body->reference_positions(), 0.3);
@@ -102,8 +103,9 @@ TEST_P(WeightedBar, DerivativesMatchDifferencesAndEachOther) {
       },
       gradient);
   ASSERT_TRUE(summary.succeeded) << summary.failure;
-  for (const int index : {int(theta::youngs_modulus), int(theta::mass_damping), int(theta::stiffness_damping),
-                          int(theta::density), int(theta::gravity), theta::linear_velocity + 1}) {
+  for (const Eigen::Index index : {Eigen::Index(layout.youngs_moduli[0]), Eigen::Index(layout.mass_damping),
+                                   Eigen::Index(layout.stiffness_damping), Eigen::Index(layout.density),
+                                   Eigen::Index(layout.gravity), layout.linear_velocity + 1}) {
     VectorX direction = VectorX::Zero(theta.size());
     direction[index] = theta[index] != 0.0 ? std::abs(theta[index]) : 1.0;
     VectorX tangent;
@@ -128,7 +130,7 @@ TEST(Stepper, RefusesCarriedPointsWithoutMasses) {
   const auto body = test::box_body({length, edge, edge}, edge);
   StepOptions options;
   options.dt = 0.01;
-  Stepper stepper(body, {}, options);
+  Stepper stepper(body, {}, MotionLayout(), options);
   EXPECT_THROW(stepper.carry(Embedding(*body, {Vector3::Zero()}), {}), std::invalid_argument);
 }
 

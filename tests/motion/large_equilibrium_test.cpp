@@ -11,8 +11,8 @@ using test::tolerance;
 /// The tip's small deflection over that of theory, with Poisson's ratio 0.49.
 double nearly_incompressible_deflection(std::shared_ptr<const Body> body) {
   Hanging bar(std::move(body));
-  bar.theta[theta::poissons_ratio] = 0.49;
-  bar.theta.segment<3>(theta::gravity) *= 1e-3;
+  bar.theta[bar.layout.poissons_ratio] = 0.49;
+  bar.theta.segment<3>(bar.layout.gravity) *= 1e-3;
   return -bar.tip(bar.positions(bar.theta)).z() / bar.slender_deflection(0.49);
 }
 
@@ -43,9 +43,9 @@ TEST(Equilibrium, LargeDeflectionFollowsTheElastica) {
     const auto body = quadratic ? test::tet_body({length, 0.036, thickness}, {60, 2, 2}, true, 0.0)
                                 : test::box_body({length, 0.036, thickness}, thickness / 2);
     Hanging bar(body);
-    bar.theta[theta::poissons_ratio] = 0.0;
-    bar.theta[theta::density] = 1e-6;
-    const double EI = bar.theta[theta::youngs_modulus] * 0.036 * std::pow(thickness, 3) / 12.0;
+    bar.theta[bar.layout.poissons_ratio] = 0.0;
+    bar.theta[bar.layout.density] = 1e-6;
+    const double EI = bar.theta[bar.layout.youngs_moduli[0]] * 0.036 * std::pow(thickness, 3) / 12.0;
     bar.options.weights = {{Vector3(0.5 * length, 0, 0), 2.0 * EI / (length * length) / 9.81}};
     const Points x = bar.positions(bar.theta);
 

@@ -48,11 +48,13 @@ LetGo let_go(const std::shared_ptr<const Body>& body, const std::shared_ptr<cons
   options.integrator = Integrator::Newton;
   options.newton.tolerance = 1e-10;
   options.holds = {Hold{[](const Vector3& p) { return p.x() < -0.199; }}};
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = modulus;
-  theta[theta::poissons_ratio] = nu;
-  theta[theta::density] = density;
-  theta.segment<3>(theta::linear_velocity) = speed * Vector3(1.0, 0.5, 0.0);
+  const MotionLayout layout;
+  options.blocks = layout;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, modulus);
+  theta[layout.poissons_ratio] = nu;
+  theta[layout.density] = density;
+  theta.segment<3>(layout.linear_velocity) = speed * Vector3(1.0, 0.5, 0.0);
   Simulation simulation(body, options);
   LetGo result;
   double first = 0.0;

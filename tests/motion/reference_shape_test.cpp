@@ -18,7 +18,7 @@ using test::hanging::length;
 struct Sagging : Hanging {
   Sagging(bool quadratic, double youngs_modulus)
       : Hanging(test::tet_body({length, edge, edge}, Eigen::Vector3i(24, 2, 2) / (quadratic ? 2 : 1), quadratic, 0.0)) {
-    theta[theta::youngs_modulus] = youngs_modulus;
+    layout.set_moduli(theta, youngs_modulus);
     straight = body->nodes;
     sagged = positions(theta);
     TetMesh mesh = std::get<TetMesh>(body->mesh);
@@ -41,8 +41,8 @@ TEST_P(ReferenceShapes, ASaggingBarWasStraight) {
     const Sagging scene(GetParam(), youngs_modulus);
     const double sag = (scene.sagged - scene.straight).rowwise().norm().maxCoeff();
     ASSERT_GT(sag, 0.02 * length);
-    ReferenceShapeSolver solver(scene.scanned, scene.held);
-    const ReferenceShape shape = solver.find(scene.theta, scan_load(*scene.scanned, scene.theta, {}));
+    ReferenceShapeSolver solver(scene.scanned, scene.held, scene.layout);
+    const ReferenceShape shape = solver.find(scene.theta, scan_load(*scene.scanned, scene.layout, scene.theta, {}));
     ASSERT_TRUE(shape.found) << shape.reason;
     EXPECT_LT(shape.residual, 1e-7);
     EXPECT_EQ(shape.carried, 1.0);
@@ -53,8 +53,8 @@ TEST_P(ReferenceShapes, ASaggingBarWasStraight) {
 /// Under its weight the body that was found sags back into the scan.
 TEST_P(ReferenceShapes, TheShapeSagsBackIntoTheScan) {
   Sagging scene(GetParam(), 1e6);
-  ReferenceShapeSolver solver(scene.scanned, scene.held);
-  const ReferenceShape shape = solver.find(scene.theta, scan_load(*scene.scanned, scene.theta, {}));
+  ReferenceShapeSolver solver(scene.scanned, scene.held, scene.layout);
+  const ReferenceShape shape = solver.find(scene.theta, scan_load(*scene.scanned, scene.layout, scene.theta, {}));
   ASSERT_TRUE(shape.found) << shape.reason;
   scene.body = std::make_shared<Body>(with_reference(*scene.scanned, shape.X));
   scene.options.holds = {{[&](const Vector3& p) { return p.x() < -0.5 * length + 1e-6; }}};
@@ -65,21 +65,22 @@ TEST_P(ReferenceShapes, TheShapeSagsBackIntoTheScan) {
 /// A material too soft for any shape to hold the scan is refused, with what it can carry.
 TEST_P(ReferenceShapes, AMaterialThatCannotCarryTheBodyIsNamed) {
   const Sagging scene(GetParam(), 1e6);
+  const ParameterHandle modulus = scene.layout.youngs_moduli[0];
   VectorX soft = scene.theta;
-  soft[theta::youngs_modulus] = 3e4;
-  ReferenceShapeSolver solver(scene.scanned, scene.held);
-  const Points load = scan_load(*scene.scanned, soft, {});
+  soft[modulus] = 3e4;
+  ReferenceShapeSolver solver(scene.scanned, scene.held, scene.layout);
+  const Points load = scan_load(*scene.scanned, scene.layout, soft, {});
   const ReferenceShape shape = solver.find(soft, load);
   EXPECT_FALSE(shape.found);
   EXPECT_THAT(shape.reason, ::testing::HasSubstr("carries"));
   EXPECT_LT(shape.carried, 1.0);
   ASSERT_GT(shape.carried, 0.0);
   VectorX enough = soft;
-  enough[theta::youngs_modulus] /= 0.9 * shape.carried;
-  EXPECT_TRUE(solver.find(enough, load).found) << enough[theta::youngs_modulus];
+  enough[modulus] /= 0.9 * shape.carried;
+  EXPECT_TRUE(solver.find(enough, load).found) << enough[modulus];
   VectorX little = soft;
-  little[theta::youngs_modulus] *= 0.94 / shape.carried;
-  EXPECT_FALSE(solver.find(little, load).found) << little[theta::youngs_modulus];
+  little[modulus] *= 0.94 / shape.carried;
+  EXPECT_FALSE(solver.find(little, load).found) << little[modulus];
   EXPECT_LT(shape.iterations, 130);  // a few for each part of the load that is tried, not many for one that is hopeless
 }
 
@@ -87,8 +88,8 @@ TEST_P(ReferenceShapes, TangentAndAdjointAreTheDerivative) {
   const Sagging scene(GetParam(), 6e5);
   ReferenceShapeOptions options;
   options.tolerance = 1e-12;
-  ReferenceShapeSolver solver(scene.scanned, scene.held, options);
-  const Points load = scan_load(*scene.scanned, scene.theta, {});
+  ReferenceShapeSolver solver(scene.scanned, scene.held, scene.layout, options);
+  const Points load = scan_load(*scene.scanned, scene.layout, scene.theta, {});
   const Points d_load = test::deformed(load, 0.3, 0.8) * 0.1;
   const auto along = [&](double step) -> VectorX {
     const ReferenceShape shape = solver.find(scene.theta, load + step * d_load);
@@ -111,19 +112,19 @@ INSTANTIATE_TEST_SUITE_P(Tetrahedra, ReferenceShapes, ::testing::Bool(),
 
 TEST(ReferenceShape, WhatNothingHoldsIsRefused) {
   const Sagging scene(false, 1e6);
-  EXPECT_THROW(ReferenceShapeSolver(scene.scanned, {}), InputError);
+  EXPECT_THROW(ReferenceShapeSolver(scene.scanned, {}, scene.layout), InputError);
 }
 
 /// The rivals find the same shape where they find one.
 TEST(ReferenceShape, OtherSchemesAgree) {
   const Sagging scene(false, 3e6);
-  const Points load = scan_load(*scene.scanned, scene.theta, {});
+  const Points load = scan_load(*scene.scanned, scene.layout, scene.theta, {});
   for (const auto scheme : {ReferenceScheme::VirtualForce, ReferenceScheme::Newton}) {
     ReferenceShapeOptions options;
     options.scheme = scheme;
     options.tolerance = 1e-8;
     options.max_iterations = 3000;
-    ReferenceShapeSolver solver(scene.scanned, scene.held, options);
+    ReferenceShapeSolver solver(scene.scanned, scene.held, scene.layout, options);
     const ReferenceShape shape = solver.find(scene.theta, load);
     ASSERT_TRUE(shape.found) << shape.reason;
     EXPECT_LT((shape.X - scene.straight).rowwise().norm().maxCoeff(), 1e-4 * length);

@@ -17,13 +17,13 @@ constexpr int last = test::released::last;
 
 enum class HeldBy { Pulls, Weight };
 
-/// A parameter of theta, the elements, the integrator, and what holds the object until it is let go.
-class Release : public ::testing::TestWithParam<std::tuple<int, ElementKind, Integrator, HeldBy>> {
+/// A number of the parameter vector, the elements, the integrator, and what holds the object until it is let go.
+class Release : public ::testing::TestWithParam<std::tuple<Eigen::Index, ElementKind, Integrator, HeldBy>> {
  protected:
   Release() {
     if (std::get<3>(GetParam()) == HeldBy::Weight) scene.hang(0.05);
   }
-  int index() const { return std::get<0>(GetParam()); }
+  Eigen::Index index() const { return std::get<0>(GetParam()); }
   Released scene{bar(std::get<1>(GetParam())), std::get<2>(GetParam())};
   VectorX direction() const {
     const double size = std::abs(scene.theta[index()]);
@@ -68,12 +68,13 @@ TEST_P(Release, AdjointMatchesTangent) {
   EXPECT_NEAR(gradient.dot(direction()), by_tangent, tolerance(1e-8) * std::abs(by_tangent));
 }
 
-const auto parameters_that_act = ::testing::Values(
-    int(theta::youngs_modulus), int(theta::poissons_ratio), int(theta::stiffness_damping), int(theta::density),
-    int(theta::gravity) + 1, int(theta::linear_velocity) + 2, theta::pull(0, 0) + 1, theta::pull(1, 0) + 2);
+const MotionLayout pulled({.pulls = test::released::pulls}), unpulled;
+const auto parameters_that_act =
+    ::testing::Values(pulled.youngs_moduli[0], pulled.poissons_ratio, pulled.stiffness_damping, pulled.density,
+                      pulled.gravity + 1, pulled.linear_velocity + 2, pulled.pulls[0] + 1, pulled.pulls[1] + 2);
 const auto without_pulls =
-    ::testing::Values(int(theta::youngs_modulus), int(theta::poissons_ratio), int(theta::stiffness_damping),
-                      int(theta::density), int(theta::gravity) + 1, int(theta::linear_velocity) + 2);
+    ::testing::Values(unpulled.youngs_moduli[0], unpulled.poissons_ratio, unpulled.stiffness_damping, unpulled.density,
+                      unpulled.gravity + 1, unpulled.linear_velocity + 2);
 
 INSTANTIATE_TEST_SUITE_P(Hexahedra, Release,
                          ::testing::Combine(parameters_that_act, ::testing::Values(ElementKind::Hexahedron),
@@ -110,7 +111,7 @@ TEST(Releases, TheWeightHangsUntilTheStringIsCut) {
   damped.options.is_static = false;
   damped.options.times = {0.0, 2.0};
   damped.options.max_dt = 0.01;
-  damped.theta[theta::mass_damping] = 25.0;
+  damped.theta[damped.layout.mass_damping] = 25.0;
   EXPECT_LT((damped.positions_at(damped.theta, 1) - sagging).cwiseAbs().maxCoeff(), 1e-4) << "it ends without it";
 }
 
@@ -122,10 +123,10 @@ TEST(Releases, DeflectionAndFrequencyOfACantileverAreThoseOfBeams) {
     Hanging scene(body);
     scene.options.is_static = false;
     scene.options.newmark_theta = 0.5;
-    scene.theta.segment<3>(theta::gravity) *= 0.01;
-    const double E = scene.theta[theta::youngs_modulus], rho = scene.theta[theta::density], nu = 0.3;
+    scene.theta.segment<3>(scene.layout.gravity) *= 0.01;
+    const double E = scene.theta[scene.layout.youngs_moduli[0]], rho = scene.theta[scene.layout.density], nu = 0.3;
     const double I = std::pow(edge, 4) / 12.0, A = edge * edge, mass = 0.2;
-    const double P = -mass * scene.theta[theta::gravity + 2];
+    const double P = -mass * scene.layout.gravity.vector(scene.theta).z();
     const double frequency =
         std::pow(1.87510407, 2) / (2 * std::numbers::pi) * std::sqrt(E * I / (rho * A * std::pow(length, 4)));
     const double quarter = 0.25 / frequency;
@@ -171,7 +172,7 @@ TEST(Releases, DeflectionAndFrequencyOfACantileverAreThoseOfBeams) {
 
 TEST(Releases, WithoutAPullTheObjectStaysWhereItSags) {
   Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);
-  scene.theta.segment<6>(theta::pull(0, 0)).setZero();
+  scene.set_pulls(Vector3::Zero(), Vector3::Zero());
   const VectorX start = scene.positions_at(scene.theta, 0), end = scene.positions_at(scene.theta, last);
   EXPECT_GT((start - flat(scene.body->nodes)).cwiseAbs().maxCoeff(), 0.02) << "it sags";
   EXPECT_LT((end - start).cwiseAbs().maxCoeff(), tolerance(1e-8));
@@ -179,11 +180,11 @@ TEST(Releases, WithoutAPullTheObjectStaysWhereItSags) {
 
 TEST(Releases, TheUnitOfAPullIsTheObjectsSize) {
   Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);
-  scene.theta.segment<3>(theta::gravity).setZero();
-  scene.theta[theta::poissons_ratio] = 0.3;
+  scene.theta.segment<3>(scene.layout.gravity).setZero();
+  scene.theta[scene.layout.poissons_ratio] = 0.3;
   for (const double modulus : {1e3, 1e7}) {
-    scene.theta[theta::youngs_modulus] = modulus;
-    scene.theta.segment<6>(theta::pull(0, 0)) << 0, 1e-4, 0, 0, 0, 0;
+    scene.layout.set_moduli(scene.theta, modulus);
+    scene.set_pulls({0, 1e-4, 0}, Vector3::Zero());
     const VectorX moved = scene.positions_at(scene.theta, 0) - flat(scene.body->nodes);
     const double farthest = as_points(moved).rowwise().norm().maxCoeff();
     EXPECT_NEAR(farthest, 1e-4 * scene.body->size(), tolerance(1e-3) * 1e-4 * scene.body->size()) << modulus << " Pa";

@@ -24,9 +24,12 @@ struct Shaped : Released {
     if (unknown != Unknown::LoadFree)
       options.shape = {{Vector3(0.25, 0.01, 0.0), Vector3(-0.05, 0.0, 0.01)}, 0.02, 0.2};
     const int shapes = int(options.shape.points.size());
-    theta.conservativeResize(theta::size(0, 1, pulls, 0, shapes));
-    if (shapes > 0) theta.tail<6>() << 0.3, -0.5, 0.8, -0.2, 0.4, 0.1;
-    theta[theta::youngs_modulus] = 2e7;
+    set_blocks({.pulls = pulls, .scan_corrections = shapes});
+    if (shapes > 0) {
+      theta.segment<3>(layout.scan_corrections[0]) = Vector3(0.3, -0.5, 0.8);
+      theta.segment<3>(layout.scan_corrections[1]) = Vector3(-0.2, 0.4, 0.1);
+    }
+    layout.set_moduli(theta, 2e7);
   }
 };
 
@@ -39,11 +42,11 @@ struct Case {
   friend void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 };
 
-class Shapes : public ::testing::TestWithParam<std::tuple<Case, int>> {
+class Shapes : public ::testing::TestWithParam<std::tuple<Case, Eigen::Index>> {
  protected:
   Shaped scene{std::get<0>(GetParam()).kind, std::get<0>(GetParam()).integrator, std::get<0>(GetParam()).unknown};
   VectorX direction() const {
-    const int index = std::get<1>(GetParam());
+    const Eigen::Index index = std::get<1>(GetParam());
     return VectorX::Unit(scene.theta.size(), index) * scene.theta[index];
   }
   /// Of the first and the last frame.
@@ -97,23 +100,25 @@ constexpr Case free_lagged{"quadratic, load-free, lagged", ElementKind::Quadrati
     both_lagged{"linear, both, lagged", ElementKind::Tetrahedron, Integrator::Lagged, Unknown::Both},
     both_newton{"quadratic, both, Newton", ElementKind::QuadraticTetrahedron, Integrator::Newton, Unknown::Both};
 
+const MotionLayout corrected({.pulls = pulls, .scan_corrections = 2});
+
 INSTANTIATE_TEST_SUITE_P(Material, Shapes,
                          ::testing::Combine(::testing::Values(free_lagged, free_newton, corrected_lagged,
                                                               corrected_newton, both_lagged, both_newton),
-                                            ::testing::Values(int(theta::youngs_modulus), int(theta::poissons_ratio),
-                                                              int(theta::density), int(theta::gravity) + 2,
-                                                              theta::pull(0, 0) + 1)));
+                                            ::testing::Values(corrected.youngs_moduli[0], corrected.poissons_ratio,
+                                                              corrected.density, corrected.gravity + 2,
+                                                              corrected.pulls[0] + 1)));
 INSTANTIATE_TEST_SUITE_P(
     Scan, Shapes,
     ::testing::Combine(::testing::Values(corrected_lagged, corrected_newton, both_lagged, both_newton),
-                       ::testing::Values(theta::shape(0, 0, pulls, 0), theta::shape(1, 0, pulls, 0) + 2)));
+                       ::testing::Values(corrected.scan_corrections[0], corrected.scan_corrections[1] + 2)));
 
 /// Without pulls the object hangs as it was scanned, whatever it is made of, and stays there.
 TEST(Shape, AScanThatSagsIsAnEquilibriumOfEveryMaterial) {
   Shaped scene(ElementKind::QuadraticTetrahedron, Integrator::Newton, Unknown::LoadFree);
-  scene.theta.segment<6>(theta::pull(0, 0)).setZero();
+  scene.set_pulls(Vector3::Zero(), Vector3::Zero());
   for (const double modulus : {2e7, 6e7}) {
-    scene.theta[theta::youngs_modulus] = modulus;
+    scene.layout.set_moduli(scene.theta, modulus);
     for (const int frame : {0, last})
       EXPECT_LT((scene.positions_at(scene.theta, frame) - flat(scene.body->nodes)).cwiseAbs().maxCoeff(),
                 tolerance(1e-7))
@@ -123,7 +128,7 @@ TEST(Shape, AScanThatSagsIsAnEquilibriumOfEveryMaterial) {
 
 TEST(Shape, WhatCannotCarryTheScanFailsAndSaysSo) {
   Shaped scene(ElementKind::Tetrahedron, Integrator::Lagged, Unknown::LoadFree);
-  scene.theta[theta::youngs_modulus] = 300.0;
+  scene.layout.set_moduli(scene.theta, 300.0);
   Simulation simulation(scene.body, scene.options);
   const RolloutSummary summary = simulation.run(scene.theta, [](int, const State&, auto) { return true; });
   EXPECT_FALSE(summary.succeeded);

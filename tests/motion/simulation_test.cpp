@@ -91,7 +91,7 @@ TEST_P(Sensitivity, AdjointMatchesTangent) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryParameter, Sensitivity,
-                         ::testing::Combine(::testing::Range(0, theta::size(1)),
+                         ::testing::Combine(::testing::Range(0, MotionLayout({.planes = 1}).size()),
                                             ::testing::Values(Integrator::Lagged, Integrator::Newton)));
 
 /// Two schemes of one equation: their difference vanishes with the step, the fully implicit one's own error too.
@@ -100,8 +100,8 @@ TEST(Simulation, BothIntegratorsAgreeAsStepsShrink) {
     std::array<VectorX, 2> x;
     for (const Integrator integrator : {Integrator::Lagged, Integrator::Newton}) {
       test::TorusScene scene = scene_for(3, integrator);
-      scene.theta.segment<3>(theta::plane_point(0)).y() -= 1.0;  // in flight: impacts are not smooth
-      scene.theta.segment<3>(theta::angular_velocity) *= 5.0;
+      scene.theta.segment<3>(scene.layout.planes[0].point).y() -= 1.0;  // in flight: impacts are not smooth
+      scene.theta.segment<3>(scene.layout.angular_velocity) *= 5.0;
       scene.options.max_dt *= share;
       scene.options.newmark_theta = 0.5;
       Simulation simulation(scene.body, scene.options);

@@ -17,11 +17,13 @@ namespace {
 
 using test::tolerance;
 
+const MotionLayout layout;
+
 VectorX soft_material() {
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 4000.0;
-  theta[theta::poissons_ratio] = 0.35;
-  theta[theta::density] = 100.0;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 4000.0);
+  theta[layout.poissons_ratio] = 0.35;
+  theta[layout.density] = 100.0;
   return theta;
 }
 
@@ -36,14 +38,15 @@ StepOptions step_options(double dt, double newmark_theta) {
 /// A body with elasticity, gravity and nodes held.
 struct Stepped {
   Stepped(std::shared_ptr<const Body> of, const VectorX& theta, const StepOptions& options, std::vector<int> held = {})
-      : body(std::move(of)), stepper(body, terms(body), options) {
+      : body(std::move(of)), stepper(body, terms(body, layout), layout, options) {
     stepper.set_parameters(theta);
     stepper.hold(std::move(held));
   }
-  static std::vector<std::unique_ptr<ForceTerm>> terms(const std::shared_ptr<const Body>& body) {
+  static std::vector<std::unique_ptr<ForceTerm>> terms(const std::shared_ptr<const Body>& body,
+                                                       const MotionBlocks& blocks) {
     std::vector<std::unique_ptr<ForceTerm>> list;
-    list.push_back(make_elasticity(body));
-    list.push_back(std::make_unique<Gravity>(*body));
+    list.push_back(make_elasticity(body, blocks));
+    list.push_back(std::make_unique<Gravity>(*body, blocks));
     return list;
   }
   void step(State& state) {
@@ -68,12 +71,12 @@ Eigen::Matrix<double, 6, 1> momentum(const Body& body, double density, const Sta
 }
 
 double total_energy(const std::shared_ptr<const Body>& body, const VectorX& theta, const State& state) {
-  const auto term = make_elasticity(body);
+  const auto term = make_elasticity(body, layout);
   Elasticity& elasticity = *term;
   elasticity.set_parameters(theta);
   elasticity.linearise(state.x);
   Points p = Points::Zero(state.v.rows(), 3);
-  body->add_mass_product(theta[theta::density], state.v, p);
+  body->add_mass_product(theta[layout.density], state.v, p);
   return elasticity.energy(state.x) + 0.5 * p.cwiseProduct(state.v).sum();
 }
 
@@ -91,7 +94,7 @@ TEST(Stepper, FreeFallIsExact) {
     const auto body = test::torus_body(0.1, 0.04, 0.05);
     VectorX theta = soft_material();
     const Vector3 g(0.5, -9.81, 1.0), v(0.3, 2.0, -0.4);
-    theta.segment<3>(theta::gravity) = g;
+    theta.segment<3>(layout.gravity) = g;
     const double dt = 0.01;
     const int steps = 30;
     Stepped scene(body, theta, step_options(dt, blend));
@@ -167,7 +170,7 @@ struct Mode {
   Mode() : body(test::box_body(Vector3(0.3, 0.1, 0.1), 0.1)) {
     theta = soft_material();
     held = held_nodes(*body, {{[](const Vector3& p) { return p.x() < -0.15 + 1e-5; }}});
-    const auto term = make_elasticity(body);
+    const auto term = make_elasticity(body, layout);
     Elasticity& elasticity = *term;
     elasticity.set_parameters(theta);
     elasticity.linearise(body->reference_positions());
@@ -197,7 +200,7 @@ struct Mode {
   }
   /// Rayleigh damping: q'' + (alpha + beta w^2) q' + w^2 q = 0, q(0) = 1, q'(0) = 0.
   double exact(double time) const {
-    const double c = 0.5 * (theta[theta::mass_damping] + theta[theta::stiffness_damping] * omega * omega);
+    const double c = 0.5 * (theta[layout.mass_damping] + theta[layout.stiffness_damping] * omega * omega);
     const double d = std::sqrt(omega * omega - c * c);
     return std::exp(-c * time) * (std::cos(d * time) + c / d * std::sin(d * time));
   }
@@ -223,8 +226,8 @@ TEST(Stepper, FreeOscillationHasTheModesFrequencyAndOrderTwo) {
   Mode mode;
   for (const auto& [alpha, beta] :
        {std::pair{0.0, 0.0}, std::pair{1.0, 0.0}, std::pair{0.0, 0.004}, std::pair{1.0, 0.004}}) {
-    mode.theta[theta::mass_damping] = alpha;
-    mode.theta[theta::stiffness_damping] = beta;
+    mode.theta[layout.mass_damping] = alpha;
+    mode.theta[layout.stiffness_damping] = beta;
     EXPECT_NEAR(mode.order(0.5, {50, 100, 200, 400}), 2.0, 0.1) << "alpha " << alpha << " beta " << beta;
     EXPECT_NEAR(mode.order(0.55, {400, 800, 1600}), 1.0, 0.15) << "alpha " << alpha << " beta " << beta;
   }
@@ -232,7 +235,7 @@ TEST(Stepper, FreeOscillationHasTheModesFrequencyAndOrderTwo) {
 
 TEST(Stepper, MassDampingHalvesAtItsRate) {
   Mode mode;
-  mode.theta[theta::mass_damping] = 2.0;
+  mode.theta[layout.mass_damping] = 2.0;
   // exp(-alpha t / 2) is one half; the phase is chosen at a maximum, where it does not matter.
   const double damped = std::sqrt(mode.omega * mode.omega - 1.0), period = 2.0 * std::numbers::pi / damped;
   const double cycles = std::round(std::log(2.0) / period), time = cycles * period;
@@ -242,7 +245,7 @@ TEST(Stepper, MassDampingHalvesAtItsRate) {
 
 TEST(Stepper, StiffnessDampingActsWithTheSquareOfTheFrequency) {
   Mode mode;
-  mode.theta[theta::stiffness_damping] = 0.1 / mode.omega;  // damping ratio 0.05
+  mode.theta[layout.stiffness_damping] = 0.1 / mode.omega;  // damping ratio 0.05
   const double damped = mode.omega * std::sqrt(1 - 0.05 * 0.05), period = 2.0 * std::numbers::pi / damped;
   EXPECT_NEAR(mode.released(3 * period, period / 400, 0.5), std::exp(-0.05 * mode.omega * 3 * period), tolerance(2e-3));
 }
@@ -260,12 +263,12 @@ TEST(Stepper, RepeatedLaggedStepsConvergeToTheImplicitStep) {
   const auto& body = scene.body;
   for (const double blend : {0.51, 0.999}) {
     const auto make = [&](Integrator integrator) {
-      auto terms = Stepped::terms(body);
-      terms.push_back(std::make_unique<PlaneContact>(body, 0, scene.options.contact));
+      auto terms = Stepped::terms(body, scene.layout);
+      terms.push_back(std::make_unique<PlaneContact>(body, scene.layout.planes[0], scene.options.contact));
       StepOptions options = step_options(1.0 / 120.0, blend);
       options.integrator = integrator;
       options.newton.tolerance = 1e-13;
-      auto stepper = std::make_unique<Stepper>(body, std::move(terms), options);
+      auto stepper = std::make_unique<Stepper>(body, std::move(terms), scene.layout, options);
       stepper->set_parameters(scene.theta);
       return stepper;
     };
@@ -309,16 +312,16 @@ TEST(Stepper, ReportsAnEndThatIsNotFinite) {
 
 TEST(Stepper, RefusesSenselessOptions) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
-  EXPECT_NO_THROW(Stepper(body, {}, step_options(0.1, 0.5)));
-  EXPECT_THROW(Stepper(body, {}, step_options(0.0, 0.5)), std::invalid_argument);
-  EXPECT_THROW(Stepper(body, {}, step_options(0.1, 0.4)), std::invalid_argument);
-  EXPECT_THROW(Stepper(body, {}, step_options(0.1, 1.0)), std::invalid_argument);
+  EXPECT_NO_THROW(Stepper(body, {}, layout, step_options(0.1, 0.5)));
+  EXPECT_THROW(Stepper(body, {}, layout, step_options(0.0, 0.5)), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, layout, step_options(0.1, 0.4)), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, layout, step_options(0.1, 1.0)), std::invalid_argument);
   StepOptions options = step_options(0.1, 0.5);
   options.contact_weight = 0.5;
-  EXPECT_THROW(Stepper(body, {}, options), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, layout, options), std::invalid_argument);
   options = step_options(0.1, 0.5);
   options.rotation_prediction = 1.1;
-  EXPECT_THROW(Stepper(body, {}, options), std::invalid_argument);
+  EXPECT_THROW(Stepper(body, {}, layout, options), std::invalid_argument);
 }
 
 TEST(Stepper, ReportsAStateThatIsNotFinite) {
@@ -335,7 +338,7 @@ TEST(Simulation, ParametersThatAreNotFiniteFailWithAReason) {
   options.max_dt = 0.02;
   Simulation simulation(test::torus_body(0.1, 0.04, 0.05), options);
   VectorX theta = soft_material();
-  theta[theta::youngs_modulus] = std::nan("");
+  layout.set_moduli(theta, std::nan(""));
   const RolloutSummary summary = simulation.run(theta, [](int, const State&, auto) { return true; });
   EXPECT_FALSE(summary.succeeded);
   EXPECT_FALSE(summary.failure.empty());
@@ -349,7 +352,7 @@ TEST(Simulation, FramesMayBeUnequallyFarApart) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
   Simulation simulation(body, options);
   VectorX theta = soft_material();
-  theta.segment<3>(theta::gravity) = Vector3(0, -10, 0);
+  theta.segment<3>(layout.gravity) = Vector3(0, -10, 0);
   const auto summary = simulation.run(theta, [&](int frame, const State& state, auto) {
     const double t = options.times[std::size_t(frame)] - 1.0;
     EXPECT_NEAR((state.x - body->reference_positions()).col(1).mean(), -5.0 * t * t, tolerance(1e-8));  // the solver's
@@ -366,23 +369,24 @@ TEST(PlaneContact, CarriesTheWeightOfABodyAtRest) {
   SimulationOptions options;
   options.times = {0.0, 2.0};
   options.max_dt = 0.01;
-  options.planes = 1;
+  const MotionLayout with_plane({.planes = 1});
+  options.blocks = with_plane;
   options.contact = default_contact(*body, weight_density * body->volume(), 9.81);
-  VectorX theta = VectorX::Zero(theta::size(1));
-  theta[theta::youngs_modulus] = 2e4;
-  theta[theta::poissons_ratio] = 0.4;
-  theta[theta::density] = weight_density;
-  theta[theta::mass_damping] = 20.0;
-  theta[theta::stiffness_damping] = 0.01;
+  VectorX theta = with_plane.zero();
+  with_plane.set_moduli(theta, 2e4);
+  theta[with_plane.poissons_ratio] = 0.4;
+  theta[with_plane.density] = weight_density;
+  theta[with_plane.mass_damping] = 20.0;
+  theta[with_plane.stiffness_damping] = 0.01;
   const Vector3 normal = Vector3(0.0, 1.0, 0.0);
-  theta.segment<3>(theta::gravity) = -9.81 * normal;
-  theta.segment<3>(theta::plane_point(0)) = -(radius + 1e-3) * normal;
-  theta.segment<3>(theta::plane_normal(0)) = normal;
+  theta.segment<3>(with_plane.gravity) = -9.81 * normal;
+  theta.segment<3>(with_plane.planes[0].point) = -(radius + 1e-3) * normal;
+  theta.segment<3>(with_plane.planes[0].normal) = normal;
   Simulation simulation(body, options);
   State end;
   ASSERT_TRUE(simulation.run(theta, [&](int, const State& state, auto) { return end = state, true; }).succeeded);
   ASSERT_LT(end.v.cwiseAbs().maxCoeff(), 1e-3) << "it has not come to rest";
-  PlaneContact contact(body, 0, options.contact);
+  PlaneContact contact(body, with_plane.planes[0], options.contact);
   contact.set_parameters(theta);
   contact.linearise(end.x);
   ASSERT_GT(contact.active_count(), 0);

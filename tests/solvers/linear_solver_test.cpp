@@ -27,11 +27,12 @@ VectorX random_vector(Eigen::Index size, unsigned seed) {
 /// Stiffness + mass of a turned, bent torus: what a time step solves with. `share` of the mass term against stiffness.
 BlockMatrix step_matrix(double mass_factor = 2000.0, double cell_size = 0.04) {
   const auto body = test::torus_body(0.1, 0.04, cell_size);
-  const auto owned = make_elasticity(body);
+  const MotionLayout layout;
+  const auto owned = make_elasticity(body, layout);
   Elasticity& elasticity = *owned;
-  VectorX theta = VectorX::Zero(theta::size(0));
-  theta[theta::youngs_modulus] = 1.0;
-  theta[theta::poissons_ratio] = 0.4;
+  VectorX theta = layout.zero();
+  layout.set_moduli(theta, 1.0);
+  theta[layout.poissons_ratio] = 0.4;
   elasticity.set_parameters(theta);
   elasticity.linearise(test::deformed(body->reference_positions(), 0.2));
   BlockMatrix A(body->pattern);

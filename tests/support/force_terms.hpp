@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <memory>
 #include <ostream>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "elasticity/force_term.hpp"
+#include "parameters/motion_blocks.hpp"
 #include "support/bodies.hpp"
 #include "support/dense.hpp"
 #include "support/derivatives.hpp"
@@ -23,28 +25,32 @@ inline constexpr int pulls = 2;
 struct Family {
   std::string name;
   std::function<std::shared_ptr<const Body>()> body;
-  std::function<std::unique_ptr<ForceTerm>(std::shared_ptr<const Body>)> make;
+  std::function<std::unique_ptr<ForceTerm>(std::shared_ptr<const Body>, const MotionBlocks&)> make;
   bool depends_on_lag, depends_on_position;
-  std::vector<int> parameters;  ///< of theta that it depends on
+  std::function<std::vector<ParameterHandle>(const MotionBlocks&)> parameters;  ///< that it depends on
 };
 
 inline void PrintTo(const Family& family, std::ostream* out) { *out << family.name; }
 
 struct ForceTerms : ::testing::TestWithParam<Family> {
-  ForceTerms() : body(GetParam().body()), term(GetParam().make(body)) {
-    theta.setZero(theta::size(2, body->modulus.controls, pulls));
-    theta.segment<6>(theta::pull(0, 2)) << 0.1, -0.2, 0.05, 0.02, 0.15, -0.1;
-    theta.tail(body->modulus.controls - 1).setLinSpaced(2000.0, 5000.0);
-    theta[theta::youngs_modulus] = 3000.0;
-    theta[theta::poissons_ratio] = 0.35;
-    theta[theta::mass_damping] = 0.4;
-    theta[theta::stiffness_damping] = 0.002;
-    theta[theta::density] = 120.0;
-    theta.segment<3>(theta::gravity) = Vector3(0.3, -9.7, 0.2);
-    theta.segment<3>(theta::plane_normal(0)) = Vector3::UnitX();
-    theta.segment<3>(theta::plane_point(0)) = Vector3(-1, 0, 0);
-    theta.segment<3>(theta::plane_normal(1)) = Vector3(0.2, 0.9, -0.3).normalized();
-    theta.segment<3>(theta::plane_point(1)) = Vector3(0.01, 0.0, -0.02);  // through the middle: gaps of both signs
+  ForceTerms()
+      : body(GetParam().body()),
+        layout({.moduli = body->modulus.controls, .planes = 2, .pulls = pulls}),
+        term(GetParam().make(body, layout)),
+        theta(layout.zero()) {
+    constexpr std::array moduli = {3000.0, 2000.0, 5000.0};
+    for (std::size_t k = 0; k < layout.youngs_moduli.size(); ++k) theta[layout.youngs_moduli[k]] = moduli[k];
+    theta[layout.poissons_ratio] = 0.35;
+    theta[layout.mass_damping] = 0.4;
+    theta[layout.stiffness_damping] = 0.002;
+    theta[layout.density] = 120.0;
+    theta.segment<3>(layout.gravity) = Vector3(0.3, -9.7, 0.2);
+    theta.segment<3>(layout.planes[0].normal) = Vector3::UnitX();
+    theta.segment<3>(layout.planes[0].point) = Vector3(-1, 0, 0);
+    theta.segment<3>(layout.planes[1].normal) = Vector3(0.2, 0.9, -0.3).normalized();
+    theta.segment<3>(layout.planes[1].point) = Vector3(0.01, 0.0, -0.02);  // through the middle: gaps of both signs
+    theta.segment<3>(layout.pulls[0]) = Vector3(0.1, -0.2, 0.05);
+    theta.segment<3>(layout.pulls[1]) = Vector3(0.02, 0.15, -0.1);
     lag = deformed(body->reference_positions(), 0.3);
     z = deformed(body->reference_positions(), 0.28, 1.93);
     d_lag = deformed(body->reference_positions(), 0.6, -0.7);
@@ -67,7 +73,15 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
   }
   Points none() const { return Points::Zero(z.rows(), 3); }
 
+  /// Whether the force depends on this number of the parameter vector.
+  bool depends_on(int number) const {
+    return std::ranges::any_of(GetParam().parameters(layout), [&](const ParameterHandle& block) {
+      return number >= block.first && number < block.first + block.size;
+    });
+  }
+
   std::shared_ptr<const Body> body;
+  MotionLayout layout;
   std::unique_ptr<ForceTerm> term;
   VectorX theta;
   Points lag, z, d_lag, d_z;
@@ -110,11 +124,10 @@ TEST_P(ForceTerms, TangentByPosition) {
 }
 
 TEST_P(ForceTerms, TangentByEveryParameter) {
-  const auto& active = GetParam().parameters;
   for (int i = 0; i < theta.size(); ++i) {
     const VectorX direction = VectorX::Unit(theta.size(), i);
     const Points df = tangent(none(), none(), direction);
-    const bool is_active = std::find(active.begin(), active.end(), i) != active.end();
+    const bool is_active = depends_on(i);
     ASSERT_EQ(df.norm() > 0.0, is_active) << "theta[" << i << "]";
     const double step = 0.1 * std::max(std::abs(theta[i]), 0.05);
     if (!is_active) {

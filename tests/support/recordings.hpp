@@ -23,31 +23,13 @@ struct Recording {
   }
 };
 
-inline ParameterSet torus_parameters(const VectorX& theta, int planes) {
-  std::vector<Parameter> list = {
-      {"youngs_modulus", "Pa", Transform::Logarithm, theta::youngs_modulus, 1.0, 1.0, 1e7},
-      {"poisson_ratio", "1", Transform::LogitHalf, theta::poissons_ratio, 1.0, 0.02, 0.495},
-      {"mass_damping", "1/s", Transform::Logarithm, theta::mass_damping, 1.0, 1e-4, 1e3},
-      {"stiffness_damping", "s", Transform::Logarithm, theta::stiffness_damping, 1.0, 1e-6, 1.0},
-      {"density", "kg/m^3", Transform::Logarithm, theta::density, 1.0, 1.0, 1e4},
-      {"gravity", "m/s^2", Transform::Vector, theta::gravity, 2.0},
-      {"linear_velocity", "m/s", Transform::Vector, theta::linear_velocity, 0.5},
-      {"angular_velocity", "rad/s", Transform::Vector, theta::angular_velocity, 3.0}};
-  if (planes > 0) list.push_back({"plane", "", Transform::PlanePosition, theta::plane_point(0), 0.1});
-  return {list, theta};
-}
-
 /// Every so many of the body's surface samples are seen in each frame, with noise along all three axes.
 inline Recording torus_recording(double cell_size, int frames, int planes, double noise, unsigned seed = 1,
                                  int points = 40, double true_cell_size = 0.0, double true_step_share = 1.0,
                                  double solver_tolerance = 1e-13, double spacing = 0.004) {
   const auto make_scene = [&](double cell) {
-    TorusScene scene = torus_scene(cell, frames, SolverKind::Iterative, solver_tolerance);
-    if (planes == 0) {
-      scene.options.planes = 0;
-      scene.theta.conservativeResize(theta::size(0));
-      scene.theta.segment<3>(theta::angular_velocity) *= 4.0;  // so that stiffness shows
-    }
+    TorusScene scene = torus_scene(cell, frames, SolverKind::Iterative, solver_tolerance, planes);
+    if (planes == 0) scene.theta.segment<3>(scene.layout.angular_velocity) *= 4.0;  // so that stiffness shows
     return scene;
   };
   Recording r;
@@ -59,7 +41,7 @@ inline Recording torus_recording(double cell_size, int frames, int planes, doubl
   const auto distance = std::make_shared<SignedDistance>(torus_distance(0.1, 0.04, spacing, 0.1));
   r.constraints = std::make_shared<SurfaceConstraints>(r.scene.body, distance, 0.035);
   r.observations = std::make_shared<std::vector<FrameObservations>>();
-  r.parameters = torus_parameters(r.truth, planes);
+  r.parameters = torus_parameters(r.scene.layout, r.truth);
 
   std::vector<Vector3> samples;
   for (const SurfacePoint& p : real.body->surface) samples.push_back(p.position);

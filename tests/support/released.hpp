@@ -16,20 +16,22 @@ struct Released : hanging::Hanging {
     options.integrator = integrator;
     options.newton.tolerance = 1e-13;
     options.solver.tolerance = 1e-13;
-    options.pulls = pulls;
-    theta.conservativeResize(theta::size(0, 1, pulls));
-    theta[theta::youngs_modulus] = 3e5;
-    theta[theta::mass_damping] = 0.5;
-    theta[theta::stiffness_damping] = 0.004;
-    theta.segment<6>(theta::pull(0, 0)) << 0.01, 0.1, 0.05, 0.0, -0.03, 0.02;
+    set_blocks({.pulls = pulls});
+    layout.set_moduli(theta, 3e5);
+    theta[layout.mass_damping] = 0.5;
+    theta[layout.stiffness_damping] = 0.004;
+    set_pulls({0.01, 0.1, 0.05}, {0.0, -0.03, 0.02});
+  }
+  void set_pulls(const Vector3& first, const Vector3& second) {
+    theta.segment<3>(layout.pulls[0]) = first;
+    theta.segment<3>(layout.pulls[1]) = second;
   }
   /// Instead of pulls a weight hangs from the free end, until its string is cut; the bar is light and stiff enough for
   /// that to show.
   void hang(double mass) {
-    options.pulls = 0;
-    theta.conservativeResize(theta::size(0));
-    theta[theta::youngs_modulus] = 5e6;
-    theta[theta::density] = 200.0;
+    set_blocks({});
+    layout.set_moduli(theta, 5e6);
+    theta[layout.density] = 200.0;
     options.released_weights = {{Vector3(0.5 * hanging::length, 0.2 * hanging::edge, -0.5 * hanging::edge), mass}};
   }
   VectorX positions_at(const VectorX& at, int frame) const {

@@ -76,28 +76,29 @@ struct Swing {
 
     const bool is_bar = of.shape == SwingShape::Bar;
     scene.holds = {{[is_bar](const Vector3& p) { return is_bar ? p.z() > -1e-6 : p.x() < 1e-6; }}};
+    scene.blocks = layout;
     scene.times = {0.0};
     scene.max_dt = 1.0 / of.rate;
-    theta.setZero(theta::size(0));
-    theta[theta::youngs_modulus] = of.youngs_modulus;
-    theta[theta::poissons_ratio] = 0.35;
-    theta[theta::mass_damping] = 0.2;
-    theta[theta::stiffness_damping] = 0.002;
-    theta[theta::density] = 300.0;
-    theta.segment<3>(theta::gravity) = Vector3(0.0, 0.0, -9.81);
+    theta = layout.zero();
+    layout.set_moduli(theta, of.youngs_modulus);
+    theta[layout.poissons_ratio] = 0.35;
+    theta[layout.mass_damping] = 0.2;
+    theta[layout.stiffness_damping] = 0.002;
+    theta[layout.density] = 300.0;
+    theta.segment<3>(layout.gravity) = Vector3(0.0, 0.0, -9.81);
 
     SimulationOptions moving = scene;
     moving.times.clear();
     for (int f = 0; f < of.frames - of.held + 1; ++f) moving.times.push_back(f / of.rate);
     moving.max_dt = (1.0 + 1e-9) / (of.rate * of.steps);
     moving.integrator = Integrator::Newton;
-    moving.pulls = int(of.pulls.size());
+    const MotionLayout pulled({.pulls = int(of.pulls.size())});
+    moving.blocks = pulled;
     moving.pull_points.size = size;
     for (std::size_t k = 0; k < of.pulls.size(); ++k)
       moving.pull_points.at.push_back((1.0 - 0.5 * double(k)) * (is_bar ? Vector3(0, 0, -0.6) : Vector3(0.3, 0, 0)));
-    VectorX own = VectorX::Zero(theta::size(0, 1, moving.pulls));
-    own.head(theta.size()) = theta;
-    for (std::size_t k = 0; k < of.pulls.size(); ++k) own.segment<3>(theta::pull(int(k), 0)) = of.pulls[k];
+    VectorX own = carry(layout.layout(), theta, pulled.layout(), pulled.zero());
+    for (std::size_t k = 0; k < of.pulls.size(); ++k) own.segment<3>(pulled.pulls[k]) = of.pulls[k];
     Simulation simulation(truth, moving);
     const RolloutSummary summary = simulation.run(own, [&](int frame, const State& state, auto) {
       for (int f = frame == 0 ? 1 - of.held : 0; f <= 0; ++f) positions.push_back(state.x);
@@ -126,6 +127,7 @@ struct Swing {
   SwingOptions options;
   std::shared_ptr<const Body> truth, body;
   SimulationOptions scene;        ///< for the tracked body
+  MotionLayout layout;            ///< of `theta`
   VectorX theta;                  ///< the true material
   TriangleMesh surface;           ///< the scan
   double size = 0.0;              ///< [m]

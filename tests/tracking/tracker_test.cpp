@@ -83,7 +83,7 @@ TEST(Tracker, FollowsMotionOfATenthOfTheSizeBetweenFrames) {
 /// Where the object is depends little on how stiff it is thought to be.
 TEST(Tracker, FollowsWithAMaterialTenTimesTooHard) {
   VectorX theta = bar().theta;
-  theta[theta::youngs_modulus] *= 10.0;
+  bar().layout.scale_moduli(theta, 10.0);
   expect_followed(bar(), recording().track(bar(), theta));
 }
 
@@ -248,7 +248,7 @@ TEST(Tracker, NotesAScanThatSagsTooSoftly) {
   recorded.capture.times.resize(3);
   VectorX theta = swing.theta;
   EXPECT_EQ(recorded.track(sagging, theta).note, "");
-  theta[theta::youngs_modulus] = 50.0;
+  swing.layout.set_moduli(theta, 50.0);
   const Track track = recorded.track(sagging, theta);
   EXPECT_THAT(track.note, HasSubstr("too soft"));
   EXPECT_THAT(track.note, HasSubstr("without gravity"));

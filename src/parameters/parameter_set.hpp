@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "elasticity/parameters.hpp"
+#include "parameters/layout.hpp"
 
 namespace pliant {
 
@@ -23,8 +23,8 @@ struct Parameter {
   std::string name;  ///< as in result.json
   std::string unit;
   Transform transform = Transform::Logarithm;
-  int theta_index = 0;  ///< of its first number; a plane's point, followed by its normal
-  double scale = 1.0;   ///< [unit] of an unconstrained step of one, for vectors and planes
+  ParameterHandle at;  ///< its numbers; a plane's point, followed by its normal
+  double scale = 1.0;  ///< [unit] of an unconstrained step of one, for vectors and planes
   double lower = 0.0;   ///< bounds of a scalar's value
   double upper = std::numeric_limits<double>::infinity();
   bool estimated = false;
@@ -33,26 +33,36 @@ struct Parameter {
   VectorX prior_mean = {};
   /// About what a plane (point, normal) or a direction moves; empty: the set's reference.
   VectorX origin = {};
-  /// Where else in theta a scalar stands: recordings of one object share its material.
-  std::vector<int> also = {};
+  /// Whether it only stands for something else: forces for whoever held the object, parts of a scan's error. Of no
+  /// interest one by one.
+  bool is_auxiliary = false;
+  Role role = Role::Material;  ///< that of its block; a `ParameterSet` sets it
 
   bool is_scalar() const { return transform < Transform::Vector; }
   int dimension() const { return is_scalar() ? 1 : transform == Transform::Direction ? 2 : 3; }
 };
 
-/// The estimated parameters of a scene, or of several side by side in theta, as one unconstrained vector p, with its
-/// map to theta.
+/// Whether a parameter is an elastic modulus [Pa].
+bool is_modulus(const Parameter& parameter);
+/// Whether a parameter belongs to the object itself: what all recordings of it have in common.
+bool is_of_object(const Parameter& parameter);
+
+/// The estimated parameters of a layout as one unconstrained vector p, with its map to the physical parameter vector
+/// theta.
 class ParameterSet {
  public:
   ParameterSet() = default;
-  /// @param reference  theta of everything that is not estimated
-  ParameterSet(std::vector<Parameter> parameters, VectorX reference);
+  /// @param parameters  with handles of the layout
+  /// @param reference   theta of everything that is not estimated
+  /// Throws std::invalid_argument where the reference is not as long as the layout, or a handle is not of it.
+  ParameterSet(ParameterLayout layout, std::vector<Parameter> parameters, VectorX reference);
 
+  const ParameterLayout& layout() const { return layout_; }
   const std::vector<Parameter>& parameters() const { return parameters_; }
   const Parameter* find(const std::string& name) const;
   /// Chooses whether a parameter is estimated. Throws std::invalid_argument for an unknown name.
   void set_estimated(const std::string& name, bool estimated);
-  /// Leaves a scalar at a value, wherever it stands. Throws std::invalid_argument for an unknown name.
+  /// Leaves a scalar at a value. Throws std::invalid_argument for an unknown name.
   void fix(const std::string& name, double value);
   const VectorX& reference() const { return reference_; }
   void set_reference(const VectorX& theta) { reference_ = theta; }
@@ -62,10 +72,17 @@ class ParameterSet {
   /// @param precision  names x names, symmetric, not negative
   void set_joint_prior(const std::vector<std::string>& names, MatrixX precision);
   const MatrixX& joint_precision() const { return joint_precision_; }  ///< empty: there is no joint prior
+  /// Numbers of p of the estimated parameters of the joint prior, in its order.
+  std::vector<Eigen::Index> joint_coordinates() const;
 
   int dimension() const;
   /// Name of each number of p: "youngs_modulus", "linear_velocity.x", "plane.tilt_1", ...
   std::vector<std::string> coordinate_names() const;
+  /// The first number of p of the estimated parameter that stands at a handle. Throws std::invalid_argument where none
+  /// does.
+  Eigen::Index coordinate(const ParameterHandle& at) const;
+  /// The parameter that each number of p belongs to.
+  std::vector<const Parameter*> coordinate_parameters() const;
 
   [[nodiscard]] VectorX to_unconstrained(const VectorX& theta) const;
   [[nodiscard]] VectorX to_theta(const VectorX& p) const;
@@ -83,6 +100,7 @@ class ParameterSet {
   template <class Function>
   void for_each_estimated(Function&& function) const;
 
+  ParameterLayout layout_;
   std::vector<Parameter> parameters_;
   VectorX reference_;
   std::vector<int> joint_;  // numbers of the parameters of the joint prior

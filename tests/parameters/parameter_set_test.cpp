@@ -1,7 +1,10 @@
-#include "estimation/parameter_set.hpp"
+#include "parameters/parameter_set.hpp"
+
+#include <set>
+#include <stdexcept>
 
 #include "support/derivatives.hpp"
-#include "support/recordings.hpp"
+#include "support/parameters.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant {
@@ -9,8 +12,10 @@ namespace {
 
 using test::tolerance;
 
+const MotionLayout layout({.planes = 1});
+
 ParameterSet all_estimated() {
-  ParameterSet set = test::torus_parameters(test::torus_scene(0.05, 2).theta, 1);
+  ParameterSet set = test::torus_parameters(layout, test::torus_values(layout));
   for (const Parameter& p : std::vector(set.parameters())) set.set_estimated(p.name, true);
   return set;
 }
@@ -29,14 +34,14 @@ TEST(ParameterSet, RoundTrips) {
   EXPECT_LT((set.to_theta(set.to_unconstrained(theta)) - theta).norm(), tolerance(1e-12) * theta.norm());
   EXPECT_LT((set.to_theta(set.to_unconstrained(set.reference())) - set.reference()).norm(),
             tolerance(1e-12) * theta.norm());
-  EXPECT_NEAR(theta.segment<3>(theta::plane_normal(0)).norm(), 1.0, tolerance(1e-14));
+  EXPECT_NEAR(layout.planes[0].normal.vector(theta).norm(), 1.0, tolerance(1e-14));
 }
 
 TEST(ParameterSet, JacobianMatchesCentralDifferences) {
   const ParameterSet set = all_estimated();
   const VectorX p = somewhere(set);
   const MatrixX J = set.jacobian(p);
-  ASSERT_EQ(J.rows(), theta::size(1));
+  ASSERT_EQ(J.rows(), layout.size());
   for (int i = 0; i < set.dimension(); ++i) {
     ASSERT_GT(J.col(i).norm(), 0.0);
     const auto along = [&](double h) -> VectorX { return set.to_theta(p + h * VectorX::Unit(p.size(), i)); };
@@ -51,10 +56,10 @@ TEST(ParameterSet, WhatIsNotEstimatedStays) {
   set.set_estimated("youngs_modulus", false);
   EXPECT_EQ(set.dimension(), 13);
   const VectorX theta = set.to_theta(VectorX::Constant(13, 0.1));
-  EXPECT_EQ(theta[theta::youngs_modulus], set.reference()[theta::youngs_modulus]);
-  EXPECT_EQ(theta.segment<3>(theta::gravity), set.reference().segment<3>(theta::gravity));
-  EXPECT_NE(theta[theta::density], set.reference()[theta::density]);
-  EXPECT_EQ(set.jacobian(VectorX::Zero(13)).row(theta::gravity).norm(), 0.0);
+  EXPECT_EQ(layout.moduli(theta), layout.moduli(set.reference()));
+  EXPECT_EQ(layout.gravity.vector(theta), layout.gravity.vector(set.reference()));
+  EXPECT_NE(theta[layout.density], set.reference()[layout.density]);
+  EXPECT_EQ(set.jacobian(VectorX::Zero(13)).row(layout.gravity).norm(), 0.0);
 }
 
 TEST(ParameterSet, NamesEveryCoordinateAndRefusesUnknownOnes) {
@@ -67,17 +72,17 @@ TEST(ParameterSet, NamesEveryCoordinateAndRefusesUnknownOnes) {
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
   EXPECT_THROW(set.set_estimated("stiffness", true), std::invalid_argument);
   EXPECT_EQ(set.find("stiffness"), nullptr);
-  EXPECT_EQ(set.find("density")->theta_index, theta::density);
+  EXPECT_EQ(set.find("density")->at, layout.density);
 }
 
 TEST(ParameterSet, ClampsScalarsIntoTheirBounds) {
   const ParameterSet set = all_estimated();
   const VectorX high = set.to_theta(set.clamp(VectorX::Constant(17, 100.0)));
   const VectorX low = set.to_theta(set.clamp(VectorX::Constant(17, -100.0)));
-  EXPECT_NEAR(high[theta::youngs_modulus], 1e7, tolerance(1.0));
-  EXPECT_NEAR(low[theta::youngs_modulus], 1.0, tolerance(1e-9));
-  EXPECT_NEAR(high[theta::poissons_ratio], 0.495, tolerance(1e-9));
-  EXPECT_NEAR(low[theta::poissons_ratio], 0.02, tolerance(1e-9));
+  EXPECT_NEAR(high[layout.youngs_moduli[0]], 1e7, tolerance(1.0));
+  EXPECT_NEAR(low[layout.youngs_moduli[0]], 1.0, tolerance(1e-9));
+  EXPECT_NEAR(high[layout.poissons_ratio], 0.495, tolerance(1e-9));
+  EXPECT_NEAR(low[layout.poissons_ratio], 0.02, tolerance(1e-9));
   const VectorX inside = somewhere(set);
   EXPECT_EQ(set.clamp(inside), inside);
 }
@@ -90,7 +95,7 @@ TEST(ParameterSet, PriorsAreNormal) {
   VectorX mean(3);
   mean << 0.1, -4.0, 0.2;
   list[5].prior_mean = mean;
-  const ParameterSet set(list, all_estimated().reference());
+  const ParameterSet set(layout.layout(), list, all_estimated().reference());
   const VectorX p = somewhere(set);
   VectorX gradient;
   MatrixX curvature;
@@ -106,17 +111,18 @@ TEST(ParameterSet, PriorsAreNormal) {
 
 /// Three moduli tied to one another, the second of them not estimated, the first one with a prior of its own.
 TEST(ParameterSet, AJointPriorTiesLogarithmsTogether) {
+  const MotionLayout of_three({.moduli = 3});
   std::vector<Parameter> list;
-  for (int k = 0; k < 3; ++k)
-    list.push_back({"youngs_modulus@" + std::to_string(k + 1), "Pa", Transform::Logarithm, theta::modulus(k, 3, 16)});
+  for (const ParameterHandle& modulus : of_three.youngs_moduli)
+    list.push_back({"youngs_modulus@" + std::to_string(list.size() + 1), "Pa", Transform::Logarithm, modulus});
   list[0].estimated = list[2].estimated = true;
   list[0].prior_std = 0.5;
   list[0].prior_mean = VectorX::Constant(1, 8.0);
-  VectorX reference = VectorX::Constant(16, 2000.0);
-  ParameterSet set(list, reference);
+  ParameterSet set(of_three.layout(), list, VectorX::Constant(of_three.size(), 2000.0));
   MatrixX precision(3, 3);  // of differences, along a chain
   precision << 4, -4, 0, -4, 5, -1, 0, -1, 1;
   set.set_joint_prior({"youngs_modulus@1", "youngs_modulus@2", "youngs_modulus@3"}, precision);
+  EXPECT_EQ(set.joint_coordinates(), (std::vector<Eigen::Index>{0, 1})) << "of those that are estimated";
   VectorX p(2);
   p << 8.3, 7.1;
   const double fixed = std::log(2000.0);
@@ -137,24 +143,26 @@ TEST(ParameterSet, AJointPriorTiesLogarithmsTogether) {
   EXPECT_NEAR(set.prior(all + VectorX::Constant(3, 0.7)) - before, one, 1e-12) << "a common factor is free";
   set.prior(all, nullptr, &curvature);
   EXPECT_EQ(curvature(1, 2), -1.0);
+  set.set_joint_prior({"youngs_modulus@3", "youngs_modulus@1"}, MatrixX::Identity(2, 2));
+  EXPECT_EQ(set.joint_coordinates(), (std::vector<Eigen::Index>{2, 0})) << "in the prior's order";
   EXPECT_THROW(set.set_joint_prior({"mass_damping"}, MatrixX::Identity(1, 1)), std::invalid_argument);
 }
 
 TEST(ParameterSet, DirectionsKeepTheirLengthAndTheirOrigin) {
-  Parameter direction{"gravity", "m/s^2", Transform::Direction, theta::gravity};
+  Parameter direction{"gravity", "m/s^2", Transform::Direction, layout.gravity};
   direction.estimated = true;
-  VectorX reference = VectorX::Zero(theta::size(0));
-  reference.segment<3>(theta::gravity) = Vector3(0.5, -9.7, 0.3);
-  direction.origin = reference.segment(theta::gravity, 3);
-  ParameterSet set({direction}, reference);
+  VectorX reference = layout.zero();
+  reference.segment<3>(layout.gravity) = Vector3(0.5, -9.7, 0.3);
+  direction.origin = layout.gravity.vector(reference);
+  ParameterSet set(layout.layout(), {direction}, reference);
   ASSERT_EQ(set.dimension(), 2);
   EXPECT_LT(set.to_unconstrained(reference).norm(), tolerance(1e-15));
   VectorX p(2);
   p << 0.1, -0.2;
   const VectorX theta = set.to_theta(p);
-  EXPECT_NEAR(theta.segment<3>(theta::gravity).norm(), direction.origin.norm(), tolerance(1e-13));
+  EXPECT_NEAR(layout.gravity.vector(theta).norm(), direction.origin.norm(), tolerance(1e-13));
   EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-13));
-  const Vector3 turned = theta.segment<3>(theta::gravity), before = direction.origin;
+  const Vector3 turned = layout.gravity.vector(theta), before = direction.origin;
   EXPECT_NEAR(std::acos(turned.dot(before) / before.squaredNorm()), std::atan(p.norm()), tolerance(1e-12));
   const MatrixX J = set.jacobian(p);
   for (int i = 0; i < 2; ++i) {
@@ -165,20 +173,73 @@ TEST(ParameterSet, DirectionsKeepTheirLengthAndTheirOrigin) {
   EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-13));
 }
 
-TEST(ParameterSet, AScalarMayStandInSeveralPlaces) {
-  Parameter modulus{"youngs_modulus", "Pa", Transform::Logarithm, 0};
-  modulus.also = {2, 3};
-  Parameter shift{"range_error", "m", Transform::Shift, 1, 0.1};
-  modulus.estimated = shift.estimated = true;
-  const ParameterSet set({modulus, shift}, VectorX::Constant(4, 2.0));
-  VectorX p(2);
-  p << 1.0, -0.5;
-  const VectorX theta = set.to_theta(p);
-  EXPECT_EQ(theta, (VectorX(4) << std::exp(1.0), -0.05, std::exp(1.0), std::exp(1.0)).finished());
+TEST(ParameterSet, AShiftIsALengthOfAnySign) {
+  ParameterLayout own;
+  own.add({"youngs_modulus", "Pa"});
+  Parameter shift{"range_error", "m", Transform::Shift, own.add({"range_error", "m", 1, Role::Sensor}), 0.1};
+  shift.estimated = true;
+  const ParameterSet set(own, {shift}, VectorX::Constant(2, 2.0));
+  const VectorX p = VectorX::Constant(1, -0.5), theta = set.to_theta(p);
+  EXPECT_EQ(theta, Eigen::Vector2d(2.0, -0.05));
   EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-15));
-  const MatrixX J = set.jacobian(p);
-  EXPECT_EQ(J.col(0), (VectorX(4) << std::exp(1.0), 0.0, std::exp(1.0), std::exp(1.0)).finished());
-  EXPECT_EQ(J.col(1), (VectorX(4) << 0.0, 0.1, 0.0, 0.0).finished());
+  EXPECT_EQ(set.jacobian(p), Eigen::Vector2d(0.0, 0.1));
+}
+
+TEST(ParameterSet, RolesAreThoseOfTheBlocks) {
+  const ParameterSet set = all_estimated();
+  for (const Parameter& p : set.parameters()) EXPECT_EQ(p.role, layout.layout().block_of(p.at).role) << p.name;
+  EXPECT_EQ(set.find("mass_damping")->role, Role::Damping);
+  EXPECT_EQ(set.find("gravity")->role, Role::Load);
+  EXPECT_EQ(set.find("plane")->role, Role::Obstacle);
+}
+
+TEST(ParameterSet, WhatIsOfTheObjectIsToldByRoleAndUnit) {
+  const std::set<std::string> of_object = {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping",
+                                           "density"};
+  for (const Parameter& p : all_estimated().parameters()) {
+    EXPECT_EQ(is_modulus(p), p.name == "youngs_modulus") << p.name;
+    EXPECT_EQ(is_of_object(p), of_object.contains(p.name)) << p.name;
+  }
+}
+
+TEST(ParameterSet, CoordinatesAreFoundByHandles) {
+  ParameterSet set = all_estimated();
+  EXPECT_EQ(set.coordinate(layout.youngs_moduli[0]), 0);
+  EXPECT_EQ(set.coordinate(layout.gravity), 5);
+  EXPECT_EQ(set.coordinate(layout.planes[0].whole()), 14);
+  EXPECT_THROW((void)set.coordinate(layout.planes[0].normal), std::invalid_argument) << "a part is no parameter";
+  set.set_estimated("mass_damping", false);
+  EXPECT_EQ(set.coordinate(layout.gravity), 4);
+  EXPECT_THROW((void)set.coordinate(layout.mass_damping), std::invalid_argument);
+  EXPECT_THROW((void)set.coordinate({}), std::invalid_argument);
+}
+
+TEST(ParameterSet, EveryCoordinateKnowsItsParameter) {
+  ParameterSet set = all_estimated();
+  set.set_estimated("density", false);
+  const std::vector<const Parameter*> of = set.coordinate_parameters();
+  const std::vector<std::string> names = set.coordinate_names();
+  ASSERT_EQ(of.size(), names.size());
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    EXPECT_TRUE(names[i].starts_with(of[i]->name)) << names[i];
+    EXPECT_TRUE(of[i]->estimated);
+    const Eigen::Index first = set.coordinate(of[i]->at);
+    EXPECT_GE(Eigen::Index(i), first);
+    EXPECT_LT(Eigen::Index(i), first + of[i]->dimension());
+  }
+}
+
+TEST(ParameterSet, RefusesWhatIsNotOfItsLayout) {
+  const VectorX reference = layout.zero();
+  const std::vector<Parameter> density = {{"density", "kg/m^3", Transform::Logarithm, layout.density}};
+  EXPECT_NO_THROW(ParameterSet(layout.layout(), density, reference));
+  for (const Eigen::Index size : {reference.size() - 1, reference.size() + 1})
+    EXPECT_THROW(ParameterSet(layout.layout(), density, VectorX::Zero(size)), std::invalid_argument);
+  const ParameterHandle beyond{layout.size(), 1};
+  EXPECT_THROW(ParameterSet(layout.layout(), {{"beyond", "1", Transform::Shift, beyond}}, reference),
+               std::invalid_argument);
+  EXPECT_THROW(ParameterSet(layout.layout(), {{"nowhere", "1", Transform::Shift, ParameterHandle()}}, reference),
+               std::invalid_argument);
 }
 
 }  // namespace

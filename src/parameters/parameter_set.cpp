@@ -1,4 +1,4 @@
-#include "estimation/parameter_set.hpp"
+#include "parameters/parameter_set.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,8 +21,18 @@ double logistic_half(double p) { return 0.5 / (1.0 + std::exp(-p)); }
 
 }  // namespace
 
-ParameterSet::ParameterSet(std::vector<Parameter> parameters, VectorX reference)
-    : parameters_(std::move(parameters)), reference_(std::move(reference)) {}
+bool is_modulus(const Parameter& p) { return p.role == Role::Material && p.unit == "Pa"; }
+
+bool is_of_object(const Parameter& p) {
+  return p.role == Role::Material || p.role == Role::Damping || p.role == Role::Inertia;
+}
+
+ParameterSet::ParameterSet(ParameterLayout layout, std::vector<Parameter> parameters, VectorX reference)
+    : layout_(std::move(layout)), parameters_(std::move(parameters)), reference_(std::move(reference)) {
+  if (reference_.size() != layout_.size())
+    throw std::invalid_argument("the reference is not as long as the parameters' layout");
+  for (Parameter& p : parameters_) p.role = layout_.block_of(p.at).role;
+}
 
 const Parameter* ParameterSet::find(const std::string& name) const {
   const auto it =
@@ -38,9 +48,7 @@ void ParameterSet::set_estimated(const std::string& name, bool estimated) {
 
 void ParameterSet::fix(const std::string& name, double value) {
   set_estimated(name, false);
-  const Parameter& parameter = *find(name);
-  reference_[parameter.theta_index] = value;
-  for (const int other : parameter.also) reference_[other] = value;
+  reference_[find(name)->at] = value;
 }
 
 void ParameterSet::set_joint_prior(const std::vector<std::string>& names, MatrixX precision) {
@@ -85,15 +93,39 @@ std::vector<std::string> ParameterSet::coordinate_names() const {
   return names;
 }
 
+Eigen::Index ParameterSet::coordinate(const ParameterHandle& at) const {
+  Eigen::Index found = -1;
+  for_each_estimated([&](const Parameter& p, int first) {
+    if (p.at == at) found = first;
+  });
+  if (found < 0) throw std::invalid_argument("no estimated parameter stands there");
+  return found;
+}
+
+std::vector<const Parameter*> ParameterSet::coordinate_parameters() const {
+  std::vector<const Parameter*> all;
+  for_each_estimated([&](const Parameter& p, int) { all.insert(all.end(), std::size_t(p.dimension()), &p); });
+  return all;
+}
+
+std::vector<Eigen::Index> ParameterSet::joint_coordinates() const {
+  std::vector<int> place(parameters_.size(), -1);
+  for_each_estimated([&](const Parameter& q, int at) { place[std::size_t(&q - parameters_.data())] = at; });
+  std::vector<Eigen::Index> coordinates;
+  for (const int number : joint_)
+    if (place[std::size_t(number)] >= 0) coordinates.push_back(place[std::size_t(number)]);
+  return coordinates;
+}
+
 VectorX ParameterSet::origin_of(const Parameter& parameter) const {
   if (parameter.origin.size() > 0) return parameter.origin;
-  return reference_.segment(parameter.theta_index, parameter.transform == Transform::PlanePosition ? 6 : 3);
+  return reference_.segment(parameter.at, parameter.transform == Transform::PlanePosition ? 6 : 3);
 }
 
 VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
   VectorX p(dimension());
   for_each_estimated([&](const Parameter& q, int at) {
-    const int i = q.theta_index;
+    const Eigen::Index i = q.at;
     switch (q.transform) {
       case Transform::Logarithm:
         p[at] = std::log(theta[i]);
@@ -127,7 +159,7 @@ VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
 VectorX ParameterSet::to_theta(const VectorX& p) const {
   VectorX theta = reference_;
   for_each_estimated([&](const Parameter& q, int at) {
-    const int i = q.theta_index;
+    const Eigen::Index i = q.at;
     switch (q.transform) {
       case Transform::Logarithm:
         theta[i] = std::exp(p[at]);
@@ -154,7 +186,6 @@ VectorX ParameterSet::to_theta(const VectorX& p) const {
         break;
       }
     }
-    for (const int other : q.also) theta[other] = theta[i];
   });
   return theta;
 }
@@ -162,7 +193,7 @@ VectorX ParameterSet::to_theta(const VectorX& p) const {
 MatrixX ParameterSet::jacobian(const VectorX& p) const {
   MatrixX J = MatrixX::Zero(reference_.size(), dimension());
   for_each_estimated([&](const Parameter& q, int at) {
-    const int i = q.theta_index;
+    const Eigen::Index i = q.at;
     switch (q.transform) {
       case Transform::Logarithm:
         J(i, at) = std::exp(p[at]);
@@ -196,7 +227,6 @@ MatrixX ParameterSet::jacobian(const VectorX& p) const {
         break;
       }
     }
-    for (const int other : q.also) J(other, at) = J(i, at);
   });
   return J;
 }
@@ -234,7 +264,7 @@ double ParameterSet::prior(const VectorX& p, VectorX* gradient, MatrixX* curvatu
   VectorX t(count);
   for (Eigen::Index k = 0; k < count; ++k) {
     const int number = joint_[std::size_t(k)], at = place[std::size_t(number)];
-    t[k] = at >= 0 ? p[at] : std::log(reference_[parameters_[std::size_t(number)].theta_index]);
+    t[k] = at >= 0 ? p[at] : std::log(reference_[parameters_[std::size_t(number)].at]);
   }
   const VectorX slope = joint_precision_ * t;
   sum += 0.5 * t.dot(slope);

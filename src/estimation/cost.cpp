@@ -1,0 +1,51 @@
+#include "estimation/cost.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pliant {
+
+double CostEvaluation::surface_rms() const {
+  double sum = 0.0;
+  long long count = 0;
+  for (const FrameFit& f : frames) sum += f.sum_squares, count += f.points;
+  return count > 0 ? std::sqrt(sum / double(count)) : 0.0;
+}
+
+double CostEvaluation::surface_median() const {
+  std::vector<float> all;
+  for (const FrameFit& f : frames) all.insert(all.end(), f.distances.begin(), f.distances.end());
+  if (all.empty()) return 0.0;
+  const auto middle = all.begin() + std::ptrdiff_t(all.size() / 2);
+  std::nth_element(all.begin(), middle, all.end());
+  return double(*middle);
+}
+
+double CostEvaluation::track_rms() const {
+  double sum = 0.0;
+  long long count = 0;
+  for (const FrameFit& f : frames) sum += f.track_sum_squares, count += f.tracks;
+  return count > 0 ? std::sqrt(sum / double(count)) : 0.0;
+}
+
+double CostEvaluation::matched_fraction() const {
+  long long matched = 0, count = 0;
+  for (const FrameFit& f : frames) matched += f.matched, count += f.points;
+  return count > 0 ? double(matched) / double(count) : 0.0;
+}
+
+double CostEvaluation::independent_observations() const {
+  double count = 0.0;
+  for (const FrameFit& f : frames) count += f.independent;
+  return count;
+}
+
+CostEvaluation CostEvaluation::of_recording(int recording) const {
+  CostEvaluation one;
+  one.succeeded = succeeded, one.failure = failure;
+  for (const FrameFit& f : frames)
+    if (f.recording == recording) one.cost += f.cost, one.frames.push_back(f);
+  return one;
+}
+
+}  // namespace pliant

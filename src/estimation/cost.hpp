@@ -1,0 +1,57 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "parameters/parameter_set.hpp"
+
+namespace pliant {
+
+/// How one instant of what was simulated fits what was measured: a frame of a motion, a press, a load, a curve.
+struct FrameFit {
+  int recording = 0;  ///< which trial of an objective it belongs to, as that counts
+  int frame = 0;      ///< of the trial
+  int points = 0, matched = 0;  ///< of the surface
+  int tracks = 0;               ///< followed points
+  double independent = 0.0;     ///< observations behind the cost
+  double cost = 0.0;
+  VectorX gradient;                ///< by p; empty unless asked for
+  MatrixX gauss_newton;            ///< J^T W J
+  std::vector<float> distances;    ///< [m] of each point to the deformed surface, each at most the loss's scale
+  double sum_squares = 0.0;        ///< [m^2] of them
+  double max_distance = 0.0;       ///< [m] of matched points
+  double sum_noise_squares = 0.0;  ///< [m^2] of the sensor's standard deviations
+  double track_sum_squares = 0.0;  ///< [m^2] of the followed points' distances
+};
+
+struct CostEvaluation {
+  bool succeeded = false;
+  std::string failure;
+  double cost = 0.0;
+  VectorX gradient;
+  MatrixX gauss_newton;
+  std::vector<FrameFit> frames;  ///< of all recordings, one after the other
+  int steps = 0;
+  double surface_rms() const;     ///< [m]; 0 where no surface was seen
+  double surface_median() const;  ///< [m], likewise
+  double track_rms() const;       ///< [m], of the followed points; 0 where there are none
+  double matched_fraction() const;
+  double independent_observations() const;  ///< behind the cost, as `ObjectiveOptions` counts them
+  /// The frames of one recording alone, with its cost and without derivatives.
+  [[nodiscard]] CostEvaluation of_recording(int recording) const;
+};
+
+/// What is minimised: parameters to cost. One instance for one thread.
+class CostFunction {
+ public:
+  virtual ~CostFunction() = default;
+  virtual const ParameterSet& parameters() const = 0;
+  /// Cost alone.
+  [[nodiscard]] virtual CostEvaluation evaluate(const VectorX& p) = 0;
+  /// Cost, gradient and Gauss-Newton matrix: for few parameters.
+  [[nodiscard]] virtual CostEvaluation linearise(const VectorX& p) = 0;
+  /// Cost and gradient: any number of parameters.
+  [[nodiscard]] virtual CostEvaluation gradient(const VectorX& p) = 0;
+};
+
+}  // namespace pliant

@@ -1,0 +1,299 @@
+#include "estimation/motion_trial.hpp"
+
+#include <tbb/task_group.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace pliant {
+
+/// The simulation, and how its frames are compared.
+class MotionTrial::Comparison {
+ public:
+  Comparison(ObservedMotion motion, int number)
+      : motion_(std::move(motion)), number_(number), simulation_(motion_.body, motion_.simulation) {}
+
+  bool hold_shape(const VectorX& theta) { return simulation_.hold_shape(theta).empty(); }
+
+  CostEvaluation run(const VectorX& theta, const MatrixX& all_directions);
+  /// @param theta_bar  out: the cost's derivative by theta
+  CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar);
+
+ private:
+  /// The sensors' corrections at a theta, and how they change along directions.
+  struct Sensors {
+    std::vector<SensorCorrection> corrections;
+    std::vector<MatrixX> changes;  // 7 x directions, of each
+    bool correct = false, change = false;
+  };
+  Sensors sensors_at(const VectorX& theta, const MatrixX& directions) const;
+  const Sensors& sensors() const { return sensors_; }
+  double frame_weight(const FrameObservations& seen) const {
+    return std::min(1.0, motion_.options.independent_points / double(seen.points.size()));
+  }
+  std::vector<SurfaceObservation> corrected(const std::vector<SurfaceObservation>& points) const;
+  std::vector<TrackObservation> corrected(const std::vector<TrackObservation>& tracks) const;
+  bool is_corrected(int sensor) const { return sensor < int(sensors_.corrections.size()); }
+  const SensorBlocks& sensor_blocks(int sensor) const { return motion_.mismatch.sensors[std::size_t(sensor)]; }
+  /// Whether a change of theta changes anything about this recording.
+  bool depends_on(const Eigen::Ref<const VectorX>& direction) const;
+
+  FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents) const;
+  void fit_surface(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+                   FrameFit& fit) const;
+  void fit_tracks(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+                  FrameFit& fit) const;
+  /// Cotangents of positions and of the sensors' corrections for the cost of a frame.
+  void add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar, VectorX& theta_bar) const;
+
+  ObservedMotion motion_;
+  int number_;
+  Simulation simulation_;
+  Sensors sensors_;
+};
+
+MotionTrial::Comparison::Sensors MotionTrial::Comparison::sensors_at(const VectorX& theta, const MatrixX& directions) const {
+  Sensors s;
+  for (const SensorBlocks& blocks : motion_.mismatch.sensors) {
+    const SensorCorrection::Values values = blocks.values(theta);
+    s.corrections.emplace_back(motion_.mismatch.centre, values);
+    s.changes.push_back(blocks.rows(directions));
+    s.correct = s.correct || !values.isZero();
+    s.change = s.change || !s.changes.back().isZero();
+  }
+  return s;
+}
+
+std::vector<SurfaceObservation> MotionTrial::Comparison::corrected(const std::vector<SurfaceObservation>& points) const {
+  std::vector<SurfaceObservation> moved = points;
+  if (sensors_.correct)
+    for (SurfaceObservation& o : moved)
+      if (is_corrected(o.sensor)) o.position = sensors_.corrections[std::size_t(o.sensor)].apply(o.position, o.view);
+  return moved;
+}
+
+std::vector<TrackObservation> MotionTrial::Comparison::corrected(const std::vector<TrackObservation>& tracks) const {
+  std::vector<TrackObservation> moved = tracks;
+  if (sensors_.correct)
+    for (TrackObservation& o : moved)
+      if (is_corrected(o.sensor))
+        o.position = sensors_.corrections[std::size_t(o.sensor)].apply(o.position, Vector3::Zero());
+  return moved;
+}
+
+void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const Points& positions,
+                                  const std::vector<Points>& tangents, FrameFit& fit) const {
+  const SurfaceConstraints& surface = *motion_.mismatch.surface;
+  const double outlier_scale = motion_.options.outlier_scale;
+  fit.points = int(seen.points.size());
+  fit.independent += std::min(double(fit.points), motion_.options.independent_points);
+  const auto matches = surface.match(corrected(seen.points), positions);
+  const RobustLoss loss{outlier_scale};
+  const double share = frame_weight(seen);
+  MatrixX J(fit.points, Eigen::Index(tangents.size()));
+  for (std::size_t c = 0; c < tangents.size(); ++c) J.col(Eigen::Index(c)) = surface.tangent(matches, tangents[c]);
+  VectorX weight(fit.points), weighted(fit.points);
+  fit.distances.assign(std::size_t(fit.points), float(outlier_scale));
+  for (int i = 0; i < fit.points; ++i) {
+    const SurfaceObservation& o = seen.points[std::size_t(i)];
+    const double noise = o.noise, w = share / (noise * noise);
+    const PointMatch& m = matches[std::size_t(i)];
+    fit.sum_noise_squares += noise * noise;
+    weight[i] = weighted[i] = 0.0;
+    if (m.cell < 0) {
+      fit.cost += w * loss.outlier();
+      fit.sum_squares += outlier_scale * outlier_scale;
+      continue;
+    }
+    ++fit.matched;
+    fit.cost += w * loss.value(m.distance);
+    const double true_distance = std::abs(m.distance) / m.stretch;
+    fit.distances[std::size_t(i)] = float(std::min(true_distance, outlier_scale));
+    fit.sum_squares += std::pow(std::min(true_distance, outlier_scale), 2);
+    fit.max_distance = std::max(fit.max_distance, true_distance);
+    weight[i] = w * loss.weight(m.distance);
+    weighted[i] = weight[i] * m.distance;
+    // A point that moves changes its distance as the object does that moves the other way.
+    if (sensors_.change && is_corrected(o.sensor))
+      J.row(i) -= m.direction.transpose() * sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, o.view) *
+                  sensors_.changes[std::size_t(o.sensor)];
+  }
+  if (!tangents.empty()) {
+    fit.gradient += J.transpose() * weighted;
+    fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
+  }
+}
+
+void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Points& positions,
+                                 const std::vector<Points>& tangents, FrameFit& fit) const {
+  const PointTracks& tracks = *motion_.mismatch.tracks;
+  const double outlier_scale = motion_.options.outlier_scale;
+  fit.tracks = int(seen.tracks.size());
+  fit.independent += 3.0 * fit.tracks;
+  const Points r = tracks.residuals(corrected(seen.tracks), positions);
+  const RobustLoss loss{outlier_scale};
+  VectorX weight(3 * r.rows());
+  for (int i = 0; i < fit.tracks; ++i) {
+    const double noise = seen.tracks[std::size_t(i)].noise, distance = r.row(i).norm(), w = 1.0 / (noise * noise);
+    fit.cost += w * loss.value(distance);
+    fit.track_sum_squares += std::pow(std::min(distance, outlier_scale), 2);
+    weight.segment<3>(3 * i).setConstant(w * loss.weight(distance));
+  }
+  if (tangents.empty()) return;
+  MatrixX J(weight.size(), Eigen::Index(tangents.size()));
+  for (std::size_t c = 0; c < tangents.size(); ++c)
+    J.col(Eigen::Index(c)) = flat(tracks.tangent(seen.tracks, tangents[c]));
+  for (int i = 0; i < fit.tracks && sensors_.change; ++i) {
+    const TrackObservation& o = seen.tracks[std::size_t(i)];
+    if (is_corrected(o.sensor))
+      J.middleRows<3>(3 * i) -= sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, Vector3::Zero()) *
+                                sensors_.changes[std::size_t(o.sensor)];
+  }
+  fit.gradient += J.transpose() * weight.cwiseProduct(flat(r));
+  fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
+}
+
+FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const Points& positions,
+                                    const std::vector<Points>& tangents) const {
+  FrameFit fit;
+  fit.recording = number_;
+  fit.frame = seen.frame;
+  const auto n = Eigen::Index(tangents.size());
+  if (n > 0) {
+    fit.gradient.setZero(n);
+    fit.gauss_newton.setZero(n, n);
+  }
+  if (!seen.points.empty()) fit_surface(seen, positions, tangents, fit);
+  if (!seen.tracks.empty()) fit_tracks(seen, positions, tangents, fit);
+  return fit;
+}
+
+bool MotionTrial::Comparison::depends_on(const Eigen::Ref<const VectorX>& direction) const {
+  const auto changes = [&](const ParameterHandle& block) {
+    return !direction.segment(block.first, block.size).isZero(0.0);
+  };
+  if (std::ranges::any_of(motion_.simulation.blocks.all(), changes)) return true;
+  return std::ranges::any_of(motion_.mismatch.sensors,
+                             [&](const SensorBlocks& s) { return std::ranges::any_of(s.all(), changes); });
+}
+
+CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX& all_directions) {
+  // Directions along which only other recordings change cost nothing.
+  std::vector<Eigen::Index> columns;
+  for (Eigen::Index c = 0; c < all_directions.cols(); ++c)
+    if (depends_on(all_directions.col(c))) columns.push_back(c);
+  const MatrixX directions = all_directions(Eigen::all, columns);
+  sensors_ = sensors_at(theta, directions);
+  const auto& observations = *motion_.observations;
+  CostEvaluation evaluation;
+  std::vector<FrameFit> fits(observations.size());
+  std::size_t next = 0;
+  tbb::task_group beside;
+  const int last_frame = motion_.options.last_frame;
+  const RolloutSummary summary = simulation_.run(
+      theta, directions, last_frame, [&](int frame, const State& state, std::span<const State> tangents) {
+        if (next < observations.size() && observations[next].frame == frame) {
+          std::vector<Points> changes;
+          for (const State& t : tangents) changes.push_back(t.x);
+          const std::size_t slot = next++;
+          beside.run([this, &observations, &fits, slot, x = state.x, changes = std::move(changes)] {
+            fits[slot] = fit_frame(observations[slot], x, changes);
+          });
+        }
+        return frame < last_frame;
+      });
+  beside.wait();
+  evaluation.steps = summary.steps;
+  if (!summary.succeeded) return evaluation.failure = summary.failure, evaluation;
+  fits.resize(next);
+  const Eigen::Index n = all_directions.cols();
+  for (FrameFit& fit : fits) {
+    evaluation.cost += fit.cost;
+    if (n == 0) continue;
+    VectorX gradient = VectorX::Zero(n);
+    MatrixX matrix = MatrixX::Zero(n, n);
+    if (!columns.empty()) gradient(columns) = fit.gradient, matrix(columns, columns) = fit.gauss_newton;
+    fit.gradient = std::move(gradient), fit.gauss_newton = std::move(matrix);
+  }
+  evaluation.frames = std::move(fits);
+  return evaluation.succeeded = true, evaluation;
+}
+
+void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar,
+                                     VectorX& theta_bar) const {
+  const RobustLoss loss{motion_.options.outlier_scale};
+  if (!seen.points.empty()) {
+    const SurfaceConstraints& surface = *motion_.mismatch.surface;
+    const auto matches = surface.match(corrected(seen.points), positions);
+    VectorX bar = VectorX::Zero(Eigen::Index(matches.size()));
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      const SurfaceObservation& o = seen.points[i];
+      if (matches[i].cell < 0) continue;
+      bar[Eigen::Index(i)] = frame_weight(seen) / (o.noise * o.noise) * loss.derivative(matches[i].distance);
+      if (is_corrected(o.sensor))
+        sensor_blocks(o.sensor).add(
+            -bar[Eigen::Index(i)] *
+                sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, o.view).transpose() *
+                matches[i].direction,
+            theta_bar);
+    }
+    x_bar += surface.adjoint(matches, bar);
+  }
+  if (!seen.tracks.empty()) {
+    Points bar = motion_.mismatch.tracks->residuals(corrected(seen.tracks), positions);
+    for (std::size_t i = 0; i < seen.tracks.size(); ++i) {
+      const TrackObservation& o = seen.tracks[i];
+      const auto row = Eigen::Index(i);
+      bar.row(row) *= loss.weight(bar.row(row).norm()) / (o.noise * o.noise);
+      if (is_corrected(o.sensor))
+        sensor_blocks(o.sensor).add(
+            -sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, Vector3::Zero()).transpose() *
+                bar.row(row).transpose(),
+            theta_bar);
+    }
+    motion_.mismatch.tracks->add_adjoint(seen.tracks, bar, x_bar);
+  }
+}
+
+CostEvaluation MotionTrial::Comparison::gradient(const VectorX& theta, VectorX& theta_bar) {
+  sensors_ = sensors_at(theta, MatrixX(theta.size(), 0));
+  const auto& observations = *motion_.observations;
+  CostEvaluation evaluation;
+  const auto seen_in = [&](int frame) -> const FrameObservations* {
+    const auto it = std::lower_bound(observations.begin(), observations.end(), frame,
+                                     [](const FrameObservations& o, int f) { return o.frame < f; });
+    return it != observations.end() && it->frame == frame ? &*it : nullptr;
+  };
+  VectorX sensor_bar = VectorX::Zero(theta.size());
+  const RolloutSummary summary = simulation_.run_adjoint(
+      theta, motion_.options.last_frame,
+      [&](int frame, const State& state) {
+        if (const auto* seen = seen_in(frame)) evaluation.frames.push_back(fit_frame(*seen, state.x, {}));
+        return true;
+      },
+      [&](int frame, const State& state, Points& x_bar) {
+        if (const auto* seen = seen_in(frame)) add_cotangents(*seen, state.x, x_bar, sensor_bar);
+      },
+      theta_bar);
+  evaluation.steps = summary.steps;
+  if (!summary.succeeded) return evaluation.failure = summary.failure, evaluation;
+  theta_bar += sensor_bar;
+  for (const FrameFit& fit : evaluation.frames) evaluation.cost += fit.cost;
+  return evaluation.succeeded = true, evaluation;
+}
+
+MotionTrial::MotionTrial(ObservedMotion motion, int number)
+    : comparison_(std::make_unique<Comparison>(std::move(motion), number)) {}
+MotionTrial::~MotionTrial() = default;
+
+CostEvaluation MotionTrial::run(const VectorX& theta, const MatrixX& directions) {
+  return comparison_->run(theta, directions);
+}
+
+CostEvaluation MotionTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
+  return comparison_->gradient(theta, theta_bar);
+}
+
+bool MotionTrial::hold_shape(const VectorX& theta) { return comparison_->hold_shape(theta); }
+
+}  // namespace pliant

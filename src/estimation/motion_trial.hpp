@@ -1,0 +1,63 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "estimation/trial.hpp"
+#include "mismatch/point_tracks.hpp"
+#include "mismatch/sensor_correction.hpp"
+#include "mismatch/surface_constraints.hpp"
+#include "motion/simulation.hpp"
+
+namespace pliant {
+
+/// What was seen in one frame of the simulation.
+struct FrameObservations {
+  int frame = 0;                                ///< of the simulation: 0 is when the object is let go
+  std::vector<SurfaceObservation> points = {};  ///< somewhere on the surface
+  std::vector<TrackObservation> tracks = {};    ///< known points of the object
+};
+
+struct ObjectiveOptions {
+  double outlier_scale = 0.0;  ///< c of the robust loss [m], > 0, within the band
+  int last_frame = 0;          ///< horizon, inclusive
+  /// Neighbouring pixels err together: a frame counts as at most so many independent points.
+  double independent_points = 50.0;
+};
+
+/// What was observed of a body and how it is compared; either may be null where there is nothing of its kind.
+struct Mismatch {
+  std::shared_ptr<const SurfaceConstraints> surface;
+  std::shared_ptr<const PointTracks> tracks;
+  Vector3 centre = Vector3::Zero();  ///< about which sensors are corrected
+  std::vector<SensorBlocks> sensors = {};  ///< their corrections in the parameter vector; may be fewer than there are
+};
+
+/// A body in motion, or at rest, and what was seen of it.
+struct ObservedMotion {
+  Mismatch mismatch;
+  std::shared_ptr<const Body> body;
+  SimulationOptions simulation;
+  std::shared_ptr<const std::vector<FrameObservations>> observations;
+  ObjectiveOptions options;
+};
+
+/// A motion, or an equilibrium, compared with points on its surface and points of the object that were followed: the sum
+/// over frames and points of a robust loss of the pulled-back distance, or of the distance from where a followed point
+/// was seen, over its noise. The comparison of a frame is evaluated beside the simulation of the next.
+class MotionTrial : public Trial {
+ public:
+  /// @param number  what its frames call it (`FrameFit::recording`)
+  MotionTrial(ObservedMotion motion, int number);
+  ~MotionTrial() override;
+
+  [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
+  [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  [[nodiscard]] bool hold_shape(const VectorX& theta) override;
+
+ private:
+  class Comparison;
+  std::unique_ptr<Comparison> comparison_;
+};
+
+}  // namespace pliant

@@ -1,0 +1,141 @@
+#include "estimation/press_trial.hpp"
+
+#include <cmath>
+
+namespace pliant {
+
+PressedMaterial::PressedMaterial(std::shared_ptr<const Body> body, LawLayout layout)
+    : body_(std::move(body)), layout_(std::move(layout)) {}
+
+std::shared_ptr<const MaterialLaw> PressedMaterial::law(const VectorX& theta) {
+  const std::lock_guard lock(mutex_);
+  if (!law_ || theta_.size() != theta.size() || theta_ != theta) {
+    law_ = press_law(*body_, layout_, theta);
+    theta_ = theta;
+  }
+  return law_;
+}
+
+void PressedMaterial::set_form(std::shared_ptr<const Body> body, LawLayout layout) {
+  body_ = std::move(body);
+  layout_ = std::move(layout);
+  law_.reset();
+}
+
+PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
+                       const VectorX& reference, const PressTrialOptions& options, int number)
+    : scene_(std::move(scene)),
+      press_(press),
+      number_(number),
+      material_(std::move(material)),
+      options_(options),
+      body_(*scene_, press, material_->law(reference), mean_modulus(material_->body(), *material_->law(reference))) {}
+
+bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight) {
+  const ObservedPress& seen = scene_->presses[std::size_t(press_)];
+  body_.equilibrium().set_law(material_->law(theta));
+  result.steps = 1;
+  if (!body_.solve().converged) return result.failure = seen.name + ": " + body_.equilibrium().failure(), false;
+  Points residuals = body_.points();
+  for (Eigen::Index m = 0; m < residuals.rows(); ++m) residuals.row(m) -= seen.loaded[std::size_t(m)].transpose();
+  residuals_ = residuals;
+  FrameFit fit;
+  fit.recording = number_;
+  fit.frame = press_;
+  // Pseudo-Huber in each coordinate: c^2 (sqrt(1 + r^2 / c^2) - 1).
+  const double c = options_.outlier_scale, inverse = 1.0 / options_.noise;
+  slope.resize(residuals.size()), weight.resize(residuals.size());
+  for (Eigen::Index k = 0; k < residuals.size(); ++k) {
+    const double r = residuals.data()[k] * inverse, root = std::sqrt(1.0 + r * r / (c * c));
+    fit.cost += c * c * (root - 1.0);
+    slope[k] = r / root * inverse;
+    weight[k] = inverse * inverse / root;
+  }
+  fit.tracks = int(residuals.rows());
+  fit.independent = 3.0 * fit.tracks;
+  fit.track_sum_squares = residuals.squaredNorm();
+  fit.sum_noise_squares = fit.tracks * options_.noise * options_.noise;
+  result.cost = fit.cost;
+  result.frames.push_back(std::move(fit));
+  result.succeeded = true;
+  return true;
+}
+
+template <class Visit>
+void PressTrial::for_parameter_derivatives(const VectorX& theta, Visit&& visit) {
+  const LawLayout& layout = material_->layout();
+  body_.equilibrium().elasticity().for_parameter_derivatives(
+      [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
+        const VectorX own = element_numbers(material_->body(), layout, theta, e);
+        const MatrixX by = by_q * law_parameter_derivatives(layout.form().terms, own);
+        for (const auto& [number, at, share] : number_shares(material_->body(), layout, theta, own, e))
+          visit(nodes, at, share, by.col(number));
+      });
+}
+
+CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) {
+  CostEvaluation result;
+  VectorX slope, weight;
+  if (!compare(theta, result, slope, weight) || directions.cols() == 0) return result;
+  if (!body_.equilibrium().prepare_derivatives(body_.placement())) {
+    result.succeeded = false;
+    return result.failure = scene_->presses[std::size_t(press_)].name + ": the equilibrium is not stable", result;
+  }
+  // Changes of the forces -dW/dx by each of the law's parameters.
+  const std::vector<ParameterHandle> blocks = material_->layout().all();
+  std::vector<int> place(std::size_t(theta.size()), -1);
+  std::vector<Eigen::Index> rows_of_theta;
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    place[std::size_t(blocks[k].first)] = int(k);
+    rows_of_theta.push_back(blocks[k].first);
+  }
+  const int n = scene_->body->node_count(), rows = n + body_.equilibrium().contact_count();
+  std::vector<Points> forces(blocks.size(), Points::Zero(rows, 3));
+  for_parameter_derivatives(theta, [&](std::span<const int> nodes, const ParameterHandle& at, double share,
+                                       const auto& by) {
+    Points& force = forces[std::size_t(place[std::size_t(at.first)])];
+    for (std::size_t a = 0; a < nodes.size(); ++a)
+      force.row(nodes[a]) -= share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
+  });
+  MatrixX by_parameters(residuals_.size(), Eigen::Index(blocks.size()));
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    const Points& change = body_.equilibrium().response(forces[k]);
+    Points moved = Points::Zero(residuals_.rows(), 3);
+    moved.topRows(body_.embedding().point_count()) = body_.embedding().positions(change.topRows(n));
+    if (body_.has_probe()) moved.row(moved.rows() - 1) = change.row(n);
+    by_parameters.col(Eigen::Index(k)) = flat(moved);
+  }
+  const MatrixX J = by_parameters * directions(rows_of_theta, Eigen::all);
+  FrameFit& fit = result.frames.front();
+  fit.gradient = J.transpose() * slope;
+  fit.gauss_newton = J.transpose() * weight.asDiagonal() * J;
+  return result;
+}
+
+CostEvaluation PressTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
+  CostEvaluation result;
+  VectorX slope, weight;
+  theta_bar = VectorX::Zero(theta.size());
+  if (!compare(theta, result, slope, weight)) return result;
+  if (!body_.equilibrium().prepare_derivatives(body_.placement())) {
+    result.succeeded = false;
+    return result.failure = scene_->presses[std::size_t(press_)].name + ": the equilibrium is not stable", result;
+  }
+  // The cotangent of the points, back through the equilibrium: its matrix is symmetric.
+  const int n = scene_->body->node_count(), points = body_.embedding().point_count();
+  Points bar = Points::Zero(n + body_.equilibrium().contact_count(), 3), of_nodes = Points::Zero(n, 3);
+  for (int m = 0; m < points; ++m) body_.embedding().add_transpose(m, slope.segment<3>(3 * m), of_nodes);
+  bar.topRows(n) = of_nodes;
+  if (body_.has_probe()) bar.row(n) = slope.tail<3>().transpose();
+  const Points adjoint = body_.equilibrium().response(bar);
+  for_parameter_derivatives(theta, [&](std::span<const int> nodes, const ParameterHandle& at, double share,
+                                       const auto& by) {
+    double sum = 0.0;
+    for (std::size_t a = 0; a < nodes.size(); ++a)
+      sum -= adjoint.row(nodes[a]).dot(by.template segment<3>(3 * Eigen::Index(a)));
+    theta_bar[at] += share * sum;
+  });
+  return result;
+}
+
+}  // namespace pliant

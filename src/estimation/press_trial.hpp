@@ -1,0 +1,71 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "estimation/press_law.hpp"
+#include "estimation/press_scene.hpp"
+#include "estimation/trial.hpp"
+
+namespace pliant {
+
+/// The law of a pressed object as a function of the parameters, computed once for all presses that ask for the same.
+class PressedMaterial {
+ public:
+  PressedMaterial(std::shared_ptr<const Body> body, LawLayout layout);
+
+  const Body& body() const { return *body_; }
+  const LawLayout& layout() const { return layout_; }
+  /// The law of all elements for theta; from any thread.
+  std::shared_ptr<const MaterialLaw> law(const VectorX& theta);
+  /// Goes on with another form of the law.
+  /// @param body  the same but for its modulus field
+  void set_form(std::shared_ptr<const Body> body, LawLayout layout);
+
+ private:
+  std::shared_ptr<const Body> body_;
+  LawLayout layout_;
+  std::mutex mutex_;
+  VectorX theta_;
+  std::shared_ptr<const MaterialLaw> law_;
+};
+
+struct PressTrialOptions {
+  double noise = 0.0;          ///< standard deviation of a coordinate [m], > 0
+  double outlier_scale = 0.0;  ///< residuals beyond this many deviations count less (pseudo-Huber), > 0
+};
+
+/// One press with known force: over points' coordinates, half the square of where the equilibrium has them less where
+/// they were seen, over the noise, robust beyond `outlier_scale`. Derivatives are those of the equilibrium, by its exact
+/// Hessian: a back-substitution a parameter, or one for all by the adjoint. Each run sets out from the last equilibrium.
+class PressTrial : public Trial {
+ public:
+  /// @param reference  parameters whose modulus says how stiff the contact is
+  /// @param number     what its frame calls it (`FrameFit::recording`)
+  PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
+             const VectorX& reference, const PressTrialOptions& options, int number = 0);
+
+  [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
+  [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+
+  void set_options(const PressTrialOptions& options) { options_ = options; }
+  /// Residuals of the last run [m], n x 3.
+  const Points& residuals() const { return residuals_; }
+
+ private:
+  /// The equilibrium and its cost. `slope` and `weight` are those of each coordinate's loss.
+  bool compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight);
+  /// Calls visit(element, nodes, parameter, derivative) for the derivatives of the elements' dW/dx by theta.
+  template <class Visit>
+  void for_parameter_derivatives(const VectorX& theta, Visit&& visit);
+
+  std::shared_ptr<const PressScene> scene_;
+  int press_, number_;
+  std::shared_ptr<PressedMaterial> material_;
+  PressTrialOptions options_;
+  PressedBody body_;
+  Points residuals_;
+};
+
+}  // namespace pliant

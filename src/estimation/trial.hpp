@@ -1,0 +1,31 @@
+#pragma once
+
+#include "estimation/cost.hpp"
+
+namespace pliant {
+
+/// Something that is simulated and compared with what was measured of it: a motion seen by sensors, a body at rest under
+/// a load, a press with known force, a stress-strain curve. It reads its parameters from the vector that all trials of
+/// an objective share, by handles of its own. One instance for one thread.
+class Trial {
+ public:
+  virtual ~Trial() = default;
+
+  /// Cost at theta, frame by frame; with the gradient and the Gauss-Newton matrix of each frame along directions.
+  /// @param directions  changes of theta, one a column; may have none: the cost alone
+  /// Where it cannot be simulated the result says why.
+  [[nodiscard]] virtual CostEvaluation run(const VectorX& theta, const MatrixX& directions) = 0;
+
+  /// Cost at theta, and its derivative by the adjoint: as much work for any number of parameters.
+  /// @param theta_bar  out: d cost / d theta, as long as theta; of no meaning where the evaluation failed
+  [[nodiscard]] virtual CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) = 0;
+
+  /// From now on load-free shapes and corrected scans stay what they are for theta: costs and derivatives leave their
+  /// changes out. False where there is none for theta.
+  [[nodiscard]] virtual bool hold_shape(const VectorX& theta) {
+    (void)theta;
+    return true;
+  }
+};
+
+}  // namespace pliant

@@ -1,0 +1,58 @@
+#include "motion/probe_contact.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double glue = 10.0;               // stiffness of a glued disc and of a punch, in layers of elements
+constexpr double ball_stiffness = 100.0;    // of a ball, which touches a small part of an element
+constexpr double punch_smoothing = 0.005;   // over which pressure sets in, in radii
+constexpr double ball_smoothing = 0.01;     // likewise
+constexpr double punch_rim = 0.05;          // radius of the rounded rim, in radii
+constexpr int fewest_cuts = 4, most_cuts = 8;  // of a face, for the samples where contact acts
+
+RigidContact glued_disc(const Body& body, const ProbeOptions& probe, double youngs_modulus) {
+  const ContactSamples disc = disc_samples(body, probe.centre, probe.radius);
+  if (disc.rest.empty())
+    throw InputError({{},
+                      fmt::format("the disc at ({:.4g}, {:.4g}, {:.4g}) m touches nothing of the object",
+                                  probe.centre.x(), probe.centre.y(), probe.centre.z()),
+                      "a contact whose centre lies on the surface at rest",
+                      "correct where the probe touches the object"});
+  return RigidContact::glued(body, disc, glued_stiffness(youngs_modulus, mean_edge(body)));
+}
+
+}  // namespace
+
+Vector3 probe_axis(const Body& body, const ProbeOptions& probe) {
+  if (probe.axis) return probe.axis->normalized();
+  const auto nearest = std::ranges::min_element(
+      body.surface, {}, [&](const SurfacePoint& p) { return (p.position - probe.centre).squaredNorm(); });
+  return -nearest->normal;
+}
+
+RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double youngs_modulus) {
+  if (probe.kind == ProbeKind::GluedDisc) return glued_disc(body, probe, youngs_modulus);
+  const Vector3 axis = probe_axis(body, probe);
+  const double edge = mean_edge(body), radius = probe.radius;
+  const ContactSamples samples = boundary_samples(body, std::clamp(int(2.0 * edge / radius), fewest_cuts, most_cuts));
+  if (probe.kind == ProbeKind::Ball)
+    return RigidContact::sliding(body, samples, rigid_ball(probe.centre - radius * axis, radius),
+                                 ball_stiffness * youngs_modulus / edge, ball_smoothing * radius);
+  return RigidContact::sliding(body, samples, rigid_punch(probe.centre, axis, radius, punch_rim * radius),
+                               glued_stiffness(youngs_modulus, edge), punch_smoothing * radius);
+}
+
+double glued_stiffness(double youngs_modulus, double edge) { return glue * youngs_modulus / edge; }
+
+/// A regular tetrahedron of edge a has the volume a^3 / (6 sqrt 2).
+double mean_edge(const Body& body) { return std::cbrt(6.0 * std::sqrt(2.0) * body.volume() / body.element_count()); }
+
+}  // namespace pliant

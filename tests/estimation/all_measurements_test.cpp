@@ -1,0 +1,219 @@
+// One capture that shows an object by depth, followed markers, weights that hang from it, and presses with known force.
+// Each kind of measurement is made of a material of its own stiffness: what takes part in the fit draws the estimate
+// towards its own.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "capture/markers.hpp"
+#include "estimation/fit.hpp"
+#include "estimation/press_law.hpp"
+#include "estimation/press_scene.hpp"
+#include "estimation/recordings.hpp"
+#include "geometry/primitives.hpp"
+#include "support/tolerance.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using test::tolerance;
+
+constexpr double length = 0.3, edge = 0.05, modulus = 1e5, noise = 5e-4;
+constexpr int frames = 12;
+
+/// How stiff the material is that a kind of measurement sees.
+struct Truths {
+  double depth = modulus, markers = modulus, loads = modulus, presses = modulus;
+};
+
+/// What of the capture takes part.
+struct Parts {
+  bool depth = true, markers = true, loads = true, presses = true;
+};
+
+/// A bar along x, clamped at its low end and let go straight.
+class SeenInEveryWay : public ::testing::Test {
+ protected:
+  SeenInEveryWay() {
+    capture_.name = "bar";
+    capture_.file = folder_.path() / "capture.toml";
+    capture_.surface = make_box(Vector3(length, edge, edge), 0.0125);
+    capture_.density = 300.0;
+    capture_.gravity = Vector3(0.0, -9.81, 0.0);
+    for (int f = 0; f < frames; ++f) capture_.times.push_back(f / 30.0);
+    capture_.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
+    DepthCamera camera;
+    camera.name = "front";
+    capture_.depth = {camera};
+    for (double x = -0.1; x < 0.16; x += 0.05)
+      for (const double z : {-0.02, 0.02}) markers_.emplace_back(x, 0.5 * edge, z);
+    write("rest.csv", markers_);
+  }
+
+  void write(const std::string& name, const std::vector<Vector3>& places) const {
+    MarkerPositions positions;
+    positions.positions.resize(Eigen::Index(places.size()), 3);
+    for (std::size_t m = 0; m < places.size(); ++m) {
+      positions.ids.push_back(std::to_string(m));
+      positions.positions.row(Eigen::Index(m)) = places[m].transpose();
+    }
+    write_marker_positions(folder_ / name, positions);
+  }
+
+  Vector3 error() { return noise * Vector3(normal_(random_), normal_(random_), normal_(random_)); }
+
+  CaptureParameters parameters() const { return default_parameters(capture_, enclosed_volume(*capture_.surface)); }
+  Discretisation discretised(const CaptureParameters& p, const VectorX& theta) const {
+    Resolution resolution;
+    resolution.cells = 10.0;
+    return discretise(capture_, capture_distance(capture_, 0.2), resolution, p.blocks, theta);
+  }
+
+  void run(double youngs_modulus, bool at_rest, const std::vector<HungWeight>& weights,
+           const std::function<void(int, const Body&, const Points&)>& see) {
+    const CaptureParameters p = parameters();
+    VectorX theta = p.set.reference();
+    p.blocks.motion.set_moduli(theta, youngs_modulus);
+    const Discretisation d = discretised(p, theta);
+    SimulationOptions options = d.simulation;
+    options.weights = weights;
+    if (at_rest) options.is_static = true, options.times = {0.0};
+    const RolloutSummary summary =
+        Simulation(d.body, options).run(theta, [&](int frame, const State& state, auto) {
+          see(frame, *d.body, state.x);
+          return true;
+        });
+    ASSERT_TRUE(summary.succeeded) << summary.failure;
+  }
+
+  void record(const Truths& truths) {
+    run(truths.depth, false, {}, [&](int frame, const Body& body, const Points& nodes) {
+      const Points x = Embedding(body, capture_.surface->vertices).positions(nodes);
+      ObservedFrame seen;
+      seen.frame = frame;
+      for (Eigen::Index v = 0; v < x.rows(); ++v) {
+        if (capture_.surface->vertices[std::size_t(v)].z() < 0.0) continue;
+        seen.points.push_back(Vector3(x.row(v)) + error());
+        seen.noise.push_back(float(noise));
+        seen.view.emplace_back(-Vector3::UnitZ());
+        seen.camera.push_back(0);
+        seen.pixel.push_back(-1);
+      }
+      observed_.push_back(std::move(seen));
+    });
+    std::vector<Points> track;
+    std::vector<std::string> ids;
+    for (std::size_t m = 0; m < markers_.size(); ++m) ids.push_back(std::to_string(m));
+    run(truths.markers, false, {}, [&](int, const Body& body, const Points& nodes) {
+      track.push_back(Embedding(body, markers_).positions(nodes));
+      for (Eigen::Index m = 0; m < track.back().rows(); ++m) track.back().row(m) += error().transpose();
+    });
+    write_marker_track(folder_ / "track.csv", ids, track);
+    const HungWeight weight{Vector3(0.5 * length, -0.5 * edge, 0.0), 0.05};
+    run(truths.loads, true, {weight}, [&](int, const Body& body, const Points& nodes) {
+      const Points x = Embedding(body, markers_).positions(nodes);
+      std::vector<Vector3> there;
+      for (Eigen::Index m = 0; m < x.rows(); ++m) there.push_back(Vector3(x.row(m)) + error());
+      write("load.csv", there);
+    });
+    record_press(truths.presses);
+  }
+
+  void record_press(double youngs_modulus) {
+    Press press;
+    press.force = Vector3(0.0, -0.5, 0.0);
+    press.contact_centre = Vector3(0.08, 0.5 * edge, 0.0);
+    press.contact_radius = 0.015;
+    press.markers = folder_ / "press.csv", press.markers_rest = folder_ / "rest.csv";
+    write("press.csv", markers_);
+    Capture pressed = capture_;
+    pressed.presses = {press};
+    Resolution resolution;
+    resolution.cells = 10.0;
+    resolution.element = ElementKind::Tetrahedron;
+    std::vector<Vector3> control_points;
+    const PressScene scene =
+        make_press_scene(pressed, make_body_of(pressed, SignedDistance(), resolution, control_points));
+    const LawLayout layout({1, 0});
+    const auto law = press_law(*scene.body, layout, law_parameters(layout, youngs_modulus).reference());
+    PressedBody body(scene, 0, law, youngs_modulus);
+    ASSERT_TRUE(body.solve().converged) << body.equilibrium().failure();
+    const Points x = body.points();
+    std::vector<Vector3> there;
+    for (Eigen::Index m = 0; m < Eigen::Index(markers_.size()); ++m) there.push_back(Vector3(x.row(m)) + error());
+    write("press.csv", there);
+    press_ = press;
+  }
+
+  RecordedCapture recorded(const Parts& parts) const {
+    RecordedCapture r{capture_, {}, {}};
+    if (parts.depth) r.observed = observed_;
+    if (parts.markers) r.capture.markers = {{folder_ / "rest.csv", folder_ / "track.csv"}};
+    if (parts.loads) {
+      Load load;
+      load.mass = 0.05;
+      load.at = Vector3(0.5 * length, -0.5 * edge, 0.0);
+      load.markers = folder_ / "load.csv", load.markers_rest = folder_ / "rest.csv";
+      r.capture.loads = {load};
+    }
+    if (parts.presses) r.capture.presses = {*press_};
+    return r;
+  }
+
+  /// Young's modulus [Pa] that fits best, everything else known.
+  double estimate(const Parts& parts) const {
+    std::vector<std::string> notes;
+    FitOptions options;
+    options.parameters["poisson_ratio"] = {VectorX::Constant(1, 0.35), false, {}};
+    for (const char* damping : {"mass_damping", "stiffness_damping"}) options.parameters[damping].estimated = false;
+    const Recordings recordings({recorded(parts)}, options, notes);
+    ParameterSet set = recordings.parameters();
+    VectorX start = set.reference();
+    recordings.material().set_moduli(start, 1.2 * modulus);
+    set.set_reference(start);
+    Objective objective = recordings.objective(recordings.grid(10.0, 1.0), set, 0.2,
+                                               [](const Recording& r) { return r.last_frame; });
+    const OptimiserSummary s = minimise(objective, set.to_unconstrained(start), {});
+    EXPECT_TRUE(s.succeeded) << s.reason;
+    return set.to_theta(s.p)[recordings.material().youngs_moduli.front()];
+  }
+
+  test::TemporaryFolder folder_;
+  Capture capture_;
+  std::vector<Vector3> markers_;
+  std::vector<ObservedFrame> observed_;
+  std::optional<Press> press_;
+  std::mt19937 random_{4};
+  std::normal_distribution<double> normal_;
+};
+
+TEST_F(SeenInEveryWay, OneMaterialIsFoundByAllMeasurementsTogetherAndByEach) {
+  record({});
+  EXPECT_NEAR(estimate({}) / modulus, 1.0, tolerance(0.03));
+  EXPECT_NEAR(estimate({true, false, false, false}) / modulus, 1.0, tolerance(0.05));
+  EXPECT_NEAR(estimate({false, true, false, false}) / modulus, 1.0, tolerance(0.05));
+  EXPECT_NEAR(estimate({false, false, true, false}) / modulus, 1.0, tolerance(0.05));
+}
+
+TEST_F(SeenInEveryWay, EachKindOfMeasurementDrawsTheEstimateToItsOwnStiffness) {
+  const std::vector<std::pair<const char*, double Truths::*>> kinds = {{"depth", &Truths::depth},
+                                                                       {"markers", &Truths::markers},
+                                                                       {"loads", &Truths::loads},
+                                                                       {"presses", &Truths::presses}};
+  const std::vector<bool Parts::*> parts = {&Parts::depth, &Parts::markers, &Parts::loads, &Parts::presses};
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    Truths truths;
+    truths.*kinds[k].second = 1.5 * modulus;
+    observed_.clear();
+    record(truths);
+    Parts without;
+    without.*parts[k] = false;
+    const double all = estimate({}), others = estimate(without);
+    EXPECT_NEAR(others / modulus, 1.0, tolerance(0.04)) << kinds[k].first;
+    EXPECT_GT(all, 1.005 * others) << kinds[k].first << " stiffer than the rest takes no part";
+  }
+}
+
+}  // namespace
+}  // namespace pliant
