@@ -85,53 +85,59 @@ bool Indenter::derivatives(std::size_t depth, const LawLayout& layout, const Vec
   return true;
 }
 
-IndentationObjective::IndentationObjective(std::shared_ptr<const Body> body, const std::vector<int>& held,
-                                           std::vector<Indentation> indentations, const LawLayout& layout,
-                                           ParameterSet parameters)
-    : body_(std::move(body)),
-      indentations_(std::move(indentations)),
-      layout_(layout),
-      parameters_(std::move(parameters)) {
-  const auto law = press_law(*body_, layout_, parameters_.reference());
-  const double modulus = mean_modulus(*body_, *law);
-  for (const Indentation& indentation : indentations_) indenters_.emplace_back(body_, held, indentation, law, modulus);
+IndentationTrial::IndentationTrial(const Indentation& indentation, const std::vector<int>& held,
+                                   std::shared_ptr<PressedMaterial> material, const VectorX& reference, int number)
+    : indentation_(indentation),
+      material_(std::move(material)),
+      number_(number),
+      indenter_(material_->shared_body(), held, indentation, material_->law(reference),
+                mean_modulus(material_->body(), *material_->law(reference))) {}
+
+CostEvaluation IndentationTrial::run(const VectorX& theta, const MatrixX& directions) {
+  CostEvaluation result;
+  indenter_.set_law(material_->law(theta));
+  const Eigen::Index n = directions.cols();
+  FrameFit fit;
+  fit.frame = number_;
+  fit.independent = double(indentation_.depths.size());
+  if (n > 0) fit.gradient = VectorX::Zero(n), fit.gauss_newton = MatrixX::Zero(n, n);
+  forces_.clear();
+  VectorX by_theta;
+  for (std::size_t d = 0; d < indentation_.depths.size(); ++d) {
+    if (!indenter_.solve(d)) return result.failure = indenter_.failure(), result;
+    forces_.push_back(indenter_.force(d));
+    const double r = (forces_.back() - indentation_.forces[d]) / indentation_.noise;
+    fit.cost += 0.5 * r * r;
+    ++result.steps;
+    if (n == 0) continue;
+    if (!indenter_.derivatives(d, material_->layout(), theta, by_theta))
+      return result.failure = "the equilibrium is not stable", result;
+    const VectorX J = directions.transpose() * by_theta / indentation_.noise;
+    fit.gradient += r * J;
+    fit.gauss_newton += J * J.transpose();
+  }
+  result.cost = fit.cost;
+  result.frames.push_back(std::move(fit));
+  result.succeeded = true;
+  return result;
 }
 
-CostEvaluation IndentationObjective::run(const VectorX& p, bool with_derivatives) {
-  CostEvaluation result;
-  const VectorX theta = parameters_.to_theta(p);
-  const auto law = press_law(*body_, layout_, theta);
-  const MatrixX by_p = with_derivatives ? parameters_.jacobian(p) : MatrixX();
-  VectorX gradient, by_theta;
-  MatrixX curvature;
-  result.cost = parameters_.prior(p, with_derivatives ? &gradient : nullptr, with_derivatives ? &curvature : nullptr);
-  forces_.assign(indentations_.size(), {});
-  for (std::size_t i = 0; i < indentations_.size(); ++i) {
-    const Indentation& seen = indentations_[i];
-    indenters_[i].set_law(law);
-    for (std::size_t d = 0; d < seen.depths.size(); ++d) {
-      if (!indenters_[i].solve(d)) {
-        result.failure = indenters_[i].failure();
-        return result;
-      }
-      const double force = indenters_[i].force(d), r = (force - seen.forces[d]) / seen.noise;
-      forces_[i].push_back(force);
-      result.cost += 0.5 * r * r;
-      ++result.steps;
-      if (!with_derivatives) continue;
-      if (!indenters_[i].derivatives(d, layout_, theta, by_theta)) {
-        result.failure = "the equilibrium is not stable";
-        return result;
-      }
-      const VectorX J = by_p.transpose() * by_theta / seen.noise;
-      gradient += r * J;
-      curvature += J * J.transpose();
-    }
-  }
-  if (with_derivatives) result.gradient = gradient, result.gauss_newton = curvature;
-  result.succeeded = std::isfinite(result.cost);
-  if (!result.succeeded) result.failure = "the cost is not finite";
+CostEvaluation IndentationTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
+  CostEvaluation result = run(theta, MatrixX::Identity(theta.size(), theta.size()));
+  if (result.succeeded) theta_bar = result.frames.front().gradient;
   return result;
+}
+
+std::vector<std::unique_ptr<Trial>> indentation_trials(const std::shared_ptr<const Body>& body,
+                                                       const std::vector<int>& held,
+                                                       const std::vector<Indentation>& indentations,
+                                                       const LawLayout& layout, const VectorX& reference) {
+  const auto material = std::make_shared<PressedMaterial>(body, layout);
+  std::vector<std::unique_ptr<Trial>> trials;
+  for (const Indentation& indentation : indentations)
+    trials.push_back(
+        std::make_unique<IndentationTrial>(indentation, held, material, reference, int(trials.size())));
+  return trials;
 }
 
 }  // namespace pliant

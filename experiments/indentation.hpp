@@ -39,28 +39,32 @@ class Indenter {
   std::vector<Placement> placements_;
 };
 
-/// Cost of indentations: half the squares of simulated less measured force over its deviation; and the priors.
-class IndentationObjective : public CostFunction {
+/// Forces of a ball at its depths: half the squares of simulated less measured force over its standard deviation.
+class IndentationTrial : public Trial {
  public:
-  IndentationObjective(std::shared_ptr<const Body> body, const std::vector<int>& held,
-                       std::vector<Indentation> indentations, const LawLayout& layout, ParameterSet parameters);
+  /// @param reference  parameters whose modulus says how stiff the contact is
+  /// @param number     what its frame calls it
+  IndentationTrial(const Indentation& indentation, const std::vector<int>& held,
+                   std::shared_ptr<PressedMaterial> material, const VectorX& reference, int number);
 
-  const ParameterSet& parameters() const override { return parameters_; }
-  [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override { return run(p, false); }
-  [[nodiscard]] CostEvaluation linearise(const VectorX& p) override { return run(p, true); }
-  [[nodiscard]] CostEvaluation gradient(const VectorX& p) override { return run(p, true); }
-  /// Of the last evaluation [N], a vector an indentation.
-  const std::vector<std::vector<double>>& forces() const { return forces_; }
+  [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
+  [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  /// At each depth of the last run [N].
+  const std::vector<double>& forces() const { return forces_; }
 
  private:
-  CostEvaluation run(const VectorX& p, bool with_derivatives);
-
-  std::shared_ptr<const Body> body_;
-  std::vector<Indentation> indentations_;
-  LawLayout layout_;
-  ParameterSet parameters_;
-  std::vector<Indenter> indenters_;
-  std::vector<std::vector<double>> forces_;
+  Indentation indentation_;
+  std::shared_ptr<PressedMaterial> material_;
+  int number_;
+  Indenter indenter_;
+  std::vector<double> forces_;
 };
+
+/// Trials of indentations of one body.
+/// @param reference  parameters whose modulus says how stiff contacts are
+std::vector<std::unique_ptr<Trial>> indentation_trials(const std::shared_ptr<const Body>& body,
+                                                       const std::vector<int>& held,
+                                                       const std::vector<Indentation>& indentations,
+                                                       const LawLayout& layout, const VectorX& reference);
 
 }  // namespace pliant

@@ -96,7 +96,9 @@ class Experiment {
     ParameterSet parameters = law_parameters(layout, start);
     parameters.fix("poisson_ratio", nu);
     const VectorX theta = parameters.reference();
-    IndentationObjective objective(body_, held_, {seen}, layout, parameters);
+    auto trials = indentation_trials(body_, held_, {seen}, layout, parameters.reference());
+    const auto* ball = static_cast<const IndentationTrial*>(trials.front().get());
+    Objective objective(std::move(trials), parameters);
     const VectorX p = parameters.to_unconstrained(theta);
     if (request_.at("task") == "check") {
       report["derivative_errors"] = check(objective, p);
@@ -114,12 +116,12 @@ class Experiment {
     const VectorX q = law->table().row(0);
     report["parameters"] = Numbers(q.begin(), q.end());
     (void)objective.evaluate(summary.p);
-    report["fitted"] = objective.forces()[0];
+    report["fitted"] = ball->forces();
     others(law, report);
   }
 
   /// Central differences against the gradient, relative.
-  static json check(IndentationObjective& objective, const VectorX& p) {
+  static json check(Objective& objective, const VectorX& p) {
     json errors = json::array();
     const CostEvaluation at = objective.linearise(p);
     if (!at.succeeded) throw std::runtime_error(at.failure);

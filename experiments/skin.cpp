@@ -38,55 +38,54 @@ struct Sheet {
   double noise = 1.0;
 };
 
-class SheetObjective : public CostFunction {
+class SheetTrial : public Trial {
  public:
-  SheetObjective(std::shared_ptr<const Sheet> sheet, const LawLayout& layout, ParameterSet parameters, bool all)
+  SheetTrial(std::shared_ptr<const Sheet> sheet, const LawLayout& layout, const VectorX& reference, bool all)
       : sheet_(std::move(sheet)),
         layout_(layout),
-        parameters_(std::move(parameters)),
         all_(all),
-        equilibrium_(sheet_->body, press_law(*sheet_->body, layout, parameters_.reference()), sheet_->held, {},
+        equilibrium_(sheet_->body, press_law(*sheet_->body, layout, reference), sheet_->held, {},
                      EquilibriumOptions{.tolerance = 1e-9}),
         placements_(sheet_->steps.size()) {}
 
-  const ParameterSet& parameters() const override { return parameters_; }
-  [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override { return run(p, false); }
-  [[nodiscard]] CostEvaluation linearise(const VectorX& p) override { return run(p, true); }
-  [[nodiscard]] CostEvaluation gradient(const VectorX& p) override { return run(p, true); }
+  [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override {
+    CostEvaluation result = run(theta, MatrixX::Identity(theta.size(), theta.size()));
+    if (result.succeeded) theta_bar = result.frames.front().gradient;
+    return result;
+  }
 
-  /// Of the last evaluation, a step each: force on the sheet [N], rms of the displacements' errors [m]; not a number
-  /// where there was none.
-  std::vector<double> forces, rms;
-
- private:
-  CostEvaluation run(const VectorX& p, bool with_derivatives) {
+  [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override {
     CostEvaluation result;
-    const VectorX theta = parameters_.to_theta(p);
     equilibrium_.set_law(press_law(*sheet_->body, layout_, theta));
-    VectorX gradient;
-    MatrixX curvature;
-    result.cost = parameters_.prior(p, with_derivatives ? &gradient : nullptr, with_derivatives ? &curvature : nullptr);
-    const MatrixX by_p = with_derivatives ? parameters_.jacobian(p) : MatrixX();
+    FrameFit fit;
+    const bool with_derivatives = directions.cols() > 0;
+    if (with_derivatives) {
+      fit.gradient = VectorX::Zero(directions.cols());
+      fit.gauss_newton = MatrixX::Zero(directions.cols(), directions.cols());
+    }
     const double none = std::numeric_limits<double>::quiet_NaN();
     forces.assign(sheet_->steps.size(), none), rms.assign(sheet_->steps.size(), none);
     std::size_t before = sheet_->steps.size();
     for (std::size_t s = 0; s < sheet_->steps.size(); ++s) {
       const Step& step = sheet_->steps[s];
       if (!all_ && !step.fitted) continue;
-      if (!solve(s, before)) {
-        result.failure = equilibrium_.failure();
-        return result;
-      }
+      if (!solve(s, before)) return result.failure = equilibrium_.failure(), result;
       before = s;
       ++result.steps;
-      add(s, step, theta, by_p, with_derivatives, result.cost, gradient, curvature);
+      add(s, step, theta, directions, with_derivatives, fit.cost, fit.gradient, fit.gauss_newton);
     }
-    if (with_derivatives) result.gradient = gradient, result.gauss_newton = curvature;
+    result.cost = fit.cost;
+    result.frames.push_back(std::move(fit));
     result.succeeded = std::isfinite(result.cost);
     if (!result.succeeded) result.failure = "the cost is not finite";
     return result;
   }
 
+  /// Of the last evaluation, a step each: force on the sheet [N], rms of the displacements' errors [m]; not a number
+  /// where there was none.
+  std::vector<double> forces, rms;
+
+ private:
   /// From where the step was last, or from the step before.
   bool solve(std::size_t s, std::size_t before) {
     Placement& placement = placements_[s];
@@ -172,11 +171,16 @@ class SheetObjective : public CostFunction {
 
   std::shared_ptr<const Sheet> sheet_;
   LawLayout layout_;
-  ParameterSet parameters_;
   bool all_;  ///< steps that are not fitted are simulated, too
   Equilibrium equilibrium_;
   std::vector<Placement> placements_;
 };
+
+std::vector<std::unique_ptr<Trial>> only(std::unique_ptr<Trial> trial) {
+  std::vector<std::unique_ptr<Trial>> trials;
+  trials.push_back(std::move(trial));
+  return trials;
+}
 
 class Experiment {
  public:
@@ -226,7 +230,7 @@ class Experiment {
     ParameterSet parameters = law_parameters(layout, request_.at("start_modulus"));
     parameters.fix("poisson_ratio", request_.at("poisson_ratio"));
     const VectorX theta = parameters.reference();
-    SheetObjective objective(sheet_, layout, parameters, false);
+    Objective objective(only(std::make_unique<SheetTrial>(sheet_, layout, theta, false)), parameters);
     const VectorX p = parameters.to_unconstrained(theta);
     json report = {{"nodes", sheet_->body->node_count()}, {"elements", sheet_->body->element_count()}};
     if (request_.at("task") == "check") {
@@ -247,8 +251,8 @@ class Experiment {
     if (summary.succeeded) {
       const VectorX found = parameters.to_theta(summary.p);
       report["theta"] = Numbers(found.begin(), found.end());
-      SheetObjective whole(sheet_, layout, parameters, true);
-      const CostEvaluation evaluation = whole.evaluate(summary.p);
+      SheetTrial whole(sheet_, layout, theta, true);
+      const CostEvaluation evaluation = whole.run(found, MatrixX(found.size(), 0));
       if (!evaluation.succeeded) report["failure"] = evaluation.failure;
       for (const double f : whole.forces) report["forces"].push_back(std::isfinite(f) ? json(f) : json());
       for (const double r : whole.rms) report["rms"].push_back(std::isfinite(r) ? json(r) : json());

@@ -111,7 +111,7 @@ class Experiment {
     std::vector<Indentation> fitted;
     for (std::size_t i = 0; i < pokes_.size(); ++i)
       if (meets_[i] && request_.at("pokes")[i].at("fitted")) fitted.push_back(pokes_[i]);
-    IndentationObjective objective(body, held_, fitted, layout, parameters);
+    Objective objective(indentation_trials(body, held_, fitted, layout, parameters.reference()), parameters);
     OptimiserOptions options;
     options.max_iterations = 8;
     options.cost_tolerance = 2e-3;

@@ -16,6 +16,7 @@ class PressedMaterial {
   PressedMaterial(std::shared_ptr<const Body> body, LawLayout layout);
 
   const Body& body() const { return *body_; }
+  const std::shared_ptr<const Body>& shared_body() const { return body_; }
   const LawLayout& layout() const { return layout_; }
   /// The law of all elements for theta; from any thread.
   std::shared_ptr<const MaterialLaw> law(const VectorX& theta);

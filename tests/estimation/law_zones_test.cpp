@@ -52,7 +52,7 @@ struct TwoLayers : ::testing::Test {
 TEST_F(TwoLayers, AreFoundByTheCutThatPromisesMost) {
   const ParameterSet set = law_parameters(one, 6000.0);
   PressObjective objective(scene, {0, 1, 2, 3}, one, set, {noise, 5.0});
-  const OptimiserSummary best = minimise(objective, set.to_unconstrained(set.reference()), {});
+  const OptimiserSummary best = minimise(objective.cost(), set.to_unconstrained(set.reference()), {});
   ASSERT_TRUE(best.succeeded) << best.reason;
   const auto cut = most_promising_cut(objective, *scene, one, set.to_theta(best.p), {}, 1.5);
   ASSERT_TRUE(cut);
@@ -82,7 +82,7 @@ TEST_F(TwoLayers, DrawACutToTheirBorder) {
   cut_scene->body = body;
   const ParameterSet set = zone_parameters(two, 6000.0, 1.5);
   PressObjective objective(cut_scene, {0, 1, 2, 3}, two, set, {noise, 5.0});
-  const OptimiserSummary best = minimise(objective, set.to_unconstrained(set.reference()), {});
+  const OptimiserSummary best = minimise(objective.cost(), set.to_unconstrained(set.reference()), {});
   ASSERT_TRUE(best.succeeded) << best.reason;
   const auto move = best_move(objective, *cut_scene, two, set.to_theta(best.p), cuts, 0, 1.5);
   ASSERT_TRUE(move);
@@ -95,7 +95,7 @@ TEST_F(TwoLayers, AreNotSeenInPressesOfOneMaterial) {
   const auto uniform = std::make_shared<PressScene>(
       block.scene(test::PressedBlock::presses(), press_law(*block.body, one, set.reference()), noise, 7));
   PressObjective objective(uniform, {0, 1, 2, 3}, one, set, {noise, 5.0});
-  const OptimiserSummary best = minimise(objective, set.to_unconstrained(set.reference()), {});
+  const OptimiserSummary best = minimise(objective.cost(), set.to_unconstrained(set.reference()), {});
   ASSERT_TRUE(best.succeeded) << best.reason;
   const auto cut = most_promising_cut(objective, *uniform, one, set.to_theta(best.p), {}, 1.5);
   ASSERT_TRUE(cut);

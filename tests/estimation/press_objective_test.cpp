@@ -62,6 +62,15 @@ TEST_P(Presses, GradientMatchesCentralDifferences) {
   }
 }
 
+TEST_P(Presses, GradientByTheAdjointIsThatByTangents) {
+  PressObjective cost = objective();
+  const VectorX p = set.to_unconstrained(set.reference());
+  const CostEvaluation tangents = cost.linearise(p), adjoint = cost.cost().gradient(p);
+  ASSERT_TRUE(tangents.succeeded && adjoint.succeeded) << tangents.failure << adjoint.failure;
+  ASSERT_GT(tangents.gradient.norm(), 1.0);
+  EXPECT_LT((adjoint.gradient - tangents.gradient).norm(), tolerance(1e-6) * tangents.gradient.norm());
+}
+
 TEST_P(Presses, GaussNewtonMatrixIsThatOfTheResidualsDerivatives) {
   PressObjective cost = objective(1e9);  // no loss: the matrix is J^T J
   const VectorX p = set.to_unconstrained(set.reference());
@@ -90,7 +99,7 @@ TEST_P(Presses, TruthIsFoundFromElsewhere) {
   PressObjective cost = objective();
   OptimiserOptions options;
   options.max_iterations = 40;
-  const OptimiserSummary s = minimise(cost, set.to_unconstrained(set.reference()), options);
+  const OptimiserSummary s = minimise(cost.cost(), set.to_unconstrained(set.reference()), options);
   ASSERT_TRUE(s.succeeded) << s.reason;
   const VectorX theta = set.to_theta(s.p);
   EXPECT_LT(s.evaluation.cost, cost.evaluate(set.to_unconstrained(truth)).cost + 1.0);
@@ -107,7 +116,7 @@ TEST_P(Presses, AWrongMarkerHardlyMoves) {
   auto spoilt = std::make_shared<PressScene>(*scene);
   spoilt->presses[1].loaded[3] += Vector3(0.03, 0.0, 0.02);
   PressObjective cost(spoilt, {0, 1, 2, 3}, layout, set, {1e-4, 5.0});
-  const OptimiserSummary s = minimise(cost, set.to_unconstrained(truth), {});
+  const OptimiserSummary s = minimise(cost.cost(), set.to_unconstrained(truth), {});
   ASSERT_TRUE(s.succeeded) << s.reason;
   EXPECT_NEAR(set.to_theta(s.p)[layout.modulus(0)], truth[layout.modulus(0)], 0.03 * truth[layout.modulus(0)]);
 }

@@ -1,5 +1,6 @@
 #include "elasticity/sampled_law.hpp"
 #include "motion/equilibrium.hpp"
+#include "motion/probe_contact.hpp"
 #include "support/bodies.hpp"
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"

@@ -153,7 +153,7 @@ TEST(ParameterSet, DirectionsKeepTheirLengthAndTheirOrigin) {
   direction.estimated = true;
   VectorX reference = layout.zero();
   reference.segment<3>(layout.gravity) = Vector3(0.5, -9.7, 0.3);
-  direction.origin = layout.gravity.vector(reference);
+  direction.origin = reference.segment(layout.gravity, 3);
   ParameterSet set(layout.layout(), {direction}, reference);
   ASSERT_EQ(set.dimension(), 2);
   EXPECT_LT(set.to_unconstrained(reference).norm(), tolerance(1e-15));
@@ -196,7 +196,8 @@ TEST(ParameterSet, RolesAreThoseOfTheBlocks) {
 TEST(ParameterSet, WhatIsOfTheObjectIsToldByRoleAndUnit) {
   const std::set<std::string> of_object = {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping",
                                            "density"};
-  for (const Parameter& p : all_estimated().parameters()) {
+  const ParameterSet set = all_estimated();
+  for (const Parameter& p : set.parameters()) {
     EXPECT_EQ(is_modulus(p), p.name == "youngs_modulus") << p.name;
     EXPECT_EQ(is_of_object(p), of_object.contains(p.name)) << p.name;
   }
