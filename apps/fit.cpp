@@ -192,7 +192,7 @@ int ended(bool converged, bool interrupted, const std::string& words, const fs::
 }
 
 /// Whether a capture's presses are what there is to fit.
-bool is_of_presses(const Capture& capture) { return !capture.presses.empty() && capture.times.empty(); }
+bool is_of_presses(const Capture& capture) { return !capture.presses.empty() && capture.scene.timing.times.empty(); }
 
 std::string describe(const PressFitEvent& event) {
   char text[160];

@@ -1,7 +1,7 @@
 // The cost of a recording and its derivative over Young's modulus, as CSV on stdout.
 //   pliant_sweep CAPTURE CELLS FROM TO COUNT [NAME=VALUE]...
-// FROM and TO [Pa] are spaced evenly by logarithm; NAME=VALUE sets another parameter of result.json, a scalar. Columns: E
-// [Pa], cost, its derivative by E [1/Pa] by the adjoint and by tangents, and rms distance [m].
+// FROM and TO [Pa] are spaced evenly by logarithm; NAME=VALUE sets another parameter of result.json, a scalar. Columns:
+// E [Pa], cost, its derivative by E [1/Pa] by the adjoint and by tangents, and rms distance [m].
 
 #include <cmath>
 #include <cstdio>
@@ -27,7 +27,7 @@ void set_scalar(ParameterSet& parameters, const std::string& assignment) {
 }
 
 ParameterSet only_youngs_modulus(const Capture& capture, int argc, char** argv) {
-  ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.surface));
+  ParameterSet parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface));
   for (int i = 6; i < argc; ++i) set_scalar(parameters, argv[i]);
   const std::vector<Parameter> all = parameters.parameters();
   for (const Parameter& p : all) parameters.set_estimated(p.name, p.name == "youngs_modulus");
@@ -42,14 +42,15 @@ int run(int argc, char** argv) {
   const double from = std::atof(argv[3]), to = std::atof(argv[4]);
   const int count = std::atoi(argv[5]);
   const Capture capture = read_capture(argv[1]);
-  const auto observations = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observe(capture)));
+  const auto observations =
+      std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observe(capture)));
   ParameterSet parameters = only_youngs_modulus(capture, argc, argv);
   Resolution resolution;
   resolution.cells = std::atof(argv[2]);
   const Discretisation scene =
       discretise(capture, capture_distance(capture, resolution.band), resolution, parameters.reference());
   ObjectiveOptions options;
-  options.outlier_scale = 0.12 * object_size(capture);
+  options.outlier_scale = 0.12 * object_size(capture.scene);
   options.last_frame = int(scene.simulation.times.size()) - 1;
   Objective objective(scene.mismatch, scene.body, scene.simulation, observations, parameters, options);
   std::printf("youngs_modulus,cost,gradient_adjoint,gradient_tangent,surface_rms\n");
@@ -73,9 +74,7 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace pliant
 
-int main(int argc, char** argv) try {
-  return pliant::run(argc, argv);
-} catch (const std::exception& error) {
+int main(int argc, char** argv) try { return pliant::run(argc, argv); } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 2;
 }

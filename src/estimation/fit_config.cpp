@@ -8,7 +8,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "capture/toml_table.hpp"
+#include "scene/toml_table.hpp"
 
 namespace pliant {
 

@@ -160,7 +160,7 @@ class StartFinder {
   bool find_swing() {
     for (std::size_t i = 0; i < run_.recordings.all().size(); ++i) {
       const Recording& r = run_.recordings.all()[i];
-      if (r.capture.is_static || r.capture.fixed.empty()) continue;
+      if (r.capture.scene.timing.is_static || r.capture.scene.fixed.empty()) continue;
       const Discretisation& d = run_.coarse.recording[i];
       const std::vector<int> held = held_nodes(*d.body, d.simulation.holds);
       if (held.size() < 3) continue;
@@ -170,9 +170,9 @@ class StartFinder {
       };
       if (!r.tracked.rest.empty()) {
         ModalStartOptions o;
-        o.first_frame = r.capture.start_frame;
+        o.first_frame = r.capture.scene.timing.start_frame;
         o.curve_samples = 0;
-        const ModalStart start = modal_start(d.body, r.own(theta), held, r.tracked, r.capture.times, o);
+        const ModalStart start = modal_start(d.body, r.own(theta), held, r.tracked, r.capture.scene.timing.times, o);
         if (!start.found) continue;
         take_dampings(start);
         relative_moduli_ = start.moduli / start.moduli[0];

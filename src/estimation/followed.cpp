@@ -10,7 +10,7 @@ namespace pliant {
 namespace {
 
 FitOptions for_following(const Capture& capture, FitOptions options) {
-  if (!options.element && capture.shape_is == ShapeIs::Static) options.element = ElementKind::Tetrahedron;
+  if (!options.element && capture.scene.object.shape_is == ShapeIs::Static) options.element = ElementKind::Tetrahedron;
   options.control_points = options.controls();
   return options;
 }

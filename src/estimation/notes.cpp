@@ -17,8 +17,8 @@ std::string spoken(std::string name) {
 }
 
 void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
-  if (capture.mass || capture.density) return;
-  if (capture.initial.release_of)
+  if (capture.scene.object.mass || capture.scene.object.density) return;
+  if (capture.scene.initial.release_of)
     outcome.notes.push_back(
         "Neither mass nor density is known: both pascals and the density follow from the weight that was released.");
   else

@@ -72,7 +72,7 @@ class PressFit {
       : capture_(capture), options_(options), monitor_(monitor), state_(std::move(state)) {
     if (const std::string wrong = options.validate(); !wrong.empty())
       throw InputError({{capture.file}, wrong, "", "see `pliant fit --help`"});
-    if (!capture.surface)
+    if (!capture.scene.object.surface)
       throw InputError({{capture.file},
                         "there is no scan of the object at rest ([object] surface)",
                         "a closed triangle mesh",
@@ -81,7 +81,7 @@ class PressFit {
     resolution.cells = options.cells;
     resolution.element = options.quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
     std::vector<Vector3> control_points;
-    const auto body = make_body_of(capture, SignedDistance(), resolution, control_points);
+    const auto body = make_body_of(capture.scene, SignedDistance(), resolution, control_points);
     scene_ = std::make_shared<PressScene>(make_press_scene(capture, body));
     for (int i = 0; i < int(scene_->presses.size()); ++i)
       if (scene_->presses[std::size_t(i)].role == "fit") fitted_.push_back(i);

@@ -13,27 +13,27 @@ void require_fittable(const Capture& capture) {
   const auto refuse = [&](const std::string& found, const std::string& advice) {
     throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
   };
-  if (!capture.surface) refuse("there is no scan of the object at rest", "add [object] surface");
+  if (!capture.scene.object.surface) refuse("there is no scan of the object at rest", "add [object] surface");
   if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty())
     refuse("there are no depth cameras, no clouds and no markers", "");
-  if (capture.is_static && capture.fixed.empty() && capture.planes.empty())
+  if (capture.scene.timing.is_static && capture.scene.fixed.empty() && capture.scene.planes.empty())
     refuse("the recording is static, but nothing holds the object",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
-  if (capture.shape_is == ShapeIs::Static && capture.fixed.empty())
+  if (capture.scene.object.shape_is == ShapeIs::Static && capture.scene.fixed.empty())
     refuse("the scan was taken sagging (shape_is = \"static\"), and nothing holds the object",
            "add the [[fixed]] region that it hangs from");
-  if (capture.initial.released && capture.fixed.empty())
+  if (capture.scene.initial.released && capture.scene.fixed.empty())
     refuse("the object is released from a held, deformed pose, and nothing holds it afterwards",
            "add the [[fixed]] region where it stays held");
-  if (!capture.is_static && capture.frame_count() - capture.start_frame < 2)
+  if (!capture.scene.timing.is_static && capture.frame_count() - capture.scene.timing.start_frame < 2)
     refuse("fewer than two frames follow start_frame", "record longer");
 }
 
 /// Puts planes that are only roughly known where the depth images show them. Returns the numbers of those found.
 std::vector<int> take_planes_from_images(Capture& capture) {
   std::vector<int> found;
-  for (int i = 0; i < int(capture.planes.size()); ++i) {
-    Plane& plane = capture.planes[std::size_t(i)];
+  for (int i = 0; i < int(capture.scene.planes.size()); ++i) {
+    Plane& plane = capture.scene.planes[std::size_t(i)];
     if (plane.known) continue;
     const auto seen = find_plane(capture, plane);
     if (!seen) continue;
@@ -89,7 +89,7 @@ bool is_material(const Parameter& p) {
 }
 
 int Recording::horizon(double part) const {
-  if (capture.is_static) return last_frame;
+  if (capture.scene.timing.is_static) return last_frame;
   const int least = is_released() ? std::min(last_frame, 10) : std::max(1, last_frame / 3);
   return std::max(least, int(part * last_frame));
 }
@@ -129,20 +129,20 @@ ParameterSet Recordings::make_ready(RecordedCapture recorded, Recording& recordi
                       "no frame shows any point of the object",
                       "depth images or clouds that see it",
                       "run `pliant check` on the capture to see what the cameras saw"});
-  const int controls = capture.regions.empty() ? options_.controls() : int(capture.regions.size()) + 1;
+  const int controls = capture.scene.regions.empty() ? options_.controls() : int(capture.scene.regions.size()) + 1;
   if (all_.size() > 1 && controls != controls_)
     throw InputError({{capture.file},
-                      "the object has " + std::to_string(capture.regions.size()) + " regions",
+                      "the object has " + std::to_string(capture.scene.regions.size()) + " regions",
                       "those of the first recording, " + std::to_string(controls_ - 1),
                       "name the same materials in every recording of the object"});
   controls_ = controls;
-  recording.size = object_size(capture);
-  recording.last_frame =
-      std::min(int(capture.times.size()) - capture.start_frame - 1, recording.observations->back().frame);
+  recording.size = object_size(capture.scene);
+  recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
+                                  recording.observations->back().frame);
   recording.distance = capture_distance(capture, widest_band());
   ParameterSet parameters =
-      default_parameters(capture, enclosed_volume(*capture.surface), controls_,
-                         pull_count(capture, resolution(0.0, options_.steps)), options_.scan_points);
+      default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
+                         pull_count(capture.scene, resolution(0.0, options_.steps)), options_.scan_points);
   trust_planes_seen(parameters, planes_seen);
   return parameters;
 }

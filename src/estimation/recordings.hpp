@@ -20,7 +20,7 @@ struct Recording {
   int theta_offset = 0, theta_size = 0;
 
   VectorX own(const VectorX& theta) const { return theta.segment(theta_offset, theta_size); }
-  bool is_released() const { return capture.initial.released; }
+  bool is_released() const { return capture.scene.initial.released; }
   /// The last frame of a part of the recording, (0, 1]. A flying object shows no stiffness in its first third; one that
   /// swings shows it at once.
   int horizon(double part) const;
@@ -46,14 +46,15 @@ class Recordings {
   const ParameterSet& parameters() const { return parameters_; }
   bool any_released() const { return std::ranges::any_of(all_, &Recording::is_released); }
   bool all_static() const {
-    return std::ranges::all_of(all_, [](const Recording& r) { return r.capture.is_static; });
+    return std::ranges::all_of(all_, [](const Recording& r) { return r.capture.scene.timing.is_static; });
   }
   /// Whether a scan was taken as the object sags.
   bool any_sags() const {
-    return std::ranges::any_of(all_, [](const Recording& r) { return r.capture.shape_is == ShapeIs::Static; });
+    return std::ranges::any_of(all_,
+                               [](const Recording& r) { return r.capture.scene.object.shape_is == ShapeIs::Static; });
   }
   bool any_meshed_here() const {
-    return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.volume; });
+    return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.scene.object.volume; });
   }
 
   [[nodiscard]] Grid grid(double cells, double steps) const;

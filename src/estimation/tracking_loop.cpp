@@ -28,8 +28,8 @@ TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOpti
   if (options.tracking != TrackingUse::Automatic) return options.tracking;
   const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
     const Capture& c = r.capture;
-    return !r.followed && !c.is_static && c.shape_is == ShapeIs::Reference && c.markers.empty() &&
-           (!c.clouds.empty() || c.depth.size() > 1);
+    return !r.followed && !c.scene.timing.is_static && c.scene.object.shape_is == ShapeIs::Reference &&
+           c.markers.empty() && (!c.clouds.empty() || c.depth.size() > 1);
   });
   return suits ? TrackingUse::Both : TrackingUse::Off;
 }
@@ -67,7 +67,7 @@ class TrackingLoop {
   void split(const RecordedCapture& r) {
     RecordedCapture training{r.capture, {}, {}}, held_out = training;
     for (const ObservedFrame& frame : r.observed) {
-      const int since = frame.frame - r.capture.start_frame;
+      const int since = frame.frame - r.capture.scene.timing.start_frame;
       (since > 0 && since % every_so_many == 3 ? held_out : training).observed.push_back(frame);
     }
     training_.push_back(std::move(training));
@@ -126,7 +126,7 @@ class TrackingLoop {
     std::vector<RecordedCapture> followed;
     for (std::size_t i = 0; i < recordings.size(); ++i) {
       const Capture& capture = recordings[i].capture;
-      followed.push_back({capture, {}, supported_points(*tracks_[i], object_size(capture))});
+      followed.push_back({capture, {}, supported_points(*tracks_[i], object_size(capture.scene))});
       if (followed.back().followed->frames.empty())
         throw InputError({{capture.file},
                           "the tracker finds the object in no frame",
@@ -196,13 +196,14 @@ class TrackingLoop {
     options.control_points = 1;
     std::vector<Eigen::Index> sizes;
     for (const RecordedCapture& r : recordings) {
-      const int controls = r.capture.regions.empty() ? 1 : int(r.capture.regions.size()) + 1;
+      const int controls = r.capture.scene.regions.empty() ? 1 : int(r.capture.scene.regions.size()) + 1;
       Resolution pulls;
       pulls.pulls = options.pull_points;
-      sizes.push_back(default_parameters(r.capture, 1.0, controls, pull_count(r.capture, pulls), options.scan_points)
-                          .reference()
-                          .size() -
-                      (controls - 1));
+      sizes.push_back(
+          default_parameters(r.capture, 1.0, controls, pull_count(r.capture.scene, pulls), options.scan_points)
+              .reference()
+              .size() -
+          (controls - 1));
     }
     return sizes;
   }
@@ -341,7 +342,7 @@ class TrackingLoop {
   CostEvaluation predicted(const RecordingOutcome& estimate, const RecordedCapture& seen) const {
     const Discretisation& d = estimate.discretisation;
     ObjectiveOptions o;
-    o.outlier_scale = options_.fine_band * object_size(seen.capture);
+    o.outlier_scale = options_.fine_band * object_size(seen.capture.scene);
     o.last_frame = int(d.simulation.times.size()) - 1;
     const auto observations =
         std::make_shared<std::vector<FrameObservations>>(frame_observations(seen.capture, seen.observed, {}));

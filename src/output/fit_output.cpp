@@ -2,21 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <tuple>
 
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "elasticity/corotated.hpp"
 #include "elasticity/element_moduli.hpp"
-#include "elasticity/law_elasticity.hpp"
-#include "model/vtu.hpp"
-#include "report/gallery.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
-#include "report/report.hpp"
 #include "output/track_output.hpp"
+#include "report/gallery.hpp"
+#include "report/report.hpp"
+#include "simulation/model_simulation.hpp"
+#include "simulation/trajectory.hpp"
 
 namespace pliant {
 
@@ -105,57 +103,6 @@ ConvergenceHistory history_of(const FitOutcome& outcome) {
   return history;
 }
 
-std::vector<double> six(const Matrix3& m) { return {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(1, 2), m(0, 2)}; }
-
-VtuCell vtu_cell(ElementKind kind) {
-  switch (kind) {
-    case ElementKind::Tetrahedron:
-      return VtuCell::Tetrahedron;
-    case ElementKind::QuadraticTetrahedron:
-      return VtuCell::QuadraticTetrahedron;
-    case ElementKind::Hexahedron:
-      break;
-  }
-  return VtuCell::Hexahedron;
-}
-
-}  // namespace
-
-VtuGrid frame_grid(const std::shared_ptr<const Body>& shared, const VectorX& parameters, const State& state,
-                   Elasticity& elasticity) {
-  const Body& body = *shared;
-  VtuGrid grid;
-  grid.kind = vtu_cell(body.kind);
-  auto* by_law = dynamic_cast<LawElasticity*>(&elasticity);
-  ElementModuli modulus(shared);
-  if (!by_law) modulus.set_parameters(parameters);
-  grid.points = state.x;
-  VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}},
-      stress{"stress [Pa]", 6, {}};
-  const Points u = state.x - body.reference_positions();
-  displacement.values.assign(u.data(), u.data() + u.size());
-  velocity.values.assign(state.v.data(), state.v.data() + state.v.size());
-  elasticity.linearise(state.x);
-  const UnitLame c = unit_lame(parameters[theta::poissons_ratio]);
-  for (int e = 0; e < body.element_count(); ++e) {
-    const auto cell = to_vtk_order(grid.kind, body.element(e));
-    grid.connectivity.insert(grid.connectivity.end(), cell.begin(), cell.end());
-    const Polar& polar = elasticity.rotation(e);
-    const Matrix3 in_body = polar.S - Matrix3::Identity();
-    const Matrix3 in_world = polar.R * in_body * polar.R.transpose();
-    const Matrix3 sigma =
-        by_law ? by_law->cauchy_stress(e)
-               : Matrix3(modulus[e] * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world));
-    for (const double v : six(in_world)) strain.values.push_back(v);
-    for (const double v : six(sigma)) stress.values.push_back(v);
-  }
-  grid.point_data = {std::move(displacement), std::move(velocity)};
-  grid.cell_data = {std::move(strain), std::move(stress)};
-  return grid;
-}
-
-namespace {
-
 /// What was observed in a frame, and how far it lies from the simulated surface; points outside the band are left out.
 void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, const Discretisation& d,
                       const Points& nodes) {
@@ -171,7 +118,7 @@ void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, con
 }
 
 std::vector<Plane> planes_of(const Capture& capture, const VectorX& theta) {
-  std::vector<Plane> planes = capture.planes;
+  std::vector<Plane> planes = capture.scene.planes;
   for (std::size_t i = 0; i < planes.size(); ++i) {
     planes[i].point = theta.segment<3>(theta::plane_point(int(i)));
     planes[i].normal = theta.segment<3>(theta::plane_normal(int(i)));
@@ -197,22 +144,23 @@ Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutco
   const Capture& capture = recorded_capture.capture;
   const Discretisation& d = outcome.discretisation;
   Gallery gallery;
-  gallery.triangles = capture.surface->triangles;
+  gallery.triangles = capture.scene.object.surface->triangles;
   gallery.planes = planes_of(capture, outcome.theta);
   if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
-  gallery.up = capture.up;
+  gallery.up = capture.scene.world.up;
   gallery.width = 480, gallery.height = 400;
   const auto& fitted = outcome.evaluation.frames;
   std::vector<int> told;
   for (const int i : spread_frames(0, int(fitted.size()) - 1, 6)) told.push_back(fitted[std::size_t(i)].frame);
   if (told.empty()) return gallery;
-  const Embedding embedding(*d.body, capture.surface->vertices);
-  const double start = capture.times[std::size_t(capture.start_frame)];
+  const Embedding embedding(*d.body, capture.scene.object.surface->vertices);
+  const double start = capture.scene.timing.times[std::size_t(capture.scene.timing.start_frame)];
   Simulation simulation(d.body, d.simulation);
   simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
     if (!std::ranges::binary_search(told, frame)) return true;
-    const int recorded = frame + capture.start_frame;
-    GalleryFrame drawn{recorded, capture.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
+    const int recorded = frame + capture.scene.timing.start_frame;
+    GalleryFrame drawn{
+        recorded, capture.scene.timing.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
     const auto seen = std::ranges::find(recorded_capture.observed, recorded, &ObservedFrame::frame);
     if (seen != recorded_capture.observed.end())
       add_observations(drawn, corrected_points(*seen, capture, d, outcome.theta), d, state.x);
@@ -243,43 +191,6 @@ ConvergenceHistory drawn_history(ConvergenceHistory history) {
   std::erase_if(history.rows, [](const ConvergenceRow& row) { return row.stage == "scan"; });
   for (ConvergenceRow& row : history.rows) row.stage = spoken_stage(row.stage);
   return history;
-}
-
-VectorX model_theta(const Model& model, const Vector3& gravity, int sensors) {
-  const int planes = int(model.planes.size()), pulls = int(model.initial.pulls.size());
-  VectorX theta = VectorX::Zero(theta::size(planes, 1, pulls, sensors));
-  for (int k = 0; k < pulls; ++k) theta.segment<3>(theta::pull(k, planes)) = model.initial.pulls[std::size_t(k)];
-  theta[theta::youngs_modulus] = model.youngs_modulus;
-  theta[theta::poissons_ratio] = model.poisson_ratio;
-  theta[theta::mass_damping] = model.mass_damping;
-  theta[theta::stiffness_damping] = model.stiffness_damping;
-  theta[theta::density] = model.density;
-  theta.segment<3>(theta::gravity) = gravity;
-  theta.segment<3>(theta::linear_velocity) = model.initial.linear_velocity;
-  theta.segment<3>(theta::angular_velocity) = model.initial.angular_velocity;
-  for (int i = 0; i < int(model.planes.size()); ++i) {
-    theta.segment<3>(theta::plane_point(i)) = model.planes[i].point;
-    theta.segment<3>(theta::plane_normal(i)) = model.planes[i].normal;
-  }
-  return theta;
-}
-
-/// A model as the capture that it would have been fitted to: the same scene builder serves both.
-Capture as_capture(const Model& model) {
-  Capture capture;
-  capture.name = model.name;
-  capture.surface = model.surface;
-  capture.mass = model.mass;
-  capture.gravity = model.gravity;
-  capture.planes = model.planes;
-  capture.fixed = model.fixed;
-  capture.weights = model.weights;
-  capture.initial = model.initial;
-  capture.is_static = model.frames == 0;
-  if (capture.is_static) capture.times = {0.0};
-  for (int f = 0; f < model.frames; ++f) capture.times.push_back(f / model.frame_rate);
-  capture.start_frame = model.start_frame;
-  return capture;
 }
 
 /// Of ln E of the first recording's control moduli; zero where one is not estimated, empty where nothing is known.
@@ -429,6 +340,17 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   return result;
 }
 
+namespace {
+
+World world_of(const Vector3& gravity) {
+  World world;
+  world.gravity = gravity;
+  if (gravity.norm() > 0.0) world.up = -gravity.normalized();
+  return world;
+}
+
+}  // namespace
+
 Model make_model(const Capture& capture, const FitOutcome& outcome) {
   const RecordingOutcome& first = outcome.recordings.front();
   Discretisation free = first.discretisation;
@@ -440,42 +362,44 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
                  double cells) {
   Model model;
   model.name = capture.name;
-  model.surface = *capture.surface;
+  TriangleMesh surface = *capture.scene.object.surface;
   model.youngs_modulus = modulus.mean;
   model.poisson_ratio = t[theta::poissons_ratio];
   model.mass_damping = t[theta::mass_damping];
   model.stiffness_damping = t[theta::stiffness_damping];
-  model.mass = t[theta::density] * enclosed_volume(*capture.surface);
+  const double mass = t[theta::density] * enclosed_volume(*capture.scene.object.surface);
   if (d.body->kind != ElementKind::Hexahedron) {  // the scan may have been taken under load
-    const Points free = Embedding(*d.body, capture.surface->vertices).positions(d.body->reference_positions());
-    for (Eigen::Index v = 0; v < free.rows(); ++v) model.surface.vertices[std::size_t(v)] = free.row(v).transpose();
+    const Points free = Embedding(*d.body, surface.vertices).positions(d.body->reference_positions());
+    for (Eigen::Index v = 0; v < free.rows(); ++v) surface.vertices[std::size_t(v)] = free.row(v).transpose();
   }
-  model.density = model.mass / enclosed_volume(model.surface);
-  model.gravity = theta::vector_at(t, theta::gravity);
-  model.planes = capture.planes;
-  for (std::size_t i = 0; i < model.planes.size(); ++i) {
-    model.planes[i].point = t.segment<3>(theta::plane_point(int(i)));
-    model.planes[i].normal = t.segment<3>(theta::plane_normal(int(i)));
-    model.planes[i].known = true;
+  Scene& scene = model.scene;
+  scene.object.mass = mass;
+  scene.object.density = mass / enclosed_volume(surface);
+  scene.object.surface = std::move(surface);
+  scene.world = world_of(theta::vector_at(t, theta::gravity));
+  scene.planes = capture.scene.planes;
+  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
+    scene.planes[i].point = t.segment<3>(theta::plane_point(int(i)));
+    scene.planes[i].normal = t.segment<3>(theta::plane_normal(int(i)));
+    scene.planes[i].known = true;
   }
-  model.fixed = capture.fixed;
-  model.weights = capture.weights;
-  model.initial = capture.initial;
-  model.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
-  model.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);
-  model.initial.known = true;
+  scene.fixed = capture.scene.fixed;
+  scene.weights = capture.scene.weights;
+  scene.initial = capture.scene.initial;
+  scene.initial.linear_velocity = theta::vector_at(t, theta::linear_velocity);
+  scene.initial.angular_velocity = theta::vector_at(t, theta::angular_velocity);
+  scene.initial.known = true;
   for (int k = 0; k < d.simulation.pulls; ++k)
-    model.initial.pulls.push_back(theta::vector_at(t, theta::pull(k, d.simulation.planes)));
-  model.cell_size = object_size(capture) / cells;
+    scene.initial.pulls.push_back(theta::vector_at(t, theta::pull(k, d.simulation.planes)));
+  model.cell_size = object_size(capture.scene) / cells;
   if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
     model.cell_size = grid->cell_size;
     model.grid_origin = grid->origin;
   }
-  if (!capture.is_static) {
-    model.frames = capture.frame_count();
-    model.frame_rate = (capture.frame_count() - 1) / (capture.times.back() - capture.times.front());
-    model.start_frame = capture.start_frame;
-    model.substeps = std::max(1, int(std::ceil(1.0 / (model.frame_rate * d.simulation.max_dt) - 1e-9)));
+  if (const Timing& timing = capture.scene.timing; !timing.is_static) {
+    const double rate = (timing.frame_count() - 1) / (timing.times.back() - timing.times.front());
+    scene.timing = evenly_timed(rate, timing.frame_count(), timing.start_frame);
+    model.substeps = std::max(1, int(std::ceil(1.0 / (rate * d.simulation.max_dt) - 1e-9)));
   }
   model.theta = d.simulation.newmark_theta;
   model.contact_stiffness = d.simulation.contact.stiffness;
@@ -493,92 +417,14 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   return model;
 }
 
-namespace {
-
-/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's
-/// modulus where the volume mesh has as many elements.
-std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* distance) {
-  const ModelVolume& volume = model.volume;
-  Body body;
-  if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
-    body = make_body(make_hex_grid(*distance, bounding_box(model.surface), model.cell_size));
-  } else {
-    const auto points = std::size_t(corner_count(volume.kind));
-    std::vector<std::array<int, 4>> tets;
-    std::vector<std::array<int, 6>> mid_nodes;
-    for (std::size_t i = 0; i < volume.connectivity.size(); i += points) {
-      std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i), 4, tets.emplace_back().begin());
-      if (points == 10)
-        std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i) + 4, 6, mid_nodes.emplace_back().begin());
-    }
-    body = make_body(make_tet_mesh(volume.nodes, std::move(tets), std::move(mid_nodes)));
-  }
-  if (volume.youngs_modulus.size() == body.modulus.relative.size())
-    for (std::size_t e = 0; e < volume.youngs_modulus.size(); ++e)
-      body.modulus.relative[e] = volume.youngs_modulus[e] / model.youngs_modulus;
-  return std::make_shared<Body>(std::move(body));
-}
-
-}  // namespace
-
-std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, nullptr); }
-
-ModelScene make_scene(const Model& model) {
-  const CaptureScene scene = make_scene(model, as_capture(model));
-  SimulationOptions options = scene.discretisation.simulation;
-  if (model.frame_rate > 0.0) options.max_dt = 1.0 / (model.frame_rate * model.substeps) * (1.0 + 1e-9);
-  return {scene.discretisation.distance, scene.discretisation.body, options, scene.theta};
-}
-
 CaptureScene make_scene(const Model& model, const Capture& capture) {
-  CaptureScene scene;
-  const auto distance = capture_distance(capture, 0.15);
-  Model situated = model;
-  situated.planes = capture.planes;
-  situated.initial = capture.initial;
-  if (capture.initial.released && !capture.initial.release_of && capture.initial.pulls.empty()) {
-    if (model.initial.pulls.empty())
-      throw InputError({{capture.file},
-                        "the object is released, and the model knows no pose before a release",
-                        "the model of a fit to this recording",
-                        "let `pliant fit --hold-out` find the pose and score the rest"});
-    situated.initial.pulls = model.initial.pulls;
-  }
-  const Vector3 gravity = capture.gravity.value_or(model.gravity.value_or(-9.81 * capture.up));
-  scene.theta = model_theta(situated, gravity, int(sensor_names(capture).size()));
-  SimulationOptions settings;
-  settings.newmark_theta = model.theta;
+  ModelScene made = make_scene(model, capture.scene, capture_distance(capture, Resolution{}.band), capture.file,
+                               int(sensor_names(capture).size()));
   Resolution resolution;
-  resolution.cells = object_size(capture) / model.cell_size;
-  resolution.pulls = int(situated.initial.pulls.size());
-  const auto body = body_of(model, distance.get());
-  if (model.law) settings.law = make_law(*model.law, body->element_count());
-  resolution.element = body->kind;
-  scene.discretisation =
-      discretise(capture, distance, body, resolution, scene.theta, settings, tracked_points(capture).rest);
-  if (model.contact_stiffness > 0.0)
-    scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
-  const double dt = 1.0 / (model.frame_rate * model.substeps);
-  if (model.frame_rate > 0.0) scene.discretisation.simulation.max_dt = dt * (1.0 + 1e-9);
-  return scene;
-}
-
-RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Body> body,
-                                const SimulationOptions& options, const VectorX& parameters,
-                                const std::function<bool(int, int)>& progress) {
-  std::vector<PvdEntry> entries;
-  const auto elasticity = scene_elasticity(body, options);
-  elasticity->set_parameters(parameters);
-  Simulation simulation(body, options);
-  const RolloutSummary summary = simulation.run(parameters, [&](int frame, const State& state, auto) {
-    char name[32];
-    std::snprintf(name, sizeof name, "frames/%06d.vtu", frame);
-    write_vtu(folder / name, frame_grid(body, parameters, state, *elasticity), VtuPrecision::Single);
-    entries.push_back({options.times[std::size_t(frame)] - options.times.front(), name});
-    return !progress || progress(frame + 1, simulation.frame_count());
-  });
-  write_pvd(folder / "trajectory.pvd", entries);
-  return summary;
+  resolution.cells = object_size(capture.scene) / model.cell_size;
+  Mismatch mismatch = make_mismatch(capture, made.distance, made.body, resolution, tracked_points(capture).rest);
+  return {{std::move(made.distance), std::move(made.body), std::move(mismatch), {}, std::move(made.simulation)},
+          std::move(made.theta)};
 }
 
 void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
@@ -601,8 +447,8 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
                    [&](int done, int total) { return tell("trajectory", done, total), true; });
   report.capture_path = facts.capture_path;
   for (const auto& f : surface_errors(first.evaluation).frames) {
-    const int frame = f.frame + capture.start_frame;
-    report.residuals.push_back({frame, capture.times[std::size_t(frame)], f.rms, f.points, f.noise});
+    const int frame = f.frame + capture.scene.timing.start_frame;
+    report.residuals.push_back({frame, capture.scene.timing.times[std::size_t(frame)], f.rms, f.points, f.noise});
   }
   tell("loads", 0, 1);
   report.loads = predict_loads(capture, {first.discretisation, first.theta});

@@ -77,13 +77,13 @@ Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& obs
                    const VectorX& theta) {
   Gallery gallery;
   gallery.triangles = track.surface.triangles;
-  gallery.planes = capture.planes;
+  gallery.planes = capture.scene.planes;
   for (std::size_t i = 0; i < gallery.planes.size(); ++i) {
     gallery.planes[i].point = theta.segment<3>(theta::plane_point(int(i)));
     gallery.planes[i].normal = theta.segment<3>(theta::plane_normal(int(i)));
   }
   if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
-  gallery.up = capture.up;
+  gallery.up = capture.scene.world.up;
   gallery.width = 560, gallery.height = 420;
   gallery.samples = 2;  // a picture a frame
   const Embedding embedding(*track.body, track.surface.vertices);

@@ -4,49 +4,62 @@
 #include <ostream>
 #include <string>
 
-#include "capture/capture.hpp"
-#include "capture/toml_table.hpp"
+#include "scene/scene.hpp"
+#include "scene/toml_table.hpp"
 
-// What scenes and models say in the words of a capture (docs/formats.md): regions, planes, first velocities.
+// Scenes in TOML, the same words in all formats that hold one (docs/formats.md): captures, models, synthetic scenes and
+// sessions of photographs. A reader asks a table for its keys; who opened the table finishes it, and may ask for more.
+// What is missing or makes no sense is a complaint in the table's context, and a default in the value.
 
 namespace pliant {
 
-/// A region: one of `box`, `sphere`, `half_space`, `vertices` (a file in `folder` with one index a line).
-/// Nothing, with a complaint in the table's context, where there is none or it makes no sense.
-std::optional<Region> read_region(TomlTable& table, const std::filesystem::path& folder);
+/// Keys of [object] that every format has: `mass`, `density`, `shape_is`.
+void read_object_facts(TomlTable& table, Object& object);
+/// Key `surface` or `volume_mesh` of [object], neither required: the file's path and its mesh.
+void read_object_shape(TomlTable& table, const NamedFiles& files, Object& object);
+/// Complains where both or neither of `mass` and `density` is written.
+void require_mass_or_density(TomlTable& table);
 
-/// A [[fixed]] block, a [[plane]] block, a [[weight]] block, the table [initial]; each finishes its table.
-FixedRegion read_fixed(TomlTable block, const std::filesystem::path& folder);
-Plane read_plane(TomlTable block);
-Weight read_weight(TomlTable block);
-Initial read_initial(TomlTable table);
+/// Table [world]. @param gravity_is_required  false: gravity may be unknown
+World read_world(TomlTable& table, bool gravity_is_required = false);
 
-/// A number with a range. Complains, and answers `fallback`, where it is missing (unless optional) or outside.
-struct NumberRule {
-  double low = -1e300, high = 1e300;
-  bool low_allowed = true, high_allowed = true;
-  const char* meaning = "";  ///< for the complaint: what to write, with its unit
-};
-double read_number(TomlTable& table, const std::string& name, const NumberRule& rule);
-double read_number(TomlTable& table, const std::string& name, const NumberRule& rule, double fallback);
-int read_count(TomlTable& table, const std::string& name, int low, int high, std::optional<int> fallback = {});
+/// Table [timing] of a recording: `frame_rate` or a file of `timestamps`, `frame_count`, `start_frame`, `static`.
+Timing read_timing(TomlTable& table, const NamedFiles& files);
+/// Table [timing] where frames are equally spaced: `frame_rate`, `frame_count`, `start_frame`.
+Timing read_even_timing(TomlTable& table, int most_frames);
 
-/// An existing file named by a key, below `folder`; an empty path, with a complaint, where it is not there.
-std::filesystem::path read_path(TomlTable& table, const std::string& name, const std::filesystem::path& folder);
+/// A region: one of `box`, `sphere`, `half_space`, `vertices` (a file with one index a line).
+std::optional<Region> read_region(TomlTable& table, const NamedFiles& files);
 
-/// Throws InputError with all problems in the order of their lines, if there are any.
-void throw_problems(TomlContext& context);
+/// Complains about vertices in the lists of [[fixed]] and [[region]] that the surface has not; about none without
+/// surface.
+void check_vertex_lists(TomlContext& context, const Scene& scene);
 
-/// TOML text of values; numbers come back exactly.
-std::string toml_text(double value);
-std::string toml_text(const std::string& text);
-std::string toml_text(const Vector3& vector);
-std::string toml_text(const RigidMotion& motion);
+/// Blocks [[fixed]], [[region]], [[plane]], [[weight]]; and any table with a weight's keys.
+FixedRegion read_fixed(TomlTable& block, const NamedFiles& files);
+MaterialRegion read_material_region(TomlTable& block, const NamedFiles& files);
+Plane read_plane(TomlTable& block);
+Weight read_weight(TomlTable& block);
 
-/// The same blocks as text. @param vertices_file  for a region of vertices: the file that lists them
+/// Table [initial]. @param may_pull  whether the format has the key `pulls`
+Initial read_initial(TomlTable& table, bool may_pull = false);
+
+/// The same tables and blocks as text, each with an empty line behind it. Times that are not equally spaced, and lists
+/// of vertices, are files: see `write_scene_files`.
+void write_toml(std::ostream& out, const World& world);
+void write_toml(std::ostream& out, const Timing& timing);
+void write_toml(std::ostream& out, const Initial& initial);
 void write_toml(std::ostream& out, const Plane& plane);
 void write_toml(std::ostream& out, const Weight& weight);
-void write_toml(std::ostream& out, const Initial& initial);
-void write_toml(std::ostream& out, const FixedRegion& fixed, const std::string& vertices_file);
+
+/// Table [object]. @param file  path of the surface or volume mesh as it shall be written; empty: of neither
+void write_toml(std::ostream& out, const Object& object, const std::string& file);
+
+/// Blocks [[plane]], [[fixed]], [[region]] and [[weight]] of a scene.
+void write_toml_blocks(std::ostream& out, const Scene& scene);
+
+/// Writes what the text refers to and the value itself holds: `fixed_0.txt`, `region_0.txt`, ... with the vertices of a
+/// region that lists them, by its number, and `timestamps.txt` [s]. Throws InputError where a file cannot be written.
+void write_scene_files(const std::filesystem::path& folder, const Scene& scene);
 
 }  // namespace pliant
