@@ -42,45 +42,46 @@ Json vector_json(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); 
 double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
 
 void describe_object(const Capture& capture, Json& json) {
-  if (!capture.surface) {
+  if (!capture.scene.object.surface) {
     say("object", "no scan of it at rest");
     return;
   }
-  const MeshReport mesh = examine(*capture.surface);
+  const MeshReport mesh = examine(*capture.scene.object.surface);
   const Vector3 extent = mesh.box.extent();
   say("object", formatted("%.4g x %.4g x %.4g m, volume %.4g m^3", extent.x(), extent.y(), extent.z(), mesh.volume));
-  if (const auto mass = capture.total_mass())
+  if (const auto mass = capture.scene.object.total_mass())
     say("", formatted("mass %.4g kg, density %.4g kg/m^3 (%s given)", *mass, *mass / mesh.volume,
-                      capture.mass ? "mass" : "density"));
+                      capture.scene.object.mass ? "mass" : "density"));
   else
     say("", "mass and density unknown");
   say("surface",
       formatted("%zu vertices, %zu triangles, closed, %d part%s, %d triangles without area, %d vertices unused",
-                capture.surface->vertices.size(), capture.surface->triangles.size(), mesh.components,
-                mesh.components == 1 ? "" : "s", mesh.degenerate_triangles, mesh.unused_vertices));
+                capture.scene.object.surface->vertices.size(), capture.scene.object.surface->triangles.size(),
+                mesh.components, mesh.components == 1 ? "" : "s", mesh.degenerate_triangles, mesh.unused_vertices));
   for (const std::string& complaint : mesh.complaints) say("", "note: " + complaint);
   json["object"] = {{"extent", vector_json(extent)}, {"volume", mesh.volume}, {"parts", mesh.components}};
-  if (const auto mass = capture.total_mass()) json["object"]["mass"] = *mass;
+  if (const auto mass = capture.scene.object.total_mass()) json["object"]["mass"] = *mass;
 }
 
 void describe_world(const Capture& capture) {
-  say("gravity",
-      capture.gravity ? vector_text(*capture.gravity) + " m/s^2" : "unknown; up is " + vector_text(capture.up));
-  if (!capture.times.empty())
+  say("gravity", capture.scene.world.gravity ? vector_text(*capture.scene.world.gravity) + " m/s^2"
+                                             : "unknown; up is " + vector_text(capture.scene.world.up));
+  if (!capture.scene.timing.times.empty())
     say("frames", formatted("%d in %.4g s, free from frame %d%s", capture.frame_count(),
-                            capture.times.back() - capture.times.front(), capture.start_frame,
-                            capture.is_static ? ", all of one equilibrium (static)" : ""));
-  if (!capture.fixed.empty())
-    say("held", formatted("%zu region%s", capture.fixed.size(), capture.fixed.size() == 1 ? "" : "s"));
-  if (!capture.weights.empty()) {
+                            capture.scene.timing.times.back() - capture.scene.timing.times.front(),
+                            capture.scene.timing.start_frame,
+                            capture.scene.timing.is_static ? ", all of one equilibrium (static)" : ""));
+  if (!capture.scene.fixed.empty())
+    say("held", formatted("%zu region%s", capture.scene.fixed.size(), capture.scene.fixed.size() == 1 ? "" : "s"));
+  if (!capture.scene.weights.empty()) {
     double mass = 0.0;
-    for (const Weight& weight : capture.weights) mass += weight.mass;
-    say("hung",
-        formatted("%.4g kg at %zu point%s", mass, capture.weights.size(), capture.weights.size() == 1 ? "" : "s"));
+    for (const Weight& weight : capture.scene.weights) mass += weight.mass;
+    say("hung", formatted("%.4g kg at %zu point%s", mass, capture.scene.weights.size(),
+                          capture.scene.weights.size() == 1 ? "" : "s"));
   }
-  if (const auto& weight = capture.initial.release_of)
+  if (const auto& weight = capture.scene.initial.release_of)
     say("start", formatted("released from under a hung weight of %.4g kg", weight->mass));
-  else if (capture.initial.released)
+  else if (capture.scene.initial.released)
     say("start", "released from a held, deformed pose");
 }
 
@@ -144,7 +145,7 @@ void describe_markers(const Capture& capture, const Survey& seen, Json& json) {
 }
 
 void describe_observations(const Capture& capture, const Survey& seen, Json& json) {
-  if (!capture.surface || seen.points.greatest == 0) return;
+  if (!capture.scene.object.surface || seen.points.greatest == 0) return;
   const std::string count = seen.points.least == seen.points.greatest
                                 ? std::to_string(seen.points.least)
                                 : formatted("%d to %d a frame", seen.points.least, seen.points.greatest);
@@ -152,7 +153,7 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
   if (!seen.points.empty_frames.empty())
     say("", "note: no point on the object in frames " + ranges_text(seen.points.empty_frames));
   if (seen.seen_share) say("", formatted("%.0f %% of the surface is seen at the start", 100.0 * *seen.seen_share));
-  if (!capture.is_static)
+  if (!capture.scene.timing.is_static)
     say("motion",
         (seen.moves ? formatted("the seen points move by up to %.3g m", seen.travel) : std::string("none seen")) +
             (seen.first_contact ? formatted(", first contact with a plane about frame %d", *seen.first_contact) : ""));
@@ -165,9 +166,9 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
 }
 
 void describe_planes(const Capture& capture, const Survey& seen, Json& json) {
-  for (std::size_t i = 0; i < capture.planes.size(); ++i) {
+  for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
     const PlaneSurvey& plane = seen.planes[i];
-    const std::string known = capture.planes[i].known ? "known" : "roughly known";
+    const std::string known = capture.scene.planes[i].known ? "known" : "roughly known";
     if (!plane.seen) {
       say("plane", known + ", not seen by any camera");
       continue;
@@ -347,11 +348,11 @@ void check(const Arguments& arguments) {
   if (!arguments.compare_masks.empty()) compare_with_masks(capture, arguments, json);
   describe_prospects(prospects(capture, seen), json);
   if (arguments.out.empty()) return;
-  if (capture.surface)
+  if (capture.scene.object.surface)
     write_sorted_pictures(capture, arguments);
   else
     write_scenes(capture, arguments);
-  if (capture.surface || capture.depth.empty()) write_clouds(frames, arguments);
+  if (capture.scene.object.surface || capture.depth.empty()) write_clouds(frames, arguments);
   if (!capture.clouds.empty()) write_cloud_picture(frames, arguments);
   write_file(fs::path(arguments.out) / "check.json", json.dump(2) + "\n");
 }

@@ -24,7 +24,7 @@ using Observations = std::shared_ptr<std::vector<FrameObservations>>;
 /// Compares the motion with what was seen. False where it cannot be simulated.
 bool evaluate_frames(const Capture& capture, const CaptureScene& scene, const Observations& seen, Evaluation& result) {
   ObjectiveOptions objective_options;
-  objective_options.outlier_scale = 0.05 * object_size(capture);
+  objective_options.outlier_scale = 0.05 * object_size(capture.scene);
   objective_options.last_frame =
       scene.discretisation.simulation.times.empty() ? 0 : int(scene.discretisation.simulation.times.size()) - 1;
   Objective objective(scene.discretisation.mismatch, scene.discretisation.body, scene.discretisation.simulation, seen,

@@ -193,7 +193,7 @@ int ended(bool converged, bool interrupted, const std::string& words, const fs::
 /// Whether a capture's presses are all that there is to fit.
 bool is_of_presses(const Capture& capture) {
   const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
-  return !capture.presses.empty() && capture.times.empty() && !has_loads;
+  return !capture.presses.empty() && capture.scene.timing.times.empty() && !has_loads;
 }
 
 std::string describe(const PressFitEvent& event) {
@@ -308,8 +308,8 @@ int run(const Arguments& arguments) {
   monitor.interrupted = [] { return is_interrupted(); };
   FitOutcome outcome = fit(recordings, options, monitor, std::move(state));
   log.clear_live();
-  const bool has_presses = std::ranges::any_of(
-      recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
+  const bool has_presses =
+      std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
   for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
   if (outcome.interrupted && !fs::exists(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
   if (!outcome.evaluation.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);

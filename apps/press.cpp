@@ -9,10 +9,13 @@
 
 #include "base/error.hpp"
 #include "commands.hpp"
-#include "estimation/problem.hpp"
+#include "elasticity/law_elasticity.hpp"
 #include "geometry/mesh_io.hpp"
 #include "motion/press_session.hpp"
-#include "output/press_output.hpp"
+#include "simulation/law_table.hpp"
+#include "simulation/model_simulation.hpp"
+#include "simulation/scene_simulation.hpp"
+#include "simulation/trajectory.hpp"
 
 namespace pliant::apps {
 
@@ -35,8 +38,9 @@ int run(const Arguments& arguments) {
   if (arguments.force.empty() == arguments.to.empty())
     throw InputError({{}, "neither or both of --force and --move", "one of them", "say what leads the probe"});
   PressSessionOptions options;
-  options.held = held_nodes(*body, held_regions(model.fixed, model.surface));
-  if (model.gravity) options.dead_load = weight_of(*body, model.density, *model.gravity);
+  options.held = held_nodes(*body, held_regions(model.scene));
+  if (const auto& gravity = model.scene.world.gravity)
+    options.dead_load = weight_of(*body, model.scene.object.density.value(), *gravity);
   ProbeOptions probe;
   probe.centre = vector_of(arguments.contact);
   probe.radius = arguments.radius;
@@ -46,7 +50,7 @@ int run(const Arguments& arguments) {
   if (!arguments.axis.empty()) probe.axis = vector_of(arguments.axis).normalized();
   PressSession session(body, law, probe, options);
   const std::string file = arguments.surface.empty() ? "" : arguments.surface;
-  const TriangleMesh fine = file.empty() ? model.surface : read_mesh(file);
+  const TriangleMesh fine = file.empty() ? model.scene.object.surface.value() : read_mesh(file);
   const SurfaceFollower follower(*body, fine.vertices);
   std::vector<PvdEntry> entries;
   std::cout << "step  force [N]                        displacement [mm]              iterations\n";
@@ -70,8 +74,7 @@ int run(const Arguments& arguments) {
     std::snprintf(name, sizeof name, "frames/%06d", step);
     const State state{session.nodes(), Points::Zero(session.nodes().rows(), 3)};
     const std::filesystem::path folder = arguments.out;
-    write_vtu(folder / (std::string(name) + ".vtu"),
-              frame_grid(*body, state, *elasticity), VtuPrecision::Single);
+    write_vtu(folder / (std::string(name) + ".vtu"), frame_grid(*body, state, *elasticity), VtuPrecision::Single);
     TriangleMesh deformed = fine;
     const Points positions = follower.positions(session.nodes());
     for (std::size_t v = 0; v < deformed.vertices.size(); ++v)

@@ -48,17 +48,18 @@ Box box_of(const Points& points) {
 /// The load-free shape and what it sags into, as grey surfaces; the scan as dots, which should lie on the second.
 Picture overlay(const Capture& capture, const LoadFree& found) {
   PictureScene scene;
-  const Points free = Embedding(*found.scene.body, capture.surface->vertices).positions(found.shape.X),
-               sagged = Embedding(*found.scene.body, capture.surface->vertices).positions(found.sagged_again);
+  const Points free = Embedding(*found.scene.body, capture.scene.object.surface->vertices).positions(found.shape.X),
+               sagged =
+                   Embedding(*found.scene.body, capture.scene.object.surface->vertices).positions(found.sagged_again);
   scene.surface.resize(free.rows() + sagged.rows(), 3);
   scene.surface << free, sagged;
   const int shift = int(free.rows());
-  for (const auto& t : capture.surface->triangles) {
+  for (const auto& t : capture.scene.object.surface->triangles) {
     scene.triangles.push_back(t);
     scene.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
   }
-  scene.points = capture.surface->vertices;
-  return draw(scene, view_of(box_of(scene.surface), capture.up, 900, 640, 0.6, 0.15));
+  scene.points = capture.scene.object.surface->vertices;
+  return draw(scene, view_of(box_of(scene.surface), capture.scene.world.up, 900, 640, 0.6, 0.15));
 }
 
 nlohmann::json facts_of(const LoadFree& found, double modulus, double size, double seconds) {
@@ -88,14 +89,14 @@ int run(const Arguments& arguments) {
   if (options.control_points == FitOptions::automatic)
     throw InputError({{}, "control_points is auto", "a number: nothing here tells how many the object needs", ""});
   const Capture capture = at_rest(read_capture(arguments.capture));
-  if (!capture.surface) throw InputError({{capture.file}, "there is no scan ([object] surface)", "", ""});
-  const double size = object_size(capture);
+  if (!capture.scene.object.surface) throw InputError({{capture.file}, "there is no scan ([object] surface)", "", ""});
+  const double size = object_size(capture.scene);
   Resolution resolution;
   resolution.element = options.element.value_or(ElementKind::QuadraticTetrahedron);
   resolution.cells = options.cells;
   resolution.field = {options.controls(), options.control_weights};
-  const int controls = capture.regions.empty() ? options.controls() : int(capture.regions.size()) + 1;
-  CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.surface), controls);
+  const int controls = capture.scene.regions.empty() ? options.controls() : int(capture.scene.regions.size()) + 1;
+  CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls);
   apply_overrides(parameters.set, options);
   const VectorX theta = parameters.set.reference();
   const auto begin = std::chrono::steady_clock::now();

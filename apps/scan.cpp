@@ -130,7 +130,7 @@ void scan_object(const Capture& capture, const Arguments& arguments) {
   const ScanViews views = read_scan_views(capture, choice);
   describe_views(capture, views, json);
   stop_if_interrupted();
-  const RestScan scan = scan_rest_surface(views, capture.up, options, capture.file);
+  const RestScan scan = scan_rest_surface(views, capture.scene.world.up, options, capture.file);
   describe_surface(scan, json);
   describe_scan(scan, json);
   const fs::path out = arguments.out;
@@ -139,9 +139,9 @@ void scan_object(const Capture& capture, const Arguments& arguments) {
     for (const Vector3& point : points_of(view)) points.push_back(point);
   write_scan(out / "rest.ply", scan);
   write_points(out / "seen.ply", points);
-  write_pictures(out, scan, points, views.plane, views.views[0].camera, capture.up);
+  write_pictures(out, scan, points, views.plane, views.views[0].camera, capture.scene.world.up);
   write_file(out / "scan.json", json.dump(2) + "\n");
-  if (!views.plane || !capture.planes.empty()) return;
+  if (!views.plane || !capture.scene.planes.empty()) return;
   std::cout << "\nFor the capture:\n[[plane]]\npoint = " << toml_vector(views.plane->point)
             << "\nnormal = " << toml_vector(views.plane->normal) << "\nknown = true\n";
 }
@@ -164,7 +164,7 @@ void scan_cloud(const Capture& capture, const Arguments& arguments) {
                          1e3 * scan.readings_rms));
   const fs::path out = arguments.out;
   write_scan(out / "rest.ply", scan);
-  write_pictures(out, scan, points, std::nullopt, std::nullopt, capture.up);
+  write_pictures(out, scan, points, std::nullopt, std::nullopt, capture.scene.world.up);
   write_file(out / "scan.json", json.dump(2) + "\n");
 }
 

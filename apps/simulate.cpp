@@ -4,7 +4,8 @@
 #include <string>
 
 #include "commands.hpp"
-#include "output/fit_output.hpp"
+#include "simulation/model_simulation.hpp"
+#include "simulation/trajectory.hpp"
 
 namespace pliant::apps {
 

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdint>
 #include <iostream>
 #include <memory>
@@ -6,11 +7,11 @@
 #include <string>
 
 #include "base/error.hpp"
-#include "capture/region.hpp"
 #include "commands.hpp"
 #include "meshing/mesh_distance.hpp"
 #include "motion/simulation.hpp"
-#include "synthesis/scene.hpp"
+#include "simulation/scene_simulation.hpp"
+#include "synthesis/synthetic_scene.hpp"
 
 namespace pliant::apps {
 
@@ -21,75 +22,86 @@ struct Arguments {
   std::optional<std::uint32_t> seed;
 };
 
-std::shared_ptr<const Body> body_of(const Scene& scene) {
-  const Box box = bounding_box(scene.surface);
-  const double size = box.extent().maxCoeff(), spacing = std::min(size / 80.0, 0.5 * scene.cell_size);
-  const SignedDistance distance = signed_distance(scene.surface, spacing, 0.1 * size + 2.0 * scene.cell_size);
-  return std::make_shared<Body>(make_body(make_hex_grid(distance, box, scene.cell_size)));
+std::shared_ptr<const Body> body_of(const SyntheticScene& synthetic) {
+  const TriangleMesh& surface = *synthetic.scene.object.surface;
+  const Box box = bounding_box(surface);
+  const double size = box.extent().maxCoeff(), spacing = std::min(size / 80.0, 0.5 * synthetic.cell_size);
+  const SignedDistance distance = signed_distance(surface, spacing, 0.1 * size + 2.0 * synthetic.cell_size);
+  Body body = make_body(make_hex_grid(distance, box, synthetic.cell_size));
+  if (!synthetic.scene.regions.empty()) body.modulus = region_field(body, region_tests(synthetic.scene)).field;
+  return std::make_shared<Body>(std::move(body));
 }
 
-VectorX theta_of(const Scene& scene, const MotionLayout& blocks) {
+VectorX theta_of(const SyntheticScene& synthetic, const MotionLayout& blocks) {
+  const Scene& scene = synthetic.scene;
   VectorX theta = blocks.zero();
-  theta[blocks.youngs_moduli.front()] = scene.youngs_modulus;
-  theta[blocks.poissons_ratio] = scene.poisson_ratio;
-  theta[blocks.mass_damping] = scene.mass_damping;
-  theta[blocks.stiffness_damping] = scene.stiffness_damping;
-  theta[blocks.density] = scene.true_density();
-  theta.segment<3>(blocks.gravity) = scene.gravity;
+  theta[blocks.youngs_moduli.front()] = synthetic.youngs_modulus;
+  for (std::size_t k = 1; k < blocks.youngs_moduli.size(); ++k)
+    theta[blocks.youngs_moduli[k]] = synthetic.region_moduli[k - 1];
+  theta[blocks.poissons_ratio] = synthetic.poisson_ratio;
+  theta[blocks.mass_damping] = synthetic.mass_damping;
+  theta[blocks.stiffness_damping] = synthetic.stiffness_damping;
+  theta[blocks.density] = synthetic.true_density();
+  theta.segment<3>(blocks.gravity) = *scene.world.gravity;
   theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
   theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
   for (std::size_t i = 0; i < scene.planes.size(); ++i) {
-    theta.segment<3>(blocks.planes[i].point) = scene.planes[i].plane.point;
-    theta.segment<3>(blocks.planes[i].normal) = scene.planes[i].plane.normal;
+    theta.segment<3>(blocks.planes[i].point) = scene.planes[i].point;
+    theta.segment<3>(blocks.planes[i].normal) = scene.planes[i].normal;
   }
   return theta;
 }
 
-SimulationOptions options_of(const Scene& scene, const MotionBlocks& blocks, const Body& body) {
+SimulationOptions options_of(const SyntheticScene& synthetic, const MotionBlocks& blocks, const Body& body) {
+  const Scene& scene = synthetic.scene;
   SimulationOptions options;
-  for (int i = 0; i < scene.frames - scene.start_frame; ++i) options.times.push_back(i / scene.frame_rate);
-  options.max_dt = 1.0 / (scene.frame_rate * scene.substeps);
-  options.newmark_theta = scene.newmark_theta;
-  options.contact = default_contact(body, scene.true_density() * body.volume(), scene.gravity.norm());
-  if (scene.contact_stiffness > 0.0) options.contact.stiffness = scene.contact_stiffness;
-  if (scene.contact_smoothing > 0.0) options.contact.smoothing = scene.contact_smoothing;
+  const Timing& timing = scene.timing;
+  for (int i = 0; i < timing.frame_count() - timing.start_frame; ++i) options.times.push_back(i / timing.frame_rate);
+  options.max_dt = 1.0 / (timing.frame_rate * synthetic.substeps);
+  options.newmark_theta = synthetic.newmark_theta;
+  options.contact = default_contact(body, synthetic.true_density() * body.volume(), scene.world.gravity->norm());
+  if (synthetic.contact_stiffness > 0.0) options.contact.stiffness = synthetic.contact_stiffness;
+  if (synthetic.contact_smoothing > 0.0) options.contact.smoothing = synthetic.contact_smoothing;
   options.blocks = blocks;
-  for (const FixedRegion& fixed : scene.fixed) {
-    const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
-    options.holds.push_back({[region = fixed.region](const Vector3& point) { return contains(region, point); },
-                             motion.rotation, motion.translation});
-  }
+  options.holds = held_regions(scene);
+  for (const Weight& weight : scene.weights) options.weights.push_back({weight.at, weight.mass});
+  if (const auto& weight = scene.initial.release_of) options.released_weights.push_back({weight->at, weight->mass});
   return options;
 }
 
-std::vector<Points> simulate(const Scene& scene) {
-  const std::shared_ptr<const Body> body = body_of(scene);
-  const Embedding embedding(*body, scene.surface.vertices);
-  std::vector<Points> frames(size_t(scene.start_frame), vertex_points(scene.surface));
-  const MotionLayout blocks({.planes = int(scene.planes.size())});
-  Simulation simulation(body, options_of(scene, blocks, *body));
+std::vector<Points> simulate(const SyntheticScene& synthetic) {
+  const std::shared_ptr<const Body> body = body_of(synthetic);
+  const Timing& timing = synthetic.scene.timing;
+  const TriangleMesh& surface = *synthetic.scene.object.surface;
+  const Embedding embedding(*body, surface.vertices);
+  std::vector<Points> frames(size_t(timing.start_frame), vertex_points(surface));
+  const MotionLayout blocks(
+      {.moduli = 1 + int(synthetic.region_moduli.size()), .planes = int(synthetic.scene.planes.size())});
+  Simulation simulation(body, options_of(synthetic, blocks, *body));
   const auto on_frame = [&](int, const State& state, std::span<const State>) {
     frames.push_back(embedding.positions(state.x));
-    show_progress("simulated", int(frames.size()), scene.frames);
+    show_progress("simulated", int(frames.size()), timing.frame_count());
     return !is_interrupted();
   };
-  const RolloutSummary summary = simulation.run(theta_of(scene, blocks), on_frame);
+  const RolloutSummary summary = simulation.run(theta_of(synthetic, blocks), on_frame);
   stop_if_interrupted();
   if (!summary.succeeded)
     throw std::runtime_error("the simulation stopped in frame " + std::to_string(frames.size()) + ": " +
                              summary.failure + "; try more `substeps` or a coarser `cell_size`");
+  if (synthetic.scene.initial.released)  // held there until it is let go
+    std::fill_n(frames.begin(), timing.start_frame, frames[size_t(timing.start_frame)]);
   return frames;
 }
 
 void run(const Arguments& arguments) {
-  Scene scene = read_scene(arguments.scene);
+  SyntheticScene scene = read_synthetic_scene(arguments.scene);
   if (arguments.seed) scene.seed = *arguments.seed;
   const Synthesis synthesis = synthesise(scene, simulate);
   write_synthetic_capture(arguments.out, synthesis,
                           [](int done, int total) { show_progress("recorded", done, total); });
-  std::cout << arguments.out << ": " << scene.frames << " frames of " << scene.cameras.size() << " camera"
-            << (scene.cameras.size() > 1 ? "s" : "") << ", seed " << scene.seed << "\nthe truth is in " << arguments.out
-            << "/truth.json; next: pliant check " << arguments.out << "\n";
+  std::cout << arguments.out << ": " << scene.scene.timing.frame_count() << " frames of " << scene.cameras.size()
+            << " camera" << (scene.cameras.size() > 1 ? "s" : "") << ", seed " << scene.seed << "\nthe truth is in "
+            << arguments.out << "/truth.json; next: pliant check " << arguments.out << "\n";
 }
 
 }  // namespace

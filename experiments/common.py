@@ -102,6 +102,35 @@ def number(value, digits=5):
     return None if value is None else float(f"{value:.{digits}g}")
 
 
+def rounded(values, digits=9):
+    """Numbers, or lists of them, to so many digits."""
+    return [rounded(v, digits) for v in values] if isinstance(values, (list, tuple)) else float(f"{values:.{digits}g}")
+
+
+def toml(value):
+    """A value as TOML: numbers come back exactly."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml(v)}" for key, v in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    if isinstance(value, (bool, str, pathlib.Path)):
+        return json.dumps(str(value) if isinstance(value, pathlib.Path) else value, ensure_ascii=False)
+    return repr(value)
+
+
+def write_capture(folder, name, **facts):
+    """Writes capture.toml into a folder and returns the folder: a dictionary is a table, a list of dictionaries the blocks
+    of that name, as docs/formats.md tells. Tables and keys that are None are left out."""
+    lines = ['format = "capture/1"', f"name = {toml(name)}"]
+    for title, blocks in facts.items():
+        for block in blocks if isinstance(blocks, list) else [blocks] if blocks is not None else []:
+            lines += ["", f"[[{title}]]" if isinstance(blocks, list) else f"[{title}]"]
+            lines += [f"{key} = {toml(value)}" for key, value in block.items() if value is not None]
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "capture.toml").write_text("\n".join(lines) + "\n")
+    return folder
+
+
 def machine():
     """What the figures were measured on."""
     model = platform.machine()

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 
+import common
 import png
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -45,36 +46,24 @@ def refer(link, target):
     link.symlink_to(os.path.relpath(target, link.parent))
 
 
-def vector(v):
-    return "[" + ", ".join(f"{x:.6g}" for x in v) + "]"
-
-
 def depth_camera(name, size, pinhole, images, masks):
-    """A [[depth]] block: readings in millimetres, of a camera whose axes are the world's; `pinhole` is fx, fy, cx, cy."""
-    lines = ["[[depth]]", f'name = "{name}"'] + [f"{key} = {x}" for key, x in zip(("width", "height"), size)]
-    lines += [f"{key} = {x}" for key, x in zip(("fx", "fy", "cx", "cy"), pinhole)]
-    lines += ["camera_to_world = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]", f'images = "{images}"', "depth_scale = 1000.0",
-              f'masks = "{masks}"']
-    return "\n".join(lines) + "\n"
+    """Sensors of a capture: one camera whose readings are millimetres and whose axes are the world's; `pinhole` is fx, fy,
+    cx, cy."""
+    return {"depth": [{"name": name, **dict(zip(("width", "height"), size)), **dict(zip(("fx", "fy", "cx", "cy"), pinhole)),
+                       "camera_to_world": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], "images": images,
+                       "depth_scale": 1000.0, "masks": masks}]}
 
 
 def write_capture(folder, name, sensors, frames, up, surface=None, density=None, plane=None, static=False, start=0,
                   frame_rate=30.0):
-    """Writes capture.toml; `sensors` are its [[depth]] or [[cloud]] blocks as text."""
-    lines = ['format = "capture/1"', f'name = "{name}"', "", "[object]"]
-    if surface:
-        lines.append(f'surface = "{os.path.relpath(surface, folder)}"')
-    if density:
-        lines.append(f"density = {density}             # kg/m^3: a guess, nobody weighed it")
-    gravity = [-9.81 * x for x in up]
-    lines += ["", "[world]", f"gravity = {vector(gravity)}" if surface else f"up = {vector(up)}", "", "[timing]",
-              f"frame_rate = {frame_rate}           # nominal: the recording states none", f"frame_count = {frames}",
-              f"start_frame = {start}", f"static = {str(static).lower()}", ""]
-    if plane:
-        lines += ["[[plane]]", f"point = {vector(plane['point'])}", f"normal = {vector(plane['normal'])}",
-                  "known = true", ""]
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "capture.toml").write_text("\n".join(lines) + "\n" + sensors)
+    """Writes capture.toml; `sensors` are its blocks `depth` or `cloud`. The frame rate is nominal: the recordings state none;
+    the density is a guess: nobody weighed the objects."""
+    plane = [{"point": common.rounded(plane["point"], 6), "normal": common.rounded(plane["normal"], 6), "known": True}] if plane else []
+    world = {"gravity": common.rounded([-9.81 * x for x in up], 6)} if surface else {"up": common.rounded(up, 6)}
+    common.write_capture(
+        folder, name, object={"surface": os.path.relpath(surface, folder) if surface else None, "density": density},
+        world=world, timing={"frame_rate": frame_rate, "frame_count": frames, "start_frame": start, "static": static},
+        plane=plane, **sensors)
 
 
 def call(program, *words):

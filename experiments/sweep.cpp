@@ -27,7 +27,7 @@ void set_scalar(ParameterSet& parameters, const std::string& assignment) {
 }
 
 CaptureParameters only_youngs_modulus(const Capture& capture, int argc, char** argv) {
-  CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.surface));
+  CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface));
   for (int i = 6; i < argc; ++i) set_scalar(parameters.set, argv[i]);
   const std::vector<Parameter> all = parameters.set.parameters();
   for (const Parameter& p : all) parameters.set.set_estimated(p.name, is_modulus(p));
@@ -50,7 +50,7 @@ int run(int argc, char** argv) {
   const Discretisation scene =
       discretise(capture, capture_distance(capture, resolution.band), resolution, blocks, parameters.reference());
   ObjectiveOptions options;
-  options.outlier_scale = 0.12 * object_size(capture);
+  options.outlier_scale = 0.12 * object_size(capture.scene);
   options.last_frame = int(scene.simulation.times.size()) - 1;
   Objective objective(scene.mismatch, scene.body, scene.simulation, observations, parameters, options);
   std::printf("youngs_modulus,cost,gradient_adjoint,gradient_tangent,surface_rms\n");

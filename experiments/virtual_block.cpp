@@ -16,7 +16,7 @@
 #include <limits>
 #include <random>
 
-#include "base/files.hpp"
+#include "capture/capture.hpp"
 #include "capture/markers.hpp"
 #include "elasticity/polar.hpp"
 #include "estimation/press_scene.hpp"
@@ -146,11 +146,13 @@ MarkerPositions markers() {
   return m;
 }
 
-std::string text_of(const Vector3& v) {
-  char text[100];
-  std::snprintf(text, sizeof text, "[%.9g, %.9g, %.9g]", v.x(), v.y(), v.z());
-  return text;
+/// Nine digits: what a user would write down.
+double rounded(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", value);
+  return std::strtod(text, nullptr);
 }
+Vector3 rounded(const Vector3& v) { return {rounded(v.x()), rounded(v.y()), rounded(v.z())}; }
 
 }  // namespace
 
@@ -195,10 +197,13 @@ int main(int count, char** arguments) {
     fs::create_directories(folder / "press");
     write_vtu(folder / "block.vtu", grid);
     write_marker_positions(folder / "markers_rest.csv", rest);
-    std::string toml =
-        "format = \"capture/1\"\nname = \"virtual block of three layers, noise " + std::string(name) +
-        " %\"\n\n[object]\nvolume_mesh = \"block.vtu\"\ndensity = 40.0\n\n[world]\ngravity = [0.0, -9.81, 0.0]\n\n"
-        "[[fixed]]\nbox = { min = [-0.2, -0.01, -0.2], max = [0.2, 1e-6, 0.2] }\n";
+    Capture capture;
+    capture.name = "virtual block of three layers, noise " + std::string(name) + " %";
+    capture.scene.object.volume.emplace();
+    capture.scene.object.file = folder / "block.vtu";
+    capture.scene.object.density = 40.0;
+    capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
+    capture.scene.fixed = {{RegionBox{{-0.2, -0.01, -0.2}, {0.2, 1e-6, 0.2}}, std::nullopt}};
     for (std::size_t i = 0; i < all.size(); ++i) {
       char file[40];
       std::snprintf(file, sizeof file, "press/%03zu.csv", i);
@@ -210,14 +215,16 @@ int main(int count, char** arguments) {
       write_marker_positions(folder / file, seen);
       std::snprintf(file, sizeof file, "press/%03zu_truth.csv", i);
       write_marker_positions(folder / file, clean);
-      char block[600];
-      std::snprintf(block, sizeof block,
-                    "\n[[press]]\nforce = %s\ncontact = { centre = %s, radius = %.3f }\nmarkers = \"press/%03zu.csv\"\n"
-                    "markers_rest = \"markers_rest.csv\"\nrole = \"%s\"\n",
-                    text_of(all[i].force).c_str(), text_of(all[i].centre).c_str(), all[i].radius, i,
-                    all[i].is_test ? "test" : "fit");
-      toml += block;
+      Press press;
+      press.force = rounded(all[i].force);
+      press.contact_centre = rounded(all[i].centre);
+      press.contact_radius = all[i].radius;
+      std::snprintf(file, sizeof file, "press/%03zu.csv", i);
+      press.markers = folder / file;
+      press.markers_rest = folder / "markers_rest.csv";
+      press.role = all[i].is_test ? "test" : "fit";
+      capture.presses.push_back(press);
     }
-    write_file(folder / "capture.toml", toml);
+    write_capture(folder, capture);
   }
 }

@@ -21,10 +21,7 @@ import rest_captures as rc
 FIRST, LAST = 8, {"paper": 20, "polka": 24}  # later the paper's lower half is lost to the cameras
 THICKNESS = 0.008      # [m]
 MASS_OF_AREA = 0.15    # kg/m^2, a guess
-SENSORS = """[[cloud]]
-points = "clouds/%03d.ply"
-noise = 0.003
-"""
+SENSORS = {"cloud": [{"points": "clouds/%03d.ply", "noise": 0.003}]}
 
 
 def main():

@@ -143,30 +143,15 @@ def write_capture(folder, frames, k, middle=True, whole_end=False):
     row = lambda n, p: f"{n}," + ",".join(f"{c:.9g}" for c in p)
     (folder / "rest.csv").write_text("id,x,y,z\n" + "".join(row(n, rest[n]) + "\n" for n in seen))
     (folder / "track.csv").write_text("frame,id,x,y,z\n" + "".join(f"0,{row(n, now[n])}\n" for n in seen))
-    held = ""
+    held = []
     for x, normal in zip(inner, (-1.0, 1.0)):
         R, t = pose_at(rest, now, x, ((x, math.inf) if normal > 0 else (-math.inf, x)) if whole_end else (x - EDGE, x + EDGE))
         matrix = [R[i] + [t[i]] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
-        held += f"\n[[fixed]]\nhalf_space = {{ point = [{x!r}, 0.0, 0.0], normal = [{normal}, 0.0, 0.0] }}\ndisplaced_to = {matrix}\n"
-    (folder / "capture.toml").write_text(f"""format = "capture/1"
-name = "rubber strip, frame {k}"
-
-[object]
-surface = "rest.obj"
-density = {DENSITY}
-
-[world]
-gravity = [0.0, 0.0, -9.81]
-
-[timing]
-frame_rate = 1.0
-frame_count = 1
-static = true
-{held}
-[[markers]]
-rest = "rest.csv"
-track = "track.csv"
-""")
+        held.append({"half_space": {"point": [x, 0.0, 0.0], "normal": [normal, 0.0, 0.0]}, "displaced_to": matrix})
+    common.write_capture(
+        folder, f"rubber strip, frame {k}", object={"surface": "rest.obj", "density": DENSITY},
+        world={"gravity": [0.0, 0.0, -9.81]}, timing={"frame_rate": 1.0, "frame_count": 1, "static": True}, fixed=held,
+        markers=[{"rest": "rest.csv", "track": "track.csv"}])
 
 
 def main():

@@ -109,10 +109,6 @@ def write_markers(path, frames):
     path.write_text("\n".join(lines) + "\n")
 
 
-def numbers(values):
-    return "[" + ", ".join(f"{v:.9g}" for v in values) + "]"
-
-
 def write_capture(folder, recording, weight=None, hung_at=EDGE, window=None, released_at=0.0, static=None, density=DENSITY):
     """A capture of the release, its frames from the last one held to `window` seconds later; or, where `static` is a
     pair of times after the release, of the mean between them as one frame at rest.
@@ -123,34 +119,19 @@ def write_capture(folder, recording, weight=None, hung_at=EDGE, window=None, rel
     write_markers(folder / "rest.csv", recording.rest)
     if static:
         write_markers(folder / "track.csv", [recording.settled(*static)])
-        timing = f"frame_rate = {RATE}\nframe_count = 1\nstatic = true\n"
+        timing = {"frame_rate": RATE, "frame_count": 1, "static": True}
     else:
         frames = recording.frames[recording.start:recording.start + round(window * RATE) + 1]
         write_markers(folder / "track.csv", frames)
         times = [released_at] + [k / RATE for k in range(1, len(frames))]
         (folder / "times.txt").write_text("".join(f"{t:.6f}\n" for t in times))
-        timing = f"timestamps = \"times.txt\"\nframe_count = {len(frames)}\nstart_frame = 0\n"
-    hung = "".join(f"\n[[weight]]\nmass = {weight / len(hung_at):.9g}\nat = {numbers(p)}\n" for p in hung_at) if weight else ""
-    (folder / "capture.toml").write_text(f"""format = "capture/1"
-name = "silicone beam, {recording.name}"
-
-[object]
-surface = "beam.obj"
-density = {density}
-
-[world]
-gravity = {numbers(recording.gravity)}
-
-[timing]
-{timing}
-[[fixed]]
-half_space = {{ point = [-0.09999, 0, 0], normal = [-1, 0, 0] }}
-{hung}
-[[markers]]
-rest = "rest.csv"
-track = "track.csv"
-""")
-    return folder
+        timing = {"timestamps": "times.txt", "frame_count": len(frames), "start_frame": 0}
+    hung = [{"mass": common.rounded(weight / len(hung_at)), "at": common.rounded(p)} for p in hung_at] if weight else []
+    return common.write_capture(
+        folder, f"silicone beam, {recording.name}", object={"surface": "beam.obj", "density": density},
+        world={"gravity": common.rounded(recording.gravity)}, timing=timing,
+        fixed=[{"half_space": {"point": [-0.09999, 0, 0], "normal": [-1, 0, 0]}}], weight=hung,
+        markers=[{"rest": "rest.csv", "track": "track.csv"}])
 
 
 def read_track(path):

@@ -65,31 +65,11 @@ def write_capture(folder, pressure, tip, start):
     (folder / "rest.csv").write_text(f"id,x,y,z\ntip,{LENGTH},0,0\n")
     rows = [f"{k},tip,{LENGTH + p[0]:.9g},{p[1]:.9g},{p[2]:.9g}\n" for k, p in enumerate(tip[start:start + FRAMES])]
     (folder / "track.csv").write_text("frame,id,x,y,z\n" + "".join(rows))
-    (folder / "capture.toml").write_text(f"""format = "capture/1"
-name = "soft arm after {pressure} mbar"
-
-[object]
-surface = "arm.obj"
-density = {DENSITY}
-
-[world]
-gravity = [9.81, 0.0, 0.0]
-
-[timing]
-frame_rate = {RATE}
-frame_count = {FRAMES}
-start_frame = 0
-
-[initial]
-released = true
-
-[[fixed]]
-half_space = {{ point = [0.001, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }}
-
-[[markers]]
-rest = "rest.csv"
-track = "track.csv"
-""")
+    common.write_capture(
+        folder, f"soft arm after {pressure} mbar", object={"surface": "arm.obj", "density": DENSITY},
+        world={"gravity": [9.81, 0.0, 0.0]}, timing={"frame_rate": RATE, "frame_count": FRAMES, "start_frame": 0},
+        initial={"released": True}, fixed=[{"half_space": {"point": [0.001, 0.0, 0.0], "normal": [-1.0, 0.0, 0.0]}}],
+        markers=[{"rest": "rest.csv", "track": "track.csv"}])
 
 
 def main():

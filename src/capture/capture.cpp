@@ -34,10 +34,4 @@ std::filesystem::path FramePattern::operator()(int frame) const {
   return pattern.substr(0, field->first) + number + pattern.substr(field->second);
 }
 
-std::optional<double> Capture::total_mass() const {
-  if (mass) return mass;
-  if (density && surface) return *density * enclosed_volume(*surface);
-  return std::nullopt;
-}
-
 }  // namespace pliant

@@ -4,68 +4,14 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "base/error.hpp"
 #include "base/types.hpp"
 #include "geometry/camera.hpp"
-#include "geometry/triangle_mesh.hpp"
-#include "geometry/volume_mesh.hpp"
+#include "scene/scene.hpp"
 
 namespace pliant {
-
-/// A region of space at rest: where a point of the object is held, or of another material.
-struct RegionBox {
-  Vector3 min, max;
-};
-struct RegionSphere {
-  Vector3 centre;
-  double radius;
-};
-struct RegionHalfSpace {
-  Vector3 point, normal;
-};  ///< the normal points into the region
-struct RegionVertices {
-  std::vector<int> indices;
-};  ///< vertices of the object's surface
-using Region = std::variant<RegionBox, RegionSphere, RegionHalfSpace, RegionVertices>;
-
-struct FixedRegion {
-  Region region;
-  std::optional<RigidMotion> displaced_to;  ///< from rest to where it is held; nothing: held where it rests
-};
-
-struct MaterialRegion {
-  std::string name;
-  Region region;
-};
-
-struct Plane {
-  Vector3 point = Vector3::Zero();
-  Vector3 normal = Vector3::UnitY();  ///< unit length, to the side where the object may be
-  bool known = true;
-};
-
-enum class ShapeIs { Reference, Static };
-
-/// A small heavy thing that hangs at a point of the object, and moves along with it.
-struct Weight {
-  double mass = 0.0;             ///< [kg]
-  Vector3 at = Vector3::Zero();  ///< on the undeformed surface
-};
-
-struct Initial {
-  Vector3 linear_velocity = Vector3::Zero();   ///< [m/s], of the centre of mass
-  Vector3 angular_velocity = Vector3::Zero();  ///< [rad/s], about the centre of mass
-  bool known = true;
-  bool released = false;
-  /// Of a model or scene whose object is released: what pulls it until then, in the unit of `Pull`.
-  std::vector<Vector3> pulls = {};
-  /// Of an object that is released: the weight that hangs from it until then, and whose string is cut. Nothing: nobody
-  /// knows what held it.
-  std::optional<Weight> release_of = {};
-};
 
 /// Paths of one file a frame: a printf pattern like "front/%06d.png", relative to the capture's folder.
 struct FramePattern {
@@ -76,6 +22,7 @@ struct FramePattern {
   bool is_valid() const;
   /// Whether it holds no percent sign: the name of one file, enough for a recording of one frame.
   bool is_plain() const { return pattern.find('%') == std::string::npos; }
+  bool operator==(const FramePattern&) const = default;
 };
 
 struct DepthCamera {
@@ -87,16 +34,19 @@ struct DepthCamera {
   std::optional<std::filesystem::path> background;  ///< absolute
   int every = 1;
   std::optional<double> noise;  ///< standard deviation of a reading [m]
+  bool operator==(const DepthCamera&) const = default;
 };
 
 struct CloudSequence {
   FramePattern points;
   int every = 1;
   std::optional<double> noise;
+  bool operator==(const CloudSequence&) const = default;
 };
 
 struct MarkerTrack {
   std::filesystem::path rest, track;  ///< absolute
+  bool operator==(const MarkerTrack&) const = default;
 };
 
 struct Press {
@@ -107,6 +57,7 @@ struct Press {
   std::filesystem::path markers, markers_rest;  ///< absolute
   std::string role = "fit";                     ///< "fit" or "test"
   bool glued = true;
+  bool operator==(const Press&) const = default;
 };
 
 struct Load {
@@ -115,6 +66,7 @@ struct Load {
   std::optional<std::filesystem::path> cloud, markers, markers_rest;  ///< absolute
   std::map<std::string, std::filesystem::path> images, masks;         ///< absolute, by the depth camera's name
   std::string role = "fit";                                           ///< "fit" or "test"
+  bool operator==(const Load&) const = default;
 };
 
 /// Facts read from a `capture.toml`, valid as a whole (see docs/formats.md). SI units, world coordinates.
@@ -124,25 +76,7 @@ struct Capture {
   std::string name;
   std::string sha256;  ///< of capture.toml and the surface file, hexadecimal
 
-  std::optional<TriangleMesh> surface;  ///< nothing: no rest scan, nothing can be fitted
-  std::optional<VolumeMesh> volume;     ///< tetrahedra made elsewhere, whose boundary `surface` then is
-  std::filesystem::path surface_file;   ///< or the volume's
-  std::optional<double> mass;           ///< [kg]
-  std::optional<double> density;        ///< [kg/m^3]
-  ShapeIs shape_is = ShapeIs::Reference;
-
-  std::optional<Vector3> gravity;  ///< [m/s^2]; nothing: to be estimated
-  Vector3 up = Vector3::UnitY();   ///< opposite to gravity's direction where that is known, else as given
-
-  std::vector<double> times;  ///< [s] of each frame; empty in a capture of presses and loads alone
-  int start_frame = 0;
-  bool is_static = false;
-
-  std::vector<FixedRegion> fixed;
-  std::vector<MaterialRegion> regions;
-  std::vector<Plane> planes;
-  std::vector<Weight> weights;  ///< that hang in every frame
-  Initial initial;
+  Scene scene;
 
   std::vector<DepthCamera> depth;
   std::vector<CloudSequence> clouds;
@@ -150,14 +84,21 @@ struct Capture {
   std::vector<Press> presses;
   std::vector<Load> loads;
 
-  int frame_count() const { return int(times.size()); }
-  /// Mass [kg] of the object, from its density where that is given. Nothing: neither is known.
-  std::optional<double> total_mass() const;
+  int frame_count() const { return scene.timing.frame_count(); }
 };
 
 /// Reads and validates a capture: `path` is the folder or its capture.toml.
 /// Throws InputError with every problem found, each with file, line and column, what was found, what was expected
 /// and what to do. Image files are all opened and their headers checked; pixels are read by `observe`.
 Capture read_capture(const std::filesystem::path& path);
+
+/// Writes `capture.toml` into a folder, and the files beside it that hold what the value itself holds: `rest.ply` where
+/// the surface has no file, `timestamps.txt` where frames have no common rate, lists of vertices. Files that the value
+/// names by their paths are there already, and are named relative to the folder. `read_capture` gives the same facts
+/// back; rotations and unit vectors to the last digit but one. `capture.toml` is written last: a folder with it is
+/// whole.
+/// @param comment  first line of the file, without its number sign; "" for none
+/// Throws InputError where a file cannot be written.
+void write_capture(const std::filesystem::path& folder, const Capture& capture, const std::string& comment = "");
 
 }  // namespace pliant

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "capture/capture.hpp"
-#include "capture/toml_table.hpp"
+#include "scene/toml_table.hpp"
 
 namespace pliant {
 

@@ -38,8 +38,8 @@ double DepthNoise::along_normal(double depth, double incidence) const {
 double DepthNoise::jump(double depth) const { return std::max(6.0 * axial(depth), 4.0 * depth / focal_); }
 
 double typical_depth(const Capture& capture, const PinholeCamera& camera) {
-  if (!capture.surface) return 1.0;
-  const Box box = bounding_box(*capture.surface);
+  if (!capture.scene.object.surface) return 1.0;
+  const Box box = bounding_box(*capture.scene.object.surface);
   const double depth = camera.project(0.5 * (box.min + box.max)).z();
   return depth > 0.05 ? depth : 1.0;
 }

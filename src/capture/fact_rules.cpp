@@ -5,9 +5,10 @@
 #include <set>
 
 #include "capture/capture_rules.hpp"
-#include "capture/region.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/surface_distance.hpp"
+#include "scene/region.hpp"
+#include "scene/scene_toml.hpp"
 
 namespace pliant {
 
@@ -43,33 +44,36 @@ std::string item(const char* name, std::size_t i, const char* key = "") {
 double size_of(const TriangleMesh& surface) { return bounding_box(surface).extent().maxCoeff(); }
 
 void complain_off_surface(RuleContext& context, const std::string& key, const Vector3& point) {
-  if (!context.capture.surface) return;
-  const double distance = distances_to_surface(*context.capture.surface, {&point, 1}).front();
-  if (distance > surface_tolerance * size_of(*context.capture.surface))
+  if (!context.capture.scene.object.surface) return;
+  const double distance = distances_to_surface(*context.capture.scene.object.surface, {&point, 1}).front();
+  if (distance > surface_tolerance * size_of(*context.capture.scene.object.surface))
     context.toml.complain(key, text_of(point) + " is " + text_of(distance, "m") + " off the rest surface",
                           "a point on the undeformed surface", "give it in metres, in world coordinates, at rest");
 }
 
 /// Where the shape comes from.
-const char* surface_key(const Capture& capture) { return capture.volume ? "object.volume_mesh" : "object.surface"; }
+const char* surface_key(const Capture& capture) {
+  return capture.scene.object.volume ? "object.volume_mesh" : "object.surface";
+}
 
 }  // namespace
 
 void check_surface_is_solid(RuleContext& context) {
-  if (!context.capture.surface) return;
-  const MeshReport report = examine(*context.capture.surface);
+  if (!context.capture.scene.object.surface) return;
+  const MeshReport report = examine(*context.capture.scene.object.surface);
   if (report.is_closed_solid) return;
   std::string wrong;
   for (const std::string& complaint : report.complaints) wrong += (wrong.empty() ? "" : "; ") + complaint;
-  context.toml.complain(
-      surface_key(context.capture),
-      (context.capture.volume ? "the boundary of `volume_mesh`" : "`surface`") + std::string(" is no solid: ") + wrong,
-      "a closed surface that faces outwards", "close holes and make orientations agree in a mesh editor");
+  context.toml.complain(surface_key(context.capture),
+                        (context.capture.scene.object.volume ? "the boundary of `volume_mesh`" : "`surface`") +
+                            std::string(" is no solid: ") + wrong,
+                        "a closed surface that faces outwards",
+                        "close holes and make orientations agree in a mesh editor");
 }
 
 void check_object_size(RuleContext& context) {
-  if (!context.capture.surface) return;
-  const double size = size_of(*context.capture.surface);
+  if (!context.capture.scene.object.surface) return;
+  const double size = size_of(*context.capture.scene.object.surface);
   if (size >= smallest_object && size <= largest_object) return;
   context.toml.complain(surface_key(context.capture), "the object is " + text_of(size, "m") + " long", "1 mm to 10 m",
                         size > largest_object ? "meshes are in metres: divide by 1000 if this one is in millimetres"
@@ -78,26 +82,26 @@ void check_object_size(RuleContext& context) {
 
 void check_mass_or_density(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (capture.mass && capture.density)
+  if (capture.scene.object.mass && capture.scene.object.density)
     context.toml.complain("object.density", "both `mass` and `density`", "one of the two", "keep what was measured");
   for (const auto& [key, value] :
-       {std::pair("object.mass", capture.mass), std::pair("object.density", capture.density)})
+       {std::pair("object.mass", capture.scene.object.mass), std::pair("object.density", capture.scene.object.density)})
     if (value && *value <= 0) context.toml.complain(key, text_of(*value, ""), "a number above 0", "");
-  if (capture.density && *capture.density > 0 &&
-      (*capture.density < least_density || *capture.density > greatest_density))
-    context.toml.complain("object.density", "a density of " + text_of(*capture.density, "kg/m^3"), "3 to 25000 kg/m^3",
-                          "1 g/cm^3 is 1000 kg/m^3");
-  if (!capture.mass || *capture.mass <= 0 || !capture.surface) return;
-  const double volume = enclosed_volume(*capture.surface), density = *capture.mass / volume;
+  if (capture.scene.object.density && *capture.scene.object.density > 0 &&
+      (*capture.scene.object.density < least_density || *capture.scene.object.density > greatest_density))
+    context.toml.complain("object.density", "a density of " + text_of(*capture.scene.object.density, "kg/m^3"),
+                          "3 to 25000 kg/m^3", "1 g/cm^3 is 1000 kg/m^3");
+  if (!capture.scene.object.mass || *capture.scene.object.mass <= 0 || !capture.scene.object.surface) return;
+  const double volume = enclosed_volume(*capture.scene.object.surface), density = *capture.scene.object.mass / volume;
   if (volume > 0 && (density < least_density || density > greatest_density))
-    context.toml.complain(
-        "object.mass",
-        text_of(*capture.mass, "kg") + " in " + text_of(volume, "m^3") + " is " + text_of(density, "kg/m^3"),
-        "3 to 25000 kg/m^3", "mass is in kilograms and the mesh in metres");
+    context.toml.complain("object.mass",
+                          text_of(*capture.scene.object.mass, "kg") + " in " + text_of(volume, "m^3") + " is " +
+                              text_of(density, "kg/m^3"),
+                          "3 to 25000 kg/m^3", "mass is in kilograms and the mesh in metres");
 }
 
 void check_gravity(RuleContext& context) {
-  const auto& gravity = context.capture.gravity;
+  const auto& gravity = context.capture.scene.world.gravity;
   if (!gravity) {
     if (context.toml.places.has("world") && !context.toml.places.has("world.up") && context.toml.is_sound("world"))
       context.toml.complain("world.gravity", "neither `gravity` nor `up`", "gravity = [x, y, z] in m/s^2",
@@ -108,7 +112,8 @@ void check_gravity(RuleContext& context) {
   if (strength != 0 && (strength < least_gravity || strength > greatest_gravity))
     context.toml.complain("world.gravity", "a gravity of " + text_of(strength, "m/s^2"), "about 9.81 m/s^2",
                           "give it in metres per second squared");
-  if (strength > 0 && context.toml.places.has("world.up") && context.capture.up.dot(*gravity) > -0.5 * strength)
+  if (strength > 0 && context.toml.places.has("world.up") &&
+      context.capture.scene.world.up.dot(*gravity) > -0.5 * strength)
     context.toml.complain("world.up", "`up` does not point against `gravity`", "the opposite direction",
                           "leave out `up`");
 }
@@ -119,7 +124,7 @@ void check_timing(RuleContext& context) {
   if (is_moving && !context.toml.places.has("timing"))
     context.toml.complain("timing", "no table [timing]", "[timing] with `frame_rate` and `frame_count`");
   if (!context.toml.is_sound("timing")) return;
-  const auto& times = capture.times;
+  const auto& times = capture.scene.timing.times;
   const std::string key = context.toml.places.has("timing.timestamps") ? "timing.timestamps" : "timing.frame_rate";
   for (std::size_t i = 1; i < times.size(); ++i)
     if (times[i] <= times[i - 1]) {
@@ -128,7 +133,7 @@ void check_timing(RuleContext& context) {
           "times that increase", "sort the frames by time");
       return;
     }
-  if (times.size() < 2 || capture.is_static) return;
+  if (times.size() < 2 || capture.scene.timing.is_static) return;
   const double interval = (times.back() - times.front()) / double(times.size() - 1);
   if (interval < shortest_interval || interval > longest_interval)
     context.toml.complain(key, text_of(interval, "s") + " between frames", "0.00001 to 10 s",
@@ -137,25 +142,25 @@ void check_timing(RuleContext& context) {
 
 void check_start_frame(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!context.toml.is_sound("timing") || capture.times.empty()) return;
-  if (capture.start_frame < 0 || capture.start_frame >= capture.frame_count())
-    context.toml.reject("timing.start_frame", "`start_frame` is " + std::to_string(capture.start_frame),
+  if (!context.toml.is_sound("timing") || capture.scene.timing.times.empty()) return;
+  if (capture.scene.timing.start_frame < 0 || capture.scene.timing.start_frame >= capture.frame_count())
+    context.toml.reject("timing.start_frame", "`start_frame` is " + std::to_string(capture.scene.timing.start_frame),
                         "0 to " + std::to_string(capture.frame_count() - 1), "frames are counted from 0");
 }
 
 void check_static(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.is_static) return;
-  if (capture.initial.released)
+  if (!capture.scene.timing.is_static) return;
+  if (capture.scene.initial.released)
     context.toml.complain("initial.released", "a static capture that is released", "one of the two",
                           "remove `static` or `released`");
-  if (capture.initial.linear_velocity.norm() > 0 || capture.initial.angular_velocity.norm() > 0)
+  if (capture.scene.initial.linear_velocity.norm() > 0 || capture.scene.initial.angular_velocity.norm() > 0)
     context.toml.complain("initial", "a static capture with a velocity", "an object at rest",
                           "remove the velocity or `static`");
 }
 
 void check_initial_velocity(RuleContext& context) {
-  const Initial& initial = context.capture.initial;
+  const Initial& initial = context.capture.scene.initial;
   if (const double speed = initial.linear_velocity.norm(); speed > fastest)
     context.toml.complain("initial.linear_velocity", text_of(speed, "m/s"), "at most 100 m/s",
                           "give it in metres per second");
@@ -164,37 +169,22 @@ void check_initial_velocity(RuleContext& context) {
                           "give it in radians per second");
 }
 
-void check_vertex_lists(RuleContext& context) {
-  if (!context.capture.surface) return;
-  const int count = int(context.capture.surface->vertices.size());
-  const auto check = [&](const Region& region, const std::string& key) {
-    const auto* list = std::get_if<RegionVertices>(&region);
-    if (!list || !context.toml.is_sound(key)) return;
-    const auto bad = std::ranges::find_if(list->indices, [&](int v) { return v < 0 || v >= count; });
-    if (bad != list->indices.end())
-      context.toml.complain(key + ".vertices", "vertex " + std::to_string(*bad) + " in the list",
-                            "0 to " + std::to_string(count - 1), "indices count the surface file's vertices from 0");
-  };
-  for (std::size_t i = 0; i < context.capture.fixed.size(); ++i)
-    check(context.capture.fixed[i].region, item("fixed", i));
-  for (std::size_t i = 0; i < context.capture.regions.size(); ++i)
-    check(context.capture.regions[i].region, item("region", i));
-}
+void check_vertex_lists(RuleContext& context) { check_vertex_lists(context.toml, context.capture.scene); }
 
 void check_fixed_regions(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.surface) return;
-  for (std::size_t i = 0; i < capture.fixed.size(); ++i) {
+  if (!capture.scene.object.surface) return;
+  for (std::size_t i = 0; i < capture.scene.fixed.size(); ++i) {
     if (!context.toml.is_sound(item("fixed", i))) continue;
-    const Region& region = capture.fixed[i].region;
-    if (!touches_solid(region, *capture.surface))
+    const Region& region = capture.scene.fixed[i].region;
+    if (!touches_solid(region, *capture.scene.object.surface))
       context.toml.complain(item("fixed", i), "no point of the object lies in this fixed region",
                             "a region that holds a part of it",
-                            "the object's box is " + text_of(bounding_box(*capture.surface).min) + " to " +
-                                text_of(bounding_box(*capture.surface).max));
+                            "the object's box is " + text_of(bounding_box(*capture.scene.object.surface).min) + " to " +
+                                text_of(bounding_box(*capture.scene.object.surface).max));
     bool holds_all = true;
-    for (int v = 0; holds_all && v < int(capture.surface->vertices.size()); ++v)
-      holds_all = contains_vertex(region, *capture.surface, v);
+    for (int v = 0; holds_all && v < int(capture.scene.object.surface->vertices.size()); ++v)
+      holds_all = contains_vertex(region, *capture.scene.object.surface, v);
     if (holds_all)
       context.toml.complain(item("fixed", i), "the whole object lies in this fixed region", "a part of it",
                             "nothing could move");
@@ -204,15 +194,15 @@ void check_fixed_regions(RuleContext& context) {
 void check_material_regions(RuleContext& context) {
   const Capture& capture = context.capture;
   std::set<std::string> names;
-  for (std::size_t i = 0; i < capture.regions.size(); ++i) {
-    const MaterialRegion& part = capture.regions[i];
+  for (std::size_t i = 0; i < capture.scene.regions.size(); ++i) {
+    const MaterialRegion& part = capture.scene.regions[i];
     if (!context.toml.is_sound(item("region", i))) continue;
     if (!names.insert(part.name).second)
       context.toml.complain(item("region", i, "name"), "a second region \"" + part.name + "\"", "different names");
     if (part.name.find('@') != std::string::npos)
       context.toml.complain(item("region", i, "name"), "the name \"" + part.name + "\"", "a name without @",
                             "parameters are listed as name@region");
-    if (capture.surface && !touches_solid(part.region, *capture.surface))
+    if (capture.scene.object.surface && !touches_solid(part.region, *capture.scene.object.surface))
       context.toml.complain(item("region", i), "no point of the object lies in region \"" + part.name + "\"",
                             "a region that holds a part of it", "check its unit and the side of its normal");
   }
@@ -221,13 +211,13 @@ void check_material_regions(RuleContext& context) {
 void check_planes(RuleContext& context) {
   const Capture& capture = context.capture;
   // A released or static object is not in its rest pose when it is seen.
-  if (!capture.surface || capture.initial.released || capture.is_static) return;
-  const double size = size_of(*capture.surface);
-  for (std::size_t i = 0; i < capture.planes.size(); ++i) {
-    const Plane& plane = capture.planes[i];
+  if (!capture.scene.object.surface || capture.scene.initial.released || capture.scene.timing.is_static) return;
+  const double size = size_of(*capture.scene.object.surface);
+  for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
+    const Plane& plane = capture.scene.planes[i];
     if (!context.toml.is_sound(item("plane", i))) continue;
     double deepest = 1e300, highest = -1e300;
-    for (const Vector3& vertex : capture.surface->vertices) {
+    for (const Vector3& vertex : capture.scene.object.surface->vertices) {
       const double height = plane.normal.dot(vertex - plane.point);
       deepest = std::min(deepest, height);
       highest = std::max(highest, height);
@@ -311,7 +301,8 @@ void check_presses(RuleContext& context) {
     if (const double force = press.force.norm(); force == 0 || force > greatest_force)
       context.toml.complain(item("press", i, "force"), "a force of " + text_of(force, "N"),
                             "above 0 and at most 100000 N", "forces are in newtons");
-    const double limit = context.capture.surface ? size_of(*context.capture.surface) : largest_object;
+    const double limit =
+        context.capture.scene.object.surface ? size_of(*context.capture.scene.object.surface) : largest_object;
     if (press.contact_radius <= 0 || press.contact_radius > limit)
       context.toml.complain(item("press", i, "contact"), "a contact radius of " + text_of(press.contact_radius, "m"),
                             "above 0 and smaller than the object", "radii are in metres");
@@ -320,28 +311,28 @@ void check_presses(RuleContext& context) {
 }
 
 void complain_of_mass(RuleContext& context, const std::string& key, double mass) {
-  const double limit = greatest_load * context.capture.total_mass().value_or(largest_object);
+  const double limit = greatest_load * context.capture.scene.object.total_mass().value_or(largest_object);
   if (mass <= 0 || mass > limit)
     context.toml.complain(key, "a hung mass of " + text_of(mass, "kg"), "above 0 and at most " + text_of(limit, "kg"),
                           "masses are in kilograms");
 }
 
 void check_weights(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.weights.size(); ++i) {
+  for (std::size_t i = 0; i < context.capture.scene.weights.size(); ++i) {
     if (!context.toml.is_sound(item("weight", i))) continue;
-    complain_of_mass(context, item("weight", i, "mass"), context.capture.weights[i].mass);
-    complain_off_surface(context, item("weight", i, "at"), context.capture.weights[i].at);
+    complain_of_mass(context, item("weight", i, "mass"), context.capture.scene.weights[i].mass);
+    complain_off_surface(context, item("weight", i, "at"), context.capture.scene.weights[i].at);
   }
 }
 
 void check_release(RuleContext& context) {
   const Capture& capture = context.capture;
-  const auto& weight = capture.initial.release_of;
+  const auto& weight = capture.scene.initial.release_of;
   if (!weight || !context.toml.is_sound("initial")) return;
-  if (!capture.initial.released)
+  if (!capture.scene.initial.released)
     context.toml.complain("initial.release_of", "`release_of` without `released`", "released = true",
                           "a weight that hangs in every frame is a block [[weight]]");
-  if (capture.gravity && capture.gravity->norm() == 0)
+  if (capture.scene.world.gravity && capture.scene.world.gravity->norm() == 0)
     context.toml.complain("initial.release_of", "a hung weight without gravity", "a gravity that pulls at it",
                           "remove `release_of`");
   complain_of_mass(context, "initial.release_of.mass", weight->mass);

@@ -98,12 +98,12 @@ void check_sequence(RuleContext& context, std::size_t i, const char* name, const
 
 // Whether there are frames, and `start_frame` is one of them.
 bool has_start(const RuleContext& context) {
-  return !context.capture.times.empty() && context.toml.is_sound("timing.start_frame");
+  return !context.capture.scene.timing.times.empty() && context.toml.is_sound("timing.start_frame");
 }
 
 // The first frame of a sequence that shows the object free.
 int first_free_frame(const Capture& capture, int every) {
-  const int frame = (capture.start_frame + every - 1) / every * every;
+  const int frame = (capture.scene.timing.start_frame + every - 1) / every * every;
   return frame < capture.frame_count() ? frame : (capture.frame_count() - 1) / every * every;
 }
 
@@ -114,14 +114,14 @@ struct Sphere {
 
 // Where the object may be: around its place at rest, and on the way of a fall. Generous on purpose.
 std::vector<Sphere> possible_places(const Capture& capture) {
-  const Box box = bounding_box(*capture.surface);
+  const Box box = bounding_box(*capture.scene.object.surface);
   const double own = 0.5 * box.extent().norm();
-  const double radius = (capture.is_static || capture.initial.released ? 3.0 : 1.5) * own;
+  const double radius = (capture.scene.timing.is_static || capture.scene.initial.released ? 3.0 : 1.5) * own;
   std::vector<Sphere> places{{0.5 * (box.min + box.max), radius}};
-  const bool may_fall = capture.fixed.empty() && !capture.is_static;
+  const bool may_fall = capture.scene.fixed.empty() && !capture.scene.timing.is_static;
   for (double fallen = own; may_fall && fallen < 2.0; fallen += own)
-    places.push_back({places[0].centre - fallen * capture.up, radius});
-  for (const FixedRegion& fixed : capture.fixed)
+    places.push_back({places[0].centre - fallen * capture.scene.world.up, radius});
+  for (const FixedRegion& fixed : capture.scene.fixed)
     if (fixed.displaced_to) places.push_back({(*fixed.displaced_to)(places[0].centre), radius});
   return places;
 }
@@ -192,8 +192,8 @@ void add_problems(RuleContext& context, const std::string& key, const InputError
 }
 
 void check_markers_on_object(RuleContext& context, const std::string& key, const MarkerSet& markers) {
-  if (!context.capture.surface) return;
-  const Box box = bounding_box(*context.capture.surface);
+  if (!context.capture.scene.object.surface) return;
+  const Box box = bounding_box(*context.capture.scene.object.surface);
   const double margin = 0.1 * box.extent().maxCoeff();
   for (Eigen::Index i = 0; i < markers.rest.rows(); ++i) {
     const Vector3 p = markers.rest.row(i);
@@ -206,8 +206,8 @@ void check_markers_on_object(RuleContext& context, const std::string& key, const
 
 // Followed markers in another unit than those at rest: far beyond where the object can have got.
 void check_marker_unit(RuleContext& context, const std::string& key, const MarkerSet& markers) {
-  if (!context.capture.surface) return;
-  const double size = bounding_box(*context.capture.surface).extent().maxCoeff();
+  if (!context.capture.scene.object.surface) return;
+  const double size = bounding_box(*context.capture.scene.object.surface).extent().maxCoeff();
   std::vector<double> ways;
   for (const Points& frame : markers.frames)
     for (Eigen::Index i = 0; i < frame.rows(); ++i)
@@ -222,7 +222,7 @@ void check_marker_unit(RuleContext& context, const std::string& key, const Marke
 
 // The capture's facts and those of the track's file must be one recording.
 void check_marker_rate(RuleContext& context, const std::string& key, const fs::path& track, const MarkerSet& markers) {
-  const std::vector<double>& times = context.capture.times;
+  const std::vector<double>& times = context.capture.scene.timing.times;
   if (!markers.frame_rate || times.size() < 2 || !context.toml.is_sound("timing")) return;
   const double rate = double(times.size() - 1) / (times.back() - times.front());
   if (std::abs(*markers.frame_rate / rate - 1.0) <= rate_tolerance) return;
@@ -298,7 +298,7 @@ void check_clouds(RuleContext& context) {
 }
 
 void check_markers(RuleContext& context) {
-  if (context.capture.times.empty()) return;
+  if (context.capture.scene.timing.times.empty()) return;
   for (std::size_t i = 0; i < context.capture.markers.size(); ++i) {
     if (!context.toml.is_sound(item("markers", i))) continue;
     const MarkerTrack& files = context.capture.markers[i];
@@ -365,7 +365,7 @@ void check_depth_scale(RuleContext& context) {
 
 void check_cameras_see_object(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.surface || !has_start(context)) return;
+  if (!capture.scene.object.surface || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
   for (std::size_t i = 0; i < capture.depth.size(); ++i) {
     const DepthCamera& camera = capture.depth[i];
@@ -398,7 +398,7 @@ void check_cameras_see_object(RuleContext& context) {
 
 void check_clouds_near_object(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.surface || !has_start(context)) return;
+  if (!capture.scene.object.surface || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
   for (std::size_t i = 0; i < capture.clouds.size(); ++i) {
     const CloudSequence& cloud = capture.clouds[i];

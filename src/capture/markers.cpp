@@ -12,10 +12,10 @@
 #include <stdexcept>
 #include <unordered_map>
 
+#include "base/csv.hpp"
 #include "base/files.hpp"
 #include "capture/c3d.hpp"
-#include "capture/csv.hpp"
-#include "capture/toml_table.hpp"
+#include "scene/toml_table.hpp"
 
 namespace pliant {
 

@@ -49,7 +49,8 @@ void append_camera(ObservedFrame& frame, const Capture& capture, const PixelSort
 /// Points of a cloud that may be the object's.
 std::vector<Vector3> reachable_points(const Capture& capture, const std::filesystem::path& path,
                                       const ObserveOptions& options) {
-  const double size = capture.surface ? bounding_box(*capture.surface).extent().maxCoeff() : 0.0;
+  const double size =
+      capture.scene.object.surface ? bounding_box(*capture.scene.object.surface).extent().maxCoeff() : 0.0;
   const auto reachable = reachable_box(capture, options.band > 0 ? options.band : size);
   std::vector<Vector3> points = read_points(path);
   std::erase_if(points, [&](const Vector3& point) {

@@ -36,12 +36,13 @@ void extend(Box& box, const Box& other) {
 }  // namespace
 
 std::optional<Box> reachable_box(const Capture& capture, double margin) {
-  if (!capture.surface) return std::nullopt;
-  const Box rest = bounding_box(*capture.surface);
+  if (!capture.scene.object.surface) return std::nullopt;
+  const Box rest = bounding_box(*capture.scene.object.surface);
   Box box = rest;
-  for (const FixedRegion& fixed : capture.fixed)
+  for (const FixedRegion& fixed : capture.scene.fixed)
     if (fixed.displaced_to) extend(box, moved(rest, *fixed.displaced_to));
-  if (capture.fixed.empty() && !capture.is_static) extend(box, moved(rest, {Matrix3::Identity(), -fall * capture.up}));
+  if (capture.scene.fixed.empty() && !capture.scene.timing.is_static)
+    extend(box, moved(rest, {Matrix3::Identity(), -fall * capture.scene.world.up}));
   box.min.array() -= margin;
   box.max.array() += margin;
   return box;
@@ -53,11 +54,11 @@ PixelSorter::PixelSorter(const Capture& capture, const DepthCamera& camera, cons
       plane_margin_(options.plane_margin),
       edge_jump_(options.edge_jump),
       background_(read_background(camera)) {
-  if (capture.surface) {
-    const double size = bounding_box(*capture.surface).extent().maxCoeff();
+  if (capture.scene.object.surface) {
+    const double size = bounding_box(*capture.scene.object.surface).extent().maxCoeff();
     band_ = reachable_box(capture, options.band > 0 ? options.band : size);
   }
-  for (const Plane& plane : capture.planes) {
+  for (const Plane& plane : capture.scene.planes) {
     if (plane.known)
       planes_.push_back(plane);
     else if (const auto found = find_plane(capture, plane))
@@ -75,7 +76,8 @@ void PixelSorter::find_undeclared_planes(const Capture& capture, const DepthCame
   for (std::size_t p = 0; p < scene.planes.size(); ++p) {
     const auto on_plane =
         points_of(depth, camera_, noise_, [&](int i) { return scene.label.pixels[std::size_t(i)] == -2 - int(p); });
-    const auto own_box = capture.surface ? std::optional(bounding_box(*capture.surface)) : std::nullopt;
+    const auto own_box =
+        capture.scene.object.surface ? std::optional(bounding_box(*capture.scene.object.surface)) : std::nullopt;
     const auto inside = std::ranges::count_if(
         on_plane.points, [&](const Vector3& point) { return own_box && is_inside(*own_box, point); });
     if (double(inside) < 0.3 * double(on_plane.points.size()))

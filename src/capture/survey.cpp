@@ -77,7 +77,7 @@ std::vector<double> shifts(const Capture& capture, std::span<const ObservedFrame
   std::vector<double> result(frames.size(), 0.0);
   std::optional<Vector3> start;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (frames[i].frame < capture.start_frame || frames[i].points.empty()) continue;
+    if (frames[i].frame < capture.scene.timing.start_frame || frames[i].points.empty()) continue;
     const Vector3 now = centroid_of(frames[i].points);
     if (!start) start = now;
     result[i] = direction.dot(now - *start);
@@ -96,16 +96,17 @@ double clearance(const TriangleMesh& surface, const Plane& plane) {
 // come nearer to the plane by the clearance at the start.
 std::optional<int> first_contact(const Capture& capture, std::span<const ObservedFrame> frames, double noise,
                                  const std::vector<PlaneSurvey>& seen) {
-  if (!capture.surface || capture.is_static) return std::nullopt;
-  const double gap = plane_reach * noise + contact_gap * bounding_box(*capture.surface).extent().maxCoeff();
+  if (!capture.scene.object.surface || capture.scene.timing.is_static) return std::nullopt;
+  const double gap =
+      plane_reach * noise + contact_gap * bounding_box(*capture.scene.object.surface).extent().maxCoeff();
   std::optional<int> first;
-  for (std::size_t p = 0; p < capture.planes.size(); ++p) {
-    const bool is_found = !capture.planes[p].known && seen[p].seen;
-    const Plane plane = is_found ? Plane(*seen[p].seen) : capture.planes[p];
+  for (std::size_t p = 0; p < capture.scene.planes.size(); ++p) {
+    const bool is_found = !capture.scene.planes[p].known && seen[p].seen;
+    const Plane plane = is_found ? Plane(*seen[p].seen) : capture.scene.planes[p];
     const std::vector<double> shift = shifts(capture, frames, plane.normal);
-    const double start = capture.initial.released ? 1e300 : clearance(*capture.surface, plane);
+    const double start = capture.scene.initial.released ? 1e300 : clearance(*capture.scene.object.surface, plane);
     for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (frames[i].frame < capture.start_frame || frames[i].points.empty()) continue;
+      if (frames[i].frame < capture.scene.timing.start_frame || frames[i].points.empty()) continue;
       if (low_height(frames[i].points, plane) >= gap && start + shift[i] >= gap) continue;
       first = std::min(first.value_or(frames[i].frame), frames[i].frame);
       break;
@@ -116,22 +117,24 @@ std::optional<int> first_contact(const Capture& capture, std::span<const Observe
 
 // Share of the rest surface's vertices with a seen point near them.
 std::optional<double> seen_share(const Capture& capture, std::span<const ObservedFrame> frames, double noise) {
-  if (!capture.surface || capture.is_static || capture.initial.released) return std::nullopt;
-  const auto start = std::ranges::find_if(
-      frames, [&](const ObservedFrame& frame) { return frame.frame >= capture.start_frame && !frame.points.empty(); });
+  if (!capture.scene.object.surface || capture.scene.timing.is_static || capture.scene.initial.released)
+    return std::nullopt;
+  const auto start = std::ranges::find_if(frames, [&](const ObservedFrame& frame) {
+    return frame.frame >= capture.scene.timing.start_frame && !frame.points.empty();
+  });
   if (start == frames.end()) return std::nullopt;
-  const double reach = std::max(3.0 * noise, 0.02 * bounding_box(*capture.surface).extent().maxCoeff());
+  const double reach = std::max(3.0 * noise, 0.02 * bounding_box(*capture.scene.object.surface).extent().maxCoeff());
   const auto is_seen = [&](const Vector3& vertex) {
     return std::ranges::any_of(start->points,
                                [&](const Vector3& p) { return (p - vertex).squaredNorm() < reach * reach; });
   };
-  const auto& vertices = capture.surface->vertices;
+  const auto& vertices = capture.scene.object.surface->vertices;
   return double(std::ranges::count_if(vertices, is_seen)) / double(vertices.size());
 }
 
 std::vector<PlaneSurvey> survey_planes(const Capture& capture) {
   std::vector<PlaneSurvey> planes;
-  for (const Plane& declared : capture.planes) {
+  for (const Plane& declared : capture.scene.planes) {
     PlaneSurvey& plane = planes.emplace_back();
     plane.seen = find_plane(capture, declared);
     if (!plane.seen) continue;
@@ -143,7 +146,7 @@ std::vector<PlaneSurvey> survey_planes(const Capture& capture) {
 
 std::vector<Segmentation> survey_scenes(const Capture& capture) {
   std::vector<Segmentation> scenes;
-  if (capture.surface) return scenes;
+  if (capture.scene.object.surface) return scenes;
   for (const DepthCamera& camera : capture.depth)
     if (capture.frame_count() > 0)
       scenes.push_back(segment(read_depth(capture, camera, 0), camera.camera, DepthNoise(camera, 1.0)));
@@ -153,7 +156,7 @@ std::vector<Segmentation> survey_scenes(const Capture& capture) {
 std::vector<CloudScene> survey_clouds(const Capture& capture) {
   constexpr double least_share = 0.2;
   std::vector<CloudScene> scenes;
-  if (capture.surface || capture.frame_count() == 0) return scenes;
+  if (capture.scene.object.surface || capture.frame_count() == 0) return scenes;
   for (const CloudSequence& cloud : capture.clouds) {
     const auto points = read_points(capture.folder / cloud.points(0));
     CloudScene& scene = scenes.emplace_back();
@@ -256,11 +259,12 @@ bool touches(const MarkerSet& markers, int frame, const Plane& plane, double sta
 }
 
 std::optional<int> first_contact(const Capture& capture, const MarkerSet& markers, double noise) {
-  if (!capture.surface || capture.is_static) return std::nullopt;
-  const double gap = plane_reach * noise + contact_gap * bounding_box(*capture.surface).extent().maxCoeff();
-  for (int frame = capture.start_frame; frame < capture.frame_count(); ++frame)
-    for (const Plane& plane : capture.planes) {
-      const double start = capture.initial.released ? 1e300 : clearance(*capture.surface, plane);
+  if (!capture.scene.object.surface || capture.scene.timing.is_static) return std::nullopt;
+  const double gap =
+      plane_reach * noise + contact_gap * bounding_box(*capture.scene.object.surface).extent().maxCoeff();
+  for (int frame = capture.scene.timing.start_frame; frame < capture.frame_count(); ++frame)
+    for (const Plane& plane : capture.scene.planes) {
+      const double start = capture.scene.initial.released ? 1e300 : clearance(*capture.scene.object.surface, plane);
       if (touches(markers, frame, plane, start, gap)) return frame;
     }
   return std::nullopt;
@@ -271,7 +275,7 @@ void add_markers(const Capture& capture, Survey& result) {
     const MarkerSet markers = read_markers(files, capture.frame_count());
     const MarkerSurvey own = survey_markers(markers);
     const double noise = own.noise.value_or(0.0);
-    result.moves = result.moves || (!capture.is_static && own.travel > moving_markers * noise);
+    result.moves = result.moves || (!capture.scene.timing.is_static && own.travel > moving_markers * noise);
     if (const auto contact = first_contact(capture, markers, noise))
       result.first_contact = std::min(result.first_contact.value_or(*contact), *contact);
     result.markers.push_back(own);
@@ -293,10 +297,11 @@ bool has_forces_to_fit(const Capture& capture) {
 void add_scale(const Capture& capture, Prospects& result) {
   if (has_forces_to_fit(capture))
     result.possible.push_back("Pascals are anchored by measured forces: `[[press]]` or `[[load]]`.");
-  else if (capture.initial.release_of)
+  else if (capture.scene.initial.release_of)
     result.possible.push_back("Pascals are anchored by the weight from which the object is released.");
-  else if (capture.mass || capture.density)
-    result.possible.push_back(std::string("Pascals are anchored by the ") + (capture.mass ? "mass." : "density."));
+  else if (capture.scene.object.mass || capture.scene.object.density)
+    result.possible.push_back(std::string("Pascals are anchored by the ") +
+                              (capture.scene.object.mass ? "mass." : "density."));
   else
     result.impossible.push_back(
         "Nothing anchors pascals: neither mass, density nor a force is known. Only the ratio of stiffness to density "
@@ -305,17 +310,17 @@ void add_scale(const Capture& capture, Prospects& result) {
 }
 
 void add_stiffness(const Capture& capture, const Survey& seen, Prospects& result) {
-  const bool is_held = !capture.fixed.empty(), touches = seen.first_contact.has_value();
+  const bool is_held = !capture.scene.fixed.empty(), touches = seen.first_contact.has_value();
   const bool has_forces = has_forces_to_fit(capture);
   if (has_forces)
     result.possible.push_back("Stiffness, and Poisson's ratio to some degree: from shapes under known forces.");
-  if (capture.times.empty()) return;
-  if (capture.is_static) {
+  if (capture.scene.timing.times.empty()) return;
+  if (capture.scene.timing.is_static) {
     result.possible.push_back(is_held ? "Stiffness: from how far the held object sags under gravity."
                                       : "Stiffness, if what carries the object is given: it rests under gravity.");
   } else if (!seen.moves) {
     result.impossible.push_back("The object does not move: neither stiffness nor damping shows in its motion.");
-  } else if (is_held || capture.initial.released || touches) {
+  } else if (is_held || capture.scene.initial.released || touches) {
     result.possible.push_back(std::string("Stiffness: from ") +
                               (touches ? "the impact and the motion after it." : "the swinging of the held object."));
   } else if (!has_forces) {
@@ -326,28 +331,29 @@ void add_stiffness(const Capture& capture, const Survey& seen, Prospects& result
 }
 
 void add_damping(const Capture& capture, const Survey& seen, Prospects& result) {
-  if (capture.times.empty())
+  if (capture.scene.timing.times.empty())
     result.impossible.push_back("Damping does not show: under presses and loads the object is at rest.");
-  else if (capture.is_static)
+  else if (capture.scene.timing.is_static)
     result.impossible.push_back("Damping does not show: the object is at rest in every frame (`static = true`).");
-  else if (seen.moves && (!capture.fixed.empty() || capture.initial.released || seen.first_contact))
+  else if (seen.moves && (!capture.scene.fixed.empty() || capture.scene.initial.released || seen.first_contact))
     result.possible.push_back("Damping: from how the motion dies out.");
 }
 
 void add_surroundings(const Capture& capture, const Survey& seen, Prospects& result) {
-  if (!capture.gravity) result.possible.push_back("Gravity is unknown and has to be estimated from the motion.");
-  if (!capture.initial.known)
+  if (!capture.scene.world.gravity)
+    result.possible.push_back("Gravity is unknown and has to be estimated from the motion.");
+  if (!capture.scene.initial.known)
     result.possible.push_back("The velocity at the start has to be estimated from the first frames.");
-  if (capture.shape_is == ShapeIs::Static)
+  if (capture.scene.object.shape_is == ShapeIs::Static)
     result.possible.push_back("The load-free shape is unknown (`shape_is = \"static\"`) and has to be estimated too.");
-  for (std::size_t i = 0; i < capture.regions.size(); ++i)
-    result.possible.push_back("Region \"" + capture.regions[i].name + "\" can have a stiffness of its own.");
-  for (std::size_t i = 0; i < capture.planes.size(); ++i) {
+  for (std::size_t i = 0; i < capture.scene.regions.size(); ++i)
+    result.possible.push_back("Region \"" + capture.scene.regions[i].name + "\" can have a stiffness of its own.");
+  for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
     const std::string name = "Plane " + std::to_string(i + 1);
-    if (seen.planes[i].seen && !capture.planes[i].known)
+    if (seen.planes[i].seen && !capture.scene.planes[i].known)
       result.possible.push_back(name + " is only roughly known; the cameras see it (" +
                                 millimetres(seen.planes[i].seen->rms) + " rms), and its place is taken from there.");
-    else if (!capture.planes[i].known)
+    else if (!capture.scene.planes[i].known)
       result.possible.push_back(
           name + " is only roughly known and no camera sees it: it has to be estimated from the impact.");
   }
@@ -360,7 +366,7 @@ Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
   result.points = count_points(frames);
   result.median_noise = median_noise(frames);
   result.travel = greatest_travel(frames);
-  result.moves = !capture.is_static && result.travel > moving * result.median_noise;
+  result.moves = !capture.scene.timing.is_static && result.travel > moving * result.median_noise;
   result.planes = survey_planes(capture);
   result.first_contact = first_contact(capture, frames, result.median_noise, result.planes);
   result.seen_share = seen_share(capture, frames, result.median_noise);
@@ -372,7 +378,7 @@ Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
 
 Prospects prospects(const Capture& capture, const Survey& seen) {
   Prospects result;
-  if (!capture.surface) {
+  if (!capture.scene.object.surface) {
     result.impossible.push_back(
         "Nothing can be fitted: there is no scan of the object at rest. Scan it all around and write `[object] "
         "surface`.");

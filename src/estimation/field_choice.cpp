@@ -134,7 +134,7 @@ class FieldChoice {
   JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }
 
   ModulusField field_of(const Body& body, int count) const {
-    return control_field(body, recordings_.front().capture, {count, options_.control_weights}).field;
+    return control_field(body, recordings_.front().capture.scene, {count, options_.control_weights}).field;
   }
 
   void judge(int count, const FitOutcome& outcome) {
@@ -258,7 +258,7 @@ MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusFi
 
 FitOutcome fit_with_chosen_field(const std::vector<RecordedCapture>& recordings, const FitOptions& options,
                                  const FitMonitor& monitor, FitState resume) {
-  if (!recordings.front().capture.regions.empty())
+  if (!recordings.front().capture.scene.regions.empty())
     return fit(recordings, with_controls(options, 1), monitor, std::move(resume));
   return FieldChoice(recordings, options, monitor, std::move(resume)).run();
 }

@@ -8,7 +8,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "capture/toml_table.hpp"
+#include "scene/toml_table.hpp"
 
 namespace pliant {
 
@@ -364,10 +364,11 @@ void read_fit_options(const std::filesystem::path& path, FitOptions& options) {
 }
 
 std::vector<std::string> unused_choices(const FitOptions& options, bool has_motion, bool has_presses) {
-  static const std::set<std::string> of_laws = {"material", "law_terms", "law_zones", "basis_tolerance", "basis_samples"};
-  static const std::set<std::string> of_presses = {"cells",    "element",        "control_points", "modulus_variation",
-                                                   "material", "max_iterations", "marker_noise",   "law_terms",
-                                                   "law_zones", "basis_tolerance", "basis_samples"};
+  static const std::set<std::string> of_laws = {"material", "law_terms", "law_zones", "basis_tolerance",
+                                                "basis_samples"};
+  static const std::set<std::string> of_presses = {
+      "cells",        "element",   "control_points", "modulus_variation", "material",     "max_iterations",
+      "marker_noise", "law_terms", "law_zones",      "basis_tolerance",   "basis_samples"};
   std::vector<std::string> notes;
   const FitOptions standard;
   for (const Entry& e : entries()) {

@@ -157,7 +157,7 @@ class StartFinder {
   bool find_swing() {
     for (std::size_t i = 0; i < run_.recordings.all().size(); ++i) {
       const Recording& r = run_.recordings.all()[i];
-      if (r.capture.is_static || r.capture.fixed.empty()) continue;
+      if (r.capture.scene.timing.is_static || r.capture.scene.fixed.empty()) continue;
       const Discretisation& d = run_.coarse.recording[i];
       const std::vector<int> held = held_nodes(*d.body, d.simulation.holds);
       if (held.size() < 3) continue;
@@ -167,9 +167,10 @@ class StartFinder {
       };
       if (!r.tracked.rest.empty()) {
         ModalStartOptions o;
-        o.first_frame = r.capture.start_frame;
+        o.first_frame = r.capture.scene.timing.start_frame;
         o.curve_samples = 0;
-        const ModalStart start = modal_start(d.body, r.blocks.motion, theta, held, r.tracked, r.capture.times, o);
+        const ModalStart start =
+            modal_start(d.body, r.blocks.motion, theta, held, r.tracked, r.capture.scene.timing.times, o);
         if (!start.found) continue;
         take_dampings(start);
         relative_moduli_ = start.moduli / start.moduli[0];
@@ -231,7 +232,8 @@ class StartFinder {
             [&](const Recording& r) { return run_.swings() ? r.horizon(growing_horizon().front()) : r.last_frame; });
         const CostEvaluation e = objective.evaluate(VectorX(0));
         if (e.succeeded) run_.state.scan[std::size_t(i)].second = e.cost;
-        run_.emit({StageKind::Scan, "scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
+        run_.emit({StageKind::Scan, "scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial,
+                   0.05 + 0.1 * double(++done) / count});
       };
       if (run_.recordings.all_static())
         scan_downwards(count, try_value);
@@ -310,8 +312,8 @@ class StartFinder {
       const double from = 0.15 + 0.3 * (part < 1.0 ? 0.0 : 0.4);
       Objective objective = run_.recordings.objective(run_.coarse, parameters, run_.options.wide_band,
                                                       [&](const Recording& r) { return r.horizon(part); });
-      const OptimiserSummary s = run_.optimise(objective, FitRun::start_of(parameters), StageKind::Coarse, "coarse", index, last ? 10 : 5,
-                                               counter, from, from + 0.15);
+      const OptimiserSummary s = run_.optimise(objective, FitRun::start_of(parameters), StageKind::Coarse, "coarse",
+                                               index, last ? 10 : 5, counter, from, from + 0.15);
       start.iterations += s.iterations;
       start.converged = s.converged;
       start.reason = s.reason;

@@ -10,7 +10,7 @@ namespace pliant {
 namespace {
 
 FitOptions for_following(const Capture& capture, FitOptions options) {
-  if (!options.element && capture.shape_is == ShapeIs::Static) options.element = ElementKind::Tetrahedron;
+  if (!options.element && capture.scene.object.shape_is == ShapeIs::Static) options.element = ElementKind::Tetrahedron;
   options.control_points = options.controls();
   return options;
 }
@@ -32,7 +32,8 @@ void FollowedRecording::stiffen() {
   const Discretisation& d = grid_.recording.front();
   const LinearStatics statics(d.body, held_nodes(*d.body, d.simulation.holds), d.simulation.blocks, start_);
   if (!statics.is_held()) return;
-  const double sag = statics.greatest_displacement(scan_load(*d.body, d.simulation.blocks, start_, d.simulation.weights));
+  const double sag =
+      statics.greatest_displacement(scan_load(*d.body, d.simulation.blocks, start_, d.simulation.weights));
   const double factor = std::max(1.0, sag / (sag_of_size * recording().size));
   d.simulation.blocks.scale_moduli(start_, factor);
 }

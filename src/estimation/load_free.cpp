@@ -30,10 +30,11 @@ RolloutSummary sag_from_load_free(const Body& free, SimulationOptions options, c
 
 Capture at_rest(const Capture& capture) {
   Capture still = capture;
-  still.is_static = true;
-  still.initial = {};
-  still.times = {0.0};
-  still.start_frame = 0;
+  still.scene.timing.is_static = true;
+  still.scene.initial = {};
+  still.scene.timing.frame_rate = 0.0;
+  still.scene.timing.times = {0.0};
+  still.scene.timing.start_frame = 0;
   still.depth.clear(), still.clouds.clear(), still.markers.clear();
   return still;
 }
@@ -52,7 +53,8 @@ double carrying_modulus(const std::shared_ptr<const Body>& body, const Simulatio
   const LinearStatics statics(body, held, scene.blocks, theta);
   if (statics.is_held()) scale(statics.greatest_displacement(load) / (sag_of_size * body->size()));
   for (int i = 0; i < most_doublings; ++i, scale(2.0)) {
-    if ((interrupted && interrupted()) || shape.find(theta, load).found) return theta[scene.blocks.youngs_moduli.front()];
+    if ((interrupted && interrupted()) || shape.find(theta, load).found)
+      return theta[scene.blocks.youngs_moduli.front()];
   }
   throw InputError({{},
                     "no material holds up the scan of the sagging object",
@@ -67,7 +69,7 @@ LoadFree find_load_free(const Capture& capture, const Resolution& resolution, co
                       "hexahedra have no shape free of load but their grid",
                       "tetrahedra",
                       "use element=quadratic_tetrahedra or element=tetrahedra"});
-  if (capture.fixed.empty())
+  if (capture.scene.fixed.empty())
     throw InputError(
         {{capture.file}, "nothing holds the object while it sags", "a [[fixed]] region", "name what holds it"});
   const Capture still = at_rest(capture);
@@ -81,8 +83,8 @@ LoadFree find_load_free(const Capture& capture, const Resolution& resolution, co
   const auto free = std::make_shared<Body>(with_reference(body, found.shape.X));
   found.scene = discretise(still, distance, free, resolution, blocks, theta);
   found.scene.control_points = scanned.control_points;
-  found.surface = *still.surface;
-  const Points vertices = Embedding(*free, still.surface->vertices).positions(found.shape.X);
+  found.surface = *still.scene.object.surface;
+  const Points vertices = Embedding(*free, still.scene.object.surface->vertices).positions(found.shape.X);
   for (Eigen::Index v = 0; v < vertices.rows(); ++v)
     found.surface.vertices[std::size_t(v)] = vertices.row(v).transpose();
   found.sag = (scan - found.shape.X).rowwise().norm().maxCoeff();

@@ -15,12 +15,12 @@ std::string spoken(std::string name) {
 }
 
 void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
-  if (capture.mass || capture.density) return;
+  if (capture.scene.object.mass || capture.scene.object.density) return;
   const bool hangs = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
   if (hangs)
     outcome.notes.push_back(
         "Neither mass nor density is known: both pascals and the density follow from the weights of [[load]].");
-  else if (capture.initial.release_of)
+  else if (capture.scene.initial.release_of)
     outcome.notes.push_back(
         "Neither mass nor density is known: both pascals and the density follow from the weight that was released.");
   else

@@ -76,7 +76,7 @@ class PressFit {
       : capture_(capture), options_(options), monitor_(monitor), state_(std::move(state)) {
     if (const std::string wrong = options.validate(); !wrong.empty())
       throw InputError({{capture.file}, wrong, "", "see `pliant fit --help`"});
-    if (!capture.surface)
+    if (!capture.scene.object.surface)
       throw InputError({{capture.file},
                         "there is no scan of the object at rest ([object] surface)",
                         "a closed triangle mesh",
@@ -85,7 +85,7 @@ class PressFit {
     resolution.cells = options.cells;
     resolution.element = options.quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
     std::vector<Vector3> control_points;
-    const auto body = make_body_of(capture, SignedDistance(), resolution, control_points);
+    const auto body = make_body_of(capture.scene, SignedDistance(), resolution, control_points);
     scene_ = std::make_shared<PressScene>(make_press_scene(capture, body));
     for (int i = 0; i < int(scene_->presses.size()); ++i)
       if (scene_->presses[std::size_t(i)].role == "fit") fitted_.push_back(i);
@@ -285,7 +285,8 @@ class PressFit {
       const auto more = double(next->parameters.dimension() - best_->parameters.dimension());
       tried.evidence =
           0.5 * n * std::log(squares_of(best_->evaluation) / squares_of(next->evaluation)) - 0.5 * more * std::log(n);
-      tried.kept = (options_.terms > 0 && layout.form().terms > best_->layout.form().terms) || tried.evidence > needed_evidence;
+      tried.kept =
+          (options_.terms > 0 && layout.form().terms > best_->layout.form().terms) || tried.evidence > needed_evidence;
     }
     conclude(std::move(next), tried, noise, form.cuts);
     return tried.kept && !interrupted_;

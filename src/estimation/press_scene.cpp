@@ -73,16 +73,17 @@ std::vector<Vector3> without_probe(const ObservedPress& seen) {
 
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body) {
   PressScene scene;
-  scene.held = held_nodes(*body, held_regions(capture));
+  scene.held = held_nodes(*body, held_regions(capture.scene));
   if (scene.held.size() < 3)
     throw InputError({{capture.file},
                       "nothing holds the object while it is pressed",
                       "a block [[fixed]] that holds nodes of the mesh",
                       "say where the object stands or is clamped"});
   const double volume = body->volume();
-  scene.density = capture.mass ? *capture.mass / volume : capture.density.value_or(0.0);
-  scene.unit_weight = weight_of(*body, 1.0, capture.gravity.value_or(Vector3::Zero()));
-  scene.noise = 1e-3 * object_size(capture);
+  scene.density =
+      capture.scene.object.mass ? *capture.scene.object.mass / volume : capture.scene.object.density.value_or(0.0);
+  scene.unit_weight = weight_of(*body, 1.0, capture.scene.world.gravity.value_or(Vector3::Zero()));
+  scene.noise = 1e-3 * object_size(capture.scene);
   scene.body = std::move(body);
   for (std::size_t i = 0; i < capture.presses.size(); ++i) scene.presses.push_back(observe_press(capture, i));
   scene.facts = capture.presses;

@@ -6,29 +6,10 @@
 
 #include "capture/capture.hpp"
 #include "capture/observe.hpp"
-#include "elasticity/modulus_field.hpp"
 #include "estimation/objective.hpp"
+#include "simulation/scene_simulation.hpp"
 
 namespace pliant {
-
-/// How Young's modulus varies over the object where the capture names no regions.
-struct FieldOptions {
-  enum class Weights { Linear, Harmonic, InverseDistance };
-  int control_points = 1;             ///< >= 1; 1: homogeneous
-  Weights weights = Weights::Linear;  ///< linear ones stand along the object's longest axis, the others spread over it
-};
-
-/// How finely the body and its motion are resolved, and by what elements.
-struct Resolution {
-  ElementKind element = ElementKind::Hexahedron;
-  FieldOptions field;
-  double cells = 12.0;      ///< elements along the object's longest axis
-  double steps = 1.0;       ///< time steps per default step: 2 halves the step
-  int pulls = 4;            ///< that hold a released object until it is let go
-  int shape_points = 0;     ///< about which the scan may err; 0: it is exact. Tetrahedra only
-  double shape_std = 0.01;  ///< by how much, times the object's longest axis
-  double band = 0.15;       ///< of the mismatch, times the object's longest axis
-};
 
 /// A recording made ready for simulation at one resolution.
 struct Discretisation {
@@ -39,25 +20,15 @@ struct Discretisation {
   SimulationOptions simulation;
 };
 
-/// The field of a body where the capture names no regions.
-ControlledField control_field(const Body& body, const Capture& capture, const FieldOptions& options);
-
-/// Longest edge of the surface's box [m].
-double object_size(const Capture& capture);
-
 /// Signed distance of the capture's surface, fine enough for every resolution.
 /// Throws InputError where the capture has no surface.
 std::shared_ptr<const SignedDistance> capture_distance(const Capture& capture, double band);
 
-/// The object's elements at one resolution; `control_points` are those of its field of moduli, if any.
-/// @param distance  of the capture's surface; only hexahedra ask for it
-std::shared_ptr<const Body> make_body_of(const Capture& capture, const SignedDistance& distance,
-                                         const Resolution& resolution, std::vector<Vector3>& control_points);
-
-/// The capture's held regions.
-std::vector<Hold> held_regions(const Capture& capture);
-/// Those of a model, say.
-std::vector<Hold> held_regions(const std::vector<FixedRegion>& fixed, const TriangleMesh& surface);
+/// What a capture's observations are compared with, around a body.
+/// @param tracked  points of the object that are followed [m], at rest
+Mismatch make_mismatch(const Capture& capture, const std::shared_ptr<const SignedDistance>& distance,
+                       const std::shared_ptr<const Body>& body, const Resolution& resolution,
+                       const std::vector<Vector3>& tracked = {});
 
 /// Where the parameters of a capture stand in a vector.
 struct CaptureBlocks {
@@ -97,9 +68,6 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
 
 /// What corrections of sensors apply to: each depth camera by its name, "clouds" and "markers".
 std::vector<std::string> sensor_names(const Capture& capture);
-
-/// The pulls of a capture's motion: none where it is not released, or from under a known weight.
-int pull_count(const Capture& capture, const Resolution& resolution);
 
 /// "youngs_modulus" alone; with regions followed by "youngs_modulus@name" of each; with control points
 /// "youngs_modulus@1", "youngs_modulus@2", ...

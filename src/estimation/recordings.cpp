@@ -21,22 +21,22 @@ void require_fittable(const Capture& capture) {
   const auto refuse = [&](const std::string& found, const std::string& advice) {
     throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
   };
-  if (!capture.surface) refuse("there is no scan of the object at rest", "add [object] surface");
+  if (!capture.scene.object.surface) refuse("there is no scan of the object at rest", "add [object] surface");
   if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty() && !has_fitted_loads(capture))
     refuse("there are no depth cameras, no clouds and no markers", "");
-  if (has_fitted_loads(capture) && capture.fixed.empty() && capture.planes.empty())
+  if (has_fitted_loads(capture) && capture.scene.fixed.empty() && capture.scene.planes.empty())
     refuse("weights hang from the object, but nothing holds it",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
-  if (capture.is_static && capture.fixed.empty() && capture.planes.empty())
+  if (capture.scene.timing.is_static && capture.scene.fixed.empty() && capture.scene.planes.empty())
     refuse("the recording is static, but nothing holds the object",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
-  if (capture.shape_is == ShapeIs::Static && capture.fixed.empty())
+  if (capture.scene.object.shape_is == ShapeIs::Static && capture.scene.fixed.empty())
     refuse("the scan was taken sagging (shape_is = \"static\"), and nothing holds the object",
            "add the [[fixed]] region that it hangs from");
-  if (capture.initial.released && capture.fixed.empty())
+  if (capture.scene.initial.released && capture.scene.fixed.empty())
     refuse("the object is released from a held, deformed pose, and nothing holds it afterwards",
            "add the [[fixed]] region where it stays held");
-  if (!capture.is_static && capture.frame_count() - capture.start_frame < 2)
+  if (!capture.scene.timing.is_static && capture.scene.timing.frame_count() - capture.scene.timing.start_frame < 2)
     refuse("fewer than two frames follow start_frame", "record longer");
 }
 
@@ -46,29 +46,29 @@ LoadCase load_case(const Capture& capture, const Load& load, int points) {
   std::vector<ObservedFrame> seen;
   if (load.markers) {
     const MarkerSet markers = read_marker_pair(*load.markers_rest, *load.markers);
-    const double noise = 1e-3 * object_size(capture);
+    const double noise = 1e-3 * object_size(capture.scene);
     const int sensor = int(sensor_names(capture).size());  // beyond those whose errors are estimated
     for (int m = 0; m < markers.marker_count(); ++m) {
       one.tracked.rest.push_back(markers.rest.row(m).transpose());
       if (markers.is_seen(0, m))
-        one.tracked.frames[capture.start_frame].push_back({m, markers.frames[0].row(m).transpose(), noise, sensor});
+        one.tracked.frames[capture.scene.timing.start_frame].push_back(
+            {m, markers.frames[0].row(m).transpose(), noise, sensor});
     }
   } else {
     ObserveOptions options;
     options.max_points_per_frame = points;
     seen.push_back(observe_load(capture, load, options).seen);
-    seen.back().frame = capture.start_frame;
+    seen.back().frame = capture.scene.timing.start_frame;
   }
-  one.observations =
-      std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, seen, one.tracked));
+  one.observations = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, seen, one.tracked));
   return one;
 }
 
 /// Puts planes that are only roughly known where the depth images show them. Returns the numbers of those found.
 std::vector<int> take_planes_from_images(Capture& capture) {
   std::vector<int> found;
-  for (int i = 0; i < int(capture.planes.size()); ++i) {
-    Plane& plane = capture.planes[std::size_t(i)];
+  for (int i = 0; i < int(capture.scene.planes.size()); ++i) {
+    Plane& plane = capture.scene.planes[std::size_t(i)];
     if (plane.known) continue;
     const auto seen = find_plane(capture, plane);
     if (!seen) continue;
@@ -92,8 +92,7 @@ void trust_planes_seen(CaptureParameters& parameters, const std::vector<int>& pl
 }
 
 bool is_shared(const ParameterBlock& block, bool shares_density) {
-  return block.role == Role::Material || block.role == Role::Damping ||
-         (block.role == Role::Inertia && shares_density);
+  return block.role == Role::Material || block.role == Role::Damping || (block.role == Role::Inertia && shares_density);
 }
 
 std::string suffix(std::size_t recording) { return recording == 0 ? "" : "[" + std::to_string(recording + 1) + "]"; }
@@ -112,7 +111,8 @@ ParameterSet joined(const std::vector<CaptureParameters>& recordings, const Join
   for (std::size_t r = recordings.size(); r-- > 0;) {  // the first one's values for what is shared
     const ParameterSet& own = recordings[r].set;
     for (std::size_t b = 0; b < own.layout().blocks().size(); ++b) {
-      const ParameterHandle from = own.layout().handle(b), to = joint.layout.at(joint.name_of(own.layout().blocks()[b].name, r));
+      const ParameterHandle from = own.layout().handle(b),
+                            to = joint.layout.at(joint.name_of(own.layout().blocks()[b].name, r));
       theta.segment(to.first, to.size) = own.reference().segment(from.first, from.size);
     }
   }
@@ -166,7 +166,7 @@ JointLayout joint_layout(const std::vector<RecordedCapture>& recordings, const F
   resolution.pulls = options.pull_points;
   for (const RecordedCapture& r : recordings)
     parameters.push_back(
-        default_parameters(r.capture, 1.0, controls, pull_count(r.capture, resolution), options.scan_points));
+        default_parameters(r.capture, 1.0, controls, pull_count(r.capture.scene, resolution), options.scan_points));
   return join(parameters, shares_density(parameters, options));
 }
 
@@ -178,7 +178,7 @@ VectorX with_moduli(const JointLayout& from, const VectorX& theta, const JointLa
 }
 
 int Recording::horizon(double part) const {
-  if (capture.is_static) return last_frame;
+  if (capture.scene.timing.is_static) return last_frame;
   const int least = is_released() ? std::min(last_frame, 10) : std::max(1, last_frame / 3);
   return std::max(least, int(part * last_frame));
 }
@@ -198,11 +198,13 @@ Recordings::Recordings(std::vector<RecordedCapture> recorded, const FitOptions& 
 }
 
 /// Everything of a recording that needs no parameters; returns those.
-CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes) {
+CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& recording,
+                                         std::vector<std::string>& notes) {
   recording.capture = std::move(recorded.capture);
   Capture& capture = recording.capture;
   require_fittable(capture);
-  if (capture.times.empty()) capture.times = {0.0}, capture.is_static = true;  // loads and presses alone
+  if (capture.scene.timing.times.empty())
+    capture.scene.timing.times = {0.0}, capture.scene.timing.is_static = true;  // loads and presses alone
   for (const Load& load : capture.loads)
     if (is_fitted(load.role)) recording.loads.push_back(load_case(capture, load, options_.points_per_frame));
   const std::vector<int> planes_seen = take_planes_from_images(capture);
@@ -217,21 +219,21 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                       "no frame shows any point of the object",
                       "depth images or clouds that see it",
                       "run `pliant check` on the capture to see what the cameras saw"});
-  const int controls = capture.regions.empty() ? options_.controls() : int(capture.regions.size()) + 1;
+  const int controls = capture.scene.regions.empty() ? options_.controls() : int(capture.scene.regions.size()) + 1;
   if (all_.size() > 1 && controls != controls_)
     throw InputError({{capture.file},
-                      "the object has " + std::to_string(capture.regions.size()) + " regions",
+                      "the object has " + std::to_string(capture.scene.regions.size()) + " regions",
                       "those of the first recording, " + std::to_string(controls_ - 1),
                       "name the same materials in every recording of the object"});
   controls_ = controls;
-  recording.size = object_size(capture);
+  recording.size = object_size(capture.scene);
   if (!recording.observations->empty())
-    recording.last_frame =
-        std::min(int(capture.times.size()) - capture.start_frame - 1, recording.observations->back().frame);
+    recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
+                                    recording.observations->back().frame);
   recording.distance = capture_distance(capture, widest_band());
   CaptureParameters parameters =
-      default_parameters(capture, enclosed_volume(*capture.surface), controls_,
-                         pull_count(capture, resolution(0.0, options_.steps)), options_.scan_points);
+      default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
+                         pull_count(capture.scene, resolution(0.0, options_.steps)), options_.scan_points);
   trust_planes_seen(parameters, planes_seen);
   return parameters;
 }
@@ -284,7 +286,7 @@ std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recor
     Resolution tetrahedra = resolution(cells, 1.0);
     tetrahedra.element = ElementKind::Tetrahedron;
     std::vector<Vector3> control_points;
-    body = make_body_of(capture, *recording.distance, tetrahedra, control_points);
+    body = make_body_of(capture.scene, *recording.distance, tetrahedra, control_points);
   }
   return std::make_shared<PressScene>(make_press_scene(capture, std::move(body)));
 }
@@ -304,8 +306,8 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
     o.outlier_scale = band * r.size;
     o.last_frame = std::min(r.last_frame, last_frame(r));
     options.push_back(o);
-    trials.push_back(std::make_unique<MotionTrial>(
-        ObservedMotion{d.mismatch, d.body, d.simulation, r.observations, o}, int(i)));
+    trials.push_back(
+        std::make_unique<MotionTrial>(ObservedMotion{d.mismatch, d.body, d.simulation, r.observations, o}, int(i)));
   }
   for (std::size_t i = 0; i < all_.size() && has_statics; ++i) {
     add_loads(all_[i], grid.recording[i], options[i], trials);
@@ -332,14 +334,12 @@ void Recordings::add_loads(const Recording& recording, const Discretisation& d, 
 void Recordings::add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
                              const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const {
   constexpr double outlier_scale = 6.0, least_noise = 1e-4;  // deviations; times the object's size
-  const auto material =
-      std::make_shared<PressedMaterial>(scene->body, LawLayout::linear(recording.blocks.motion));
+  const auto material = std::make_shared<PressedMaterial>(scene->body, LawLayout::linear(recording.blocks.motion));
   for (std::size_t i = 0; i < scene->presses.size(); ++i) {
     const ObservedPress& seen = scene->presses[i];
     if (!is_fitted(seen.role)) continue;
-    const double noise = options_.marker_noise > 0.0
-                             ? options_.marker_noise
-                             : std::max(marker_noise(seen), least_noise * recording.size);
+    const double noise = options_.marker_noise > 0.0 ? options_.marker_noise
+                                                     : std::max(marker_noise(seen), least_noise * recording.size);
     trials.push_back(std::make_unique<PressTrial>(scene, int(i), material, parameters.reference(),
                                                   PressTrialOptions{noise, outlier_scale}, int(trials.size())));
   }

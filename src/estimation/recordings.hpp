@@ -14,7 +14,7 @@ namespace pliant {
 /// The object at rest under a weight, and what was seen of it then.
 struct LoadCase {
   Load load;
-  TrackedPoints tracked;  ///< markers
+  TrackedPoints tracked;                                               ///< markers
   std::shared_ptr<const std::vector<FrameObservations>> observations;  ///< of one frame
 };
 
@@ -29,7 +29,7 @@ struct Recording {
   CaptureBlocks blocks;
   std::vector<LoadCase> loads;  ///< those that are fitted
 
-  bool is_released() const { return capture.initial.released; }
+  bool is_released() const { return capture.scene.initial.released; }
   /// The last frame of a part of the recording, (0, 1]. A flying object shows no stiffness in its first third; one that
   /// swings shows it at once.
   int horizon(double part) const;
@@ -57,14 +57,15 @@ class Recordings {
   const ParameterSet& parameters() const { return parameters_; }
   bool any_released() const { return std::ranges::any_of(all_, &Recording::is_released); }
   bool all_static() const {
-    return std::ranges::all_of(all_, [](const Recording& r) { return r.capture.is_static; });
+    return std::ranges::all_of(all_, [](const Recording& r) { return r.capture.scene.timing.is_static; });
   }
   /// Whether a scan was taken as the object sags.
   bool any_sags() const {
-    return std::ranges::any_of(all_, [](const Recording& r) { return r.capture.shape_is == ShapeIs::Static; });
+    return std::ranges::any_of(all_,
+                               [](const Recording& r) { return r.capture.scene.object.shape_is == ShapeIs::Static; });
   }
   bool any_meshed_here() const {
-    return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.volume; });
+    return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.scene.object.volume; });
   }
 
   [[nodiscard]] Grid grid(double cells, double steps) const;
@@ -100,9 +101,9 @@ class Recordings {
   ParameterSet parameters_;
 };
 
-/// Where the parameters of several recordings of one object stand in one vector: blocks of the object once, those of each
-/// recording's own start, planes and sensors each for itself, with "[2]" and so on after their names from the second
-/// recording.
+/// Where the parameters of several recordings of one object stand in one vector: blocks of the object once, those of
+/// each recording's own start, planes and sensors each for itself, with "[2]" and so on after their names from the
+/// second recording.
 struct JointLayout {
   ParameterLayout layout;
   std::vector<ParameterLayout> own;   ///< of each recording by itself

@@ -28,8 +28,8 @@ TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOpti
   if (options.tracking != TrackingUse::Automatic) return options.tracking;
   const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
     const Capture& c = r.capture;
-    return !r.followed && !c.is_static && c.shape_is == ShapeIs::Reference && c.markers.empty() &&
-           (!c.clouds.empty() || c.depth.size() > 1);
+    return !r.followed && !c.scene.timing.is_static && c.scene.object.shape_is == ShapeIs::Reference &&
+           c.markers.empty() && (!c.clouds.empty() || c.depth.size() > 1);
   });
   return suits ? TrackingUse::Both : TrackingUse::Off;
 }
@@ -66,7 +66,7 @@ class TrackingLoop {
   void split(const RecordedCapture& r) {
     RecordedCapture training{r.capture, {}, {}}, held_out = training;
     for (const ObservedFrame& frame : r.observed) {
-      const int since = frame.frame - r.capture.start_frame;
+      const int since = frame.frame - r.capture.scene.timing.start_frame;
       (since > 0 && since % every_so_many == 3 ? held_out : training).observed.push_back(frame);
     }
     training_.push_back(std::move(training));
@@ -125,7 +125,7 @@ class TrackingLoop {
     std::vector<RecordedCapture> followed;
     for (std::size_t i = 0; i < recordings.size(); ++i) {
       const Capture& capture = recordings[i].capture;
-      followed.push_back({capture, {}, supported_points(*tracks_[i], object_size(capture))});
+      followed.push_back({capture, {}, supported_points(*tracks_[i], object_size(capture.scene))});
       if (followed.back().followed->frames.empty())
         throw InputError({{capture.file},
                           "the tracker finds the object in no frame",
@@ -217,7 +217,8 @@ class TrackingLoop {
     const std::vector<ParameterBlock> blocks = layout_of(options.controls()).layout.blocks();
     for (auto& [name, change] : options.parameters) {
       const auto block = std::ranges::find(blocks, name, &ParameterBlock::name);
-      const bool is_modulus = name == "youngs_modulus" || (block != blocks.end() && block->role == Role::Material && block->unit == "Pa");
+      const bool is_modulus =
+          name == "youngs_modulus" || (block != blocks.end() && block->role == Role::Material && block->unit == "Pa");
       if (is_modulus && change.estimated.value_or(true)) change.start.reset();
     }
     return options;
@@ -252,9 +253,8 @@ class TrackingLoop {
       outcome_ = fit_once(followed_captures(recordings), options, std::exchange(from, {}),
                           "round " + std::to_string(round + 1), share(round), share(round + 1));
       if (outcome_->interrupted || !outcome_->evaluation.succeeded) return false;
-      const VectorX moduli_before = theta.size() == 0
-                                        ? followed_.front().material().moduli(own.front())
-                                        : layout_of(controls).blocks.front().motion.moduli(theta);
+      const VectorX moduli_before = theta.size() == 0 ? followed_.front().material().moduli(own.front())
+                                                      : layout_of(controls).blocks.front().motion.moduli(theta);
       controls = controls_of(*outcome_);
       theta = outcome_->theta;
       options = without_start(with_chosen_controls(options_, controls));
@@ -276,9 +276,9 @@ class TrackingLoop {
   bool resume_loop() {
     const TrackingRound& round = state_.rounds.back();
     if (!follow(followed_, to_follow_with(round.theta, round.controls))) return stop({});
-    outcome_ = fit_once(followed_captures(is_both_ ? training_ : all_),
-                        with_chosen_controls(without_start(options_), round.controls), *state_.loop, "rounds", 0.5,
-                        0.5);
+    outcome_ =
+        fit_once(followed_captures(is_both_ ? training_ : all_),
+                 with_chosen_controls(without_start(options_), round.controls), *state_.loop, "rounds", 0.5, 0.5);
     return true;
   }
 
@@ -329,11 +329,12 @@ class TrackingLoop {
     const RecordingOutcome& estimate = outcome.recordings[recording];
     const Discretisation& d = estimate.discretisation;
     ObjectiveOptions o;
-    o.outlier_scale = options_.fine_band * object_size(seen.capture);
+    o.outlier_scale = options_.fine_band * object_size(seen.capture.scene);
     o.last_frame = int(d.simulation.times.size()) - 1;
     const auto observations =
         std::make_shared<std::vector<FrameObservations>>(frame_observations(seen.capture, seen.observed, {}));
-    return Objective(d.mismatch, d.body, d.simulation, observations, ParameterSet(outcome.parameters.layout(), {}, outcome.theta), o)
+    return Objective(d.mismatch, d.body, d.simulation, observations,
+                     ParameterSet(outcome.parameters.layout(), {}, outcome.theta), o)
         .evaluate(VectorX(0));
   }
 
@@ -422,7 +423,7 @@ class TrackingLoop {
   bool is_both_;
   std::vector<RecordedCapture> training_, held_out_;
   std::vector<FollowedRecording> followed_;
-  std::vector<std::string> notes_;    // of reading the recordings, which the fits tell too
+  std::vector<std::string> notes_;  // of reading the recordings, which the fits tell too
   FitState::Tracking state_;
   FitState left_;     // by an interruption
   FitState reached_;  // by the fit that runs

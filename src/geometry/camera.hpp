@@ -10,6 +10,7 @@ struct RigidMotion {
   Vector3 translation = Vector3::Zero();
   Vector3 operator()(const Vector3& point) const { return rotation * point + translation; }
   RigidMotion inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
+  bool operator==(const RigidMotion&) const = default;
 };
 
 /// Pinhole camera with axes as in OpenCV (x right, y down, z forward); pixel centres at whole numbers.
@@ -17,6 +18,8 @@ struct PinholeCamera {
   int width = 0, height = 0;
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< [pixels]
   RigidMotion camera_to_world;
+
+  bool operator==(const PinholeCamera&) const = default;
 
   /// World point [m] seen at pixel (u, v) with `depth` [m] along the optical axis.
   Vector3 unproject(double u, double v, double depth) const {

@@ -11,6 +11,7 @@ namespace pliant {
 struct TriangleMesh {
   std::vector<Vector3> vertices;              ///< [m]
   std::vector<std::array<int, 3>> triangles;  ///< counter-clockwise seen from outside
+  bool operator==(const TriangleMesh&) const = default;
 };
 
 /// Smallest axis-aligned box around points.

@@ -5,12 +5,12 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "base/csv.hpp"
 #include "base/files.hpp"
-#include "capture/csv.hpp"
-#include "capture/toml_facts.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
+#include "scene/scene_toml.hpp"
 
 namespace pliant {
 
@@ -33,8 +33,6 @@ void line(std::ostream& out, const char* key, int value, const char* comment) {
   out << fmt::format("{:<18}= {:<24}# {}\n", key, value, comment);
 }
 
-std::string vertices_file(size_t number) { return fmt::format("fixed_{}.txt", number); }
-
 std::string model_toml(const Model& m) {
   std::ostringstream out;
   out << "# A fitted elastic object, ready to be simulated. All quantities are SI.\n"
@@ -43,8 +41,8 @@ std::string model_toml(const Model& m) {
       << "\n\n[object]\nsurface = \"surface.ply\"          # free of load, world frame of the recording\n";
   if (!m.volume.connectivity.empty())
     out << "volume_mesh = \"model.vtu\"        # elements with the material of each\n";
-  line(out, "mass", m.mass, "kg");
-  line(out, "density", m.density, "kg/m^3");
+  line(out, "mass", m.scene.object.mass.value(), "kg");
+  line(out, "density", m.scene.object.density.value(), "kg/m^3");
   out << (m.law ? "\n[material]                          # moduli are those of small strains\n"
                 : "\n[material]                          # isotropic, linear in the rotated frame of each element\n");
   if (m.law) {
@@ -55,15 +53,10 @@ std::string model_toml(const Model& m) {
   line(out, "poisson_ratio", m.poisson_ratio, "-1 .. 0.5");
   line(out, "mass_damping", m.mass_damping, "Rayleigh, 1/s");
   line(out, "stiffness_damping", m.stiffness_damping, "Rayleigh, s");
-  out << "\n[world]\n";
-  if (m.gravity) out << "gravity = " << toml_text(*m.gravity) << "   # m/s^2\n";
-  if (m.frames > 0) {
-    out << "\n[timing]                            # of the recording behind the fit\n";
-    line(out, "frame_rate", m.frame_rate, "Hz");
-    line(out, "frame_count", m.frames, "");
-    line(out, "start_frame", m.start_frame, "the first frame in which the object moves freely");
-  }
-  out << "\n[simulation]\n";
+  out << "\n";
+  write_toml(out, m.scene.world);
+  if (!m.scene.timing.times.empty()) write_toml(out, m.scene.timing);
+  out << "[simulation]\n";
   line(out, "cell_size", m.cell_size, "edge of the hexahedral grid's cells, m");
   out << "grid_origin = " << toml_text(m.grid_origin) << "   # m\n";
   line(out, "substeps", m.substeps, "time steps a frame");
@@ -71,10 +64,8 @@ std::string model_toml(const Model& m) {
   line(out, "contact_stiffness", m.contact_stiffness, "pressure by penetration, Pa/m");
   line(out, "contact_smoothing", m.contact_smoothing, "length over which contact sets in, m");
   out << "\n";
-  write_toml(out, m.initial);
-  for (const Plane& plane : m.planes) write_toml(out, plane);
-  for (size_t i = 0; i < m.fixed.size(); ++i) write_toml(out, m.fixed[i], vertices_file(i));
-  for (const Weight& weight : m.weights) write_toml(out, weight);
+  write_toml(out, m.scene.initial);
+  write_toml_blocks(out, m.scene);
   return std::move(out).str();
 }
 
@@ -122,34 +113,23 @@ ModelLaw read_law(const fs::path& path, std::string name) {
   return law;
 }
 
-void write_vertices(const fs::path& folder, const Model& model) {
-  for (size_t i = 0; i < model.fixed.size(); ++i)
-    if (const auto* vertices = std::get_if<RegionVertices>(&model.fixed[i].region))
-      write_file(folder / vertices_file(i), fmt::format("{}\n", fmt::join(vertices->indices, "\n")));
-}
-
 // ---- reading
 
 class Reader {
  public:
-  Reader(const fs::path& folder, TomlContext& context) : folder_(folder), context_(context) {}
+  Reader(const fs::path& folder, TomlContext& context) : files_{folder}, context_(context) {}
 
   Model read(const toml::table& table) {
     TomlTable root(table, "", context_);
-    if (const auto format = root.required<std::string>("format"); format && *format != "model/1")
-      context_.complain("format", "the format \"" + *format + "\"", "\"model/1\"",
-                        "use a program that knows this format");
+    check_format(root, "model/1");
     model_.name = root.required<std::string>("name").value_or("");
     for (const auto& [name, read_part] : {std::pair{"object", &Reader::read_object},
                                           {"material", &Reader::read_material},
-                                          {"world", &Reader::read_world},
                                           {"simulation", &Reader::read_simulation}})
-      read_table(root, name, read_part);
-    if (root.has("timing")) read_table(root, "timing", &Reader::read_timing);
-    if (auto initial = root.table("initial")) model_.initial = read_initial(*initial);
-    for (TomlTable& block : root.blocks("plane")) model_.planes.push_back(read_plane(block));
-    for (TomlTable& block : root.blocks("fixed")) model_.fixed.push_back(read_fixed(block, folder_));
-    for (TomlTable& block : root.blocks("weight")) model_.weights.push_back(read_weight(block));
+      root.with_table(
+          name, [&](TomlTable& own) { (this->*read_part)(own); }, std::string("[") + name + "]",
+          "save the model again");
+    read_scene(root);
     root.finish();
     ModelVolume& volume = model_.volume;
     if (volume.youngs_modulus.empty()) {  // of one material
@@ -160,40 +140,38 @@ class Reader {
   }
 
  private:
-  void read_table(TomlTable& root, const std::string& name, void (Reader::*read_part)(TomlTable&)) {
-    if (auto table = root.table(name)) {
-      (this->*read_part)(*table);
-      table->finish();
-    } else if (!root.has(name)) {
-      context_.complain(name, "no table [" + name + "]", "[" + name + "]", "save the model again");
-    }
+  void read_scene(TomlTable& root) {
+    Scene& scene = model_.scene;
+    root.with_table(
+        "world", [&](TomlTable& world) { scene.world = read_world(world); }, "[world]", "save the model again");
+    root.with_table("timing", [&](TomlTable& timing) { scene.timing = read_even_timing(timing, 10'000'000); });
+    root.with_table("initial", [&](TomlTable& initial) { scene.initial = read_initial(initial, true); });
+    root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
+    root.each_block("fixed", [&](TomlTable& block) { scene.fixed.push_back(read_fixed(block, files_)); });
+    root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
+    check_vertex_lists(context_, scene);
   }
 
   // Reads another file of the model; its problems join the others.
   template <class Read>
-  void with_file(const fs::path& path, const Read& read) {
-    if (path.empty()) return;
-    try {
-      read(path);
-    } catch (const InputError& error) {
-      context_.problems.insert(context_.problems.end(), error.problems().begin(), error.problems().end());
-    }
+  void with_file(TomlTable& table, const std::string& name, const Read& read) {
+    if (const auto path = read_path(table, name, files_)) read_file_of(table, name, *path, read);
   }
 
   void read_object(TomlTable& object) {
+    TriangleMesh& surface = model_.scene.object.surface.emplace();
     if (object.has("surface") || !object.has("volume_mesh"))
-      with_file(read_path(object, "surface", folder_), [&](const fs::path& path) { model_.surface = read_mesh(path); });
-    if (object.has("volume_mesh"))
-      with_file(read_path(object, "volume_mesh", folder_), [&](const fs::path& path) { read_volume(path); });
-    model_.mass = read_number(object, "mass", {.low = 0.0, .low_allowed = false, .meaning = "the mass in kilograms"});
-    model_.density =
+      with_file(object, "surface", [&](const fs::path& path) { surface = read_mesh(path); });
+    if (object.has("volume_mesh")) with_file(object, "volume_mesh", [&](const fs::path& path) { read_volume(path); });
+    model_.scene.object.mass =
+        read_number(object, "mass", {.low = 0.0, .low_allowed = false, .meaning = "the mass in kilograms"});
+    model_.scene.object.density =
         read_number(object, "density", {.low = 0.0, .low_allowed = false, .meaning = "the density in kg/m^3"});
   }
 
   void read_material(TomlTable& material) {
     if (const auto law = material.optional<std::string>("law"))
-      with_file(read_path(material, "table", folder_),
-                [&](const fs::path& path) { model_.law = read_law(path, *law); });
+      with_file(material, "table", [&](const fs::path& path) { model_.law = read_law(path, *law); });
     const double metric_nu = read_number(material, "metric_nu", {.low = -1.0, .high = 0.5, .meaning = "a norm's"}, 0.0);
     if (model_.law) model_.law->metric_nu = metric_nu;
     model_.youngs_modulus = read_number(material, "youngs_modulus",
@@ -204,15 +182,6 @@ class Reader {
     model_.mass_damping = read_number(material, "mass_damping", {.low = 0.0, .meaning = "Rayleigh's, in 1/s"}, 0.0);
     model_.stiffness_damping =
         read_number(material, "stiffness_damping", {.low = 0.0, .meaning = "Rayleigh's, in s"}, 0.0);
-  }
-
-  void read_world(TomlTable& world) { model_.gravity = world.optional<Vector3>("gravity"); }
-
-  void read_timing(TomlTable& timing) {
-    model_.frame_rate =
-        read_number(timing, "frame_rate", {.low = 0.0, .low_allowed = false, .meaning = "frames a second"});
-    model_.frames = read_count(timing, "frame_count", 1, 10'000'000);
-    model_.start_frame = read_count(timing, "start_frame", 0, std::max(0, model_.frames - 1), 0);
   }
 
   void read_simulation(TomlTable& simulation) {
@@ -246,7 +215,8 @@ class Reader {
         volume.connectivity.insert(volume.connectivity.end(), mesh.mid_nodes[e].begin(), mesh.mid_nodes[e].end());
     }
     volume.fill.assign(mesh.tets.size(), 1.0);
-    if (model_.surface.triangles.empty()) model_.surface = boundary_surface(mesh);
+    TriangleMesh& surface = *model_.scene.object.surface;
+    if (surface.triangles.empty()) surface = boundary_surface(mesh);
   }
 
   void read_volume(const fs::path& path) {
@@ -270,7 +240,7 @@ class Reader {
     volume.fill = field(path, grid, fill_field);
   }
 
-  fs::path folder_;
+  NamedFiles files_;
   TomlContext& context_;
   Model model_;
 };
@@ -279,8 +249,8 @@ class Reader {
 
 void save_model(const fs::path& folder, const Model& model) {
   if (!model.volume.connectivity.empty()) write_volume(folder / "model.vtu", model.volume);
-  write_mesh(folder / "surface.ply", model.surface);
-  write_vertices(folder, model);
+  write_mesh(folder / "surface.ply", model.scene.object.surface.value());
+  write_scene_files(folder, model.scene);
   if (model.law) write_law(folder / "material.csv", *model.law);
   write_file(folder / "model.toml", model_toml(model));
 }
@@ -289,7 +259,7 @@ Model load_model(const fs::path& path) {
   const toml::table table = parse_toml(read_file(path), path);
   TomlContext context{TomlPlaces(path), {}, {}};
   Model model = Reader(fs::absolute(path).parent_path(), context).read(table);
-  throw_problems(context);
+  context.throw_problems();
   return model;
 }
 

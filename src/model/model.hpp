@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "capture/capture.hpp"
-#include "geometry/triangle_mesh.hpp"
 #include "model/vtu.hpp"
+#include "scene/scene.hpp"
 
 namespace pliant {
 
@@ -35,24 +34,14 @@ struct ModelLaw {
 /// A fitted object, ready to be simulated. SI units, the capture's world frame.
 struct Model {
   std::string name;
-  TriangleMesh surface;  ///< free of load [m]
+  /// Situation of the recording: the surface free of load, mass and density both known, frames equally spaced; no
+  /// frames: static.
+  Scene scene;
 
   double youngs_modulus = 0.0;     ///< [Pa] > 0; with fields: the volume-weighted mean
   double poisson_ratio = 0.0;      ///< (-1, 0.5)
   double mass_damping = 0.0;       ///< [1/s] >= 0
   double stiffness_damping = 0.0;  ///< [s] >= 0
-  double density = 0.0;            ///< [kg/m^3] > 0
-  double mass = 0.0;               ///< [kg] > 0
-
-  std::optional<Vector3> gravity;  ///< [m/s^2]
-  std::vector<Plane> planes;
-  std::vector<FixedRegion> fixed;
-  std::vector<Weight> weights;
-  Initial initial;
-
-  int frames = 0;           ///< of the recording; 0: static
-  double frame_rate = 0.0;  ///< [Hz]; 0: static
-  int start_frame = 0;
 
   double cell_size = 0.0;                 ///< of the hexahedral grid [m] > 0
   Vector3 grid_origin = Vector3::Zero();  ///< lattice point (0, 0, 0) [m]

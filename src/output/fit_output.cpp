@@ -2,21 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <tuple>
 
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "elasticity/corotated.hpp"
 #include "elasticity/element_moduli.hpp"
-#include "elasticity/law_elasticity.hpp"
-#include "model/vtu.hpp"
-#include "report/gallery.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
-#include "report/report.hpp"
 #include "output/track_output.hpp"
+#include "report/gallery.hpp"
+#include "report/report.hpp"
+#include "simulation/model_simulation.hpp"
+#include "simulation/trajectory.hpp"
 
 namespace pliant {
 
@@ -106,52 +104,15 @@ ConvergenceHistory history_of(const FitOutcome& outcome, bool with_trials) {
   return history;
 }
 
-std::vector<double> six(const Matrix3& m) { return {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(1, 2), m(0, 2)}; }
-
-VtuCell vtu_cell(ElementKind kind) {
-  switch (kind) {
-    case ElementKind::Tetrahedron:
-      return VtuCell::Tetrahedron;
-    case ElementKind::QuadraticTetrahedron:
-      return VtuCell::QuadraticTetrahedron;
-    case ElementKind::Hexahedron:
-      break;
-  }
-  return VtuCell::Hexahedron;
-}
-
 }  // namespace
 
 std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks, const VectorX& theta) {
-  std::vector<Plane> planes = capture.planes;
+  std::vector<Plane> planes = capture.scene.planes;
   for (std::size_t i = 0; i < planes.size(); ++i) {
     planes[i].point = blocks.planes[i].point.vector(theta);
     planes[i].normal = blocks.planes[i].normal.vector(theta);
   }
   return planes;
-}
-
-VtuGrid frame_grid(const Body& body, const State& state, Elasticity& elasticity) {
-  VtuGrid grid;
-  grid.kind = vtu_cell(body.kind);
-  grid.points = state.x;
-  VtuArray displacement{"displacement [m]", 3, {}}, velocity{"velocity [m/s]", 3, {}}, strain{"strain [1]", 6, {}},
-      stress{"stress [Pa]", 6, {}};
-  const Points u = state.x - body.reference_positions();
-  displacement.values.assign(u.data(), u.data() + u.size());
-  velocity.values.assign(state.v.data(), state.v.data() + state.v.size());
-  elasticity.linearise(state.x);
-  for (int e = 0; e < body.element_count(); ++e) {
-    const auto cell = to_vtk_order(grid.kind, body.element(e));
-    grid.connectivity.insert(grid.connectivity.end(), cell.begin(), cell.end());
-    const Polar& polar = elasticity.rotation(e);
-    const Matrix3 in_body = polar.S - Matrix3::Identity();
-    for (const double v : six(polar.R * in_body * polar.R.transpose())) strain.values.push_back(v);
-    for (const double v : six(elasticity.cauchy_stress(e))) stress.values.push_back(v);
-  }
-  grid.point_data = {std::move(displacement), std::move(velocity)};
-  grid.cell_data = {std::move(strain), std::move(stress)};
-  return grid;
 }
 
 namespace {
@@ -187,22 +148,23 @@ Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutco
   const Capture& capture = recorded_capture.capture;
   const Discretisation& d = outcome.discretisation;
   Gallery gallery;
-  gallery.triangles = capture.surface->triangles;
+  gallery.triangles = capture.scene.object.surface->triangles;
   gallery.planes = planes_at(capture, d.simulation.blocks, outcome.theta);
   if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
-  gallery.up = capture.up;
+  gallery.up = capture.scene.world.up;
   gallery.width = 480, gallery.height = 400;
   const auto& fitted = outcome.evaluation.frames;
   std::vector<int> told;
   for (const int i : spread_frames(0, int(fitted.size()) - 1, 6)) told.push_back(fitted[std::size_t(i)].frame);
   if (told.empty()) return gallery;
-  const Embedding embedding(*d.body, capture.surface->vertices);
-  const double start = capture.times[std::size_t(capture.start_frame)];
+  const Embedding embedding(*d.body, capture.scene.object.surface->vertices);
+  const double start = capture.scene.timing.times[std::size_t(capture.scene.timing.start_frame)];
   Simulation simulation(d.body, d.simulation);
   simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
     if (!std::ranges::binary_search(told, frame)) return true;
-    const int recorded = frame + capture.start_frame;
-    GalleryFrame drawn{recorded, capture.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
+    const int recorded = frame + capture.scene.timing.start_frame;
+    GalleryFrame drawn{
+        recorded, capture.scene.timing.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
     const auto seen = std::ranges::find(recorded_capture.observed, recorded, &ObservedFrame::frame);
     if (seen != recorded_capture.observed.end())
       add_observations(drawn, corrected_points(*seen, capture, d, outcome.theta), d, state.x);
@@ -237,58 +199,12 @@ ConvergenceHistory drawn_history(const FitOutcome& outcome) {
   return history;
 }
 
-/// A model's parameters, and where they stand.
-struct ModelParameters {
-  ParameterLayout layout;
-  CaptureBlocks blocks;
-  VectorX theta;
-};
-ModelParameters model_parameters(const Model& model, const Vector3& gravity, const std::vector<std::string>& sensors) {
-  ModelParameters p;
-  const int planes = int(model.planes.size()), pulls = int(model.initial.pulls.size());
-  p.blocks.motion = add_motion_blocks(p.layout, {.planes = planes, .pulls = pulls});
-  for (const std::string& sensor : sensors) p.blocks.sensors.push_back(add_sensor_blocks(p.layout, sensor));
-  const MotionBlocks& m = p.blocks.motion;
-  VectorX& theta = p.theta = VectorX::Zero(p.layout.size());
-  for (std::size_t k = 0; k < m.pulls.size(); ++k) theta.segment<3>(m.pulls[k]) = model.initial.pulls[k];
-  m.set_moduli(theta, model.youngs_modulus);
-  theta[m.poissons_ratio] = model.poisson_ratio;
-  theta[m.mass_damping] = model.mass_damping;
-  theta[m.stiffness_damping] = model.stiffness_damping;
-  theta[m.density] = model.density;
-  theta.segment<3>(m.gravity) = gravity;
-  theta.segment<3>(m.linear_velocity) = model.initial.linear_velocity;
-  theta.segment<3>(m.angular_velocity) = model.initial.angular_velocity;
-  for (std::size_t i = 0; i < m.planes.size(); ++i) {
-    theta.segment<3>(m.planes[i].point) = model.planes[i].point;
-    theta.segment<3>(m.planes[i].normal) = model.planes[i].normal;
-  }
-  return p;
-}
-
-/// A model as the capture that it would have been fitted to: the same scene builder serves both.
-Capture as_capture(const Model& model) {
-  Capture capture;
-  capture.name = model.name;
-  capture.surface = model.surface;
-  capture.mass = model.mass;
-  capture.gravity = model.gravity;
-  capture.planes = model.planes;
-  capture.fixed = model.fixed;
-  capture.weights = model.weights;
-  capture.initial = model.initial;
-  capture.is_static = model.frames == 0;
-  if (capture.is_static) capture.times = {0.0};
-  for (int f = 0; f < model.frames; ++f) capture.times.push_back(f / model.frame_rate);
-  capture.start_frame = model.start_frame;
-  return capture;
-}
-
 /// Of ln E of the first recording's control moduli; zero where one is not estimated, empty where nothing is known.
 MatrixX log_modulus_covariance(const FitOutcome& outcome) {
   if (outcome.covariance.size() == 0) return {};
   const int controls = outcome.recordings.front().discretisation.body->modulus.controls;
-  const std::vector<ParameterHandle>& moduli = outcome.recordings.front().discretisation.simulation.blocks.youngs_moduli;
+  const std::vector<ParameterHandle>& moduli =
+      outcome.recordings.front().discretisation.simulation.blocks.youngs_moduli;
   std::vector<int> coordinate(std::size_t(controls), -1);
   int at = 0;
   for (const Parameter& p : outcome.parameters.parameters()) {
@@ -428,9 +344,21 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
   if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
   result.notes = outcome.notes;
-  if (outcome.tracking) result.tracking = tracking_result(*outcome.tracking, outcome.recordings.front().discretisation.simulation.blocks);
+  if (outcome.tracking)
+    result.tracking = tracking_result(*outcome.tracking, outcome.recordings.front().discretisation.simulation.blocks);
   return result;
 }
+
+namespace {
+
+World world_of(const Vector3& gravity) {
+  World world;
+  world.gravity = gravity;
+  if (gravity.norm() > 0.0) world.up = -gravity.normalized();
+  return world;
+}
+
+}  // namespace
 
 Model make_model(const Capture& capture, const FitOutcome& outcome) {
   const RecordingOutcome& first = outcome.recordings.front();
@@ -444,37 +372,39 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   const MotionBlocks& blocks = d.simulation.blocks;
   Model model;
   model.name = capture.name;
-  model.surface = *capture.surface;
+  TriangleMesh surface = *capture.scene.object.surface;
   model.youngs_modulus = modulus.mean;
   model.poisson_ratio = t[blocks.poissons_ratio];
   model.mass_damping = t[blocks.mass_damping];
   model.stiffness_damping = t[blocks.stiffness_damping];
-  model.mass = t[blocks.density] * enclosed_volume(*capture.surface);
+  const double mass = t[blocks.density] * enclosed_volume(*capture.scene.object.surface);
   if (d.body->kind != ElementKind::Hexahedron) {  // the scan may have been taken under load
-    const Points free = Embedding(*d.body, capture.surface->vertices).positions(d.body->reference_positions());
-    for (Eigen::Index v = 0; v < free.rows(); ++v) model.surface.vertices[std::size_t(v)] = free.row(v).transpose();
+    const Points free = Embedding(*d.body, surface.vertices).positions(d.body->reference_positions());
+    for (Eigen::Index v = 0; v < free.rows(); ++v) surface.vertices[std::size_t(v)] = free.row(v).transpose();
   }
-  model.density = model.mass / enclosed_volume(model.surface);
-  model.gravity = blocks.gravity.vector(t);
-  model.planes = planes_at(capture, blocks, t);
-  for (Plane& plane : model.planes) plane.known = true;
-  model.fixed = capture.fixed;
-  model.weights = capture.weights;
-  model.initial = capture.initial;
-  model.initial.linear_velocity = blocks.linear_velocity.vector(t);
-  model.initial.angular_velocity = blocks.angular_velocity.vector(t);
-  model.initial.known = true;
-  for (const ParameterHandle& pull : blocks.pulls) model.initial.pulls.push_back(pull.vector(t));
-  model.cell_size = object_size(capture) / cells;
+  Scene& scene = model.scene;
+  scene.object.mass = mass;
+  scene.object.density = mass / enclosed_volume(surface);
+  scene.object.surface = std::move(surface);
+  scene.world = world_of(blocks.gravity.vector(t));
+  scene.planes = planes_at(capture, blocks, t);
+  for (Plane& plane : scene.planes) plane.known = true;
+  scene.fixed = capture.scene.fixed;
+  scene.weights = capture.scene.weights;
+  scene.initial = capture.scene.initial;
+  scene.initial.linear_velocity = blocks.linear_velocity.vector(t);
+  scene.initial.angular_velocity = blocks.angular_velocity.vector(t);
+  scene.initial.known = true;
+  for (const ParameterHandle& pull : blocks.pulls) scene.initial.pulls.push_back(pull.vector(t));
+  model.cell_size = object_size(capture.scene) / cells;
   if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
     model.cell_size = grid->cell_size;
     model.grid_origin = grid->origin;
   }
-  if (!capture.is_static) {
-    model.frames = capture.frame_count();
-    model.frame_rate = (capture.frame_count() - 1) / (capture.times.back() - capture.times.front());
-    model.start_frame = capture.start_frame;
-    model.substeps = std::max(1, int(std::ceil(1.0 / (model.frame_rate * d.simulation.max_dt) - 1e-9)));
+  if (const Timing& timing = capture.scene.timing; !timing.is_static) {
+    const double rate = (timing.frame_count() - 1) / (timing.times.back() - timing.times.front());
+    scene.timing = evenly_timed(rate, timing.frame_count(), timing.start_frame);
+    model.substeps = std::max(1, int(std::ceil(1.0 / (rate * d.simulation.max_dt) - 1e-9)));
   }
   model.theta = d.simulation.newmark_theta;
   model.contact_stiffness = d.simulation.contact.stiffness;
@@ -492,100 +422,19 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   return model;
 }
 
-namespace {
-
-/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's
-/// modulus where the volume mesh has as many elements.
-std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* distance) {
-  const ModelVolume& volume = model.volume;
-  Body body;
-  if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
-    body = make_body(make_hex_grid(*distance, bounding_box(model.surface), model.cell_size));
-  } else {
-    const auto points = std::size_t(corner_count(volume.kind));
-    std::vector<std::array<int, 4>> tets;
-    std::vector<std::array<int, 6>> mid_nodes;
-    for (std::size_t i = 0; i < volume.connectivity.size(); i += points) {
-      std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i), 4, tets.emplace_back().begin());
-      if (points == 10)
-        std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i) + 4, 6, mid_nodes.emplace_back().begin());
-    }
-    body = make_body(make_tet_mesh(volume.nodes, std::move(tets), std::move(mid_nodes)));
-  }
-  if (volume.youngs_modulus.size() == body.modulus.relative.size())
-    for (std::size_t e = 0; e < volume.youngs_modulus.size(); ++e)
-      body.modulus.relative[e] = volume.youngs_modulus[e] / model.youngs_modulus;
-  return std::make_shared<Body>(std::move(body));
-}
-
-}  // namespace
-
-std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, nullptr); }
-
-ModelScene make_scene(const Model& model) {
-  const CaptureScene scene = make_scene(model, as_capture(model));
-  SimulationOptions options = scene.discretisation.simulation;
-  if (model.frame_rate > 0.0) options.max_dt = 1.0 / (model.frame_rate * model.substeps) * (1.0 + 1e-9);
-  return {scene.discretisation.distance, scene.discretisation.body, options, scene.theta};
-}
-
 CaptureScene make_scene(const Model& model, const Capture& recorded) {
-  CaptureScene scene;
   Capture capture = recorded;
-  if (capture.shape_is == ShapeIs::Static) {  // the model's surface and mesh are free of load already
-    capture.surface = model.surface;
-    capture.shape_is = ShapeIs::Reference;
+  if (capture.scene.object.shape_is == ShapeIs::Static) {  // the model's surface and mesh are free of load already
+    capture.scene.object.surface = model.scene.object.surface;
+    capture.scene.object.shape_is = ShapeIs::Reference;
   }
-  const auto distance = capture_distance(capture, 0.15);
-  Model situated = model;
-  situated.planes = capture.planes;
-  situated.initial = capture.initial;
-  if (capture.initial.released && !capture.initial.release_of && capture.initial.pulls.empty()) {
-    if (model.initial.pulls.empty())
-      throw InputError({{capture.file},
-                        "the object is released, and the model knows no pose before a release",
-                        "the model of a fit to this recording",
-                        "let `pliant fit --hold-out` find the pose and score the rest"});
-    situated.initial.pulls = model.initial.pulls;
-  }
-  const Vector3 gravity = capture.gravity.value_or(model.gravity.value_or(-9.81 * capture.up));
-  const ModelParameters parameters = model_parameters(situated, gravity, sensor_names(capture));
-  scene.layout = parameters.layout;
-  scene.theta = parameters.theta;
-  SimulationOptions settings;
-  settings.newmark_theta = model.theta;
+  ModelScene made = make_scene(model, capture.scene, capture_distance(capture, Resolution{}.band), capture.file);
   Resolution resolution;
-  resolution.cells = object_size(capture) / model.cell_size;
-  resolution.pulls = int(situated.initial.pulls.size());
-  const auto body = body_of(model, distance.get());
-  if (model.law) settings.law = make_law(*model.law, body->element_count());
-  resolution.element = body->kind;
-  scene.discretisation =
-      discretise(capture, distance, body, resolution, parameters.blocks, scene.theta, settings,
-                 tracked_points(capture).rest);
-  if (model.contact_stiffness > 0.0)
-    scene.discretisation.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
-  const double dt = 1.0 / (model.frame_rate * model.substeps);
-  if (model.frame_rate > 0.0) scene.discretisation.simulation.max_dt = dt * (1.0 + 1e-9);
-  return scene;
-}
-
-RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Body> body,
-                                const SimulationOptions& options, const VectorX& parameters,
-                                const std::function<bool(int, int)>& progress) {
-  std::vector<PvdEntry> entries;
-  const auto elasticity = scene_elasticity(body, options);
-  elasticity->set_parameters(parameters);
-  Simulation simulation(body, options);
-  const RolloutSummary summary = simulation.run(parameters, [&](int frame, const State& state, auto) {
-    char name[32];
-    std::snprintf(name, sizeof name, "frames/%06d.vtu", frame);
-    write_vtu(folder / name, frame_grid(*body, state, *elasticity), VtuPrecision::Single);
-    entries.push_back({options.times[std::size_t(frame)] - options.times.front(), name});
-    return !progress || progress(frame + 1, simulation.frame_count());
-  });
-  write_pvd(folder / "trajectory.pvd", entries);
-  return summary;
+  resolution.cells = object_size(capture.scene) / model.cell_size;
+  Mismatch mismatch = make_mismatch(capture, made.distance, made.body, resolution, tracked_points(capture).rest);
+  return {{std::move(made.distance), std::move(made.body), std::move(mismatch), {}, std::move(made.simulation)},
+          std::move(made.layout),
+          std::move(made.theta)};
 }
 
 void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
@@ -607,8 +456,8 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
                    [&](int done, int total) { return tell("trajectory", done, total), true; });
   report.capture_path = facts.capture_path;
   for (const auto& f : surface_errors(first.evaluation).frames) {
-    const int frame = f.frame + capture.start_frame;
-    report.residuals.push_back({frame, capture.times[std::size_t(frame)], f.rms, f.points, f.noise});
+    const int frame = f.frame + capture.scene.timing.start_frame;
+    report.residuals.push_back({frame, capture.scene.timing.times[std::size_t(frame)], f.rms, f.points, f.noise});
   }
   tell("loads", 0, 1);
   report.loads = predict_loads(capture, {first.discretisation, outcome.parameters.layout(), first.theta});

@@ -29,17 +29,6 @@ Model make_model(const Capture& capture, const FitOutcome& outcome);
 Model make_model(const Capture& capture, const Discretisation& discretisation, const VectorX& theta,
                  const ModulusStatistics& modulus, double cells);
 
-/// Body, scene and parameters that a model describes.
-struct ModelScene {
-  std::shared_ptr<const SignedDistance> distance;
-  std::shared_ptr<const Body> body;
-  SimulationOptions simulation;
-  VectorX theta;
-};
-ModelScene make_scene(const Model& model);
-/// The body of a model of tetrahedra, with each element's modulus.
-std::shared_ptr<const Body> model_body(const Model& model);
-
 /// A model's material in a capture's situation, on a grid as fine as the model's.
 /// Throws InputError where the capture has no moving object.
 struct CaptureScene {
@@ -49,19 +38,8 @@ struct CaptureScene {
 };
 CaptureScene make_scene(const Model& model, const Capture& capture);
 
-/// A state as cells with displacement, velocity, strain and stress (at the elements' middles, turned into the world).
-/// @param elasticity  of the body, with its parameters set; it is left linearised about the state
-VtuGrid frame_grid(const Body& body, const State& state, Elasticity& elasticity);
-
 /// A capture's planes where a parameter vector has them.
 std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks, const VectorX& theta);
-
-/// Writes `trajectory.pvd` and `frames/*.vtu`: displacement, velocity, strain and stress of each frame.
-/// @param progress  frames done and their total; false stops
-/// Returns the steps taken and why the simulation ended early, if it did.
-RolloutSummary write_trajectory(const std::filesystem::path& folder, std::shared_ptr<const Body> body,
-                                const SimulationOptions& options, const VectorX& theta,
-                                const std::function<bool(int, int)>& progress = {});
 
 /// Distances of observed points to a simulated surface, frame by frame.
 struct SurfaceErrors {

@@ -52,7 +52,7 @@ void compare_markers(const MarkerSet& seen, const Points& predicted, double size
 /// What was seen of one load, ready to be compared with node positions.
 class LoadComparison {
  public:
-  LoadComparison(const Capture& capture, const Load& load, const Body& body) : size_(object_size(capture)) {
+  LoadComparison(const Capture& capture, const Load& load, const Body& body) : size_(object_size(capture.scene)) {
     if (load.markers && load.markers_rest) {
       markers_ = read_marker_pair(*load.markers_rest, *load.markers);
       embedding_ = Embedding(body, rows_of(markers_->rest));
@@ -62,7 +62,7 @@ class LoadComparison {
     ObservedLoad observed = observe_load(capture, load);
     outliers_ = observed.outliers;
     points_ = std::move(observed.seen.points);
-    surface_ = *capture.surface;
+    surface_ = *capture.scene.object.surface;
     embedding_ = Embedding(body, surface_.vertices);
     const bool is_cloud = load.cloud.has_value(), is_depth = !load.images.empty();
     observed_ = is_cloud && is_depth ? "cloud and depth" : is_cloud ? "cloud" : "depth";
@@ -108,7 +108,7 @@ MarkerPrediction predict_markers(const Capture& capture, const CaptureScene& sce
                            Points::Constant(Eigen::Index(rest.size()), 3, std::numeric_limits<double>::quiet_NaN()));
   Simulation simulation(d.body, d.simulation);
   prediction.summary = simulation.run(scene.theta, [&](int frame, const State& state, auto) {
-    prediction.frames[std::size_t(capture.start_frame + frame)] = embedding.positions(state.x);
+    prediction.frames[std::size_t(capture.scene.timing.start_frame + frame)] = embedding.positions(state.x);
     return true;
   });
   return prediction;

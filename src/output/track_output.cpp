@@ -79,7 +79,7 @@ Gallery gallery_of(const Capture& capture, const std::vector<ObservedFrame>& obs
   gallery.triangles = track.surface.triangles;
   gallery.planes = planes_at(capture, blocks, theta);
   if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
-  gallery.up = capture.up;
+  gallery.up = capture.scene.world.up;
   gallery.width = 560, gallery.height = 420;
   gallery.samples = 2;  // a picture a frame
   const Embedding embedding(*track.body, track.surface.vertices);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "capture/csv.hpp"
+#include "base/csv.hpp"
 
 namespace pliant {
 

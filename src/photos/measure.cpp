@@ -94,7 +94,10 @@ std::vector<Vector3> normals_of(const Points& points, std::span<const LensCamera
 class Measurer {
  public:
   Measurer(const PhotoSession& session, const PhotographSource& photographs, const PhotoProgress& progress)
-      : session_(session), photographs_(photographs), progress_(progress), size_(size_of(session.surface)) {}
+      : session_(session),
+        photographs_(photographs),
+        progress_(progress),
+        size_(size_of(*session.scene.object.surface)) {}
 
   MarkerMeasurement measure() {
     measure_rest();
@@ -129,7 +132,7 @@ class Measurer {
 
   // Between which diameters [pixels] dots of a kind can be, `slack` times nearer or farther than the object.
   FindDotsOptions find_options(const LensCamera& lens, const DotKind& kind, double slack) const {
-    const Box box = bounding_box(session_.surface);
+    const Box box = bounding_box(*session_.scene.object.surface);
     double least = 1e300, greatest = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
       const Vector3 p(corner & 1 ? box.max.x() : box.min.x(), corner & 2 ? box.max.y() : box.min.y(),
@@ -171,7 +174,7 @@ class Measurer {
   }
 
   std::function<bool(const Vector3&)> near_box(double margin) const {
-    const Box box = bounding_box(session_.surface);
+    const Box box = bounding_box(*session_.scene.object.surface);
     return [box, margin](const Vector3& p) {
       return (p.array() >= box.min.array() - margin).all() && (p.array() <= box.max.array() + margin).all();
     };
@@ -186,7 +189,7 @@ class Measurer {
     const Points places = positions_of(all);
     std::vector<Vector3> points;
     for (const Sighting& s : all) points.push_back(s.position);
-    const std::vector<double> away = distances_to_surface(session_.surface, points);
+    const std::vector<double> away = distances_to_surface(*session_.scene.object.surface, points);
     std::vector<Sighting> near;
     for (std::size_t i = 0; i < all.size(); ++i)
       if (away[i] <= surface_tolerance * size_) near.push_back(all[i]);
@@ -302,7 +305,8 @@ class Measurer {
     const double slack = probe_slack * session_.tolerance;
     const std::vector<ViewDots> views = without_lens(cameras(), seen.probe);
     const ResolvedSightings dots = resolve(possible_sightings(cameras(), views, {slack, 2, {}}), slack);
-    const FoundProbe probe = find_probe(dots.sure, session_.probe, session_.surface, noise_factor(dots.sure));
+    const FoundProbe probe =
+        find_probe(dots.sure, session_.probe, *session_.scene.object.surface, noise_factor(dots.sure));
     own.failure = probe.failure;
     if (!probe.pose) return;
     own.probe = *probe.pose;
@@ -310,7 +314,7 @@ class Measurer {
       own.contact = *own.press.contact;
       return;
     }
-    const auto contact = contact_of(own.probe, session_.surface, size_);
+    const auto contact = contact_of(own.probe, *session_.scene.object.surface, size_);
     if (contact)
       own.contact = *contact;
     else

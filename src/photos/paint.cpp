@@ -16,11 +16,11 @@
 
 #include "base/files.hpp"
 #include "capture/markers.hpp"
-#include "capture/toml_facts.hpp"
-#include "rays/look_at.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
+#include "rays/look_at.hpp"
 #include "rays/ray_scene.hpp"
+#include "scene/scene_toml.hpp"
 
 namespace pliant {
 
@@ -413,11 +413,11 @@ PhotoExample::PhotoExample(const PhotoExampleOptions& options) : options_(option
   painted_.lamp = {0.5, 0.7, 0.2};
   session_.name = "painted dome, pressed at two places";
   session_.file = "markers.toml";
-  session_.surface = painted_.rest;
-  session_.surface_file = "rest.ply";
-  session_.density = 60.0;
-  session_.gravity = {0.0, -9.81, 0.0};
-  session_.fixed.push_back({RegionHalfSpace{{0.0, -0.03, 0.0}, {0.0, -1.0, 0.0}}, {}});
+  session_.scene.object.surface = painted_.rest;
+  session_.scene.object.file = "rest.ply";
+  session_.scene.object.density = 60.0;
+  session_.scene.world.gravity = {0.0, -9.81, 0.0};
+  session_.scene.fixed.push_back({RegionHalfSpace{{0.0, -0.03, 0.0}, {0.0, -1.0, 0.0}}, {}});
   session_.cameras = example_cameras(options.width, options.height);
   for (const LensCamera& camera : session_.cameras) session_.images.push_back({camera.name + "/%03d.png"});
   session_.markers = {DotColour::Dark, options.dot_diameter, 0.1};
@@ -472,7 +472,7 @@ Image<Rgb> PhotoExample::photograph(int camera, int number, PhotoQuality quality
 }
 
 void PhotoExample::write(const fs::path& folder) const {
-  write_mesh(folder / session_.surface_file, session_.surface);
+  write_mesh(folder / session_.scene.object.file, *session_.scene.object.surface);
   write_file(folder / "force.csv", [&](std::ostream& out) {
     out << "time,force\n";
     for (std::size_t i = 0; i < session_.log.times.size(); ++i)
@@ -493,10 +493,10 @@ void PhotoExample::write(const fs::path& folder) const {
     write_marker_positions(folder / fmt::format("truth/{:03}.csv", number), truth);
   }
   write_file(folder / "markers.toml", [&](std::ostream& out) {
-    out << "format = \"markers/1\"\nname = " << toml_text(session_.name)
-        << "\n\n[object]\nsurface = \"rest.ply\"\ndensity = " << toml_text(*session_.density)
-        << "\n\n[world]\ngravity = " << toml_text(session_.gravity) << "\n\n";
-    for (const FixedRegion& fixed : session_.fixed) write_toml(out, fixed, "");
+    out << "format = \"markers/1\"\nname = " << toml_text(session_.name) << "\n\n";
+    write_toml(out, session_.scene.object, session_.scene.object.file.string());
+    write_toml(out, session_.scene.world);
+    write_toml_blocks(out, session_.scene);
     out << "[markers]\ncolour = \"dark\"\ndiameter = " << toml_text(session_.markers.diameter)
         << "\n\n[probe]\ncolour = \"red\"\ndiameter = " << toml_text(session_.probe_dots.diameter)
         << "\ndots_apart = " << toml_text(session_.probe.dots_apart) << "\ntip = " << toml_text(session_.probe.tip)

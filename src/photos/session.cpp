@@ -6,9 +6,8 @@
 #include <set>
 
 #include "base/files.hpp"
-#include "capture/toml_facts.hpp"
-#include "capture/toml_table.hpp"
 #include "geometry/mesh_io.hpp"
+#include "scene/scene_toml.hpp"
 
 namespace pliant {
 
@@ -25,24 +24,23 @@ class Reader {
   Reader(const fs::path& file, TomlContext& context) : context_(context) {
     session_.file = file;
     session_.folder = fs::absolute(file).parent_path().lexically_normal();
+    files_.folder = session_.folder;
   }
 
   PhotoSession read(const toml::table& table) {
     TomlTable root(table, "", context_);
-    if (const auto format = root.required<std::string>("format", "write format = \"markers/1\" first");
-        format && *format != "markers/1")
-      context_.complain("format", "the format \"" + *format + "\"", "\"markers/1\"",
-                        "use a program that knows this format");
+    check_format(root, "markers/1");
     session_.name = root.required<std::string>("name", "give the recording a name").value_or("");
     read_part(root, "object", &Reader::read_object);
-    read_part(root, "world", &Reader::read_world);
-    for (TomlTable& block : root.blocks("fixed")) session_.fixed.push_back(read_fixed(block, session_.folder));
+    read_part(root, "world", &Reader::read_gravity);
+    root.each_block("fixed", [&](TomlTable& block) { session_.scene.fixed.push_back(read_fixed(block, files_)); });
+    check_vertex_lists(context_, session_.scene);
     read_part(root, "markers", &Reader::read_markers);
     read_part(root, "probe", &Reader::read_probe);
     read_part(root, "force", &Reader::read_force);
-    for (TomlTable& block : root.blocks("camera")) read_camera(block);
+    root.each_block("camera", [&](TomlTable& block) { read_camera(block); });
     read_part(root, "rest", &Reader::read_rest);
-    for (TomlTable& block : root.blocks("press")) read_press(block);
+    root.each_block("press", [&](TomlTable& block) { read_press(block); });
     check_counts(root);
     check_presses();
     root.finish();
@@ -52,12 +50,8 @@ class Reader {
 
  private:
   void read_part(TomlTable& root, const std::string& name, void (Reader::*read_it)(TomlTable&)) {
-    if (auto table = root.table(name)) {
-      (this->*read_it)(*table);
-      table->finish();
-    } else if (!root.has(name)) {
-      context_.complain(name, "no table [" + name + "]", "[" + name + "]", "see docs/markers.md");
-    }
+    root.with_table(
+        name, [&](TomlTable& table) { (this->*read_it)(table); }, "[" + name + "]", "see docs/markers.md");
   }
 
   // Runs a reader of another file; what it throws joins the problems.
@@ -72,29 +66,22 @@ class Reader {
   }
 
   void read_object(TomlTable& object) {
-    session_.surface_file = read_path(object, "surface", session_.folder);
-    if (!session_.surface_file.empty())
-      gather("object.surface", [&] {
-        session_.surface = read_mesh(session_.surface_file);
-        const MeshReport report = examine(session_.surface);
+    Object& own = session_.scene.object;
+    if (const auto file = read_path(object, "surface", files_)) {
+      own.file = *file;
+      read_file_of(object, "surface", *file, [&](const fs::path& path) {
+        own.surface = read_mesh(path);
+        const MeshReport report = examine(*own.surface);
         if (!report.is_closed_solid)
           context_.reject("object.surface", report.complaints.empty() ? "an open surface" : report.complaints.front(),
                           "a closed surface that faces outwards", "close holes in a mesh editor");
       });
-    session_.mass = object.optional<double>("mass");
-    session_.density = object.optional<double>("density");
-    if (object.has("mass") == object.has("density"))
-      context_.reject("object", object.has("mass") ? "both `mass` and `density`" : "neither `mass` nor `density`",
-                      "one of the two");
-    session_.shape_is = object.optional<std::string>("shape_is").value_or("reference");
-    if (session_.shape_is != "reference" && session_.shape_is != "static")
-      context_.reject("object.shape_is", "`shape_is` is \"" + session_.shape_is + "\"", "\"reference\" or \"static\"");
+    }
+    read_object_facts(object, own);
+    require_mass_or_density(object);
   }
 
-  void read_world(TomlTable& world) {
-    session_.gravity = world.required<Vector3>("gravity", "gravity = [x, y, z] in m/s^2, in the cameras' world")
-                           .value_or(Vector3::Zero());
-  }
+  void read_gravity(TomlTable& world) { session_.scene.world = read_world(world, true); }
 
   DotKind read_kind(TomlTable& table, const char* usual) {
     DotKind kind;
@@ -232,6 +219,7 @@ class Reader {
   }
 
   TomlContext& context_;
+  NamedFiles files_;
   PhotoSession session_;
   std::map<int, double> times_;
   std::set<std::string> names_;
@@ -246,7 +234,7 @@ PhotoSession read_photo_session(const fs::path& path) {
   const toml::table table = parse_toml(read_file(file), file);
   TomlContext context{TomlPlaces(file), {}, {}};
   PhotoSession session = Reader(file, context).read(table);
-  throw_problems(context);
+  context.throw_problems();
   return session;
 }
 

@@ -35,12 +35,7 @@ struct PhotoSession {
   std::filesystem::path file, folder;
   std::string name;
 
-  TriangleMesh surface;
-  std::filesystem::path surface_file;
-  std::optional<double> mass, density;  ///< [kg], [kg/m^3]; one of the two
-  std::string shape_is = "reference";
-  Vector3 gravity = Vector3::Zero();  ///< [m/s^2]
-  std::vector<FixedRegion> fixed;
+  Scene scene;  ///< surface, mass or density, gravity, and where the object is held
 
   std::vector<LensCamera> cameras;
   std::vector<FramePattern> images;  ///< by camera, relative to `folder`

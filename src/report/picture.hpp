@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "base/types.hpp"
-#include "capture/capture.hpp"
 #include "geometry/triangle_mesh.hpp"
 #include "report/image.hpp"
+#include "scene/scene.hpp"
 
 namespace pliant {
 

@@ -26,7 +26,8 @@ constexpr int least_readings = 100;                                // on an obje
 }
 
 std::vector<int> frames_at_rest(const Capture& capture, const DepthCamera& camera, const ScanChoice& choice) {
-  const int by_default = capture.is_static ? capture.frame_count() - 1 : std::max(0, capture.start_frame - 1);
+  const int by_default =
+      capture.scene.timing.is_static ? capture.frame_count() - 1 : std::max(0, capture.scene.timing.start_frame - 1);
   const int last = choice.last_frame.value_or(by_default);
   if (last < 0 || last >= capture.frame_count())
     fail(capture, "the last frame of the scan is " + std::to_string(last),
@@ -106,7 +107,7 @@ std::optional<FoundPlane> largest_level_plane(const Capture& capture, const std:
   for (std::size_t c = 0; c < scenes.size(); ++c)
     for (int i = 0; i < int(scenes[c].planes.size()); ++i) {
       const PlaneFit& fit = scenes[c].planes[std::size_t(i)];
-      const double cosine = fit.normal.dot(capture.up);
+      const double cosine = fit.normal.dot(capture.scene.world.up);
       const int pixels = free_pixels(scenes[c], i, averages[c].mask);
       if (std::abs(cosine) < std::cos(greatest_tilt) || pixels <= (best ? best->pixels : 0)) continue;
       best.emplace();
@@ -118,11 +119,11 @@ std::optional<FoundPlane> largest_level_plane(const Capture& capture, const std:
 
 void find_support(const Capture& capture, const std::vector<Segmentation>& scenes, const std::vector<Average>& averages,
                   ScanViews& result) {
-  if (!capture.planes.empty()) {
-    const auto found = find_plane(capture, capture.planes[0]);
-    result.plane = capture.planes[0];
+  if (!capture.scene.planes.empty()) {
+    const auto found = find_plane(capture, capture.scene.planes[0]);
+    result.plane = capture.scene.planes[0];
     if (found) result.plane_rms = found->rms;
-    if (found && !capture.planes[0].known) result.plane = Plane(*found);
+    if (found && !capture.scene.planes[0].known) result.plane = Plane(*found);
     return;
   }
   const auto found = largest_level_plane(capture, scenes, averages);

@@ -7,11 +7,9 @@
 #include <algorithm>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <stdexcept>
 
 #include "base/files.hpp"
-#include "capture/toml_facts.hpp"
 #include "geometry/mesh_io.hpp"
 #include "rays/ray_scene.hpp"
 
@@ -29,19 +27,23 @@ std::string image_name(const SyntheticCamera& camera, int frame) {
 std::string mask_name(const SyntheticCamera& camera, int frame) {
   return fmt::format("{}/mask_{:06}.png", camera.name, frame);
 }
-std::string vertices_name(size_t region) { return fmt::format("fixed_{}.txt", region); }
 
 void check(const Synthesis& s) {
   const auto require = [](bool good, const char* what) {
     if (!good) throw std::invalid_argument(std::string("write_synthetic_capture: ") + what);
   };
-  require(!s.rest.vertices.empty() && !s.trajectory.empty(), "a surface and at least one frame are needed");
+  const Object& object = s.scene.object;
+  require(object.surface && !object.surface->vertices.empty() && !s.trajectory.empty(),
+          "a surface and at least one frame are needed");
   for (const Points& frame : s.trajectory)
-    require(size_t(frame.rows()) == s.rest.vertices.size() && frame.allFinite(),
+    require(size_t(frame.rows()) == object.surface->vertices.size() && frame.allFinite(),
             "a frame does not fit the surface, or is not finite");
-  require(s.mass.has_value() != s.density.has_value(), "exactly one of mass and density is needed");
+  require(object.mass.has_value() != object.density.has_value(), "exactly one of mass and density is needed");
   require(!s.cameras.empty(), "at least one camera is needed");
-  require(s.frame_rate > 0.0 && s.start_frame >= 0 && s.start_frame < int(s.trajectory.size()),
+  require(s.plane_half_sizes.size() == s.scene.planes.size(), "each plane needs a visible size");
+  const Timing& timing = s.scene.timing;
+  require(timing.frame_rate > 0.0 && timing.start_frame >= 0 && timing.start_frame < timing.frame_count() &&
+              timing.frame_count() == int(s.trajectory.size()),
           "the timing makes no sense");
   for (const SyntheticCamera& camera : s.cameras)
     require(!camera.name.empty() && camera.every >= 1 && camera.depth_scale > 0.0 && camera.sensor.validate().empty(),
@@ -49,24 +51,26 @@ void check(const Synthesis& s) {
 }
 
 // The visible square of a plane around the object.
-TriangleMesh patch(const SceneryPlane& scenery, const Vector3& centre) {
-  const Vector3& n = scenery.plane.normal;
-  const Vector3 middle = centre - n.dot(centre - scenery.plane.point) * n;
-  const Vector3 a = scenery.half_size * n.unitOrthogonal(), b = n.cross(a);
+TriangleMesh patch(const Plane& plane, double half_size, const Vector3& centre) {
+  const Vector3& n = plane.normal;
+  const Vector3 middle = centre - n.dot(centre - plane.point) * n;
+  const Vector3 a = half_size * n.unitOrthogonal(), b = n.cross(a);
   return {{middle - a - b, middle + a - b, middle + a + b, middle - a + b}, {{0, 1, 2}, {0, 2, 3}}};
 }
 
 RayScene scene_of(const Synthesis& s, const Points& frame) {
   RayScene scene;
-  scene.add(frame, s.rest.triangles);
-  const Box box = bounding_box(s.rest);
-  for (const SceneryPlane& scenery : s.planes)
-    if (scenery.half_size > 0.0) scene.add(patch(scenery, 0.5 * (box.min + box.max)));
+  const TriangleMesh& rest = *s.scene.object.surface;
+  scene.add(frame, rest.triangles);
+  const Box box = bounding_box(rest);
+  for (size_t i = 0; i < s.scene.planes.size(); ++i)
+    if (s.plane_half_sizes[i] > 0.0)
+      scene.add(patch(s.scene.planes[i], s.plane_half_sizes[i], 0.5 * (box.min + box.max)));
   return scene;
 }
 
 TriangleMesh scanned(const Synthesis& s) {
-  TriangleMesh mesh = s.rest;
+  TriangleMesh mesh = *s.scene.object.surface;
   const std::vector<Vector3> normals = vertex_normals(mesh);
   if (s.scan_noise > 0.0)
     for (size_t i = 0; i < mesh.vertices.size(); ++i)
@@ -76,38 +80,30 @@ TriangleMesh scanned(const Synthesis& s) {
 
 // A typical reading's deviation: at the object's distance, with the steps' rounding.
 double typical_noise(const Synthesis& s, const SyntheticCamera& camera) {
-  const Box box = bounding_box(s.rest);
+  const Box box = bounding_box(*s.scene.object.surface);
   const double depth = camera.camera.project(0.5 * (box.min + box.max)).z();
   const double step = std::max(camera.sensor.step, 1.0 / camera.depth_scale);
   return std::sqrt(std::pow(camera.sensor.noise(depth), 2) + step * step / 12.0);
 }
 
-void write_camera(std::ostream& out, const Synthesis& s, const SyntheticCamera& camera) {
-  const PinholeCamera& c = camera.camera;
-  out << "[[depth]]\nname = " << toml_text(camera.name) << "\nwidth = " << c.width << "\nheight = " << c.height;
-  for (const auto& [key, value] : {std::pair{"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}})
-    out << "\n" << key << " = " << toml_text(value);
-  out << "\ncamera_to_world = " << toml_text(c.camera_to_world) << "\nimages = " << toml_text(camera.name + "/%06d.png")
-      << "\nmasks = " << toml_text(camera.name + "/mask_%06d.png")
-      << "\ndepth_scale = " << toml_text(camera.depth_scale) << "\nevery = " << camera.every
-      << "\nnoise = " << fmt::format("{:.3g}", typical_noise(s, camera)) << "   # m\n\n";
-}
+// Three digits: what a user would write down.
+double rounded(double noise) { return std::stod(fmt::format("{:.3g}", noise)); }
 
-std::string capture_toml(const Synthesis& s) {
-  std::ostringstream out;
-  out << "# A synthetic recording; its truth is in truth.json.\nformat = \"capture/1\"\nname = " << toml_text(s.name)
-      << "\n\n[object]\nsurface = \"rest.ply\"\n";
-  if (s.mass) out << "mass = " << toml_text(*s.mass) << "   # kg\n";
-  if (s.density) out << "density = " << toml_text(*s.density) << "   # kg/m^3\n";
-  out << "\n[world]\ngravity = " << toml_text(s.gravity) << "   # m/s^2\n";
-  if (s.gravity.norm() == 0.0) out << "up = [0.0, 1.0, 0.0]\n";
-  out << "\n[timing]\nframe_rate = " << toml_text(s.frame_rate) << "\nframe_count = " << s.trajectory.size()
-      << "\nstart_frame = " << s.start_frame << "\n\n";
-  write_toml(out, s.initial);
-  for (const SceneryPlane& scenery : s.planes) write_toml(out, scenery.plane);
-  for (size_t i = 0; i < s.fixed.size(); ++i) write_toml(out, s.fixed[i], vertices_name(i));
-  for (const SyntheticCamera& camera : s.cameras) write_camera(out, s, camera);
-  return std::move(out).str();
+Capture capture_of(const Synthesis& s, const fs::path& folder) {
+  Capture capture;
+  capture.name = s.name;
+  capture.scene = s.scene;
+  capture.scene.object.file = folder / "rest.ply";
+  for (const SyntheticCamera& camera : s.cameras)
+    capture.depth.push_back({camera.name,
+                             camera.camera,
+                             {camera.name + "/%06d.png"},
+                             camera.depth_scale,
+                             FramePattern{camera.name + "/mask_%06d.png"},
+                             {},
+                             camera.every,
+                             rounded(typical_noise(s, camera))});
+  return capture;
 }
 
 nlohmann::ordered_json vector_json(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
@@ -128,9 +124,6 @@ std::string truth_json(const Synthesis& s) {
 
 void write_facts(const fs::path& folder, const Synthesis& s) {
   write_mesh(folder / "rest.ply", scanned(s));
-  for (size_t i = 0; i < s.fixed.size(); ++i)
-    if (const auto* vertices = std::get_if<RegionVertices>(&s.fixed[i].region))
-      write_file(folder / vertices_name(i), fmt::format("{}\n", fmt::join(vertices->indices, "\n")));
   write_file(folder / "truth.json", truth_json(s));
 }
 
@@ -144,7 +137,7 @@ void write_frame(const fs::path& folder, const Synthesis& s, int frame) {
     write_png(folder / mask_name(camera, frame), seen.mask);
   }
   if (!s.write_trajectory) return;
-  TriangleMesh mesh{{}, s.rest.triangles};
+  TriangleMesh mesh{{}, s.scene.object.surface->triangles};
   for (Eigen::Index i = 0; i < s.trajectory[frame].rows(); ++i) mesh.vertices.emplace_back(s.trajectory[frame].row(i));
   write_mesh(folder / fmt::format("truth/{:06}.ply", frame), mesh);
 }
@@ -164,7 +157,7 @@ void write_synthetic_capture(const fs::path& folder, const Synthesis& synthesis,
     ++done;
     if (progress) progress(done, frames);
   });
-  write_file(folder / "capture.toml", capture_toml(synthesis));  // last: a folder with it is whole
+  write_capture(folder, capture_of(synthesis, folder), "A synthetic recording; its truth is in truth.json.");
 }
 
 }  // namespace pliant

@@ -13,12 +13,6 @@
 
 namespace pliant {
 
-/// An obstacle, and how much of it the cameras see.
-struct SceneryPlane {
-  Plane plane;
-  double half_size = 1.0;  ///< [m] half the edge of the visible square around the object; 0: invisible
-};
-
 /// A depth camera of a synthetic recording.
 struct SyntheticCamera {
   std::string name;
@@ -38,15 +32,10 @@ struct TrueParameter {
 /// A recording that is known completely.
 struct Synthesis {
   std::string name;
-  TriangleMesh rest;               ///< surface at rest, world [m]
-  std::vector<Points> trajectory;  ///< its vertices in each frame, n x 3 [m]
-  double frame_rate = 60.0;        ///< [Hz]
-  int start_frame = 0;
-  std::optional<double> mass, density;  ///< exactly one of them
-  Vector3 gravity = Vector3(0.0, -9.81, 0.0);
-  std::vector<SceneryPlane> planes;
-  std::vector<FixedRegion> fixed;
-  Initial initial;
+  Scene scene;                           ///< the object's surface at rest, exactly one of its mass and density; timing
+  std::vector<double> plane_half_sizes;  ///< [m] of each plane: half the edge of the square that cameras see around the
+                                         ///< object; 0: invisible
+  std::vector<Points> trajectory;        ///< the surface's vertices in each frame, n x 3 [m]
   std::vector<SyntheticCamera> cameras;
   std::vector<TrueParameter> truth;
   std::uint64_t seed = 1;

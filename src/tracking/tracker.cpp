@@ -449,7 +449,7 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
             const VectorX& theta, const std::vector<ObservedFrame>& observed, const std::vector<Vector3>& markers,
             const std::map<int, std::vector<TrackObservation>>& seen_markers, const TrackOptions& options,
             const std::function<bool(int, int)>& progress) {
-  if (std::ranges::any_of(capture.fixed, [](const FixedRegion& f) { return f.displaced_to.has_value(); }))
+  if (std::ranges::any_of(capture.scene.fixed, [](const FixedRegion& f) { return f.displaced_to.has_value(); }))
     throw InputError({{capture.file},
                       "a held region is moved from rest (displaced_to)",
                       "regions held where they are at rest",
@@ -487,16 +487,16 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
   std::vector<PinholeCamera> cameras;
   if (capture.clouds.empty())
     for (const DepthCamera& depth : capture.depth) cameras.push_back(depth.camera);
-  Tracker tracker(result.body, still, own, *capture.surface, std::move(cameras), markers, int(quantile(counts, 0.5)),
-                  all > 0 ? std::sqrt(squares / double(all)) : 0.0, options);
+  Tracker tracker(result.body, still, own, *capture.scene.object.surface, std::move(cameras), markers,
+                  int(quantile(counts, 0.5)), all > 0 ? std::sqrt(squares / double(all)) : 0.0, options);
   result.surface = tracker.surface();
   result.marks = tracker.marks();
 
-  const bool held_before = capture.initial.released || capture.is_static;
-  const int first = held_before ? 0 : capture.start_frame, frames = capture.frame_count();
+  const bool held_before = capture.scene.initial.released || capture.scene.timing.is_static;
+  const int first = held_before ? 0 : capture.scene.timing.start_frame, frames = capture.frame_count();
   for (int f = first; f < frames; ++f) {
-    const bool at_rest = held_before && (capture.is_static || f <= capture.start_frame);
-    const double time = capture.times[std::size_t(f)];
+    const bool at_rest = held_before && (capture.scene.timing.is_static || f <= capture.scene.timing.start_frame);
+    const double time = capture.scene.timing.times[std::size_t(f)];
     const TrackView& view = views[f];
     if (at_rest && view.points.empty() && view.markers.empty()) continue;
     TrackedFrame frame;
@@ -505,7 +505,7 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
     } else if (f == first) {  // a falling object is, when it is let go, where it was scanned
       frame = tracker.compare(view);
     } else {
-      frame = tracker.advance(time - capture.times[std::size_t(f) - 1], view);
+      frame = tracker.advance(time - capture.scene.timing.times[std::size_t(f) - 1], view);
     }
     frame.frame = f, frame.time = time;
     result.frames.push_back(std::move(frame));

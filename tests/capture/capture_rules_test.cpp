@@ -61,7 +61,7 @@ const Slip slips[] = {
     {"OneTableTwice", "[timing]", "[[timing]]", "expected a table [timing]", "[[timing]]"},
     {"BlockWithSingleBrackets", "[[plane]]", "[plane]", "expected blocks [[plane]]", "[plane]"},
     {"SurfaceMissing", "rest.ply", "rset.ply", "\"rset.ply\" is not there", "surface"},
-    {"AbsolutePath", "\"rest.ply\"", "\"/rest.ply\"", "relative to the capture's folder", "surface"},
+    {"AbsolutePath", "\"rest.ply\"", "\"/rest.ply\"", "relative to the folder", "surface"},
     {"ShapeIs", "mass = 0.8", "mass = 0.8\nshape_is = \"loaded\"", "expected \"reference\" or \"static\"", "shape_is"},
     {"MassInGrams", "mass = 0.8", "mass = 800.0", "mass is in kilograms", "mass"},
     {"MassZero", "mass = 0.8", "mass = 0.0", "expected a number above 0", "mass"},
@@ -71,7 +71,7 @@ const Slip slips[] = {
     {"NeitherGravityNorUp", "gravity = [0.0, 9.81, 0.0]", "", "neither `gravity` nor `up`", "[world]"},
     {"UpAlongGravity", "gravity = [0.0, 9.81, 0.0]", "gravity = [0.0, 9.81, 0.0]\nup = [0, 1, 0]",
      "does not point against", "up ="},
-    {"UpWithoutLength", "gravity = [0.0, 9.81, 0.0]", "up = [0, 0, 0]", "no length", "up ="},
+    {"UpWithoutLength", "gravity = [0.0, 9.81, 0.0]", "up = [0, 0, 0]", "without length", "up ="},
     {"NoRate", "frame_rate = 60.0", "", "neither `frame_rate` nor `timestamps`", "[timing]"},
     {"NoCount", "frame_count = 4", "", "has no `frame_count`", "[timing]"},
     {"RateZero", "frame_rate = 60.0", "frame_rate = 0.0", "expected above 0", "frame_rate"},
@@ -87,7 +87,7 @@ const Slip slips[] = {
     {"SpinInDegrees", "[[plane]]", "[initial]\nangular_velocity = [0, 3600, 0]\n[[plane]]", "radians per second",
      "angular_velocity"},
     {"PlaneTurnedRound", "normal = [0.0, -2.0, 0.0]", "normal = [0.0, 1.0, 0.0]", "below this plane", "[[plane]]"},
-    {"PlaneWithoutNormal", "normal = [0.0, -2.0, 0.0]", "normal = [0, 0, 0]", "a normal without length",
+    {"PlaneWithoutNormal", "normal = [0.0, -2.0, 0.0]", "normal = [0, 0, 0]", "a direction without length",
      "normal = [0, 0, 0]"},
     {"FixedOutside", "[[plane]]", "[[fixed]]\nsphere = { centre = [1, 0, 0], radius = 0.02 }\n[[plane]]",
      "no point of the object lies in this fixed region", "[[fixed]]"},
@@ -100,7 +100,7 @@ const Slip slips[] = {
     {"BoxInsideOut", "[[plane]]", "[[fixed]]\nbox = { min = [1, 0, 0], max = [0, 1, 1] }\n[[plane]]", "swap them",
      "box = {"},
     {"SphereRadius", "[[plane]]", "[[fixed]]\nsphere = { centre = [0, 0, 0], radius = 0 }\n[[plane]]",
-     "a radius of 0 or less", "sphere"},
+     "`radius` is 0; expected above 0; a radius in metres", "sphere"},
     {"DisplacedByAShear", "[[plane]]",
      "[[fixed]]\nvertices = \"held.txt\"\ndisplaced_to = [[1, 0.5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, "
      "1]]\n[[plane]]",
@@ -174,10 +174,10 @@ TEST(CaptureRules, TakeTetrahedraInPlaceOfASurface) {
   small.folder.write("rest.vtk", box_of_tetrahedra("0.1"));
   small.edit("surface = \"rest.ply\"", "volume_mesh = \"rest.vtk\"");
   const Capture capture = small.read();
-  ASSERT_TRUE(capture.volume && capture.surface);
-  EXPECT_EQ(capture.volume->tets.size(), 6u);
-  EXPECT_EQ(capture.surface->triangles.size(), 12u);
-  EXPECT_NEAR(enclosed_volume(*capture.surface), 0.008, 1e-9);  // the file has single precision
+  ASSERT_TRUE(capture.scene.object.volume && capture.scene.object.surface);
+  EXPECT_EQ(capture.scene.object.volume->tets.size(), 6u);
+  EXPECT_EQ(capture.scene.object.surface->triangles.size(), 12u);
+  EXPECT_NEAR(enclosed_volume(*capture.scene.object.surface), 0.008, 1e-9);  // the file has single precision
   EXPECT_NE(capture.sha256, SmallCapture().read().sha256);
 }
 
@@ -400,9 +400,9 @@ TEST(CaptureRules, CheckRelease) {
   EXPECT_THAT(complaint_of([&] { (void)weightless.read(); }), HasSubstr("a hung weight without gravity"));
   SmallCapture small;
   const Capture capture = small.append("\n[initial]\nreleased = true\n" + good).read();
-  ASSERT_TRUE(capture.initial.release_of);
-  EXPECT_EQ(capture.initial.release_of->mass, 0.1);
-  EXPECT_EQ(capture.initial.release_of->at, Vector3(0, 0.1, 0));
+  ASSERT_TRUE(capture.scene.initial.release_of);
+  EXPECT_EQ(capture.scene.initial.release_of->mass, 0.1);
+  EXPECT_EQ(capture.scene.initial.release_of->at, Vector3(0, 0.1, 0));
 }
 
 TEST(CaptureRules, CheckWeights) {
@@ -417,9 +417,9 @@ TEST(CaptureRules, CheckWeights) {
   EXPECT_THAT(said("mass = 0.1\nat = [0, 0.1, 0]\nforce = 3"), HasSubstr("unknown key `force`"));
   SmallCapture small;
   const Capture capture = small.append("\n[[weight]]\nmass = 0.1\nat = [0, 0.1, 0]\n").read();
-  ASSERT_EQ(capture.weights.size(), 1u);
-  EXPECT_EQ(capture.weights[0].mass, 0.1);
-  EXPECT_EQ(capture.weights[0].at, Vector3(0, 0.1, 0));
+  ASSERT_EQ(capture.scene.weights.size(), 1u);
+  EXPECT_EQ(capture.scene.weights[0].mass, 0.1);
+  EXPECT_EQ(capture.scene.weights[0].at, Vector3(0, 0.1, 0));
 }
 
 TEST(CaptureRules, CheckClouds) {

@@ -17,18 +17,18 @@ TEST(ReadCapture, GivesWhatIsWritten) {
   const Capture capture = small.read();
   EXPECT_EQ(capture.name, "box");
   EXPECT_TRUE(capture.folder.is_absolute());
-  EXPECT_EQ(capture.mass, 0.8);
-  EXPECT_EQ(capture.density, std::nullopt);
-  EXPECT_EQ(capture.up, Vector3(0, -1, 0));
+  EXPECT_EQ(capture.scene.object.mass, 0.8);
+  EXPECT_EQ(capture.scene.object.density, std::nullopt);
+  EXPECT_EQ(capture.scene.world.up, Vector3(0, -1, 0));
   EXPECT_EQ(capture.frame_count(), 4);
-  EXPECT_DOUBLE_EQ(capture.times[3], 3 / 60.0);
-  EXPECT_EQ(capture.start_frame, 1);
-  ASSERT_EQ(capture.planes.size(), 1u);
-  EXPECT_EQ(capture.planes[0].normal, Vector3(0, -1, 0)) << "of unit length";
+  EXPECT_DOUBLE_EQ(capture.scene.timing.times[3], 3 / 60.0);
+  EXPECT_EQ(capture.scene.timing.start_frame, 1);
+  ASSERT_EQ(capture.scene.planes.size(), 1u);
+  EXPECT_EQ(capture.scene.planes[0].normal, Vector3(0, -1, 0)) << "of unit length";
   ASSERT_EQ(capture.depth.size(), 1u);
   EXPECT_EQ(capture.depth[0].images(3), "front/000003.png");
   EXPECT_EQ(capture.depth[0].camera.camera_to_world.translation, Vector3(0, 0, -1));
-  EXPECT_TRUE(std::holds_alternative<RegionHalfSpace>(capture.regions.at(0).region));
+  EXPECT_TRUE(std::holds_alternative<RegionHalfSpace>(capture.scene.regions.at(0).region));
 }
 
 TEST(ReadCapture, TakesFolderOrFile) {
@@ -51,14 +51,14 @@ TEST(ReadCapture, TakesACaptureWithoutRestScan) {
   SmallCapture small;
   small.edit("surface = \"rest.ply\"\n", "");
   const Capture capture = small.read();
-  EXPECT_FALSE(capture.surface.has_value());
-  EXPECT_EQ(capture.total_mass(), 0.8);
+  EXPECT_FALSE(capture.scene.object.surface.has_value());
+  EXPECT_EQ(capture.scene.object.total_mass(), 0.8);
 }
 
 TEST(ReadCapture, WeighsByDensity) {
   SmallCapture small;
   small.edit("mass = 0.8", "density = 100.0");
-  EXPECT_NEAR(small.read().total_mass().value(), 0.8, 1e-12);
+  EXPECT_NEAR(small.read().scene.object.total_mass().value(), 0.8, 1e-12);
 }
 
 TEST(ReadCapture, TakesPathsAboveItsFolder) {

@@ -38,11 +38,11 @@ class SeenInEveryWay : public ::testing::Test {
   SeenInEveryWay() {
     capture_.name = "bar";
     capture_.file = folder_.path() / "capture.toml";
-    capture_.surface = make_box(Vector3(length, edge, edge), 0.0125);
-    capture_.density = 300.0;
-    capture_.gravity = Vector3(0.0, -9.81, 0.0);
-    for (int f = 0; f < frames; ++f) capture_.times.push_back(f / 30.0);
-    capture_.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
+    capture_.scene.object.surface = make_box(Vector3(length, edge, edge), 0.0125);
+    capture_.scene.object.density = 300.0;
+    capture_.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
+    for (int f = 0; f < frames; ++f) capture_.scene.timing.times.push_back(f / 30.0);
+    capture_.scene.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
     DepthCamera camera;
     camera.name = "front";
     capture_.depth = {camera};
@@ -63,7 +63,9 @@ class SeenInEveryWay : public ::testing::Test {
 
   Vector3 error() { return noise * Vector3(normal_(random_), normal_(random_), normal_(random_)); }
 
-  CaptureParameters parameters() const { return default_parameters(capture_, enclosed_volume(*capture_.surface)); }
+  CaptureParameters parameters() const {
+    return default_parameters(capture_, enclosed_volume(*capture_.scene.object.surface));
+  }
   Discretisation discretised(const CaptureParameters& p, const VectorX& theta) const {
     Resolution resolution;
     resolution.cells = 10.0;
@@ -79,21 +81,20 @@ class SeenInEveryWay : public ::testing::Test {
     SimulationOptions options = d.simulation;
     options.weights = weights;
     if (at_rest) options.is_static = true, options.times = {0.0};
-    const RolloutSummary summary =
-        Simulation(d.body, options).run(theta, [&](int frame, const State& state, auto) {
-          see(frame, *d.body, state.x);
-          return true;
-        });
+    const RolloutSummary summary = Simulation(d.body, options).run(theta, [&](int frame, const State& state, auto) {
+      see(frame, *d.body, state.x);
+      return true;
+    });
     ASSERT_TRUE(summary.succeeded) << summary.failure;
   }
 
   void record(const Truths& truths) {
     run(truths.depth, false, {}, [&](int frame, const Body& body, const Points& nodes) {
-      const Points x = Embedding(body, capture_.surface->vertices).positions(nodes);
+      const Points x = Embedding(body, capture_.scene.object.surface->vertices).positions(nodes);
       ObservedFrame seen;
       seen.frame = frame;
       for (Eigen::Index v = 0; v < x.rows(); ++v) {
-        if (capture_.surface->vertices[std::size_t(v)].z() < 0.0) continue;
+        if (capture_.scene.object.surface->vertices[std::size_t(v)].z() < 0.0) continue;
         seen.points.push_back(Vector3(x.row(v)) + error());
         seen.noise.push_back(float(noise));
         seen.view.emplace_back(-Vector3::UnitZ());
@@ -134,7 +135,7 @@ class SeenInEveryWay : public ::testing::Test {
     resolution.element = ElementKind::Tetrahedron;
     std::vector<Vector3> control_points;
     const PressScene scene =
-        make_press_scene(pressed, make_body_of(pressed, SignedDistance(), resolution, control_points));
+        make_press_scene(pressed, make_body_of(pressed.scene, SignedDistance(), resolution, control_points));
     const LawLayout layout({1, 0});
     const auto law = press_law(*scene.body, layout, law_parameters(layout, youngs_modulus).reference());
     PressedBody body(scene, 0, law, youngs_modulus);
@@ -172,8 +173,8 @@ class SeenInEveryWay : public ::testing::Test {
     VectorX start = set.reference();
     recordings.material().set_moduli(start, 1.2 * modulus);
     set.set_reference(start);
-    Objective objective = recordings.objective(recordings.grid(10.0, 1.0), set, 0.2,
-                                               [](const Recording& r) { return r.last_frame; });
+    Objective objective =
+        recordings.objective(recordings.grid(10.0, 1.0), set, 0.2, [](const Recording& r) { return r.last_frame; });
     const OptimiserSummary s = minimise(objective, set.to_unconstrained(start), {});
     EXPECT_TRUE(s.succeeded) << s.reason;
     return set.to_theta(s.p)[recordings.material().youngs_moduli.front()];

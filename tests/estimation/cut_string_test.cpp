@@ -95,19 +95,19 @@ TEST(CutString, AnchorsModulusAndDensity) {
 /// A bar of which a capture knows that it hangs under a weight until the start.
 struct ReleasedCapture : ::testing::Test {
   ReleasedCapture() {
-    capture.surface = make_box(Vector3(2 * length, 2 * edge, 2 * edge), edge);
-    capture.gravity = Vector3(0, -9.81, 0);
-    capture.fixed = {{RegionHalfSpace{{-0.9 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
-    capture.times = {0.0, 0.1};
-    capture.initial.released = true;
-    capture.initial.release_of = Weight{0.02, Vector3(length, 0, 0)};
+    capture.scene.object.surface = make_box(Vector3(2 * length, 2 * edge, 2 * edge), edge);
+    capture.scene.world.gravity = Vector3(0, -9.81, 0);
+    capture.scene.fixed = {{RegionHalfSpace{{-0.9 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
+    capture.scene.timing.times = {0.0, 0.1};
+    capture.scene.initial.released = true;
+    capture.scene.initial.release_of = Weight{0.02, Vector3(length, 0, 0)};
   }
   Capture capture;
 };
 
 TEST_F(ReleasedCapture, HasTheWeightAndNoPulls) {
   Resolution resolution;
-  EXPECT_EQ(pull_count(capture, resolution), 0);
+  EXPECT_EQ(pull_count(capture.scene, resolution), 0);
   const auto [parameters, blocks] = default_parameters(capture, 1e-4);
   const Discretisation d =
       discretise(capture, capture_distance(capture, resolution.band), resolution, blocks, parameters.reference());
@@ -116,8 +116,8 @@ TEST_F(ReleasedCapture, HasTheWeightAndNoPulls) {
   ASSERT_EQ(d.simulation.released_weights.size(), 1u);
   EXPECT_EQ(d.simulation.released_weights[0].mass, 0.02);
   EXPECT_EQ(d.simulation.released_weights[0].at, Vector3(length, 0, 0));
-  capture.initial.release_of.reset();
-  EXPECT_EQ(pull_count(capture, resolution), resolution.pulls);
+  capture.scene.initial.release_of.reset();
+  EXPECT_EQ(pull_count(capture.scene, resolution), resolution.pulls);
 }
 
 TEST_F(ReleasedCapture, EstimatesTheDensityOnlyWhereNobodyKnowsIt) {
@@ -129,9 +129,9 @@ TEST_F(ReleasedCapture, EstimatesTheDensityOnlyWhereNobodyKnowsIt) {
   };
   EXPECT_TRUE(is_estimated(capture));
   Capture weighed = capture;
-  weighed.mass = 0.1;
+  weighed.scene.object.mass = 0.1;
   EXPECT_FALSE(is_estimated(weighed));
-  capture.initial.release_of.reset();
+  capture.scene.initial.release_of.reset();
   EXPECT_FALSE(is_estimated(capture));
 }
 

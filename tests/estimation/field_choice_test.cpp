@@ -172,24 +172,24 @@ RecordedCapture sagging_bar(double beyond, const Vector3& gravity = {0.0, -9.81,
   RecordedCapture recorded;
   Capture& capture = recorded.capture;
   capture.name = "bar";
-  capture.surface = make_box(Vector3(length, edge, edge), 0.0125);
-  capture.density = 400.0;
-  capture.gravity = gravity;
-  capture.up = -gravity.normalized();
-  capture.is_static = true;
-  capture.times = {0.0};
-  capture.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
+  capture.scene.object.surface = make_box(Vector3(length, edge, edge), 0.0125);
+  capture.scene.object.density = 400.0;
+  capture.scene.world.gravity = gravity;
+  capture.scene.world.up = -gravity.normalized();
+  capture.scene.timing.is_static = true;
+  capture.scene.timing.times = {0.0};
+  capture.scene.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
   capture.clouds = {{{"cloud.ply"}, 1, noise}};
   Capture zoned = capture;
-  zoned.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
-  const auto [parameters, blocks] = default_parameters(zoned, enclosed_volume(*capture.surface), 2);
+  zoned.scene.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  const auto [parameters, blocks] = default_parameters(zoned, enclosed_volume(*capture.scene.object.surface), 2);
   VectorX theta = parameters.reference();
   theta[blocks.motion.youngs_moduli[0]] = stiff;
   theta[blocks.motion.youngs_moduli[1]] = beyond;
   Resolution resolution;
   resolution.cells = 16.0;
   const Discretisation d = discretise(zoned, capture_distance(zoned, 0.2), resolution, blocks, theta);
-  const Embedding embedding(*d.body, capture.surface->vertices);
+  const Embedding embedding(*d.body, capture.scene.object.surface->vertices);
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   ObservedFrame seen;
@@ -293,7 +293,7 @@ TEST(FieldChoice, AnInterruptedChoiceGoesOnToTheSameEnd) {
 
 TEST(FieldChoice, RegionsLeaveNothingToChoose) {
   RecordedCapture bar = sagging_bar(soft);
-  bar.capture.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  bar.capture.scene.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
   const FitOutcome outcome = fit({bar}, quick());
   EXPECT_EQ(controls(outcome), 2);
   EXPECT_TRUE(outcome.fields.empty());

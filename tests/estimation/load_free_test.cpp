@@ -14,11 +14,12 @@ constexpr double length = 0.3;
 /// A bar along x as it was scanned, clamped at its low end.
 Capture scanned_bar() {
   Capture capture;
-  capture.surface = make_box(Vector3(length, 0.02, 0.03), 0.02);
-  for (Vector3& v : capture.surface->vertices) v += 0.5 * Vector3(length, 0.02, 0.03);  // one corner at the origin
-  capture.mass = 0.18;
-  capture.gravity = Vector3(0.0, -9.81, 0.0);
-  capture.fixed = {{RegionBox{Vector3::Constant(-0.01), Vector3(0.001, 0.04, 0.04)}, {}}};
+  capture.scene.object.surface = make_box(Vector3(length, 0.02, 0.03), 0.02);
+  for (Vector3& v : capture.scene.object.surface->vertices)
+    v += 0.5 * Vector3(length, 0.02, 0.03);  // one corner at the origin
+  capture.scene.object.mass = 0.18;
+  capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
+  capture.scene.fixed = {{RegionBox{Vector3::Constant(-0.01), Vector3(0.001, 0.04, 0.04)}, {}}};
   return at_rest(capture);
 }
 
@@ -26,7 +27,7 @@ LoadFree load_free(const Capture& capture, double youngs_modulus) {
   Resolution resolution;
   resolution.element = ElementKind::QuadraticTetrahedron;
   resolution.cells = 8.0;
-  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.surface));
+  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.scene.object.surface));
   VectorX theta = parameters.reference();
   blocks.motion.set_moduli(theta, youngs_modulus);
   return find_load_free(capture, resolution, blocks, theta);
@@ -56,10 +57,10 @@ TEST(LoadFree, AMaterialThatCannotCarryTheBarIsNamed) {
 
 TEST(LoadFree, WhatCannotBeDoneIsRefused) {
   Capture loose = scanned_bar();
-  loose.fixed.clear();
+  loose.scene.fixed.clear();
   EXPECT_THROW((void)load_free(loose, 1e6), InputError);
   const Capture capture = scanned_bar();
-  const CaptureParameters p = default_parameters(capture, enclosed_volume(*capture.surface));
+  const CaptureParameters p = default_parameters(capture, enclosed_volume(*capture.scene.object.surface));
   EXPECT_THROW((void)find_load_free(capture, Resolution{}, p.blocks, p.set.reference()), InputError) << "hexahedra";
 }
 

@@ -217,12 +217,12 @@ TEST(Corrections, OnlyTheSensorThatStandsElsewhereNeedsCorrection) {
 struct TwoCaptures : ::testing::Test {
   TwoCaptures() {
     Capture capture;
-    capture.surface = make_box(Vector3(0.3, 0.1, 0.1), 0.1);
-    capture.density = 300.0;
-    capture.times = {0.0, 0.1};
-    capture.planes.resize(1);
+    capture.scene.object.surface = make_box(Vector3(0.3, 0.1, 0.1), 0.1);
+    capture.scene.object.density = 300.0;
+    capture.scene.timing.times = {0.0, 0.1};
+    capture.scene.planes.resize(1);
     capture.clouds = {{{"cloud.ply"}, 1, 1e-3}};
-    capture.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+    capture.scene.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
     recordings = {{capture, {}}, {capture, {}}};
   }
   JointLayout joint(const FitOptions& options = {}) const { return joint_layout(recordings, options, 2); }
@@ -270,9 +270,9 @@ TEST_F(TwoCaptures, ShareADensityWhereItIsEstimatedOrTheUserNamesIt) {
   named.parameters["density"].start = VectorX::Constant(1, 250.0);
   EXPECT_TRUE(is_shared(named));
   for (RecordedCapture& r : recordings) {
-    r.capture.density.reset();
-    r.capture.initial.released = true;
-    r.capture.initial.release_of = Weight{0.02, Vector3(0.3, 0.0, 0.0)};
+    r.capture.scene.object.density.reset();
+    r.capture.scene.initial.released = true;
+    r.capture.scene.initial.release_of = Weight{0.02, Vector3(0.3, 0.0, 0.0)};
   }
   EXPECT_TRUE(is_shared()) << "it is estimated";
 }
@@ -296,7 +296,7 @@ TEST_F(TwoCaptures, ArePartsOfTheirVector) {
 
 /// A number of control moduli is chosen on the way: all else stays.
 TEST_F(TwoCaptures, KeepAllButTheModuliWhereThereAreOthers) {
-  for (RecordedCapture& r : recordings) r.capture.regions.clear();
+  for (RecordedCapture& r : recordings) r.capture.scene.regions.clear();
   const JointLayout from = joint_layout(recordings, {}, 2), to = joint_layout(recordings, {}, 3);
   const VectorX theta = VectorX::LinSpaced(from.layout.size(), 1.0, from.layout.size());
   const Vector3 moduli(1e3, 2e3, 3e3);

@@ -23,13 +23,13 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
   RecordedCapture recorded;
   Capture& capture = recorded.capture;
   capture.name = "bar";
-  capture.surface = make_box(Vector3(length, edge, edge), 0.0125);
-  capture.density = 300.0;
-  capture.gravity = Vector3(0.0, -9.81, 0.0);
-  for (int f = 0; f < frames_seen; ++f) capture.times.push_back(f / 30.0);
-  capture.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
+  capture.scene.object.surface = make_box(Vector3(length, edge, edge), 0.0125);
+  capture.scene.object.density = 300.0;
+  capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
+  for (int f = 0; f < frames_seen; ++f) capture.scene.timing.times.push_back(f / 30.0);
+  capture.scene.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
   capture.clouds = {{{"cloud.ply"}, 1, noise}};
-  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.surface));
+  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.scene.object.surface));
   VectorX theta = parameters.reference();
   blocks.motion.set_moduli(theta, modulus);
   theta[blocks.motion.mass_damping] = 0.4;
@@ -37,7 +37,7 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
   Resolution resolution;
   resolution.cells = 16.0, resolution.steps = 2.0;
   const Discretisation d = discretise(capture, capture_distance(capture, 0.2), resolution, blocks, theta);
-  const Embedding embedding(*d.body, capture.surface->vertices);
+  const Embedding embedding(*d.body, capture.scene.object.surface->vertices);
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   const RolloutSummary summary = Simulation(d.body, d.simulation).run(theta, [&](int frame, const State& state, auto) {
@@ -45,7 +45,7 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
     ObservedFrame seen;
     seen.frame = frame;
     for (Eigen::Index v = 0; v < x.rows(); ++v) {
-      if (capture.surface->vertices[std::size_t(v)].z() < 0.0) continue;
+      if (capture.scene.object.surface->vertices[std::size_t(v)].z() < 0.0) continue;
       seen.points.push_back(Vector3(x.row(v)) + noise * Vector3(normal(random), normal(random), normal(random)));
       seen.noise.push_back(float(noise));
       seen.view.emplace_back(Vector3::Zero());
@@ -208,7 +208,7 @@ TEST(TrackingLoop, InterruptedAsItFollowsEndsWithTheBestSoFar) {
 TEST(TrackingLoop, GoesOnUntilNoModulusChanges) {
   FitOptions options = quickest(TrackingUse::Loop);
   RecordedCapture bar = swinging_bar(few);
-  bar.capture.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  bar.capture.scene.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
   constexpr double wrong = 5.0;
   options.parameters["youngs_modulus"] = {VectorX::Constant(1, modulus), false, {}};
   options.parameters["youngs_modulus@beyond"].start = VectorX::Constant(1, wrong * modulus);
@@ -231,7 +231,7 @@ TEST(TrackingLoop, IsWhereItSuits) {
   EXPECT_TRUE(tracks({bar}, {}));
   EXPECT_FALSE(tracks({bar}, quick(TrackingUse::Off)));
   RecordedCapture still = bar;
-  still.capture.is_static = true;
+  still.capture.scene.timing.is_static = true;
   EXPECT_FALSE(tracks({still}, {}));
   EXPECT_TRUE(tracks({still}, quick(TrackingUse::Loop))) << "on request";
   RecordedCapture one_camera = bar;
@@ -258,7 +258,7 @@ TEST(SupportedPoints, AreThoseAboutWhichPointsWereSeen) {
   const auto distance = capture_distance(bar.capture, 0.2);
   Resolution resolution;
   resolution.cells = 8.0;
-  const CaptureParameters p = default_parameters(bar.capture, enclosed_volume(*bar.capture.surface));
+  const CaptureParameters p = default_parameters(bar.capture, enclosed_volume(*bar.capture.scene.object.surface));
   track.body = discretise(bar.capture, distance, resolution, p.blocks, p.set.reference()).body;
   track.marks = {Vector3(0.1, 0.0, 0.02), Vector3(-0.1, 0.01, 0.0)};
   TrackedFrame frame;

@@ -14,19 +14,19 @@ using testing::HasSubstr;
 Model full_model() {
   Model m;
   m.name = "a \"soft\" ring \\ with\ttab";
-  m.surface = make_torus(0.15, 0.06, 12, 8);
+  m.scene.object.surface = make_torus(0.15, 0.06, 12, 8);
   m.youngs_modulus = 590.1234567890123, m.poisson_ratio = 1.0 / 3.0, m.mass_damping = 0.24, m.stiffness_damping = 0.027;
-  m.density = 95.0, m.mass = 0.456;
-  m.gravity = Vector3(0.1, -9.81, 1e-17);
-  m.planes = {{{0, 0.1, 0}, Vector3(0.6, 0.8, 0), false}, {}};
-  m.fixed = {{RegionBox{{-1, -1, -1}, {0.01, 1, 1}}, std::nullopt},
-             {RegionSphere{{0, 0, 1}, 0.02},
-              RigidMotion{Eigen::AngleAxisd(0.3, Vector3::UnitX()).toRotationMatrix(), {1, 2, 3}}},
-             {RegionHalfSpace{{0, 0, 0}, {1, 0, 0}}, std::nullopt},
-             {RegionVertices{{3, 1, 4}}, std::nullopt}};
-  m.weights = {{0.05, {0.01, -0.06, 0.15}}};
-  m.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true, {}, Weight{0.02, {0.1, 1.0 / 3.0, 0}}};
-  m.frames = 80, m.frame_rate = 60.0, m.start_frame = 4;
+  m.scene.object.density = 95.0, m.scene.object.mass = 0.456;
+  m.scene.world.gravity = Vector3(0.1, -9.81, 1e-17);
+  m.scene.planes = {{{0, 0.1, 0}, Vector3(0.6, 0.8, 0), false}, {}};
+  m.scene.fixed = {{RegionBox{{-1, -1, -1}, {0.01, 1, 1}}, std::nullopt},
+                   {RegionSphere{{0, 0, 1}, 0.02},
+                    RigidMotion{Eigen::AngleAxisd(0.3, Vector3::UnitX()).toRotationMatrix(), {1, 2, 3}}},
+                   {RegionHalfSpace{{0, 0, 0}, {1, 0, 0}}, std::nullopt},
+                   {RegionVertices{{3, 1, 4}}, std::nullopt}};
+  m.scene.weights = {{0.05, {0.01, -0.06, 0.15}}};
+  m.scene.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true, {}, Weight{0.02, {0.1, 1.0 / 3.0, 0}}};
+  m.scene.timing = evenly_timed(60.0, 80, 4);
   m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
   m.substeps = 4, m.theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;
   m.volume.nodes = Points::Random(12, 3);
@@ -42,19 +42,17 @@ TEST(Model, ComesBackAsItWasSaved) {
   save_model(folder.path(), m);
   const Model read = load_model(folder / "model.toml");
   EXPECT_EQ(read.name, m.name);
-  EXPECT_EQ(read.surface.triangles, m.surface.triangles);
-  for (size_t i = 0; i < m.surface.vertices.size(); ++i)
-    EXPECT_LT((read.surface.vertices[i] - m.surface.vertices[i]).norm(), 1e-7);
+  EXPECT_EQ(read.scene.object.surface->triangles, m.scene.object.surface->triangles);
+  for (size_t i = 0; i < m.scene.object.surface->vertices.size(); ++i)
+    EXPECT_LT((read.scene.object.surface->vertices[i] - m.scene.object.surface->vertices[i]).norm(), 1e-7);
   EXPECT_EQ(read.youngs_modulus, m.youngs_modulus);
   EXPECT_EQ(read.poisson_ratio, m.poisson_ratio);
   EXPECT_EQ(read.mass_damping, m.mass_damping);
   EXPECT_EQ(read.stiffness_damping, m.stiffness_damping);
-  EXPECT_EQ(read.density, m.density);
-  EXPECT_EQ(read.mass, m.mass);
-  EXPECT_EQ(read.gravity, m.gravity);
-  EXPECT_EQ(read.frames, 80);
-  EXPECT_EQ(read.frame_rate, 60.0);
-  EXPECT_EQ(read.start_frame, 4);
+  EXPECT_EQ(read.scene.object.density, m.scene.object.density);
+  EXPECT_EQ(read.scene.object.mass, m.scene.object.mass);
+  EXPECT_EQ(read.scene.world.gravity, m.scene.world.gravity);
+  EXPECT_EQ(read.scene.timing, m.scene.timing);
   EXPECT_EQ(read.cell_size, m.cell_size);
   EXPECT_EQ(read.grid_origin, m.grid_origin);
   EXPECT_EQ(read.substeps, 4);
@@ -87,7 +85,7 @@ TEST(Model, TakesTetrahedraMadeElsewhereAsOfOneMaterial) {
   EXPECT_EQ(read.volume.connectivity, (std::vector<int>{0, 1, 2, 3})) << "turned";
   EXPECT_EQ(read.volume.youngs_modulus, std::vector<double>{read.youngs_modulus});
   EXPECT_EQ(read.volume.poisson_ratio, std::vector<double>{read.poisson_ratio});
-  EXPECT_EQ(read.surface.triangles.size(), 4u);
+  EXPECT_EQ(read.scene.object.surface->triangles.size(), 4u);
 }
 
 TEST(Model, PlanesRegionsAndVelocitiesComeBack) {
@@ -95,38 +93,38 @@ TEST(Model, PlanesRegionsAndVelocitiesComeBack) {
   const Model m = full_model();
   save_model(folder.path(), m);
   const Model read = load_model(folder / "model.toml");
-  ASSERT_EQ(read.planes.size(), 2u);
-  EXPECT_LT((read.planes[0].normal - m.planes[0].normal).norm(), 1e-15);
-  EXPECT_FALSE(read.planes[0].known);
-  EXPECT_TRUE(read.planes[1].known);
-  ASSERT_EQ(read.weights.size(), 1u);
-  EXPECT_EQ(read.weights[0].mass, 0.05);
-  EXPECT_EQ(read.weights[0].at, m.weights[0].at);
-  ASSERT_EQ(read.fixed.size(), 4u);
-  EXPECT_EQ(std::get<RegionBox>(read.fixed[0].region).max, Vector3(0.01, 1, 1));
-  EXPECT_EQ(std::get<RegionSphere>(read.fixed[1].region).radius, 0.02);
-  EXPECT_LT((read.fixed[1].displaced_to->rotation - m.fixed[1].displaced_to->rotation).norm(), 1e-14);
-  EXPECT_EQ(read.fixed[1].displaced_to->translation, Vector3(1, 2, 3));
-  EXPECT_EQ(std::get<RegionHalfSpace>(read.fixed[2].region).normal, Vector3(1, 0, 0));
-  EXPECT_EQ(std::get<RegionVertices>(read.fixed[3].region).indices, (std::vector<int>{3, 1, 4}));
-  EXPECT_EQ(read.initial.linear_velocity, m.initial.linear_velocity);
-  EXPECT_EQ(read.initial.angular_velocity, m.initial.angular_velocity);
-  EXPECT_FALSE(read.initial.known);
-  EXPECT_TRUE(read.initial.released);
-  ASSERT_TRUE(read.initial.release_of);
-  EXPECT_EQ(read.initial.release_of->mass, 0.02);
-  EXPECT_EQ(read.initial.release_of->at, m.initial.release_of->at);
+  ASSERT_EQ(read.scene.planes.size(), 2u);
+  EXPECT_LT((read.scene.planes[0].normal - m.scene.planes[0].normal).norm(), 1e-15);
+  EXPECT_FALSE(read.scene.planes[0].known);
+  EXPECT_TRUE(read.scene.planes[1].known);
+  ASSERT_EQ(read.scene.weights.size(), 1u);
+  EXPECT_EQ(read.scene.weights[0].mass, 0.05);
+  EXPECT_EQ(read.scene.weights[0].at, m.scene.weights[0].at);
+  ASSERT_EQ(read.scene.fixed.size(), 4u);
+  EXPECT_EQ(std::get<RegionBox>(read.scene.fixed[0].region).max, Vector3(0.01, 1, 1));
+  EXPECT_EQ(std::get<RegionSphere>(read.scene.fixed[1].region).radius, 0.02);
+  EXPECT_LT((read.scene.fixed[1].displaced_to->rotation - m.scene.fixed[1].displaced_to->rotation).norm(), 1e-14);
+  EXPECT_EQ(read.scene.fixed[1].displaced_to->translation, Vector3(1, 2, 3));
+  EXPECT_EQ(std::get<RegionHalfSpace>(read.scene.fixed[2].region).normal, Vector3(1, 0, 0));
+  EXPECT_EQ(std::get<RegionVertices>(read.scene.fixed[3].region).indices, (std::vector<int>{3, 1, 4}));
+  EXPECT_EQ(read.scene.initial.linear_velocity, m.scene.initial.linear_velocity);
+  EXPECT_EQ(read.scene.initial.angular_velocity, m.scene.initial.angular_velocity);
+  EXPECT_FALSE(read.scene.initial.known);
+  EXPECT_TRUE(read.scene.initial.released);
+  ASSERT_TRUE(read.scene.initial.release_of);
+  EXPECT_EQ(read.scene.initial.release_of->mass, 0.02);
+  EXPECT_EQ(read.scene.initial.release_of->at, m.scene.initial.release_of->at);
 }
 
 TEST(Model, MayHaveNoVolumeNoGravityAndNoTiming) {
   const TemporaryFolder folder;
   Model m = full_model();
-  m.volume = {}, m.gravity.reset(), m.frames = 0;
+  m.volume = {}, m.scene.world.gravity.reset(), m.scene.timing = {};
   save_model(folder.path(), m);
   EXPECT_FALSE(std::filesystem::exists(folder / "model.vtu"));
   const Model read = load_model(folder / "model.toml");
-  EXPECT_FALSE(read.gravity);
-  EXPECT_EQ(read.frames, 0);
+  EXPECT_FALSE(read.scene.world.gravity);
+  EXPECT_TRUE(read.scene.timing.times.empty());
   EXPECT_TRUE(read.volume.connectivity.empty());
 }
 
@@ -159,7 +157,7 @@ TEST_F(ModelFile, RefusesWhatIsOutOfRangeNotFiniteOrMissing) {
   EXPECT_THAT(after("density           = 95.0", "density = nan"), HasSubstr("finite"));
   EXPECT_THAT(after("mass              = 0.456", "mass = \"heavy\""), HasSubstr("a number"));
   EXPECT_THAT(after("substeps          = 4", "substeps = 0"), HasSubstr("1 to 100000"));
-  EXPECT_THAT(after("start_frame       = 4", "start_frame = 80"), HasSubstr("0 to 79"));
+  EXPECT_THAT(after("start_frame = 4", "start_frame = 80"), HasSubstr("0 to 79"));
   EXPECT_THAT(after("cell_size         = 0.0243", ""), HasSubstr("no `cell_size`"));
   EXPECT_THAT(after("model/1", "model/2"), HasSubstr("expected \"model/1\""));
   EXPECT_THAT(after("surface.ply", "other.ply"), HasSubstr("other.ply"));

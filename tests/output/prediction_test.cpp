@@ -22,14 +22,14 @@ const Vector3 tip(0.5 * length, 0.0, 0.5 * edge);
 struct Predictions : ::testing::Test {
   Predictions() {
     capture.file = "capture.toml";
-    capture.surface = make_box(Vector3(length, edge, edge), edge);
-    capture.density = 1000.0;
-    capture.gravity = Vector3(0.0, 0.0, -9.81);
-    capture.up = Vector3::UnitZ();
-    capture.fixed = {{RegionHalfSpace{{-0.499 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
-    model.surface = *capture.surface;
+    capture.scene.object.surface = make_box(Vector3(length, edge, edge), edge);
+    capture.scene.object.density = 1000.0;
+    capture.scene.world.gravity = Vector3(0.0, 0.0, -9.81);
+    capture.scene.world.up = Vector3::UnitZ();
+    capture.scene.fixed = {{RegionHalfSpace{{-0.499 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
+    model.scene.object.surface = capture.scene.object.surface;
     model.youngs_modulus = 2e5, model.poisson_ratio = 0.3, model.stiffness_damping = 2e-3;
-    model.density = 1000.0, model.mass = 0.5;
+    model.scene.object.density = 1000.0, model.scene.object.mass = 0.5;
     model.cell_size = edge;
     write_marker_positions(folder / "rest.csv", {{"tip"}, tip.transpose()});
   }
@@ -96,7 +96,7 @@ struct LoadClouds : Predictions {
     options.is_static = true;
     options.times = {0.0};
     options.weights = {{tip, mass}};
-    TriangleMesh surface = *capture.surface;
+    TriangleMesh surface = *capture.scene.object.surface;
     const Embedding embedding(*scene.discretisation.body, surface.vertices);
     Simulation simulation(scene.discretisation.body, options);
     const RolloutSummary summary = simulation.run(scene.theta, [&](int, const State& state, auto) {
@@ -157,7 +157,7 @@ TEST_F(LoadClouds, LieFartherFromAWrongModel) {
 
 TEST_F(LoadClouds, WithoutEquilibriumSaySoAndStopNoOther) {
   write_cloud(make_scene(model, capture));
-  capture.fixed.clear();  // nothing holds it against gravity
+  capture.scene.fixed.clear();  // nothing holds it against gravity
   capture.loads.push_back(capture.loads.front());
   const std::vector<LoadError> errors = predict_loads(capture, make_scene(model, capture));
   ASSERT_EQ(errors.size(), 2u);
@@ -192,10 +192,10 @@ TEST(LoadSentence, IsToldInMillimetresAndPercent) {
 
 /// A model that was fitted to one release predicts another whose weight is known, and needs no pulls for it.
 TEST_F(Predictions, AReleaseFromUnderAKnownWeightStartsAtItsEquilibrium) {
-  capture.times = {0.0, 0.01};
-  capture.initial.released = true;
+  capture.scene.timing.times = {0.0, 0.01};
+  capture.scene.initial.released = true;
   EXPECT_THROW(make_scene(model, capture), InputError) << "nobody knows what held it";
-  capture.initial.release_of = Weight{0.1, tip};
+  capture.scene.initial.release_of = Weight{0.1, tip};
   const CaptureScene scene = make_scene(model, capture);
   SimulationOptions at_rest = scene.discretisation.simulation, first = at_rest;
   ASSERT_EQ(first.released_weights.size(), 1u);
@@ -209,9 +209,9 @@ TEST_F(Predictions, AReleaseFromUnderAKnownWeightStartsAtItsEquilibrium) {
 }
 
 TEST_F(Predictions, MarkersFollowTheMotionFromItsStart) {
-  for (int frame = 0; frame < 5; ++frame) capture.times.push_back(0.01 * frame);
-  capture.start_frame = 2;
-  capture.weights = {{0.2, tip}};
+  for (int frame = 0; frame < 5; ++frame) capture.scene.timing.times.push_back(0.01 * frame);
+  capture.scene.timing.start_frame = 2;
+  capture.scene.weights = {{0.2, tip}};
   folder.write("track.csv", "frame,id,x,y,z\n0,tip,0,0,0\n");
   capture.markers = {{folder / "rest.csv", folder / "track.csv"}};
   const CaptureScene scene = make_scene(model, capture);
@@ -222,14 +222,14 @@ TEST_F(Predictions, MarkersFollowTheMotionFromItsStart) {
   EXPECT_TRUE(std::isnan(prediction.frames[1](0, 0))) << "nothing is known before the start";
   EXPECT_LT((prediction.frames[2].row(0).transpose() - tip).norm(), 1e-12);
   EXPECT_LT((prediction.frames[4].row(0).transpose() - tip_of(scene.discretisation.simulation, scene)).norm(), 1e-12);
-  capture.weights.clear();
+  capture.scene.weights.clear();
   const MarkerPrediction light = predict_markers(capture, make_scene(model, capture));
   EXPECT_GT(std::abs(light.frames[4](0, 2) - prediction.frames[4](0, 2)), 1e-5)
       << "the capture's weights hang in the scene";
 }
 
 TEST_F(Predictions, RefuseMarkersThatAreMissingOrNamedTwice) {
-  capture.times = {0.0, 0.01};
+  capture.scene.timing.times = {0.0, 0.01};
   folder.write("track.csv", "frame,id,x,y,z\n0,tip,0,0,0\n");
   const MarkerTrack block{folder / "rest.csv", folder / "track.csv"};
   EXPECT_THROW(predict_markers(capture, make_scene(model, capture)), InputError);

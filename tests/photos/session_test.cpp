@@ -47,8 +47,8 @@ TEST(PhotoSession, BecomesACapture) {
   write_marker_capture(folder / "capture", session, measured);
   const Capture capture = read_capture(folder / "capture");
   ASSERT_EQ(capture.presses.size(), 2u);
-  EXPECT_EQ(capture.fixed.size(), 1u);
-  EXPECT_EQ(*capture.density, 60.0);
+  EXPECT_EQ(capture.scene.fixed.size(), 1u);
+  EXPECT_EQ(*capture.scene.object.density, 60.0);
   for (int k = 0; k < 2; ++k) {
     const Press& press = capture.presses[std::size_t(k)];
     const PaintedScene truth = example.scene(k + 1);

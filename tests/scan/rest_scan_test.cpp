@@ -44,11 +44,13 @@ class StillObject {
                        double table = 0.6) {
     Synthesis s;
     s.name = "still";
-    s.rest = truth;
+    s.scene.object.surface = truth;
     s.trajectory.assign(still_frames, vertex_points(truth));
-    s.start_frame = still_frames - 1;
-    s.mass = 0.1;
-    s.planes.push_back({{Vector3::Zero(), Vector3::UnitY(), true}, table});
+    s.scene.timing = evenly_timed(60.0, still_frames, still_frames - 1);
+    s.scene.object.mass = 0.1;
+    s.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
+    s.scene.planes.push_back({Vector3::Zero(), Vector3::UnitY(), true});
+    s.plane_half_sizes.push_back(table);
     for (const Vector3& eye : eyes)
       s.cameras.push_back({"camera" + std::to_string(s.cameras.size()),
                            look_at(eye, {0.0, 0.04, 0.0}, Vector3::UnitY(), 320, 240, 0.6),
@@ -72,7 +74,7 @@ class StillObject {
   }
   RestScan scan(const ScanChoice& choice = {}, const RestScanOptions& options = {40, {}}) const {
     const Capture capture = read();
-    return scan_rest_surface(read_scan_views(capture, choice), capture.up, options, capture.file);
+    return scan_rest_surface(read_scan_views(capture, choice), capture.scene.world.up, options, capture.file);
   }
 
   TemporaryFolder folder;

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "base/files.hpp"
+#include "capture/capture.hpp"
 #include "capture/markers.hpp"
 #include "model/vtu.hpp"
 #include "support/presses.hpp"
@@ -20,11 +20,13 @@ inline std::filesystem::path write_press_capture(const std::filesystem::path& fo
   grid.points = scene.body->nodes;
   grid.connectivity = scene.body->connectivity;
   write_vtu(folder / "block.vtu", grid);
-  std::string text = fmt::format(
-      "format = \"capture/1\"\nname = \"pressed block\"\n[object]\nvolume_mesh = \"block.vtu\"\ndensity = {}\n"
-      "[world]\ngravity = [0.0, -9.81, 0.0]\n"
-      "[[fixed]]\nbox = {{ min = [-1.0, -1.0, -1.0], max = [1.0, -0.0499, 1.0] }}\n",
-      scene.density);
+  Capture capture;
+  capture.name = "pressed block";
+  capture.scene.object.volume.emplace();
+  capture.scene.object.file = folder / "block.vtu";
+  capture.scene.object.density = scene.density;
+  capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
+  capture.scene.fixed = {{RegionBox{{-1.0, -1.0, -1.0}, {1.0, -0.0499, 1.0}}, std::nullopt}};
   const auto write_markers = [&](const std::string& name, const std::vector<Vector3>& places, std::size_t count) {
     MarkerPositions markers;
     markers.positions.resize(Eigen::Index(count), 3);
@@ -39,14 +41,16 @@ inline std::filesystem::path write_press_capture(const std::filesystem::path& fo
     const std::size_t count = press.rest.size() - (press.has_probe ? 1 : 0);  // the probe's pose is not told
     if (i == 0) write_markers("rest.csv", press.rest, count);
     write_markers(fmt::format("press{}.csv", i + 1), press.loaded, count);
-    const Vector3 &f = press.force, &c = scene.facts[i].contact_centre;
-    text += fmt::format(
-        "[[press]]\nforce = [{}, {}, {}]\ncontact = {{ centre = [{}, {}, {}], radius = {} }}\n"
-        "markers = \"press{}.csv\"\nmarkers_rest = \"rest.csv\"\nrole = \"{}\"\n",
-        f.x(), f.y(), f.z(), c.x(), c.y(), c.z(), scene.facts[i].contact_radius, i + 1,
-        int(scene.presses.size() - i) <= tests ? "test" : "fit");
+    Press written = scene.facts[i];
+    written.force = press.force;
+    written.probe.reset();
+    written.markers = folder / fmt::format("press{}.csv", i + 1);
+    written.markers_rest = folder / "rest.csv";
+    written.role = int(scene.presses.size() - i) <= tests ? "test" : "fit";
+    written.glued = true;
+    capture.presses.push_back(std::move(written));
   }
-  write_file(folder / "capture.toml", text);
+  write_capture(folder, capture);
   return folder / "capture.toml";
 }
 

@@ -203,11 +203,11 @@ struct SwingRecording {
 
   SwingRecording(const Swing& swing, const Sensors& sensors) {
     capture.name = "swing";
-    capture.surface = swing.surface;
-    capture.start_frame = swing.options.held - 1;
-    capture.initial.released = true;
+    capture.scene.object.surface = swing.surface;
+    capture.scene.timing.start_frame = swing.options.held - 1;
+    capture.scene.initial.released = true;
     for (int f = 0; f < swing.frame_count(); ++f) {
-      capture.times.push_back(swing.time(f));
+      capture.scene.timing.times.push_back(swing.time(f));
       TrackView view = sensors.see(swing, f);
       ObservedFrame frame;
       frame.frame = f, frame.points = std::move(view.points), frame.noise = std::move(view.noise);

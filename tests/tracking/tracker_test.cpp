@@ -222,7 +222,7 @@ TEST(Tracker, StopsWhereItIsTold) {
 
 TEST(Tracker, RefusesClampsThatMove) {
   SwingRecording recorded = recording();
-  recorded.capture.fixed.push_back({RegionSphere{Vector3::Zero(), 0.1}, RigidMotion{}});
+  recorded.capture.scene.fixed.push_back({RegionSphere{Vector3::Zero(), 0.1}, RigidMotion{}});
   try {
     (void)recorded.track(bar());
     FAIL() << "it should not track";
@@ -245,7 +245,7 @@ TEST(Tracker, NotesAScanThatSagsTooSoftly) {
   sagging.scene.hold_strongly = true;
   SwingRecording recorded = recording();
   recorded.observed.resize(3);
-  recorded.capture.times.resize(3);
+  recorded.capture.scene.timing.times.resize(3);
   VectorX theta = swing.theta;
   EXPECT_EQ(recorded.track(sagging, theta).note, "");
   swing.layout.set_moduli(theta, 50.0);

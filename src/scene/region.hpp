@@ -1,6 +1,6 @@
 #pragma once
 
-#include "capture/capture.hpp"
+#include "scene/scene.hpp"
 
 namespace pliant {
 

@@ -1,4 +1,6 @@
-#include "capture/toml_table.hpp"
+#include "scene/toml_table.hpp"
+
+#include <fmt/format.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -6,8 +8,11 @@
 #include <cstdio>
 #include <limits>
 #include <numeric>
+#include <tuple>
 
 namespace pliant {
+
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -127,6 +132,40 @@ int edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+std::string range_text(const NumberRule& rule) {
+  std::string text;
+  if (rule.low > -1e300) text = fmt::format("{} {}", rule.low_allowed ? "at least" : "above", rule.low);
+  if (rule.high < 1e300)
+    text += fmt::format("{}{} {}", text.empty() ? "" : " and ", rule.high_allowed ? "at most" : "below", rule.high);
+  return text;
+}
+
+double checked(TomlTable& table, const std::string& name, const NumberRule& rule, std::optional<double> value,
+               double fallback) {
+  if (!value) return fallback;
+  const bool low = rule.low_allowed ? *value >= rule.low : *value > rule.low;
+  const bool high = rule.high_allowed ? *value <= rule.high : *value < rule.high;
+  if (low && high) return *value;
+  table.context().reject(table.key_of(name), fmt::format("`{}` is {}", name, *value), range_text(rule), rule.meaning);
+  return fallback;
+}
+
+// Whether the path may stand in such a file and something is there; complains where not.
+std::optional<fs::path> existing(TomlTable& table, const std::string& name, const std::string& text,
+                                 const NamedFiles& files) {
+  if (files.only_relative && fs::path(text).is_absolute()) {
+    table.context().reject(table.key_of(name), "the absolute path \"" + text + "\"",
+                           "a path relative to the folder of this file",
+                           "the folder must still be whole when it is moved");
+    return std::nullopt;
+  }
+  const fs::path path = (files.folder / text).lexically_normal();
+  if (fs::is_regular_file(path)) return path;
+  table.context().reject(table.key_of(name), "the file \"" + text + "\" is not there",
+                         "a file in " + files.folder.string(), "check the spelling, or copy the file");
+  return std::nullopt;
+}
+
 }  // namespace
 
 Place TomlPlaces::operator()(std::string key) const {
@@ -142,6 +181,21 @@ void TomlContext::complain(const std::string& key, std::string found, std::strin
 void TomlContext::reject(const std::string& key, std::string found, std::string expected, std::string advice) {
   complain(key, std::move(found), std::move(expected), std::move(advice));
   for (std::string at = key; !at.empty(); at = parent_of(at)) broken.insert(at);
+}
+
+void TomlContext::reject(const std::string& key, const std::vector<Problem>& problems_of_file) {
+  problems.insert(problems.end(), problems_of_file.begin(), problems_of_file.end());
+  for (std::string at = key; !at.empty(); at = parent_of(at)) broken.insert(at);
+}
+
+void TomlContext::throw_problems() {
+  if (problems.empty()) return;
+  const auto rank = [&](const Problem& problem) {
+    const bool is_own = problem.place.file == places.file();
+    return is_own ? std::tuple(0, problem.place.line, problem.place.column) : std::tuple(1, 0, 0);
+  };
+  std::ranges::stable_sort(problems, {}, rank);
+  throw InputError(std::move(problems));
 }
 
 std::string nearest_name(std::string_view name, const std::set<std::string>& known) {
@@ -251,6 +305,80 @@ void TomlTable::finish() {
                        nearest.empty() ? "one of " + known : "`" + nearest + "`",
                        nearest.empty() ? "remove it" : "did you mean `" + nearest + "`? Else remove it");
   }
+}
+
+void check_format(TomlTable& root, const std::string& expected) {
+  const auto format = root.required<std::string>("format", "write format = \"" + expected + "\" first");
+  if (format && *format != expected)
+    root.context().complain("format", "the format \"" + *format + "\"", "\"" + expected + "\"",
+                            "use a program that knows this format");
+}
+
+double read_number(TomlTable& table, const std::string& name, const NumberRule& rule) {
+  return checked(table, name, rule, table.required<double>(name, rule.meaning), 1.0);
+}
+
+double read_number(TomlTable& table, const std::string& name, const NumberRule& rule, double fallback) {
+  return checked(table, name, rule, table.optional<double>(name), fallback);
+}
+
+int read_count(TomlTable& table, const std::string& name, int low, int high, std::optional<int> fallback) {
+  const auto value = fallback ? table.optional<int>(name) : table.required<int>(name);
+  if (value && (*value < low || *value > high))
+    table.context().reject(table.key_of(name), fmt::format("`{}` is {}", name, *value),
+                           fmt::format("{} to {}", low, high));
+  return value.value_or(fallback.value_or(low));
+}
+
+std::optional<Vector3> read_direction(TomlTable& table, const std::string& name, const std::string& advice) {
+  const auto direction = table.required<Vector3>(name, advice);
+  if (!direction) return std::nullopt;
+  if (direction->norm() > 1e-9) return direction->normalized();
+  table.context().reject(table.key_of(name), "`" + name + "` is a direction without length",
+                         "a direction like [0, 1, 0]", advice);
+  return std::nullopt;
+}
+
+std::optional<fs::path> read_path(TomlTable& table, const std::string& name, const NamedFiles& files) {
+  const auto text = table.required<std::string>(name);
+  return text ? existing(table, name, *text, files) : std::nullopt;
+}
+
+std::optional<fs::path> read_optional_path(TomlTable& table, const std::string& name, const NamedFiles& files) {
+  const auto text = table.optional<std::string>(name);
+  return text ? existing(table, name, *text, files) : std::nullopt;
+}
+
+std::string toml_text(double value) {
+  const std::string text = fmt::format("{}", value);
+  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+}
+
+std::string toml_text(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      out += std::string("\\") + c;
+    else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+      out += fmt::format("\\u{:04X}", int(static_cast<unsigned char>(c)));
+    else
+      out += c;
+  }
+  return out + "\"";
+}
+
+std::string toml_text(const Vector3& v) {
+  return "[" + toml_text(v.x()) + ", " + toml_text(v.y()) + ", " + toml_text(v.z()) + "]";
+}
+
+std::string toml_text(const RigidMotion& motion) {
+  std::string out = "[";
+  for (int i = 0; i < 3; ++i) {
+    out += "[";
+    for (int j = 0; j < 3; ++j) out += toml_text(motion.rotation(i, j)) + ", ";
+    out += toml_text(motion.translation[i]) + "], ";
+  }
+  return out + "[0.0, 0.0, 0.0, 1.0]]";
 }
 
 toml::table parse_toml(const std::string& content, const std::filesystem::path& path) {

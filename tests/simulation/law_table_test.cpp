@@ -1,4 +1,4 @@
-#include "output/press_output.hpp"
+#include "simulation/law_table.hpp"
 
 #include <random>
 
@@ -20,8 +20,9 @@ constexpr int elements = 3;
 Model model_with(const MaterialLaw& law) {
   Model m;
   m.name = "pressed";
-  m.surface = make_torus(0.15, 0.06, 12, 8);
-  m.youngs_modulus = 5000.0, m.poisson_ratio = 0.3, m.density = 95.0, m.mass = 0.456, m.cell_size = 0.02;
+  m.scene.object.surface = make_torus(0.15, 0.06, 12, 8);
+  m.youngs_modulus = 5000.0, m.poisson_ratio = 0.3, m.scene.object.density = 95.0, m.scene.object.mass = 0.456,
+  m.cell_size = 0.02;
   m.volume.kind = VtuCell::Tetrahedron;
   m.volume.nodes = Points::Random(6, 3);
   m.volume.connectivity = {0, 1, 2, 3, 1, 2, 3, 4, 2, 3, 4, 5};

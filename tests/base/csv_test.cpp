@@ -1,4 +1,4 @@
-#include "capture/csv.hpp"
+#include "base/csv.hpp"
 
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"

@@ -1,4 +1,4 @@
-#include "capture/toml_table.hpp"
+#include "scene/toml_table.hpp"
 
 #include <Eigen/Geometry>
 

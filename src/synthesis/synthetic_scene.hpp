@@ -12,23 +12,17 @@
 namespace pliant {
 
 /// A situation to simulate and to record: the format "scene/1" of docs/scene.md. SI units.
-struct Scene {
+struct SyntheticScene {
   std::string name;
-  TriangleMesh surface;  ///< free of load, in the world, where the object is at the start [m]
-  double scan_noise = 0.0;
-  std::optional<double> mass, density;  ///< exactly one of them
+  Scene scene;  ///< surface free of load, where the object is at the start; exactly one of mass and density
+  std::vector<double> plane_half_sizes;  ///< [m] of each plane: half the edge of the square that cameras see; 0: none
+  double scan_noise = 0.0;               ///< [m] deviation of the vertices of rest.ply along their normals
 
-  double youngs_modulus = 0.0, poisson_ratio = 0.0;
+  double youngs_modulus = 0.0;        ///< [Pa], outside of all regions
+  std::vector<double> region_moduli;  ///< [Pa] of each region
+  double poisson_ratio = 0.0;
   double mass_damping = 0.0;       ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;  ///< Rayleigh [s]
-
-  Vector3 gravity = Vector3::Zero();
-  std::vector<SceneryPlane> planes;
-  std::vector<FixedRegion> fixed;
-  Initial initial;
-
-  double frame_rate = 0.0;
-  int frames = 0, start_frame = 0;
 
   double cell_size = 0.0;  ///< [m]
   int substeps = 4;        ///< time steps a frame
@@ -45,12 +39,12 @@ struct Scene {
 };
 
 /// Reads a scene strictly. Throws InputError with every problem found, with file, line and column.
-Scene read_scene(const std::filesystem::path& path);
+SyntheticScene read_synthetic_scene(const std::filesystem::path& path);
 
-/// Vertices of the scene's surface in each frame (n x 3, `scene.frames` of them; those up to start_frame at rest).
-using Simulate = std::function<std::vector<Points>(const Scene&)>;
+/// Vertices of the scene's surface in each frame, n x 3 [m]; frames up to the start show the object as it is held.
+using Simulate = std::function<std::vector<Points>(const SyntheticScene&)>;
 
 /// Simulates a scene and makes a recording of it with the truth.
-Synthesis synthesise(const Scene& scene, const Simulate& simulate);
+Synthesis synthesise(const SyntheticScene& scene, const Simulate& simulate);
 
 }  // namespace pliant

@@ -1,4 +1,4 @@
-#include "capture/region.hpp"
+#include "scene/region.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "capture/csv.hpp"
+#include "base/csv.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -1,4 +1,4 @@
-#include "synthesis/scene.hpp"
+#include "synthesis/synthetic_scene.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -54,42 +54,43 @@ vertical_fov_deg = 50.0
 sensor = { preset = "structured-light", hole_rate = 0.01 }
 )toml";
 
-Scene read_ring() {
+SyntheticScene read_ring() {
   const TemporaryFolder folder;
-  return read_scene(folder.write("scene.toml", ring_scene));
+  return read_synthetic_scene(folder.write("scene.toml", ring_scene));
 }
 
 // Stands in for the simulation: the object falls rigidly.
-std::vector<Points> fall(const Scene& scene) {
+std::vector<Points> fall(const SyntheticScene& scene) {
   std::vector<Points> frames;
-  const Points rest = vertex_points(scene.surface);
-  for (int i = 0; i < scene.frames; ++i) {
-    const double t = std::max(0, i - scene.start_frame) / scene.frame_rate;
-    const Vector3 shift = t * scene.initial.linear_velocity + 0.5 * t * t * scene.gravity;
+  const Timing& timing = scene.scene.timing;
+  const Points rest = vertex_points(*scene.scene.object.surface);
+  for (int i = 0; i < timing.frame_count(); ++i) {
+    const double t = std::max(0, i - timing.start_frame) / timing.frame_rate;
+    const Vector3 shift = t * scene.scene.initial.linear_velocity + 0.5 * t * t * *scene.scene.world.gravity;
     frames.push_back(rest.rowwise() + shift.transpose());
   }
   return frames;
 }
 
-TEST(Scene, IsReadWithItsUnitsAndDefaults) {
-  const Scene s = read_ring();
+TEST(SyntheticScene, IsReadWithItsUnitsAndDefaults) {
+  const SyntheticScene s = read_ring();
   EXPECT_EQ(s.name, "ring");
   EXPECT_EQ(s.seed, 7u);
   EXPECT_EQ(s.youngs_modulus, 2000.0);
-  EXPECT_EQ(s.frames, 5);
-  EXPECT_EQ(s.start_frame, 1);
+  EXPECT_EQ(s.scene.timing.frame_count(), 5);
+  EXPECT_EQ(s.scene.timing.start_frame, 1);
   EXPECT_EQ(s.substeps, 8);
   EXPECT_EQ(s.newmark_theta, 0.5);
-  EXPECT_EQ(s.planes[0].half_size, 2.0);
+  EXPECT_EQ(s.plane_half_sizes[0], 2.0);
   EXPECT_EQ(s.cameras[0].sensor.hole_rate, 0.01);
   EXPECT_EQ(s.cameras[0].sensor.noise_base, 0.0012);
   EXPECT_EQ(s.cameras[0].depth_scale, 1000.0);
-  EXPECT_NEAR(s.true_density() * enclosed_volume(s.surface), 0.3, 1e-12);
-  EXPECT_LT((enclosed_centroid(s.surface) - Vector3(0, 0.4, 0)).norm(), 1e-9);
-  EXPECT_NEAR(bounding_box(s.surface).extent().z(), 2 * (0.12 * std::cos(M_PI / 6) + 0.05), 1e-3);
+  EXPECT_NEAR(s.true_density() * enclosed_volume(*s.scene.object.surface), 0.3, 1e-12);
+  EXPECT_LT((enclosed_centroid(*s.scene.object.surface) - Vector3(0, 0.4, 0)).norm(), 1e-9);
+  EXPECT_NEAR(bounding_box(*s.scene.object.surface).extent().z(), 2 * (0.12 * std::cos(M_PI / 6) + 0.05), 1e-3);
 }
 
-TEST(Scene, EveryPrimitiveAndFilesMakeASolid) {
+TEST(SyntheticScene, EveryPrimitiveAndFilesMakeASolid) {
   const TemporaryFolder folder;
   write_mesh(folder / "ball.ply", make_sphere(0.1, 2));
   for (const char* shape :
@@ -97,7 +98,9 @@ TEST(Scene, EveryPrimitiveAndFilesMakeASolid) {
     std::string text = ring_scene;
     const size_t at = text.find("torus"), end = text.find('\n', at);
     text.replace(at, end - at, shape);
-    EXPECT_TRUE(examine(read_scene(folder.write("scene.toml", text)).surface).is_closed_solid) << shape;
+    EXPECT_TRUE(
+        examine(read_synthetic_scene(folder.write("scene.toml", text)).scene.object.surface.value()).is_closed_solid)
+        << shape;
   }
 }
 
@@ -109,7 +112,7 @@ class SceneFile : public testing::Test {
     const size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     const auto path = folder.write("scene.toml", text.replace(at, from.size(), to));
-    return complaint_of([&] { read_scene(path); });
+    return complaint_of([&] { read_synthetic_scene(path); });
   }
 };
 
@@ -147,11 +150,11 @@ TEST(Synthesis, MakesACaptureThatTheReaderAccepts) {
   const Capture capture = read_capture(folder.path());
   EXPECT_EQ(capture.name, "ring");
   EXPECT_EQ(capture.frame_count(), 5);
-  EXPECT_EQ(capture.start_frame, 1);
-  EXPECT_EQ(capture.mass, 0.3);
-  EXPECT_EQ(capture.initial.linear_velocity, Vector3(0, -1, 0));
+  EXPECT_EQ(capture.scene.timing.start_frame, 1);
+  EXPECT_EQ(capture.scene.object.mass, 0.3);
+  EXPECT_EQ(capture.scene.initial.linear_velocity, Vector3(0, -1, 0));
   ASSERT_EQ(capture.depth.size(), 1u);
-  const Scene scene = read_ring();
+  const SyntheticScene scene = read_ring();
   EXPECT_LT(
       (capture.depth[0].camera.camera_to_world.rotation - scene.cameras[0].camera.camera_to_world.rotation).norm(),
       1e-9);
@@ -161,7 +164,7 @@ TEST(Synthesis, MakesACaptureThatTheReaderAccepts) {
 
 TEST(Synthesis, ObservedPointsLieOnTheTrueSurface) {
   const TemporaryFolder folder;
-  Scene scene = read_ring();
+  SyntheticScene scene = read_ring();
   scene.cameras[0].sensor = sensor_preset("ideal");
   scene.cameras[0].depth_scale = 10000.0;
   const Synthesis synthesis = synthesise(scene, fall);
@@ -183,7 +186,7 @@ TEST(Synthesis, ObservedPointsLieOnTheTrueSurface) {
 
 TEST(Synthesis, TruthIsWrittenApart) {
   const TemporaryFolder folder;
-  Scene scene = read_ring();
+  SyntheticScene scene = read_ring();
   scene.write_trajectory = true;
   write_synthetic_capture(folder.path(), synthesise(scene, fall));
   const auto truth = nlohmann::json::parse(read_file(folder / "truth.json"));
@@ -198,7 +201,7 @@ TEST(Synthesis, TruthIsWrittenApart) {
 
 TEST(Synthesis, IsRepeatableAndChangesWithTheSeed) {
   const TemporaryFolder folder;
-  Scene scene = read_ring();
+  SyntheticScene scene = read_ring();
   const auto image = [&](const char* name, std::uint64_t seed) {
     scene.seed = seed;
     write_synthetic_capture(folder / name, synthesise(scene, fall));
@@ -211,24 +214,24 @@ TEST(Synthesis, IsRepeatableAndChangesWithTheSeed) {
 
 TEST(Synthesis, ScanNoiseMovesRestVerticesAlongTheirNormals) {
   const TemporaryFolder folder;
-  Scene scene = read_ring();
+  SyntheticScene scene = read_ring();
   scene.scan_noise = 0.0005;
   write_synthetic_capture(folder.path(), synthesise(scene, fall));
   const TriangleMesh scan = read_mesh(folder / "rest.ply");
   double squares = 0.0;
   for (size_t i = 0; i < scan.vertices.size(); ++i)
-    squares += (scan.vertices[i] - scene.surface.vertices[i]).squaredNorm();
+    squares += (scan.vertices[i] - scene.scene.object.surface->vertices[i]).squaredNorm();
   EXPECT_NEAR(std::sqrt(squares / double(scan.vertices.size())), 0.0005, 0.00005);
 }
 
 TEST(Synthesis, RefusesATrajectoryThatDoesNotFit) {
-  const Scene scene = read_ring();
-  EXPECT_THROW(synthesise(scene, [](const Scene&) { return std::vector<Points>(); }), std::invalid_argument);
+  const SyntheticScene scene = read_ring();
+  EXPECT_THROW(synthesise(scene, [](const SyntheticScene&) { return std::vector<Points>(); }), std::invalid_argument);
   Synthesis s = synthesise(scene, fall);
   s.trajectory[2](3, 1) = std::nan("");
   EXPECT_THROW(write_synthetic_capture("never", s), std::invalid_argument);
   s = synthesise(scene, fall);
-  s.density = 90.0;
+  s.scene.object.density = 90.0;
   EXPECT_THROW(write_synthetic_capture("never", s), std::invalid_argument);
 }
 

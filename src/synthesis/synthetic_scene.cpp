@@ -1,16 +1,18 @@
-#include "synthesis/scene.hpp"
+#include "synthesis/synthetic_scene.hpp"
 
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 
 #include "base/files.hpp"
-#include "capture/toml_facts.hpp"
-#include "rays/look_at.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
+#include "rays/look_at.hpp"
+#include "scene/region.hpp"
+#include "scene/scene_toml.hpp"
 
 namespace pliant {
 
@@ -26,40 +28,38 @@ NumberRule part(const char* meaning) { return {.low = 0.0, .high = 1.0, .meaning
 
 class Reader {
  public:
-  Reader(const fs::path& folder, TomlContext& context) : folder_(folder), context_(context) {}
+  Reader(const fs::path& folder, TomlContext& context) : files_{folder}, context_(context) {}
 
-  Scene read(const toml::table& table) {
+  SyntheticScene read(const toml::table& table) {
+    scene_.scene.object.surface.emplace();
     TomlTable root(table, "", context_);
-    if (const auto format = root.required<std::string>("format"); format && *format != "scene/1")
-      context_.complain("format", "the format \"" + *format + "\"", "\"scene/1\"",
-                        "use a program that knows this format");
+    check_format(root, "scene/1");
     scene_.name = root.required<std::string>("name", "give the recording a name").value_or("");
     scene_.seed = std::uint64_t(read_count(root, "seed", 0, 2'000'000'000, 1));
     scene_.write_trajectory = root.optional<bool>("truth_trajectory").value_or(false);
     read_table(root, "object", &Reader::read_object);
     read_table(root, "material", &Reader::read_material);
-    read_table(root, "world", &Reader::read_world);
-    read_table(root, "timing", &Reader::read_timing);
+    read_table(root, "world", &Reader::read_gravity);
+    read_table(root, "timing", &Reader::read_frames);
     read_table(root, "simulation", &Reader::read_simulation);
-    if (auto initial = root.table("initial")) read_first_velocities(*initial);
-    for (TomlTable& block : root.blocks("plane")) scene_.planes.push_back(read_scenery(block));
-    for (TomlTable& block : root.blocks("fixed")) scene_.fixed.push_back(read_fixed(block, folder_));
-    for (TomlTable& block : root.blocks("camera")) scene_.cameras.push_back(read_camera(block));
+    root.with_table("initial", [&](TomlTable& initial) { read_start(initial); });
+    root.each_block("plane", [&](TomlTable& block) { read_scenery(block); });
+    root.each_block("fixed", [&](TomlTable& block) { scene_.scene.fixed.push_back(read_fixed(block, files_)); });
+    root.each_block("region", [&](TomlTable& block) { read_part(block); });
+    root.each_block("weight", [&](TomlTable& block) { read_hung(block); });
+    root.each_block("camera", [&](TomlTable& block) { scene_.cameras.push_back(read_camera(block)); });
     if (scene_.cameras.empty() && !root.has("camera"))
       context_.complain("camera", "no camera", "a block [[camera]]", "a recording needs at least one");
     check_names();
+    check_parts();
     root.finish();
     return std::move(scene_);
   }
 
  private:
-  void read_table(TomlTable& root, const std::string& name, void (Reader::*read_part)(TomlTable&)) {
-    if (auto table = root.table(name)) {
-      (this->*read_part)(*table);
-      table->finish();
-    } else if (!root.has(name)) {
-      context_.complain(name, "no table [" + name + "]", "[" + name + "]", "see docs/scene.md");
-    }
+  void read_table(TomlTable& root, const std::string& name, void (Reader::*read_it)(TomlTable&)) {
+    root.with_table(
+        name, [&](TomlTable& table) { (this->*read_it)(table); }, "[" + name + "]", "see docs/scene.md");
   }
 
   // ---- the object
@@ -76,26 +76,24 @@ class Reader {
     if (auto sphere = object.table("sphere")) read_sphere(*sphere);
     place(object);
     scene_.scan_noise = read_number(object, "scan_noise", at_least_zero("in metres"), 0.0);
-    if (object.has("mass") == object.has("density"))
-      context_.reject("object", object.has("mass") ? "both `mass` and `density`" : "neither `mass` nor `density`",
-                      "one of the two");
-    if (object.has("mass")) scene_.mass = read_number(object, "mass", positive("in kilograms"));
-    if (object.has("density")) scene_.density = read_number(object, "density", positive("in kg/m^3"));
+    require_mass_or_density(object);
+    if (object.has("mass")) scene_.scene.object.mass = read_number(object, "mass", positive("in kilograms"));
+    if (object.has("density")) scene_.scene.object.density = read_number(object, "density", positive("in kg/m^3"));
   }
 
   void read_surface(TomlTable& object) {
-    const fs::path path = read_path(object, "surface", folder_);
-    if (path.empty()) return;
-    try {
-      scene_.surface = read_mesh(path);
-      const MeshReport report = examine(scene_.surface);
+    const auto file = read_path(object, "surface", files_);
+    if (!file) return;
+    read_file_of(object, "surface", *file, [&](const fs::path& path) {
+      surface() = read_mesh(path);
+      const MeshReport report = examine(surface());
       if (!report.is_closed_solid)
         context_.reject("object.surface", report.complaints.empty() ? "an open surface" : report.complaints.front(),
                         "a closed surface");
-    } catch (const InputError& error) {
-      context_.problems.insert(context_.problems.end(), error.problems().begin(), error.problems().end());
-    }
+    });
   }
+
+  TriangleMesh& surface() { return *scene_.scene.object.surface; }
 
   // Ranges that are not told by the table's rules are told by the generator.
   template <class Make>
@@ -103,7 +101,7 @@ class Reader {
     table.finish();
     if (!context_.is_sound(table.key())) return;
     try {
-      scene_.surface = make();
+      surface() = make();
     } catch (const std::invalid_argument& error) {
       context_.reject(table.key(), error.what(), "sensible sizes");
     }
@@ -141,7 +139,7 @@ class Reader {
       context_.reject("object", "a rotation without a proper axis and angle", "`axis` with a length, and `angle_deg`");
     else if (axis && angle)
       pose.rotation = Eigen::AngleAxisd(*angle * degree, axis->normalized()).toRotationMatrix();
-    for (Vector3& vertex : scene_.surface.vertices) vertex = pose(vertex);
+    for (Vector3& vertex : surface().vertices) vertex = pose(vertex);
   }
 
   // ---- physics
@@ -155,15 +153,9 @@ class Reader {
     scene_.stiffness_damping = read_number(t, "stiffness_damping", at_least_zero("Rayleigh's, in s"), 0.0);
   }
 
-  void read_world(TomlTable& t) {
-    scene_.gravity = t.required<Vector3>("gravity", "in m/s^2").value_or(Vector3::Zero());
-  }
+  void read_gravity(TomlTable& t) { scene_.scene.world = read_world(t, true); }
 
-  void read_timing(TomlTable& t) {
-    scene_.frame_rate = read_number(t, "frame_rate", positive("frames a second"));
-    scene_.frames = read_count(t, "frame_count", 1, 100'000);
-    scene_.start_frame = read_count(t, "start_frame", 0, std::max(0, scene_.frames - 1), 0);
-  }
+  void read_frames(TomlTable& t) { scene_.scene.timing = read_even_timing(t, 100'000); }
 
   void read_simulation(TomlTable& t) {
     scene_.cell_size = read_number(t, "cell_size", positive("in metres"));
@@ -174,18 +166,33 @@ class Reader {
     scene_.contact_smoothing = read_number(t, "contact_smoothing", at_least_zero("in metres"), 0.0);
   }
 
-  void read_first_velocities(TomlTable& table) {
-    scene_.initial = read_initial(table);
-    if (scene_.initial.released || scene_.initial.release_of)
-      context_.reject("initial", "a release from a held pose", "neither `released` nor `release_of`",
-                      "scenes begin with the load-free shape");
+  void read_start(TomlTable& table) {
+    Initial& initial = scene_.scene.initial;
+    initial = read_initial(table);
+    if (initial.released != initial.release_of.has_value())
+      context_.reject("initial", "only one of `released` and `release_of`", "both, or neither",
+                      "a released object begins at its equilibrium under a weight whose string is cut");
+    if (initial.release_of) check_weight("initial.release_of", *initial.release_of);
   }
 
-  SceneryPlane read_scenery(TomlTable& block) {
-    SceneryPlane scenery;
-    scenery.half_size = read_number(block, "half_size", at_least_zero("in metres"), 1.0);
-    scenery.plane = read_plane(block);
-    return scenery;
+  void read_scenery(TomlTable& block) {
+    scene_.plane_half_sizes.push_back(read_number(block, "half_size", at_least_zero("in metres"), 1.0));
+    scene_.scene.planes.push_back(read_plane(block));
+  }
+
+  void read_part(TomlTable& block) {
+    scene_.region_moduli.push_back(read_number(block, "youngs_modulus", positive("in pascals")));
+    scene_.scene.regions.push_back(read_material_region(block, files_));
+  }
+
+  void read_hung(TomlTable& block) {
+    scene_.scene.weights.push_back(read_weight(block));
+    check_weight(block.key(), scene_.scene.weights.back());
+  }
+
+  void check_weight(const std::string& key, const Weight& weight) {
+    if (context_.is_sound(key) && !(weight.mass > 0.0))
+      context_.reject(key + ".mass", fmt::format("`mass` is {}", weight.mass), "above 0", "in kilograms");
   }
 
   // ---- cameras
@@ -203,16 +210,17 @@ class Reader {
       camera.camera = block.has("eye") ? read_look_at(block, width, height) : read_pinhole(block, width, height);
     camera.depth_scale = read_number(block, "depth_scale", positive("raw units per metre"), 1000.0);
     camera.every = read_count(block, "every", 1, 100'000, 1);
-    if (auto sensor = block.table("sensor")) camera.sensor = read_sensor(*sensor);
-    block.finish();
+    block.with_table("sensor", [&](TomlTable& sensor) { camera.sensor = read_sensor(sensor); });
     return camera;
   }
+
+  Vector3 gravity() const { return scene_.scene.world.gravity.value_or(Vector3::Zero()); }
 
   PinholeCamera read_look_at(TomlTable& block, int width, int height) {
     const Vector3 eye = block.required<Vector3>("eye").value_or(Vector3::Zero());
     const Vector3 target = block.required<Vector3>("target").value_or(Vector3::UnitZ());
-    const Vector3 up = block.optional<Vector3>("up").value_or(scene_.gravity.norm() > 0.0 ? Vector3(-scene_.gravity)
-                                                                                          : Vector3::UnitY());
+    const Vector3 up =
+        block.optional<Vector3>("up").value_or(gravity().norm() > 0.0 ? Vector3(-gravity()) : Vector3::UnitY());
     const double angle =
         read_number(block, "vertical_fov_deg", {.low = 1.0, .high = 170.0, .meaning = "in degrees"}, 45.0);
     try {
@@ -261,7 +269,6 @@ class Reader {
     s.grazing_angle = degree * read_number(t, "grazing_angle_deg", {.low = 0.0, .high = 90.0, .meaning = "in degrees"},
                                            s.grazing_angle / degree);
     s.hole_rate = read_number(t, "hole_rate", part("a probability"), s.hole_rate);
-    t.finish();
     return s;
   }
 
@@ -273,42 +280,61 @@ class Reader {
                           "a name of its own");
   }
 
-  fs::path folder_;
+  // Regions are named apart, and each holds a part of the object.
+  void check_parts() {
+    check_vertex_lists(context_, scene_.scene);
+    std::set<std::string> names;
+    for (size_t i = 0; i < scene_.scene.regions.size(); ++i) {
+      const MaterialRegion& region = scene_.scene.regions[i];
+      const std::string key = fmt::format("region[{}]", i);
+      if (!context_.is_sound(key) || !context_.is_sound("object")) continue;
+      if (!names.insert(region.name).second || region.name.find('@') != std::string::npos)
+        context_.reject(key + ".name", "the name \"" + region.name + "\"", "a name of its own, without @");
+      if (!touches_solid(region.region, surface()))
+        context_.reject(key, "no point of the object lies in region \"" + region.name + "\"",
+                        "a region that holds a part of it", "check its unit and the side of its normal");
+    }
+  }
+
+  NamedFiles files_;
   TomlContext& context_;
-  Scene scene_;
+  SyntheticScene scene_;
 };
 
 }  // namespace
 
-double Scene::true_density() const { return density ? *density : mass.value_or(0.0) / enclosed_volume(surface); }
+double SyntheticScene::true_density() const {
+  const Object& object = scene.object;
+  return object.density ? *object.density : object.mass.value_or(0.0) / enclosed_volume(*object.surface);
+}
 
-Scene read_scene(const fs::path& path) {
+SyntheticScene read_synthetic_scene(const fs::path& path) {
   const toml::table table = parse_toml(read_file(path), path);
   TomlContext context{TomlPlaces(path), {}, {}};
-  Scene scene = Reader(fs::absolute(path).parent_path(), context).read(table);
-  throw_problems(context);
+  SyntheticScene scene = Reader(fs::absolute(path).parent_path(), context).read(table);
+  context.throw_problems();
   return scene;
 }
 
-Synthesis synthesise(const Scene& scene, const Simulate& simulate) {
+Synthesis synthesise(const SyntheticScene& scene, const Simulate& simulate) {
   Synthesis s;
-  s.name = scene.name, s.rest = scene.surface, s.scan_noise = scene.scan_noise;
-  s.mass = scene.mass, s.density = scene.density, s.gravity = scene.gravity;
-  s.frame_rate = scene.frame_rate, s.start_frame = scene.start_frame;
-  s.planes = scene.planes, s.fixed = scene.fixed, s.initial = scene.initial;
-  s.cameras = scene.cameras, s.seed = scene.seed, s.write_trajectory = scene.write_trajectory;
+  s.name = scene.name, s.scene = scene.scene, s.plane_half_sizes = scene.plane_half_sizes;
+  s.scan_noise = scene.scan_noise, s.cameras = scene.cameras, s.seed = scene.seed;
+  s.write_trajectory = scene.write_trajectory;
   s.truth = {{"youngs_modulus", scene.youngs_modulus, "Pa"},
              {"poisson_ratio", scene.poisson_ratio, "1"},
              {"mass_damping", scene.mass_damping, "1/s"},
              {"stiffness_damping", scene.stiffness_damping, "s"},
              {"density", scene.true_density(), "kg/m^3"},
-             {"gravity", scene.gravity, "m/s^2"},
-             {"linear_velocity", scene.initial.linear_velocity, "m/s"},
-             {"angular_velocity", scene.initial.angular_velocity, "rad/s"}};
+             {"gravity", *scene.scene.world.gravity, "m/s^2"},
+             {"linear_velocity", scene.scene.initial.linear_velocity, "m/s"},
+             {"angular_velocity", scene.scene.initial.angular_velocity, "rad/s"}};
+  for (std::size_t i = 0; i < scene.region_moduli.size(); ++i)
+    s.truth.push_back({"youngs_modulus@" + scene.scene.regions[i].name, scene.region_moduli[i], "Pa"});
   s.trajectory = simulate(scene);
-  if (int(s.trajectory.size()) != scene.frames)
-    throw std::invalid_argument("synthesise: the simulation gave " + std::to_string(s.trajectory.size()) + " of " +
-                                std::to_string(scene.frames) + " frames");
+  if (int(s.trajectory.size()) != scene.scene.timing.frame_count())
+    throw std::invalid_argument(fmt::format("synthesise: the simulation gave {} of {} frames", s.trajectory.size(),
+                                            scene.scene.timing.frame_count()));
   return s;
 }
 

@@ -6,7 +6,6 @@
 
 #include "base/files.hpp"
 #include "capture/markers.hpp"
-#include "capture/toml_facts.hpp"
 #include "photos/measure.hpp"
 
 namespace pliant {
@@ -36,30 +35,25 @@ void write_markers(const fs::path& folder, const std::string& name, const std::v
 
 std::string press_name(const MeasuredPress& press) { return fmt::format("press/{:03}", press.press.number); }
 
-void write_press(std::ostream& out, const MeasuredPress& press, const PhotoSession& session) {
-  const Vector3 force = press.force.force * press.probe.direction;
-  out << "[[press]]\nforce = " << toml_text(force) << "   # N, "
-      << fmt::format("{:.4g} along the probe", press.force.force)
-      << "\ncontact = { centre = " << toml_text(press.contact) << ", radius = " << toml_text(session.probe.radius)
-      << " }\nprobe = { point = " << toml_text(press.probe.tip) << ", normal = " << toml_text(press.probe.direction)
-      << " }\nmarkers = " << toml_text(press_name(press) + ".csv")
-      << "\nmarkers_rest = \"markers_rest.csv\"\nrole = " << toml_text(press.press.role) << "\n";
-  if (press.press.glued) out << "glued = " << (*press.press.glued ? "true" : "false") << "\n";
-  out << "\n";
-}
-
-void write_capture_toml(std::ostream& out, const PhotoSession& session, const MarkerMeasurement& measurement,
-                        const std::string& surface) {
-  out << "format = \"capture/1\"\nname = " << toml_text(session.name)
-      << "\n\n[object]\nsurface = " << toml_text(surface) << "\n";
-  if (session.mass) out << "mass = " << toml_text(*session.mass) << "   # kg\n";
-  if (session.density) out << "density = " << toml_text(*session.density) << "   # kg/m^3\n";
-  out << "shape_is = " << toml_text(session.shape_is) << "\n\n[world]\ngravity = " << toml_text(session.gravity)
-      << "   # m/s^2\n\n";
-  for (std::size_t i = 0; i < session.fixed.size(); ++i)
-    write_toml(out, session.fixed[i], fmt::format("fixed_{}.txt", i));
-  for (const MeasuredPress& press : measurement.presses)
-    if (press.failure.empty()) write_press(out, press, session);
+// What the presses that can be used were, with the files of their markers in `folder`.
+Capture capture_of(const PhotoSession& session, const MarkerMeasurement& measurement, const fs::path& folder) {
+  Capture capture;
+  capture.name = session.name;
+  capture.scene = session.scene;
+  capture.scene.object.file = folder / ("rest" + session.scene.object.file.extension().string());
+  for (const MeasuredPress& measured : measurement.presses) {
+    if (!measured.failure.empty()) continue;
+    Press& press = capture.presses.emplace_back();
+    press.force = measured.force.force * measured.probe.direction;
+    press.contact_centre = measured.contact;
+    press.contact_radius = session.probe.radius;
+    press.probe = Plane{measured.probe.tip, measured.probe.direction};
+    press.markers = folder / (press_name(measured) + ".csv");
+    press.markers_rest = folder / "markers_rest.csv";
+    press.role = measured.press.role;
+    press.glued = measured.press.glued.value_or(true);
+  }
+  return capture;
 }
 
 Json json_of(const PhotoFigures& figures) {
@@ -103,19 +97,13 @@ void write_marker_capture(const fs::path& folder, const PhotoSession& session, c
     failures.push_back({{session.file}, "no press can be used", "one at least", ""});
     throw InputError(std::move(failures));
   }
-  const std::string surface = "rest" + session.surface_file.extension().string();
-  write_file(folder / surface, read_file(session.surface_file));
-  for (std::size_t i = 0; i < session.fixed.size(); ++i)
-    if (const auto* list = std::get_if<RegionVertices>(&session.fixed[i].region))
-      write_file(folder / fmt::format("fixed_{}.txt", i), [&](std::ostream& out) {
-        for (const int index : list->indices) out << index << '\n';
-      });
+  const Capture capture = capture_of(session, measurement, folder);
+  write_file(capture.scene.object.file, read_file(session.scene.object.file));
   write_markers(folder, "markers_rest", measurement.ids, measurement.rest);
   for (const MeasuredPress& press : measurement.presses)
     if (press.failure.empty()) write_markers(folder, press_name(press), measurement.ids, press.markers);
   write_file(folder / "markers.json", json_of(session, measurement).dump(2) + "\n");
-  write_file(folder / "capture.toml",
-             [&](std::ostream& out) { write_capture_toml(out, session, measurement, surface); });
+  write_capture(folder, capture);
 }
 
 }  // namespace pliant

@@ -1,0 +1,123 @@
+#include <ostream>
+
+#include "base/files.hpp"
+#include "capture/capture.hpp"
+#include "geometry/mesh_io.hpp"
+#include "scene/scene_toml.hpp"
+
+namespace pliant {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+const char* text_of(bool value) { return value ? "true" : "false"; }
+
+// Writes the blocks of a capture.toml; paths come out relative to its folder.
+class Writer {
+ public:
+  Writer(std::ostream& out, fs::path folder) : out_(out), folder_(std::move(folder)) {}
+
+  void write(const Capture& capture, const std::string& comment) {
+    const Scene& scene = capture.scene;
+    if (!comment.empty()) out_ << "# " << comment << "\n";
+    out_ << "format = \"capture/1\"\nname = " << toml_text(capture.name) << "\n\n";
+    write_toml(out_, scene.object, scene.object.file.empty() ? "" : relative(scene.object.file));
+    write_toml(out_, scene.world);
+    if (!scene.timing.times.empty()) write_toml(out_, scene.timing);
+    if (!scene.timing.times.empty() || scene.initial != Initial{}) write_toml(out_, scene.initial);
+    write_toml_blocks(out_, scene);
+    for (const DepthCamera& camera : capture.depth) write(camera);
+    for (const CloudSequence& cloud : capture.clouds) write(cloud);
+    for (const MarkerTrack& track : capture.markers)
+      out_ << "[[markers]]\nrest = " << file_text(track.rest) << "\ntrack = " << file_text(track.track) << "\n\n";
+    for (const Press& press : capture.presses) write(press);
+    for (const Load& load : capture.loads) write(load);
+  }
+
+ private:
+  std::string relative(const fs::path& file) const {
+    return fs::absolute(file).lexically_normal().lexically_relative(folder_).generic_string();
+  }
+  std::string file_text(const fs::path& file) const { return toml_text(relative(file)); }
+
+  void write_file_key(const char* key, const std::optional<fs::path>& file) {
+    if (file) out_ << key << " = " << file_text(*file) << "\n";
+  }
+  void write_every(int every) { out_ << "every = " << every << "\n"; }
+  void write_noise(const std::optional<double>& noise) {
+    if (noise) out_ << "noise = " << toml_text(*noise) << "   # m\n";
+  }
+
+  void write(const DepthCamera& depth) {
+    const PinholeCamera& c = depth.camera;
+    out_ << "[[depth]]\nname = " << toml_text(depth.name) << "\nwidth = " << c.width << "\nheight = " << c.height
+         << "\n";
+    for (const auto& [key, value] : {std::pair{"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}})
+      out_ << key << " = " << toml_text(value) << "\n";
+    out_ << "camera_to_world = " << toml_text(c.camera_to_world) << "\nimages = " << toml_text(depth.images.pattern)
+         << "\n";
+    if (depth.masks) out_ << "masks = " << toml_text(depth.masks->pattern) << "\n";
+    write_file_key("background", depth.background);
+    out_ << "depth_scale = " << toml_text(depth.depth_scale) << "\n";
+    write_every(depth.every);
+    write_noise(depth.noise);
+    out_ << "\n";
+  }
+
+  void write(const CloudSequence& cloud) {
+    out_ << "[[cloud]]\npoints = " << toml_text(cloud.points.pattern) << "\n";
+    write_every(cloud.every);
+    write_noise(cloud.noise);
+    out_ << "\n";
+  }
+
+  void write(const Press& press) {
+    out_ << "[[press]]\nforce = " << toml_text(press.force)
+         << "   # N\ncontact = { centre = " << toml_text(press.contact_centre)
+         << ", radius = " << toml_text(press.contact_radius) << " }\n";
+    if (press.probe)
+      out_ << "probe = { point = " << toml_text(press.probe->point) << ", normal = " << toml_text(press.probe->normal)
+           << " }\n";
+    out_ << "markers = " << file_text(press.markers) << "\nmarkers_rest = " << file_text(press.markers_rest)
+         << "\nrole = " << toml_text(press.role) << "\nglued = " << text_of(press.glued) << "\n\n";
+  }
+
+  void write(const Load& load) {
+    out_ << "[[load]]\nmass = " << toml_text(load.mass) << "   # kg\nat = " << toml_text(load.at) << "\n";
+    write_file_key("cloud", load.cloud);
+    write_file_key("markers", load.markers);
+    write_file_key("markers_rest", load.markers_rest);
+    for (const auto& [key, paths] : {std::pair{"images", &load.images}, {"masks", &load.masks}}) {
+      if (paths->empty()) continue;
+      out_ << key << " = {";
+      const char* separator = " ";
+      for (const auto& [camera, path] : *paths) {
+        out_ << separator << toml_text(camera) << " = " << file_text(path);
+        separator = ", ";
+      }
+      out_ << " }\n";
+    }
+    out_ << "role = " << toml_text(load.role) << "\n\n";
+  }
+
+  std::ostream& out_;
+  fs::path folder_;
+};
+
+}  // namespace
+
+void write_capture(const fs::path& folder, const Capture& capture, const std::string& comment) {
+  const fs::path place = (fs::absolute(folder) / "").lexically_normal().parent_path();
+  Capture written = capture;
+  written.scene.initial.pulls.clear();  // of models alone
+  if (const auto& surface = capture.scene.object.surface; surface && capture.scene.object.file.empty()) {
+    written.scene.object.file = place / "rest.ply";
+    written.scene.object.volume.reset();
+    write_mesh(written.scene.object.file, *surface);
+  }
+  write_scene_files(place, capture.scene);
+  write_file(place / "capture.toml", [&](std::ostream& out) { Writer(out, place).write(written, comment); });
+}
+
+}  // namespace pliant

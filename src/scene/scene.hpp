@@ -1,0 +1,134 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/types.hpp"
+#include "geometry/camera.hpp"
+#include "geometry/triangle_mesh.hpp"
+#include "geometry/volume_mesh.hpp"
+
+// The facts of a situation: an object, its world, what holds, loads and surrounds it, how it begins to move, and when.
+// Recordings, models, synthetic scenes and sessions of photographs hold one each. SI units, world coordinates.
+
+namespace pliant {
+
+/// Axis-aligned box [m] with its border.
+struct RegionBox {
+  Vector3 min, max;
+  bool operator==(const RegionBox&) const = default;
+};
+/// Ball [m] with its border.
+struct RegionSphere {
+  Vector3 centre;
+  double radius;
+  bool operator==(const RegionSphere&) const = default;
+};
+/// Half of space with its border [m]; the unit normal points into the region.
+struct RegionHalfSpace {
+  Vector3 point, normal;
+  bool operator==(const RegionHalfSpace&) const = default;
+};
+/// Vertices of the object's surface, by their indices from 0.
+struct RegionVertices {
+  std::vector<int> indices;
+  bool operator==(const RegionVertices&) const = default;
+};
+/// Region of the object at rest: where it is held, or of another material.
+using Region = std::variant<RegionBox, RegionSphere, RegionHalfSpace, RegionVertices>;
+
+/// Region in which the object is held.
+struct FixedRegion {
+  Region region;
+  std::optional<RigidMotion>
+      displaced_to;  ///< rigid motion from rest to where it is held; nothing: held where it rests
+  bool operator==(const FixedRegion&) const = default;
+};
+
+/// Region of another material than the object's own.
+struct MaterialRegion {
+  std::string name;
+  Region region;
+  bool operator==(const MaterialRegion&) const = default;
+};
+
+/// Plane obstacle.
+struct Plane {
+  Vector3 point = Vector3::Zero();    ///< [m]
+  Vector3 normal = Vector3::UnitY();  ///< unit length, to the side where the object may be
+  bool known = true;                  ///< false: a rough guess, to be estimated
+  bool operator==(const Plane&) const = default;
+};
+
+/// Attached point mass: hangs at a point of the object, and moves along with it.
+struct Weight {
+  double mass = 0.0;             ///< [kg]
+  Vector3 at = Vector3::Zero();  ///< [m], on the undeformed surface
+  bool operator==(const Weight&) const = default;
+};
+
+/// Motion of the object at the start frame.
+struct Initial {
+  Vector3 linear_velocity = Vector3::Zero();   ///< [m/s], of the centre of mass
+  Vector3 angular_velocity = Vector3::Zero();  ///< [rad/s], about the centre of mass
+  bool known = true;                           ///< false: the velocities are guesses, to be estimated
+  bool released = false;                       ///< from a held, deformed pose
+  /// Forces on an object of a model that is released, until then, in the unit of `Pull`.
+  std::vector<Vector3> pulls = {};
+  /// Weight that hangs from a released object until its string is cut. Nothing: nobody knows what held the object.
+  std::optional<Weight> release_of = {};
+  bool operator==(const Initial&) const = default;
+};
+
+/// State in which the object's shape was scanned: free of load, or sagging under gravity.
+enum class ShapeIs { Reference, Static };
+
+/// The object itself.
+struct Object {
+  std::optional<TriangleMesh> surface;  ///< [m]; nothing: no rest scan, nothing can be fitted
+  std::optional<VolumeMesh> volume;     ///< tetrahedra made elsewhere, whose boundary `surface` then is
+  std::filesystem::path file;           ///< file of the surface or the volume, absolute; empty: of neither
+  std::optional<double> mass;           ///< [kg]
+  std::optional<double> density;        ///< [kg/m^3]
+  ShapeIs shape_is = ShapeIs::Reference;
+
+  /// Mass [kg], from the density where that is given. Nothing: neither is known.
+  std::optional<double> total_mass() const;
+};
+
+/// Gravity, and which way is up.
+struct World {
+  std::optional<Vector3> gravity;  ///< [m/s^2]; nothing: to be estimated
+  Vector3 up = Vector3::UnitY();   ///< unit length, opposite to gravity's direction where that is known, else as given
+  bool operator==(const World&) const = default;
+};
+
+/// Instants at which sensors recorded.
+struct Timing {
+  double frame_rate = 0.0;    ///< [Hz] of equally spaced frames; 0: `times` say all
+  std::vector<double> times;  ///< [s] of each frame; empty: presses and loads alone, or a static model
+  int start_frame = 0;        ///< first frame in which the object moves freely
+  bool is_static = false;     ///< frames are looks at one equilibrium
+  int frame_count() const { return int(times.size()); }
+  bool operator==(const Timing&) const = default;
+};
+
+/// Frames k / frame_rate [s] for k = 0 .. frame_count - 1.
+Timing evenly_timed(double frame_rate, int frame_count, int start_frame = 0);
+
+/// A situation as a whole.
+struct Scene {
+  Object object;
+  World world;
+  Timing timing;
+  std::vector<FixedRegion> fixed;
+  std::vector<MaterialRegion> regions;
+  std::vector<Plane> planes;
+  std::vector<Weight> weights;  ///< that hang in every frame
+  Initial initial;
+};
+
+}  // namespace pliant

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <filesystem>
+#include <ostream>
+#include <string>
+
+#include "scene/scene.hpp"
+#include "scene/toml_table.hpp"
+
+// Scenes in TOML, the same words in all formats that hold one (docs/formats.md): captures, models, synthetic scenes and
+// sessions of photographs. A reader asks a table for its keys; who opened the table finishes it, and may ask for more.
+// What is missing or makes no sense is a complaint in the table's context, and a default in the value.
+
+namespace pliant {
+
+/// Keys of [object] that every format has: `mass`, `density`, `shape_is`.
+void read_object_facts(TomlTable& table, Object& object);
+/// Key `surface` or `volume_mesh` of [object], neither required: the file's path and its mesh.
+void read_object_shape(TomlTable& table, const NamedFiles& files, Object& object);
+/// Complains where both or neither of `mass` and `density` is written.
+void require_mass_or_density(TomlTable& table);
+
+/// Table [world]. @param gravity_is_required  false: gravity may be unknown
+World read_world(TomlTable& table, bool gravity_is_required = false);
+
+/// Table [timing] of a recording: `frame_rate` or a file of `timestamps`, `frame_count`, `start_frame`, `static`.
+Timing read_timing(TomlTable& table, const NamedFiles& files);
+/// Table [timing] where frames are equally spaced: `frame_rate`, `frame_count`, `start_frame`.
+Timing read_even_timing(TomlTable& table, int most_frames);
+
+/// A region: one of `box`, `sphere`, `half_space`, `vertices` (a file with one index a line).
+std::optional<Region> read_region(TomlTable& table, const NamedFiles& files);
+
+/// Complains about vertices in the lists of [[fixed]] and [[region]] that the surface has not; about none without
+/// surface.
+void check_vertex_lists(TomlContext& context, const Scene& scene);
+
+/// Blocks [[fixed]], [[region]], [[plane]], [[weight]]; and any table with a weight's keys.
+FixedRegion read_fixed(TomlTable& block, const NamedFiles& files);
+MaterialRegion read_material_region(TomlTable& block, const NamedFiles& files);
+Plane read_plane(TomlTable& block);
+Weight read_weight(TomlTable& block);
+
+/// Table [initial]. @param may_pull  whether the format has the key `pulls`
+Initial read_initial(TomlTable& table, bool may_pull = false);
+
+/// The same tables and blocks as text, each with an empty line behind it. Times that are not equally spaced, and lists
+/// of vertices, are files: see `write_scene_files`.
+void write_toml(std::ostream& out, const World& world);
+void write_toml(std::ostream& out, const Timing& timing);
+void write_toml(std::ostream& out, const Initial& initial);
+void write_toml(std::ostream& out, const Plane& plane);
+void write_toml(std::ostream& out, const Weight& weight);
+
+/// Table [object]. @param file  path of the surface or volume mesh as it shall be written; empty: of neither
+void write_toml(std::ostream& out, const Object& object, const std::string& file);
+
+/// Blocks [[plane]], [[fixed]], [[region]] and [[weight]] of a scene.
+void write_toml_blocks(std::ostream& out, const Scene& scene);
+
+/// Writes what the text refers to and the value itself holds: `fixed_0.txt`, `region_0.txt`, ... with the vertices of a
+/// region that lists them, by its number, and `timestamps.txt` [s]. Throws InputError where a file cannot be written.
+void write_scene_files(const std::filesystem::path& folder, const Scene& scene);
+
+}  // namespace pliant

@@ -1,0 +1,99 @@
+#include "simulation/model_simulation.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "base/error.hpp"
+#include "simulation/law_table.hpp"
+#include "simulation/scene_simulation.hpp"
+
+namespace pliant {
+
+namespace {
+
+/// Parameters of a model's material in a scene.
+VectorX model_theta(const Model& model, const Scene& scene, const Vector3& gravity, const MotionLayout& blocks) {
+  VectorX theta = blocks.zero();
+  for (std::size_t k = 0; k < blocks.pulls.size(); ++k) theta.segment<3>(blocks.pulls[k]) = scene.initial.pulls[k];
+  blocks.set_moduli(theta, model.youngs_modulus);
+  theta[blocks.poissons_ratio] = model.poisson_ratio;
+  theta[blocks.mass_damping] = model.mass_damping;
+  theta[blocks.stiffness_damping] = model.stiffness_damping;
+  theta[blocks.density] = model.scene.object.density.value();
+  theta.segment<3>(blocks.gravity) = gravity;
+  theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
+  theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
+  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
+    theta.segment<3>(blocks.planes[i].point) = scene.planes[i].point;
+    theta.segment<3>(blocks.planes[i].normal) = scene.planes[i].normal;
+  }
+  return theta;
+}
+
+/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's
+/// modulus where the volume mesh has as many elements.
+std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* distance) {
+  const ModelVolume& volume = model.volume;
+  Body body;
+  if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
+    body = make_body(make_hex_grid(*distance, bounding_box(*model.scene.object.surface), model.cell_size));
+  } else {
+    const auto points = std::size_t(corner_count(volume.kind));
+    std::vector<std::array<int, 4>> tets;
+    std::vector<std::array<int, 6>> mid_nodes;
+    for (std::size_t i = 0; i < volume.connectivity.size(); i += points) {
+      std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i), 4, tets.emplace_back().begin());
+      if (points == 10)
+        std::copy_n(volume.connectivity.begin() + std::ptrdiff_t(i) + 4, 6, mid_nodes.emplace_back().begin());
+    }
+    body = make_body(make_tet_mesh(volume.nodes, std::move(tets), std::move(mid_nodes)));
+  }
+  if (volume.youngs_modulus.size() == body.modulus.relative.size())
+    for (std::size_t e = 0; e < volume.youngs_modulus.size(); ++e)
+      body.modulus.relative[e] = volume.youngs_modulus[e] / model.youngs_modulus;
+  return std::make_shared<Body>(std::move(body));
+}
+
+}  // namespace
+
+std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, nullptr); }
+
+ModelScene make_scene(const Model& model) {
+  Scene situation = model.scene;
+  if (situation.timing.times.empty()) situation.timing.is_static = true, situation.timing.times = {0.0};
+  return make_scene(model, situation, scene_distance(situation, Resolution{}.band), {});
+}
+
+ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
+                      const std::filesystem::path& file) {
+  Scene scene = situation;
+  if (scene.initial.released && !scene.initial.release_of && scene.initial.pulls.empty()) {
+    if (model.scene.initial.pulls.empty())
+      throw InputError({{file},
+                        "the object is released, and the model knows no pose before a release",
+                        "the model of a fit to this recording",
+                        "let `pliant fit --hold-out` find the pose and score the rest"});
+    scene.initial.pulls = model.scene.initial.pulls;
+  }
+  const Vector3 gravity = scene.world.gravity.value_or(model.scene.world.gravity.value_or(-9.81 * scene.world.up));
+  ModelScene made;
+  const MotionLayout blocks({.planes = int(scene.planes.size()), .pulls = int(scene.initial.pulls.size())});
+  made.layout = blocks.layout();
+  made.theta = model_theta(model, scene, gravity, blocks);
+  SimulationOptions settings;
+  settings.newmark_theta = model.theta;
+  Resolution resolution;
+  resolution.cells = object_size(scene) / model.cell_size;
+  resolution.pulls = int(scene.initial.pulls.size());
+  made.body = body_of(model, distance.get());
+  made.distance = std::move(distance);
+  if (model.law) settings.law = make_law(*model.law, made.body->element_count());
+  resolution.element = made.body->kind;
+  made.simulation = make_simulation(scene, *made.body, resolution, blocks, made.theta, settings);
+  if (model.contact_stiffness > 0.0) made.simulation.contact = {model.contact_stiffness, model.contact_smoothing};
+  const double frame_rate = model.scene.timing.frame_rate;
+  if (frame_rate > 0.0) made.simulation.max_dt = 1.0 / (frame_rate * model.substeps) * (1.0 + 1e-9);
+  return made;
+}
+
+}  // namespace pliant

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "geometry/signed_distance.hpp"
+#include "model/model.hpp"
+#include "motion/simulation.hpp"
+
+namespace pliant {
+
+/// Body, scene and parameters that a model describes.
+struct ModelScene {
+  std::shared_ptr<const SignedDistance> distance;
+  std::shared_ptr<const Body> body;
+  SimulationOptions simulation;
+  ParameterLayout layout;  ///< of `theta`
+  VectorX theta;
+};
+/// A model in its own situation. Throws InputError where its object is released from a pose that it does not know.
+ModelScene make_scene(const Model& model);
+
+/// A model's material in another situation, on a grid as fine as the model's.
+/// @param distance  of the situation's surface, as `scene_distance` makes it
+/// @param file      that the situation was read from, for complaints
+/// Throws InputError where the object is released from a pose that neither knows.
+ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
+                      const std::filesystem::path& file);
+
+/// The body of a model of tetrahedra, with each element's modulus.
+std::shared_ptr<const Body> model_body(const Model& model);
+
+}  // namespace pliant

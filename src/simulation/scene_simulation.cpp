@@ -1,0 +1,150 @@
+#include "simulation/scene_simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "meshing/mesh_distance.hpp"
+#include "scene/region.hpp"
+
+namespace pliant {
+
+namespace {
+
+std::function<bool(const Vector3&)> region_test(const TriangleMesh& mesh, const Region& region) {
+  const auto* vertices = std::get_if<RegionVertices>(&region);
+  if (!vertices) return [region](const Vector3& p) { return contains(region, p); };
+  // Named vertices hold the object around them, as far as the next vertices.
+  std::vector<Vector3> centres;
+  double radius = 0.0;
+  for (const int v : vertices->indices) centres.push_back(mesh.vertices[std::size_t(v)]);
+  for (const auto& triangle : mesh.triangles)
+    for (int side = 0; side < 3; ++side)
+      radius += (mesh.vertices[triangle[side]] - mesh.vertices[triangle[(side + 1) % 3]]).norm();
+  radius /= 3.0 * double(mesh.triangles.size());
+  return [centres = std::move(centres), radius](const Vector3& p) {
+    return std::any_of(centres.begin(), centres.end(), [&](const Vector3& c) { return (p - c).norm() <= radius; });
+  };
+}
+
+}  // namespace
+
+ControlledField control_field(const Body& body, const Scene& scene, const FieldOptions& options) {
+  const int count = options.control_points;
+  if (options.weights == FieldOptions::Weights::Linear) {
+    Eigen::Index longest = 0;
+    bounding_box(*scene.object.surface).extent().maxCoeff(&longest);
+    return linear_field(body, Vector3::Unit(longest), count);
+  }
+  const std::vector<Vector3> points = farthest_points(body, count);
+  return options.weights == FieldOptions::Weights::Harmonic ? harmonic_field(body, points)
+                                                            : inverse_distance_field(body, points);
+}
+
+double object_size(const Scene& scene) { return bounding_box(*scene.object.surface).extent().maxCoeff(); }
+
+std::shared_ptr<const SignedDistance> scene_distance(const Scene& scene, double band) {
+  const double size = object_size(scene);
+  return std::make_shared<SignedDistance>(signed_distance(*scene.object.surface, size / 80.0, (band + 0.1) * size));
+}
+
+std::vector<std::function<bool(const Vector3&)>> region_tests(const Scene& scene) {
+  std::vector<std::function<bool(const Vector3&)>> regions;
+  for (const MaterialRegion& region : scene.regions)
+    regions.push_back(region_test(*scene.object.surface, region.region));
+  return regions;
+}
+
+std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
+                                         const Resolution& resolution, std::vector<Vector3>& control_points) {
+  const double edge = object_size(scene) / resolution.cells;
+  Body body;
+  if (scene.object.volume) {
+    const VolumeMesh& volume = *scene.object.volume;
+    const TetMesh mesh = make_tet_mesh(volume.nodes, volume.tets, volume.mid_nodes);
+    body = make_body(resolution.element == ElementKind::QuadraticTetrahedron ? with_mid_nodes(mesh) : mesh);
+  } else if (resolution.element == ElementKind::Hexahedron) {
+    body = make_body(make_hex_grid(distance, bounding_box(*scene.object.surface), edge));
+  } else {
+    TetMeshOptions options;
+    options.cell_size = edge;
+    options.quadratic = resolution.element == ElementKind::QuadraticTetrahedron;
+    body = make_body(make_tet_mesh(*scene.object.surface, options));
+  }
+  if (!scene.regions.empty()) {
+    body.modulus = region_field(body, region_tests(scene)).field;
+  } else if (resolution.field.control_points > 1) {
+    ControlledField field = control_field(body, scene, resolution.field);
+    body.modulus = std::move(field.field);
+    control_points = std::move(field.points);
+  }
+  return std::make_shared<Body>(std::move(body));
+}
+
+std::vector<Hold> held_regions(const std::vector<FixedRegion>& regions, const TriangleMesh& surface) {
+  std::vector<Hold> holds;
+  for (const FixedRegion& fixed : regions) {
+    const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
+    holds.push_back({region_test(surface, fixed.region), motion.rotation, motion.translation});
+  }
+  return holds;
+}
+
+std::vector<Hold> held_regions(const Scene& scene) { return held_regions(scene.fixed, *scene.object.surface); }
+
+int pull_count(const Scene& scene, const Resolution& resolution) {
+  if (!scene.initial.released || scene.initial.release_of) return 0;
+  return scene.initial.pulls.empty() ? resolution.pulls : int(scene.initial.pulls.size());
+}
+
+namespace {
+
+/// Of the scan, far from what is held; none where the regions hold no vertex of it.
+PullPoints pull_points(const Scene& scene, int count) {
+  std::vector<Vector3> held;
+  for (const FixedRegion& fixed : scene.fixed) {
+    const auto contains = region_test(*scene.object.surface, fixed.region);
+    std::ranges::copy_if(scene.object.surface->vertices, std::back_inserter(held), contains);
+  }
+  if (count == 0 || held.empty()) return {};
+  return {far_points(scene.object.surface->vertices, held, count), object_size(scene)};
+}
+
+constexpr double shape_length = 0.25;  // over which a scan's errors are alike, times the object's size
+
+ShapeField shape_field(const Scene& scene, const Resolution& resolution) {
+  if (resolution.shape_points == 0) return {};
+  const double size = object_size(scene);
+  PullPoints far = pull_points(scene, resolution.shape_points);
+  const std::vector<Vector3>& vertices = scene.object.surface->vertices;
+  if (far.at.empty()) far.at = far_points(vertices, {vertices.front()}, resolution.shape_points);
+  return {std::move(far.at), resolution.shape_std * size, shape_length * size};
+}
+
+}  // namespace
+
+SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
+                                  const MotionBlocks& blocks, const VectorX& theta, const SimulationOptions& settings) {
+  SimulationOptions simulation = settings;
+  simulation.is_static = scene.timing.is_static;
+  simulation.times.assign(scene.timing.times.begin() + scene.timing.start_frame, scene.timing.times.end());
+  const double gravity = std::max(blocks.gravity.vector(theta).norm(), 0.1);
+  simulation.max_dt = default_time_step(body, gravity);
+  simulation.scan_sags = scene.object.shape_is == ShapeIs::Static && !body.is_free_elsewhere();
+  // What hangs and touches nothing moves smoothly; its elements are quadratic, and its steps dear.
+  const std::vector<double>& times = simulation.times;
+  if (simulation.scan_sags && scene.planes.empty() && times.size() > 1)
+    simulation.max_dt = std::max(simulation.max_dt, 0.125 * (times.back() - times.front()) / double(times.size() - 1));
+  simulation.max_dt /= resolution.steps;
+  simulation.blocks = blocks;
+  simulation.contact = default_contact(body, theta[blocks.density] * body.volume(), gravity);
+  for (const Weight& weight : scene.weights) simulation.weights.push_back({weight.at, weight.mass});
+  if (const auto& weight = scene.initial.release_of; weight && scene.initial.released)
+    simulation.released_weights.push_back({weight->at, weight->mass});
+  simulation.pull_points = pull_points(scene, int(blocks.pulls.size()));
+  simulation.shape = shape_field(scene, resolution);
+  simulation.holds = held_regions(scene);
+  return simulation;
+}
+
+}  // namespace pliant

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "elasticity/body.hpp"
+#include "elasticity/modulus_field.hpp"
+#include "geometry/signed_distance.hpp"
+#include "motion/simulation.hpp"
+#include "scene/scene.hpp"
+
+// From the facts of a scene to a body and its simulation.
+
+namespace pliant {
+
+/// How Young's modulus varies over the object where the scene names no regions.
+struct FieldOptions {
+  enum class Weights { Linear, Harmonic, InverseDistance };
+  int control_points = 1;             ///< >= 1; 1: homogeneous
+  Weights weights = Weights::Linear;  ///< linear ones stand along the object's longest axis, the others spread over it
+};
+
+/// How finely the body and its motion are resolved, and by what elements.
+struct Resolution {
+  ElementKind element = ElementKind::Hexahedron;
+  FieldOptions field;
+  double cells = 12.0;      ///< elements along the object's longest axis
+  double steps = 1.0;       ///< time steps per default step: 2 halves the step
+  int pulls = 4;            ///< that hold a released object until it is let go
+  int shape_points = 0;     ///< about which the scan may err; 0: it is exact. Tetrahedra only
+  double shape_std = 0.01;  ///< by how much, times the object's longest axis
+  double band = 0.15;       ///< of the mismatch, times the object's longest axis
+};
+
+/// The field of a body where the scene names no regions.
+ControlledField control_field(const Body& body, const Scene& scene, const FieldOptions& options);
+
+/// Longest edge of the surface's box [m].
+double object_size(const Scene& scene);
+
+/// Signed distance of the scene's surface, fine enough for every resolution.
+/// @param band  how far outside it is known, times the object's longest axis
+std::shared_ptr<const SignedDistance> scene_distance(const Scene& scene, double band);
+
+/// Whether a point [m] at rest lies in each of the scene's regions of other materials.
+std::vector<std::function<bool(const Vector3&)>> region_tests(const Scene& scene);
+
+/// The object's elements at one resolution; `control_points` are those of its field of moduli, if any.
+/// @param distance  of the scene's surface; only hexahedra ask for it
+std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
+                                         const Resolution& resolution, std::vector<Vector3>& control_points);
+
+/// Held regions of a scene.
+std::vector<Hold> held_regions(const Scene& scene);
+/// The same of regions of a surface.
+std::vector<Hold> held_regions(const std::vector<FixedRegion>& fixed, const TriangleMesh& surface);
+
+/// Number of pulls of a scene's motion: none where it is not released, or from under a known weight.
+int pull_count(const Scene& scene, const Resolution& resolution);
+
+/// How a body moves in a scene: its instants and time step, what it touches, what holds and loads it.
+/// @param blocks    of the motion's parameters, with the scene's planes
+/// @param theta     by those blocks; its density and gravity scale contact
+/// @param settings  what the scene does not say
+SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
+                                  const MotionBlocks& blocks, const VectorX& theta,
+                                  const SimulationOptions& settings = {});
+
+}  // namespace pliant

@@ -1,0 +1,190 @@
+#include "base/files.hpp"
+#include "capture/small_capture.hpp"
+
+namespace pliant {
+namespace {
+
+using test::SmallCapture;
+using testing::HasSubstr;
+using testing::Not;
+
+void expect_same_scene(const Scene& is, const Scene& was) {
+  EXPECT_EQ(is.object.file, was.object.file);
+  EXPECT_EQ(is.object.mass, was.object.mass);
+  EXPECT_EQ(is.object.density, was.object.density);
+  EXPECT_EQ(is.object.shape_is, was.object.shape_is);
+  EXPECT_EQ(is.object.surface, was.object.surface);
+  EXPECT_EQ(is.object.volume.has_value(), was.object.volume.has_value());
+  EXPECT_EQ(is.world, was.world);
+  EXPECT_EQ(is.timing, was.timing);
+  EXPECT_EQ(is.fixed, was.fixed);
+  EXPECT_EQ(is.regions, was.regions);
+  EXPECT_EQ(is.planes, was.planes);
+  EXPECT_EQ(is.weights, was.weights);
+  EXPECT_EQ(is.initial, was.initial);
+}
+
+// Everything that a capture.toml can say but its hash and its place.
+void expect_same(const Capture& is, const Capture& was) {
+  EXPECT_EQ(is.name, was.name);
+  expect_same_scene(is.scene, was.scene);
+  EXPECT_EQ(is.depth, was.depth);
+  EXPECT_EQ(is.clouds, was.clouds);
+  EXPECT_EQ(is.markers, was.markers);
+  EXPECT_EQ(is.presses, was.presses);
+  EXPECT_EQ(is.loads, was.loads);
+}
+
+Capture written_and_read(const std::filesystem::path& folder, const Capture& capture) {
+  write_capture(folder, capture);
+  return read_capture(folder);
+}
+
+// Gives a small recording every kind of block.
+void fill(SmallCapture& small) {
+  write_points(small.folder / "clouds/000000.ply", std::vector<Vector3>{{0, 0, -0.1}});
+  write_points(small.folder / "clouds/000002.ply", std::vector<Vector3>{{0, 0.08, -0.1}});
+  small.folder.write("press/000.csv", "id,x,y,z\n0,0,0,-0.09\n");
+  write_png(small.folder / "load.png", SmallCapture::depth_image(0.0));
+  write_png(small.folder / "load_mask.png", SmallCapture::mask_image(0.0));
+  small.edit("mass = 0.8", "density = 100.0\nshape_is = \"static\"");
+  small.edit("noise = 0.002", "background = \"front/background.png\"\nevery = 1\nnoise = 0.002");
+  small.append(R"([initial]
+linear_velocity = [0, 0.5, 0]
+angular_velocity = [0, 0, 0.1]
+known = false
+[[fixed]]
+vertices = "held.txt"
+displaced_to = [[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+[[fixed]]
+sphere = { centre = [0.1, 0.1, 0.1], radius = 0.01 }
+[[region]]
+name = "listed"
+vertices = "held.txt"
+[[plane]]
+point = [0.0, 0.7, 0.0]
+normal = [0.0, -0.8, 0.6]
+known = false
+[[weight]]
+mass = 0.05
+at = [0.1, 0.1, 0.0]
+[[cloud]]
+points = "clouds/%06d.ply"
+every = 2
+noise = 0.003
+[[markers]]
+rest = "markers_rest.csv"
+track = "markers.csv"
+[[press]]
+force = [0.0, 0.1, -3.3333333333333335]
+contact = { centre = [0, 0, -0.1], radius = 0.01 }
+probe = { point = [0, 0, -0.1], normal = [0, 0, 1] }
+markers = "press/000.csv"
+markers_rest = "markers_rest.csv"
+role = "test"
+glued = false
+[[press]]
+force = [0, 0, 1]
+contact = { centre = [0, 0, -0.1], radius = 0.01 }
+markers = "press/000.csv"
+markers_rest = "markers_rest.csv"
+[[load]]
+mass = 0.1
+at = [0, 0.1, 0]
+cloud = "load.ply"
+images = { front = "load.png" }
+masks = { front = "load_mask.png" }
+role = "test"
+[[load]]
+mass = 0.2
+at = [0, 0.1, 0]
+markers = "press/000.csv"
+markers_rest = "markers_rest.csv"
+)");
+}
+
+TEST(WriteCapture, ComesBackAsItWasRead) {
+  SmallCapture small;
+  fill(small);
+  const Capture capture = small.read();
+  ASSERT_EQ(capture.presses.size(), 2u);
+  ASSERT_EQ(capture.loads.size(), 2u);
+  ASSERT_EQ(capture.scene.fixed.size(), 2u);
+  const Capture again = written_and_read(small.folder.path(), capture);
+  expect_same(again, capture);
+  const std::string text = read_file(small.folder / "capture.toml");
+  write_capture(small.folder.path(), again);
+  EXPECT_EQ(read_file(small.folder / "capture.toml"), text);
+}
+
+TEST(WriteCapture, ReleasesAndRecordedTimesComeBack) {
+  SmallCapture small;
+  small.folder.write("times.txt", "0\n0.1\n0.25\n0.3333333333333333\n");
+  small.edit("frame_rate = 60.0", "timestamps = \"times.txt\"");
+  small.append(
+      "[initial]\nreleased = true\nrelease_of = { mass = 0.02, at = [0.1, 0.1, 0.1] }\n[[fixed]]\nhalf_space = { "
+      "point = [-0.099, 0, 0], normal = [-1, 0, 0] }\n");
+  const Capture capture = small.read();
+  expect_same(written_and_read(small.folder.path(), capture), capture);
+}
+
+TEST(WriteCapture, MaySayNothingOfScanGravityAndFrames) {
+  SmallCapture small;
+  small.edit("surface = \"rest.ply\"\n", "").edit("gravity = [0.0, 9.81, 0.0]", "up = [0.0, -1.0, 0.0]");
+  const Capture capture = small.read();
+  expect_same(written_and_read(small.folder.path(), capture), capture);
+}
+
+TEST(WriteCapture, ElementsMadeElsewhereStayWhatTheyAre) {
+  SmallCapture small;
+  small.folder.write("made.msh",
+                     "$NOD\n4\n1 0 0 0\n2 .1 0 0\n3 0 .1 0\n4 0 0 .1\n$ENDNOD\n$ELM\n1\n1 4 1 1 4 1 2 3 4\n$ENDELM\n");
+  small.text = R"(format = "capture/1"
+name = "tetrahedron"
+[object]
+volume_mesh = "made.msh"
+density = 100.0
+[world]
+gravity = [0.0, -9.81, 0.0]
+[[press]]
+force = [0, 0, 1]
+contact = { centre = [0.01, 0.01, 0], radius = 0.01 }
+markers = "markers_rest.csv"
+markers_rest = "markers_rest.csv"
+)";
+  small.folder.write("markers_rest.csv", "id,x,y,z\n0,0,0,0\n");
+  const Capture capture = small.read();
+  ASSERT_TRUE(capture.scene.object.volume);
+  expect_same(written_and_read(small.folder.path(), capture), capture);
+  EXPECT_THAT(read_file(small.folder / "capture.toml"), Not(HasSubstr("[timing]")));
+}
+
+TEST(WriteCapture, FilesOfAnotherFolderAreNamedFromTheNewOne) {
+  SmallCapture small;
+  Capture capture = small.read();
+  capture.depth.clear();
+  capture.markers = {{small.folder / "markers_rest.csv", small.folder / "markers.csv"}};
+  const Capture again = written_and_read(small.folder / "new", capture);
+  expect_same(again, capture);
+  EXPECT_THAT(read_file(small.folder / "new/capture.toml"), HasSubstr("surface = \"../rest.ply\""));
+}
+
+TEST(WriteCapture, ASurfaceWithoutFileGetsOne) {
+  SmallCapture small;
+  Capture capture = small.read();
+  capture.scene.object.file.clear();
+  std::filesystem::remove(small.folder / "rest.ply");
+  const Capture again = written_and_read(small.folder.path(), capture);
+  EXPECT_EQ(again.scene.object.surface, capture.scene.object.surface);
+  EXPECT_EQ(again.scene.object.file.filename(), "rest.ply");
+}
+
+TEST(WriteCapture, BeginsWithItsComment) {
+  const SmallCapture small;
+  write_capture(small.folder.path(), small.read(), "made by a test");
+  EXPECT_THAT(read_file(small.folder / "capture.toml"),
+              testing::StartsWith("# made by a test\nformat = \"capture/1\""));
+}
+
+}  // namespace
+}  // namespace pliant

@@ -1,0 +1,84 @@
+#include "simulation/model_simulation.hpp"
+
+#include "geometry/primitives.hpp"
+#include "input_errors.hpp"
+#include "simulation/scene_simulation.hpp"
+#include "simulation/trajectory.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using test::complaint_of;
+using test::TemporaryFolder;
+using testing::HasSubstr;
+
+constexpr double length = 0.2, edge = 0.05, frame_rate = 50.0;
+constexpr int frames = 6, start = 2, substeps = 4;
+
+/// A bar held at its low end, with a weight at its other one, above a floor.
+Model bar() {
+  Model model;
+  model.name = "bar";
+  model.scene.object.surface = make_box(Vector3(length, edge, edge), edge);
+  model.scene.object.density = 1000.0, model.scene.object.mass = 0.5;
+  model.scene.world.gravity = Vector3(0.0, 0.0, -9.81);
+  model.scene.world.up = Vector3::UnitZ();
+  model.scene.timing = evenly_timed(frame_rate, frames, start);
+  model.scene.fixed = {{RegionHalfSpace{{-0.499 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
+  model.scene.planes = {{{0, 0, -0.3}, Vector3::UnitZ(), true}};
+  model.scene.weights = {{0.1, {0.5 * length, 0, 0}}};
+  model.youngs_modulus = 2e5, model.poisson_ratio = 0.3, model.stiffness_damping = 2e-3;
+  model.cell_size = edge, model.substeps = substeps, model.theta = 0.6;
+  return model;
+}
+
+TEST(ModelSimulation, IsTheModelsOwnSituation) {
+  const ModelScene made = make_scene(bar());
+  const SimulationOptions& s = made.simulation;
+  ASSERT_EQ(s.times.size(), std::size_t(frames - start));
+  EXPECT_EQ(s.times.front(), start / frame_rate);
+  EXPECT_FALSE(s.is_static);
+  EXPECT_DOUBLE_EQ(s.max_dt, 1.0 / (frame_rate * substeps) * (1.0 + 1e-9));
+  EXPECT_EQ(s.newmark_theta, 0.6);
+  EXPECT_EQ(s.blocks.planes.size(), 1u);
+  EXPECT_EQ(s.holds.size(), 1u);
+  ASSERT_EQ(s.weights.size(), 1u);
+  EXPECT_EQ(s.weights[0].mass, 0.1);
+  EXPECT_EQ(made.theta[made.simulation.blocks.youngs_moduli.front()], 2e5);
+  EXPECT_EQ(made.theta[made.simulation.blocks.density], 1000.0);
+  EXPECT_EQ(made.simulation.blocks.planes[0].point.vector(made.theta), Vector3(0, 0, -0.3));
+}
+
+TEST(ModelSimulation, WithoutFramesIsOneEquilibrium) {
+  Model model = bar();
+  model.scene.timing = {};
+  const SimulationOptions s = make_scene(model).simulation;
+  EXPECT_TRUE(s.is_static);
+  EXPECT_EQ(s.times, std::vector<double>{0.0});
+}
+
+TEST(ModelSimulation, AReleaseNeedsThePoseBefore) {
+  Model model = bar();
+  model.scene.initial.released = true;
+  EXPECT_THAT(complaint_of([&] { (void)make_scene(model); }), HasSubstr("knows no pose before a release"));
+  Scene other = model.scene;
+  model.scene.initial.pulls = {{0, 0, 0.1}, {0, 0.1, 0}};
+  const ModelScene made = make_scene(model, other, scene_distance(other, 0.15), "other/capture.toml");
+  EXPECT_EQ(made.simulation.blocks.pulls.size(), 2u) << "those of the model";
+  EXPECT_EQ(made.simulation.blocks.pulls[1].vector(made.theta), Vector3(0, 0.1, 0));
+}
+
+TEST(Trajectory, HasAFileForEachFrame) {
+  const TemporaryFolder folder;
+  const ModelScene made = make_scene(bar());
+  const RolloutSummary summary = write_trajectory(folder.path(), made.body, made.simulation, made.theta);
+  EXPECT_TRUE(summary.succeeded) << summary.failure;
+  EXPECT_TRUE(std::filesystem::exists(folder / "trajectory.pvd"));
+  const VtuGrid first = read_vtu(folder / "frames/000000.vtu"), last = read_vtu(folder / "frames/000003.vtu");
+  EXPECT_FALSE(std::filesystem::exists(folder / "frames/000004.vtu"));
+  EXPECT_LT(last.points.col(2).minCoeff(), first.points.col(2).minCoeff() - 1e-4) << "it sinks";
+}
+
+}  // namespace
+}  // namespace pliant
