@@ -54,12 +54,9 @@ std::vector<Family> families() {
   std::vector<Family> list;
   for (const test::BodyKind& kind : test::body_kinds())
     for (const double t : {1.0, 0.1})
-      list.push_back({"SpringsOn" + kind.name + (t < 1.0 ? "Sliding" : ""),
-                      kind.make,
-                      [t](const auto& body) { return Springs(*body, t).make(*body); },
-                      false,
-                      true,
-                      {}});
+      list.push_back({"SpringsOn" + kind.name + (t < 1.0 ? "Sliding" : ""), kind.make,
+                      [t](const auto& body, const MotionBlocks&) { return Springs(*body, t).make(*body); }, false, true,
+                      [](const MotionBlocks&) { return std::vector<ParameterHandle>(); }});
   return list;
 }
 
