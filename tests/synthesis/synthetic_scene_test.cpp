@@ -174,7 +174,7 @@ TEST(Synthesis, ObservedPointsLieOnTheTrueSurface) {
   for (const ObservedFrame& frame : frames) {
     EXPECT_GT(frame.points.size(), 200u);
     RayScene truth;
-    truth.add(synthesis.trajectory[frame.frame], scene.surface.triangles);
+    truth.add(synthesis.trajectory[frame.frame], scene.scene.object.surface->triangles);
     const Vector3 eye = scene.cameras[0].camera.camera_to_world.translation;
     for (const Vector3& point : frame.points) {
       const auto hit = truth.cast(eye, (point - eye).normalized());
