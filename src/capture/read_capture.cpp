@@ -4,9 +4,9 @@
 #include <string_view>
 
 #include "base/files.hpp"
+#include "base/sha256.hpp"
 #include "capture/capture.hpp"
 #include "capture/capture_rules.hpp"
-#include "capture/hash.hpp"
 #include "capture/toml_table.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/volume_mesh.hpp"
@@ -77,8 +77,8 @@ class Reader {
       return std::nullopt;
     }
     const fs::path path = (capture_.folder / text).lexically_normal();
-    if (!fs::is_regular_file(path)) {
-      context_.reject(table.key_of(name), "the file \"" + text + "\" is not there",
+    if (!is_file(path)) {
+      context_.reject(table.key_of(name), "the file \"" + text + "\" " + why_no_file(path),
                       "a file in " + capture_.folder.string(), "check the spelling, or copy the file");
       return std::nullopt;
     }
@@ -434,10 +434,10 @@ class Reader {
 };
 
 fs::path toml_file(const fs::path& path) {
-  const fs::path file = fs::is_directory(path) ? path / "capture.toml" : path;
-  if (!fs::is_regular_file(file))
-    throw InputError(
-        Problem{{file}, "the file is not there", "a folder with a capture.toml in it", "name the recording's folder"});
+  const fs::path file = is_folder(path) ? path / "capture.toml" : path;
+  if (!is_file(file))
+    throw InputError(Problem{
+        {file}, "the file " + why_no_file(file), "a folder with a capture.toml in it", "name the recording's folder"});
   return file;
 }
 

@@ -160,9 +160,9 @@ fs::path read_path(TomlTable& table, const std::string& name, const fs::path& fo
   const auto text = table.required<std::string>(name);
   if (!text) return {};
   const fs::path path = (folder / *text).lexically_normal();
-  if (fs::is_regular_file(path)) return path;
-  table.context().reject(table.key_of(name), "the file \"" + *text + "\" is not there", "a file in " + folder.string(),
-                         "check the spelling, or copy the file");
+  if (is_file(path)) return path;
+  table.context().reject(table.key_of(name), "the file \"" + *text + "\" " + why_no_file(path),
+                         "a file in " + folder.string(), "check the spelling, or copy the file");
   return {};
 }
 

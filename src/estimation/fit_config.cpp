@@ -18,6 +18,7 @@ const std::vector<std::pair<std::string, OptimiserKind>> optimisers = {
     {"levenberg_marquardt", OptimiserKind::LevenbergMarquardt},
     {"rprop", OptimiserKind::Rprop},
     {"gradient_descent", OptimiserKind::GradientDescent},
+    {"lbfgs", OptimiserKind::Lbfgs},
     {"nelder_mead", OptimiserKind::NelderMead}};
 const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", SolverKind::Automatic},
                                                                  {"iterative", SolverKind::Iterative},
@@ -364,10 +365,11 @@ void read_fit_options(const std::filesystem::path& path, FitOptions& options) {
 }
 
 std::vector<std::string> unused_choices(const FitOptions& options, bool has_motion, bool has_presses) {
-  static const std::set<std::string> of_laws = {"material", "law_terms", "law_zones", "basis_tolerance", "basis_samples"};
-  static const std::set<std::string> of_presses = {"cells",    "element",        "control_points", "modulus_variation",
-                                                   "material", "max_iterations", "marker_noise",   "law_terms",
-                                                   "law_zones", "basis_tolerance", "basis_samples"};
+  static const std::set<std::string> of_laws = {"material", "law_terms", "law_zones", "basis_tolerance",
+                                                "basis_samples"};
+  static const std::set<std::string> of_presses = {
+      "cells",        "element",   "control_points", "modulus_variation", "material",     "max_iterations",
+      "marker_noise", "law_terms", "law_zones",      "basis_tolerance",   "basis_samples"};
   std::vector<std::string> notes;
   const FitOptions standard;
   for (const Entry& e : entries()) {

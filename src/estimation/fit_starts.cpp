@@ -1,4 +1,3 @@
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
@@ -7,6 +6,7 @@
 #include <numeric>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "estimation/fit_run.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/modal_start.hpp"
@@ -231,12 +231,13 @@ class StartFinder {
             [&](const Recording& r) { return run_.swings() ? r.horizon(growing_horizon().front()) : r.last_frame; });
         const CostEvaluation e = objective.evaluate(VectorX(0));
         if (e.succeeded) run_.state.scan[std::size_t(i)].second = e.cost;
-        run_.emit({StageKind::Scan, "scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial, 0.05 + 0.1 * double(++done) / count});
+        run_.emit({StageKind::Scan, "scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial,
+                   0.05 + 0.1 * double(++done) / count});
       };
       if (run_.recordings.all_static())
         scan_downwards(count, try_value);
       else
-        tbb::parallel_for(0, count, try_value, tbb::simple_partitioner());
+        parallel_tasks(std::size_t(count), [&](std::size_t i) { try_value(int(i)); });
       if (run_.interrupted()) {
         run_.state.scan.clear();
         run_.outcome.interrupted = true;
@@ -283,9 +284,7 @@ class StartFinder {
       return;
     }
     std::vector<FitStart> starts(count);
-    tbb::parallel_for(
-        std::size_t(0), count, [&](std::size_t i) { starts[i] = follow(int(i), start_moduli_[i]); },
-        tbb::simple_partitioner());
+    parallel_tasks(count, [&](std::size_t i) { starts[i] = follow(int(i), start_moduli_[i]); });
     if (run_.interrupted()) run_.outcome.interrupted = true;
     run_.outcome.starts = starts;
     if (run_.outcome.interrupted) return;  // half-followed starts are a result, but nothing to go on from
@@ -310,8 +309,8 @@ class StartFinder {
       const double from = 0.15 + 0.3 * (part < 1.0 ? 0.0 : 0.4);
       Objective objective = run_.recordings.objective(run_.coarse, parameters, run_.options.wide_band,
                                                       [&](const Recording& r) { return r.horizon(part); });
-      const OptimiserSummary s = run_.optimise(objective, FitRun::start_of(parameters), StageKind::Coarse, "coarse", index, last ? 10 : 5,
-                                               counter, from, from + 0.15);
+      const OptimiserSummary s = run_.optimise(objective, FitRun::start_of(parameters), StageKind::Coarse, "coarse",
+                                               index, last ? 10 : 5, counter, from, from + 0.15);
       start.iterations += s.iterations;
       start.converged = s.converged;
       start.reason = s.reason;
