@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -19,6 +18,7 @@
 #include "capture/pixel_kinds.hpp"
 #include "capture/point_cloud.hpp"
 #include "capture/survey.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
 #include "speech.hpp"
@@ -367,19 +367,16 @@ the points on the object as PLY files. A capture without a scan of the object at
 
 }  // namespace
 
-void add_check(CLI::App& app, int& exit_code) {
+void add_check(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("check", "Validate a capture and say what can be estimated from it");
-  command->add_option("capture", arguments->capture, "the capture's folder, or its capture.toml")->required();
-  command->add_option("--out", arguments->out, "folder for pictures, point clouds and figures");
-  command->add_option("--pictures", arguments->pictures, "frames of each camera to picture")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 100000));
-  command->add_option(
-      "--compare-masks", arguments->compare_masks,
-      "pattern of reference masks, relative to the capture: report how well found objects agree with them");
-  command->footer(footer);
-  command->callback([arguments, &exit_code] {
+  Command command = line.add_command("check", "Validate a capture and say what can be estimated from it");
+  command.option("capture", arguments->capture, "the capture's folder, or its capture.toml").required();
+  command.option("--out", arguments->out, "folder for pictures, point clouds and figures");
+  command.option("--pictures", arguments->pictures, "frames of each camera to picture").show_default().range(1, 100000);
+  command.option("--compare-masks", arguments->compare_masks,
+                 "pattern of reference masks, relative to the capture: report how well found objects agree with them");
+  command.footer(footer);
+  command.callback([arguments, &exit_code] {
     check(*arguments);
     exit_code = Fine;
   });

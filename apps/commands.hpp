@@ -2,27 +2,25 @@
 
 #include <stdexcept>
 
-namespace CLI {
-class App;
-}
-
 /// Commands of the program, one file each. A command registers itself and stores its exit code when it runs.
 namespace pliant::apps {
+
+class CommandLine;
 
 /// Exit codes of every command.
 enum ExitCode : int { Fine = 0, BadInput = 2, NotConverged = 3, WasInterrupted = 130 };
 
-void add_check(CLI::App& app, int& exit_code);
-void add_fit(CLI::App& app, int& exit_code);
-void add_simulate(CLI::App& app, int& exit_code);
-void add_track(CLI::App& app, int& exit_code);
-void add_evaluate(CLI::App& app, int& exit_code);
-void add_press(CLI::App& app, int& exit_code);
-void add_synth(CLI::App& app, int& exit_code);
-void add_rest(CLI::App& app, int& exit_code);
-void add_mesh(CLI::App& app, int& exit_code);
-void add_markers(CLI::App& app, int& exit_code);
-void add_scan(CLI::App& app, int& exit_code);
+void add_check(CommandLine& line, int& exit_code);
+void add_fit(CommandLine& line, int& exit_code);
+void add_simulate(CommandLine& line, int& exit_code);
+void add_track(CommandLine& line, int& exit_code);
+void add_evaluate(CommandLine& line, int& exit_code);
+void add_press(CommandLine& line, int& exit_code);
+void add_synth(CommandLine& line, int& exit_code);
+void add_rest(CommandLine& line, int& exit_code);
+void add_mesh(CommandLine& line, int& exit_code);
+void add_markers(CommandLine& line, int& exit_code);
+void add_scan(CommandLine& line, int& exit_code);
 
 /// Thrown where a command notices that the user pressed Ctrl-C.
 struct Interrupted : std::runtime_error {

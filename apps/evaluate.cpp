@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -6,6 +5,7 @@
 
 #include "base/error.hpp"
 #include "capture/markers.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "output/fit_output.hpp"
 #include "output/prediction.hpp"
@@ -81,15 +81,15 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_evaluate(CLI::App& app, int& exit_code) {
+void add_evaluate(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("evaluate", "Predict another recording with a fitted model, and say how well");
-  command->add_option("model", arguments->model, "model.toml of a fit")->required()->type_name("MODEL");
-  command->add_option("capture", arguments->capture, "recording of the same object")->required()->type_name("CAPTURE");
-  command->add_option("-o,--out", arguments->out, "file for the figures (JSON)")->type_name("FILE");
-  command->add_option("--markers", arguments->markers, "file for the predicted tracks of the capture's markers (CSV)")
-      ->type_name("FILE");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  Command command = line.add_command("evaluate", "Predict another recording with a fitted model, and say how well");
+  command.option("model", arguments->model, "model.toml of a fit").required().type_name("MODEL");
+  command.option("capture", arguments->capture, "recording of the same object").required().type_name("CAPTURE");
+  command.option("-o,--out", arguments->out, "file for the figures (JSON)").type_name("FILE");
+  command.option("--markers", arguments->markers, "file for the predicted tracks of the capture's markers (CSV)")
+      .type_name("FILE");
+  command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
 }  // namespace pliant::apps

@@ -1,7 +1,5 @@
-#include <tbb/global_control.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -12,6 +10,8 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "base/parallel.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
@@ -159,7 +159,7 @@ State begun(const Arguments& arguments, const FitOptions& options, const std::st
   const fs::path out = arguments.out, state_file = out / "state.json";
   State state;
   if (arguments.resume) {
-    if (!fs::exists(state_file))
+    if (!is_file(state_file))
       throw InputError({{state_file},
                         "there is no interrupted fit to resume",
                         "the state that an interrupted fit leaves",
@@ -167,7 +167,7 @@ State begun(const Arguments& arguments, const FitOptions& options, const std::st
     state = read(state_file, key);
     log.line("resuming the fit in " + out.string());
   } else {
-    fs::remove(state_file);
+    remove_file(state_file);
   }
   write_file(out / "fit.toml", to_toml(options));
   return state;
@@ -186,7 +186,7 @@ int ended(bool converged, bool interrupted, const std::string& words, const fs::
               << " --resume\n";
     return WasInterrupted;
   }
-  fs::remove(out / "state.json");
+  remove_file(out / "state.json");
   return converged ? Fine : NotConverged;
 }
 
@@ -241,7 +241,7 @@ int run_presses(const Arguments& arguments, const FitOptions& options, const Cap
   PressFitOutcome outcome = fit_presses(capture, press_options(options), monitor, std::move(state));
   log.clear_live();
   for (std::string& note : unused_choices(options, false, true)) outcome.notes.push_back(std::move(note));
-  if (outcome.interrupted && !fs::exists(state_file)) write_press_state(state_file, {}, key);
+  if (outcome.interrupted && !is_file(state_file)) write_press_state(state_file, {}, key);
   if (!outcome.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
   const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
   const Result result = make_result(capture, outcome, facts);
@@ -266,11 +266,10 @@ int run(const Arguments& arguments) {
   }
   if (!arguments.held_out.empty()) held_out = RecordedCapture{read_capture(arguments.held_out), {}};
   const fs::path out = arguments.out;
-  fs::create_directories(out);
+  make_folder(out);
 
-  std::optional<tbb::global_control> threads;
-  if (arguments.threads > 0)
-    threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(arguments.threads));
+  std::optional<ThreadLimit> threads;
+  if (arguments.threads > 0) threads.emplace(arguments.threads);
 
   Log log;
   log.line("pliant " PLIANT_VERSION " fit " + words);
@@ -311,7 +310,7 @@ int run(const Arguments& arguments) {
   const bool has_presses =
       std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
   for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
-  if (outcome.interrupted && !fs::exists(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
+  if (outcome.interrupted && !is_file(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
   if (!outcome.evaluation.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
   RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
   Result result = make_result(recordings, outcome, facts);
@@ -343,34 +342,33 @@ std::string key_help() {
 
 }  // namespace
 
-void add_fit(CLI::App& app, int& exit_code) {
+void add_fit(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("fit", "Estimate stiffness, damping and what else a recording leaves unknown");
+  Command command = line.add_command("fit", "Estimate stiffness, damping and what else a recording leaves unknown");
   command
-      ->add_option("captures", arguments->captures,
-                   "recordings of one object: folders with capture.toml in them; they share its material")
-      ->required()
-      ->type_name("CAPTURE...");
+      .option("captures", arguments->captures,
+              "recordings of one object: folders with capture.toml in them; they share its material")
+      .required()
+      .type_name("CAPTURE...");
   command
-      ->add_option("--hold-out", arguments->held_out,
-                   "a recording that takes no part in the fit; how well it is predicted stands in the result")
-      ->type_name("CAPTURE");
-  command->add_option("--out,-o", arguments->out, "folder for the result")->required()->type_name("DIR");
-  command->add_option("--config", arguments->config, "choices (TOML); none is needed")->type_name("FILE");
-  command->add_option("--set", arguments->settings, "one choice; may be given many times")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
+      .option("--hold-out", arguments->held_out,
+              "a recording that takes no part in the fit; how well it is predicted stands in the result")
+      .type_name("CAPTURE");
+  command.option("--out,-o", arguments->out, "folder for the result").required().type_name("DIR");
+  command.option("--config", arguments->config, "choices (TOML); none is needed").type_name("FILE");
+  command.option("--set", arguments->settings, "one choice; may be given many times")
+      .type_name("KEY=VALUE")
+      .one_value_a_use();
   command
-      ->add_option("--refine", arguments->refine,
-                   "make the estimate at so many resolutions of mesh and time step (2, or 3: several times the work), "
-                   "take it to the limit, and state what error is left")
-      ->check(CLI::Range(1, 3))
-      ->type_name("N");
-  command->add_option("--threads", arguments->threads, "most threads to use; all processors where left out")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
-  command->footer(key_help());
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+      .option("--refine", arguments->refine,
+              "make the estimate at so many resolutions of mesh and time step (2, or 3: several times the work), "
+              "take it to the limit, and state what error is left")
+      .range(1, 3)
+      .type_name("N");
+  command.option("--threads", arguments->threads, "most threads to use; all processors where left out").positive();
+  command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
+  command.footer(key_help());
+  command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
 }  // namespace pliant::apps

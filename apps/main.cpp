@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -8,6 +7,7 @@
 #include <iostream>
 
 #include "base/error.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 
 namespace pliant::apps {
@@ -30,27 +30,21 @@ A capture is a folder with a file capture.toml in it (docs/formats.md).
 Exit codes: 0 fine, 2 bad usage or input, 3 not converged, 130 interrupted.)";
 
 int run(int argc, char** argv) {
-  CLI::App app{"pliant turns a recording of a soft object into an elastic model.", "pliant"};
-  app.set_version_flag("--version", "pliant " PLIANT_VERSION);
-  app.footer(footer);
-  app.require_subcommand(1);
+  CommandLine line("pliant turns a recording of a soft object into an elastic model.", "pliant " PLIANT_VERSION,
+                   footer);
   int exit_code = Fine;
-  add_check(app, exit_code);
-  add_scan(app, exit_code);
-  add_markers(app, exit_code);
-  add_fit(app, exit_code);
-  add_simulate(app, exit_code);
-  add_track(app, exit_code);
-  add_evaluate(app, exit_code);
-  add_press(app, exit_code);
-  add_synth(app, exit_code);
-  add_rest(app, exit_code);
-  add_mesh(app, exit_code);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? Fine : BadInput;
-  }
+  add_check(line, exit_code);
+  add_scan(line, exit_code);
+  add_markers(line, exit_code);
+  add_fit(line, exit_code);
+  add_simulate(line, exit_code);
+  add_track(line, exit_code);
+  add_evaluate(line, exit_code);
+  add_press(line, exit_code);
+  add_synth(line, exit_code);
+  add_rest(line, exit_code);
+  add_mesh(line, exit_code);
+  if (!line.run(argc, argv)) return BadInput;
   return exit_code;
 }
 

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -6,6 +5,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #ifdef PLIANT_WITH_OPENCV
 #include "photos/measure.hpp"
@@ -117,15 +117,14 @@ Returns 3 where a press had to be left out.)";
 
 }  // namespace
 
-void add_markers(CLI::App& app, int& exit_code) {
+void add_markers(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("markers", "Make a capture of presses from photographs of painted dots");
-  command->add_option("session", arguments->session, "the session's folder, or its markers.toml")->type_name("SESSION");
-  command->add_option("--out", arguments->out, "folder for the capture")->type_name("DIR");
-  command->add_option("--example", arguments->example, "instead: write a session with known truth here")
-      ->type_name("DIR");
-  command->footer(footer);
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  Command command = line.add_command("markers", "Make a capture of presses from photographs of painted dots");
+  command.option("session", arguments->session, "the session's folder, or its markers.toml").type_name("SESSION");
+  command.option("--out", arguments->out, "folder for the capture").type_name("DIR");
+  command.option("--example", arguments->example, "instead: write a session with known truth here").type_name("DIR");
+  command.footer(footer);
+  command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
 }  // namespace pliant::apps

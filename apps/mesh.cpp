@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -7,6 +6,7 @@
 #include <string>
 
 #include "base/files.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/volume_mesh.hpp"
@@ -107,18 +107,17 @@ Without --out nothing is written. With it, the folder gets mesh.vtu in metres, w
 
 }  // namespace
 
-void add_mesh(CLI::App& app, int& exit_code) {
+void add_mesh(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("mesh", "Look at a tetrahedral mesh made elsewhere, and bring it into metres");
-  command->add_option("mesh", arguments->file, "Gmsh's .msh, or VTK's .vtk or .vtu")->required()->type_name("FILE");
-  command->add_option("--unit", arguments->unit, "length of the file's unit in metres: 0.001 for millimetres")
-      ->capture_default_str()
-      ->check(CLI::Range(1e-9, 1e9));
-  command->add_option("--out", arguments->out, "folder for mesh.vtu, surface.ply and mesh.json")->type_name("DIR");
-  command->add_flag("--quadratic", arguments->quadratic,
-                    "give linear elements mid nodes on their edges: they do not lock");
-  command->footer(footer);
-  command->callback([arguments, &exit_code] {
+  Command command = line.add_command("mesh", "Look at a tetrahedral mesh made elsewhere, and bring it into metres");
+  command.option("mesh", arguments->file, "Gmsh's .msh, or VTK's .vtk or .vtu").required().type_name("FILE");
+  command.option("--unit", arguments->unit, "length of the file's unit in metres: 0.001 for millimetres")
+      .show_default()
+      .range(1e-9, 1e9);
+  command.option("--out", arguments->out, "folder for mesh.vtu, surface.ply and mesh.json").type_name("DIR");
+  command.flag("--quadratic", arguments->quadratic, "give linear elements mid nodes on their edges: they do not lock");
+  command.footer(footer);
+  command.callback([arguments, &exit_code] {
     run(*arguments);
     exit_code = Fine;
   });

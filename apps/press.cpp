@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <iostream>
@@ -8,6 +7,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "elasticity/law_elasticity.hpp"
 #include "geometry/mesh_io.hpp"
@@ -95,38 +95,38 @@ The probe begins where it touches the surface at rest; each step is an equilibri
 
 }  // namespace
 
-void add_press(CLI::App& app, int& exit_code) {
+void add_press(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("press", "Press a fitted model with a probe, by force or by moving it");
-  command->add_option("model", arguments->model, "model.toml of a fit, of tetrahedra")->required()->type_name("MODEL");
-  command->add_option("--contact", arguments->contact, "where the probe touches the surface at rest, metres")
-      ->required()
-      ->delimiter(',')
-      ->expected(3)
-      ->type_name("X,Y,Z");
-  command->add_option("--force", arguments->force, "of the probe on the object, newtons")
-      ->delimiter(',')
-      ->expected(3)
-      ->type_name("X,Y,Z");
-  command->add_option("--move", arguments->to, "where the probe goes from there, metres")
-      ->delimiter(',')
-      ->expected(3)
-      ->type_name("X,Y,Z");
-  command->add_option("--probe", arguments->probe, "a disc that is glued on, a flat punch or a ball that slides")
-      ->check(CLI::IsMember({"disc", "punch", "ball"}));
-  command->add_option("--radius", arguments->radius, "of the probe, metres")->check(CLI::PositiveNumber);
+  Command command = line.add_command("press", "Press a fitted model with a probe, by force or by moving it");
+  command.option("model", arguments->model, "model.toml of a fit, of tetrahedra").required().type_name("MODEL");
+  command.option("--contact", arguments->contact, "where the probe touches the surface at rest, metres")
+      .required()
+      .delimiter(',')
+      .expected(3)
+      .type_name("X,Y,Z");
+  command.option("--force", arguments->force, "of the probe on the object, newtons")
+      .delimiter(',')
+      .expected(3)
+      .type_name("X,Y,Z");
+  command.option("--move", arguments->to, "where the probe goes from there, metres")
+      .delimiter(',')
+      .expected(3)
+      .type_name("X,Y,Z");
+  command.option("--probe", arguments->probe, "a disc that is glued on, a flat punch or a ball that slides")
+      .one_of({"disc", "punch", "ball"});
+  command.option("--radius", arguments->radius, "of the probe, metres").positive();
   command
-      ->add_option("--axis", arguments->axis,
-                   "along which a punch or ball points into the object; else the force's or the surface's")
-      ->delimiter(',')
-      ->expected(3)
-      ->type_name("X,Y,Z");
-  command->add_option("--steps", arguments->steps, "equilibria on the way")->check(CLI::PositiveNumber);
-  command->add_option("--surface", arguments->surface, "a finer mesh of the same object that follows along")
-      ->type_name("FILE");
-  command->add_option("--out,-o", arguments->out, "folder for the deformed meshes and surfaces")->type_name("DIR");
-  command->footer(footer);
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+      .option("--axis", arguments->axis,
+              "along which a punch or ball points into the object; else the force's or the surface's")
+      .delimiter(',')
+      .expected(3)
+      .type_name("X,Y,Z");
+  command.option("--steps", arguments->steps, "equilibria on the way").positive();
+  command.option("--surface", arguments->surface, "a finer mesh of the same object that follows along")
+      .type_name("FILE");
+  command.option("--out,-o", arguments->out, "folder for the deformed meshes and surfaces").type_name("DIR");
+  command.footer(footer);
+  command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
 }  // namespace pliant::apps

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -8,6 +7,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "capture/image_io.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/load_free.hpp"
@@ -105,7 +105,7 @@ int run(const Arguments& arguments) {
   const fs::path out = arguments.out;
   const double modulus = theta[parameters.blocks.motion.youngs_moduli.front()];
   const nlohmann::json facts = facts_of(found, modulus, size, seconds);
-  fs::create_directories(out);
+  make_folder(out);
   write_file(out / "rest.json", facts.dump(2) + "\n");
   std::cout << capture.name << "\n  " << found.scene.body->element_count() << " elements, "
             << found.scene.body->node_count() << " nodes, " << found.shape.iterations << " iterations, " << seconds
@@ -140,20 +140,20 @@ figures, and rest.png: both shapes in grey, the scan as dots.)";
 
 }  // namespace
 
-void add_rest(CLI::App& app, int& exit_code) {
+void add_rest(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("rest", "Find the shape that an object scanned as it sags has free of load");
+  Command command = line.add_command("rest", "Find the shape that an object scanned as it sags has free of load");
   command
-      ->add_option("capture", arguments->capture,
-                   "folder with a capture.toml in it; what holds the object is in its [[fixed]]")
-      ->required()
-      ->type_name("CAPTURE");
-  command->add_option("--set", arguments->settings, "one choice; may be given many times")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
-  command->add_option("--out,-o", arguments->out, "folder for the result")->required()->type_name("DIR");
-  command->footer(footer);
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+      .option("capture", arguments->capture,
+              "folder with a capture.toml in it; what holds the object is in its [[fixed]]")
+      .required()
+      .type_name("CAPTURE");
+  command.option("--set", arguments->settings, "one choice; may be given many times")
+      .type_name("KEY=VALUE")
+      .one_value_a_use();
+  command.option("--out,-o", arguments->out, "folder for the result").required().type_name("DIR");
+  command.footer(footer);
+  command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
 }  // namespace pliant::apps

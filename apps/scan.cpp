@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -10,6 +9,7 @@
 #include "base/files.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/point_cloud.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
 #include "rays/ray_scene.hpp"
@@ -186,31 +186,31 @@ pictures of both, and scan.json (the figures). From one side the back is a guess
 
 }  // namespace
 
-void add_scan(CLI::App& app, int& exit_code) {
+void add_scan(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("scan", "Make a closed rest surface of a recording's first frames");
-  command->add_option("capture", arguments->capture, "the capture's folder, or its capture.toml")->required();
-  command->add_option("--out", arguments->out, "folder for rest.ply, seen.ply, scan.json and pictures")
-      ->required()
-      ->type_name("DIR");
-  command->add_option("--until", arguments->until, "last frame in which the object rests (default: before start_frame)")
-      ->check(CLI::Range(0, 1000000000));
-  command->add_option("--pixel", arguments->pixel, "column and row of a pixel of the first camera on the object")
-      ->expected(2)
-      ->type_name("U V");
-  command->add_flag("--floating", arguments->floating, "the object stands on no plane");
-  command->add_option("--depth", arguments->depth, "the object's extent along the view, level, where it is known [m]")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--resolution", arguments->resolution, "edges of the mesh across the object")
-      ->capture_default_str()
-      ->check(CLI::Range(10, 200));
+  Command command = line.add_command("scan", "Make a closed rest surface of a recording's first frames");
+  command.option("capture", arguments->capture, "the capture's folder, or its capture.toml").required();
+  command.option("--out", arguments->out, "folder for rest.ply, seen.ply, scan.json and pictures")
+      .required()
+      .type_name("DIR");
+  command.option("--until", arguments->until, "last frame in which the object rests (default: before start_frame)")
+      .range(0, 1000000000);
+  command.option("--pixel", arguments->pixel, "column and row of a pixel of the first camera on the object")
+      .expected(2)
+      .type_name("U V");
+  command.flag("--floating", arguments->floating, "the object stands on no plane");
+  command.option("--depth", arguments->depth, "the object's extent along the view, level, where it is known [m]")
+      .positive();
+  command.option("--resolution", arguments->resolution, "edges of the mesh across the object")
+      .show_default()
+      .range(10, 200);
   command
-      ->add_option("--thickness", arguments->thickness,
-                   "the object is a thin sheet, seen as a cloud: make a slab of this thickness [m]")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--frame", arguments->frame, "of the cloud with --thickness")->check(CLI::Range(0, 1000000000));
-  command->footer(footer);
-  command->callback([arguments, &exit_code] {
+      .option("--thickness", arguments->thickness,
+              "the object is a thin sheet, seen as a cloud: make a slab of this thickness [m]")
+      .positive();
+  command.option("--frame", arguments->frame, "of the cloud with --thickness").range(0, 1000000000);
+  command.footer(footer);
+  command.callback([arguments, &exit_code] {
     run(*arguments);
     exit_code = Fine;
   });

@@ -1,8 +1,8 @@
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <string>
 
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
@@ -34,14 +34,12 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_simulate(CLI::App& app, int& exit_code) {
+void add_simulate(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("simulate", "Simulate a fitted model as its recording was");
-  command->add_option("model", arguments->model, "model.toml of a fit")->required()->type_name("MODEL");
-  command->add_option("--out,-o", arguments->out, "folder for trajectory.pvd and its frames")
-      ->required()
-      ->type_name("DIR");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  Command command = line.add_command("simulate", "Simulate a fitted model as its recording was");
+  command.option("model", arguments->model, "model.toml of a fit").required().type_name("MODEL");
+  command.option("--out,-o", arguments->out, "folder for trajectory.pvd and its frames").required().type_name("DIR");
+  command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
 }  // namespace pliant::apps

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdint>
 #include <iostream>
@@ -7,6 +6,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "meshing/mesh_distance.hpp"
 #include "motion/simulation.hpp"
@@ -106,13 +106,13 @@ void run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_synth(CLI::App& app, int& exit_code) {
+void add_synth(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("synth", "Simulate a scene and make a recording of it whose truth is known");
-  command->add_option("scene", arguments->scene, "scene file (docs/scene.md)")->required()->type_name("SCENE.toml");
-  command->add_option("--out,-o", arguments->out, "folder for the capture")->required()->type_name("DIR");
-  command->add_option("--seed", arguments->seed, "of the sensor's noise; instead of the scene's");
-  command->callback([arguments, &exit_code] {
+  Command command = line.add_command("synth", "Simulate a scene and make a recording of it whose truth is known");
+  command.option("scene", arguments->scene, "scene file (docs/scene.md)").required().type_name("SCENE.toml");
+  command.option("--out,-o", arguments->out, "folder for the capture").required().type_name("DIR");
+  command.option("--seed", arguments->seed, "of the sensor's noise; instead of the scene's");
+  command.callback([arguments, &exit_code] {
     run(*arguments);
     exit_code = Fine;
   });

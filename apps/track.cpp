@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -6,6 +5,7 @@
 
 #include "base/error.hpp"
 #include "capture/markers.hpp"
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/followed.hpp"
@@ -65,7 +65,8 @@ int run(const Arguments& arguments) {
   std::cout << capture.name << "\n";
   report_track(found, seconds);
   for (const std::string& note : notes) std::cout << "  note: " << note << "\n";
-  write_track(arguments.out, capture, observed, found, recording.recording().blocks.motion, theta, !arguments.no_pictures, show_progress);
+  write_track(arguments.out, capture, observed, found, recording.recording().blocks.motion, theta,
+              !arguments.no_pictures, show_progress);
   if (!arguments.points.empty()) {
     std::vector<Vector3> rest;
     for (Eigen::Index i = 0; i < follow_these.positions.rows(); ++i)
@@ -91,26 +92,24 @@ pictures/ with each frame's points over the surface, and track.html. Exit code 3
 
 }  // namespace
 
-void add_track(CLI::App& app, int& exit_code) {
+void add_track(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("track", "Follow a deforming object through point clouds, depth or markers");
-  command->add_option("capture", arguments->capture, "folder with a capture.toml in it")
-      ->required()
-      ->type_name("CAPTURE");
-  command->add_option("--set", arguments->settings, "one choice; may be given many times")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
+  Command command = line.add_command("track", "Follow a deforming object through point clouds, depth or markers");
+  command.option("capture", arguments->capture, "folder with a capture.toml in it").required().type_name("CAPTURE");
+  command.option("--set", arguments->settings, "one choice; may be given many times")
+      .type_name("KEY=VALUE")
+      .one_value_a_use();
   command
-      ->add_option("--points", arguments->points,
-                   "points of the object (CSV: id,x,y,z at rest) whose paths are written to points.csv")
-      ->type_name("FILE");
-  command->add_option("--points-per-frame", arguments->points_per_frame, "an even subset of what was seen; 0: all")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command->add_flag("--no-pictures", arguments->no_pictures, "leave out pictures/ and the page's");
-  command->add_option("--out,-o", arguments->out, "folder for the result")->required()->type_name("DIR");
-  command->footer(footer);
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+      .option("--points", arguments->points,
+              "points of the object (CSV: id,x,y,z at rest) whose paths are written to points.csv")
+      .type_name("FILE");
+  command.option("--points-per-frame", arguments->points_per_frame, "an even subset of what was seen; 0: all")
+      .not_negative()
+      .show_default();
+  command.flag("--no-pictures", arguments->no_pictures, "leave out pictures/ and the page's");
+  command.option("--out,-o", arguments->out, "folder for the result").required().type_name("DIR");
+  command.footer(footer);
+  command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 
 }  // namespace pliant::apps

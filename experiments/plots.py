@@ -130,7 +130,9 @@ def shade(share):
     return "#faeb78"
 
 
+made = {}  # text of each picture by its path, until `make_docs.py` writes or compares them
+
+
 def write(path, width, height, parts):
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {FONT}>\n<rect width="100%" height="100%" fill="#fff"/>\n'
+    made[path] = (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {FONT}>\n<rect width="100%" height="100%" fill="#fff"/>\n'
                     + "\n".join(parts) + "\n</svg>\n")

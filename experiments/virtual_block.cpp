@@ -6,8 +6,6 @@
 // Writes OUT/00, OUT/10, OUT/20, OUT/30 (noise in percent of each marker's own displacement), the same mesh in all, and
 // truth.csv beside each press: markers without noise.
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,6 +14,7 @@
 #include <limits>
 #include <random>
 
+#include "base/parallel.hpp"
 #include "capture/capture.hpp"
 #include "capture/markers.hpp"
 #include "elasticity/polar.hpp"
@@ -175,7 +174,7 @@ int main(int count, char** arguments) {
   const Embedding embedding(*body, rest_points);
   std::vector<Points> truth(all.size());
   std::vector<Vector3> probe(all.size());
-  tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
+  parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
     PressSession session(body, law, {ProbeKind::GluedDisc, all[i].centre, all[i].radius, {}}, options);
     if (!session.push(all[i].force).converged) {
       std::fprintf(stderr, "press %zu: %s\n", i + 1, session.failure().c_str());

@@ -40,6 +40,14 @@ class TemporaryFolder {
     return path_ / name;
   }
 
+  /// Puts a symbolic link that points at itself where `name` is, and returns its path.
+  std::filesystem::path link_to_itself(std::string_view name) const {
+    const std::filesystem::path path = path_ / name;
+    std::filesystem::remove_all(path);
+    std::filesystem::create_symlink(path.filename(), path);
+    return path;
+  }
+
  private:
   std::filesystem::path path_;
 };

@@ -45,13 +45,53 @@ void write_file(const fs::path& path, std::string_view content) {
 std::string read_file(const fs::path& path) {
   errno = 0;
   std::ifstream stream(path, std::ios::binary);
+  const int error = errno;
   std::ostringstream content;
-  if (stream && !fs::is_directory(path)) content << stream.rdbuf();
-  if (!stream || fs::is_directory(path)) {
-    const std::string why = fs::is_directory(path) ? "it is a folder" : std::strerror(errno ? errno : ENOENT);
-    throw InputError({{path}, "cannot be read: " + why, "", ""});
+  const bool is_readable = stream && !is_folder(path);
+  if (is_readable) content << stream.rdbuf();
+  if (!is_readable || !stream) {
+    const std::string why = is_folder(path) ? "it is a folder" : std::strerror(error ? error : ENOENT);
+    throw InputError(
+        {{path}, "cannot be read: " + why, "a file", "check the path, what it links to and its permissions"});
   }
   return std::move(content).str();
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+std::string why_no_file(const fs::path& path) {
+  std::error_code error;
+  const fs::file_type type = fs::status(path, error).type();
+  if (error == std::errc::too_many_symbolic_link_levels) return "is a symbolic link that leads in a circle";
+  if (type == fs::file_type::not_found) return "is not there";
+  if (error) return "cannot be reached: " + error.message();
+  return type == fs::file_type::directory ? "is a folder" : "is no file";
+}
+
+void make_folder(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (is_folder(path)) return;
+  const std::string why = error ? error.message() : why_no_file(path);
+  throw InputError({{path},
+                    "the folder cannot be made: " + why,
+                    "a folder, or a name that is free",
+                    "name another folder, or remove what is there"});
+}
+
+void remove_file(const fs::path& path) {
+  std::error_code error;
+  fs::remove(path, error);
+  if (error)
+    throw InputError({{path}, "cannot be removed: " + error.message(), "a file", "remove it, or name another folder"});
 }
 
 }  // namespace pliant

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/files.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/image_io.hpp"
@@ -36,7 +37,7 @@ std::string size_text(int width, int height) { return std::to_string(width) + " 
 std::vector<int> missing_frames(const Capture& capture, const FramePattern& pattern, const std::vector<int>& frames) {
   std::vector<int> missing;
   for (const int frame : frames)
-    if (!fs::is_regular_file(capture.folder / pattern(frame))) missing.push_back(frame);
+    if (!is_file(capture.folder / pattern(frame))) missing.push_back(frame);
   return missing;
 }
 
@@ -77,7 +78,7 @@ void check_header(RuleContext& context, const std::string& key, const fs::path& 
   const std::string fault = header_fault(path, camera, kind);
   if (fault.empty()) return;
   context.toml.reject(
-      key, "\"" + fs::relative(path, context.capture.folder).string() + "\" has " + fault,
+      key, "\"" + path.lexically_relative(context.capture.folder).string() + "\" has " + fault,
       size_text(camera.width, camera.height) + (kind == Kind::Depth ? " pixels of 16-bit grey" : " pixels of 8 bits"),
       "correct the camera's size, or write the images again");
 }

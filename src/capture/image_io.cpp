@@ -221,7 +221,7 @@ void write_any(const fs::path& path, const Image<Pixel>& image, int bits, int ki
 ImageHeader read_image_header(const fs::path& path) {
   char bytes[512] = {};
   std::ifstream stream(path, std::ios::binary);
-  if (!stream || fs::is_directory(path)) fail(path, "the image cannot be read", "an image file", "check the path");
+  if (!stream || is_folder(path)) fail(path, "the image cannot be read", "an image file", "check the path");
   stream.read(bytes, sizeof bytes);
   return header_of(std::string_view(bytes, std::size_t(stream.gcount())), path);
 }

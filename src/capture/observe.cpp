@@ -1,12 +1,11 @@
 #include "capture/observe.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <set>
 
+#include "base/parallel.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_points.hpp"
@@ -105,7 +104,7 @@ std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions&
   std::vector<ObservedFrame> frames(numbers.size());
   std::mutex mutex;
   int done = 0;
-  tbb::parallel_for(std::size_t(0), numbers.size(), [&](std::size_t i) {
+  parallel_for(std::size_t(0), numbers.size(), [&](std::size_t i) {
     ObservedFrame& frame = frames[i];
     frame.frame = numbers[i];
     for (std::size_t c = 0; c < capture.depth.size(); ++c)

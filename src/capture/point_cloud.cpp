@@ -210,7 +210,7 @@ std::vector<Vector3> ply_positions(const fs::path& path) {
 
 std::size_t ply_point_count(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
-  if (!stream || fs::is_directory(path)) fail({path}, "the file cannot be read", "a point cloud", "check the path");
+  if (!stream || is_folder(path)) fail({path}, "the file cannot be read", "a point cloud", "check the path");
   std::string line;
   std::getline(stream, line);
   if (!line.starts_with("ply")) fail({path, 1, 0}, "the first line is not \"ply\"", "a PLY file");

@@ -1,7 +1,7 @@
 #include "base/files.hpp"
+#include "base/sha256.hpp"
 #include "capture/capture.hpp"
 #include "capture/capture_rules.hpp"
-#include "capture/hash.hpp"
 #include "scene/scene_toml.hpp"
 
 namespace pliant {
@@ -178,10 +178,10 @@ class Reader {
 };
 
 fs::path toml_file(const fs::path& path) {
-  const fs::path file = fs::is_directory(path) ? path / "capture.toml" : path;
-  if (!fs::is_regular_file(file))
-    throw InputError(
-        Problem{{file}, "the file is not there", "a folder with a capture.toml in it", "name the recording's folder"});
+  const fs::path file = is_folder(path) ? path / "capture.toml" : path;
+  if (!is_file(file))
+    throw InputError(Problem{
+        {file}, "the file " + why_no_file(file), "a folder with a capture.toml in it", "name the recording's folder"});
   return file;
 }
 

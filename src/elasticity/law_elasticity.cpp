@@ -1,11 +1,10 @@
 #include "elasticity/law_elasticity.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <stdexcept>
 
+#include "base/parallel.hpp"
 #include "elasticity/tet_element.hpp"
 
 namespace pliant {
@@ -107,8 +106,8 @@ TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::sha
 template <int N>
 double TetLawElasticity<N>::evaluate(const Points& x, bool with_tangent) {
   const int count = body_->element_count();
-  tbb::parallel_for(tbb::blocked_range<int>(0, count, 128), [&](const tbb::blocked_range<int>& range) {
-    for (int e = range.begin(); e < range.end(); ++e)
+  parallel_ranges(0, std::size_t(count), 128, [&](std::size_t begin, std::size_t end) {
+    for (int e = int(begin); e < int(end); ++e)
       for (int q = 0; q < points; ++q) {
         Point& point = points_[std::size_t(e * points + q)];
         point.F = deformation(e, point.gradient, x);

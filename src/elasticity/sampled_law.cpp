@@ -1,13 +1,12 @@
 #include "elasticity/sampled_law.hpp"
 
-#include <tbb/parallel_for.h>
-
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 
+#include "base/dense.hpp"
+#include "base/parallel.hpp"
 #include "elasticity/polar.hpp"
 
 namespace pliant {
@@ -257,7 +256,7 @@ class StressFit {
     for (int iteration = 0; iteration < 10; ++iteration) {
       MatrixX H = J.transpose() * J;
       H.diagonal() *= 1.0 + damping;
-      const VectorX step = -H.ldlt().solve(J.transpose() * residuals);
+      const VectorX step = -solve_symmetric(H, VectorX(J.transpose() * residuals));
       const StrainSamples before = law_;
       add(step);
       VectorX next_residuals;
@@ -436,7 +435,7 @@ SampledMaterial sample_material(const std::vector<MaterialSample>& samples, cons
     for (const LambdaAlpha& p : sample.p) metric_nu += p.alpha / p.lambda / double(count) / double(samples.size());
   const Matrix6 to_metric = metric_root(metric_nu);
   std::vector<Selection> selections{std::size_t(count)};
-  tbb::parallel_for(0, count, [&](int e) {
+  parallel_for(0, count, [&](int e) {
     ElementSamples own;
     for (const MaterialSample& sample : samples) {
       own.strains.emplace_back(sample.strains.row(e).transpose());

@@ -1,9 +1,10 @@
 #include "estimation/corrections.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
+
+#include "base/dense.hpp"
 
 namespace pliant {
 
@@ -31,7 +32,7 @@ double gain_of(const CostEvaluation& e, const std::vector<Eigen::Index>& followi
     if (rows.empty()) return 0.0;
     const VectorX g = e.gradient(rows);
     const MatrixX H = e.gauss_newton(rows, rows);
-    return 0.5 * g.dot(H.ldlt().solve(g));
+    return 0.5 * g.dot(solve_symmetric(H, g));
   };
   std::vector<Eigen::Index> together = following;
   together.insert(together.end(), moved.begin(), moved.end());

@@ -1,24 +1,11 @@
 #include "estimation/field_evidence.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "base/dense.hpp"
+
 namespace pliant {
-
-namespace {
-
-double log_determinant(const MatrixX& positive) { return positive.ldlt().vectorD().array().abs().log().sum(); }
-
-/// Orthonormal rows that span what is orthogonal to a matrix's columns.
-MatrixX contrasts_to(const MatrixX& columns) {
-  const Eigen::HouseholderQR<MatrixX> qr(columns);
-  const MatrixX q = qr.householderQ();
-  return q.rightCols(columns.rows() - columns.cols()).transpose();
-}
-
-}  // namespace
 
 MatrixX field_precision(const std::vector<Vector3>& points, double length, double deviation) {
   const auto n = Eigen::Index(points.size());
@@ -33,18 +20,17 @@ MatrixX field_precision(const std::vector<Vector3>& points, double length, doubl
           0.5 * deviation * deviation / length * (distance(i, 0) + distance(j, 0) - distance(i, j));
   MatrixX ratios(n - 1, n);
   ratios << VectorX::Constant(n - 1, -1.0), MatrixX::Identity(n - 1, n - 1);
-  return ratios.transpose() * covariance.ldlt().solve(ratios);
+  return ratios.transpose() * solve_symmetric(covariance, ratios);
 }
 
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& carried) {
   const std::vector<Eigen::Index> rows = parameters.joint_coordinates();
   if (Eigen::Index(rows.size()) != carried.rows() || carried.rows() <= carried.cols()) return 0.0;
-  const MatrixX own = contrasts_to(carried);
+  const MatrixX own = orthogonal_complement(carried);
   MatrixX contrasts = MatrixX::Zero(own.rows(), p.size());
   contrasts(Eigen::all, rows) = own;
-  const MatrixX covariance =
-      parameters.joint_precision().completeOrthogonalDecomposition().pseudoInverse();  // of contrasts
+  const MatrixX covariance = pseudo_inverse(parameters.joint_precision());  // of contrasts
   return log_bayes_factor(evaluation, parameters, p, contrasts, own * covariance * own.transpose());
 }
 
@@ -60,10 +46,10 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
     g(rows) -= (1.0 - trace) * precision * p(rows);
   }
   const VectorX scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // pulls and dampings differ by 1e10
-  const MatrixX inverse =
-      scale.asDiagonal() *
-      MatrixX(scale.asDiagonal() * H * scale.asDiagonal()).ldlt().solve(MatrixX::Identity(H.rows(), H.cols())) *
-      scale.asDiagonal();
+  const MatrixX inverse = scale.asDiagonal() *
+                          solve_symmetric(MatrixX(scale.asDiagonal() * H * scale.asDiagonal()),
+                                          MatrixX(MatrixX::Identity(H.rows(), H.cols()))) *
+                          scale.asDiagonal();
   const MatrixX by_gradient = contrasts * inverse;
   const VectorX d = contrasts * p - by_gradient * g;
 
@@ -75,7 +61,8 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
   const MatrixX V = noise * by_gradient * contrasts.transpose() +
                     left * by_gradient * gradient_scatter(evaluation, mean) * by_gradient.transpose();
   const MatrixX both = V + prior;
-  return 0.5 * (d.dot(V.ldlt().solve(d)) - d.dot(both.ldlt().solve(d)) + log_determinant(V) - log_determinant(both));
+  return 0.5 *
+         (d.dot(solve_symmetric(V, d)) - d.dot(solve_symmetric(both, d)) + log_determinant(V) - log_determinant(both));
 }
 
 MatrixX gradient_scatter(const CostEvaluation& evaluation, const VectorX& mean) {

@@ -1,11 +1,11 @@
 #include "estimation/fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <limits>
 #include <tuple>
 
+#include "base/dense.hpp"
 #include "base/error.hpp"
 #include "estimation/corrections.hpp"
 #include "estimation/field_choice.hpp"
@@ -128,8 +128,9 @@ class Fit {
       if (now.optimiser.p.size() == 0) now.optimiser = FitRun::start_of(parameters);
       Objective objective = run_.recordings.objective(run_.fine, parameters, stage.band,
                                                       [&](const Recording& r) { return r.horizon(stage.horizon); });
-      s = run_.optimise(objective, now.optimiser, StageKind::Fine, stage.name, index, run_.outcome.interrupted ? 1 : stage.iterations,
-                        counter, stage.from, stage.to, [&](const OptimiserState& optimiser) {
+      s = run_.optimise(objective, now.optimiser, StageKind::Fine, stage.name, index,
+                        run_.outcome.interrupted ? 1 : stage.iterations, counter, stage.from, stage.to,
+                        [&](const OptimiserState& optimiser) {
                           if (run_.outcome.interrupted)
                             return;  // a last look at what was reached is no state to go on from
                           run_.state.fine = {now.stage, now.reference, optimiser};
@@ -301,7 +302,7 @@ class Fit {
 MatrixX parameter_covariance(const CostEvaluation& evaluation) {
   const MatrixX& H = evaluation.gauss_newton;
   const Eigen::Index n = H.rows();
-  const MatrixX inverse = H.ldlt().solve(MatrixX::Identity(n, n));
+  const MatrixX inverse = solve_symmetric(H, MatrixX(MatrixX::Identity(n, n)));
   MatrixX sandwich = inverse * gradient_scatter(evaluation) * inverse;
   // Fewer frames than parameters, or gradients that cancel by chance, must not make the estimate look sure.
   for (Eigen::Index i = 0; i < n; ++i) sandwich(i, i) = std::max(sandwich(i, i), 0.0);

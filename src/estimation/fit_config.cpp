@@ -18,6 +18,7 @@ const std::vector<std::pair<std::string, OptimiserKind>> optimisers = {
     {"levenberg_marquardt", OptimiserKind::LevenbergMarquardt},
     {"rprop", OptimiserKind::Rprop},
     {"gradient_descent", OptimiserKind::GradientDescent},
+    {"lbfgs", OptimiserKind::Lbfgs},
     {"nelder_mead", OptimiserKind::NelderMead}};
 const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", SolverKind::Automatic},
                                                                  {"iterative", SolverKind::Iterative},

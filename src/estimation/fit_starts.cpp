@@ -1,4 +1,3 @@
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
@@ -7,6 +6,7 @@
 #include <numeric>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "estimation/fit_run.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/modal_start.hpp"
@@ -238,7 +238,7 @@ class StartFinder {
       if (run_.recordings.all_static())
         scan_downwards(count, try_value);
       else
-        tbb::parallel_for(0, count, try_value, tbb::simple_partitioner());
+        parallel_tasks(std::size_t(count), [&](std::size_t i) { try_value(int(i)); });
       if (run_.interrupted()) {
         run_.state.scan.clear();
         run_.outcome.interrupted = true;
@@ -285,9 +285,7 @@ class StartFinder {
       return;
     }
     std::vector<FitStart> starts(count);
-    tbb::parallel_for(
-        std::size_t(0), count, [&](std::size_t i) { starts[i] = follow(int(i), start_moduli_[i]); },
-        tbb::simple_partitioner());
+    parallel_tasks(count, [&](std::size_t i) { starts[i] = follow(int(i), start_moduli_[i]); });
     if (run_.interrupted()) run_.outcome.interrupted = true;
     run_.outcome.starts = starts;
     if (run_.outcome.interrupted) return;  // half-followed starts are a result, but nothing to go on from

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 
+#include "base/dense.hpp"
 #include "estimation/field_evidence.hpp"
 
 namespace pliant {
@@ -175,9 +176,7 @@ ModulusField zone_field(const ModulusField& before, const std::vector<int>& zone
   return field;
 }
 
-LawForm with_zone(const LawForm& form) {
-  return {form.controls + 1, form.terms, form.controls + 1, form.own_ratios};
-}
+LawForm with_zone(const LawForm& form) { return {form.controls + 1, form.terms, form.controls + 1, form.own_ratios}; }
 
 VectorX with_zone(const LawLayout& from, const VectorX& theta, const LawLayout& to, int zone) {
   std::vector<int> like;
@@ -200,7 +199,8 @@ double zone_evidence(const CostEvaluation& evaluation, const ParameterSet& param
                      const LawLayout& layout, int cut_from, double modulus_variation) {
   const VectorX deviation = law_contrast_deviations(layout.form(), modulus_variation);
   MatrixX contrasts = MatrixX::Zero(deviation.size(), p.size());
-  const auto last = places(parameters, layout, layout.form().controls - 1), first = places(parameters, layout, cut_from);
+  const auto last = places(parameters, layout, layout.form().controls - 1),
+             first = places(parameters, layout, cut_from);
   for (Eigen::Index s = 0; s < deviation.size(); ++s) {
     contrasts(s, last[std::size_t(s)]) = 1.0;
     contrasts(s, first[std::size_t(s)]) = -1.0;
@@ -296,7 +296,7 @@ std::optional<PromisedMove> best_move(PressObjective& objective, const PressScen
   const VectorX p = set.to_unconstrained(theta);
   const auto promised_cost = [&](const std::vector<int>& division) {
     const CostEvaluation e = parts.of_division(division, layout, set, p);
-    return e.cost - 0.5 * e.gradient.dot(e.gauss_newton.ldlt().solve(e.gradient));
+    return e.cost - 0.5 * e.gradient.dot(solve_symmetric(e.gauss_newton, e.gradient));
   };
   const double now = promised_cost(zone_of);
   PromisedMove best;

@@ -1,12 +1,12 @@
 #include "estimation/modal_start.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <numeric>
 
+#include "base/dense.hpp"
 #include "base/error.hpp"
 
 namespace pliant {
@@ -38,7 +38,10 @@ class Vibrations {
  public:
   Vibrations(std::shared_ptr<const Body> body, const MotionBlocks& blocks, const VectorX& parameters,
              const std::vector<int>& held, int count)
-      : analysis_(std::move(body), blocks, held), blocks_(blocks), theta_(parameters), skipped_(held.empty() ? rigid_motions : 0) {
+      : analysis_(std::move(body), blocks, held),
+        blocks_(blocks),
+        theta_(parameters),
+        skipped_(held.empty() ? rigid_motions : 0) {
     const int half = 3 * (analysis_.body().node_count() - int(analysis_.held().size())) / 2;
     count_ = std::min(count, half - skipped_);
     solved_ = std::min(count_ + spare_modes, half - skipped_);
@@ -247,7 +250,7 @@ bool match_frequencies(FrequencyMatch& match, const Bounds& bounds, VectorX& q) 
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
     MatrixX H = J.transpose() * w.asDiagonal() * J + pull;
     H.diagonal() += damping * H.diagonal();
-    const VectorX step = -H.ldlt().solve(J.transpose() * w.cwiseProduct(r) + pull * q);
+    const VectorX step = -solve_symmetric(H, VectorX(J.transpose() * w.cwiseProduct(r) + pull * q));
     const VectorX trial = bounds.clamped(q + step.cwiseMax(-1.5).cwiseMin(1.5));
     const VectorX r_trial = match.residuals(trial);
     if (r_trial.size() > 0 && cost(trial, r_trial) < best) {
@@ -432,7 +435,7 @@ ModalStart modal_start(std::shared_ptr<const Body> body, const MotionBlocks& blo
   start.moduli = q.array().exp();
   const MatrixX J = match.jacobian();
   const MatrixX H = J.transpose() * match.weights().asDiagonal() * J + pull_towards_equal(q.size());
-  start.log_deviations = H.inverse().diagonal().cwiseSqrt();
+  start.log_deviations = inverse(H).diagonal().cwiseSqrt();
   describe_modes(best.tones, best.doubts, match, vibrations, start);
   find_dampings(best.tones, start);
   draw_curves(match, bounds, options.curve_samples, q, start);

@@ -1,12 +1,12 @@
 #include "estimation/mode_coordinates.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "base/dense.hpp"
 #include "elasticity/polar.hpp"
 
 namespace pliant {
@@ -178,7 +178,7 @@ ModeCoordinates TrackedMotion::project(const std::vector<Points>& shapes, const 
     MatrixX normal = rows.transpose() * rows;
     // Where a mode is hardly seen it must not take up others' motion.
     normal.diagonal() += prior * normal.diagonal().maxCoeff() * stiffness.cwiseMax(1e-6);
-    values.push_back(normal.ldlt().solve(rows.transpose() * observed));
+    values.push_back(solve_symmetric(normal, VectorX(rows.transpose() * observed)));
     out.times.push_back(instant.time);
   }
   out.values.resize(Eigen::Index(values.size()), Eigen::Index(shapes.size()));

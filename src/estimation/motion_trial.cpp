@@ -1,9 +1,9 @@
 #include "estimation/motion_trial.hpp"
 
-#include <tbb/task_group.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "base/parallel.hpp"
 
 namespace pliant {
 
@@ -52,7 +52,8 @@ class MotionTrial::Comparison {
   Sensors sensors_;
 };
 
-MotionTrial::Comparison::Sensors MotionTrial::Comparison::sensors_at(const VectorX& theta, const MatrixX& directions) const {
+MotionTrial::Comparison::Sensors MotionTrial::Comparison::sensors_at(const VectorX& theta,
+                                                                     const MatrixX& directions) const {
   Sensors s;
   for (const SensorBlocks& blocks : motion_.mismatch.sensors) {
     const SensorCorrection::Values values = blocks.values(theta);
@@ -64,7 +65,8 @@ MotionTrial::Comparison::Sensors MotionTrial::Comparison::sensors_at(const Vecto
   return s;
 }
 
-std::vector<SurfaceObservation> MotionTrial::Comparison::corrected(const std::vector<SurfaceObservation>& points) const {
+std::vector<SurfaceObservation> MotionTrial::Comparison::corrected(
+    const std::vector<SurfaceObservation>& points) const {
   std::vector<SurfaceObservation> moved = points;
   if (sensors_.correct)
     for (SurfaceObservation& o : moved)
@@ -82,7 +84,7 @@ std::vector<TrackObservation> MotionTrial::Comparison::corrected(const std::vect
 }
 
 void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const Points& positions,
-                                  const std::vector<Points>& tangents, FrameFit& fit) const {
+                                          const std::vector<Points>& tangents, FrameFit& fit) const {
   const SurfaceConstraints& surface = *motion_.mismatch.surface;
   const double outlier_scale = motion_.options.outlier_scale;
   fit.points = int(seen.points.size());
@@ -125,7 +127,7 @@ void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const P
 }
 
 void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Points& positions,
-                                 const std::vector<Points>& tangents, FrameFit& fit) const {
+                                         const std::vector<Points>& tangents, FrameFit& fit) const {
   const PointTracks& tracks = *motion_.mismatch.tracks;
   const double outlier_scale = motion_.options.outlier_scale;
   fit.tracks = int(seen.tracks.size());
@@ -154,7 +156,7 @@ void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Po
 }
 
 FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const Points& positions,
-                                    const std::vector<Points>& tangents) const {
+                                            const std::vector<Points>& tangents) const {
   FrameFit fit;
   fit.recording = number_;
   fit.frame = seen.frame;
@@ -188,7 +190,7 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
   CostEvaluation evaluation;
   std::vector<FrameFit> fits(observations.size());
   std::size_t next = 0;
-  tbb::task_group beside;
+  TaskGroup beside;
   const int last_frame = motion_.options.last_frame;
   const RolloutSummary summary = simulation_.run(
       theta, directions, last_frame, [&](int frame, const State& state, std::span<const State> tangents) {
@@ -220,7 +222,7 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
 }
 
 void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar,
-                                     VectorX& theta_bar) const {
+                                             VectorX& theta_bar) const {
   const RobustLoss loss{motion_.options.outlier_scale};
   if (!seen.points.empty()) {
     const SurfaceConstraints& surface = *motion_.mismatch.surface;

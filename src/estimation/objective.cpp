@@ -1,10 +1,10 @@
 #include "estimation/objective.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "base/parallel.hpp"
 
 namespace pliant {
 
@@ -60,9 +60,7 @@ CostEvaluation Objective::run(const VectorX& p, bool with_tangents) {
   const VectorX theta = parameters_.to_theta(p);
   const MatrixX directions = with_tangents ? parameters_.jacobian(p) : MatrixX(theta.size(), 0);
   std::vector<CostEvaluation> parts(trials_.size());
-  tbb::parallel_for(
-      std::size_t(0), trials_.size(), [&](std::size_t i) { parts[i] = trials_[i]->run(theta, directions); },
-      tbb::simple_partitioner());
+  parallel_tasks(trials_.size(), [&](std::size_t i) { parts[i] = trials_[i]->run(theta, directions); });
   return sum(p, std::move(parts), with_tangents, with_tangents);
 }
 
@@ -78,9 +76,7 @@ CostEvaluation Objective::gradient(const VectorX& p) {
   const VectorX theta = parameters_.to_theta(p);
   std::vector<CostEvaluation> parts(trials_.size());
   std::vector<VectorX> bars(trials_.size());
-  tbb::parallel_for(
-      std::size_t(0), trials_.size(), [&](std::size_t i) { parts[i] = trials_[i]->gradient(theta, bars[i]); },
-      tbb::simple_partitioner());
+  parallel_tasks(trials_.size(), [&](std::size_t i) { parts[i] = trials_[i]->gradient(theta, bars[i]); });
   CostEvaluation total = sum(p, std::move(parts), true, false);
   if (!total.succeeded) return total;
   VectorX theta_bar = VectorX::Zero(theta.size());

@@ -1,6 +1,7 @@
 #include "estimation/optimiser.hpp"
 
-#include <Eigen/Cholesky>
+#include <LBFGSpp/BFGSMat.h>
+
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -9,6 +10,8 @@
 #include <vector>
 #ifdef PLIANT_WITH_NLOPT
 #include <nlopt.hpp>
+
+#include "base/dense.hpp"
 #endif
 
 namespace pliant {
@@ -91,7 +94,7 @@ VectorX step_within_bounds(const Run& run, const MatrixX& H) {
   std::iota(free.begin(), free.end(), 0);
   while (!free.empty()) {
     VectorX step = VectorX::Zero(p.size());
-    step(free) = -MatrixX(H(free, free)).ldlt().solve(VectorX(g(free)));
+    step(free) = -solve_symmetric(MatrixX(H(free, free)), VectorX(g(free)));
     const VectorX moved = run.clamp(p + step) - p;
     const auto is_blocked = [&](Eigen::Index i) {
       return step[i] != 0.0 && std::abs(moved[i]) < 1e-9 * std::abs(step[i]);
@@ -193,6 +196,117 @@ void gradient_descent(Run& run, const OptimiserOptions& options, const VectorX& 
     if (run.report(length, better, VectorX::Constant(1, length), finished)) return;
   }
 }
+
+/// Limited-memory BFGS (Liu and Nocedal 1989) with bounds by projection: an iteration is one evaluation, a step that
+/// does not lower the cost enough (Armijo's rule) is tried again shorter. Numbers at a bound that are pushed outwards
+/// stay.
+class LbfgsRun {
+ public:
+  LbfgsRun(Run& run, const OptimiserOptions& options, const VectorX& memory)
+      : run_(run), options_(options), n_(run.summary.p.size()) {
+    if (memory.size() < 2) return;
+    share_ = memory[0], length_ = memory[1];
+    for (Eigen::Index at = 2; at < memory.size(); at += 2 * n_)
+      changes_.push_back({memory.segment(at, n_), memory.segment(at + n_, n_)});
+  }
+
+  void minimise() {
+    OptimiserSummary& s = run_.summary;
+    for (bool done = false; !done;) {
+      const VectorX trial = run_.clamp(s.p + share_ * full_step());
+      const double moved = (trial - s.p).cwiseAbs().maxCoeff();
+      if (moved == 0.0) {
+        run_.end(true, "the step is zero");
+        return;
+      }
+      const double predicted = -s.evaluation.gradient.dot(trial - s.p);
+      CostEvaluation e = run_.evaluate(trial, Derivatives::Adjoint);
+      const double gain = s.evaluation.cost - e.cost;
+      const bool accepted = e.succeeded && gain > 1e-4 * std::max(predicted, 0.0);
+      // A first step of arbitrary length that gains little says nothing: only those of a curvature that is known do.
+      const bool knows_curvature = !changes_.empty();
+      if (accepted) {
+        const bool small = moved < options_.step_tolerance || gain < options_.cost_tolerance * s.evaluation.cost;
+        learn(trial - s.p, e.gradient - s.evaluation.gradient);
+        s.p = trial, s.evaluation = std::move(e);
+        if (small && knows_curvature) done = run_.end(true, "the cost no longer falls");
+      } else {
+        share_ *= e.succeeded ? shorter(predicted, gain) : 0.25;
+        if (moved < options_.step_tolerance) {
+          if (!knows_curvature) done = run_.end(true, "no step lowers the cost");
+          changes_.clear(), share_ = 1.0;  // it may be the matrix that leads nowhere
+        }
+      }
+      done = run_.report(moved, accepted, memory(), done);
+    }
+  }
+
+ private:
+  struct Change {
+    VectorX p, gradient;
+  };
+  static constexpr std::size_t most_changes = 8;
+
+  /// The gradient without the numbers that lie at a bound and are pushed outwards.
+  VectorX free_gradient() const {
+    const OptimiserSummary& s = run_.summary;
+    VectorX free = s.evaluation.gradient;
+    const VectorX pushed = run_.clamp(s.p - 1e-6 * free.cwiseSign());
+    for (Eigen::Index i = 0; i < n_; ++i)
+      if (pushed[i] == s.p[i]) free[i] = 0.0;
+    return free;
+  }
+
+  /// The step of the limited-memory matrix, no number of it longer than allowed; along the steepest descent where the
+  /// matrix knows nothing or leads uphill.
+  VectorX full_step() const {
+    const VectorX free = free_gradient();
+    if (!changes_.empty()) {
+      LBFGSpp::BFGSMat<double> matrix;
+      matrix.reset(int(n_), int(most_changes));
+      for (const Change& change : changes_) matrix.add_correction(change.p, change.gradient);
+      VectorX step;
+      matrix.apply_Hv(free, -1.0, step);
+      step = (free.array() == 0.0).select(0.0, step);
+      const double longest = step.cwiseAbs().maxCoeff();
+      if (step.dot(free) < 0.0) return std::min(1.0, options_.max_step / longest) * step;
+    }
+    return -length_ / std::max(free.cwiseAbs().maxCoeff(), 1e-300) * free;
+  }
+
+  /// By how much a step was too long: the minimum of the parabola through both costs and the slope.
+  static double shorter(double predicted, double gain) {
+    const double minimum = 0.5 * predicted / std::max(predicted - gain, 1e-300);
+    return std::clamp(minimum, 0.1, 0.5);
+  }
+
+  void learn(const VectorX& p, const VectorX& gradient) {
+    share_ = 1.0;
+    length_ = std::min(2.0 * p.cwiseAbs().maxCoeff(), options_.max_step);
+    if (p.dot(gradient) <= 1e-10 * p.norm() * gradient.norm()) return;  // the matrix stays positive
+    changes_.push_back({p, gradient});
+    if (changes_.size() > most_changes) changes_.erase(changes_.begin());
+  }
+
+  VectorX memory() const {
+    VectorX all(2 + 2 * n_ * Eigen::Index(changes_.size()));
+    all[0] = share_, all[1] = length_;
+    Eigen::Index at = 2;
+    for (const Change& change : changes_) {
+      all.segment(at, n_) = change.p;
+      all.segment(at + n_, n_) = change.gradient;
+      at += 2 * n_;
+    }
+    return all;
+  }
+
+  Run& run_;
+  const OptimiserOptions& options_;
+  Eigen::Index n_;
+  double share_ = 1.0;           // of the full step that is tried next
+  double length_ = 0.1;          // of a full step along the steepest descent
+  std::vector<Change> changes_;  // of accepted steps, the oldest first
+};
 
 #ifdef PLIANT_WITH_NLOPT
 
@@ -298,6 +412,9 @@ OptimiserSummary minimise(CostFunction& objective, const OptimiserState& state, 
       break;
     case OptimiserKind::GradientDescent:
       gradient_descent(run, options, state.memory);
+      break;
+    case OptimiserKind::Lbfgs:
+      LbfgsRun(run, options, state.memory).minimise();
       break;
     case OptimiserKind::NelderMead:
       nelder_mead(run, options, state.memory);

@@ -11,6 +11,7 @@ enum class OptimiserKind {
   LevenbergMarquardt,  ///< Gauss-Newton on the residuals, by tangents: the default
   Rprop,               ///< sign of the adjoint gradient (Riedmiller and Braun 1993), the choice of Weiss 2020
   GradientDescent,     ///< adjoint gradient with an adaptive step
+  Lbfgs,               ///< limited-memory BFGS on the adjoint gradient (Liu and Nocedal 1989): for many parameters
   NelderMead,          ///< downhill simplex on the cost alone, by NLopt: the choice of Wang 2015
 };
 
@@ -31,7 +32,8 @@ struct OptimiserOptions {
 struct OptimiserState {
   int iterations = 0;  ///< done
   VectorX p;           ///< the best point
-  VectorX memory;      ///< the optimiser's own: damping, step lengths, the last trial and signs, or all costs so far
+  VectorX
+      memory;  ///< the optimiser's own: damping, step lengths, the last trial and signs, changes, or all costs so far
 };
 
 /// One accepted or rejected iteration, as it happens.
@@ -67,7 +69,8 @@ OptimiserSummary minimise(CostFunction& objective, const VectorX& p, const Optim
 OptimiserSummary minimise(CostFunction& objective, const OptimiserState& state, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration = {});
 
-/// The splitting of Wang 2015 (algorithm 1): the load-free shape for p, then a few iterations towards the p that is
+/// A splitting after Wang 2015 (algorithm 1, which solves for the shape before each update of a simplex): the load-free
+/// shape for p, then a few iterations towards the p that is
 /// best for that shape, in turns until p stays. `max_iterations` are those of all turns together; their costs are
 /// those of the shape of the turn and need not fall from one to the next.
 OptimiserSummary minimise_in_turns(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,

@@ -1,7 +1,6 @@
 #include "estimation/press_fit.hpp"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <mutex>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/problem.hpp"
@@ -491,7 +491,7 @@ class PressFit {
     while (samples.size() < fitted_.size() && !stop()) {
       const std::size_t begin = samples.size(), end = std::min(begin + batch, fitted_.size());
       std::vector<PressSample> part(end - begin);
-      tbb::parallel_for(begin, end, [&](std::size_t i) {
+      parallel_for(begin, end, [&](std::size_t i) {
         SampleFitOptions own = options;
         const ObservedPress& seen = scene_->presses[std::size_t(fitted_[i])];
         // The misfit of one law for all is no noise: what a press' markers show by themselves is, where that is less.

@@ -1,14 +1,14 @@
 #include "estimation/press_scene.hpp"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "base/dense.hpp"
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "estimation/problem.hpp"
 #include "motion/press_session.hpp"
 
@@ -146,8 +146,8 @@ PressPrediction predict_press(const PressScene& scene, int press, const std::sha
 std::vector<PressPrediction> predict_presses(const PressScene& scene, const std::shared_ptr<const MaterialLaw>& law) {
   const double modulus = mean_modulus(*scene.body, *law);
   std::vector<PressPrediction> predictions(scene.presses.size());
-  tbb::parallel_for(0, int(predictions.size()),
-                    [&](int i) { predictions[std::size_t(i)] = predict_press(scene, i, law, modulus); });
+  parallel_for(0, int(predictions.size()),
+               [&](int i) { predictions[std::size_t(i)] = predict_press(scene, i, law, modulus); });
   return predictions;
 }
 
@@ -171,8 +171,7 @@ double marker_noise(const ObservedPress& press) {
       b.row(k - 1) = (press.loaded[i] - press.rest[i]).transpose();
     }
     // Markers of one face say nothing about the normal direction: the least change along it.
-    const auto solver = A.completeOrthogonalDecomposition();
-    const VectorX row = solver.pseudoInverse().row(0).transpose();  // of the value at the marker
+    const VectorX row = pseudo_inverse(A).row(0).transpose();  // of the value at the marker
     const Vector3 error = press.loaded[std::size_t(m)] - at - b.transpose() * row;
     const double spread = std::sqrt(1.0 + row.squaredNorm());
     for (int d = 0; d < 3; ++d) sizes.push_back(std::abs(error[d]) / spread);

@@ -1,9 +1,8 @@
 #include "motion/probe_contact.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "base/error.hpp"
 
@@ -20,12 +19,16 @@ constexpr int fewest_cuts = 4, most_cuts = 8;  // of a face, for the samples whe
 
 RigidContact glued_disc(const Body& body, const ProbeOptions& probe, double youngs_modulus) {
   const ContactSamples disc = disc_samples(body, probe.centre, probe.radius);
-  if (disc.rest.empty())
+  if (disc.rest.empty()) {
+    std::ostringstream found;
+    found.precision(4);
+    found << "the disc at (" << probe.centre.x() << ", " << probe.centre.y() << ", " << probe.centre.z()
+          << ") m touches nothing of the object";
     throw InputError({{},
-                      fmt::format("the disc at ({:.4g}, {:.4g}, {:.4g}) m touches nothing of the object",
-                                  probe.centre.x(), probe.centre.y(), probe.centre.z()),
+                      found.str(),
                       "a contact whose centre lies on the surface at rest",
                       "correct where the probe touches the object"});
+  }
   return RigidContact::glued(body, disc, glued_stiffness(youngs_modulus, mean_edge(body)));
 }
 

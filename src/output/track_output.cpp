@@ -139,8 +139,8 @@ std::string page(const Capture& capture, const Track& track, const std::vector<R
 void write_track(const fs::path& folder, const Capture& capture, const std::vector<ObservedFrame>& observed,
                  const Track& track, const MotionBlocks& blocks, const VectorX& theta, bool with_pictures,
                  const std::function<void(const char*, int, int)>& progress) {
-  fs::create_directories(folder / "frames");
-  fs::create_directories(folder / "pictures");
+  make_folder(folder / "frames");
+  make_folder(folder / "pictures");
   write_file(folder / "track.json", to_json(track, capture));
   write_file(folder / "track.csv", to_csv(track));
   MaterialBlocks material = blocks;  // an estimate may have more control moduli than the body that was followed

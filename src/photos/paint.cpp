@@ -1,8 +1,6 @@
 #include "photos/paint.hpp"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -15,6 +13,7 @@
 #include <stdexcept>
 
 #include "base/files.hpp"
+#include "base/parallel.hpp"
 #include "capture/markers.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
@@ -192,9 +191,7 @@ class Painter {
 
 template <class Row>
 void each_row(int rows, const Row& row) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, rows), [&](const auto& range) {
-    for (int v = range.begin(); v < range.end(); ++v) row(v);
-  });
+  parallel_for(0, rows, row);
 }
 
 cv::Vec3f to_cv(const Colour& c) { return {c[0], c[1], c[2]}; }

@@ -210,11 +210,11 @@ class Reader {
     for (const PhotographedPress& press : session_.presses) numbers.push_back(press.number);
     for (int c = 0; c < int(session_.cameras.size()); ++c)
       for (const int number : numbers)
-        if (const fs::path file = session_.photograph(c, number); !fs::is_regular_file(file))
-          context_.complain(fmt::format("camera[{}].images", c),
-                            "the file \"" + session_.images[std::size_t(c)](number).string() + "\" is not there",
-                            "a photograph of the rest and of each press by each camera",
-                            "check the pattern and the numbers");
+        if (const fs::path file = session_.photograph(c, number); !is_file(file))
+          context_.complain(
+              fmt::format("camera[{}].images", c),
+              "the file \"" + session_.images[std::size_t(c)](number).string() + "\" " + why_no_file(file),
+              "a photograph of the rest and of each press by each camera", "check the pattern and the numbers");
   }
 
   TomlContext& context_;
@@ -229,7 +229,7 @@ class Reader {
 fs::path PhotoSession::photograph(int camera, int number) const { return folder / images[std::size_t(camera)](number); }
 
 PhotoSession read_photo_session(const fs::path& path) {
-  const fs::path file = fs::is_directory(path) ? path / "markers.toml" : path;
+  const fs::path file = is_folder(path) ? path / "markers.toml" : path;
   const toml::table table = parse_toml(read_file(file), file);
   TomlContext context{TomlPlaces(file), {}, {}};
   PhotoSession session = Reader(file, context).read(table);

@@ -1,12 +1,12 @@
 #include "rays/ray_scene.hpp"
 
 #include <embree3/rtcore.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
 #include <stdexcept>
 #include <string>
+
+#include "base/parallel.hpp"
 
 namespace pliant {
 
@@ -161,9 +161,8 @@ DepthRender RayScene::render_depth(const PinholeCamera& camera, const PixelOffse
     image.cosine[i] = float(-hit->normal.dot(direction));
     image.mesh[i] = hit->mesh, image.triangle[i] = hit->triangle;
   };
-  tbb::parallel_for(tbb::blocked_range<int>(0, camera.height), [&](const tbb::blocked_range<int>& rows) {
-    for (int v = rows.begin(); v != rows.end(); ++v)
-      for (int u = 0; u < camera.width; ++u) render_pixel(u, v);
+  parallel_for(0, camera.height, [&](int v) {
+    for (int u = 0; u < camera.width; ++u) render_pixel(u, v);
   });
   return image;
 }

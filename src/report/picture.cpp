@@ -1,8 +1,5 @@
 #include "report/picture.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "base/parallel.hpp"
 #include "rays/look_at.hpp"
 #include "rays/ray_scene.hpp"
 
@@ -304,9 +302,8 @@ Picture draw(const PictureScene& scene, const PinholeCamera& camera, const Pictu
   check(scene, options);
   const Painter painter(scene, camera, options);
   std::vector<Colour> canvas(size_t(camera.width) * camera.height);
-  tbb::parallel_for(tbb::blocked_range<int>(0, camera.height), [&](const tbb::blocked_range<int>& rows) {
-    for (int v = rows.begin(); v != rows.end(); ++v)
-      for (int u = 0; u < camera.width; ++u) canvas[size_t(v) * camera.width + u] = painter.pixel(u, v);
+  parallel_for(0, camera.height, [&](int v) {
+    for (int u = 0; u < camera.width; ++u) canvas[size_t(v) * camera.width + u] = painter.pixel(u, v);
   });
   const std::vector<Painter::Disc> discs = painter.discs();
   const double radius = options.disc_radius > 0.0 ? options.disc_radius : automatic_radius(camera, discs);

@@ -10,6 +10,8 @@
 #include <numeric>
 #include <tuple>
 
+#include "base/files.hpp"
+
 namespace pliant {
 
 namespace fs = std::filesystem;
@@ -160,8 +162,8 @@ std::optional<fs::path> existing(TomlTable& table, const std::string& name, cons
     return std::nullopt;
   }
   const fs::path path = (files.folder / text).lexically_normal();
-  if (fs::is_regular_file(path)) return path;
-  table.context().reject(table.key_of(name), "the file \"" + text + "\" is not there",
+  if (is_file(path)) return path;
+  table.context().reject(table.key_of(name), "the file \"" + text + "\" " + why_no_file(path),
                          "a file in " + files.folder.string(), "check the spelling, or copy the file");
   return std::nullopt;
 }

@@ -1,7 +1,6 @@
 #include "synthesis/synthesis.hpp"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <stdexcept>
 
 #include "base/files.hpp"
+#include "base/parallel.hpp"
 #include "geometry/mesh_io.hpp"
 #include "rays/ray_scene.hpp"
 
@@ -151,7 +151,7 @@ void write_synthetic_capture(const fs::path& folder, const Synthesis& synthesis,
   std::mutex lock;
   int done = 0;
   const int frames = int(synthesis.trajectory.size());
-  tbb::parallel_for(0, frames, [&](int frame) {
+  parallel_for(0, frames, [&](int frame) {
     write_frame(folder, synthesis, frame);
     const std::lock_guard guard(lock);
     ++done;

@@ -1,12 +1,11 @@
 #include "tracking/correspondence.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
+#include "base/parallel.hpp"
 #include "tracking/neighbours.hpp"
 
 namespace pliant {
@@ -45,7 +44,7 @@ Correspondence expect(const Points& samples, std::span<const double> share, cons
   const Neighbours near(samples);
   const double reach = 2.0 * std::log(1.0 / options.least_posterior), w = options.outlier_share;
   std::vector<ChunkOfPoints> chunks((n + chunk - 1) / chunk);
-  tbb::parallel_for(std::size_t(0), chunks.size(), [&](std::size_t k) {
+  parallel_for(std::size_t(0), chunks.size(), [&](std::size_t k) {
     std::vector<Neighbours::Match> found;
     ChunkOfPoints& own = chunks[k];
     for (std::size_t i = k * chunk; i < std::min(n, (k + 1) * chunk); ++i) {

@@ -28,7 +28,8 @@ TEST(Usage, VersionIsOneLineOnStdout) {
 TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
-  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "press", "130"})
+  for (const char* word :
+       {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "press", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -76,6 +77,27 @@ TEST(Usage, AMissingFileIsNamed) {
     EXPECT_EQ(run.exit_code, bad_input) << arguments[0];
     EXPECT_THAT(run.err, HasSubstr("nowhere")) << arguments[0];
     EXPECT_THAT(run.err, Not(HasSubstr("terminate"))) << arguments[0];
+  }
+}
+
+TEST(Usage, ALinkThatPointsAtItselfIsBadInput) {
+  const TemporaryFolder folder;
+  const std::string loop = folder.link_to_itself("loop"), out = folder / "out", scene = PLIANT_TEST_SCENE;
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"check", loop},
+                                                    {"scan", loop, "--out", out},
+                                                    {"markers", loop, "--out", out},
+                                                    {"fit", loop, "--out", out},
+                                                    {"track", loop, "--out", out},
+                                                    {"rest", loop, "--out", out},
+                                                    {"simulate", loop, "--out", out},
+                                                    {"evaluate", loop, loop},
+                                                    {"mesh", loop},
+                                                    {"synth", loop, "--out", out},
+                                                    {"synth", scene, "--out", loop}}) {
+    const ProgramRun run = run_pliant(arguments);
+    EXPECT_EQ(run.exit_code, bad_input) << arguments[0] << ": " << run.err;
+    EXPECT_THAT(run.err, HasSubstr("loop")) << arguments[0];
+    EXPECT_THAT(run.err, Not(HasSubstr("filesystem error"))) << arguments[0];
   }
 }
 

@@ -49,5 +49,50 @@ TEST(Files, SayWhyTheyCannotBeUsed) {
   EXPECT_THAT(complaint_of([&] { write_file(folder / "file/below", "y"); }), HasSubstr("cannot be written"));
 }
 
+TEST(Files, ALinkThatPointsAtItselfIsNoFile) {
+  const TemporaryFolder folder;
+  const std::filesystem::path loop = folder.link_to_itself("loop");
+  EXPECT_FALSE(is_file(loop));
+  EXPECT_FALSE(is_folder(loop));
+  EXPECT_FALSE(is_file(loop / "below"));
+  EXPECT_EQ(why_no_file(loop), "is a symbolic link that leads in a circle");
+  EXPECT_EQ(why_no_file(loop / "below"), "is a symbolic link that leads in a circle");
+  EXPECT_THAT(complaint_of([&] { (void)read_file(loop); }), HasSubstr("loop: cannot be read: Too many levels"));
+  EXPECT_THAT(complaint_of([&] { write_file(loop / "below", "y"); }), HasSubstr("cannot be written: Too many levels"));
+  EXPECT_THAT(complaint_of([&] { make_folder(loop); }), HasSubstr("loop: the folder cannot be made"));
+  EXPECT_THAT(complaint_of([&] { make_folder(loop / "below"); }), HasSubstr("below: the folder cannot be made"));
+  write_file(loop, "in its place");
+  EXPECT_EQ(read_file(loop), "in its place");
+}
+
+TEST(Files, ReasonsAreToldApart) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(why_no_file(folder / "none"), "is not there");
+  EXPECT_EQ(why_no_file(folder.path()), "is a folder");
+  EXPECT_EQ(why_no_file("/dev/null"), "is no file");
+  std::filesystem::create_symlink("none", folder / "dangling");
+  EXPECT_EQ(why_no_file(folder / "dangling"), "is not there");
+  folder.write("file", "x");
+  EXPECT_TRUE(is_file(folder / "file"));
+  EXPECT_TRUE(is_folder(folder.path()));
+  std::filesystem::create_symlink("file", folder / "link");
+  EXPECT_TRUE(is_file(folder / "link"));
+}
+
+TEST(Files, FoldersAreMadeOnceAndRemovedFilesAreGone) {
+  const TemporaryFolder folder;
+  make_folder(folder / "a/b/c");
+  make_folder(folder / "a/b/c");
+  EXPECT_TRUE(is_folder(folder / "a/b/c"));
+  const auto file = folder.write("file", "x");
+  EXPECT_THAT(complaint_of([&] { make_folder(file); }), HasSubstr("the folder cannot be made"));
+  EXPECT_THAT(complaint_of([&] { remove_file(folder / "a"); }), HasSubstr("cannot be removed"));
+  remove_file(file);
+  remove_file(file);
+  EXPECT_FALSE(is_file(file));
+  remove_file(folder.link_to_itself("loop"));
+  EXPECT_EQ(files_in(folder.path()), 1u);
+}
+
 }  // namespace
 }  // namespace pliant

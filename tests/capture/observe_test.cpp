@@ -1,9 +1,8 @@
 #include "capture/observe.hpp"
 
-#include <oneapi/tbb/global_control.h>
-
 #include <cmath>
 
+#include "base/parallel.hpp"
 #include "capture/small_capture.hpp"
 
 namespace pliant {
@@ -76,7 +75,7 @@ TEST(Observe, IsTheSameWithOneThread) {
   SmallCapture small;
   const Capture capture = small.read();
   const auto many = observe(capture);
-  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const ThreadLimit one(1);
   const auto single = observe(capture);
   for (std::size_t i = 0; i < many.size(); ++i) {
     EXPECT_EQ(many[i].points, single[i].points);

@@ -1,6 +1,6 @@
 #include <filesystem>
 
-#include "capture/hash.hpp"
+#include "base/sha256.hpp"
 #include "capture/small_capture.hpp"
 #include "input_errors.hpp"
 
@@ -81,6 +81,34 @@ TEST(ReadCapture, SaysThatNothingIsThere) {
               HasSubstr("capture.toml: the file is not there"));
   folder.write("capture.toml", "");
   EXPECT_THAT(complaint_of([&] { (void)read_capture(folder.path()); }), HasSubstr("the file is empty"));
+}
+
+/// Each file of a recording in turn is a symbolic link that points at itself.
+TEST(ReadCapture, LinksThatPointAtThemselvesAreTold) {
+  struct Case {
+    const char *file, *said;
+  };
+  constexpr const char* circle = "is a symbolic link that leads in a circle";
+  for (const auto& [file, said] : std::initializer_list<Case>{{"rest.ply", circle},
+                                                              {"front/background.png", circle},
+                                                              {"markers.csv", circle},
+                                                              {"markers_rest.csv", circle},
+                                                              {"held.txt", circle},
+                                                              {"front/000002.png", "no file for 1 of 4 frames: 2"},
+                                                              {"front/mask_000000.png", "no file for 1 of 4 frames: 0"},
+                                                              {"front", "nor for any other frame"}}) {
+    SmallCapture small;
+    small.edit("noise = 0.002", "noise = 0.002\nbackground = \"front/background.png\"");
+    small.append("\n[[markers]]\nrest = \"markers_rest.csv\"\ntrack = \"markers.csv\"\n");
+    small.append("\n[[fixed]]\nvertices = \"held.txt\"\n");
+    ASSERT_EQ(complaint_of([&] { (void)small.read(); }), "");
+    small.folder.link_to_itself(file);
+    EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr(said)) << file;
+  }
+  const test::TemporaryFolder folder;
+  const std::filesystem::path loop = folder.link_to_itself("capture.toml");
+  for (const auto& path : {folder.path(), loop, loop / "below"})
+    EXPECT_THAT(complaint_of([&] { (void)read_capture(path); }), HasSubstr(circle)) << path;
 }
 
 TEST(ReadCapture, NamesThePlaceOfASyntaxError) {

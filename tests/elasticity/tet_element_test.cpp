@@ -7,6 +7,7 @@
 #include "mesh/tet_mesh.hpp"
 #include "support/bodies.hpp"
 #include "support/derivatives.hpp"
+#include "support/eigenvalues.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant {
@@ -120,7 +121,7 @@ TYPED_TEST(TetElement, HasSixRigidModesAndIsOtherwisePositive) {
       EXPECT_LT((K * nodal<N>(X, [&](const Vector3& p) -> Vector3 { return Vector3::Unit(d).cross(p) / size; })).norm(),
                 tolerance(1e-13) * scale);
     }
-    const VectorX eigenvalues = Eigen::SelfAdjointEigenSolver<MatrixX>(K).eigenvalues();
+    const VectorX eigenvalues = test::eigenvalues(K);
     EXPECT_LT(eigenvalues.head<6>().cwiseAbs().maxCoeff(), tolerance(1e-13) * scale);
     EXPECT_GT(eigenvalues[6], 1e-4 * scale) << "a zero-energy mode that is not rigid";
   }
@@ -173,7 +174,7 @@ TYPED_TEST(TetElement, MassHasTheVolumeTheCentroidAndIsPositive) {
     EXPECT_NEAR(M.sum(), volume, tolerance(1e-13) * volume);
     EXPECT_LT((X.transpose() * M.rowwise().sum() - moment).norm(), tolerance(1e-12) * volume * size);
     EXPECT_LT((M - M.transpose()).norm(), tolerance(1e-15) * M.norm());
-    const VectorX eigenvalues = Eigen::SelfAdjointEigenSolver<MatrixX>(M).eigenvalues();
+    const VectorX eigenvalues = test::eigenvalues(M);
     EXPECT_GT(eigenvalues[0], 1e-3 * eigenvalues[N - 1]);
   }
 }

@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <random>
 
+#include "base/dense.hpp"
 #include "elasticity/element_moduli.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
@@ -28,7 +28,7 @@ constexpr double deviation = 1.5;
 MatrixX ratio_covariance(const std::vector<Vector3>& points, double length) {
   const MatrixX precision = field_precision(points, length, deviation);
   const Eigen::Index n = precision.rows() - 1;
-  return precision.bottomRightCorner(n, n).inverse();
+  return inverse(precision.bottomRightCorner(n, n));
 }
 
 TEST(FieldPrior, RatiosVaryWithDistanceWhateverOtherPointsThereAre) {

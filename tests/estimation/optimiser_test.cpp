@@ -99,7 +99,7 @@ TEST_P(BaselineOptimiser, LowersTheCostAndComesClose) {
 
 std::vector<OptimiserKind> kinds_built() {
   std::vector<OptimiserKind> kinds = {OptimiserKind::Rprop, OptimiserKind::GradientDescent,
-                                      OptimiserKind::LevenbergMarquardt};
+                                      OptimiserKind::LevenbergMarquardt, OptimiserKind::Lbfgs};
 #ifdef PLIANT_WITH_NLOPT
   kinds.push_back(OptimiserKind::NelderMead);
 #endif
@@ -191,8 +191,6 @@ TEST_P(BaselineOptimiser, GoesOnFromAnyIterationAlongTheSamePath) {
   }
 }
 
-#ifdef PLIANT_WITH_NLOPT
-
 /// x^T H x / 2 - b x of numbers between -1 and 1.
 class BoundedQuadratic : public CostFunction {
  public:
@@ -256,6 +254,113 @@ TEST(LevenbergMarquardt, DampingOfLongStepsLetsWhatIsKnownArrive) {
   EXPECT_LT(sum_after(false), 0.01);
   EXPECT_NEAR(sum_after(true), 0.4, 0.02);
 }
+
+/// Eigenvalues over three decades, in directions that mix all numbers.
+BoundedQuadratic long_valley(const VectorX& minimum) {
+  const Eigen::Index n = minimum.size();
+  MatrixX mixing(n, n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j) mixing(i, j) = std::cos(double(1 + i * (2 * j + 1)));
+  const MatrixX Q = mixing.householderQr().householderQ();
+  const VectorX eigenvalues = VectorX::LinSpaced(n, 0.0, 3.0).unaryExpr([](double e) { return std::pow(10.0, e); });
+  const MatrixX H = Q * eigenvalues.asDiagonal() * Q.transpose();
+  return {H, H * minimum};
+}
+
+OptimiserOptions precise(OptimiserKind kind) {
+  OptimiserOptions options;
+  options.kind = kind;
+  options.max_iterations = 120;
+  options.step_tolerance = 1e-7, options.cost_tolerance = 1e-12;
+  return options;
+}
+
+TEST(Lbfgs, FollowsALongValleyWhereGradientDescentDoesNotArrive) {
+  VectorX minimum(20);
+  for (Eigen::Index i = 0; i < minimum.size(); ++i) minimum[i] = 0.5 * std::sin(double(i));
+  BoundedQuadratic cost = long_valley(minimum);
+  const VectorX start = VectorX::Zero(minimum.size());
+  const OptimiserSummary s = minimise(cost, start, precise(OptimiserKind::Lbfgs));
+  EXPECT_TRUE(s.converged) << s.reason;
+  EXPECT_LT((s.p - minimum).cwiseAbs().maxCoeff(), tolerance(1e-4));
+  const OptimiserSummary other = minimise(cost, start, precise(OptimiserKind::GradientDescent));
+  EXPECT_GT((other.p - minimum).cwiseAbs().maxCoeff(), 1e-2);
+}
+
+TEST(Lbfgs, ANumberAtItsBoundDoesNotHoldUpTheOthers) {
+  VectorX minimum = VectorX::Constant(6, 0.5);
+  minimum[2] = 3.0;  // beyond its bound
+  BoundedQuadratic cost = long_valley(minimum);
+  const OptimiserSummary s = minimise(cost, VectorX::Zero(6), precise(OptimiserKind::Lbfgs));
+  // At a minimum within bounds the slope is zero but for numbers at a bound that it pushes outwards.
+  const VectorX gradient = cost.evaluate(s.p).gradient;
+  int held = 0;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const bool is_held = std::abs(s.p[i]) == 1.0;
+    held += is_held;
+    if (is_held)
+      EXPECT_LT(gradient[i] * s.p[i], 0.0) << i;
+    else
+      EXPECT_NEAR(gradient[i], 0.0, tolerance(1e-3)) << i;
+  }
+  EXPECT_GT(held, 0);
+}
+
+/// The cost of another function wherever x lies beyond a wall: there nothing can be evaluated, or the cost is no
+/// number.
+class Walled : public BoundedQuadratic {
+ public:
+  Walled(MatrixX H, VectorX b, double wall, bool says_so)
+      : BoundedQuadratic(std::move(H), std::move(b)), wall_(wall), says_so_(says_so) {}
+  CostEvaluation gradient(const VectorX& x) override {
+    CostEvaluation e = BoundedQuadratic::gradient(x);
+    if (x[0] < wall_) return e;
+    ++failures;
+    e.succeeded = !says_so_;
+    e.cost = says_so_ ? 0.0 : std::nan("");
+    e.gradient.setConstant(std::nan(""));
+    return e;
+  }
+  int failures = 0;
+
+ private:
+  double wall_;
+  bool says_so_;
+};
+
+TEST(Lbfgs, BacksOffFromCostsThatAreNoNumbers) {
+  const MatrixX H = (MatrixX(2, 2) << 1.0, 0.0, 0.0, 9.0).finished();
+  for (const bool says_so : {true, false}) {
+    Walled cost(H, H * Eigen::Vector2d(0.6, 0.5), 0.4, says_so);
+    const OptimiserSummary s = minimise(cost, Eigen::Vector2d(-0.9, -0.9), precise(OptimiserKind::Lbfgs));
+    EXPECT_TRUE(s.succeeded);
+    EXPECT_GT(cost.failures, 0);
+    EXPECT_LT(s.p[0], 0.4);
+    EXPECT_TRUE(std::isfinite(s.evaluation.cost));
+    EXPECT_LT(s.evaluation.cost, s.start_cost);
+    EXPECT_TRUE(s.evaluation.gradient.allFinite());
+  }
+}
+
+TEST(Lbfgs, TakesAStateWithMoreChangesThanItKeepsOn) {
+  VectorX minimum(12);
+  for (Eigen::Index i = 0; i < minimum.size(); ++i) minimum[i] = 0.5 * std::cos(double(i));
+  BoundedQuadratic cost = long_valley(minimum);
+  std::vector<OptimiserState> states;
+  OptimiserOptions options = precise(OptimiserKind::Lbfgs);
+  options.max_iterations = 40;
+  const OptimiserSummary whole = minimise(cost, VectorX::Zero(12), options, [&](const Iteration& i) {
+    states.push_back(i.state());
+    return true;
+  });
+  ASSERT_GE(states.size(), 30U);
+  EXPECT_EQ(states.back().memory.size(), states[25].memory.size()) << "the memory is limited";
+  const OptimiserSummary rest = minimise(cost, states[25], options);
+  EXPECT_EQ(rest.p, whole.p);
+  EXPECT_EQ(rest.iterations, whole.iterations);
+}
+
+#ifdef PLIANT_WITH_NLOPT
 
 TEST(NelderMead, FindsTheMinimumThatLevenbergAndMarquardtFind) {
   const test::Recording recording = test::torus_recording(cell_size, 6, 1, 1e-3, 1, 40, 0.0, 1.0, 1e-10);

@@ -1,7 +1,7 @@
 // Followed points as observations: derivatives through the whole chain, and moduli found from them.
-#include <Eigen/LU>
 #include <random>
 
+#include "base/dense.hpp"
 #include "elasticity/modulus_field.hpp"
 #include "estimation/objective.hpp"
 #include "estimation/optimiser.hpp"
@@ -140,7 +140,7 @@ TEST(FollowedPointsWithNoise, LeadToTheModuliWithinTheirDeviations) {
   const OptimiserSummary summary = minimise(objective, bar.start(), {});
   ASSERT_TRUE(summary.succeeded);
   const MatrixX& H = summary.evaluation.gauss_newton;
-  const VectorX std = 2.0 * H.inverse().diagonal().cwiseSqrt();
+  const VectorX std = 2.0 * inverse(H).diagonal().cwiseSqrt();
   const VectorX found = bar.parameters.to_theta(summary.p);
   for (int k = 0; k < 3; ++k) {
     EXPECT_LT(std::abs(std::log(found[bar.modulus(k)] / bar.truth[bar.modulus(k)])), tolerance(3.0 * std[k])) << k;

@@ -7,6 +7,7 @@
 #include "solvers/incomplete_cholesky.hpp"
 #include "support/bodies.hpp"
 #include "support/convergence.hpp"
+#include "support/eigenvalues.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant {
@@ -253,7 +254,7 @@ Conditioning conditioning_of(HexGrid grid) {
   MatrixX dense(A.rows(), A.rows());
   VectorX column;
   for (int c = 0; c < A.rows(); ++c) A.multiply(VectorX::Unit(A.rows(), c), column), dense.col(c) = column;
-  const VectorX eigenvalues = Eigen::SelfAdjointEigenSolver<MatrixX>(dense, Eigen::EigenvaluesOnly).eigenvalues();
+  const VectorX eigenvalues = test::eigenvalues(dense);
   ConjugateGradients solver(body->pattern, {SolverKind::Iterative, 1e-8, 2000});
   VectorX x = VectorX::Zero(A.rows());
   int iterations = 2000;

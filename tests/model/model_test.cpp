@@ -147,6 +147,16 @@ TEST_F(ModelFile, UnknownKeysNameTheNearestKnownOne) {
   EXPECT_THAT(after("[material]", "[materiel]"), HasSubstr("no table [material]"));
 }
 
+TEST_F(ModelFile, LinksThatPointAtThemselvesAreTold) {
+  for (const char* file : {"model.vtu", "surface.ply"}) {
+    folder.link_to_itself(file);
+    EXPECT_THAT(complaint_of([&] { load_model(folder / "model.toml"); }),
+                HasSubstr(std::string("the file \"") + file + "\" is a symbolic link that leads in a circle"));
+  }
+  EXPECT_THAT(complaint_of([&] { load_model(folder.link_to_itself("model.toml")); }),
+              HasSubstr("model.toml: cannot be read"));
+}
+
 TEST_F(ModelFile, PlacesAreNamedByLineAndColumn) {
   const std::string complaint = after("youngs_modulus    = 590.1234567890123", "youngs_modulus    = -1.0");
   EXPECT_THAT(complaint, testing::ContainsRegex("changed.toml:[0-9]+:1: `youngs_modulus` is -1; expected above 0"));

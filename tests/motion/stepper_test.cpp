@@ -9,6 +9,7 @@
 #include "support/bodies.hpp"
 #include "support/convergence.hpp"
 #include "support/dense.hpp"
+#include "support/eigenvalues.hpp"
 #include "support/scenes.hpp"
 #include "support/tolerance.hpp"
 
@@ -181,9 +182,9 @@ struct Mode {
     for (const int n : held) K.constrain(n), M.constrain(n);
     for (const int n : held)
       for (int d = 0; d < 3; ++d) K.block(K.pattern().diagonal[n])[4 * d] = 1e9;  // out of the way of the first mode
-    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixX> eigen(test::dense(K), test::dense(M));
-    omega = std::sqrt(eigen.eigenvalues()[0]);
-    VectorX first = eigen.eigenvectors().col(0);
+    const test::GeneralisedEigen eigen = test::generalised_eigen(test::dense(K), test::dense(M));
+    omega = std::sqrt(eigen.values[0]);
+    VectorX first = eigen.vectors.col(0);
     shape = as_points(first);
     shape *= 1e-6 / shape.cwiseAbs().maxCoeff();  // small: the corotated body is then linear to rounding
     Points product = Points::Zero(shape.rows(), 3);

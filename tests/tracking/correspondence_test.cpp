@@ -1,12 +1,12 @@
 #include "tracking/correspondence.hpp"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 #include <numbers>
 #include <random>
 
+#include "base/parallel.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant {
@@ -166,7 +166,7 @@ TEST(Expectation, EachPointHasItsOwnNoise) {
 TEST(Expectation, IsTheSameForEveryNumberOfThreads) {
   const Plate plate(3000);
   const Correspondence many = expect(plate.samples, plate.share, plate.cloud(), mixture(0.05));
-  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const ThreadLimit one(1);
   const Correspondence alone = expect(plate.samples, plate.share, plate.cloud(), mixture(0.05));
   EXPECT_EQ(many.precision, alone.precision);
   EXPECT_EQ(many.mass, alone.mass);

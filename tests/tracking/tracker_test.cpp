@@ -4,9 +4,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "support/swinging.hpp"
 
 namespace pliant {
@@ -185,7 +185,7 @@ TEST(Tracker, KnowsWhatACameraCannotSee) {
 TEST(Tracker, IsTheSameForEveryNumberOfThreads) {
   const SwingRecording recorded = recording();
   const Track many = recorded.track(bar());
-  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const ThreadLimit one(1);
   const Track alone = recorded.track(bar());
   ASSERT_EQ(many.frames.size(), alone.frames.size());
   for (std::size_t f = 0; f < many.frames.size(); ++f) {
