@@ -10,11 +10,11 @@ namespace pliant {
 
 namespace {
 
-constexpr double glue = 10.0;               // stiffness of a glued disc and of a punch, in layers of elements
-constexpr double ball_stiffness = 100.0;    // of a ball, which touches a small part of an element
-constexpr double punch_smoothing = 0.005;   // over which pressure sets in, in radii
-constexpr double ball_smoothing = 0.01;     // likewise
-constexpr double punch_rim = 0.05;          // radius of the rounded rim, in radii
+constexpr double glue = 10.0;                  // stiffness of a glued disc and of a punch, in layers of elements
+constexpr double ball_stiffness = 100.0;       // of a ball, which touches a small part of an element
+constexpr double punch_smoothing = 0.005;      // over which pressure sets in, in radii
+constexpr double ball_smoothing = 0.01;        // likewise
+constexpr double punch_rim = 0.05;             // radius of the rounded rim, in radii
 constexpr int fewest_cuts = 4, most_cuts = 8;  // of a face, for the samples where contact acts
 
 RigidContact glued_disc(const Body& body, const ProbeOptions& probe, double youngs_modulus) {

@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
-
+#include "command_line.hpp"
 #include "commands.hpp"
 #include "geometry/primitives.hpp"
 #include "model/model.hpp"
@@ -30,10 +29,14 @@ TEST(SimulateAlone, WritesAModelsTrajectory) {
   model.scene.timing = evenly_timed(60.0, 3);
   model.youngs_modulus = 3000.0, model.poisson_ratio = 0.3, model.cell_size = 0.02, model.substeps = 4;
   save_model(folder.path(), model);
-  CLI::App app;
+  apps::CommandLine line("simulate alone", "", "");
   int exit_code = -1;
-  apps::add_simulate(app, exit_code);
-  app.parse("simulate " + (folder / "model.toml").string() + " --out " + (folder / "out").string());
+  apps::add_simulate(line, exit_code);
+  std::vector<std::string> words = {"pliant", "simulate", (folder / "model.toml").string(), "--out",
+                                    (folder / "out").string()};
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  EXPECT_TRUE(line.run(int(arguments.size()), arguments.data()));
   EXPECT_EQ(exit_code, apps::Fine);
   EXPECT_TRUE(std::filesystem::exists(folder / "out/trajectory.pvd"));
   EXPECT_TRUE(std::filesystem::exists(folder / "out/frames/000002.vtu"));
