@@ -1,23 +1,15 @@
 #include "elasticity/law_elasticity.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "base/parallel.hpp"
 #include "elasticity/tet_element.hpp"
 
 namespace pliant {
-
-void LawElasticity::set_reference(std::shared_ptr<const Body>) {
-  throw std::logic_error("bodies of a material law are free of load where they were scanned");
-}
-void LawElasticity::add_force_tangent(const Points&, const Points&, const Points&, const VectorX&, Points&) {
-  throw std::logic_error("motions of a material law have no derivatives by theta");
-}
-void LawElasticity::add_force_adjoint(const Points&, const Points&, Points&, Points&, VectorX&) {
-  throw std::logic_error("motions of a material law have no derivatives by theta");
-}
 
 Strain6 biot_strain(const Matrix3& F) {
   const Matrix3 S = polar_decomposition(F).S;
@@ -28,25 +20,58 @@ Strain6 biot_strain(const Matrix3& F) {
 
 namespace {
 
-/// The tangent without its negative eigenvalues.
-Matrix9 positive_part(const Matrix9& tangent) {
-  const Eigen::SelfAdjointEigenSolver<Matrix9> solver(tangent);
-  if (solver.eigenvalues()[0] >= 0.0) return tangent;
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() * solver.eigenvectors().transpose();
-}
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+auto vec(const Matrix3& m) { return Eigen::Map<const Vector9>(m.data()); }
+Matrix3 matrix_of(const Vector9& v) { return Eigen::Map<const Matrix3>(v.data()); }
+
+/// A symmetric tangent and the same without its negative eigenvalues, the first of an ascending order.
+struct Projection {
+  Vector9 values;
+  Matrix9 vectors, positive;
+
+  Projection() = default;
+  explicit Projection(const Matrix9& tangent) {
+    const Eigen::SelfAdjointEigenSolver<Matrix9> solver(tangent);
+    values = solver.eigenvalues();
+    vectors = solver.eigenvectors();
+    positive = values[0] >= 0.0 ? tangent : Matrix9(vectors * values.cwiseMax(0.0).asDiagonal() * vectors.transpose());
+  }
+  int negative_count() const { return int((values.array() < 0.0).count()); }
+  /// How much of a change between two of its vectors the projection leaves out: 1 less the divided difference of
+  /// max(value, 0) (Daleckii & Krein 1965).
+  double left_out(int i, int j) const {
+    if (values[i] >= 0.0 && values[j] >= 0.0) return 0.0;
+    if (values[i] < 0.0 && values[j] < 0.0) return 1.0;
+    const double less = std::min(values[i], values[j]), more = std::max(values[i], values[j]);
+    return less / (less - more);
+  }
+};
 
 template <int N>
 class TetLawElasticity : public LawElasticity {
  public:
   TetLawElasticity(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
                    std::shared_ptr<const BlockPattern> pattern);
+  TetLawElasticity(std::shared_ptr<const Body> body, const LawLayout& layout)
+      : TetLawElasticity(body, nullptr, nullptr) {
+    field_ = std::make_unique<MaterialField>(std::move(body), layout);
+  }
 
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::Blended; }
+  void set_parameters(const VectorX& theta) override;
   void linearise(const Points& lag) override;
   void add_force(const Points& z, Points& force) override;
   void add_matrix(double scale, BlockMatrix& matrix) override { add_stiffness(Stiffness::Positive, scale, matrix); }
   void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
+  void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                         Points& force) override;
+  void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+  void set_reference(std::shared_ptr<const Body> body) override;
+  void linearise_reference(const Points& z) override { reference_z_ = z; }
+  void add_reference_tangent(const Points& d_reference, Points& force) override;
+  void add_reference_adjoint(const Points& w, Points& reference_bar) override;
   double energy(const Points& z) const override;
 
   double evaluate(const Points& x, bool with_tangent) override;
@@ -65,19 +90,50 @@ class TetLawElasticity : public LawElasticity {
     Matrix3 F;
     PointStress stress;
   };
+  /// Of the affine stress S = P(F) + M+(F) : H, H = F_z - F, in the frame of the world.
+  struct PointChange {
+    Matrix9 by_lag;                                          // dS/dF at the same F_z
+    Matrix9 by_z;                                            // dS/dF_z = M+
+    Matrix3 stress;                                          // S
+    Eigen::Matrix<double, 9, Eigen::Dynamic> by_parameters;  // dS/dq; where they were asked for
+  };
   const int* nodes_of(int e) const { return body_->connectivity.data() + std::size_t(e) * N; }
   Matrix3 deformation(int e, const Nodes& gradient, const Points& x) const {
     Matrix3 F = Matrix3::Zero();
     for (int a = 0; a < N; ++a) F.noalias() += x.row(nodes_of(e)[a]).transpose() * gradient.row(a);
     return F;
   }
+  void take_reference();
+  /// Calls function(element, number of the point) for all points, in any order and at once.
+  template <class Function>
+  void for_all_points(Function&& function) const;
+  /// The tangents in their own frames, without negative parts, at the last `evaluate`.
+  const std::vector<Projection>& projections() const;
   /// product += K d at the last `evaluate`, K the positive stiffness.
   void add_product(const Points& d, double scale, Points& product) const;
+  /// matrix += scale times the stiffness of a point whose tangent is M in the frame of `left` and `right`.
+  void add_point_stiffness(int e, const Point& point, const Matrix9& M, const Matrix3& left, const Matrix3& right,
+                           double scale, BlockMatrix& matrix) const;
+  /// The changes of all points' stresses about the lag point and z.
+  const std::vector<PointChange>& changes(const Points& z, bool by_parameters);
+  PointChange change_of(int e, std::size_t point, const Points& z, bool by_parameters) const;
+  /// force -= V S g for the stress S of a point.
+  void subtract(int e, const Point& point, const Matrix3& stress, Points& force) const {
+    const Nodes own = point.volume * point.gradient * stress.transpose();
+    for (int a = 0; a < N; ++a) force.row(nodes_of(e)[a]) -= own.row(a);
+  }
 
   std::shared_ptr<const Body> body_;
+  std::unique_ptr<MaterialField> field_;  // where the law follows from the parameters
   std::vector<Point> points_;
   std::vector<int> blocks_;  // N x N an element
-  Points lag_;
+  Points lag_, reference_z_;
+  bool is_possible_ = true;  // whether the law knows the deformation of the lag point
+  mutable std::vector<Projection> projections_;
+  mutable bool has_projections_ = false;
+  std::vector<PointChange> changes_;
+  Points changes_z_;
+  bool has_changes_ = false, has_parameter_changes_ = false;
 };
 
 template <int N>
@@ -87,8 +143,17 @@ TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::sha
   const int count = body_->element_count();
   points_.resize(std::size_t(count) * points);
   polar_.resize(std::size_t(count));
+  for (int e = 0; e < count; ++e)
+    for (int a = 0; a < N; ++a)
+      for (int b = 0; b < N; ++b)
+        blocks_.push_back((pattern ? *pattern : *body_->pattern).find(nodes_of(e)[a], nodes_of(e)[b]));
+  take_reference();
+}
+
+template <int N>
+void TetLawElasticity<N>::take_reference() {
   const auto rule = tet_quadrature(N == 4 ? 1 : 2);
-  for (int e = 0; e < count; ++e) {
+  for (int e = 0; e < body_->element_count(); ++e) {
     Nodes X;
     for (int a = 0; a < N; ++a) X.row(a) = body_->nodes.row(nodes_of(e)[a]);
     for (int q = 0; q < points; ++q) {
@@ -97,22 +162,49 @@ TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::sha
       point.volume = at.weight * (X.transpose() * tet_shape_derivatives<N>(at.at)).determinant() / 6.0;
       point.gradient = tet_gradients<N>(X, at.at);
     }
-    for (int a = 0; a < N; ++a)
-      for (int b = 0; b < N; ++b)
-        blocks_.push_back((pattern ? *pattern : *body_->pattern).find(nodes_of(e)[a], nodes_of(e)[b]));
   }
 }
 
 template <int N>
-double TetLawElasticity<N>::evaluate(const Points& x, bool with_tangent) {
-  const int count = body_->element_count();
-  parallel_ranges(0, std::size_t(count), 128, [&](std::size_t begin, std::size_t end) {
+void TetLawElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
+  body_ = std::move(body);
+  take_reference();
+  has_projections_ = has_changes_ = false;
+}
+
+template <int N>
+void TetLawElasticity<N>::set_parameters(const VectorX& theta) {
+  if (!field_) return;
+  field_->set_parameters(theta);
+  law_ = field_->law();
+  has_projections_ = has_changes_ = false;
+}
+
+template <int N>
+template <class Function>
+void TetLawElasticity<N>::for_all_points(Function&& function) const {
+  parallel_ranges(0, std::size_t(body_->element_count()), 32, [&](std::size_t begin, std::size_t end) {
     for (int e = int(begin); e < int(end); ++e)
-      for (int q = 0; q < points; ++q) {
-        Point& point = points_[std::size_t(e * points + q)];
-        point.F = deformation(e, point.gradient, x);
-        law_->stress(e, point.F, with_tangent, point.stress);
-      }
+      for (int q = 0; q < points; ++q) function(e, std::size_t(e * points + q));
+  });
+}
+
+template <int N>
+const std::vector<Projection>& TetLawElasticity<N>::projections() const {
+  if (has_projections_) return projections_;
+  projections_.resize(points_.size());
+  for_all_points([&](int, std::size_t p) { projections_[p] = Projection(points_[p].stress.tangent); });
+  has_projections_ = true;
+  return projections_;
+}
+
+template <int N>
+double TetLawElasticity<N>::evaluate(const Points& x, bool with_tangent) {
+  has_projections_ = has_changes_ = false;
+  for_all_points([&](int e, std::size_t p) {
+    Point& point = points_[p];
+    point.F = deformation(e, point.gradient, x);
+    law_->stress(e, point.F, with_tangent, point.stress);
   });
   double energy = 0.0;
   for (const Point& point : points_) energy += point.volume * point.stress.energy;
@@ -129,30 +221,36 @@ void TetLawElasticity<N>::add_gradient(Points& gradient) const {
     }
 }
 
-/// In the frame of a point's tangent M: K_ab(i, k) = V sum_jl g_a(j) M(ij, kl) g_b(l), turned by `left`.
+/// K_ab(i, k) = V sum_jl g_a(j) M(ij, kl) g_b(l) in the frame of M, turned by `left`.
 template <int N>
-void TetLawElasticity<N>::add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const {
-  for (int e = 0; e < body_->element_count(); ++e) {
-    const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
-    for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
-      const PointStress& s = point.stress;
-      const Matrix9 M = which == Stiffness::Exact ? s.tangent : positive_part(s.tangent);
-      const Nodes g = point.gradient * s.right;
-      const double factor = scale * point.volume;
-      for (int b = 0; b < N; ++b) {
-        // H = M g_b, 9 x 3: a change of node b's coordinate k
-        Eigen::Matrix<double, 9, 3> H;
-        for (int k = 0; k < 3; ++k) H.col(k) = M.col(k) * g(b, 0) + M.col(k + 3) * g(b, 1) + M.col(k + 6) * g(b, 2);
-        const Eigen::Matrix<double, 9, 3> turned = factor * H * s.left.transpose();
-        for (int a = 0; a < N; ++a) {
-          const Matrix3 block =
-              turned.middleRows<3>(0) * g(a, 0) + turned.middleRows<3>(3) * g(a, 1) + turned.middleRows<3>(6) * g(a, 2);
-          Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).noalias() += s.left * block;
-        }
-      }
+void TetLawElasticity<N>::add_point_stiffness(int e, const Point& point, const Matrix9& M, const Matrix3& left,
+                                              const Matrix3& right, double scale, BlockMatrix& matrix) const {
+  const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+  const Nodes g = point.gradient * right;
+  const double factor = scale * point.volume;
+  for (int b = 0; b < N; ++b) {
+    // H = M g_b, 9 x 3: a change of node b's coordinate k
+    Eigen::Matrix<double, 9, 3> H;
+    for (int k = 0; k < 3; ++k) H.col(k) = M.col(k) * g(b, 0) + M.col(k + 3) * g(b, 1) + M.col(k + 6) * g(b, 2);
+    const Eigen::Matrix<double, 9, 3> turned = factor * H * left.transpose();
+    for (int a = 0; a < N; ++a) {
+      const Matrix3 block =
+          turned.middleRows<3>(0) * g(a, 0) + turned.middleRows<3>(3) * g(a, 1) + turned.middleRows<3>(6) * g(a, 2);
+      Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).noalias() += left * block;
     }
   }
+}
+
+template <int N>
+void TetLawElasticity<N>::add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const {
+  if (which == Stiffness::Positive) projections();
+  for (int e = 0; e < body_->element_count(); ++e)
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      const PointStress& s = points_[p].stress;
+      add_point_stiffness(e, points_[p], which == Stiffness::Exact ? s.tangent : projections_[p].positive, s.left,
+                          s.right, scale, matrix);
+    }
 }
 
 template <int N>
@@ -217,7 +315,7 @@ double TetLawElasticity<N>::energy(const Points& z) const {
 
 template <int N>
 void TetLawElasticity<N>::linearise(const Points& lag) {
-  evaluate(lag, true);
+  is_possible_ = std::isfinite(evaluate(lag, true));
   lag_ = lag;
   for (int e = 0; e < body_->element_count(); ++e) {  // rotations, for who asks
     Matrix3 F = Matrix3::Zero();
@@ -233,14 +331,15 @@ void TetLawElasticity<N>::linearise(const Points& lag) {
 
 template <int N>
 void TetLawElasticity<N>::add_product(const Points& d, double scale, Points& product) const {
+  projections();
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
+      const std::size_t p = std::size_t(e * points + q);
+      const Point& point = points_[p];
       const PointStress& s = point.stress;
       const Matrix3 local = s.left.transpose() * deformation(e, point.gradient, d) * s.right;
-      Eigen::Matrix<double, 9, 1> turned =
-          positive_part(s.tangent) * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(local.data());
-      const Matrix3 dP = s.left * Eigen::Map<const Matrix3>(turned.data()) * s.right.transpose();
+      const Vector9 turned = projections_[p].positive * vec(local);
+      const Matrix3 dP = s.left * matrix_of(turned) * s.right.transpose();
       const Nodes force = scale * point.volume * point.gradient * dP.transpose();
       for (int a = 0; a < N; ++a) product.row(nodes_of(e)[a]) += force.row(a);
     }
@@ -248,21 +347,175 @@ void TetLawElasticity<N>::add_product(const Points& d, double scale, Points& pro
 
 template <int N>
 void TetLawElasticity<N>::add_force(const Points& z, Points& force) {
+  if (!is_possible_) {
+    force.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return;
+  }
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
       const Point& point = points_[std::size_t(e * points + q)];
-      const Nodes own = point.volume * point.gradient * point.stress.P.transpose();
-      for (int a = 0; a < N; ++a) force.row(nodes_of(e)[a]) -= own.row(a);
+      subtract(e, point, point.stress.P, force);
     }
   if (z == lag_) return;
   const Points d = z - lag_;
   add_product(d, -1.0, force);
 }
 
+/// With M's eigenvectors v (the first n of negative values), y = V^T H and D[v] the change of M along v, which is
+/// symmetric in all three directions,
+///   dM+[A] : H = D[H] A - sum over pairs with a negative one of c_ij y_j v_i (v_i . D[A] v_j),
+/// c what the projection leaves out; only D[H] and D[v_1], ..., D[v_n] are needed. The same for changes by q.
 template <int N>
-void TetLawElasticity<N>::add_lag_matrix(const Points&, double scale, BlockMatrix& matrix) {
-  add_stiffness(Stiffness::Exact, scale, matrix);
-  add_stiffness(Stiffness::Positive, -scale, matrix);
+auto TetLawElasticity<N>::change_of(int e, std::size_t p, const Points& z, bool by_parameters) const -> PointChange {
+  const Point& point = points_[p];
+  const PointStress& s = point.stress;
+  PointStress frame = s;
+  frame.tangent = projections_[p].positive;
+  PointChange change;
+  change.by_z = world_tangent(frame);
+  change.by_lag = world_tangent(s) - change.by_z;
+  const Matrix3 H = deformation(e, point.gradient, z) - point.F;
+  change.stress = s.P + matrix_of(change.by_z * vec(H));
+  const auto count = by_parameters ? field_->law()->table().cols() : 0;
+  change.by_parameters.resize(9, count);
+  std::vector<Matrix3> by_q(std::size_t(count), Matrix3::Zero());
+  const auto along = [&](const Matrix3& direction, auto&& column) {
+    law_->parameter_derivative_changes(e, point.F, direction, by_q);
+    for (Eigen::Index k = 0; k < count; ++k) column(k, Vector9(vec(by_q[std::size_t(k)])));
+  };
+  if (by_parameters) {
+    law_->parameter_derivatives(e, point.F, by_q);
+    for (Eigen::Index k = 0; k < count; ++k) change.by_parameters.col(k) = vec(by_q[std::size_t(k)]);
+  }
+  if (H.isZero(0.0)) return change;
+  change.by_lag += law_->tangent_derivative(e, point.F, H);
+  along(H, [&](Eigen::Index k, const Vector9& m) { change.by_parameters.col(k) += m; });
+  const Projection& projection = projections_[p];
+  const int negative = projection.negative_count();
+  if (negative == 0) return change;
+  Matrix9 V;
+  for (int i = 0; i < 9; ++i)
+    V.col(i) = vec(Matrix3(s.left * matrix_of(projection.vectors.col(i)) * s.right.transpose()));
+  const Vector9 y = V.transpose() * vec(H);
+  for (int n = 0; n < negative; ++n) {
+    // What changes of M between v_n and all v_i amount to: on v_n by the y_i, and on the others by y_n.
+    Vector9 of_own, of_others;
+    for (int i = 0; i < 9; ++i) {
+      const double c = projection.left_out(n, i);
+      of_own[i] = c * y[i];
+      of_others[i] = i < negative ? 0.0 : c * y[n];
+    }
+    const Vector9 own = V * of_own;
+    const Matrix9 others = V * of_others.asDiagonal() * V.transpose();
+    const Matrix3 direction = matrix_of(V.col(n));
+    const Matrix9 D = law_->tangent_derivative(e, point.F, direction);
+    change.by_lag -= V.col(n) * (D * own).transpose() + others * D;
+    along(direction,
+          [&](Eigen::Index k, const Vector9& m) { change.by_parameters.col(k) -= V.col(n) * m.dot(own) + others * m; });
+  }
+  return change;
+}
+
+template <int N>
+auto TetLawElasticity<N>::changes(const Points& z, bool by_parameters) -> const std::vector<PointChange>& {
+  if (has_changes_ && changes_z_ == z && (has_parameter_changes_ || !by_parameters)) return changes_;
+  projections();
+  changes_.resize(points_.size());
+  for_all_points([&](int e, std::size_t p) { changes_[p] = change_of(e, p, z, by_parameters); });
+  changes_z_ = z;
+  has_changes_ = true;
+  has_parameter_changes_ = by_parameters;
+  return changes_;
+}
+
+template <int N>
+void TetLawElasticity<N>::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
+  const std::vector<PointChange>& all = changes(z, false);
+  const Matrix3 world = Matrix3::Identity();
+  for (int e = 0; e < body_->element_count(); ++e)
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      add_point_stiffness(e, points_[p], all[p].by_lag, world, world, scale, matrix);
+    }
+}
+
+template <int N>
+void TetLawElasticity<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
+                                            const VectorX& d_theta, Points& force) {
+  if (field_) field_->set_change(d_theta);
+  const bool has_change = field_ && field_->has_change();
+  const std::vector<PointChange>& all = changes(z, has_change);
+  for (int e = 0; e < body_->element_count(); ++e)
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      const Point& point = points_[p];
+      Vector9 change = all[p].by_lag * vec(deformation(e, point.gradient, d_lag));
+      change += all[p].by_z * vec(deformation(e, point.gradient, d_z));
+      if (has_change) change += all[p].by_parameters * field_->change(e);
+      subtract(e, point, matrix_of(change), force);
+    }
+}
+
+template <int N>
+void TetLawElasticity<N>::add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
+                                            VectorX& theta_bar) {
+  const std::vector<PointChange>& all = changes(z, field_ != nullptr);
+  if (field_) field_->begin_adjoint();
+  for (int e = 0; e < body_->element_count(); ++e)
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      const Point& point = points_[p];
+      const Matrix3 W = deformation(e, point.gradient, w);
+      subtract(e, point, matrix_of(all[p].by_lag.transpose() * vec(W)), lag_bar);
+      subtract(e, point, matrix_of(all[p].by_z.transpose() * vec(W)), z_bar);
+      if (field_) field_->adjoint(e) -= point.volume * all[p].by_parameters.transpose() * vec(W);
+    }
+  if (field_) field_->end_adjoint(theta_bar);
+}
+
+/// With G = sum_b dX_b g_b^T: volumes change by tr(G), deformations by -F G and gradients by -G^T g.
+template <int N>
+void TetLawElasticity<N>::add_reference_tangent(const Points& d_reference, Points& force) {
+  const std::vector<PointChange>& all = changes(reference_z_, false);
+  for (int e = 0; e < body_->element_count(); ++e)
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      const Point& point = points_[p];
+      const Matrix3 G = deformation(e, point.gradient, d_reference);
+      const Matrix3 of_lag = point.F * G, of_z = deformation(e, point.gradient, reference_z_) * G;
+      const Matrix3 stress = G.trace() * all[p].stress - all[p].stress * G.transpose() -
+                             matrix_of(all[p].by_lag * vec(of_lag) + all[p].by_z * vec(of_z));
+      subtract(e, point, stress, force);
+    }
+}
+
+/// The transpose of the above.
+template <int N>
+void TetLawElasticity<N>::add_reference_adjoint(const Points& w, Points& reference_bar) {
+  const std::vector<PointChange>& all = changes(reference_z_, false);
+  for (int e = 0; e < body_->element_count(); ++e)
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      const Point& point = points_[p];
+      const Matrix3 W = deformation(e, point.gradient, w), F_z = deformation(e, point.gradient, reference_z_);
+      const Matrix3 G_bar = all[p].stress.cwiseProduct(W).sum() * Matrix3::Identity() - W.transpose() * all[p].stress -
+                            point.F.transpose() * matrix_of(all[p].by_lag.transpose() * vec(W)) -
+                            F_z.transpose() * matrix_of(all[p].by_z.transpose() * vec(W));
+      subtract(e, point, G_bar, reference_bar);
+    }
+}
+
+}  // namespace
+
+namespace {
+
+template <class... Arguments>
+std::unique_ptr<LawElasticity> make_for(const std::shared_ptr<const Body>& body, Arguments&&... arguments) {
+  if (body->kind == ElementKind::Tetrahedron)
+    return std::make_unique<TetLawElasticity<4>>(body, std::forward<Arguments>(arguments)...);
+  if (body->kind == ElementKind::QuadraticTetrahedron)
+    return std::make_unique<TetLawElasticity<10>>(body, std::forward<Arguments>(arguments)...);
+  throw std::invalid_argument("material laws are for tetrahedra");
 }
 
 }  // namespace
@@ -272,11 +525,11 @@ std::unique_ptr<LawElasticity> LawElasticity::make(std::shared_ptr<const Body> b
                                                    std::shared_ptr<const BlockPattern> pattern) {
   if (law->element_count() != body->element_count())
     throw std::invalid_argument("the material has another number of elements than the body");
-  if (body->kind == ElementKind::Tetrahedron)
-    return std::make_unique<TetLawElasticity<4>>(std::move(body), std::move(law), std::move(pattern));
-  if (body->kind == ElementKind::QuadraticTetrahedron)
-    return std::make_unique<TetLawElasticity<10>>(std::move(body), std::move(law), std::move(pattern));
-  throw std::invalid_argument("material laws are for tetrahedra");
+  return make_for(body, std::move(law), std::move(pattern));
+}
+
+std::unique_ptr<LawElasticity> LawElasticity::make(std::shared_ptr<const Body> body, const LawLayout& layout) {
+  return make_for(body, layout);
 }
 
 double mean_modulus(const Body& body, const MaterialLaw& law) {

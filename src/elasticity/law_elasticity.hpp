@@ -4,6 +4,7 @@
 #include <span>
 
 #include "elasticity/corotated.hpp"
+#include "elasticity/material_field.hpp"
 #include "elasticity/material_law.hpp"
 
 namespace pliant {
@@ -11,17 +12,24 @@ namespace pliant {
 /// The forces of a body of tetrahedra made of any material law, integrated at the elements' quadrature points (one of a
 /// linear element, four of a quadratic one):
 ///   f = -dW/dx,   W(x) = sum_q V_q W_e(F_q),   F_q = sum_a x_a g_a^T.
-/// As a force term it is made affine by its exact stiffness, or by that without its negative parts:
-///   f(z | p) = f(p) - K(p) (z - p),
-/// which is all that implicit steps and equilibria need. Where stiffness damping moves z away from p, it acts by K(p)
-/// without its negative parts, and Newton's matrix leaves out how that changes. Its parameters are the law's and not in
-/// theta.
+/// As a force term it is made affine by its stiffness without the negative eigenvalues of every point's tangent, K+:
+///   f(z | p) = f(p) - K+(p) (z - p),
+/// so that a step's symmetric matrix is positive. Fully implicit steps have z = p but for stiffness damping, which
+/// moves z on and so acts by K+(p). All derivatives are exact, the lag matrix with them: by p they hold the law's third
+/// derivative along z - p (`MaterialLaw::tangent_derivative`) and how the projection K+ turns with it (Daleckii and
+/// Krein's formula; where an eigenvalue is zero the projection has a kink, and the derivative is one of both sides').
+/// By where the nodes are free of load all of volumes, gradients and both deformations follow.
+/// A law out of a parameter vector (`MaterialField`) also has derivatives by that; one given as it is has none.
+/// Where the law knows no such deformation the force is not a number, so that steps back off.
 class LawElasticity : public Elasticity {
  public:
   /// @param pattern  of the matrices to come; null: the body's own. It may have more rows than the body has nodes.
   /// Throws std::invalid_argument for hexahedra, and for a law of another number of elements.
   static std::unique_ptr<LawElasticity> make(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
                                              std::shared_ptr<const BlockPattern> pattern = nullptr);
+  /// The law follows from the parameter vector by this layout; `law` is null before the first `set_parameters`.
+  /// Throws std::invalid_argument for hexahedra, and for a layout of another number of control moduli than the body's.
+  static std::unique_ptr<LawElasticity> make(std::shared_ptr<const Body> body, const LawLayout& layout);
 
   const MaterialLaw& law() const { return *law_; }
   /// A law of the same elements in its place.
@@ -46,12 +54,6 @@ class LawElasticity : public Elasticity {
   virtual void for_parameter_derivatives(const VisitDerivatives& visit) const = 0;
   /// Mean over each element's points of S - I, F = R S, there; elements x 6.
   virtual MatrixX strains() const = 0;
-
-  void set_reference(std::shared_ptr<const Body>) override;
-  void set_parameters(const VectorX&) override {}
-  void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
-                         Points& force) override;
-  void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
 
  protected:
   explicit LawElasticity(std::shared_ptr<const MaterialLaw> law) : law_(std::move(law)) {}

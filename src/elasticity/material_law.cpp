@@ -1,13 +1,58 @@
 #include "elasticity/material_law.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "elasticity/polar.hpp"
 
 namespace pliant {
+
+namespace {
+
+// Differences of fourth order: (8 (f(h) - f(-h)) - (f(2h) - f(-2h))) / 12 h. Their error is h^4 against 1e-16 / h.
+constexpr double difference_step = 2e-4;  // |dF| of a step
+constexpr std::array<std::pair<double, double>, 4> difference_rule = {
+    {{1.0, 8.0 / 12.0}, {-1.0, -8.0 / 12.0}, {2.0, -1.0 / 12.0}, {-2.0, 1.0 / 12.0}}};
+
+}  // namespace
+
+Matrix9 MaterialLaw::tangent_derivative(int element, const Matrix3& F, const Matrix3& dF) const {
+  Matrix9 change = Matrix9::Zero();
+  const double size = dF.norm();
+  if (size == 0.0) return change;
+  const double h = difference_step / size;
+  PointStress at;
+  for (const auto& [steps, weight] : difference_rule) {
+    stress(element, F + steps * h * dF, true, at);
+    if (!std::isfinite(at.energy)) return Matrix9::Constant(std::numeric_limits<double>::quiet_NaN());
+    change += weight / h * world_tangent(at);
+  }
+  return change;
+}
+
+void MaterialLaw::parameter_derivative_changes(int element, const Matrix3& F, const Matrix3& dF,
+                                               std::span<Matrix3> out) const {
+  for (Matrix3& change : out) change.setZero();
+  const double size = dF.norm();
+  if (size == 0.0) return;
+  const double h = difference_step / size;
+  std::vector<Matrix3> at(out.size());
+  for (const auto& [steps, weight] : difference_rule) {
+    parameter_derivatives(element, F + steps * h * dF, at);
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] += weight / h * at[k];
+  }
+}
+
+Matrix9 world_tangent(const PointStress& s) {
+  Matrix9 turn;  // vec(left A right^T) = turn vec(A)
+  for (int j = 0; j < 3; ++j)
+    for (int l = 0; l < 3; ++l) turn.block<3, 3>(3 * j, 3 * l) = s.right(j, l) * s.left;
+  return turn * s.tangent * turn.transpose();
+}
 
 void TabulatedLaw::set_table(MatrixX table) {
   if (!table.allFinite()) throw std::invalid_argument("a material's parameters must be finite");

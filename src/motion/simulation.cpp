@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "base/error.hpp"
 #include "elasticity/corotated.hpp"
@@ -59,15 +60,28 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   return terms;
 }
 
+/// With the integrator that the material needs.
+SimulationOptions completed(SimulationOptions options) {
+  if (!options.law && !options.law_layout) return options;
+  if (options.law && options.law_layout)
+    throw std::invalid_argument("a material is given as it is or by the parameter vector, not both");
+  if (options.scan_sags)
+    throw InputError({{},
+                      "an object of a material law that was scanned as it sags",
+                      "its load-free shape, which is found for linear materials alone",
+                      "give the load-free shape, or a linear material"});
+  options.integrator = Integrator::Newton;
+  return options;
+}
+
 }  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(std::move(body)),
-      options_(std::move(options)),
+      options_(completed(std::move(options))),
       stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_), options_.blocks,
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
-                options_.rotation_prediction, options_.solver, options_.law ? Integrator::Newton : options_.integrator,
-                options_.newton}),
+                options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
       rest_(body_->scanned_positions()) {
   if (holds_strongly(*body_, options_)) {
     stepper_.hold(eliminated_nodes(*body_, options_));
@@ -417,6 +431,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
 
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body,
                                              const SimulationOptions& options) {
+  if (options.law_layout) return LawElasticity::make(body, *options.law_layout);
   if (options.law) return LawElasticity::make(body, options.law);
   return make_elasticity(body, options.blocks);
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
+#include "elasticity/law_layout.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
 #include "motion/plane_contact.hpp"
@@ -14,8 +15,6 @@
 #include "motion/stepper.hpp"
 
 namespace pliant {
-
-class MaterialLaw;
 
 /// A scene in motion: what is fixed about it while parameters vary.
 struct SimulationOptions {
@@ -38,9 +37,11 @@ struct SimulationOptions {
   std::vector<Hold> holds;  ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
-  /// The elements' material in the place of theta's moduli and Poisson's ratio: no derivatives then, steps are fully
-  /// implicit. Tetrahedra only.
+  /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
+  /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then. Not together
+  /// with a scan that sags.
   std::shared_ptr<const MaterialLaw> law;
+  std::optional<LawLayout> law_layout;  ///< with handles of the parameter vectors (`LawLayout::of_motion`)
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
                                ///< tetrahedra, which follow the shape
   std::size_t memory_budget = std::size_t(256) << 20;  ///< [bytes] for states kept for the adjoint
@@ -56,6 +57,8 @@ struct RolloutSummary {
 /// copies are cheap to make with the same body.
 class Simulation {
  public:
+  /// Throws std::invalid_argument where options contradict each other or the body, InputError for a law together with
+  /// a scan that sags.
   Simulation(std::shared_ptr<const Body> body, SimulationOptions options);
 
   const Body& body() const { return *body_; }

@@ -32,16 +32,18 @@ struct LawCase {
 };
 
 std::vector<LawCase> laws() {
-  MatrixX linear(1, 2), foam(1, 6), rubber(1, 3), cork(1, 3);
+  MatrixX linear(1, 2), foam(1, 6), rubber(1, 3), cork(1, 3), gel(1, 2);
   const LambdaAlpha p = lambda_alpha({3000.0, 0.3});
   linear << p.lambda, p.alpha;
   foam << 800.0, 9.0, 0.2, 500.0, -6.0, 0.1;
   rubber << 1e5, 2.0, 0.49;
   cork << 1e5, -1.5, 0.0;
+  gel << 1200.0, 2000.0;
   return {{"Linear", std::make_shared<LinearLaw>(linear)},
           {"Ogden", std::make_shared<OgdenLaw>(foam)},
           {"NearlyIncompressible", std::make_shared<OgdenLaw>(rubber)},
           {"WithoutPoissonsEffect", std::make_shared<OgdenLaw>(cork)},
+          {"NeoHookean", std::make_shared<NeoHookeanLaw>(gel)},
           {"Sampled", sampled(3)}};
 }
 
@@ -102,12 +104,45 @@ TEST_P(Law, ParametersMoveTheStressAsTheirDerivativesSay) {
       PointStress s;
       if (table->name() == "linear")
         LinearLaw(changed).stress(0, F, false, s);
+      else if (table->name() == "neo_hookean")
+        NeoHookeanLaw(changed).stress(0, F, false, s);
       else
         OgdenLaw(changed).stress(0, F, false, s);
       return vec(s.P);
     };
     const double scale = 0.01 * std::max(1e-2, std::abs(table->table()(0, Eigen::Index(k))));
     EXPECT_LT(test::best_relative_error(along, vec(derivatives[k]), scale), tolerance(1e-7)) << k;
+  }
+}
+
+TEST_P(Law, TangentDerivativeIsThatOfTheTangent) {
+  const Matrix3 F = generic(0.3), dF = generic(0.9);
+  const Matrix9 change = GetParam().law->tangent_derivative(0, F, dF);
+  ASSERT_GT(change.norm(), 0.0);
+  EXPECT_LT((change - change.transpose()).norm(), tolerance(1e-9) * change.norm());
+  const auto along = [&](double h) -> VectorX { return world_tangent(at(F + h * dF, true)).reshaped(); };
+  EXPECT_LT(test::best_relative_error(along, change.reshaped(), 0.1), tolerance(1e-7));
+  EXPECT_TRUE(GetParam().law->tangent_derivative(0, F, Matrix3::Zero()).isZero(0.0));
+  // The same along three directions in any order: it is the energy's third derivative.
+  const Matrix3 A = generic(-0.4), B = generic(0.6);
+  const double one = vec(A).dot(change * vec(B));
+  const double other = vec(dF).dot(GetParam().law->tangent_derivative(0, F, A) * vec(B));
+  EXPECT_NEAR(one, other, tolerance(1e-7) * change.norm() * A.norm() * B.norm());
+}
+
+TEST_P(Law, ParameterDerivativesChangeAsTheirDerivativesSay) {
+  const MaterialLaw& law = *GetParam().law;
+  const std::size_t count = law.parameter_names().size();
+  if (count == 0) GTEST_SKIP() << "nothing of it is estimated";
+  const Matrix3 F = generic(0.3), dF = generic(0.9);
+  std::vector<Matrix3> changes(count), there(count);
+  law.parameter_derivative_changes(0, F, dF, changes);
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto along = [&](double h) {
+      law.parameter_derivatives(0, F + h * dF, there);
+      return vec(there[k]);
+    };
+    EXPECT_LT(test::best_relative_error(along, vec(changes[k]), 0.1), tolerance(1e-7)) << k;
   }
 }
 
@@ -174,6 +209,34 @@ TEST(OgdenLaw, HasNoElementsInsideOut) {
   PointStress s;
   laws()[1].law->stress(0, Vector3(1.0, 1.0, -0.5).asDiagonal(), true, s);
   EXPECT_EQ(s.energy, std::numeric_limits<double>::infinity());
+}
+
+TEST(NeoHookeanLaw, HasTheStressOfASimpleShearByHand) {
+  // F = I + g e_x e_y^T keeps volumes: P = mu (F - F^-T), so P_xy = mu g, P_yx = mu g and no other is left.
+  MatrixX q(1, 2);
+  q << 1000.0, 3000.0;
+  const NeoHookeanLaw law(q);
+  Matrix3 F = Matrix3::Identity();
+  F(0, 1) = 0.4;
+  PointStress s;
+  law.stress(0, F, false, s);
+  Matrix3 expected = Matrix3::Zero();
+  expected(0, 1) = expected(1, 0) = 400.0;
+  EXPECT_LT((s.P - expected).norm(), tolerance(1e-10));
+  EXPECT_NEAR(s.energy, 0.5 * 1000.0 * 0.16, tolerance(1e-10));
+}
+
+TEST(NeoHookeanLaw, RefusesWhatIsNotAMaterialAndElementsInsideOut) {
+  MatrixX q(1, 2);
+  q << -1.0, 2.0;
+  EXPECT_THROW(NeoHookeanLaw{q}, std::invalid_argument);
+  q << 3.0, -2.0;
+  EXPECT_THROW(NeoHookeanLaw{q}, std::invalid_argument);
+  q << 3.0, -1.9;
+  PointStress s;
+  NeoHookeanLaw(q).stress(0, Vector3(1.0, 1.0, -0.5).asDiagonal(), true, s);
+  EXPECT_EQ(s.energy, std::numeric_limits<double>::infinity());
+  EXPECT_THROW(NeoHookeanLaw(MatrixX::Ones(1, 3)), std::invalid_argument);
 }
 
 TEST(LambdaAlpha, AndModuliAreTheSame) {
