@@ -135,8 +135,7 @@ std::vector<std::unique_ptr<Trial>> indentation_trials(const std::shared_ptr<con
   const auto material = std::make_shared<PressedMaterial>(body, layout);
   std::vector<std::unique_ptr<Trial>> trials;
   for (const Indentation& indentation : indentations)
-    trials.push_back(
-        std::make_unique<IndentationTrial>(indentation, held, material, reference, int(trials.size())));
+    trials.push_back(std::make_unique<IndentationTrial>(indentation, held, material, reference, int(trials.size())));
   return trials;
 }
 

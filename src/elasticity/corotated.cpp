@@ -258,8 +258,9 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
 }  // namespace
 
 std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks) {
-  return with_node_count(
-      *body, [&]<int N>() -> std::unique_ptr<Elasticity> { return std::make_unique<CorotatedElasticity<N>>(body, blocks); });
+  return with_node_count(*body, [&]<int N>() -> std::unique_ptr<Elasticity> {
+    return std::make_unique<CorotatedElasticity<N>>(body, blocks);
+  });
 }
 
 }  // namespace pliant

@@ -67,7 +67,10 @@ class TetReferenceForces : public ReferenceForces {
 
 template <int N>
 TetReferenceForces<N>::TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material)
-    : body_(std::move(body)), poissons_ratio_(material.poissons_ratio), modulus_(body_, material), blocks_(element_blocks(*body_)) {
+    : body_(std::move(body)),
+      poissons_ratio_(material.poissons_ratio),
+      modulus_(body_, material),
+      blocks_(element_blocks(*body_)) {
   // Mid nodes move on their own: curved elements need the rule that integrates their gradients exactly.
   const auto rule = tet_quadrature(N == 4 ? 0 : 5);
   for (int q = 0; q < points; ++q) {

@@ -9,8 +9,8 @@ namespace pliant {
 
 /// How one instant of what was simulated fits what was measured: a frame of a motion, a press, a load, a curve.
 struct FrameFit {
-  int recording = 0;  ///< which trial of an objective it belongs to, as that counts
-  int frame = 0;      ///< of the trial
+  int recording = 0;            ///< which trial of an objective it belongs to, as that counts
+  int frame = 0;                ///< of the trial
   int points = 0, matched = 0;  ///< of the surface
   int tracks = 0;               ///< followed points
   double independent = 0.0;     ///< observations behind the cost

@@ -53,9 +53,9 @@ void FitRun::emit(FitEvent event) {
   outcome.history.push_back(std::move(event));
 }
 
-OptimiserSummary FitRun::optimise(Objective& objective, const OptimiserState& from, StageKind kind, const std::string& stage, int start,
-                                  int iterations, int& counter, double done_from, double done_to,
-                                  const std::function<void(const OptimiserState&)>& on_state) {
+OptimiserSummary FitRun::optimise(Objective& objective, const OptimiserState& from, StageKind kind,
+                                  const std::string& stage, int start, int iterations, int& counter, double done_from,
+                                  double done_to, const std::function<void(const OptimiserState&)>& on_state) {
   OptimiserOptions o;
   o.kind = options.optimiser;
   o.max_iterations = iterations;

@@ -37,8 +37,8 @@ struct FitRun {
 
   /// One minimisation, told as iterations from `counter` on, which it moves on; from any thread.
   /// @param on_state  after each iteration; may be empty
-  OptimiserSummary optimise(Objective& objective, const OptimiserState& from, StageKind kind, const std::string& stage, int start,
-                            int iterations, int& counter, double done_from, double done_to,
+  OptimiserSummary optimise(Objective& objective, const OptimiserState& from, StageKind kind, const std::string& stage,
+                            int start, int iterations, int& counter, double done_from, double done_to,
                             const std::function<void(const OptimiserState&)>& on_state = {});
 
   /// On finer grids, after the first estimate.

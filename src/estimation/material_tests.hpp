@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "estimation/optimiser.hpp"
 #include "estimation/objective.hpp"
+#include "estimation/optimiser.hpp"
 #include "estimation/press_law.hpp"
 
 namespace pliant {
@@ -74,8 +74,8 @@ std::shared_ptr<const Body> unit_element();
 ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
                               bool positive_exponents = false);
 
-/// A stress-strain curve of a material: half the squares of simulated less measured stress over `noise` times the curve's
-/// greatest stress, so that curves count by their points, not by their units. The law is that of one element.
+/// A stress-strain curve of a material: half the squares of simulated less measured stress over `noise` times the
+/// curve's greatest stress, so that curves count by their points, not by their units. The law is that of one element.
 class CurveTrial : public Trial {
  public:
   /// @param number  what the evaluation's frame calls it

@@ -29,7 +29,7 @@ struct ObjectiveOptions {
 struct Mismatch {
   std::shared_ptr<const SurfaceConstraints> surface;
   std::shared_ptr<const PointTracks> tracks;
-  Vector3 centre = Vector3::Zero();  ///< about which sensors are corrected
+  Vector3 centre = Vector3::Zero();        ///< about which sensors are corrected
   std::vector<SensorBlocks> sensors = {};  ///< their corrections in the parameter vector; may be fewer than there are
 };
 
@@ -42,9 +42,9 @@ struct ObservedMotion {
   ObjectiveOptions options;
 };
 
-/// A motion, or an equilibrium, compared with points on its surface and points of the object that were followed: the sum
-/// over frames and points of a robust loss of the pulled-back distance, or of the distance from where a followed point
-/// was seen, over its noise. The comparison of a frame is evaluated beside the simulation of the next.
+/// A motion, or an equilibrium, compared with points on its surface and points of the object that were followed: the
+/// sum over frames and points of a robust loss of the pulled-back distance, or of the distance from where a followed
+/// point was seen, over its noise. The comparison of a frame is evaluated beside the simulation of the next.
 class MotionTrial : public Trial {
  public:
   /// @param number  what its frames call it (`FrameFit::recording`)

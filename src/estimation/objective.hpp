@@ -7,9 +7,9 @@
 
 namespace pliant {
 
-/// Maps parameters to the cost of trials of any kind: the sum of what they say, plus the priors. All trials read the same
-/// parameter vector, each by the handles of its own blocks. One instance for one thread; trials are simulated side by
-/// side, and their frames stand in the evaluation in the trials' order.
+/// Maps parameters to the cost of trials of any kind: the sum of what they say, plus the priors. All trials read the
+/// same parameter vector, each by the handles of its own blocks. One instance for one thread; trials are simulated side
+/// by side, and their frames stand in the evaluation in the trials' order.
 class Objective : public CostFunction {
  public:
   /// Throws std::invalid_argument where a trial is missing.

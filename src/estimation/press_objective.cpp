@@ -30,7 +30,8 @@ std::vector<std::unique_ptr<Trial>> as_trials(std::vector<std::unique_ptr<PressT
 
 PressObjective::PressObjective(std::shared_ptr<const PressScene> scene, const std::vector<int>& presses,
                                const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options)
-    : material_(std::make_shared<PressedMaterial>(scene->body, layout)), objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {
+    : material_(std::make_shared<PressedMaterial>(scene->body, layout)),
+      objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {
   auto trials = trials_of(scene, presses, material_, parameters.reference(), options);
   trials_ = pointers(trials);
   objective_ = Objective(as_trials(std::move(trials)), std::move(parameters));

@@ -6,8 +6,8 @@
 
 #include "capture/capture.hpp"
 #include "capture/markers.hpp"
-#include "parameters/parameter_set.hpp"
 #include "motion/equilibrium.hpp"
+#include "parameters/parameter_set.hpp"
 
 namespace pliant {
 

@@ -38,8 +38,9 @@ struct PressTrialOptions {
 };
 
 /// One press with known force: over points' coordinates, half the square of where the equilibrium has them less where
-/// they were seen, over the noise, robust beyond `outlier_scale`. Derivatives are those of the equilibrium, by its exact
-/// Hessian: a back-substitution a parameter, or one for all by the adjoint. Each run sets out from the last equilibrium.
+/// they were seen, over the noise, robust beyond `outlier_scale`. Derivatives are those of the equilibrium, by its
+/// exact Hessian: a back-substitution a parameter, or one for all by the adjoint. Each run sets out from the last
+/// equilibrium.
 class PressTrial : public Trial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is

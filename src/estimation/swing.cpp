@@ -103,7 +103,8 @@ std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters
                                              : 0.1;
     simulation.options().blocks.scale_moduli(parameters, ratio);
     if (simulated && !fails && std::abs(std::log(ratio)) < std::log(near_enough))
-      return SwingStart{parameters[simulation.options().blocks.youngs_moduli.front()], *observed / (2.0 * std::numbers::pi)};
+      return SwingStart{parameters[simulation.options().blocks.youngs_moduli.front()],
+                        *observed / (2.0 * std::numbers::pi)};
   }
   return std::nullopt;
 }

@@ -4,9 +4,9 @@
 
 namespace pliant {
 
-/// Something that is simulated and compared with what was measured of it: a motion seen by sensors, a body at rest under
-/// a load, a press with known force, a stress-strain curve. It reads its parameters from the vector that all trials of
-/// an objective share, by handles of its own. One instance for one thread.
+/// Something that is simulated and compared with what was measured of it: a motion seen by sensors, a body at rest
+/// under a load, a press with known force, a stress-strain curve. It reads its parameters from the vector that all
+/// trials of an objective share, by handles of its own. One instance for one thread.
 class Trial {
  public:
   virtual ~Trial() = default;

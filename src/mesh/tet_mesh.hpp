@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
+#include "geometry/triangle_mesh.hpp"
 #include "mesh/surface_point.hpp"
 #include "mesh/tet_shape.hpp"
-#include "geometry/triangle_mesh.hpp"
 
 namespace pliant {
 

@@ -13,8 +13,8 @@ struct PressSessionOptions {
   EquilibriumOptions equilibrium = {.tolerance = 1e-6, .reuse_factor = true};
 };
 
-/// An object and a probe, led interactively: each call goes on from the last equilibrium with the factorisation at hand,
-/// so that small moves take two or three cheap iterations. For one thread.
+/// An object and a probe, led interactively: each call goes on from the last equilibrium with the factorisation at
+/// hand, so that small moves take two or three cheap iterations. For one thread.
 class PressSession {
  public:
   /// Throws InputError where the probe touches nothing.

@@ -30,9 +30,9 @@ Vector3 probe_axis(const Body& body, const ProbeOptions& probe);
 /// Throws InputError where the probe is glued and covers nothing of the object, std::invalid_argument for hexahedra.
 RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double youngs_modulus);
 
-/// Stiffness [Pa/m] of a disc's glue on elements of some edge [m]. Faces that a disc covers in part would follow it as a
-/// whole were it much stiffer, as if it were wider by about half an edge, or held what is held; softer by much, the disc
-/// would sink in. At ten times the stiffness of a layer of elements both are small.
+/// Stiffness [Pa/m] of a disc's glue on elements of some edge [m]. Faces that a disc covers in part would follow it as
+/// a whole were it much stiffer, as if it were wider by about half an edge, or held what is held; softer by much, the
+/// disc would sink in. At ten times the stiffness of a layer of elements both are small.
 double glued_stiffness(double youngs_modulus, double edge);
 
 /// Mean edge of a body's tetrahedra [m], as if they were regular.

@@ -36,7 +36,8 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   terms.push_back(std::make_unique<Gravity>(*body, options.blocks));
   for (const PlaneBlock& plane : options.blocks.planes)
     terms.push_back(std::make_unique<PlaneContact>(body, plane, options.contact));
-  if (!options.weights.empty()) terms.push_back(std::make_unique<HungWeights>(*body, options.weights, options.blocks.gravity));
+  if (!options.weights.empty())
+    terms.push_back(std::make_unique<HungWeights>(*body, options.weights, options.blocks.gravity));
   if (!options.released_weights.empty()) {
     auto weights = std::make_unique<HungWeights>(*body, options.released_weights, options.blocks.gravity);
     let_go = weights.get();

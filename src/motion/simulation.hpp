@@ -36,7 +36,7 @@ struct SimulationOptions {
   ShapeField shape;         ///< how the scan may err: one point a block of scan corrections. Tetrahedra only
   std::vector<Hold> holds;  ///< held regions
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
-  bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
+  bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
   /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then. Not together
   /// with a scan that sags.

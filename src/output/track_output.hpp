@@ -26,6 +26,7 @@ std::string to_json(const Track& track, const Capture& capture);
 /// @param progress       may be empty
 void write_track(const std::filesystem::path& folder, const Capture& capture,
                  const std::vector<ObservedFrame>& observed, const Track& track, const MotionBlocks& blocks,
-                 const VectorX& theta, bool with_pictures = true, const std::function<void(const char*, int, int)>& progress = {});
+                 const VectorX& theta, bool with_pictures = true,
+                 const std::function<void(const char*, int, int)>& progress = {});
 
 }  // namespace pliant

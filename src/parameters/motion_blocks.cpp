@@ -29,9 +29,8 @@ std::vector<ParameterHandle> MotionBlocks::all() const {
 MotionBlocks MotionBlocks::moved(const std::function<ParameterHandle(const ParameterHandle&)>& there) const {
   MotionBlocks other = *this;
   for (ParameterHandle& modulus : other.youngs_moduli) modulus = there(modulus);
-  for (ParameterHandle* handle :
-       {&other.poissons_ratio, &other.mass_damping, &other.stiffness_damping, &other.density, &other.gravity,
-        &other.linear_velocity, &other.angular_velocity})
+  for (ParameterHandle* handle : {&other.poissons_ratio, &other.mass_damping, &other.stiffness_damping, &other.density,
+                                  &other.gravity, &other.linear_velocity, &other.angular_velocity})
     *handle = there(*handle);
   for (PlaneBlock& plane : other.planes) plane = {there(plane.point), there(plane.normal)};
   for (ParameterHandle& pull : other.pulls) pull = there(pull);

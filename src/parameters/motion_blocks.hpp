@@ -64,7 +64,9 @@ MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& coun
 /// The blocks of a motion in a layout of their own.
 class MotionLayout : public MotionBlocks {
  public:
-  explicit MotionLayout(const MotionCounts& counts = {}) { MotionBlocks::operator=(add_motion_blocks(layout_, counts)); }
+  explicit MotionLayout(const MotionCounts& counts = {}) {
+    MotionBlocks::operator=(add_motion_blocks(layout_, counts));
+  }
   const ParameterLayout& layout() const { return layout_; }
   int size() const { return layout_.size(); }
   VectorX zero() const { return VectorX::Zero(layout_.size()); }

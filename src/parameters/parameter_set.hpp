@@ -25,7 +25,7 @@ struct Parameter {
   Transform transform = Transform::Logarithm;
   ParameterHandle at;  ///< its numbers; a plane's point, followed by its normal
   double scale = 1.0;  ///< [unit] of an unconstrained step of one, for vectors and planes
-  double lower = 0.0;   ///< bounds of a scalar's value
+  double lower = 0.0;  ///< bounds of a scalar's value
   double upper = std::numeric_limits<double>::infinity();
   bool estimated = false;
   /// Normal prior in the unconstrained numbers, around `prior_mean`; infinite: none.

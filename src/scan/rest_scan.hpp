@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "scan/scan_views.hpp"
 #include "geometry/triangle_mesh.hpp"
+#include "scan/scan_views.hpp"
 
 namespace pliant {
 

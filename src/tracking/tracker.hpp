@@ -9,9 +9,9 @@
 
 #include "capture/capture.hpp"
 #include "capture/observe.hpp"
-#include "rays/ray_scene.hpp"
 #include "mismatch/point_tracks.hpp"
 #include "motion/simulation.hpp"
+#include "rays/ray_scene.hpp"
 #include "tracking/correspondence.hpp"
 #include "tracking/point_springs.hpp"
 #include "tracking/surface_samples.hpp"

@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "base/files.hpp"
-#include "input_errors.hpp"
 #include "geometry/meshes.hpp"
+#include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant {

@@ -5,9 +5,9 @@
 #include <fstream>
 #include <random>
 
+#include "base/base64.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "base/base64.hpp"
 
 namespace pliant {
 namespace {
