@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "base/parallel.hpp"
 
@@ -11,7 +12,11 @@ namespace pliant {
 class MotionTrial::Comparison {
  public:
   Comparison(ObservedMotion motion, int number)
-      : motion_(std::move(motion)), number_(number), simulation_(motion_.body, motion_.simulation) {}
+      : motion_(std::move(motion)), number_(number), simulation_(motion_.body, motion_.simulation) {
+    for (const ParameterHandle& block : motion_.simulation.blocks.all()) count_block(block);
+    for (const SensorBlocks& sensor : motion_.mismatch.sensors)
+      for (const ParameterHandle& block : sensor.all()) count_block(block);
+  }
 
   bool hold_shape(const VectorX& theta) { return simulation_.hold_shape(theta).empty(); }
 
@@ -46,7 +51,16 @@ class MotionTrial::Comparison {
   /// Cotangents of positions and of the sensors' corrections for the cost of a frame.
   void add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar, VectorX& theta_bar) const;
 
+  void count_block(const ParameterHandle& block) {
+    least_size_ = std::max(least_size_, Eigen::Index(block.first + block.size));
+  }
+  void require_all_blocks(const VectorX& theta) const {
+    if (theta.size() < least_size_)
+      throw std::invalid_argument("the parameter vector is not of the layout that the motion's blocks are of");
+  }
+
   ObservedMotion motion_;
+  Eigen::Index least_size_ = 0;  // of a parameter vector that has all blocks
   int number_;
   Simulation simulation_;
   Sensors sensors_;
@@ -180,6 +194,7 @@ bool MotionTrial::Comparison::depends_on(const Eigen::Ref<const VectorX>& direct
 }
 
 CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX& all_directions) {
+  require_all_blocks(theta);
   // Directions along which only other recordings change cost nothing.
   std::vector<Eigen::Index> columns;
   for (Eigen::Index c = 0; c < all_directions.cols(); ++c)
@@ -258,6 +273,7 @@ void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, cons
 }
 
 CostEvaluation MotionTrial::Comparison::gradient(const VectorX& theta, VectorX& theta_bar) {
+  require_all_blocks(theta);
   sensors_ = sensors_at(theta, MatrixX(theta.size(), 0));
   const auto& observations = *motion_.observations;
   CostEvaluation evaluation;

@@ -44,7 +44,6 @@ VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const st
 Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, const std::vector<int>& held,
            const MotionBlocks& blocks)
     : pull_blocks_(blocks.pulls), material_(blocks) {
-  if (points.at.size() != pull_blocks_.size()) throw std::invalid_argument("one parameter block a pull is expected");
   const VectorX volume = volume_of_nodes(*body);
   const double reach = width * points.size;
   const auto n = Eigen::Index(points.at.size());
@@ -60,6 +59,7 @@ Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, co
     }
   }
   const VectorX greatest = greatest_displacements(body, held, forces);
+  if (points.at.size() != pull_blocks_.size()) throw std::invalid_argument("one parameter block a pull is expected");
   strength_.resize(n, 3);
   for (Eigen::Index k = 0; k < n; ++k)
     for (int d = 0; d < 3; ++d) strength_(k, d) = points.size / greatest[3 * k + d];

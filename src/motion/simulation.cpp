@@ -23,6 +23,8 @@ PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) 
   std::vector<Vector3> all, there;
   for (Eigen::Index n = 0; n < body.nodes.rows(); ++n) all.push_back(body.scanned_positions().row(n).transpose());
   for (const int node : held) there.push_back(all[std::size_t(node)]);
+  // Where nothing is held the pull refuses; any nodes will do for that.
+  if (there.empty()) all.resize(std::min(all.size(), std::size_t(count)));
   return {there.empty() ? all : far_points(all, there, count), body.size()};
 }
 
