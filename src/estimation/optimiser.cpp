@@ -8,10 +8,10 @@
 #include <limits>
 #include <numeric>
 #include <vector>
-#ifdef PLIANT_WITH_NLOPT
-#include <nlopt.hpp>
 
 #include "base/dense.hpp"
+#ifdef PLIANT_WITH_NLOPT
+#include <nlopt.hpp>
 #endif
 
 namespace pliant {
