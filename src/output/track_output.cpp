@@ -15,6 +15,7 @@
 #include "report/gallery.hpp"
 #include "report/page_style.hpp"
 #include "report/plot.hpp"
+#include "simulation/trajectory.hpp"
 
 namespace pliant {
 

@@ -118,23 +118,22 @@ class Reader {
   }
 
   void read_force(TomlTable& table) {
-    const fs::path log = read_path(table, "log", session_.folder);
+    const auto log = read_path(table, "log", files_);
     ForceLogOptions options;
     options.scale = table.optional<double>("scale").value_or(1.0);
     if (options.scale == 0) context_.reject("force.scale", "a scale of 0", "newtons of one unit of the log");
     options.zero_until = table.optional<double>("zero_until");
     session_.force_window = read_number(table, "window", {.low = 0.0, .meaning = "seconds to take the mean over"}, 0.1);
     session_.greatest_gap = read_number(table, "greatest_gap", {.low = 0.0, .meaning = "seconds between samples"}, 0.5);
-    if (!log.empty()) gather("force.log", [&] { session_.log = read_force_log(log, options); });
-    if (table.has("times"))
-      if (const fs::path times = read_path(table, "times", session_.folder); !times.empty())
-        gather("force.times", [&] { times_ = read_photograph_times(times); });
+    if (log) gather("force.log", [&] { session_.log = read_force_log(*log, options); });
+    if (const auto times = read_optional_path(table, "times", files_))
+      gather("force.times", [&] { times_ = read_photograph_times(*times); });
   }
 
   void read_camera(TomlTable& block) {
     const std::string name = block.required<std::string>("name", "give the camera a name").value_or("");
-    const fs::path calibration = read_path(block, "calibration", session_.folder);
-    const fs::path extrinsics = block.has("extrinsics") ? read_path(block, "extrinsics", session_.folder) : calibration;
+    const auto calibration = read_path(block, "calibration", files_);
+    const auto extrinsics = block.has("extrinsics") ? read_path(block, "extrinsics", files_) : calibration;
     const double unit = read_number(block, "unit", positive("metres of one unit of T"), 1.0);
     const auto images = block.required<std::string>("images", "a pattern like \"left/%03d.png\"");
     const FramePattern pattern{images.value_or("")};
@@ -145,8 +144,8 @@ class Reader {
     if (!names_.insert(name).second)
       context_.complain(block.key_of("name"), "a second camera \"" + name + "\"", "different names");
     LensCamera camera;
-    if (!calibration.empty() && !extrinsics.empty())
-      gather(block.key(), [&] { camera = read_lens_camera(calibration, extrinsics, unit); });
+    if (calibration && extrinsics)
+      gather(block.key(), [&] { camera = read_lens_camera(*calibration, *extrinsics, unit); });
     camera.name = name;
     session_.cameras.push_back(camera);
     session_.images.push_back(pattern);
