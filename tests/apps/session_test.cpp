@@ -30,7 +30,7 @@ json read_json(const fs::path& path) { return json::parse(read_file(path)); }
 
 double value(const json& result, const char* name) { return result["parameters"][name]["value"]; }
 
-/// The parts of a result that the same seed must reproduce.
+/// The parts of a result that another run must reproduce.
 std::string without_times(json result) {
   result.erase("time");
   return result.dump(1);

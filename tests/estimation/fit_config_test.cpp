@@ -25,7 +25,6 @@ FitOptions changed() {
   o.solver = SolverKind::Cholmod;
   o.solver_tolerance = 1e-6;
   o.hold_strongly = true;
-  o.seed = 42;
   o.parameters["youngs_modulus"].start = VectorX::Constant(1, 5120.25);
   o.parameters["poisson_ratio"].estimated = false;
   o.parameters["density"].prior_std = 0.125;
@@ -48,13 +47,38 @@ TEST(FitConfig, RoundTripsEveryKey) {
   EXPECT_EQ(read.solver, SolverKind::Cholmod);
   EXPECT_EQ(read.solver_tolerance, 1e-6);
   EXPECT_TRUE(read.hold_strongly);
-  EXPECT_EQ(read.seed, 42u);
   ASSERT_TRUE(read.parameters.contains("gravity"));
   EXPECT_EQ(*read.parameters.at("gravity").start, *written.parameters.at("gravity").start);
   EXPECT_EQ(read.parameters.at("gravity").estimated, true);
   EXPECT_EQ(*read.parameters.at("youngs_modulus").start, VectorX::Constant(1, 5120.25));
   EXPECT_EQ(read.parameters.at("density").prior_std, 0.125);
   EXPECT_EQ(read.validate(), "");
+}
+
+TEST(FitConfig, ASeedThatSaysNothingIsReadAndAnotherRefused) {
+  FitOptions options;
+  set_fit_option(options, "seed=0");  // as older programs wrote it
+  EXPECT_THROW(set_fit_option(options, "seed=42"), InputError);
+}
+
+TEST(FitConfig, ChoicesThatAreNotUsedAreNamed) {
+  using testing::HasSubstr;
+  FitOptions options;
+  EXPECT_TRUE(unused_choices(options, true, false).empty());
+  EXPECT_TRUE(unused_choices(options, false, true).empty());
+  options.law_terms = 2;
+  options.steps = 2.0;
+  options.cells = 9.0;
+  options.marker_noise = 1e-4;
+  const auto motion = unused_choices(options, true, false), presses = unused_choices(options, false, true),
+             both = unused_choices(options, true, true);
+  ASSERT_EQ(motion.size(), 2u);
+  EXPECT_THAT(motion[0], HasSubstr("law_terms = 2 was not used"));
+  EXPECT_THAT(motion[1], HasSubstr("marker_noise"));
+  ASSERT_EQ(presses.size(), 1u);
+  EXPECT_THAT(presses[0], HasSubstr("steps = 2"));
+  ASSERT_EQ(both.size(), 1u);
+  EXPECT_THAT(both[0], HasSubstr("law_terms = 2"));
 }
 
 TEST(FitConfig, DefaultsRoundTripAndEveryKeyIsWritten) {

@@ -45,7 +45,7 @@ TEST(LoadFree, AScannedBarStoodHigherAndSagsBackIntoItsScan) {
   double highest = 0.0;
   for (const Vector3& v : found.surface.vertices) highest = std::max(highest, v.y());
   EXPECT_NEAR(highest, 0.02 + theory, 0.05 * theory);
-  EXPECT_NEAR(enclosed_volume(found.surface) / enclosed_volume(*scanned_bar().surface), 1.0, 0.02);
+  EXPECT_NEAR(enclosed_volume(found.surface) / enclosed_volume(*scanned_bar().scene.object.surface), 1.0, 0.02);
 }
 
 TEST(LoadFree, AMaterialThatCannotCarryTheBarIsNamed) {
