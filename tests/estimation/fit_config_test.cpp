@@ -62,7 +62,6 @@ TEST(FitConfig, ASeedThatSaysNothingIsReadAndAnotherRefused) {
 }
 
 TEST(FitConfig, ChoicesThatAreNotUsedAreNamed) {
-  using testing::HasSubstr;
   FitOptions options;
   EXPECT_TRUE(unused_choices(options, true, false).empty());
   EXPECT_TRUE(unused_choices(options, false, true).empty());
