@@ -380,6 +380,7 @@ auto TetLawElasticity<N>::change_of(int e, std::size_t p, const Points& z, bool 
   change.by_parameters.resize(9, count);
   std::vector<Matrix3> by_q(std::size_t(count), Matrix3::Zero());
   const auto along = [&](const Matrix3& direction, auto&& column) {
+    if (count == 0) return;
     law_->parameter_derivative_changes(e, point.F, direction, by_q);
     for (Eigen::Index k = 0; k < count; ++k) column(k, Vector9(vec(by_q[std::size_t(k)])));
   };

@@ -2,6 +2,8 @@
 #include "elasticity/force_term.hpp"
 
 #include "elasticity/corotated.hpp"
+#include "elasticity/law_elasticity.hpp"
+#include "elasticity/sampled_law.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
 #include "motion/plane_contact.hpp"
@@ -27,6 +29,7 @@ Handles of_pulls(const MotionBlocks& blocks) {
   all.insert(all.end(), blocks.youngs_moduli.begin(), blocks.youngs_moduli.end());
   return all;
 }
+Handles of_law(const test::SceneBlocks& blocks) { return blocks.law.all(); }
 Handles of_weight(const MotionBlocks& blocks) { return {blocks.density, blocks.gravity}; }
 Handles of_gravity(const MotionBlocks& blocks) { return {blocks.gravity}; }
 
@@ -39,19 +42,66 @@ std::shared_ptr<const Body> with_three_moduli(Body body) {
   return std::make_shared<Body>(std::move(body));
 }
 
+/// Stiffness that was sampled under a few strains, stiffer the greater they are.
+std::shared_ptr<const MaterialLaw> sampled(const Body& body) {
+  std::vector<MaterialSample> samples(4);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    samples[k].strains.resize(body.element_count(), 6);
+    for (int e = 0; e < body.element_count(); ++e) {
+      for (int i = 0; i < 6; ++i) samples[k].strains(e, i) = 0.1 * double(k) * std::sin(1.0 + e + 3.1 * i + 7.3 * k);
+      samples[k].p.push_back(lambda_alpha({3000.0 * (1.0 + 5.0 * samples[k].strains.row(e).norm()), 0.3}));
+    }
+  }
+  return sample_material(samples, {1e-6, 4}).law;
+}
+
+/// Every law, on linear and quadratic tetrahedra: of one modulus, of three, of three laws.
+void add_laws(std::vector<Family>& list) {
+  struct Form {
+    std::string name;
+    int moduli;
+    LawForm form;
+  };
+  const std::vector<Form> forms = {{"LinearLaw", 1, {1, 0}},
+                                   {"NeoHookeanLaw", 1, {1, 0, 1, false, TwoNumberLaw::NeoHookean}},
+                                   {"OgdenLaw", 1, {1, 1}},
+                                   {"OgdenLawOfTwoTerms", 1, {1, 2, 1, true}},
+                                   {"NeoHookeanLawOfThreeModuli", 3, {3, 0, 1, false, TwoNumberLaw::NeoHookean}},
+                                   {"OgdenLawOfThreeModuli", 3, {3, 2}}};
+  for (const bool quadratic : {false, true}) {
+    const std::string elements = quadratic ? "OfQuadraticTetrahedra" : "OfTetrahedra";
+    const auto box = [quadratic] { return test::tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, quadratic); };
+    for (const Form& form : forms) {
+      const auto body = [box, form] { return form.moduli == 1 ? box() : with_three_moduli(*box()); };
+      list.push_back({form.name + elements, body,
+                      [](auto of, const test::SceneBlocks& blocks) { return LawElasticity::make(of, blocks.law); },
+                      true, true, of_law, true, true, form.form});
+    }
+    list.push_back({"SampledLaw" + elements, box,
+                    [](auto of, const test::SceneBlocks&) { return LawElasticity::make(of, sampled(*of)); }, true, true,
+                    [](const auto&) { return Handles(); }, true, true});
+  }
+}
+
 std::vector<Family> families() {
-  const auto elastic = [](std::string name, std::function<std::shared_ptr<const Body>()> body) {
+  const auto elastic = [](std::string name, std::function<std::shared_ptr<const Body>()> body, bool is_of_tetrahedra) {
     return Family{std::move(name),
                   std::move(body),
                   [](auto of, const MotionBlocks& blocks) { return make_elasticity(of, blocks); },
                   true,
                   true,
-                  of_material};
+                  of_material,
+                  true,
+                  is_of_tetrahedra};
   };
   std::vector<Family> list;
-  for (const test::BodyKind& kind : test::body_kinds()) list.push_back(elastic("ElasticityOf" + kind.name, kind.make));
   for (const test::BodyKind& kind : test::body_kinds())
-    list.push_back(elastic("ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); }));
+    list.push_back(elastic("ElasticityOf" + kind.name, kind.make, kind.name.ends_with("Tetrahedra")));
+  for (const test::BodyKind& kind : test::body_kinds())
+    list.push_back(elastic(
+        "ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); },
+        kind.name.ends_with("Tetrahedra")));
+  add_laws(list);
   const auto box = [](bool quadratic) {
     return [quadratic] { return test::tet_body({0.24, 0.1, 0.24}, {3, 2, 3}, quadratic); };
   };

@@ -5,12 +5,17 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <initializer_list>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "elasticity/corotated.hpp"
 #include "elasticity/force_term.hpp"
+#include "elasticity/law_layout.hpp"
 #include "parameters/motion_blocks.hpp"
 #include "support/bodies.hpp"
 #include "support/dense.hpp"
@@ -22,12 +27,21 @@ namespace pliant::test {
 /// One battery for every force: a room's test instantiates it for its own.
 inline constexpr int pulls = 2;
 
+/// Blocks of the battery's parameter vector: those of a motion and, where a family has a law, the law's.
+struct SceneBlocks : MotionBlocks {
+  LawLayout law;
+};
+
 struct Family {
   std::string name;
   std::function<std::shared_ptr<const Body>()> body;
-  std::function<std::unique_ptr<ForceTerm>(std::shared_ptr<const Body>, const MotionBlocks&)> make;
+  std::function<std::unique_ptr<ForceTerm>(std::shared_ptr<const Body>, const SceneBlocks&)> make;
   bool depends_on_lag, depends_on_position;
-  std::function<std::vector<ParameterHandle>(const MotionBlocks&)> parameters;  ///< that it depends on
+  std::function<std::vector<ParameterHandle>(const SceneBlocks&)> parameters;  ///< that it depends on
+  /// Whether its lag matrix is exact wherever z is; else it is where z is the lag point, and zero there.
+  bool has_lag_matrix = false;
+  bool depends_on_reference = false;  ///< an `Elasticity` with derivatives by where the nodes are free of load
+  std::optional<LawForm> law = {};    ///< whose blocks the parameter vector has too
 };
 
 inline void PrintTo(const Family& family, std::ostream* out) { *out << family.name; }
@@ -35,9 +49,13 @@ inline void PrintTo(const Family& family, std::ostream* out) { *out << family.na
 struct ForceTerms : ::testing::TestWithParam<Family> {
   ForceTerms()
       : body(GetParam().body()),
-        layout({.moduli = body->modulus.controls, .planes = 2, .pulls = pulls}),
+        layout(add_blocks()),
         term(GetParam().make(body, layout)),
-        theta(layout.zero()) {
+        theta(VectorX::Zero(all.size())) {
+    // Of laws: terms that stiffen in tension and in compression.
+    for (const auto& [name, value] : std::initializer_list<std::pair<std::string, double>>{
+             {"exponent_1", 5.0}, {"exponent_2", -4.0}, {"stiffness_ratio_2", 0.6}, {"poisson_ratio_2", 0.2}})
+      if (all.contains(name)) theta[all.at(name)] = value;
     constexpr std::array moduli = {3000.0, 2000.0, 5000.0};
     for (std::size_t k = 0; k < layout.youngs_moduli.size(); ++k) theta[layout.youngs_moduli[k]] = moduli[k];
     theta[layout.poissons_ratio] = 0.35;
@@ -55,6 +73,14 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
     z = deformed(body->reference_positions(), 0.28, 1.93);
     d_lag = deformed(body->reference_positions(), 0.6, -0.7);
     d_z = deformed(body->reference_positions(), 0.9, 0.6);
+  }
+
+  SceneBlocks add_blocks() {
+    SceneBlocks blocks;
+    const MotionCounts counts{.moduli = body->modulus.controls, .planes = 2, .pulls = pulls};
+    static_cast<MotionBlocks&>(blocks) = add_motion_blocks(all, counts);
+    if (GetParam().law) blocks.law = LawLayout::of_motion(all, blocks, *GetParam().law);
+    return blocks;
   }
 
   Points force(const Points& at_lag, const Points& at_z, const VectorX& at_theta) {
@@ -81,7 +107,8 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
   }
 
   std::shared_ptr<const Body> body;
-  MotionLayout layout;
+  ParameterLayout all;
+  SceneBlocks layout;
   std::unique_ptr<ForceTerm> term;
   VectorX theta;
   Points lag, z, d_lag, d_z;
@@ -171,7 +198,7 @@ TEST_P(ForceTerms, LagMatrixIsMinusTheDerivativeByLagPoint) {
     return y;
   };
   // Contact gives its share where it is needed, with the lag point at z itself: there is none.
-  const bool is_elastic = GetParam().name.starts_with("ElasticityOf") || GetParam().name.starts_with("ThreeModuliOf");
+  const bool is_elastic = GetParam().has_lag_matrix;
   const Points& at_lag = is_elastic ? lag : z;
   const VectorX y = product(at_lag, z);
   term->linearise(at_lag);
@@ -179,6 +206,30 @@ TEST_P(ForceTerms, LagMatrixIsMinusTheDerivativeByLagPoint) {
   term->add_force_tangent(z, d_lag, none(), VectorX::Zero(theta.size()), df);
   EXPECT_EQ(df.norm() > 0.0, is_elastic);
   EXPECT_LE((y + 3.0 * flat(df)).norm(), tolerance(1e-11) * df.norm());
+}
+
+/// The force with the nodes free of load elsewhere, the lag point, z and theta the same; then both products.
+TEST_P(ForceTerms, DerivativesByTheReference) {
+  Points reference_bar = none(), by_reference = none();
+  const Points& X = body->reference_positions();
+  const Points d_X = deformed(X, 0.5, 0.4), w = deformed(X, -0.8, 2.9);
+  auto* elasticity = dynamic_cast<Elasticity*>(term.get());
+  if (elasticity && GetParam().depends_on_reference) elasticity->set_reference(body);
+  term->set_parameters(theta);
+  term->linearise(lag);
+  term->linearise_reference(z);
+  term->add_reference_tangent(d_X, by_reference);
+  term->add_reference_adjoint(w, reference_bar);
+  ASSERT_EQ(by_reference.norm() > 0.0, GetParam().depends_on_reference);
+  EXPECT_LE(std::abs(reference_bar.cwiseProduct(d_X).sum() - w.cwiseProduct(by_reference).sum()),
+            tolerance(1e-12) * w.norm() * by_reference.norm());
+  if (!GetParam().depends_on_reference) return;
+  const auto along = [&](double s) -> VectorX {
+    elasticity->set_reference(std::make_shared<Body>(with_reference(*body, X + s * d_X)));
+    return flat(force(lag, z, theta));
+  };
+  EXPECT_LT(best_relative_error(along, flat(by_reference), 0.1), tolerance(difference_error));
+  EXPECT_GT(best_relative_error(along, 1.001 * flat(by_reference), 0.1), 1e-4) << "a wrong derivative would pass";
 }
 
 }  // namespace pliant::test
