@@ -99,8 +99,7 @@ std::optional<Region> read_vertices(TomlTable& table, const NamedFiles& files) {
 }
 
 // Times of frames at a common rate, as far as rate and number make sense.
-void count_times(TomlTable& table, double rate, Timing& timing) {
-  const auto count = table.optional<int>("frame_count");
+void count_times(TomlTable& table, double rate, std::optional<int> count, Timing& timing) {
   if (!table.has("frame_count"))
     table.context().reject(table.key_of("frame_count"), "[timing] has no `frame_count`", "the number of frames",
                            "count the images");
@@ -115,9 +114,8 @@ void count_times(TomlTable& table, double rate, Timing& timing) {
   timing.frame_rate = rate > 0.0 ? rate : 0.0;
 }
 
-void read_timestamps(TomlTable& table, const fs::path& file, Timing& timing) {
+void read_timestamps(TomlTable& table, const fs::path& file, std::optional<int> count, Timing& timing) {
   read_file_of(table, "timestamps", file, [&](const fs::path& path) { timing.times = read_times(path); });
-  const auto count = table.optional<int>("frame_count");
   if (!count || timing.times.empty() || *count == timing.frame_count()) return;
   table.context().reject(table.key_of("frame_count"),
                          fmt::format("`frame_count` is {}, the timestamps are {}", *count, timing.times.size()),
@@ -194,7 +192,7 @@ Timing read_timing(TomlTable& table, const NamedFiles& files) {
   Timing timing;
   const auto rate = table.optional<double>("frame_rate");
   const auto stamps = read_optional_path(table, "timestamps", files);
-  table.optional<int>("frame_count");
+  const auto count = table.optional<int>("frame_count");
   timing.start_frame = table.optional<int>("start_frame").value_or(0);
   timing.is_static = table.optional<bool>("static").value_or(false);
   if (table.has("frame_rate") == table.has("timestamps"))
@@ -202,9 +200,9 @@ Timing read_timing(TomlTable& table, const NamedFiles& files) {
                            rate ? "both `frame_rate` and `timestamps`" : "neither `frame_rate` nor `timestamps`",
                            "one of the two", "write the one that the camera gives");
   else if (stamps)
-    read_timestamps(table, *stamps, timing);
+    read_timestamps(table, *stamps, count, timing);
   else if (rate)
-    count_times(table, *rate, timing);
+    count_times(table, *rate, count, timing);
   return timing;
 }
 

@@ -96,7 +96,7 @@ TEST(ReadCapture, LinksThatPointAtThemselvesAreTold) {
                                                               {"held.txt", circle},
                                                               {"front/000002.png", "no file for 1 of 4 frames: 2"},
                                                               {"front/mask_000000.png", "no file for 1 of 4 frames: 0"},
-                                                              {"front", "nor for any other frame"}}) {
+                                                              {"front", circle}}) {
     SmallCapture small;
     small.edit("noise = 0.002", "noise = 0.002\nbackground = \"front/background.png\"");
     small.append("\n[[markers]]\nrest = \"markers_rest.csv\"\ntrack = \"markers.csv\"\n");

@@ -78,6 +78,7 @@ TEST(Model, TakesTetrahedraMadeElsewhereAsOfOneMaterial) {
     text.replace(text.find(from), from.size(), to);
   }
   folder.write("model.toml", text);
+  folder.write("fixed_3.txt", "3\n1\n");
   folder.write("made.msh",
                "$NOD\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$ENDNOD\n$ELM\n1\n1 4 1 1 4 2 1 3 4\n$ENDELM\n");
   const Model read = load_model(folder / "model.toml");
