@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "motion/probe_contact.hpp"
+
 namespace pliant {
 
 namespace {
