@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "geometry/primitives.hpp"
+#include "meshing/mesh_distance.hpp"
 #include "motion/simulation.hpp"
 
 using namespace pliant;
@@ -12,19 +13,20 @@ int main() {  // a soft ball dropped on the floor: how high its middle is, frame
   const SignedDistance distance = signed_distance(ball, 0.002, 0.02);
   const auto body = std::make_shared<Body>(make_body(make_hex_grid(distance, bounding_box(ball), 0.0125)));
 
-  VectorX theta = VectorX::Zero(theta::size(1));  // all parameters of a scene with one plane
-  theta[theta::youngs_modulus] = 5000.0;          // [Pa]
-  theta[theta::poissons_ratio] = 0.3;
-  theta[theta::stiffness_damping] = 0.002;              // [s]
-  theta[theta::density] = 100.0;                        // [kg/m^3]
-  theta.segment<3>(theta::gravity) << 0.0, -9.81, 0.0;  // [m/s^2]
-  theta.segment<3>(theta::plane_normal(0)) << 0.0, 1.0, 0.0;
-
   SimulationOptions options;
-  options.planes = 1;
+  ParameterLayout layout;  // of all parameters of a scene with one plane
+  const MotionBlocks& at = options.blocks = add_motion_blocks(layout, {.planes = 1});
+  VectorX theta = VectorX::Zero(layout.size());
+  at.set_moduli(theta, 5000.0);  // [Pa]
+  theta[at.poissons_ratio] = 0.3;
+  theta[at.stiffness_damping] = 0.002;              // [s]
+  theta[at.density] = 100.0;                        // [kg/m^3]
+  theta.segment<3>(at.gravity) << 0.0, -9.81, 0.0;  // [m/s^2]
+  theta.segment<3>(at.planes[0].normal) << 0.0, 1.0, 0.0;
+
   for (int frame = 0; frame <= 30; ++frame) options.times.push_back(frame / 60.0);  // [s]
   options.max_dt = default_time_step(*body, 9.81);
-  options.contact = default_contact(*body, theta[theta::density] * body->volume(), 9.81);
+  options.contact = default_contact(*body, theta[at.density] * body->volume(), 9.81);
   Simulation(body, options).run(theta, [&](int frame, const State& state, auto) {
     std::printf("%.3f s  %.4f m\n", options.times[std::size_t(frame)], state.x.col(1).mean());
     return true;

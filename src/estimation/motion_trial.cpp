@@ -13,9 +13,14 @@ class MotionTrial::Comparison {
  public:
   Comparison(ObservedMotion motion, int number)
       : motion_(std::move(motion)), number_(number), simulation_(motion_.body, motion_.simulation) {
-    for (const ParameterHandle& block : motion_.simulation.blocks.all()) count_block(block);
-    for (const SensorBlocks& sensor : motion_.mismatch.sensors)
-      for (const ParameterHandle& block : sensor.all()) count_block(block);
+    const auto add = [this](const std::vector<ParameterHandle>& all) {
+      blocks_.insert(blocks_.end(), all.begin(), all.end());
+    };
+    add(motion_.simulation.blocks.all());
+    if (motion_.simulation.law_layout) add(motion_.simulation.law_layout->all());
+    for (const SensorBlocks& sensor : motion_.mismatch.sensors) add(sensor.all());
+    for (const ParameterHandle& block : blocks_)
+      least_size_ = std::max(least_size_, Eigen::Index(block.first + block.size));
   }
 
   bool hold_shape(const VectorX& theta) { return simulation_.hold_shape(theta).empty(); }
@@ -51,16 +56,14 @@ class MotionTrial::Comparison {
   /// Cotangents of positions and of the sensors' corrections for the cost of a frame.
   void add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar, VectorX& theta_bar) const;
 
-  void count_block(const ParameterHandle& block) {
-    least_size_ = std::max(least_size_, Eigen::Index(block.first + block.size));
-  }
   void require_all_blocks(const VectorX& theta) const {
     if (theta.size() < least_size_)
       throw std::invalid_argument("the parameter vector is not of the layout that the motion's blocks are of");
   }
 
   ObservedMotion motion_;
-  Eigen::Index least_size_ = 0;  // of a parameter vector that has all blocks
+  std::vector<ParameterHandle> blocks_;  // all that the comparison depends on
+  Eigen::Index least_size_ = 0;          // of a parameter vector that has them
   int number_;
   Simulation simulation_;
   Sensors sensors_;
@@ -188,9 +191,7 @@ bool MotionTrial::Comparison::depends_on(const Eigen::Ref<const VectorX>& direct
   const auto changes = [&](const ParameterHandle& block) {
     return !direction.segment(block.first, block.size).isZero(0.0);
   };
-  if (std::ranges::any_of(motion_.simulation.blocks.all(), changes)) return true;
-  return std::ranges::any_of(motion_.mismatch.sensors,
-                             [&](const SensorBlocks& s) { return std::ranges::any_of(s.all(), changes); });
+  return std::ranges::any_of(blocks_, changes);
 }
 
 CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX& all_directions) {

@@ -15,7 +15,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr int frames = 6, start = 2;
+constexpr int frames = 10, start = 2;
 
 // A bar along x that is held at its low end and bends under its weight.
 const std::string bar = R"toml(format = "scene/1"
@@ -33,7 +33,7 @@ stiffness_damping = 0.002
 gravity = [0.0, -9.81, 0.0]
 [timing]
 frame_rate = 60.0
-frame_count = 6
+frame_count = 10
 start_frame = 2
 [simulation]
 cell_size = 0.02

@@ -21,6 +21,7 @@ using test::tolerance;
 
 constexpr double length = 0.3, edge = 0.05, modulus = 1e5, noise = 5e-4;
 constexpr int frames = 12;
+constexpr OptimiserOptions converged{.step_tolerance = 1e-7, .cost_tolerance = 1e-10};
 
 /// How stiff the material is that a kind of measurement sees.
 struct Truths {
@@ -168,6 +169,7 @@ class SeenInEveryWay : public ::testing::Test {
     FitOptions options;
     options.parameters["poisson_ratio"] = {VectorX::Constant(1, 0.35), false, {}};
     for (const char* damping : {"mass_damping", "stiffness_damping"}) options.parameters[damping].estimated = false;
+    options.marker_noise = noise;
     const Recordings recordings({recorded(parts)}, options, notes);
     ParameterSet set = recordings.parameters();
     VectorX start = set.reference();
@@ -175,7 +177,7 @@ class SeenInEveryWay : public ::testing::Test {
     set.set_reference(start);
     Objective objective =
         recordings.objective(recordings.grid(10.0, 1.0), set, 0.2, [](const Recording& r) { return r.last_frame; });
-    const OptimiserSummary s = minimise(objective, set.to_unconstrained(start), {});
+    const OptimiserSummary s = minimise(objective, set.to_unconstrained(start), converged);
     EXPECT_TRUE(s.succeeded) << s.reason;
     return set.to_theta(s.p)[recordings.material().youngs_moduli.front()];
   }
@@ -212,7 +214,8 @@ TEST_F(SeenInEveryWay, EachKindOfMeasurementDrawsTheEstimateToItsOwnStiffness) {
     without.*parts[k] = false;
     const double all = estimate({}), others = estimate(without);
     EXPECT_NEAR(others / modulus, 1.0, tolerance(0.04)) << kinds[k].first;
-    EXPECT_GT(all, 1.005 * others) << kinds[k].first << " stiffer than the rest takes no part";
+    // The least share is that of one press beside two sagging motions; the optimiser comes within 1e-7.
+    EXPECT_GT(all, (1.0 + 1e-4) * others) << kinds[k].first << " stiffer than the rest takes no part";
   }
 }
 

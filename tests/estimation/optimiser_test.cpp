@@ -270,7 +270,7 @@ BoundedQuadratic long_valley(const VectorX& minimum) {
 OptimiserOptions precise(OptimiserKind kind) {
   OptimiserOptions options;
   options.kind = kind;
-  options.max_iterations = 120;
+  options.max_iterations = 200;
   options.step_tolerance = 1e-7, options.cost_tolerance = 1e-12;
   return options;
 }

@@ -40,7 +40,10 @@ TEST(LawLayouts, AllNumbersAreThoseOfTheirParameters) {
     const ParameterSet set = law_parameters(layout, 5000.0);
     std::size_t count = 0;
     for (int law = 0; law < form.laws; ++law)
-      for (const ParameterHandle& number : layout.numbers(law)) EXPECT_GE(set.coordinate(number), 0), ++count;
+      for (const ParameterHandle& number : layout.numbers(law)) {
+        EXPECT_GE(set.coordinate(number), 0);
+        ++count;
+      }
     EXPECT_EQ(count, std::size_t(layout.size()));
     EXPECT_EQ(set.dimension(), layout.size());
   }
