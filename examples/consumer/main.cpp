@@ -1,17 +1,16 @@
 #include <cstdio>
 #include <memory>
 
-#include "geometry/primitives.hpp"
-#include "meshing/mesh_distance.hpp"
 #include "motion/simulation.hpp"
 
 using namespace pliant;
 
 int main() {  // a soft ball dropped on the floor: how high its middle is, frame by frame
-  TriangleMesh ball = make_sphere(0.05, 4);                  // radius [m]
-  for (Vector3& vertex : ball.vertices) vertex.y() += 0.10;  // 50 mm above the floor
-  const SignedDistance distance = signed_distance(ball, 0.002, 0.02);
-  const auto body = std::make_shared<Body>(make_body(make_hex_grid(distance, bounding_box(ball), 0.0125)));
+  const Vector3 centre(0.0, 0.10, 0.0), radius(0.05, 0.05, 0.05), margin(0.02, 0.02, 0.02);  // [m]
+  const Box box{centre - radius, centre + radius};
+  const SignedDistance distance({box.min - margin, box.max + margin}, 0.002,
+                                [&](const Vector3& p) { return (p - centre).norm() - radius.x(); });
+  const auto body = std::make_shared<Body>(make_body(make_hex_grid(distance, box, 0.0125)));
 
   SimulationOptions options;
   ParameterLayout layout;  // of all parameters of a scene with one plane
