@@ -1,14 +1,7 @@
 # Run by CTest; see CMakeLists.txt.
 file(REMOVE_RECURSE ${WORK})
 
-function(must_run)
-  execute_process(COMMAND ${ARGV} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out)
-  if(NOT code EQUAL 0)
-    list(JOIN ARGV " " command)
-    message(FATAL_ERROR "${command}\nreturned ${code}:\n${out}")
-  endif()
-  set(output "${out}" PARENT_SCOPE)
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/must_run.cmake)
 
 must_run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/installed)
 must_run(${WORK}/installed/bin/pliant --version)
