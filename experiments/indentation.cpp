@@ -2,13 +2,13 @@
 
 #include <cmath>
 
-#include "motion/probe_contact.hpp"
+#include "motion/contact_defaults.hpp"
 
 namespace pliant {
 
 namespace {
 
-constexpr double contact_stiffness = 3.0;  // times that of a disc's glue
+constexpr double contact_stiffness = 3.0;  // times that of a disc's bond
 constexpr double smoothing = 0.01;         // of the ball's radius
 constexpr double reach = 2.5;              // radii from the touched point within which the ball may meet the surface
 
@@ -26,7 +26,8 @@ RigidContact ball_on(const Body& body, const Indentation& indentation, double mo
   edge /= double(near.rest.size());
   return RigidContact::sliding(
       body, near, rigid_ball(indentation.touch + indentation.radius * indentation.normal, indentation.radius),
-      contact_stiffness * glued_stiffness(modulus, edge), smoothing * indentation.radius);
+      Penalty{contact_stiffness * bond_stiffness(modulus, edge), smoothing * indentation.radius,
+              Penalty::Onset::Quadratic});
 }
 
 std::vector<RigidContact> one(RigidContact contact) {

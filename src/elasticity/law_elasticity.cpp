@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "base/parallel.hpp"
 #include "elasticity/tet_element.hpp"
@@ -65,6 +66,10 @@ class TetLawElasticity : public LawElasticity {
   void add_force(const Points& z, Points& force) override;
   void add_matrix(double scale, BlockMatrix& matrix) override { add_stiffness(Stiffness::Positive, scale, matrix); }
   void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
+  void add_tangent_stiffness(const Points&, double scale, BlockMatrix& matrix) override {
+    add_stiffness(Stiffness::Exact, scale, matrix);
+  }
+  std::optional<double> potential(const Points&) override { return energy_; }
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
@@ -80,6 +85,9 @@ class TetLawElasticity : public LawElasticity {
   void for_parameter_derivatives(const VisitDerivatives& visit) const override;
   Matrix3 cauchy_stress(int element) const override;
   MatrixX strains() const override;
+
+ protected:
+  void find_rotations() override;
 
  private:
   static constexpr int points = N == 4 ? 1 : 4;
@@ -128,7 +136,8 @@ class TetLawElasticity : public LawElasticity {
   std::vector<Point> points_;
   std::vector<int> blocks_;  // N x N an element
   Points lag_, reference_z_;
-  bool is_possible_ = true;  // whether the law knows the deformation of the lag point
+  double energy_ = 0.0;  // at the last `evaluate`; infinite where the law knows no such deformation
+  bool has_rotations_ = false;
   mutable std::vector<Projection> projections_;
   mutable bool has_projections_ = false;
   std::vector<PointChange> changes_;
@@ -143,10 +152,7 @@ TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::sha
   const int count = body_->element_count();
   points_.resize(std::size_t(count) * points);
   polar_.resize(std::size_t(count));
-  for (int e = 0; e < count; ++e)
-    for (int a = 0; a < N; ++a)
-      for (int b = 0; b < N; ++b)
-        blocks_.push_back((pattern ? *pattern : *body_->pattern).find(nodes_of(e)[a], nodes_of(e)[b]));
+  blocks_ = element_blocks(*body_, pattern ? *pattern : *body_->pattern);
   take_reference();
 }
 
@@ -208,7 +214,7 @@ double TetLawElasticity<N>::evaluate(const Points& x, bool with_tangent) {
   });
   double energy = 0.0;
   for (const Point& point : points_) energy += point.volume * point.stress.energy;
-  return std::isnan(energy) ? std::numeric_limits<double>::infinity() : energy;
+  return energy_ = std::isnan(energy) ? std::numeric_limits<double>::infinity() : energy;
 }
 
 template <int N>
@@ -315,9 +321,15 @@ double TetLawElasticity<N>::energy(const Points& z) const {
 
 template <int N>
 void TetLawElasticity<N>::linearise(const Points& lag) {
-  is_possible_ = std::isfinite(evaluate(lag, true));
+  evaluate(lag, true);
   lag_ = lag;
-  for (int e = 0; e < body_->element_count(); ++e) {  // rotations, for who asks
+  has_rotations_ = false;
+}
+
+template <int N>
+void TetLawElasticity<N>::find_rotations() {
+  if (std::exchange(has_rotations_, true)) return;
+  for (int e = 0; e < body_->element_count(); ++e) {
     Matrix3 F = Matrix3::Zero();
     double volume = 0.0;
     for (int q = 0; q < points; ++q) {
@@ -347,7 +359,7 @@ void TetLawElasticity<N>::add_product(const Points& d, double scale, Points& pro
 
 template <int N>
 void TetLawElasticity<N>::add_force(const Points& z, Points& force) {
-  if (!is_possible_) {
+  if (!std::isfinite(energy_)) {
     force.setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
   }

@@ -169,13 +169,14 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   const bool moves = !capture.scene.initial.known && !capture.scene.timing.is_static;
   p.push_back(vector(layout, m.linear_velocity, speed, m.linear_velocity.vector(theta) / speed, 3.0, moves));
   p.push_back(vector(layout, m.angular_velocity, 1.0 / time, m.angular_velocity.vector(theta) * time, 3.0, moves));
+  set_planes(capture.scene.planes, m, theta);
   for (std::size_t i = 0; i < m.planes.size(); ++i) {
-    theta.segment<3>(m.planes[i].point) = capture.scene.planes[i].point;
-    theta.segment<3>(m.planes[i].normal) = capture.scene.planes[i].normal;
     Parameter plane = vector(layout, m.planes[i].whole(), size, Vector3::Zero(), 0.2, !capture.scene.planes[i].known);
     plane.transform = Transform::PlanePosition;
     plane.origin = theta.segment<6>(m.planes[i].whole());
     p.push_back(std::move(plane));
+    p.push_back(
+        scalar(layout, m.planes[i].friction, Transform::Shift, 0.0, 5.0, capture.scene.planes[i].friction, 0.5, false));
   }
   for (std::size_t k = 0; k < m.pulls.size(); ++k) {
     if (k < capture.scene.initial.pulls.size()) theta.segment<3>(m.pulls[k]) = capture.scene.initial.pulls[k];

@@ -8,10 +8,11 @@
 #include "elasticity/body.hpp"
 #include "elasticity/law_layout.hpp"
 #include "motion/body_forces.hpp"
+#include "motion/contact_defaults.hpp"
 #include "motion/fixed_regions.hpp"
-#include "motion/plane_contact.hpp"
 #include "motion/pull.hpp"
 #include "motion/rest_shape.hpp"
+#include "motion/statics.hpp"
 #include "motion/stepper.hpp"
 
 namespace pliant {
@@ -25,7 +26,9 @@ struct SimulationOptions {
   SolverOptions solver;
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
-  ContactOptions contact;
+  Penalty contact;              ///< of the surface with every plane
+  double friction_speed = 0.0;  ///< below which friction fades to nothing [m/s]; 0: there is none, whatever its
+                                ///< coefficients
   /// Where the parameter vectors of the motion have what it depends on: obstacles are its planes, and where it has
   /// pulls the motion starts at rest in the equilibrium under them (see `Pull`).
   MotionBlocks blocks = MotionLayout();
@@ -93,7 +96,7 @@ class Simulation {
 
  private:
   struct StepPlan {
-    double dt;
+    double time, dt;  ///< of its start, and its length [s]
     int frame_after;  ///< frame reached by this step, -1: none
   };
   /// False where the object cannot be free of load anywhere: the summary says so.
@@ -120,6 +123,8 @@ class Simulation {
   /// The equilibrium of static scenes and of pulled objects: at once where Newton's method gets there from rest, else
   /// by steps of the load, gravity, pulls and the holds' displacement together, as large as it follows.
   bool find_equilibrium(const VectorX& theta, State& state, RolloutSummary& summary);
+  /// To the equilibrium under the parameters at hand, with the matrix of its derivatives. False where there is none.
+  [[nodiscard]] bool settle(Points& x, RolloutSummary& summary);
   /// Moves the held regions from one part of their way to another, and the whole body's positions along with them: each
   /// node as the regions move, by inverse square distance from them.
   void move_holds(double from, double to, Points& positions);
@@ -137,6 +142,7 @@ class Simulation {
   std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;
+  Statics statics_;                   // of the stepper's forces
   std::unique_ptr<RestShape> shape_;  // where theta says where the body is free of load
   bool shape_is_held_ = false;
   Points reference_bar_;     // likewise, of the reverse sweep
@@ -155,11 +161,6 @@ std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const
 
 /// Nodes that a simulation of the scene eliminates; the others in held regions are held by forces.
 std::vector<int> eliminated_nodes(const Body& body, const SimulationOptions& options);
-
-/// Stiffness and smoothing of contact that suit an object of this size and weight: its weight on its projected area
-/// presses it in by 1e-4 of its size, and contact sets in over 1e-3 of it: the smallest that steps of the default
-/// length resolve. Softer contact lets the object hover and rebound more than a rigid floor does.
-ContactOptions default_contact(const Body& body, double mass, double gravity);
 
 /// The longest step that suits an object of this size falling under this gravity.
 double default_time_step(const Body& body, double gravity);

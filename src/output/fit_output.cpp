@@ -111,6 +111,7 @@ std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks,
   for (std::size_t i = 0; i < planes.size(); ++i) {
     planes[i].point = blocks.planes[i].point.vector(theta);
     planes[i].normal = blocks.planes[i].normal.vector(theta);
+    planes[i].friction = theta[blocks.planes[i].friction];
   }
   return planes;
 }

@@ -9,7 +9,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "elasticity/law_elasticity.hpp"
-#include "motion/probe_contact.hpp"
+#include "motion/contact_defaults.hpp"
 #include "report/report.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
