@@ -19,7 +19,7 @@ struct End {
 
 End slide(double friction, bool of_tetrahedra, Integrator integrator, double seconds, double speed = 0.0) {
   const auto body =
-      of_tetrahedra ? test::tet_body({0.12, 0.04, 0.12}, {3, 1, 3}, false) : test::hex_body({0.12, 0.04, 0.12}, 0.04);
+      of_tetrahedra ? test::tet_body({0.12, 0.04, 0.12}, {3, 1, 3}, false) : test::box_body({0.12, 0.04, 0.12}, 0.04);
   const MotionLayout layout({.planes = 1});
   const Vector3 normal(std::sin(angle), std::cos(angle), 0.0), down(std::cos(angle), -std::sin(angle), 0.0);
   VectorX theta = layout.zero();
