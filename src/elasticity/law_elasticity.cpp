@@ -85,6 +85,9 @@ class TetLawElasticity : public LawElasticity {
   void for_parameter_derivatives(const VisitDerivatives& visit) const override;
   Matrix3 cauchy_stress(int element) const override;
   MatrixX strains() const override;
+  bool set_reference_positions(const Points& reference) override;
+  double least_volume_ratio() const override { return least_volume_ratio_; }
+  void add_reference_matrix(double scale, BlockMatrix& matrix) override;
 
  protected:
   void find_rotations() override;
@@ -111,7 +114,20 @@ class TetLawElasticity : public LawElasticity {
     for (int a = 0; a < N; ++a) F.noalias() += x.row(nodes_of(e)[a]).transpose() * gradient.row(a);
     return F;
   }
-  void take_reference();
+  static constexpr int rule_degree = N == 4 ? 1 : 2;
+  Nodes of_element(int e, const Points& all) const {
+    Nodes own;
+    for (int a = 0; a < N; ++a) own.row(a) = all.row(nodes_of(e)[a]);
+    return own;
+  }
+  /// Volumes of all points where the nodes are free of load here.
+  std::vector<double> volumes(const Points& reference) const;
+  void take_reference(const Points& reference);
+  /// Change of a point's stress for G, that of its reference: dX = G of the reference as it is.
+  Matrix3 reference_change(const Point& point, const PointChange& change, const Matrix3& F_z, const Matrix3& G) const {
+    return G.trace() * change.stress - change.stress * G.transpose() -
+           matrix_of(change.by_lag * vec(point.F * G) + change.by_z * vec(F_z * G));
+  }
   /// Calls function(element, number of the point) for all points, in any order and at once.
   template <class Function>
   void for_all_points(Function&& function) const;
@@ -134,6 +150,8 @@ class TetLawElasticity : public LawElasticity {
   std::shared_ptr<const Body> body_;
   std::unique_ptr<MaterialField> field_;  // where the law follows from the parameters
   std::vector<Point> points_;
+  std::vector<double> given_volumes_;  // of the body as it was given
+  double least_volume_ratio_ = 1.0;
   std::vector<int> blocks_;  // N x N an element
   Points lag_, reference_z_;
   double energy_ = 0.0;  // at the last `evaluate`; infinite where the law knows no such deformation
@@ -153,29 +171,52 @@ TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::sha
   points_.resize(std::size_t(count) * points);
   polar_.resize(std::size_t(count));
   blocks_ = element_blocks(*body_, pattern ? *pattern : *body_->pattern);
-  take_reference();
+  given_volumes_ = volumes(body_->nodes);
+  take_reference(body_->nodes);
 }
 
 template <int N>
-void TetLawElasticity<N>::take_reference() {
-  const auto rule = tet_quadrature(N == 4 ? 1 : 2);
+std::vector<double> TetLawElasticity<N>::volumes(const Points& reference) const {
+  const auto rule = tet_quadrature(rule_degree);
+  std::vector<double> all;
   for (int e = 0; e < body_->element_count(); ++e) {
-    Nodes X;
-    for (int a = 0; a < N; ++a) X.row(a) = body_->nodes.row(nodes_of(e)[a]);
+    const Nodes X = of_element(e, reference);
+    for (const TetQuadraturePoint& at : rule)
+      all.push_back(at.weight * Matrix3(X.transpose() * tet_shape_derivatives<N>(at.at)).determinant() / 6.0);
+  }
+  return all;
+}
+
+template <int N>
+void TetLawElasticity<N>::take_reference(const Points& reference) {
+  const auto rule = tet_quadrature(rule_degree);
+  const std::vector<double> all = volumes(reference);
+  for (int e = 0; e < body_->element_count(); ++e) {
+    const Nodes X = of_element(e, reference);
     for (int q = 0; q < points; ++q) {
-      Point& point = points_[std::size_t(e * points + q)];
-      const auto& at = rule[std::size_t(q)];
-      point.volume = at.weight * (X.transpose() * tet_shape_derivatives<N>(at.at)).determinant() / 6.0;
-      point.gradient = tet_gradients<N>(X, at.at);
+      const auto p = std::size_t(e * points + q);
+      points_[p].volume = all[p];
+      points_[p].gradient = tet_gradients<N>(X, rule[std::size_t(q)].at);
     }
   }
+  has_projections_ = has_changes_ = false;
 }
 
 template <int N>
 void TetLawElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
   body_ = std::move(body);
-  take_reference();
-  has_projections_ = has_changes_ = false;
+  take_reference(body_->nodes);
+}
+
+template <int N>
+bool TetLawElasticity<N>::set_reference_positions(const Points& reference) {
+  const std::vector<double> all = volumes(reference);
+  least_volume_ratio_ = std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; p < all.size(); ++p)
+    least_volume_ratio_ = std::min(least_volume_ratio_, all[p] / given_volumes_[p]);
+  if (!(least_volume_ratio_ > 0.0)) return false;
+  take_reference(reference);
+  return true;
 }
 
 template <int N>
@@ -494,12 +535,30 @@ void TetLawElasticity<N>::add_reference_tangent(const Points& d_reference, Point
     for (int q = 0; q < points; ++q) {
       const std::size_t p = std::size_t(e * points + q);
       const Point& point = points_[p];
-      const Matrix3 G = deformation(e, point.gradient, d_reference);
-      const Matrix3 of_lag = point.F * G, of_z = deformation(e, point.gradient, reference_z_) * G;
-      const Matrix3 stress = G.trace() * all[p].stress - all[p].stress * G.transpose() -
-                             matrix_of(all[p].by_lag * vec(of_lag) + all[p].by_z * vec(of_z));
-      subtract(e, point, stress, force);
+      const Matrix3 F_z = deformation(e, point.gradient, reference_z_);
+      subtract(e, point, reference_change(point, all[p], F_z, deformation(e, point.gradient, d_reference)), force);
     }
+}
+
+/// The same for each coordinate of each node: G = e_i g_b^T.
+template <int N>
+void TetLawElasticity<N>::add_reference_matrix(double scale, BlockMatrix& matrix) {
+  const std::vector<PointChange>& all = changes(reference_z_, false);
+  for (int e = 0; e < body_->element_count(); ++e) {
+    const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      const Point& point = points_[p];
+      const Matrix3 F_z = deformation(e, point.gradient, reference_z_);
+      for (int b = 0; b < N; ++b)
+        for (int i = 0; i < 3; ++i) {
+          const Matrix3 G = Vector3::Unit(i) * point.gradient.row(b);
+          const Matrix3 stress = (scale * point.volume) * reference_change(point, all[p], F_z, G);
+          for (int a = 0; a < N; ++a)
+            Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).col(i) -= stress * point.gradient.row(a).transpose();
+        }
+    }
+  }
 }
 
 /// The transpose of the above.

@@ -12,6 +12,7 @@
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_run.hpp"
 #include "estimation/notes.hpp"
+#include "estimation/press_law.hpp"
 #include "estimation/tracking_loop.hpp"
 
 namespace pliant {
@@ -122,8 +123,8 @@ class Fit {
       const bool last = now.stage + 1 == int(stages.size());
       if ((was_interrupted || coarse_is_as_fine()) && !last) continue;
       parameters = run_.parameters;
-      // Where swings may still be out of step, Poisson's ratio would make up for what others lack.
-      if (run_.swings() && !last) parameters.set_estimated("poisson_ratio", false);
+      // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
+      if (run_.swings() && !last) hold_all_but_moduli(parameters);
       parameters.set_reference(now.reference);
       if (now.optimiser.p.size() == 0) now.optimiser = FitRun::start_of(parameters);
       Objective objective = run_.recordings.objective(run_.fine, parameters, stage.band,

@@ -29,11 +29,13 @@ enum class TrackingUse {
   Both,       ///< each from a part of the frames; the one that predicts the others better is kept
 };
 
-/// What a fit of presses looks for.
-enum class PressMaterial {
-  Ogden,    ///< one smooth law, its modulus a field: fitted to all presses at once
-  Linear,   ///< one E and nu for all strains: the average fit to compare with
-  Sampled,  ///< the stiffness of each press, interpolated in strain space (Bickel 2009)
+/// What an object is taken to be made of.
+enum class MaterialKind {
+  Automatic,   ///< linear where it moves or hangs, Ogden's law where it is pressed alone
+  Linear,      ///< one E and nu for all strains
+  NeoHookean,  ///< the same two numbers, for great strains
+  Ogden,       ///< one smooth law of a few terms, its modulus a field: fitted to all that was seen at once
+  Sampled,     ///< presses alone: the stiffness of each, interpolated in strain space (Bickel 2009)
 };
 
 /// Choices about a fit; none of them is needed. `validate` answers in words.
@@ -73,9 +75,12 @@ struct FitOptions {
   /// Whether a correction of sensors or of gravity's direction is estimated where the residuals ask for it.
   bool correct = true;
   bool hold_strongly = false;  ///< eliminate nodes in held regions instead of Nitsche's method
+  MaterialKind material = MaterialKind::Automatic;
+  /// Of Ogden's law, 1..3; 0: one where the object moves, else as many as the presses support.
+  int law_terms = 0;
+  /// The law of an object that moves or hangs; none: corotated linear elasticity.
+  std::optional<LawForm> law_of_motion() const;
   /// Of presses with known force.
-  PressMaterial material = PressMaterial::Ogden;
-  int law_terms = 0;              ///< of Ogden's law, 1..3; 0: as many as the presses support
   int law_zones = 0;              ///< with a law of their own each, 1..12; 0: as many as the presses support
   double marker_noise = 0.0;      ///< of a coordinate [m]; 0: what the residuals say
   double basis_tolerance = 0.02;  ///< of a sampled material's stress, > 0

@@ -10,6 +10,7 @@
 #include "estimation/fit_run.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/modal_start.hpp"
+#include "estimation/press_law.hpp"
 #include "estimation/swing.hpp"
 
 namespace pliant {
@@ -299,8 +300,7 @@ class StartFinder {
     VectorX theta = run_.parameters.reference();
     if (scanned_) set_all_moduli(theta, modulus);
     parameters.set_reference(theta);
-    // Poisson's ratio is told from the rest only once the fit is close.
-    parameters.set_estimated("poisson_ratio", false);
+    hold_all_but_moduli(parameters);
     FitStart start;
     start.start = theta;
     int counter = 0;

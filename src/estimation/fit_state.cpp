@@ -207,6 +207,7 @@ Json to_json(const PressFitState& state) {
                             {"controls", d.form.controls},
                             {"laws", d.form.laws},
                             {"own_ratios", d.form.own_ratios},
+                            {"neo_hookean", d.form.two_numbers == TwoNumberLaw::NeoHookean},
                             {"cuts", from_cuts(d.cuts)},
                             {"theta", from_vector(d.theta)},
                             {"cost", from_cost(d.cost)},
@@ -225,7 +226,8 @@ PressFitState to_press_state(const Json& json) {
   PressFitState state;
   for (const Json& d : json.at("done"))
     state.done.push_back({{d.at("controls").get<int>(), d.at("terms").get<int>(), d.at("laws").get<int>(),
-                           d.at("own_ratios").get<bool>()},
+                           d.at("own_ratios").get<bool>(),
+                           d.value("neo_hookean", false) ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear},
                           to_cuts(d.at("cuts")),
                           to_vector(d.at("theta")),
                           to_cost(d.at("cost")),

@@ -76,6 +76,13 @@ void say_if_starts_disagree(FitOutcome& outcome) {
   }
 }
 
+void say_what_law(FitOutcome& outcome) {
+  const std::optional<LawLayout>& law = outcome.recordings.front().discretisation.simulation.law_layout;
+  if (law)
+    outcome.notes.push_back("The material is " + spoken_law(law->form()) +
+                            "; Young's modulus and Poisson's ratio are those of small strains.");
+}
+
 /// Where the object is free of load is not where its scan has it.
 void say_what_shape(FitOutcome& outcome) {
   for (const RecordingOutcome& r : outcome.recordings) {
@@ -94,7 +101,14 @@ void say_what_shape(FitOutcome& outcome) {
 
 }  // namespace
 
+std::string spoken_law(const LawForm& form) {
+  if (form.terms == 0) return form.two_numbers == TwoNumberLaw::NeoHookean ? "a neo-Hookean law" : "a linear law";
+  return "Ogden's law of " + std::to_string(form.terms) + (form.terms == 1 ? " term" : " terms") +
+         (form.own_ratios ? " with Poisson's ratios of their own" : "");
+}
+
 void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures) {
+  say_what_law(outcome);
   say_what_anchors(outcome, *captures.front());
   if (outcome.correlation.size() > 0) {
     say_what_is_inseparable(outcome);

@@ -97,10 +97,10 @@ class PressFit {
 
   PressFitOutcome run() {
     outcome_.scene = scene_;
-    const bool is_linear = options_.material == PressMaterial::Linear;
-    const int first = is_linear ? 0 : options_.material == PressMaterial::Sampled ? 1 : std::max(1, options_.terms);
-    if (!fit_first(is_linear ? 0 : std::min(first, 1))) return finish();
-    if (options_.material == PressMaterial::Ogden) {
+    const bool has_two_numbers =
+        options_.material == MaterialKind::Linear || options_.material == MaterialKind::NeoHookean;
+    if (!fit_first(has_two_numbers ? 0 : 1)) return finish();
+    if (options_.material == MaterialKind::Ogden) {
       fit_terms(2);
       if (regions_)
         fit_laws_of_regions();
@@ -109,7 +109,7 @@ class PressFit {
       fit_terms(3);  // an object of several materials looks like one of more terms
       if (!regions_ && best_->layout.form().laws == 1) fit_fields();
     }
-    if (!interrupted_ && options_.material == PressMaterial::Sampled) fit_samples();
+    if (!interrupted_ && options_.material == MaterialKind::Sampled) fit_samples();
     return finish();
   }
 
@@ -262,8 +262,12 @@ class PressFit {
   }
 
   bool fit_first(int terms) {
-    const Form form{layout_of({scene_->body->modulus.controls, terms}), scene_};
-    auto first = estimate(form, parameters_of(form).reference(), terms == 0 ? "linear" : "1 term");
+    const bool is_neo_hookean = options_.material == MaterialKind::NeoHookean;
+    const LawForm law{scene_->body->modulus.controls, terms, 1, false,
+                      is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear};
+    const Form form{layout_of(law), scene_};
+    const char* const stage = terms > 0 ? "1 term" : is_neo_hookean ? "neo-Hookean" : "linear";
+    auto first = estimate(form, parameters_of(form).reference(), stage);
     if (!first) {
       outcome_.reason = outcome_.notes.empty() ? "the start cannot be evaluated" : outcome_.notes.back();
       return false;
@@ -576,7 +580,7 @@ std::string PressFitOptions::validate() const {
 
 PressFitOptions press_options(const FitOptions& options) {
   PressFitOptions o;
-  o.material = options.material;
+  o.material = options.material == MaterialKind::Automatic ? MaterialKind::Ogden : options.material;
   o.cells = options.cells;
   o.quadratic = options.element == ElementKind::QuadraticTetrahedron;
   o.terms = options.law_terms;

@@ -14,7 +14,7 @@
 namespace pliant {
 
 struct PressFitOptions {
-  PressMaterial material = PressMaterial::Ogden;
+  MaterialKind material = MaterialKind::Ogden;
   double cells = 12.0;             ///< elements along the object's longest axis
   bool quadratic = false;          ///< elements; else linear
   int terms = 0;                   ///< of Ogden's law, 1..3; 0: as many as the presses support
@@ -55,7 +55,8 @@ struct PressFitState {
 };
 
 struct PressFitEvent {
-  /// "linear", "1 term", "2 terms", "2 terms apart", "3 zones", "a law a region", "8 control points", "press 3"
+  /// "linear", "neo-Hookean", "1 term", "2 terms", "2 terms apart", "3 zones", "a law a region", "8 control points",
+  /// "press 3"
   std::string stage;
   int iteration = 0;                    ///< begins again where noise or cuts change; of cuts that are only tried too
   double cost = 0.0, marker_rms = 0.0;  ///< [-], [m]

@@ -25,6 +25,7 @@ std::string text_of(const char* format, double value) {
 }
 
 TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOptions& options) {
+  if (options.law_of_motion()) return TrackingUse::Off;  // the tracker's own elasticity is linear
   if (options.tracking != TrackingUse::Automatic) return options.tracking;
   const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
     const Capture& c = r.capture;

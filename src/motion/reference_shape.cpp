@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/error.hpp"
-#include "elasticity/corotated.hpp"
 #include "motion/continuation.hpp"
 
 namespace pliant {
@@ -33,13 +32,15 @@ std::string percent(double share) {
 }  // namespace
 
 ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held,
-                                           const MotionBlocks& blocks, const ReferenceShapeOptions& options)
+                                           BodyMaterial material, const MotionBlocks& blocks,
+                                           const ReferenceShapeOptions& options)
     : body_(std::move(body)),
       held_(std::move(held)),
+      material_(std::move(material)),
       blocks_(blocks),
       scan_(body_->scanned_positions()),
       options_(options),
-      forces_(ReferenceForces::make(body_, blocks)),
+      forces_(material_.make_reference_forces(body_)),
       solver_(body_->pattern),
       turning_(body_, options.solver),
       jacobian_(body_->pattern),
@@ -176,7 +177,7 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
 
 bool ReferenceShapeSolver::holds_still(const VectorX& theta, const Points& X) {
   const auto reference = std::make_shared<Body>(with_reference(*body_, X));
-  const auto elasticity = make_elasticity(reference, blocks_);
+  const auto elasticity = material_.make_elasticity(reference);
   elasticity->set_parameters(theta);
   elasticity->linearise(scan_);
   matrix_.set_zero();

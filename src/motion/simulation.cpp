@@ -7,8 +7,6 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
-#include "elasticity/corotated.hpp"
-#include "elasticity/law_elasticity.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/continuation.hpp"
 
@@ -75,11 +73,6 @@ SimulationOptions completed(SimulationOptions options) {
   if (!options.law && !options.law_layout) return options;
   if (options.law && options.law_layout)
     throw std::invalid_argument("a material is given as it is or by the parameter vector, not both");
-  if (options.scan_sags)
-    throw InputError({{},
-                      "an object of a material law that was scanned as it sags",
-                      "its load-free shape, which is found for linear materials alone",
-                      "give the load-free shape, or a linear material"});
   options.integrator = Integrator::Newton;
   return options;
 }
@@ -108,7 +101,8 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   if (options_.scan_sags || !options_.shape.points.empty()) {
     const std::vector<int> held = held_nodes(*body_, options_.holds);
     shape_ = std::make_unique<RestShape>(body_, held, options_.scan_sags, options_.weights,
-                                         shape_basis(*body_, options_.shape, held), options_.blocks);
+                                         shape_basis(*body_, options_.shape, held), options_.blocks,
+                                         scene_material(options_));
   }
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->scanned_positions().rowwise() - body_->centre_of_mass().transpose();
@@ -445,11 +439,15 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   return summary;
 }
 
+BodyMaterial scene_material(const SimulationOptions& options) {
+  if (options.law_layout) return BodyMaterial(*options.law_layout);
+  if (options.law) return BodyMaterial(options.law);
+  return BodyMaterial(static_cast<const MaterialBlocks&>(options.blocks));
+}
+
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body,
                                              const SimulationOptions& options) {
-  if (options.law_layout) return LawElasticity::make(body, *options.law_layout);
-  if (options.law) return LawElasticity::make(body, options.law);
-  return make_elasticity(body, options.blocks);
+  return scene_material(options).make_elasticity(body);
 }
 
 std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,

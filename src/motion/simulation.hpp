@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
-#include "elasticity/law_layout.hpp"
+#include "elasticity/material.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/contact_defaults.hpp"
 #include "motion/fixed_regions.hpp"
@@ -41,8 +41,7 @@ struct SimulationOptions {
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
-  /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then. Not together
-  /// with a scan that sags.
+  /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then.
   std::shared_ptr<const MaterialLaw> law;
   std::optional<LawLayout> law_layout;  ///< with handles of the parameter vectors (`LawLayout::of_motion`)
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
@@ -60,8 +59,7 @@ struct RolloutSummary {
 /// copies are cheap to make with the same body.
 class Simulation {
  public:
-  /// Throws std::invalid_argument where options contradict each other or the body, InputError for a law together with
-  /// a scan that sags.
+  /// Throws std::invalid_argument where options contradict each other or the body.
   Simulation(std::shared_ptr<const Body> body, SimulationOptions options);
 
   const Body& body() const { return *body_; }
@@ -151,6 +149,9 @@ class Simulation {
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;
 };
+
+/// What a scene's body is made of.
+BodyMaterial scene_material(const SimulationOptions& options);
 
 /// The elasticity of a scene's body.
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body, const SimulationOptions& options);

@@ -13,6 +13,7 @@
 #include "output/track_output.hpp"
 #include "report/gallery.hpp"
 #include "report/report.hpp"
+#include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
 
@@ -376,6 +377,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   TriangleMesh surface = *capture.scene.object.surface;
   model.youngs_modulus = modulus.mean;
   model.poisson_ratio = t[blocks.poissons_ratio];
+  if (d.simulation.law_layout) model.law = model_law(*law_at(*d.body, *d.simulation.law_layout, t));
   model.mass_damping = t[blocks.mass_damping];
   model.stiffness_damping = t[blocks.stiffness_damping];
   const double mass = t[blocks.density] * enclosed_volume(*capture.scene.object.surface);

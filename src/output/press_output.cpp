@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "elasticity/law_elasticity.hpp"
+#include "estimation/notes.hpp"
 #include "motion/contact_defaults.hpp"
 #include "report/report.hpp"
 #include "simulation/law_table.hpp"
@@ -31,9 +32,7 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   fit.notes = outcome.notes;
   for (const TriedLaw& tried : outcome.tried) {
     const LawForm& l = tried.form;
-    const std::string form = l.terms == 0 ? "a linear law"
-                                          : fmt::format("Ogden's law of {} term{}{}", l.terms, l.terms == 1 ? "" : "s",
-                                                        l.own_ratios ? " with Poisson's ratios of their own" : "");
+    const std::string form = spoken_law(l);
     const std::string field =
         l.laws > 1 ? fmt::format(", one for each of {} {}", l.laws, capture.scene.regions.empty() ? "zones" : "regions")
         : l.controls > 1 ? fmt::format(" with {} moduli", l.controls)

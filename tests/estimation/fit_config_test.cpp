@@ -1,6 +1,7 @@
 #include "estimation/fit_config.hpp"
 
 #include "estimation/fit_state.hpp"
+#include "estimation/press_fit.hpp"
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
@@ -78,6 +79,44 @@ TEST(FitConfig, ChoicesThatAreNotUsedAreNamed) {
   EXPECT_THAT(presses[0], HasSubstr("steps = 2"));
   ASSERT_EQ(both.size(), 1u);
   EXPECT_THAT(both[0], HasSubstr("law_terms = 2"));
+}
+
+TEST(FitConfig, TheMaterialOfAMotionIsALawOfItsForm) {
+  FitOptions options;
+  EXPECT_FALSE(options.law_of_motion());
+  set_fit_option(options, "material=linear");
+  EXPECT_FALSE(options.law_of_motion());
+  set_fit_option(options, "material=neo_hookean");
+  EXPECT_EQ(options.law_of_motion(), (LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean}));
+  set_fit_option(options, "material=ogden");
+  EXPECT_EQ(options.law_of_motion(), (LawForm{1, 1}));
+  set_fit_option(options, "law_terms=2");
+  EXPECT_EQ(options.law_of_motion(), (LawForm{1, 2}));
+  EXPECT_TRUE(unused_choices(options, true, false).empty());
+  options.law_terms = 4;
+  EXPECT_THAT(options.validate(), HasSubstr("law_terms"));
+  EXPECT_THAT(test::complaint_of([&] { set_fit_option(options, "material=jelly"); }), HasSubstr("neo_hookean"));
+}
+
+TEST(FitConfig, ALawInMotionIsNotTrackedAndSaysSoWhereTrackingIsAskedFor) {
+  FitOptions options;
+  options.material = MaterialKind::Ogden;
+  options.tracking = TrackingUse::Off;
+  EXPECT_TRUE(unused_choices(options, true, false).empty());
+  options.tracking = TrackingUse::Loop;
+  ASSERT_EQ(unused_choices(options, true, false).size(), 1u);
+  EXPECT_THAT(unused_choices(options, true, false)[0], HasSubstr("tracker's own elasticity is linear"));
+  options.material = MaterialKind::Linear;
+  EXPECT_TRUE(unused_choices(options, true, false).empty());
+}
+
+TEST(FitConfig, PressesAloneAreOfOgdensLawWhereNothingIsSaid) {
+  FitOptions options;
+  EXPECT_EQ(press_options(options).material, MaterialKind::Ogden);
+  for (const MaterialKind kind : {MaterialKind::Linear, MaterialKind::NeoHookean, MaterialKind::Sampled}) {
+    options.material = kind;
+    EXPECT_EQ(press_options(options).material, kind);
+  }
 }
 
 TEST(FitConfig, DefaultsRoundTripAndEveryKeyIsWritten) {

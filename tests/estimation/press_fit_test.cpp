@@ -129,7 +129,7 @@ TEST_F(PressedLayers, AnInterruptionWhileCutsMoveKeepsTheEstimate) {
 
 TEST_F(PressedLayers, AreSampledPressByPress) {
   PressFitOptions options;
-  options.material = PressMaterial::Sampled;
+  options.material = MaterialKind::Sampled;
   const PressFitOutcome fit = fit_presses(capture, options);
   ASSERT_TRUE(fit.succeeded) << fit.reason;
   ASSERT_TRUE(fit.sampled);

@@ -240,6 +240,18 @@ std::vector<Family> families() {
   return list;
 }
 
+/// The battery's poses have tangents with negative eigenvalues: it tests what the damping leaves out of them, too.
+TEST_P(ForceTerms, PosesOfLawsHaveNegativeTangents) {
+  auto* const law = dynamic_cast<LawElasticity*>(term.get());
+  if (!law) return;
+  law->set_parameters(theta);
+  law->linearise(lag);
+  BlockMatrix exact(body->pattern), positive(body->pattern);
+  law->add_stiffness(LawElasticity::Stiffness::Exact, 1.0, exact);
+  law->add_stiffness(LawElasticity::Stiffness::Positive, 1.0, positive);
+  EXPECT_GT((test::dense(positive) - test::dense(exact)).norm(), 1e-3 * test::dense(exact).norm());
+}
+
 INSTANTIATE_TEST_SUITE_P(All, ForceTerms, ::testing::ValuesIn(families()),
                          [](const auto& member) { return member.param.name; });
 
