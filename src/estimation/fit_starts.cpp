@@ -42,6 +42,18 @@ class StartFinder {
     run_.recordings.set_moduli(theta, youngs_modulus * relative_moduli_);
   }
 
+  /// All moduli are free, whatever was assumed about them beforehand, and nothing else is.
+  ParameterSet moduli_alone() const {
+    std::vector<Parameter> list;
+    for (const Parameter& p : run_.parameters.parameters()) {
+      if (!is_modulus(p)) continue;
+      list.push_back(p);
+      list.back().estimated = true;
+      list.back().prior_std = std::numeric_limits<double>::infinity();
+    }
+    return {run_.parameters.layout(), std::move(list), run_.parameters.reference()};
+  }
+
   double first_modulus(const VectorX& theta) const { return theta[run_.recordings.material().youngs_moduli.front()]; }
 
   void set_reference(const VectorX& theta) { run_.parameters.set_reference(theta); }
@@ -77,14 +89,13 @@ class StartFinder {
 
   /// At rest every softer body hangs lower and costs more equilibria: from stiff to soft, until it is clear that the
   /// valley was passed, or that nothing softer can hold itself up.
-  template <class Try>
-  void scan_downwards(int count, Try&& try_value) {
+  void scan_downwards(Objective& objective, std::span<const VectorX> points, const Objective::OnEvaluated& tell) {
     double least = std::numeric_limits<double>::infinity();
     int worse = 0;
-    for (int i = 0; i < count; ++i) run_.state.scan[std::size_t(i)] = {0.0, std::numeric_limits<double>::infinity()};
-    for (int i = count - 1; i >= 0 && !run_.interrupted(); --i) {
-      try_value(i);
-      const double cost = run_.state.scan[std::size_t(i)].second;
+    for (std::size_t i = points.size(); i-- > 0 && !run_.interrupted();) {
+      const auto tell_of_it = [&](std::size_t, const CostEvaluation& e) { return tell(i, e); };
+      (void)objective.evaluate(points.subspan(i, 1), tell_of_it);
+      const double cost = run_.state.scan[i].second;
       worse = cost > 1.2 * least ? worse + 1 : 0;
       if (!std::isfinite(cost) || worse == 2) break;
       least = std::min(least, cost);
@@ -221,24 +232,29 @@ class StartFinder {
     const int count = 4 * per_decade + 1;
     if (int(run_.state.scan.size()) != count) {
       run_.state.scan.assign(std::size_t(count), {});
+      Objective objective = run_.recordings.objective(
+          run_.coarse, run_.fixed_at(theta), run_.options.wide_band,
+          [&](const Recording& r) { return run_.swings() ? r.horizon(growing_horizon().front()) : r.last_frame; });
+      const ParameterSet moduli = moduli_alone();
+      objective.set_parameters(moduli);
+      std::vector<VectorX> trials, points;
+      for (int i = 0; i < count; ++i) {
+        trials.push_back(theta);
+        set_all_moduli(trials.back(), stress * std::pow(10.0, double(i) / per_decade));
+        points.push_back(moduli.to_unconstrained(trials.back()));
+        run_.state.scan[std::size_t(i)] = {first_modulus(trials.back()), std::numeric_limits<double>::infinity()};
+      }
       std::atomic<int> done = 0;
-      const auto try_value = [&](int i) {
-        VectorX trial = theta;
-        set_all_moduli(trial, stress * std::pow(10.0, double(i) / per_decade));
-        run_.state.scan[std::size_t(i)] = {first_modulus(trial), std::numeric_limits<double>::infinity()};
-        if (run_.interrupted()) return;
-        Objective objective = run_.recordings.objective(
-            run_.coarse, run_.fixed_at(trial), run_.options.wide_band,
-            [&](const Recording& r) { return run_.swings() ? r.horizon(growing_horizon().front()) : r.last_frame; });
-        const CostEvaluation e = objective.evaluate(VectorX(0));
-        if (e.succeeded) run_.state.scan[std::size_t(i)].second = e.cost;
-        run_.emit({StageKind::Scan, "scan", 0, i + 1, e.cost, 0.0, e.surface_rms(), trial,
+      const auto tell = [&](std::size_t i, const CostEvaluation& e) {
+        if (e.succeeded) run_.state.scan[i].second = e.cost;
+        run_.emit({StageKind::Scan, "scan", 0, int(i) + 1, e.cost, 0.0, e.surface_rms(), trials[i],
                    0.05 + 0.1 * double(++done) / count});
+        return !run_.interrupted();
       };
       if (run_.recordings.all_static())
-        scan_downwards(count, try_value);
-      else
-        parallel_tasks(std::size_t(count), [&](std::size_t i) { try_value(int(i)); });
+        scan_downwards(objective, points, tell);
+      else if (!run_.interrupted())
+        (void)objective.evaluate(points, tell);
       if (run_.interrupted()) {
         run_.state.scan.clear();
         run_.outcome.interrupted = true;
