@@ -9,6 +9,7 @@
 
 #include "base/error.hpp"
 #include "estimation/field_evidence.hpp"
+#include "estimation/fit_run.hpp"
 #include "estimation/recordings.hpp"
 
 namespace pliant {
@@ -177,7 +178,7 @@ class FieldChoice {
       reached_ = state;
       if (saves) save();
     };
-    FitOutcome outcome = fit(recordings_, options, monitor, from);
+    FitOutcome outcome = fit_motions(recordings_, options, monitor, from);
     for (FitEvent& event : outcome.history) tell(event);
     histories_.emplace_back(count, outcome.history);
     forward_steps_ += outcome.forward_steps;
@@ -259,7 +260,7 @@ MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusFi
 FitOutcome fit_with_chosen_field(const std::vector<RecordedCapture>& recordings, const FitOptions& options,
                                  const FitMonitor& monitor, FitState resume) {
   if (!recordings.front().capture.scene.regions.empty())
-    return fit(recordings, with_controls(options, 1), monitor, std::move(resume));
+    return fit_motions(recordings, with_controls(options, 1), monitor, std::move(resume));
   return FieldChoice(recordings, options, monitor, std::move(resume)).run();
 }
 

@@ -10,8 +10,10 @@
 #include "estimation/corrections.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
+#include "estimation/fit_config.hpp"
 #include "estimation/fit_run.hpp"
 #include "estimation/notes.hpp"
+#include "estimation/press_fit.hpp"
 #include "estimation/tracking_loop.hpp"
 
 namespace pliant {
@@ -260,12 +262,7 @@ class Fit {
       run_.outcome.recordings.push_back({d, run_.outcome.theta, run_.outcome.evaluation.of_recording(int(r)),
                                          Simulation(d.body, d.simulation).rest_body(run_.outcome.theta)});
     }
-    if (run_.outcome.evaluation.succeeded && parameters.dimension() > 0) {
-      run_.outcome.covariance = parameter_covariance(run_.outcome.evaluation);
-      run_.outcome.std = run_.outcome.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-      const VectorX inverse = run_.outcome.std.cwiseMax(1e-300).cwiseInverse();
-      run_.outcome.correlation = inverse.asDiagonal() * run_.outcome.covariance * inverse.asDiagonal();
-    }
+    if (run_.outcome.evaluation.succeeded && parameters.dimension() > 0) add_uncertainty(run_.outcome);
     if (run_.outcome.evaluation.succeeded && !run_.outcome.interrupted) time_steps(parameters);
     std::vector<const Capture*> captures;
     for (const Recording& r : run_.recordings.all()) captures.push_back(&r.capture);
@@ -309,17 +306,25 @@ MatrixX parameter_covariance(const CostEvaluation& evaluation) {
   return sandwich + inverse;
 }
 
-FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
-               FitState resume) {
-  if (const std::string wrong = options.validate(); !wrong.empty())
-    throw InputError({{}, wrong, "", "see `pliant fit --help`"});
-  if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
+void add_uncertainty(FitOutcome& outcome) {
+  outcome.covariance = parameter_covariance(outcome.evaluation);
+  outcome.std = outcome.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const VectorX inverse = outcome.std.cwiseMax(1e-300).cwiseInverse();
+  outcome.correlation = inverse.asDiagonal() * outcome.covariance * inverse.asDiagonal();
+}
+
+FitOutcome fit_motions(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
+                       FitState resume) {
   if (tracks(recordings, options)) return fit_with_tracking(recordings, options, monitor, std::move(resume));
   if (options.control_points == FitOptions::automatic)
     return fit_with_chosen_field(recordings, options, monitor, std::move(resume));
   return Fit(std::move(recordings), options, monitor, std::move(resume)).run();
 }
 
+namespace {
+
+/// How well a fitted material predicts a recording that was kept out: only its own start, planes and sensors are
+/// estimated, from its own observations.
 FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
                  const FitMonitor& monitor) {
   FitOptions fixed = options;
@@ -334,7 +339,43 @@ FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOp
   }
   std::vector<RecordedCapture> one;
   one.push_back(std::move(held_out));
-  return fit(std::move(one), fixed, monitor);
+  return fit_motions(std::move(one), fixed, monitor, {});
+}
+
+/// The capture whose presses are all that there is to fit; null where more than presses is fitted.
+/// Throws InputError where they stand beside what they cannot be fitted with.
+const Capture* presses_alone(const std::vector<RecordedCapture>& recordings,
+                             const std::optional<RecordedCapture>& held_out) {
+  const auto it = std::ranges::find_if(recordings, is_of_presses_alone, &RecordedCapture::capture);
+  if (it == recordings.end()) return nullptr;
+  const auto refuse = [&](const char* what, const char* advice) {
+    throw InputError({{it->capture.file}, what, "a fit of one capture's presses", advice});
+  };
+  if (recordings.size() > 1) refuse("presses beside other recordings", "put all presses into one capture");
+  if (held_out) refuse("presses and --hold-out", "give a press role = \"test\"");
+  return &it->capture;
+}
+
+}  // namespace
+
+FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
+               FitState resume, std::optional<RecordedCapture> held_out) {
+  if (const std::string wrong = options.validate(); !wrong.empty())
+    throw InputError({{}, wrong, "", "see `pliant fit --help`"});
+  if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
+  if (const Capture* capture = presses_alone(recordings, held_out))
+    return fit_presses(*capture, options, monitor, std::move(resume));
+  const bool has_presses =
+      std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
+  FitOutcome outcome = fit_motions(std::move(recordings), options, monitor, std::move(resume));
+  for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
+  if (held_out && outcome.evaluation.succeeded && !outcome.interrupted) {
+    FitMonitor of_another_fit = monitor;
+    of_another_fit.on_state = {};
+    outcome.held_out = {held_out->capture.name, held_out->capture.sha256, {}};
+    outcome.held_out->evaluation = score(std::move(*held_out), outcome, options, of_another_fit).evaluation;
+  }
+  return outcome;
 }
 
 }  // namespace pliant

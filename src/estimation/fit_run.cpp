@@ -32,6 +32,7 @@ FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& fit_opti
       coarse(recordings.grid(options.coarse_cells, options.steps)),
       fine(recordings.grid(options.cells, options.steps)) {
   state.controls = recordings.controls();
+  layout = std::make_shared<ParameterLayout>(parameters.layout());
 }
 
 ParameterSet FitRun::fixed_at(const VectorX& theta) const {
@@ -48,6 +49,8 @@ VectorX FitRun::without_pulls(VectorX theta) const {
 
 void FitRun::emit(FitEvent event) {
   event.fraction_done /= all_work();
+  event.youngs_modulus = event.theta[recordings.material().youngs_moduli.front()];
+  event.layout = layout;
   const std::lock_guard lock(mutex);
   if (monitor.on_event) monitor.on_event(event);
   outcome.history.push_back(std::move(event));

@@ -52,6 +52,7 @@ struct FitRun {
   FitOutcome outcome;
   Recordings recordings;
   ParameterSet parameters;
+  std::shared_ptr<const ParameterLayout> layout;  ///< of the parameters
   Grid coarse, fine;
   std::mutex mutex;  ///< of the outcome's history and steps, and of the monitor
 
@@ -63,6 +64,10 @@ struct FitRun {
 /// decades of Young's modulus or the swing that was seen, and the best values followed on the coarse grid. Goes on from
 /// the state. Throws InputError where no stiffness can be simulated.
 void find_starts(FitRun& run);
+
+/// The fit of motions and equilibria: what `fit` does where there is more than presses.
+FitOutcome fit_motions(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
+                       FitState resume);
 
 /// For people.
 std::string in_three_digits(double value);

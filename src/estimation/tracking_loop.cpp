@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "estimation/fit_run.hpp"
 #include "estimation/followed.hpp"
 #include "estimation/recordings.hpp"
 
@@ -167,7 +168,7 @@ class TrackingLoop {
       reached_ = state;
       save(state);
     };
-    FitOutcome outcome = fit(recordings, options, monitor, std::move(from));
+    FitOutcome outcome = fit_motions(recordings, options, monitor, std::move(from));
     for (FitEvent& event : outcome.history) {
       event.stage = name + ": " + event.stage;
       history_.emplace_back(controls_of(outcome), event);

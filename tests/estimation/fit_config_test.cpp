@@ -215,6 +215,17 @@ FitState some_state() {
   state.corrected = {{"sensor_turn@front", "sensor_shift@front"}, "the pose of front", 12.5, 1e4 / 3.0};
   state.refined = {{12.0, 1.0, 800, VectorX::Constant(3, 1.0 / 3.0), 8.5, true, "cost settled"},
                    {12.0, 2.0, 800, VectorX::Constant(3, 2.0 / 3.0), 8.25, false, "too many iterations"}};
+  FitState::LawSearch& law = state.law.emplace();
+  law.done = {{{{2, 1, 2, true}, 1.0 / 3.0, -std::numeric_limits<double>::infinity(), false},
+               {{0, ZoneCut::By::Depth, 1e-3 / 3.0}},
+               VectorX::Constant(6, 1.0 / 9.0),
+               1e-4 / 3.0}};
+  law.under_way = {3, VectorX::Constant(6, 1.0 / 11.0), VectorX::Constant(2, 1e-9 / 3.0)};
+  law.cuts = {{0, ZoneCut::By::X, 0.1}, {1, ZoneCut::By::Y, -1.0 / 3.0}};
+  law.samples.emplace_back();
+  law.samples[0].succeeded = true, law.samples[0].weight = 1.0 / 7.0, law.samples[0].iterations = 5;
+  law.samples[0].sample.strains = MatrixX::Constant(2, 6, 1.0 / 3.0);
+  law.samples[0].sample.p = {{100.0 / 3.0, 0.3}, {200.0 / 3.0, 0.4}};
   return state;
 }
 
@@ -252,8 +263,25 @@ TEST(FitState, RoundTripsToTheLastBit) {
   EXPECT_EQ(read.refined[0].cost, 8.5);
   EXPECT_FALSE(read.refined[1].converged);
   EXPECT_EQ(read.refined[1].reason, "too many iterations");
+  ASSERT_TRUE(read.law.has_value());
+  ASSERT_EQ(read.law->done.size(), 1u);
+  const FitState::LawSearch::Done &done = read.law->done[0], &done_written = written.law->done[0];
+  EXPECT_EQ(done.tried.form, done_written.tried.form);
+  EXPECT_EQ(done.tried.cost, done_written.tried.cost);
+  EXPECT_EQ(done.tried.evidence, done_written.tried.evidence);
+  EXPECT_EQ(done.cuts, done_written.cuts);
+  EXPECT_EQ(done.theta, done_written.theta);
+  EXPECT_EQ(done.noise, done_written.noise);
+  EXPECT_EQ(read.law->under_way.p, written.law->under_way.p);
+  EXPECT_EQ(read.law->under_way.memory, written.law->under_way.memory);
+  EXPECT_EQ(read.law->cuts, written.law->cuts);
+  ASSERT_EQ(read.law->samples.size(), 1u);
+  EXPECT_EQ(read.law->samples[0].sample.strains, written.law->samples[0].sample.strains);
+  EXPECT_EQ(read.law->samples[0].sample.p[1].alpha, 0.4);
+  EXPECT_EQ(read.law->samples[0].weight, 1.0 / 7.0);
   write_fit_state(folder / "empty.json", {}, "key");
   EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").motion.has_value());
+  EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").law.has_value());
 }
 
 TEST(FitState, RefusesAnotherKeyAndDamage) {
