@@ -8,10 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "estimation/fit_stage.hpp"
 #include "estimation/law_zones.hpp"
-#include "estimation/optimiser.hpp"
 #include "estimation/problem.hpp"
-#include "estimation/refinement.hpp"
 #include "estimation/sample_fit.hpp"
 #include "tracking/tracker.hpp"
 
@@ -94,16 +93,6 @@ struct FitOptions {
   std::string validate() const;
 };
 
-/// What a step of a fit belongs to.
-enum class StageKind {
-  Motion,  ///< the motion or pose at the start
-  Scan,    ///< a trial of one Young's modulus: no iteration
-  Coarse,  ///< a start that is followed on the coarse grid
-  Fine,    ///< the estimate on the full grid, and its repetitions
-  Law,     ///< a form of the law of a pressed object
-  Sample,  ///< the stiffness of each element that one press shows: all its iterations in one step
-};
-
 /// A step of the fit, for progress and convergence.csv.
 struct FitEvent {
   StageKind kind = StageKind::Fine;
@@ -160,27 +149,16 @@ struct TriedLaw {
 
 /// Where a fit stands, to go on after an interruption.
 struct FitState {
-  int controls = 1;  ///< control moduli of the parameter vectors below
-  /// Young's modulus and cost; infinite where it cannot be simulated. One alone: that of the swing that was seen.
-  std::vector<std::pair<double, double>> scan;
-  std::optional<VectorX> motion;  ///< theta after the first stage
-  std::vector<FitStart> starts;   ///< those that are done
-  /// The stage on the full grid that was under way.
-  struct Fine {
-    int stage = 0;             ///< of those on the full grid, then of the repetitions
-    VectorX reference;         ///< theta at the beginning of the stage
-    OptimiserState optimiser;  ///< p is empty before the first iteration
+  int controls = 1;                        ///< control moduli of the parameter vectors below
+  std::vector<StageRecord> done;           ///< stages in the order in which they ended
+  std::optional<StageUnderWay> under_way;  ///< of those on the full grid
+  /// Where the stages on the full grid begin, if not with the best start: what came before was taken over from another
+  /// fit.
+  struct Beginning {
+    VectorX theta;
+    int stage = 0;  ///< number of the first one; that with corrections comes last
   };
-  std::optional<Fine> fine;
-  /// What the residuals asked to be corrected; no parameters: nothing.
-  struct Corrected {
-    std::vector<std::string> parameters;
-    std::string what;             ///< for people
-    double cost, youngs_modulus;  ///< before, [Pa]
-  };
-  std::optional<Corrected> corrected;
-  std::vector<RefinedEstimate> refined;  ///< repetitions that are done, after the first estimate
-  std::vector<std::string> notes;        ///< on how the fit began
+  std::optional<Beginning> begin;
   /// Where the number of control points is chosen: all above is the fit with one of them.
   struct FieldChoice {
     std::vector<TriedField> tried;          ///< that are done

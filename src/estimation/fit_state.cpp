@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/8";
+constexpr const char* format = "fit-state/9";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -169,37 +169,56 @@ FitState::LawSearch to_law(const Json& json) {
   return law;
 }
 
+Json from_id(const StageId& id) { return {int(id.kind), id.start, id.number}; }
+StageId to_id(const Json& json) {
+  const int kind = json.at(0).get<int>();
+  if (kind < 0 || kind > int(StageKind::Sample)) throw std::runtime_error("a stage of an unknown kind");
+  return {StageKind(kind), json.at(1).get<int>(), json.at(2).get<int>()};
+}
+
+Json from_record(const StageRecord& r) {
+  Json json = {{"stage", from_id(r.id)},
+               {"name", r.name},
+               {"from", from_vector(r.from)},
+               {"theta", from_vector(r.theta)},
+               {"start_cost", from_cost(r.start_cost)},
+               {"cost", from_cost(r.cost)},
+               {"iterations", r.iterations},
+               {"succeeded", r.succeeded},
+               {"converged", r.converged},
+               {"reason", r.reason},
+               {"elements", r.elements},
+               {"corrected", r.corrected},
+               {"told", r.told},
+               {"trials", Json::array()}};
+  for (const auto& [modulus, cost] : r.trials) json["trials"].push_back({modulus, from_cost(cost)});
+  return json;
+}
+
+StageRecord to_record(const Json& json) {
+  StageRecord r;
+  r.id = to_id(json.at("stage"));
+  r.name = json.at("name").get<std::string>();
+  r.from = to_vector(json.at("from")), r.theta = to_vector(json.at("theta"));
+  r.start_cost = to_cost(json.at("start_cost")), r.cost = to_cost(json.at("cost"));
+  r.iterations = json.at("iterations").get<int>();
+  r.succeeded = json.at("succeeded").get<bool>(), r.converged = json.at("converged").get<bool>();
+  r.reason = json.at("reason").get<std::string>();
+  r.elements = json.at("elements").get<int>();
+  r.corrected = json.at("corrected").get<std::vector<std::string>>();
+  r.told = json.at("told").get<std::string>();
+  for (const Json& t : json.at("trials")) r.trials.emplace_back(t.at(0).get<double>(), to_cost(t.at(1)));
+  return r;
+}
+
 Json to_json(const FitState& state) {
-  Json json = {
-      {"controls", state.controls}, {"scan", Json::array()}, {"starts", Json::array()}, {"notes", state.notes}};
-  for (const auto& [modulus, cost] : state.scan) json["scan"].push_back({modulus, from_cost(cost)});
-  for (const FitStart& s : state.starts)
-    json["starts"].push_back({{"start", from_vector(s.start)},
-                              {"final", from_vector(s.final)},
-                              {"start_cost", from_cost(s.start_cost)},
-                              {"cost", from_cost(s.cost)},
-                              {"iterations", s.iterations},
-                              {"converged", s.converged},
-                              {"reason", s.reason}});
-  if (state.motion) json["motion"] = from_vector(*state.motion);
-  if (const auto& fine = state.fine)
-    json["fine"] = {{"stage", fine->stage},
-                    {"reference", from_vector(fine->reference)},
-                    {"optimiser", from_optimiser(fine->optimiser)}};
-  if (const auto& c = state.corrected)
-    json["corrected"] = {{"parameters", c->parameters},
-                         {"what", c->what},
-                         {"cost", from_cost(c->cost)},
-                         {"youngs_modulus", c->youngs_modulus}};
-  json["refined"] = Json::array();
-  for (const RefinedEstimate& e : state.refined)
-    json["refined"].push_back({{"cells", e.cells},
-                               {"steps", e.steps},
-                               {"elements", e.elements},
-                               {"theta", from_vector(e.theta)},
-                               {"cost", from_cost(e.cost)},
-                               {"converged", e.converged},
-                               {"reason", e.reason}});
+  Json json = {{"controls", state.controls}, {"done", Json::array()}};
+  for (const StageRecord& r : state.done) json["done"].push_back(from_record(r));
+  if (const auto& stage = state.under_way)
+    json["under_way"] = {{"stage", from_id(stage->id)},
+                         {"from", from_vector(stage->from)},
+                         {"optimiser", from_optimiser(stage->optimiser)}};
+  if (const auto& begin = state.begin) json["begin"] = {{"theta", from_vector(begin->theta)}, {"stage", begin->stage}};
   if (state.field) json["field"] = from_field(*state.field);
   if (state.tracking) json["tracking"] = from_tracking(*state.tracking);
   if (state.law) json["law"] = from_law(*state.law);
@@ -209,26 +228,13 @@ Json to_json(const FitState& state) {
 FitState to_state(const Json& json) {
   FitState state;
   state.controls = json.at("controls").get<int>();
-  for (const Json& entry : json.at("scan")) state.scan.emplace_back(entry.at(0).get<double>(), to_cost(entry.at(1)));
-  for (const Json& s : json.at("starts"))
-    state.starts.push_back({to_vector(s.at("start")), to_vector(s.at("final")), to_cost(s.at("start_cost")),
-                            to_cost(s.at("cost")), s.at("iterations").get<int>(), s.at("converged").get<bool>(),
-                            s.at("reason").get<std::string>()});
-  if (json.contains("motion")) state.motion = to_vector(json["motion"]);
-  if (json.contains("fine")) {
-    const Json& fine = json["fine"];
-    state.fine = {fine.at("stage").get<int>(), to_vector(fine.at("reference")), to_optimiser(fine.at("optimiser"))};
+  for (const Json& r : json.at("done")) state.done.push_back(to_record(r));
+  if (json.contains("under_way")) {
+    const Json& stage = json["under_way"];
+    state.under_way = {to_id(stage.at("stage")), to_vector(stage.at("from")), to_optimiser(stage.at("optimiser"))};
   }
-  if (json.contains("corrected")) {
-    const Json& c = json["corrected"];
-    state.corrected = {c.at("parameters").get<std::vector<std::string>>(), c.at("what").get<std::string>(),
-                       to_cost(c.at("cost")), c.at("youngs_modulus").get<double>()};
-  }
-  for (const Json& e : json.at("refined"))
-    state.refined.push_back({e.at("cells").get<double>(), e.at("steps").get<double>(), e.at("elements").get<int>(),
-                             to_vector(e.at("theta")), to_cost(e.at("cost")), e.at("converged").get<bool>(),
-                             e.at("reason").get<std::string>()});
-  state.notes = json.at("notes").get<std::vector<std::string>>();
+  if (json.contains("begin"))
+    state.begin = {to_vector(json["begin"].at("theta")), json["begin"].at("stage").get<int>()};
   if (json.contains("field")) state.field = to_field(json["field"]);
   if (json.contains("tracking")) state.tracking = to_tracking(json["tracking"]);
   if (json.contains("law")) state.law = to_law(json["law"]);

@@ -9,6 +9,8 @@
 
 namespace pliant {
 
+std::string in_three_digits(double value) { return fmt::format("{:.3g}", value); }
+
 namespace {
 
 std::string spoken(std::string name) {

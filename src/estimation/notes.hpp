@@ -4,6 +4,9 @@
 
 namespace pliant {
 
+/// For people.
+std::string in_three_digits(double value);
+
 /// Adds plain sentences about what the estimate can and cannot be trusted for.
 void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures);
 
