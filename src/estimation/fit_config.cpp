@@ -499,6 +499,11 @@ std::string FitOptions::validate() const {
     return "bands must lie in (0, 0.5)";
   if (!(newmark_theta >= 0.5 && newmark_theta < 1.0)) return "newmark_theta must lie in [0.5, 1)";
   if (!(solver_tolerance > 0.0 && solver_tolerance < 1.0)) return "solver_tolerance must lie in (0, 1)";
+  if (law_terms < 0 || law_terms > 3) return "law_terms must lie in 1..3, or be 0: as many as the presses support";
+  if (law_zones < 0 || law_zones > 12) return "law_zones must lie in 1..12, or be 0: as many as the presses support";
+  if (law_zones > 1 && control_points > 1) return "law_zones and control_points cannot both be chosen";
+  if (!(marker_noise >= 0.0)) return "marker_noise must not be negative";
+  if (!(basis_tolerance > 0.0) || basis_samples < 1) return "basis_tolerance must be positive, basis_samples >= 1";
   return "";
 }
 

@@ -87,6 +87,7 @@ class CurveTrial : public Trial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  [[nodiscard]] std::unique_ptr<Trial> anew() const override { return std::make_unique<CurveTrial>(*this); }
 
  private:
   MaterialTest test_;

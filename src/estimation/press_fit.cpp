@@ -7,11 +7,14 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
+#include "estimation/fit_config.hpp"
+#include "estimation/notes.hpp"
 #include "estimation/problem.hpp"
 
 namespace pliant {
@@ -72,8 +75,9 @@ VectorX with_term(const LawLayout& from, const VectorX& theta, const LawLayout& 
 
 class PressFit {
  public:
-  PressFit(const Capture& capture, const PressFitOptions& options, const PressFitMonitor& monitor, PressFitState state)
-      : capture_(capture), options_(options), monitor_(monitor), state_(std::move(state)) {
+  PressFit(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState state)
+      : capture_(capture), options_(options), monitor_(monitor), all_state_(std::move(state)) {
+    if (!all_state_.law) all_state_.law.emplace();
     if (const std::string wrong = options.validate(); !wrong.empty())
       throw InputError({{capture.file}, wrong, "", "see `pliant fit --help`"});
     if (!capture.scene.object.surface)
@@ -83,7 +87,7 @@ class PressFit {
                         "scan the object and name the mesh in capture.toml"});
     Resolution resolution;
     resolution.cells = options.cells;
-    resolution.element = options.quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
+    resolution.element = options.element.value_or(ElementKind::Tetrahedron);
     std::vector<Vector3> control_points;
     const auto body = make_body_of(capture.scene, SignedDistance(), resolution, control_points);
     scene_ = std::make_shared<PressScene>(make_press_scene(capture, body));
@@ -92,15 +96,14 @@ class PressFit {
     if (fitted_.empty())
       throw InputError({{capture.file}, "no press is to be fitted", "a block [[press]] whose role is \"fit\"", ""});
     regions_ = body->modulus.controls > 1;
-    noise_ = options.noise > 0.0 ? options.noise : scene_->noise;
+    noise_ = options.marker_noise > 0.0 ? options.marker_noise : scene_->noise;
   }
 
-  PressFitOutcome run() {
-    outcome_.scene = scene_;
+  FitOutcome run() {
     const bool has_two_numbers =
         options_.material == MaterialKind::Linear || options_.material == MaterialKind::NeoHookean;
     if (!fit_first(has_two_numbers ? 0 : 1)) return finish();
-    if (options_.material == MaterialKind::Ogden) {
+    if (options_.material == MaterialKind::Ogden || options_.material == MaterialKind::Automatic) {
       fit_terms(2);
       if (regions_)
         fit_laws_of_regions();
@@ -160,7 +163,7 @@ class PressFit {
     o.max_iterations = is_brief ? brief_iterations : options_.max_iterations;
     o.damps_long_steps = true;
     OptimiserState from;
-    if (!is_brief) from = std::exchange(state_.under_way, {}), state_.cuts = form.cuts;
+    if (!is_brief) from = std::exchange(search().under_way, {}), search().cuts = form.cuts;
     if (from.p.size() != e.parameters.dimension()) from = {0, e.parameters.to_unconstrained(theta), {}};
     OptimiserSummary s;
     // Twice: contact is as stiff, and outliers weigh as little, as the law and the noise at the beginning say.
@@ -176,12 +179,12 @@ class PressFit {
       objective.emplace(std::move(*next));
       if (!s.succeeded) break;
       e.parameters.set_reference(e.parameters.to_theta(s.p));
-      if (!is_brief && options_.noise <= 0.0)
+      if (!is_brief && options_.marker_noise <= 0.0)
         noise_ = robust_deviation(objective->residuals(), 1e-6 * scene_->body->size());
       objective->set_options({noise_, outlier_scale});
       from = {0, s.p, {}};
     }
-    if (!is_brief) state_.under_way = {}, state_.cuts.clear();
+    if (!is_brief) search().under_way = {}, search().cuts.clear();
     if (!s.succeeded) {
       if (!is_brief) outcome_.notes.push_back(stage + ": " + s.reason);
       return std::nullopt;
@@ -198,14 +201,16 @@ class PressFit {
   }
 
   void keep_under_way(OptimiserState state, const std::vector<ZoneCut>& cuts) {
-    state_.under_way = std::move(state);
-    state_.cuts = cuts;
-    if (monitor_.on_state) monitor_.on_state(state_);
+    search().under_way = std::move(state);
+    search().cuts = cuts;
+    save();
   }
 
   void report(const std::string& stage, int iteration, double cost, const PressObjective& objective,
               const VectorX& theta, const LawLayout& layout) {
-    PressFitEvent event{stage, iteration, cost, 0.0, 0.0};
+    FitEvent event;
+    event.kind = StageKind::Law, event.stage = stage, event.iteration = iteration, event.cost = cost;
+    event.theta = theta, event.layout = std::make_shared<ParameterLayout>(layout.layout());
     const std::vector<double> residuals = objective.residuals();
     double sum = 0.0;
     for (const double r : residuals) sum += r * r;
@@ -214,8 +219,7 @@ class PressFit {
     const int controls = layout.form().controls;
     for (int k = 0; k < controls; ++k) log += std::log(theta[layout.modulus(k)]) / controls;
     event.youngs_modulus = std::exp(log);
-    if (monitor_.on_event) monitor_.on_event(event);
-    outcome_.history.push_back(event);
+    emit(std::move(event));
   }
 
   Estimate begun(const Form& form, const VectorX& theta) const {
@@ -228,19 +232,19 @@ class PressFit {
   }
 
   /// What an interrupted fit had done of this form, if anything.
-  const PressFitState::Done* done_before(const LawForm& form) const {
-    const auto it = std::ranges::find(state_.done, form, &PressFitState::Done::form);
-    return it == state_.done.end() ? nullptr : &*it;
+  const FitState::LawSearch::Done* done_before(const LawForm& form) const {
+    const auto it =
+        std::ranges::find(search().done, form, [](const FitState::LawSearch::Done& d) { return d.tried.form; });
+    return it == search().done.end() ? nullptr : &*it;
   }
 
   /// Keeps the estimate as the best, where it is that, and writes down that it was tried.
   void conclude(std::optional<Estimate> next, const TriedLaw& tried, double noise_before,
                 const std::vector<ZoneCut>& cuts = {}) {
-    outcome_.tried.push_back(tried);
+    law_.tried.push_back(tried);
     if (!interrupted_ && !done_before(tried.form)) {
-      state_.done.push_back(
-          {tried.form, cuts, next ? next->theta : VectorX(), tried.cost, tried.evidence, noise_, tried.kept});
-      if (monitor_.on_state) monitor_.on_state(state_);
+      search().done.push_back({tried, cuts, next ? next->theta : VectorX(), noise_});
+      save();
     }
     if (tried.kept)
       best_ = std::move(next);
@@ -289,19 +293,19 @@ class PressFit {
       const auto more = double(next->parameters.dimension() - best_->parameters.dimension());
       tried.evidence =
           0.5 * n * std::log(squares_of(best_->evaluation) / squares_of(next->evaluation)) - 0.5 * more * std::log(n);
-      tried.kept =
-          (options_.terms > 0 && layout.form().terms > best_->layout.form().terms) || tried.evidence > needed_evidence;
+      tried.kept = (options_.law_terms > 0 && layout.form().terms > best_->layout.form().terms) ||
+                   tried.evidence > needed_evidence;
     }
     conclude(std::move(next), tried, noise, form.cuts);
     return tried.kept && !interrupted_;
   }
 
   void fit_terms(int most) {
-    if (options_.terms > 0) most = std::min(most, options_.terms);
+    if (options_.law_terms > 0) most = std::min(most, options_.law_terms);
     while (best_->layout.form().terms < most && !stop()) {
       LawForm form = best_->layout.form();
       ++form.terms;
-      if (std::ranges::find(outcome_.tried, form, &TriedLaw::form) != outcome_.tried.end()) break;
+      if (std::ranges::find(law_.tried, form, &TriedLaw::form) != law_.tried.end()) break;
       const std::string stage = std::to_string(form.terms) + " terms";
       const LawLayout layout = layout_of(form);
       if (!fit_freer(layout, with_term(best_->layout, best_->theta, layout), stage)) break;
@@ -320,26 +324,26 @@ class PressFit {
   }
 
   void fit_zones() {
-    const int most = options_.zones > 0 ? options_.zones : options_.control_points > 1 ? 1 : most_zones;
+    const int most = options_.law_zones > 0 ? options_.law_zones : options_.control_points > 1 ? 1 : most_zones;
     for (int zones = 2; zones <= most; ++zones)
       if (stop() || !fit_zone(zones)) return;
   }
 
   /// One zone more than there are. False where that is not kept.
   bool fit_zone(int zones) {
-    const bool is_chosen = options_.zones > 0;
+    const bool is_chosen = options_.law_zones > 0;
     const LawForm form{zones, best_->layout.form().terms, zones, best_->layout.form().own_ratios};
     const LawLayout layout = layout_of(form);
     std::optional<PromisedCut> promised;
     std::vector<ZoneCut> cuts = best_->cuts;
-    const PressFitState::Done* done = done_before(form);
+    const FitState::LawSearch::Done* done = done_before(form);
     if (done && !done->cuts.empty()) {
       cuts = done->cuts;
     } else if (done) {
-      outcome_.tried.push_back({form, done->cost, done->evidence, done->kept});
+      law_.tried.push_back(done->tried);
       return false;
-    } else if (state_.under_way.p.size() > 0 && int(state_.cuts.size()) == zones - 1) {
-      cuts = state_.cuts;
+    } else if (search().under_way.p.size() > 0 && int(search().cuts.size()) == zones - 1) {
+      cuts = search().cuts;
     } else {
       PressObjective objective = objective_of(*best_);
       promised = most_promising_cut(objective, *best_->scene, best_->layout, best_->theta, best_->cuts,
@@ -400,12 +404,12 @@ class PressFit {
         noise_ = e.noise;
     }
     e.start_cost = start_cost;
-    state_.under_way = {}, state_.cuts.clear();
+    search().under_way = {}, search().cuts.clear();
   }
 
   /// A law of its own for each region, against one shape of the law for all.
   void fit_laws_of_regions() {
-    if (options_.zones == 1 || stop()) return;
+    if (options_.law_zones == 1 || stop()) return;
     const double noise = noise_;
     const LawForm& one = best_->layout.form();
     const LawLayout layout = layout_of({one.controls, one.terms, one.controls, one.own_ratios});
@@ -417,7 +421,7 @@ class PressFit {
       tried.evidence =
           own_laws_evidence(next->evaluation, next->parameters, next->parameters.to_unconstrained(next->theta), layout,
                             options_.modulus_variation);
-      tried.kept = options_.zones > 1 || tried.evidence > needed_evidence;
+      tried.kept = options_.law_zones > 1 || tried.evidence > needed_evidence;
     }
     conclude(std::move(next), tried, noise);
   }
@@ -454,8 +458,7 @@ class PressFit {
     TriedLaw tried{layout.form(), infinite, -infinite, false};
     std::optional<Estimate> next;
     const bool is_chosen = options_.control_points > 1;
-    if (const auto* done = done_before(layout.form()); done && done->theta.size() == 0)
-      tried.cost = done->cost, tried.evidence = done->evidence;
+    if (const auto* done = done_before(layout.form()); done && done->theta.size() == 0) tried = done->tried;
     if (is_chosen || done_before(layout.form()) || promises(form, start, carried, tried)) {
       next = estimate(form, start, std::to_string(size) + " control points");
       if (next) {
@@ -488,7 +491,7 @@ class PressFit {
     SampleFitOptions options;
     options.noise = noise_;
     options.max_iterations = options_.max_iterations;
-    std::vector<PressSample>& samples = state_.samples;
+    std::vector<PressSample>& samples = search().samples;
     std::mutex mutex;
     // A few at a time, so that an interruption loses little.
     const std::size_t batch = 4;
@@ -499,20 +502,21 @@ class PressFit {
         SampleFitOptions own = options;
         const ObservedPress& seen = scene_->presses[std::size_t(fitted_[i])];
         // The misfit of one law for all is no noise: what a press' markers show by themselves is, where that is less.
-        if (options_.noise <= 0.0)
+        if (options_.marker_noise <= 0.0)
           own.noise = std::min(noise_, std::max(marker_noise(seen), 1e-3 * seen.greatest_displacement));
         part[i - begin] = fit_sample(*scene_, fitted_[i], start, smoothness, own);
       });
       for (PressSample& sample : part) {
-        PressFitEvent event{"press " + std::to_string(samples.size() + 1), sample.iterations, sample.weight, sample.rms,
-                            start.youngs_modulus};
-        if (monitor_.on_event) monitor_.on_event(event);
-        outcome_.history.push_back(event);
+        FitEvent event;
+        event.kind = StageKind::Sample, event.stage = "press " + std::to_string(samples.size() + 1);
+        event.iteration = sample.iterations, event.cost = sample.weight, event.marker_rms = sample.rms;
+        event.youngs_modulus = start.youngs_modulus;
+        emit(std::move(event));
         samples.push_back(std::move(sample));
       }
-      if (monitor_.on_state) monitor_.on_state(state_);
+      save();
     }
-    outcome_.samples = samples;
+    law_.samples = samples;
     std::vector<MaterialSample> usable;
     for (std::size_t i = 0; i < samples.size(); ++i)
       if (samples[i].succeeded)
@@ -521,80 +525,90 @@ class PressFit {
         outcome_.notes.push_back(fmt::format("{} takes no part in the sampled material: {}",
                                              scene_->presses[std::size_t(fitted_[i])].name, samples[i].failure));
     if (usable.empty()) return;
-    outcome_.sampled = sample_material(usable, options_.basis);
+    law_.sampled = sample_material(usable, {options_.basis_tolerance, options_.basis_samples});
   }
 
-  PressFitOutcome finish() {
+  FitOutcome finish() {
     outcome_.interrupted = interrupted_;
+    outcome_.cells = options_.cells;
     if (!best_) return std::move(outcome_);
     Estimate& e = *best_;
-    outcome_.scene = e.scene;
-    outcome_.layout = e.layout;
+    law_.scene = e.scene, law_.layout = e.layout, law_.noise = e.noise, law_.cuts = e.cuts;
+    law_.law = press_law(*e.scene->body, e.layout, e.theta);
+    if (law_.sampled) law_.law = law_.sampled->law;
+    if (!interrupted_) law_.predictions = predict_presses(*e.scene, law_.law);
     outcome_.theta = e.theta;
     outcome_.parameters = e.parameters;
     outcome_.parameters.set_reference(e.theta);
     outcome_.evaluation = e.evaluation;
-    outcome_.noise = e.noise;
-    outcome_.start_cost = e.start_cost;
-    outcome_.control_points = e.points;
-    outcome_.cuts = e.cuts;
+    outcome_.start_cost = e.start_cost, outcome_.final_cost = e.evaluation.cost;
     outcome_.converged = e.converged && !interrupted_;
     outcome_.reason = interrupted_ ? "interrupted" : e.reason;
-    outcome_.covariance = parameter_covariance(e.evaluation);
-    outcome_.std = outcome_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-    const VectorX inverse = outcome_.std.cwiseMax(1e-300).cwiseInverse();
-    outcome_.correlation = inverse.asDiagonal() * outcome_.covariance * inverse.asDiagonal();
-    outcome_.law = press_law(*e.scene->body, e.layout, e.theta);
-    if (outcome_.sampled) outcome_.law = outcome_.sampled->law;
-    if (!interrupted_) outcome_.predictions = predict_presses(*e.scene, outcome_.law);
-    outcome_.succeeded = true;
+    add_uncertainty(outcome_);
+    outcome_.recordings.push_back(as_recording(e));
+    for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
+    add_law_notes(outcome_.notes, law_, capture_);
+    outcome_.law = std::move(law_);
     return std::move(outcome_);
   }
 
+  static RecordingOutcome as_recording(const Estimate& e) {
+    RecordingOutcome recording;
+    recording.discretisation.body = recording.rest_body = e.scene->body;
+    recording.discretisation.control_points = e.points;
+    MaterialBlocks& material = recording.discretisation.simulation.blocks;
+    material.youngs_moduli.clear();
+    for (int k = 0; k < e.layout.form().controls; ++k) material.youngs_moduli.push_back(e.layout.modulus(k));
+    recording.theta = e.theta;
+    recording.evaluation = e.evaluation;
+    return recording;
+  }
+
+  FitState::LawSearch& search() { return *all_state_.law; }
+  const FitState::LawSearch& search() const { return *all_state_.law; }
+  void save() {
+    if (monitor_.on_state) monitor_.on_state(all_state_);
+  }
+  void emit(FitEvent event) {
+    if (monitor_.on_event) monitor_.on_event(event);
+    outcome_.history.push_back(std::move(event));
+  }
+
   const Capture& capture_;
-  PressFitOptions options_;
-  const PressFitMonitor& monitor_;
-  PressFitState state_;
+  FitOptions options_;
+  const FitMonitor& monitor_;
+  FitState all_state_;
   std::shared_ptr<const PressScene> scene_;
   std::vector<int> fitted_;
   bool regions_ = false, interrupted_ = false;
   double noise_ = 0.0;
   std::optional<Estimate> best_;
-  PressFitOutcome outcome_;
+  LawOutcome law_;
+  FitOutcome outcome_;
 };
+
+/// What presses do not know is refused; what they merely do not use is told (`unused_choices`).
+void require_known(const Capture& capture, const FitOptions& options) {
+  const auto refuse = [&](const char* what, const char* advice) {
+    throw InputError({{capture.file}, what, "a fit of one capture's presses", advice});
+  };
+  if (options.element == ElementKind::Hexahedron)
+    refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
+           "leave out element, or choose tetrahedra or quadratic_tetrahedra");
+  if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
+  if (!options.parameters.empty())
+    refuse("choices about single parameters, which fits of presses do not know", "leave them out");
+}
 
 }  // namespace
 
-std::string PressFitOptions::validate() const {
-  if (!(cells >= 2.0 && cells <= 64.0)) return "cells must lie in 2..64";
-  if (terms < 0 || terms > 3) return "law_terms must lie in 1..3, or be 0: as many as the presses support";
-  if (zones < 0 || zones > 12) return "law_zones must lie in 1..12, or be 0: as many as the presses support";
-  if (zones > 1 && control_points > 1) return "law_zones and control_points cannot both be chosen";
-  if (control_points < 0 || control_points > 500) return "control_points must lie in 1..500, or be auto";
-  if (!(modulus_variation > 0.0 && modulus_variation <= 10.0)) return "modulus_variation must lie in (0, 10]";
-  if (!(noise >= 0.0)) return "marker_noise must not be negative";
-  if (max_iterations < 1) return "max_iterations must be at least 1";
-  if (!(basis.tolerance > 0.0) || basis.max_samples < 1) return "basis_tolerance must be positive, basis_samples >= 1";
-  return {};
+bool is_of_presses_alone(const Capture& capture) {
+  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
+  return !capture.presses.empty() && capture.scene.timing.times.empty() && !has_loads;
 }
 
-PressFitOptions press_options(const FitOptions& options) {
-  PressFitOptions o;
-  o.material = options.material == MaterialKind::Automatic ? MaterialKind::Ogden : options.material;
-  o.cells = options.cells;
-  o.quadratic = options.element == ElementKind::QuadraticTetrahedron;
-  o.terms = options.law_terms;
-  o.zones = options.law_zones;
-  o.control_points = std::max(0, options.control_points);
-  o.modulus_variation = options.modulus_variation;
-  o.noise = options.marker_noise;
-  o.max_iterations = options.max_iterations;
-  o.basis = {options.basis_tolerance, options.basis_samples};
-  return o;
-}
-
-PressFitOutcome fit_presses(const Capture& capture, const PressFitOptions& options, const PressFitMonitor& monitor,
-                            PressFitState resume) {
+FitOutcome fit_presses(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState resume) {
+  require_known(capture, options);
   return PressFit(capture, options, monitor, std::move(resume)).run();
 }
 

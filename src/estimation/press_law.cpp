@@ -60,12 +60,6 @@ ParameterSet law_parameters(const LawLayout& layout, double youngs_modulus) {
   return {layout.layout(), std::move(parameters), std::move(theta)};
 }
 
-void hold_all_but_moduli(ParameterSet& parameters) {
-  const std::vector<Parameter> all = parameters.parameters();
-  for (const Parameter& p : all)
-    if (p.role == Role::Material && !is_modulus(p)) parameters.set_estimated(p.name, false);
-}
-
 std::shared_ptr<const TabulatedLaw> press_law(const Body& body, const LawLayout& layout, const VectorX& theta) {
   return law_at(body, layout, theta);
 }

@@ -17,10 +17,6 @@ ParameterSet law_parameters(const LawLayout& layout, double youngs_modulus);
 void add_term_parameters(const ParameterLayout& layout, const LawLayout& law, int number, VectorX& theta,
                          std::vector<Parameter>& parameters);
 
-/// Keeps what a material has beside its moduli: Poisson's ratio, and what its law's terms have. These are told from the
-/// rest only once a fit is close.
-void hold_all_but_moduli(ParameterSet& parameters);
-
 /// The law of all elements of a pressed object for theta: `law_at`.
 std::shared_ptr<const TabulatedLaw> press_law(const Body& body, const LawLayout& layout, const VectorX& theta);
 
