@@ -15,6 +15,7 @@
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
+#include "gradient_check.hpp"
 #include "output/fit_output.hpp"
 #include "output/press_output.hpp"
 #include "report/report.hpp"
@@ -31,7 +32,7 @@ struct Arguments {
   std::string out, config, held_out;
   std::vector<std::string> settings;
   int threads = 0, refine = 0;
-  bool resume = false;
+  bool resume = false, check_gradient = false;
 };
 
 /// Lines for people on stderr, kept for log.txt.
@@ -190,12 +191,6 @@ int ended(bool converged, bool interrupted, const std::string& words, const fs::
   return converged ? Fine : NotConverged;
 }
 
-/// Whether a capture's presses are all that there is to fit.
-bool is_of_presses(const Capture& capture) {
-  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
-  return !capture.presses.empty() && capture.scene.timing.times.empty() && !has_loads;
-}
-
 std::string describe(const PressFitEvent& event) {
   char text[160];
   if (event.stage.starts_with("press"))
@@ -273,7 +268,8 @@ int run(const Arguments& arguments) {
 
   Log log;
   log.line("pliant " PLIANT_VERSION " fit " + words);
-  if (is_of_presses(recordings.front().capture)) {
+  if (arguments.check_gradient) return run_gradient_check(std::move(recordings), options, out);
+  if (is_of_static_tests(recordings.front().capture)) {
     const auto refuse = [&](const char* what, const char* advice) {
       throw InputError({{recordings.front().capture.file}, what, "a fit of one capture's presses", advice});
     };
@@ -367,6 +363,9 @@ void add_fit(CommandLine& line, int& exit_code) {
       .type_name("N");
   command.option("--threads", arguments->threads, "most threads to use; all processors where left out").positive();
   command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
+  command.flag("--check-gradient", arguments->check_gradient,
+               "instead of fitting compare the objective's gradient at the start by tangents, by the adjoint and by "
+               "central differences; fails where they disagree");
   command.footer(key_help());
   command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -71,6 +71,11 @@ std::vector<Vector3> without_probe(const ObservedPress& seen) {
 
 }  // namespace
 
+bool is_of_static_tests(const Capture& capture) {
+  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
+  return !capture.presses.empty() && capture.scene.timing.times.empty() && !has_loads;
+}
+
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body) {
   PressScene scene;
   scene.held = held_nodes(*body, held_regions(capture.scene));

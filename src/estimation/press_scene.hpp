@@ -22,6 +22,9 @@ struct ObservedPress {
   double greatest_displacement = 0.0;  ///< [m]
 };
 
+/// Whether static tests with known forces are all that a capture has to fit: no frames, and no load to fit.
+bool is_of_static_tests(const Capture& capture);
+
 /// What presses of one object share, and the presses.
 struct PressScene {
   std::shared_ptr<const Body> body;

@@ -188,6 +188,16 @@ TEST_F(Session, EvaluateAgreesWithTheFit) {
   EXPECT_NEAR(evaluated / fitted, 1.0, 0.1) << "more points of the same frames, the same noise";
 }
 
+TEST_F(Session, TheGradientIsCheckedInsteadOfFitting) {
+  const ProgramRun run = run_fit("checked", {"--check-gradient"});
+  EXPECT_EQ(run.exit_code, fine) << run.err << run.out;
+  for (const char* name : {"youngs_modulus", "stiffness_damping", "agree as far as"})
+    EXPECT_THAT(run.out, HasSubstr(name));
+  EXPECT_FALSE(fs::exists(at("checked") + "/result.json"));
+  EXPECT_THAT(read_file(at("checked") + "/gradient.csv"),
+              testing::StartsWith("parameter,step,difference,tangents,adjoint\nyoungs_modulus,0.1"));
+}
+
 TEST_F(Session, TooFewIterationsAreNotConverged) {
   const ProgramRun run = run_fit("short", {"--set", "max_iterations=1", "--set", "optimiser=rprop"});
   EXPECT_EQ(run.exit_code, not_converged) << run.err;
