@@ -101,6 +101,13 @@ void describe_sensors(const Capture& capture) {
   if (!capture.presses.empty())
     say("presses", formatted("%zu, of them %d for test only", capture.presses.size(),
                              int(std::ranges::count_if(capture.presses, is_test))));
+  const auto say_tests = [&](const char* what, const auto& tests) {
+    if (!tests.empty())
+      say(what, formatted("%zu, of them %d for test only", tests.size(), int(std::ranges::count_if(tests, is_test))));
+  };
+  say_tests("indentations", capture.indentations);
+  say_tests("grips", capture.grips);
+  say_tests("stress-strain curves", capture.material_curves);
   if (!capture.loads.empty())
     say("loads", formatted("%zu, of them %d for test only", capture.loads.size(),
                            int(std::ranges::count_if(capture.loads, is_test))));

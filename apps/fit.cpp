@@ -213,9 +213,12 @@ void print_result(const Result& result, const PressFitOutcome& outcome, const fs
   }
   for (const StaticError& press : press_errors(*outcome.scene, outcome.predictions))
     if (press.role == "test") std::cout << "  " << press_sentence(press) << "\n";
+  for (const CurvePrediction& curve : result.curves) std::cout << "  " << curve_sentence(curve) << "\n";
   char line[120];
-  std::snprintf(line, sizeof line, "  markers %.2f mm rms over the fitted presses; %s after %.0f s\n",
-                1e3 * result.error.marker_rms.value_or(0.0), outcome.reason.c_str(), seconds);
+  if (result.error.marker_rms)
+    std::snprintf(line, sizeof line, "  markers %.2f mm rms over what was fitted; ", 1e3 * *result.error.marker_rms);
+  std::cout << (result.error.marker_rms ? line : "  ");
+  std::snprintf(line, sizeof line, "%s after %.0f s\n", outcome.reason.c_str(), seconds);
   std::cout << line;
   for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
   std::cout << "Look at " << (out / "report.html").string() << "; press it with: pliant press "
@@ -279,8 +282,10 @@ int run(const Arguments& arguments) {
       refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
              "leave out element, or choose tetrahedra or quadratic_tetrahedra");
     if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
-    if (!options.parameters.empty())
-      refuse("choices about single parameters, which fits of presses do not know", "leave them out");
+    for (const auto& [name, choice] : options.parameters)
+      if (name != "poisson_ratio" || !choice.start || choice.estimated != false)
+        refuse("choices about single parameters, of which fits of static tests know a given Poisson's ratio alone",
+               "leave them out, or give poisson_ratio and poisson_ratio.estimate=false");
     return run_presses(arguments, options, recordings.front().capture, words, log);
   }
   ObserveOptions observe_options;

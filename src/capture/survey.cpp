@@ -291,12 +291,15 @@ std::string millimetres(double metres) {
 
 bool has_forces_to_fit(const Capture& capture) {
   const auto is_fit = [](const auto& item) { return item.role == "fit"; };
-  return std::ranges::any_of(capture.presses, is_fit) || std::ranges::any_of(capture.loads, is_fit);
+  const auto has_force = [&](const Grip& grip) { return is_fit(grip) && grip.force; };
+  return std::ranges::any_of(capture.presses, is_fit) || std::ranges::any_of(capture.loads, is_fit) ||
+         std::ranges::any_of(capture.indentations, is_fit) || std::ranges::any_of(capture.grips, has_force) ||
+         std::ranges::any_of(capture.material_curves, is_fit);
 }
 
 void add_scale(const Capture& capture, Prospects& result) {
   if (has_forces_to_fit(capture))
-    result.possible.push_back("Pascals are anchored by measured forces: `[[press]]` or `[[load]]`.");
+    result.possible.push_back("Pascals are anchored by measured forces or stresses.");
   else if (capture.scene.initial.release_of)
     result.possible.push_back("Pascals are anchored by the weight from which the object is released.");
   else if (capture.scene.object.mass || capture.scene.object.density)
@@ -378,6 +381,12 @@ Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
 
 Prospects prospects(const Capture& capture, const Survey& seen) {
   Prospects result;
+  const bool has_curves = std::ranges::any_of(capture.material_curves, [](const auto& c) { return c.role == "fit"; });
+  if (has_curves && !capture.scene.object.surface) {
+    result.possible.push_back("Stiffness: from stress-strain curves of the material.");
+    add_scale(capture, result);
+    return result;
+  }
   if (!capture.scene.object.surface) {
     result.impossible.push_back(
         "Nothing can be fitted: there is no scan of the object at rest. Scan it all around and write `[object] "

@@ -221,7 +221,7 @@ MatrixX law_parameter_derivatives(const LawForm& form, const VectorX& own) {
 MatrixX law_parameters_by_theta(const Body& body, const LawLayout& layout, const VectorX& theta, int e) {
   const VectorX own = element_numbers(body, layout, theta, e);
   const MatrixX by_own = law_parameter_derivatives(layout.form(), own);
-  MatrixX by_theta = MatrixX::Zero(by_own.rows(), layout.size());
+  MatrixX by_theta = MatrixX::Zero(by_own.rows(), theta.size());
   for (const auto& [number, at, share] : number_shares(body, layout, theta, own, e))
     by_theta.col(at) += share * by_own.col(number);
   return by_theta;

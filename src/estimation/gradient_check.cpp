@@ -12,8 +12,8 @@ namespace pliant {
 namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
-constexpr double trust = 10.0;          // times the spread of neighbouring differences: what they cannot tell
-constexpr double least_digits = 0.05;   // of the derivative: differences less certain than this decide nothing
+constexpr double trust = 10.0;         // times the spread of neighbouring differences: what they cannot tell
+constexpr double least_digits = 0.05;  // of the derivative: differences less certain than this decide nothing
 
 using Verdict = CheckedDerivative::Verdict;
 

@@ -29,7 +29,7 @@ struct CheckedDerivative {
   double by_difference = 0.0;  ///< at the best step; not a number where no three neighbouring steps could be evaluated
   double step = 0.0;           ///< best step size: there differences change least from step to step
   double uncertainty = 0.0;    ///< by how much the difference at the best step may be wrong
-  double scale = 0.0;          ///< root of the Gauss-Newton matrix's diagonal: size of a gradient that noise alone makes
+  double scale = 0.0;  ///< root of the Gauss-Newton matrix's diagonal: size of a gradient that noise alone makes
   std::vector<double> steps, differences;  ///< the whole V-curve; not a number where the cost cannot be evaluated
   Verdict verdict = Verdict::Undecided;
 };

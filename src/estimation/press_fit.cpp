@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
+#include "estimation/curve_fit.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/problem.hpp"
@@ -31,8 +32,9 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The deviation that residuals show, by the median of their sizes.
+/// The deviation that residuals show, by the median of their sizes; the least where there are none.
 double robust_deviation(std::vector<double> residuals, double least) {
+  if (residuals.empty()) return least;
   for (double& r : residuals) r = std::abs(r);
   return std::max(least, 1.4826 * median(std::move(residuals)));
 }
@@ -43,10 +45,11 @@ std::shared_ptr<const Body> with_field(const Body& body, ModulusField field) {
   return copy;
 }
 
-/// Sum of the squares of all residuals [m^2].
-double squares_of(const CostEvaluation& evaluation) {
+/// Sum of the squares of all residuals [m^2]: of markers as they are, of curves over their standard deviations and
+/// times the square of `noise`.
+double squares_of(const CostEvaluation& evaluation, double noise) {
   double sum = 0.0;
-  for (const FrameFit& f : evaluation.frames) sum += f.track_sum_squares;
+  for (const FrameFit& f : evaluation.frames) sum += f.tracks > 0 ? f.track_sum_squares : 2.0 * f.cost * noise * noise;
   return sum;
 }
 
@@ -89,8 +92,16 @@ class PressFit {
     scene_ = std::make_shared<PressScene>(make_press_scene(capture, body));
     for (int i = 0; i < int(scene_->presses.size()); ++i)
       if (scene_->presses[std::size_t(i)].role == "fit") fitted_.push_back(i);
-    if (fitted_.empty())
-      throw InputError({{capture.file}, "no press is to be fitted", "a block [[press]] whose role is \"fit\"", ""});
+    if (fitted_.empty() && !scene_->static_tests().any_to_fit())
+      throw InputError({{capture.file},
+                        "no static test is to be fitted",
+                        "a block [[press]], [[indentation]], [[grip]] or [[material_curve]] whose role is \"fit\"",
+                        ""});
+    if (fitted_.empty() && options.material == PressMaterial::Sampled)
+      throw InputError({{capture.file},
+                        "material=sampled and no press to fit",
+                        "blocks [[press]], whose markers show where the object is how stiff",
+                        "leave out material, or choose ogden or linear"});
     regions_ = body->modulus.controls > 1;
     noise_ = options.noise > 0.0 ? options.noise : scene_->noise;
   }
@@ -141,6 +152,9 @@ class PressFit {
 
   ParameterSet parameters_of(const Form& form) const {
     ParameterSet set = zone_parameters(form.layout, start_modulus(), options_.modulus_variation);
+    if (options_.poissons_ratio)
+      for (const Parameter& p : set.parameters())
+        if (p.transform == Transform::LogitHalf) set.fix(p.name, *options_.poissons_ratio);
     if (!form.points.empty())
       set.set_joint_prior(form.layout.modulus_names(),
                           field_precision(form.points, form.scene->body->size(), options_.modulus_variation));
@@ -284,7 +298,8 @@ class PressFit {
       const double n = next->evaluation.independent_observations();
       const auto more = double(next->parameters.dimension() - best_->parameters.dimension());
       tried.evidence =
-          0.5 * n * std::log(squares_of(best_->evaluation) / squares_of(next->evaluation)) - 0.5 * more * std::log(n);
+          0.5 * n * std::log(squares_of(best_->evaluation, noise_) / squares_of(next->evaluation, noise_)) -
+          0.5 * more * std::log(n);
       tried.kept =
           (options_.terms > 0 && layout.form().terms > best_->layout.form().terms) || tried.evidence > needed_evidence;
     }
@@ -301,7 +316,7 @@ class PressFit {
       const std::string stage = std::to_string(form.terms) + " terms";
       const LawLayout layout = layout_of(form);
       if (!fit_freer(layout, with_term(best_->layout, best_->theta, layout), stage)) break;
-      if (form.own_ratios || stop()) continue;
+      if (form.own_ratios || options_.poissons_ratio || stop()) continue;
       form.own_ratios = true;
       const LawLayout apart = layout_of(form);
       fit_freer(apart, carry_law(best_->layout, best_->theta, apart, as_they_are(form)), stage + " apart");
@@ -316,6 +331,7 @@ class PressFit {
   }
 
   void fit_zones() {
+    if (!scene_->static_tests().curves.empty()) return;  // of a specimen: the object is of one material
     const int most = options_.zones > 0 ? options_.zones : options_.control_points > 1 ? 1 : most_zones;
     for (int zones = 2; zones <= most; ++zones)
       if (stop() || !fit_zone(zones)) return;
@@ -357,8 +373,9 @@ class PressFit {
       tried.cost = next->evaluation.cost;
       tried.evidence = zone_evidence(next->evaluation, next->parameters, next->parameters.to_unconstrained(next->theta),
                                      layout, from, options_.modulus_variation);
-      tried.kept = is_chosen || (tried.evidence > needed_evidence &&
-                                 squares_of(next->evaluation) < (1.0 - least_gain) * squares_of(best_->evaluation));
+      tried.kept = is_chosen ||
+                   (tried.evidence > needed_evidence &&
+                    squares_of(next->evaluation, noise_) < (1.0 - least_gain) * squares_of(best_->evaluation, noise_));
     }
     conclude(std::move(next), tried, noise, cuts);
     return tried.kept;
@@ -419,7 +436,7 @@ class PressFit {
   }
 
   void fit_fields() {
-    if (options_.control_points == 1) return;
+    if (options_.control_points == 1 || !scene_->static_tests().curves.empty()) return;
     std::vector<int> sizes(field_sizes.begin(), field_sizes.end());
     if (options_.control_points > 1) sizes = {options_.control_points};
     for (const int size : sizes) {
@@ -585,12 +602,15 @@ PressFitOptions press_options(const FitOptions& options) {
   o.modulus_variation = options.modulus_variation;
   o.noise = options.marker_noise;
   o.max_iterations = options.max_iterations;
+  if (const auto known = options.parameters.find("poisson_ratio"); known != options.parameters.end())
+    if (known->second.start && known->second.estimated == false) o.poissons_ratio = (*known->second.start)[0];
   o.basis = {options.basis_tolerance, options.basis_samples};
   return o;
 }
 
 PressFitOutcome fit_presses(const Capture& capture, const PressFitOptions& options, const PressFitMonitor& monitor,
                             PressFitState resume) {
+  if (is_of_material_curves(capture)) return fit_material_curves(capture, options);
   return PressFit(capture, options, monitor, std::move(resume)).run();
 }
 

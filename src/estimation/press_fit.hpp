@@ -15,15 +15,16 @@ namespace pliant {
 
 struct PressFitOptions {
   PressMaterial material = PressMaterial::Ogden;
-  double cells = 12.0;             ///< elements along the object's longest axis
-  bool quadratic = false;          ///< elements; else linear
-  int terms = 0;                   ///< of Ogden's law, 1..3; 0: as many as the presses support
-  int zones = 0;                   ///< with a law of their own each, 1..12; 0: as many as they support
-  int control_points = 0;          ///< of Young's modulus, where there are no zones; 0: as many as they support
-  double modulus_variation = 1.5;  ///< prior deviation of ln E between points an object's length apart
-  double noise = 0.0;              ///< of a coordinate [m]; 0: what the residuals say
-  int max_iterations = 25;         ///< of the optimiser, each stage
-  BasisOptions basis;              ///< of the sampled material
+  double cells = 12.0;                   ///< elements along the object's longest axis
+  bool quadratic = false;                ///< elements; else linear
+  int terms = 0;                         ///< of Ogden's law, 1..3; 0: as many as the presses support
+  int zones = 0;                         ///< with a law of their own each, 1..12; 0: as many as they support
+  int control_points = 0;                ///< of Young's modulus, where there are no zones; 0: as many as they support
+  double modulus_variation = 1.5;        ///< prior deviation of ln E between points an object's length apart
+  double noise = 0.0;                    ///< of a coordinate [m]; 0: what the residuals say
+  int max_iterations = 25;               ///< of the optimiser, each stage
+  std::optional<double> poissons_ratio;  ///< known; nothing: estimated
+  BasisOptions basis;                    ///< of the sampled material
   std::string validate() const;
 };
 

@@ -26,8 +26,8 @@ StartObjective of_static_tests(const Capture& capture, const FitOptions& options
                          controls > 1 ? modulus_names(capture, controls) : std::vector<std::string>{});
   const ParameterSet parameters = law_parameters(layout, 2.0 * punch_modulus(*scene, 0.3));
   const double noise = choices.noise > 0.0 ? choices.noise : scene->noise;
-  const auto objective = std::make_shared<PressObjective>(scene, fitted, layout, parameters,
-                                                          PressTrialOptions{noise, outlier_scale});
+  const auto objective =
+      std::make_shared<PressObjective>(scene, fitted, layout, parameters, PressTrialOptions{noise, outlier_scale});
   return {{objective, &objective->cost()}, parameters.to_unconstrained(parameters.reference())};
 }
 

@@ -46,7 +46,8 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   }
   for (std::size_t c = 0; c < outcome.cuts.size(); ++c)
     fit.notes.push_back(fmt::format("Zones: {}.", describe(outcome.cuts[c], int(c) + 1)));
-  fit.notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * outcome.noise));
+  if (!outcome.scene->presses.empty())
+    fit.notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * outcome.noise));
   if (outcome.sampled) {
     double least = std::numeric_limits<double>::infinity(), most = 0.0;
     for (const PressSample& s : outcome.samples) least = std::min(least, s.weight), most = std::max(most, s.weight);
@@ -66,6 +67,7 @@ Result make_result(const Capture& capture, const PressFitOutcome& outcome, const
   recording.theta = outcome.theta;
   fit.recordings.push_back(std::move(recording));
   Result result = make_result(std::vector<RecordedCapture>{{capture, {}}}, fit, facts);
+  result.curves = predict_curves(*outcome.scene, outcome.law);
   // Where the fit began was another form of the law.
   for (ParameterResult& parameter : result.parameters) parameter.start.reset();
   return result;
@@ -113,10 +115,26 @@ std::vector<StaticError> press_errors(const PressScene& scene, const std::vector
   return errors;
 }
 
-std::vector<StaticError> predict_presses(const Model& model, const Capture& capture) {
+namespace {
+
+void require_tetrahedra(const Model& model) {
   if (model.volume.kind != VtuCell::Tetrahedron && model.volume.kind != VtuCell::QuadraticTetrahedron)
     throw InputError(
         {{}, "a model of hexahedra", "tetrahedra, which rigid bodies can press", "fit with --set element=tetrahedra"});
+}
+
+}  // namespace
+
+std::vector<CurvePrediction> predict_curves(const Model& model, const Capture& capture) {
+  const auto body = model_body(model);
+  if (capture.indentations.empty() && capture.grips.empty())
+    return predict_curves(observed_curves(capture), *law_of(model, *body));
+  require_tetrahedra(model);
+  return predict_curves(make_press_scene(capture, body), law_of(model, *body));
+}
+
+std::vector<StaticError> predict_presses(const Model& model, const Capture& capture) {
+  require_tetrahedra(model);
   const auto body = model_body(model);
   const PressScene scene = make_press_scene(capture, body);
   return press_errors(scene, predict_presses(scene, law_of(model, *body)));
@@ -180,11 +198,11 @@ void write_press_output(const fs::path& folder, const Capture& capture, const Pr
                         const std::function<void(const char*, int, int)>& progress) {
   const ConvergenceHistory history = history_of(outcome);
   write_result(folder / "result.json", result);
-  save_model(folder, make_model(capture, outcome));
+  if (capture.scene.object.surface) save_model(folder, make_model(capture, outcome));
   write_convergence(folder / "convergence.csv", history);
-  write_file(folder / "presses.csv", presses_csv(outcome));
+  if (!outcome.predictions.empty()) write_file(folder / "presses.csv", presses_csv(outcome));
   if (outcome.sampled) write_file(folder / "basis.csv", basis_csv(*outcome.sampled));
-  write_deformed(folder, outcome, progress);
+  if (!outcome.predictions.empty()) write_deformed(folder, outcome, progress);
   ReportData report;
   report.title = capture.name;
   report.capture_path = facts.capture_path;

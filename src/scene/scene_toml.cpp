@@ -340,6 +340,12 @@ void write_toml(std::ostream& out, const Initial& initial) {
   out << "\n";
 }
 
+void write_region(std::ostream& out, const Region& region, const std::string& vertices_file) {
+  out << region_text(region, vertices_file);
+}
+
+void write_region_file(const fs::path& file, const Region& region) { write_vertices(file, region); }
+
 void write_toml_blocks(std::ostream& out, const Scene& scene) {
   for (const Plane& plane : scene.planes) write_toml(out, plane);
   for (std::size_t i = 0; i < scene.fixed.size(); ++i) {

@@ -46,9 +46,7 @@ class SmallTrial : public Trial {
   }
 
  private:
-  static Vector3 residuals(const VectorX& t) {
-    return {std::exp(0.3 * t[0]) - 2.0, t[0] * t[1] - 1.0, std::sin(t[1])};
-  }
+  static Vector3 residuals(const VectorX& t) { return {std::exp(0.3 * t[0]) - 2.0, t[0] * t[1] - 1.0, std::sin(t[1])}; }
   static MatrixX jacobian(const VectorX& t) {
     MatrixX J(3, 2);
     J << 0.3 * std::exp(0.3 * t[0]), 0.0, t[1], t[0], 0.0, std::cos(t[1]);
