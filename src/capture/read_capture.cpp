@@ -190,7 +190,7 @@ class Reader {
   Indentation read_indentation(TomlTable& block) {
     Indentation test;
     test.name = block.optional<std::string>("name").value_or("");
-    test.probe = ProbeShape(
+    test.probe = IndenterShape(
         read_word(block, "probe", {"ball", "punch"}, block.required<std::string>("probe", "the probe's shape")));
     test.radius = block.required<double>("radius", "of the ball, or of the punch's flat end, in metres").value_or(0.0);
     test.contact = block.required<Vector3>("contact", "the point of the undeformed surface that is touched first")

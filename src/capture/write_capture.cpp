@@ -113,7 +113,7 @@ class Writer {
   void write(const Indentation& test) {
     out_ << "[[indentation]]\n";
     write_name(test.name);
-    out_ << "probe = " << (test.probe == ProbeShape::Ball ? "\"ball\"" : "\"punch\"")
+    out_ << "probe = " << (test.probe == IndenterShape::Ball ? "\"ball\"" : "\"punch\"")
          << "\nradius = " << toml_text(test.radius) << "   # m\ncontact = " << toml_text(test.contact)
          << "\ndirection = " << toml_text(test.direction) << "\ncurve = " << file_text(test.curve)
          << "\nrole = " << toml_text(test.role) << "\n\n";

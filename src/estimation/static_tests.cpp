@@ -63,7 +63,7 @@ ObservedGrip observe_grip(const Capture& capture, std::size_t i, const Body& bod
 ObservedIndentation observe_indentation(const Capture& capture, std::size_t i) {
   const Indentation& test = capture.indentations[i];
   ProbeOptions probe;
-  probe.kind = test.probe == ProbeShape::Ball ? ProbeKind::Ball : ProbeKind::Punch;
+  probe.kind = test.probe == IndenterShape::Ball ? ProbeKind::Ball : ProbeKind::Punch;
   probe.centre = test.contact;
   probe.radius = test.radius;
   probe.axis = test.direction;
