@@ -74,13 +74,13 @@ enum class IndenterShape { Ball, Punch };
 
 /// Force-depth curve: a probe that touches the object is pushed into it along a line, to one depth after the other.
 struct Indentation {
-  std::string name;                       ///< for reports; empty: none
-  IndenterShape probe = IndenterShape::Ball;    ///< a sphere, or a flat-ended cylinder
-  double radius = 0.0;                    ///< [m] of the sphere, or of the cylinder's end
-  Vector3 contact = Vector3::Zero();      ///< [m] point of the undeformed surface that the probe touches first
-  Vector3 direction = -Vector3::UnitY();  ///< unit vector along which the probe advances, into the object
-  std::filesystem::path curve;            ///< absolute; CSV `depth,force,std`
-  std::string role = "fit";               ///< "fit" or "test"
+  std::string name;                           ///< for reports; empty: none
+  IndenterShape probe = IndenterShape::Ball;  ///< a sphere, or a flat-ended cylinder
+  double radius = 0.0;                        ///< [m] of the sphere, or of the cylinder's end
+  Vector3 contact = Vector3::Zero();          ///< [m] point of the undeformed surface that the probe touches first
+  Vector3 direction = -Vector3::UnitY();      ///< unit vector along which the probe advances, into the object
+  std::filesystem::path curve;                ///< absolute; CSV `depth,force,std`
+  std::string role = "fit";                   ///< "fit" or "test"
   bool operator==(const Indentation&) const = default;
 };
 
