@@ -283,9 +283,9 @@ int run(const Arguments& arguments) {
              "leave out element, or choose tetrahedra or quadratic_tetrahedra");
     if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
     for (const auto& [name, choice] : options.parameters)
-      if (name != "poisson_ratio" || !choice.start || choice.estimated != false)
+      if (name != "poissons_ratio" || !choice.start || choice.estimated != false)
         refuse("choices about single parameters, of which fits of static tests know a given Poisson's ratio alone",
-               "leave them out, or give poisson_ratio and poisson_ratio.estimate=false");
+               "leave them out, or give poissons_ratio and poissons_ratio.estimate=false");
     return run_presses(arguments, options, recordings.front().capture, words, log);
   }
   ObserveOptions observe_options;
@@ -335,8 +335,8 @@ std::string key_help() {
   }
   text << parameter_key_help() << "\n\nExamples:\n"
        << "  pliant fit recordings/bear --out out/bear\n"
-       << "  pliant fit recordings/bear --out out/bear --set cells=16 --set poisson_ratio=0.3 --set "
-          "poisson_ratio.estimate=false\n"
+       << "  pliant fit recordings/bear --out out/bear --set cells=16 --set poissons_ratio=0.3 --set "
+          "poissons_ratio.estimate=false\n"
        << "Ctrl-C leaves the best result so far; --resume goes on from there.";
   return text.str();
 }

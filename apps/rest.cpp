@@ -129,7 +129,7 @@ int run(const Arguments& arguments) {
 }
 
 constexpr const char* footer =
-    R"(Keys of --set are those of `pliant fit` that a resting object has: youngs_modulus (needed), poisson_ratio, density,
+    R"(Keys of --set are those of `pliant fit` that a resting object has: youngs_modulus (needed), poissons_ratio, density,
 cells, element (quadratic_tetrahedra where left out, or tetrahedra), control_points, youngs_modulus@REGION.
 
 Examples:

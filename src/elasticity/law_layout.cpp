@@ -73,13 +73,13 @@ void LawLayout::add_laws(ParameterLayout& layout, const ParameterHandle& first_r
         form_.laws == 1 || owner.find('@') == std::string::npos ? "" : owner.substr(owner.find('@'));
     const auto add = [&](const std::string& name) { return layout.add({name + place, "1", 1, Role::Material}); };
     Blocks blocks;
-    blocks.poissons_ratios = {law == 0 && first_ratio.exists() ? first_ratio : add("poisson_ratio")};
+    blocks.poissons_ratios = {law == 0 && first_ratio.exists() ? first_ratio : add("poissons_ratio")};
     for (int i = 0; i < form_.terms; ++i) {
       const std::string number = "_" + std::to_string(i + 1);
       blocks.exponents.push_back(add("exponent" + number));
       blocks.stiffness_ratios.push_back(i > 0 ? add("stiffness_ratio" + number) : ParameterHandle{});
       if (i > 0)
-        blocks.poissons_ratios.push_back(form_.own_ratios ? add("poisson_ratio" + number)
+        blocks.poissons_ratios.push_back(form_.own_ratios ? add("poissons_ratio" + number)
                                                           : blocks.poissons_ratios.front());
     }
     laws_.push_back(std::move(blocks));

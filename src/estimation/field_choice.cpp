@@ -125,7 +125,7 @@ class FieldChoice {
     // latter where it began.
     FitState::Fine& fine = *begin.fine;
     fine.stage = std::max(0, fine.stage - (begin.corrected && !begin.corrected->parameters.empty() ? 2 : 1));
-    if (const Parameter* nu = parameters.find("poisson_ratio"); nu->estimated) {
+    if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated) {
       fine.reference[nu->at] = recordings.parameters().reference()[nu->at];
     }
     return begin;

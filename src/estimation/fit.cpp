@@ -123,7 +123,7 @@ class Fit {
       if ((was_interrupted || coarse_is_as_fine()) && !last) continue;
       parameters = run_.parameters;
       // Where swings may still be out of step, Poisson's ratio would make up for what others lack.
-      if (run_.swings() && !last) parameters.set_estimated("poisson_ratio", false);
+      if (run_.swings() && !last) parameters.set_estimated("poissons_ratio", false);
       parameters.set_reference(now.reference);
       if (now.optimiser.p.size() == 0) now.optimiser = FitRun::start_of(parameters);
       Objective objective = run_.recordings.objective(run_.fine, parameters, stage.band,

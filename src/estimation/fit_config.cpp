@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 #include "scene/toml_table.hpp"
 
 namespace pliant {
@@ -30,8 +31,8 @@ const std::vector<std::pair<std::string, TrackingUse>> tracking_uses = {{"auto",
                                                                         {"off", TrackingUse::Off},
                                                                         {"loop", TrackingUse::Loop},
                                                                         {"both", TrackingUse::Both}};
-const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {{"together", LoadFreeScheme::Together},
-                                                                               {"in_turns", LoadFreeScheme::InTurns}};
+const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {
+    {"monolithic", LoadFreeScheme::Monolithic}, {"staggered", LoadFreeScheme::Staggered}};
 const std::vector<std::pair<std::string, std::optional<ElementKind>>> elements = {
     {"automatic", std::nullopt},
     {"hexahedra", ElementKind::Hexahedron},
@@ -44,9 +45,11 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
 const std::set<std::string> parameter_names = {
-    "youngs_modulus",   "poisson_ratio", "mass_damping",   "stiffness_damping", "density", "gravity", "linear_velocity",
-    "angular_velocity", "plane",         "plane_2",        "plane_3",           "plane_4", "pull",    "range_error",
-    "sensor_turn",      "sensor_shift",  "scan_correction"};
+    "youngs_modulus", "poissons_ratio", "mass_damping",    "stiffness_damping",
+    "density",        "gravity",        "linear_velocity", "angular_velocity",
+    "plane",          "plane_2",        "plane_3",         "plane_4",
+    "pull",           "range_error",    "sensor_turn",     "sensor_shift",
+    "scan_correction"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -175,7 +178,8 @@ const std::vector<Entry>& entries() {
       integer_entry("tracking_rounds", "1..10", "of tracking and fitting in turns, at most",
                     &FitOptions::tracking_rounds),
       choice_entry("load_free",
-                   "the load-free shape of an object scanned as it sags and its material: together, or in_turns",
+                   "coupling of the material and the stress-free shape of an object scanned under gravity: monolithic, "
+                   "or staggered",
                    load_free_schemes, &FitOptions::load_free),
       integer_entry("scan_points", "0..50",
                     "about which a scan that is only roughly right is corrected; 0: it is right",
@@ -226,6 +230,13 @@ const Entry* find_entry(const std::string& name) {
   for (const Entry& e : entries())
     if (e.key.name == name) return &e;
   return nullptr;
+}
+
+/// What a choice's value is called now.
+std::string present_value(const std::string& key, const std::string& value) {
+  if (key == "load_free" && value == "together") return "monolithic";
+  if (key == "load_free" && value == "in_turns") return "staggered";
+  return value;
 }
 
 [[noreturn]] void reject_unknown(const std::string& key) {
@@ -280,7 +291,7 @@ const std::vector<FitKey>& fit_keys() {
 }
 
 std::string parameter_key_help() {
-  return "Parameters (youngs_modulus, poisson_ratio, mass_damping, stiffness_damping, density, gravity, "
+  return "Parameters (youngs_modulus, poissons_ratio, mass_damping, stiffness_damping, density, gravity, "
          "linear_velocity,\n"
          "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, and for what sensors get wrong "
          "range_error@SENSOR,\n"
@@ -301,10 +312,18 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
     if (value == "0") return;
     throw InputError({{}, "seed is \"" + value + "\"", "no seed: nothing in a fit is random", "leave it out"});
   }
+  if (const std::string present = present_value(key, value); present != value) {
+    note_former_word(value, present, key);
+    return set_fit_option(options, key + "=" + present);
+  }
   if (const Entry* entry = find_entry(key)) {
     if (const auto expected = entry->read(options, value))
       throw InputError({{}, key + " is \"" + value + "\"", *expected, ""});
     return;
+  }
+  if (const std::string present = present_name(key); present != key) {
+    note_former_word(key, present, "");
+    return set_fit_option(options, present + "=" + value);
   }
   // The name of a region, control point or sensor stands after an @ and may hold dots itself.
   std::string name = key, part;
@@ -450,8 +469,8 @@ std::string FitOptions::validate() const {
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
   if (scan_points < 0 || scan_points > 50) return "scan_points must lie in 0..50";
   if (!(scan_std > 0.0 && scan_std <= 0.2)) return "scan_std must lie in (0, 0.2]";
-  if (scan_points > 0 && load_free == LoadFreeScheme::InTurns)
-    return "load_free=in_turns holds the shape while it moves parameters: it cannot correct the scan (scan_points)";
+  if (scan_points > 0 && load_free == LoadFreeScheme::Staggered)
+    return "load_free=staggered holds the shape while it moves parameters: it cannot correct the scan (scan_points)";
   if (tracking_rounds < 1 || tracking_rounds > 10) return "tracking_rounds must lie in 1..10";
   if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
   if (control_points != automatic && control_points != unsaid && (control_points < 1 || control_points > 500))

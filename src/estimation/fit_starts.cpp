@@ -300,7 +300,7 @@ class StartFinder {
     if (scanned_) set_all_moduli(theta, modulus);
     parameters.set_reference(theta);
     // Poisson's ratio is told from the rest only once the fit is close.
-    parameters.set_estimated("poisson_ratio", false);
+    parameters.set_estimated("poissons_ratio", false);
     FitStart start;
     start.start = theta;
     int counter = 0;

@@ -227,7 +227,7 @@ ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<do
     if (p.transform == Transform::LogitHalf) p.upper = greatest_poissons_ratio;
   }
   ParameterSet parameters(set.layout(), std::move(list), set.reference());
-  if (poissons_ratio) parameters.fix("poisson_ratio", *poissons_ratio);
+  if (poissons_ratio) parameters.fix("poissons_ratio", *poissons_ratio);
   return parameters;
 }
 

@@ -602,7 +602,7 @@ PressFitOptions press_options(const FitOptions& options) {
   o.modulus_variation = options.modulus_variation;
   o.noise = options.marker_noise;
   o.max_iterations = options.max_iterations;
-  if (const auto known = options.parameters.find("poisson_ratio"); known != options.parameters.end())
+  if (const auto known = options.parameters.find("poissons_ratio"); known != options.parameters.end())
     if (known->second.start && known->second.estimated == false) o.poissons_ratio = (*known->second.start)[0];
   o.basis = {options.basis_tolerance, options.basis_samples};
   return o;

@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 
 namespace pliant {
 
@@ -359,8 +360,10 @@ Result read_all(const Member& top) {
   result.software = {optional_string(software, "name"), optional_string(software, "version"),
                      optional_string(software, "commit")};
   result.capture = {optional_string(capture, "name"), optional_string(capture, "sha256")};
-  top["parameters"].each_key(
-      [&](const std::string& name, const Member& m) { result.parameters.push_back(read_parameter(name, m)); });
+  top["parameters"].each_key([&](const std::string& name, const Member& m) {
+    const std::string present = present_name(name);  // a former name may stand alone, or beside the present one
+    if (!result.find(present)) result.parameters.push_back(read_parameter(present, m));
+  });
   if (top.has("fields"))
     top["fields"].each_key(
         [&](const std::string& name, const Member& m) { result.fields.push_back(read_field(name, m)); });
@@ -423,7 +426,8 @@ std::string to_json(const Result& result) {
   json["capture"] = {{"name", result.capture.name}, {"sha256", result.capture.sha256}};
   json["parameters"] = Json::object();
   for (const ParameterResult& parameter : result.parameters)
-    json["parameters"][parameter.name] = parameter_json(parameter);
+    for (const std::string& name : {parameter.name, former_name(parameter.name)})
+      if (!name.empty()) json["parameters"][name] = parameter_json(parameter);  // result/1 promises former names
   json["fields"] = Json::object();
   for (const FieldResult& field : result.fields) json["fields"][field.name] = field_json(field);
   json["error"] = error_json(result.error);

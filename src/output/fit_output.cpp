@@ -374,7 +374,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   model.name = capture.name;
   TriangleMesh surface = *capture.scene.object.surface;
   model.youngs_modulus = modulus.mean;
-  model.poisson_ratio = t[blocks.poissons_ratio];
+  model.poissons_ratio = t[blocks.poissons_ratio];
   model.mass_damping = t[blocks.mass_damping];
   model.stiffness_damping = t[blocks.stiffness_damping];
   const double mass = t[blocks.density] * enclosed_volume(*capture.scene.object.surface);
@@ -415,7 +415,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   for (int e = 0; e < d.body->element_count(); ++e) {
     model.volume.youngs_modulus.push_back(modulus.value[e]);
     if (modulus.mean_std > 0.0) model.volume.youngs_modulus_std.push_back(modulus.std[e]);
-    model.volume.poisson_ratio.push_back(model.poisson_ratio);
+    model.volume.poissons_ratio.push_back(model.poissons_ratio);
     const bool is_cell = d.body->kind == ElementKind::Hexahedron;
     model.volume.fill.push_back(is_cell ? d.body->element_volume[std::size_t(e)] / std::pow(model.cell_size, 3) : 1.0);
   }

@@ -82,7 +82,7 @@ Model make_model(const Capture& capture, const PressFitOutcome& outcome) {
   double nu = 0.0;
   for (int e = 0; e < body.element_count(); ++e)
     nu += body.element_volume[std::size_t(e)] / body.volume() * outcome.law->small_strain(e).poissons_ratio;
-  model.poisson_ratio = nu;
+  model.poissons_ratio = nu;
   const double density = outcome.scene->density > 0.0 ? outcome.scene->density : 100.0;
   model.scene.object.density = density;
   model.scene.object.mass = density * body.volume();
@@ -96,7 +96,7 @@ Model make_model(const Capture& capture, const PressFitOutcome& outcome) {
   for (int e = 0; e < body.element_count(); ++e) {
     const SmallStrainModuli m = outcome.law->small_strain(e);
     model.volume.youngs_modulus.push_back(m.youngs_modulus);
-    model.volume.poisson_ratio.push_back(m.poissons_ratio);
+    model.volume.poissons_ratio.push_back(m.poissons_ratio);
     model.volume.fill.push_back(1.0);
   }
   model.law = model_law(*outcome.law);

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 
 namespace pliant {
 
@@ -221,8 +222,19 @@ TomlTable::TomlTable(const toml::table& table, std::string key, TomlContext& con
   }
 }
 
+bool TomlTable::has(const std::string& name) const {
+  const std::string former = former_name(name);
+  return table_->contains(name) || (!former.empty() && table_->contains(former));
+}
+
 const toml::node* TomlTable::find(const std::string& name) {
   asked_.insert(name);
+  if (!table_->contains(name))
+    if (const std::string former = former_name(name); !former.empty() && table_->contains(former)) {
+      asked_.insert(former);
+      note_former_word(former, name, context_->places.file().filename().string());
+      return table_->get(former);
+    }
   return table_->get(name);
 }
 

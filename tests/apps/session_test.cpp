@@ -107,8 +107,8 @@ TEST_F(Session, ResultHoldsWhatTheFormatPromises) {
     EXPECT_TRUE(found.contains(key)) << key;
   EXPECT_EQ(found["software"]["name"], "pliant");
   EXPECT_EQ(found["capture"]["sha256"].get<std::string>().size(), 64U);
-  for (const char* name : {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping", "density", "gravity",
-                           "plane", "linear_velocity", "angular_velocity"}) {
+  for (const char* name : {"youngs_modulus", "poissons_ratio", "mass_damping", "stiffness_damping", "density",
+                           "gravity", "plane", "linear_velocity", "angular_velocity"}) {
     ASSERT_TRUE(found["parameters"].contains(name)) << name;
     const json& p = found["parameters"][name];
     EXPECT_TRUE(p.contains("value")) << name;

@@ -26,7 +26,7 @@ FitOptions changed() {
   o.solver_tolerance = 1e-6;
   o.hold_strongly = true;
   o.parameters["youngs_modulus"].start = VectorX::Constant(1, 5120.25);
-  o.parameters["poisson_ratio"].estimated = false;
+  o.parameters["poissons_ratio"].estimated = false;
   o.parameters["density"].prior_std = 0.125;
   VectorX g(3);
   g << 0.0, -9.5, 0.25;

@@ -59,7 +59,7 @@ ReportData example(int width, int height) {
   r.software = {"pliant", "0.1.0", "abcdef123456789"};
   r.capture = {"soft ring <dropped>", "00ff00ff00ff00ff00ff"};
   r.parameters = {{"youngs_modulus", 590.0, "Pa", 21.0, 5000.0, true},
-                  {"poisson_ratio", 0.35, "1", std::nullopt, std::nullopt, false},
+                  {"poissons_ratio", 0.35, "1", std::nullopt, std::nullopt, false},
                   {"mass_damping", 0.24, "1/s", 0.11, 0.1, true},
                   {"stiffness_damping", 0.027, "s", 0.004, 0.01, true},
                   {"density", 95.0, "kg/m^3", std::nullopt, std::nullopt, false},
@@ -91,8 +91,8 @@ ReportData example(int width, int height) {
 }
 
 TEST(PlainWords, TermsOfALawAreSpokenLikeTheWhole) {
-  EXPECT_EQ(spoken_name("poisson_ratio"), "Poisson's ratio");
-  EXPECT_EQ(spoken_name("poisson_ratio_2@top"), "Poisson's ratio 2 (top)");
+  EXPECT_EQ(spoken_name("poissons_ratio"), "Poisson's ratio");
+  EXPECT_EQ(spoken_name("poissons_ratio_2@top"), "Poisson's ratio 2 (top)");
   EXPECT_EQ(spoken_name("exponent_2"), "Exponent 2");
 }
 
