@@ -315,8 +315,8 @@ void check_presses(RuleContext& context) {
 void complain_of_mass(RuleContext& context, const std::string& key, double mass) {
   const double limit = greatest_load * context.capture.scene.object.total_mass().value_or(largest_object);
   if (mass <= 0 || mass > limit)
-    context.toml.complain(key, "a hung mass of " + text_of(mass, "kg"), "above 0 and at most " + text_of(limit, "kg"),
-                          "masses are in kilograms");
+    context.toml.complain(key, "an attached point mass of " + text_of(mass, "kg"),
+                          "above 0 and at most " + text_of(limit, "kg"), "masses are in kilograms");
 }
 
 void check_weights(RuleContext& context) {
@@ -335,7 +335,7 @@ void check_release(RuleContext& context) {
     context.toml.complain("initial.release_of", "`release_of` without `released`", "released = true",
                           "a weight that hangs in every frame is a block [[weight]]");
   if (capture.scene.world.gravity && capture.scene.world.gravity->norm() == 0)
-    context.toml.complain("initial.release_of", "a hung weight without gravity", "a gravity that pulls at it",
+    context.toml.complain("initial.release_of", "an attached weight without gravity", "a gravity that pulls at it",
                           "remove `release_of`");
   complain_of_mass(context, "initial.release_of.mass", weight->mass);
   complain_off_surface(context, "initial.release_of.at", weight->at);

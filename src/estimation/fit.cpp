@@ -152,7 +152,7 @@ class Fit {
     finish(parameters, s);
   }
 
-  /// What was not estimated and spoils the recordings, as their residuals at the estimate show.
+  /// Systematic errors that were not estimated and that a score test on the residuals requires.
   void find_corrections(const VectorX& theta, double cost) {
     run_.state.corrected = {{}, "", cost, theta[run_.recordings.material().youngs_moduli.front()]};
     std::vector<std::string> chosen;

@@ -15,10 +15,10 @@
 
 namespace pliant {
 
-/// Coupling of the material and the stress-free shape of an object that was scanned under gravity.
+/// How a fit minds that the load-free shape of an object scanned as it sags depends on its material.
 enum class LoadFreeScheme {
-  Monolithic,  ///< one minimisation, whose derivatives pass through the equilibrium
-  Staggered,   ///< shape and parameters alternate, each with the other kept (Wang 2015, algorithm 1)
+  Together,  ///< derivatives pass through the equilibrium: one minimisation sees the whole dependence
+  InTurns,   ///< shape and parameters in turns, each as the other is (Wang 2015, algorithm 1)
 };
 
 /// What a fit compares the simulated motion with, where only points on the surface were seen.
@@ -55,7 +55,7 @@ struct FitOptions {
   int pull_points = 4;  ///< that hold a released object until it is let go, 1..50
   TrackingUse tracking = TrackingUse::Automatic;
   int tracking_rounds = 3;  ///< of tracking and estimation in turns, at most, 1..10
-  LoadFreeScheme load_free = LoadFreeScheme::Monolithic;
+  LoadFreeScheme load_free = LoadFreeScheme::Together;
   int scan_points = 0;     ///< about which the scan may err, 0..50; 0: it is exact
   double scan_std = 0.01;  ///< by how much, times the object's size, (0, 0.2]
   /// Of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous; `automatic`: as many as the

@@ -61,8 +61,8 @@ OptimiserSummary FitRun::optimise(Objective& objective, const OptimiserState& fr
   o.max_iterations = iterations;
   const int first = counter;
   counter += from.iterations;
-  const bool in_turns = options.load_free == LoadFreeScheme::Staggered && recordings.any_sags();
-  OptimiserSummary s = (in_turns ? minimise_staggered : minimise_from)(objective, from, o, [&](const Iteration& i) {
+  const bool in_turns = options.load_free == LoadFreeScheme::InTurns && recordings.any_sags();
+  OptimiserSummary s = (in_turns ? minimise_in_turns : minimise_from)(objective, from, o, [&](const Iteration& i) {
     ++counter;
     if (on_state) on_state(i.state());
     const double part = double(counter - first) / iterations;

@@ -428,15 +428,15 @@ OptimiserSummary minimise(CostFunction& objective, const VectorX& p, const Optim
   return minimise(objective, OptimiserState{0, p, {}}, options, on_iteration);
 }
 
-OptimiserSummary minimise_staggered(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
-                                    const std::function<bool(const Iteration&)>& on_iteration) {
+OptimiserSummary minimise_in_turns(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+                                   const std::function<bool(const Iteration&)>& on_iteration) {
   constexpr int iterations_of_a_turn = 3;
   OptimiserSummary all;
   all.p = state.p;
   bool first = true;
   for (int done = state.iterations; done < options.max_iterations || first; first = false) {
     if (!objective.hold_shapes(all.p)) {
-      all.reason = "no shape free of load sags into the scan";
+      all.reason = "no stress-free reference shape sags into the scan";
       return all;
     }
     OptimiserOptions turn = options;

@@ -248,7 +248,7 @@ Resolution Recordings::resolution(double cells, double steps) const {
     throw InputError({{front().capture.file},
                       any_sags() ? "the scan was taken sagging (shape_is = \"static\"), and element=hexahedra"
                                  : "scan_points are given, and element=hexahedra",
-                      "tetrahedra: the grid of hexahedra is regular where the object is free of load",
+                      "tetrahedra: the grid of hexahedra is regular in the stress-free reference configuration",
                       "leave out element, or choose quadratic_tetrahedra"});
   r.shape_points = options_.scan_points;
   r.shape_std = options_.scan_std;

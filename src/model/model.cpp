@@ -39,7 +39,8 @@ std::string model_toml(const Model& m) {
   out << "# A fitted elastic object, ready to be simulated. All quantities are SI.\n"
          "format = \"model/1\"\nname = "
       << toml_text(m.name)
-      << "\n\n[object]\nsurface = \"surface.ply\"          # free of load, world frame of the recording\n";
+      << "\n\n[object]\nsurface = \"surface.ply\"          # stress-free reference shape, world frame of the "
+         "recording\n";
   if (!m.volume.connectivity.empty())
     out << "volume_mesh = \"model.vtu\"        # elements with the material of each\n";
   line(out, "mass", m.scene.object.mass.value(), "kg");

@@ -34,7 +34,7 @@ struct ModelLaw {
 /// A fitted object, ready to be simulated. SI units, the capture's world frame.
 struct Model {
   std::string name;
-  /// Situation of the recording: the surface free of load, mass and density both known, frames equally spaced; no
+  /// Situation of the recording: the surface stress-free, mass and density both known, frames equally spaced; no
   /// frames: static.
   Scene scene;
 

@@ -131,7 +131,7 @@ class Equilibrium::Solver {
     SolveSummary summary;
     double energy = evaluate(z, load, true);
     if (!std::isfinite(energy)) {
-      failure_ = "the material does not allow the shape to start from";
+      failure_ = "the energy is not finite at the initial configuration";
       return summary;
     }
     for (;; ++summary.iterations) {
@@ -149,7 +149,7 @@ class Equilibrium::Solver {
       if (!step_by_last_factor(z, load)) {
         if (!factorise(z, load, LawElasticity::Stiffness::Exact) &&
             !factorise(z, load, LawElasticity::Stiffness::Positive) && !factorise_lifted()) {
-          failure_ = "the stiffness is singular: is the object held anywhere?";
+          failure_ = "the stiffness matrix is singular: insufficient Dirichlet constraints";
           return summary;
         }
         factor_->solve(right_, step_);

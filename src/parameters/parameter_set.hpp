@@ -59,7 +59,6 @@ class ParameterSet {
 
   const ParameterLayout& layout() const { return layout_; }
   const std::vector<Parameter>& parameters() const { return parameters_; }
-  /// Parameter of a name, or of what a former name is called now; null where there is none.
   const Parameter* find(const std::string& name) const;
   /// Chooses whether a parameter is estimated. Throws std::invalid_argument for an unknown name.
   void set_estimated(const std::string& name, bool estimated);

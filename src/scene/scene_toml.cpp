@@ -268,7 +268,7 @@ Plane read_plane(TomlTable& block) {
 
 Weight read_weight(TomlTable& block) {
   Weight weight;
-  weight.mass = block.required<double>("mass", "the hung mass in kilograms").value_or(0.0);
+  weight.mass = block.required<double>("mass", "the attached point mass in kilograms").value_or(0.0);
   weight.at = block.required<Vector3>("at", "where it hangs, on the rest surface").value_or(Vector3::Zero());
   return weight;
 }
@@ -320,8 +320,8 @@ void write_toml(std::ostream& out, const Plane& plane) {
 }
 
 void write_toml(std::ostream& out, const Weight& weight) {
-  out << "[[weight]]\nmass = " << toml_text(weight.mass) << "   # kg, hung\nat = " << toml_text(weight.at)
-      << "   # m, on the rest surface\n\n";
+  out << "[[weight]]\nmass = " << toml_text(weight.mass)
+      << "   # kg, attached point mass\nat = " << toml_text(weight.at) << "   # m, on the rest surface\n\n";
 }
 
 void write_toml(std::ostream& out, const Initial& initial) {

@@ -222,11 +222,6 @@ TomlTable::TomlTable(const toml::table& table, std::string key, TomlContext& con
   }
 }
 
-bool TomlTable::has(const std::string& name) const {
-  const std::string former = former_name(name);
-  return table_->contains(name) || (!former.empty() && table_->contains(former));
-}
-
 const toml::node* TomlTable::find(const std::string& name) {
   asked_.insert(name);
   if (!table_->contains(name))
@@ -252,8 +247,7 @@ std::optional<T> TomlTable::optional(const std::string& name) {
 
 template <class T>
 std::optional<T> TomlTable::required(const std::string& name, const std::string& advice) {
-  if (!has(name)) {
-    find(name);
+  if (!find(name)) {
     const std::string where = key_.empty() ? "the file" : "[" + key_ + "]";
     context_->reject(key_of(name), where + " has no `" + name + "`", "the key `" + name + "`", advice);
     return std::nullopt;

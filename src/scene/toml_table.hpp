@@ -52,9 +52,8 @@ struct TomlContext {
 /// The known name nearest to a misspelt one by edit distance; "" where none is near.
 std::string nearest_name(std::string_view name, const std::set<std::string>& known);
 
-/// One table of a TOML file, read strictly. Each value is asked for by key and type, and found under a former name of
-/// the key too (`former_name`); `finish` complains about keys that nobody asked for. Problems go to the context; a
-/// value with a problem comes back as nothing.
+/// One table of a TOML file, read strictly. Each value is asked for by key and type; `finish` complains about keys
+/// that nobody asked for. Problems go to the context; a value with a problem comes back as nothing.
 class TomlTable {
  public:
   TomlTable(const toml::table& table, std::string key, TomlContext& context);
@@ -83,8 +82,7 @@ class TomlTable {
   /// All keys of this table, asked for or not; none of them is unknown then.
   std::vector<std::string> take_all_keys();
 
-  /// Whether the key is written, under its present name or a former one.
-  bool has(const std::string& name) const;
+  bool has(const std::string& name) const { return table_->contains(name); }
   std::string key_of(const std::string& name) const { return key_.empty() ? name : key_ + "." + name; }
   const std::string& key() const { return key_; }
   TomlContext& context() const { return *context_; }

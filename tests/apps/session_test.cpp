@@ -222,7 +222,7 @@ TEST_F(Session, RefiningRepeatsTheEstimateAndStatesWhatIsLeft) {
   EXPECT_LE(std::abs(change), modulus["mesh_error"].get<double>() + modulus["step_error"].get<double>());
   EXPECT_FALSE(refined["parameters"]["density"].contains("mesh_error")) << "given, not estimated";
   EXPECT_THAT(run.out, HasSubstr("limit"));
-  EXPECT_THAT(read_file(at("refined") + "/report.html"), HasSubstr("Mesh and time step"));
+  EXPECT_THAT(read_file(at("refined") + "/report.html"), HasSubstr("Convergence in mesh and time step"));
 }
 
 class InterruptedRefinement : public Session, public testing::WithParamInterface<const char*> {};
