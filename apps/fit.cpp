@@ -221,8 +221,11 @@ void print_result(const Result& result, const PressFitOutcome& outcome, const fs
   std::snprintf(line, sizeof line, "%s after %.0f s\n", outcome.reason.c_str(), seconds);
   std::cout << line;
   for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
-  std::cout << "Look at " << (out / "report.html").string() << "; press it with: pliant press "
-            << (out / "model.toml").string() << " --contact X,Y,Z --force X,Y,Z --out DIR\n";
+  std::cout << "Look at " << (out / "report.html").string();
+  if (is_file(out / "model.toml"))
+    std::cout << "; press it with: pliant press " << (out / "model.toml").string()
+              << " --contact X,Y,Z --force X,Y,Z --out DIR";
+  std::cout << "\n";
 }
 
 int run_presses(const Arguments& arguments, const FitOptions& options, const Capture& capture, const std::string& words,

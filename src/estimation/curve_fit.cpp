@@ -1,5 +1,6 @@
 #include "estimation/curve_fit.hpp"
 
+#include <limits>
 #include <stdexcept>
 
 #include "base/error.hpp"
@@ -57,9 +58,13 @@ PressFitOutcome fit_material_curves(const Capture& capture, const PressFitOption
                       "stress-strain curves of an elastic material",
                       "stretches are 1 and shears 0 at rest; tension is positive"});
   }
+  double before = 0.0;
   for (const CurveFit::Tried& tried : fit.tried) {
-    const bool kept = fit.succeeded && tried.terms == fit.layout.form().terms;
-    outcome.tried.push_back({{1, tried.terms}, tried.cost, 0.5 * (fit.tried.front().bic - tried.bic), kept});
+    const bool is_first = outcome.tried.empty();
+    const double evidence = is_first ? std::numeric_limits<double>::infinity() : 0.5 * (before - tried.bic);
+    before = tried.bic;
+    const bool kept = fit.succeeded && tried.terms <= fit.layout.form().terms;
+    outcome.tried.push_back({{1, tried.terms}, tried.cost, evidence, kept});
   }
   outcome.reason = fit.succeeded ? fit.reason : fit.failure;
   if (!fit.succeeded) return outcome;
