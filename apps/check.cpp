@@ -76,11 +76,11 @@ void describe_world(const Capture& capture) {
   if (!capture.scene.weights.empty()) {
     double mass = 0.0;
     for (const Weight& weight : capture.scene.weights) mass += weight.mass;
-    say("hung", formatted("%.4g kg at %zu point%s", mass, capture.scene.weights.size(),
-                          capture.scene.weights.size() == 1 ? "" : "s"));
+    say("masses", formatted("%.4g kg at %zu point%s", mass, capture.scene.weights.size(),
+                            capture.scene.weights.size() == 1 ? "" : "s"));
   }
   if (const auto& weight = capture.scene.initial.release_of)
-    say("start", formatted("released from under a hung weight of %.4g kg", weight->mass));
+    say("start", formatted("released from equilibrium under a weight of %.4g kg", weight->mass));
   else if (capture.scene.initial.released)
     say("start", "released from a held, deformed pose");
 }
@@ -101,6 +101,13 @@ void describe_sensors(const Capture& capture) {
   if (!capture.presses.empty())
     say("presses", formatted("%zu, of them %d for test only", capture.presses.size(),
                              int(std::ranges::count_if(capture.presses, is_test))));
+  const auto say_tests = [&](const char* what, const auto& tests) {
+    if (!tests.empty())
+      say(what, formatted("%zu, of them %d for test only", tests.size(), int(std::ranges::count_if(tests, is_test))));
+  };
+  say_tests("indentations", capture.indentations);
+  say_tests("grips", capture.grips);
+  say_tests("stress-strain curves", capture.material_curves);
   if (!capture.loads.empty())
     say("loads", formatted("%zu, of them %d for test only", capture.loads.size(),
                            int(std::ranges::count_if(capture.loads, is_test))));
@@ -222,12 +229,12 @@ void describe_cloud(const CloudScene& scene, Json& json) {
   json["clouds"].push_back(own);
 }
 
-void describe_prospects(const Prospects& prospects, Json& json) {
+void describe_identifiability(const Identifiability& identifiability, Json& json) {
   std::cout << '\n';
-  for (const std::string& text : prospects.possible) std::cout << "+ " << text << '\n';
-  for (const std::string& text : prospects.impossible) std::cout << "- " << text << '\n';
-  json["possible"] = prospects.possible;
-  json["impossible"] = prospects.impossible;
+  for (const std::string& text : identifiability.possible) std::cout << "+ " << text << '\n';
+  for (const std::string& text : identifiability.impossible) std::cout << "- " << text << '\n';
+  json["possible"] = identifiability.possible;
+  json["impossible"] = identifiability.impossible;
 }
 
 // A few frames spread over the recording, among those of the camera; the start is one of them.
@@ -346,7 +353,7 @@ void check(const Arguments& arguments) {
   for (std::size_t i = 0; i < seen.scenes.size(); ++i) describe_scene(seen.scenes[i], capture.depth[i].name, json);
   for (const CloudScene& scene : seen.clouds) describe_cloud(scene, json);
   if (!arguments.compare_masks.empty()) compare_with_masks(capture, arguments, json);
-  describe_prospects(prospects(capture, seen), json);
+  describe_identifiability(identifiability(capture, seen), json);
   if (arguments.out.empty()) return;
   if (capture.scene.object.surface)
     write_sorted_pictures(capture, arguments);

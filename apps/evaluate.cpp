@@ -56,14 +56,19 @@ int run(const Arguments& arguments) {
       converged = converged && press.marker_rms;
     }
   }
-  if (seen->empty() && capture.loads.empty() && capture.presses.empty())
+  if (has_static_tests(capture)) result.curves = predict_curves(model, capture);
+  for (const CurvePrediction& curve : result.curves) {
+    std::cerr << curve_sentence(curve) << "\n";
+    converged = converged && curve.failure.empty();
+  }
+  if (seen->empty() && capture.loads.empty() && capture.presses.empty() && !has_static_tests(capture))
     throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
   const bool has_frames = !seen->empty(), has_loads = !capture.loads.empty();
   std::optional<CaptureScene> scene;
   if (has_frames || has_loads || !arguments.markers.empty()) scene = make_scene(model, capture);
   if (has_frames && !evaluate_frames(capture, *scene, seen, result)) {
     converged = false;
-    if (!has_loads && result.presses.empty()) return NotConverged;
+    if (!has_loads && result.presses.empty() && result.curves.empty()) return NotConverged;
   }
   if (has_loads) result.loads = predict_loads(capture, *scene);
   for (const LoadError& load : result.loads) {

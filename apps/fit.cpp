@@ -15,6 +15,8 @@
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
+#include "estimation/press_scene.hpp"
+#include "gradient_check.hpp"
 #include "output/fit_output.hpp"
 #include "output/press_output.hpp"
 #include "report/report.hpp"
@@ -31,7 +33,7 @@ struct Arguments {
   std::string out, config, held_out;
   std::vector<std::string> settings;
   int threads = 0, refine = 0;
-  bool resume = false;
+  bool resume = false, check_gradient = false;
 };
 
 /// Lines for people on stderr, kept for log.txt.
@@ -82,7 +84,7 @@ std::string describe_others(const FitEvent& event) {
   const auto value = [&](const char* name) { return event.theta[event.layout->at(name)]; };
   const auto has = [&](const char* name) { return event.layout && event.layout->contains(name); };
   std::string text;
-  if (has("poisson_ratio")) text += "  nu " + with_prefix(value("poisson_ratio"), "1");
+  if (has("poissons_ratio")) text += "  nu " + with_prefix(value("poissons_ratio"), "1");
   if (has("mass_damping") && has("stiffness_damping"))
     text +=
         "  damping " + with_prefix(value("mass_damping"), "1/s") + ", " + with_prefix(value("stiffness_damping"), "s");
@@ -147,15 +149,15 @@ void print_agreement(const Result& result, const FitOutcome& outcome, double sec
   if (outcome.law)
     for (const StaticError& press : press_errors(*outcome.law->scene, outcome.law->predictions))
       if (press.role == "test") std::cout << "  " << press_sentence(press) << "\n";
-  char line[200];
-  if (outcome.law)
-    std::snprintf(line, sizeof line, "  markers %.2f mm rms over the fitted presses",
-                  1e3 * result.error.marker_rms.value_or(0.0));
-  else
-    std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points",
+  for (const CurvePrediction& curve : result.curves) std::cout << "  " << curve_sentence(curve) << "\n";
+  char line[200] = "  ";
+  if (outcome.law && result.error.marker_rms)
+    std::snprintf(line, sizeof line, "  markers %.2f mm rms over what was fitted; ", 1e3 * *result.error.marker_rms);
+  else if (!outcome.law)
+    std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points; ",
                   1e3 * result.error.surface_rms.value_or(0.0), result.error.points);
   std::cout << line;
-  std::snprintf(line, sizeof line, "; %s after %.0f s\n", outcome.reason.c_str(), seconds);
+  std::snprintf(line, sizeof line, "%s after %.0f s\n", outcome.reason.c_str(), seconds);
   std::cout << line;
   for (const RecordingResult& r : result.recordings) print_error(r, "");
   if (result.held_out) print_error(*result.held_out, "held out, ");
@@ -168,9 +170,11 @@ void print_result(const Result& result, const FitOutcome& outcome, const fs::pat
   print_agreement(result, outcome, seconds);
   for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
   const std::string model = (out / "model.toml").string();
-  std::cout << "Look at " << (out / "report.html").string()
-            << (outcome.law ? "; press it with: pliant press " + model + " --contact X,Y,Z --force X,Y,Z --out DIR\n"
-                            : "; simulate with: pliant simulate " + model + " --out DIR\n");
+  std::cout << "Look at " << (out / "report.html").string();
+  if (is_file(model))
+    std::cout << (outcome.law ? "; press it with: pliant press " + model + " --contact X,Y,Z --force X,Y,Z --out DIR"
+                              : "; simulate with: pliant simulate " + model + " --out DIR");
+  std::cout << "\n";
 }
 
 /// Where the fit in the output folder begins: where an interrupted one was, or anew.
@@ -230,9 +234,11 @@ int run(const Arguments& arguments) {
 
   Log log;
   log.line("pliant " PLIANT_VERSION " fit " + words);
+  if (arguments.check_gradient) return run_gradient_check(std::move(recordings), options, out);
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
   const auto read = [&](RecordedCapture& recording) {
+    if (is_of_static_tests(recording.capture)) return;
     recording.observed =
         observe(recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
     stop_if_interrupted();
@@ -271,8 +277,8 @@ std::string key_help() {
   }
   text << parameter_key_help() << "\n\nExamples:\n"
        << "  pliant fit recordings/bear --out out/bear\n"
-       << "  pliant fit recordings/bear --out out/bear --set cells=16 --set poisson_ratio=0.3 --set "
-          "poisson_ratio.estimate=false\n"
+       << "  pliant fit recordings/bear --out out/bear --set cells=16 --set poissons_ratio=0.3 --set "
+          "poissons_ratio.estimate=false\n"
        << "Ctrl-C leaves the best result so far; --resume goes on from there.";
   return text.str();
 }
@@ -304,6 +310,9 @@ void add_fit(CommandLine& line, int& exit_code) {
       .type_name("N");
   command.option("--threads", arguments->threads, "most threads to use; all processors where left out").positive();
   command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
+  command.flag("--check-gradient", arguments->check_gradient,
+               "instead of fitting compare the objective's gradient at the start by tangents, by the adjoint and by "
+               "central differences; fails where they disagree");
   command.footer(key_help());
   command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -41,10 +41,10 @@ Json describe(const VolumeMesh& file, const TetMesh& mesh, const MeshReport& bou
   say("volumes", formatted("%.3g to %.3g m^3, mean %.3g", q.least_volume, q.greatest_volume, q.mean_volume));
   say("radii",
       formatted("least ratio %.3f of inscribed to circumscribed sphere, 1 for a regular one", q.least_radius_ratio));
-  if (file.turned > 0) say("mended", formatted("%d elements were inside out and have been turned", file.turned));
+  if (file.turned > 0) say("repaired", formatted("%d elements were inside out and have been turned", file.turned));
   if (file.unused_nodes > 0)
     say("", formatted("%d nodes belong to no tetrahedron and are left out", file.unused_nodes));
-  if (file.passed_over > 0) say("", formatted("%d points, lines and faces are passed over", file.passed_over));
+  if (file.passed_over > 0) say("", formatted("%d points, lines and faces are ignored", file.passed_over));
   if (file.pieces > 1)
     say("note", formatted("it is in %d pieces that share no node: each moves on its own", file.pieces));
   for (const std::string& complaint : boundary.complaints)

@@ -111,7 +111,7 @@ int run(const Arguments& arguments) {
             << found.scene.body->node_count() << " nodes, " << found.shape.iterations << " iterations, " << seconds
             << " s\n";
   if (!found.shape.found) {
-    std::cout << "  no shape free of load sags into the scan: " << found.shape.reason << "\n";
+    std::cout << "  no stress-free reference shape sags into the scan: " << found.shape.reason << "\n";
     if (found.shape.carried > 0.0)
       std::cout << "  the smallest Young's modulus that can carry it is about " << modulus / found.shape.carried
                 << " Pa\n";
@@ -123,26 +123,27 @@ int run(const Arguments& arguments) {
   const ModulusStatistics moduli = modulus_statistics(found.scene.body, parameters.blocks.motion, theta, MatrixX());
   save_model(out, make_model(capture, found.scene, theta, moduli, options.cells));
   write_png(out / "rest.png", overlay(capture, found));
-  std::cout << "Look at " << (out / "rest.png").string() << "; the model with its load-free shape is "
+  std::cout << "Look at " << (out / "rest.png").string() << "; the model with its stress-free reference shape is "
             << (out / "model.toml").string() << "\n";
   return Fine;
 }
 
 constexpr const char* footer =
-    R"(Keys of --set are those of `pliant fit` that a resting object has: youngs_modulus (needed), poisson_ratio, density,
+    R"(Keys of --set are those of `pliant fit` that a resting object has: youngs_modulus (needed), poissons_ratio, density,
 cells, element (quadratic_tetrahedra where left out, or tetrahedra), control_points, youngs_modulus@REGION.
 
 Examples:
   pliant rest recordings/plant --set youngs_modulus=3e6 --out plant-rest
 
-The folder gets the model with its load-free surface and volume mesh (model.toml, surface.ply, model.vtu), rest.json with the
+The folder gets the model with its stress-free surface and volume mesh (model.toml, surface.ply, model.vtu), rest.json with the
 figures, and rest.png: both shapes in grey, the scan as dots.)";
 
 }  // namespace
 
 void add_rest(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
-  Command command = line.add_command("rest", "Find the shape that an object scanned as it sags has free of load");
+  Command command = line.add_command(
+      "rest", "Find the stress-free reference shape of an object scanned under gravity (inverse elastostatics)");
   command
       .option("capture", arguments->capture,
               "folder with a capture.toml in it; what holds the object is in its [[fixed]]")

@@ -38,7 +38,7 @@ VectorX theta_of(const SyntheticScene& synthetic, const MotionLayout& blocks) {
   theta[blocks.youngs_moduli.front()] = synthetic.youngs_modulus;
   for (std::size_t k = 1; k < blocks.youngs_moduli.size(); ++k)
     theta[blocks.youngs_moduli[k]] = synthetic.region_moduli[k - 1];
-  theta[blocks.poissons_ratio] = synthetic.poisson_ratio;
+  theta[blocks.poissons_ratio] = synthetic.poissons_ratio;
   theta[blocks.mass_damping] = synthetic.mass_damping;
   theta[blocks.stiffness_damping] = synthetic.stiffness_damping;
   theta[blocks.density] = synthetic.true_density();

@@ -81,7 +81,7 @@ int run(const Arguments& arguments) {
 
 constexpr const char* footer =
     R"(Keys of --set are those of `pliant fit` that say how the object is simulated: cells, element, youngs_modulus,
-poisson_ratio, mass_damping, stiffness_damping, density. None is needed: where the object is depends little on them.
+poissons_ratio, mass_damping, stiffness_damping, density. None is needed: where the object is depends little on them.
 
 Examples:
   pliant track recordings/plant --out plant-track

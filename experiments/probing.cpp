@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "estimation/optimiser.hpp"
-#include "indentation.hpp"
 #include "request.hpp"
+#include "tested_bodies.hpp"
 
 namespace pliant {
 namespace {
@@ -39,24 +39,11 @@ std::shared_ptr<const Body> make_block(const json& j) {
   return std::make_shared<Body>(make_body(with_mid_nodes(make_tet_mesh(std::move(nodes), std::move(mesh.tets)))));
 }
 
-Indentation push(double radius, const Numbers& depths, const Numbers& forces) {
-  Indentation indentation{Vector3::Zero(), Vector3::UnitZ(), radius, depths, forces, 1.0};
+ObservedIndentation push(double radius, const Numbers& depths, const Numbers& forces) {
   double greatest = 0.0;
   for (const double f : forces) greatest = std::max(greatest, std::abs(f));
-  if (greatest > 0.0) indentation.noise = relative_noise * greatest;
-  return indentation;
-}
-
-/// Hertz: the median of the moduli that the points say.
-double hertz_modulus(const Indentation& seen, double nu) {
-  Numbers moduli;
-  for (std::size_t i = 0; i < seen.depths.size(); ++i)
-    if (seen.forces[i] > 0.0)
-      moduli.push_back(0.75 * seen.forces[i] * (1.0 - nu * nu) /
-                       (std::sqrt(seen.radius) * std::pow(seen.depths[i], 1.5)));
-  if (moduli.empty()) throw std::invalid_argument("no force is positive");
-  std::ranges::nth_element(moduli, moduli.begin() + std::ptrdiff_t(moduli.size() / 2));
-  return moduli[moduli.size() / 2];
+  return pushed_ball(Vector3::Zero(), Vector3::UnitZ(), radius, depths, forces,
+                     greatest > 0.0 ? relative_noise * greatest : 1.0);
 }
 
 class Experiment {
@@ -88,25 +75,23 @@ class Experiment {
 
  private:
   void fit(json& report) {
-    const Indentation seen = push(request_.at("radius"), request_.at("depths"), request_.at("forces"));
+    const auto scene =
+        tested(body_, held_, {{push(request_.at("radius"), request_.at("depths"), request_.at("forces"))}, {}, {}});
     const int terms = request_.at("terms");
-    const double nu = request_.at("poisson_ratio"), start = hertz_modulus(seen, nu);
+    const double nu = request_.at("poisson_ratio"), start = punch_modulus(*scene, nu);
     report["hertz_modulus"] = start;
     const LawLayout layout({1, terms});
     ParameterSet parameters = law_parameters(layout, start);
-    parameters.fix("poisson_ratio", nu);
-    const VectorX theta = parameters.reference();
-    auto trials = indentation_trials(body_, held_, {seen}, layout, parameters.reference());
-    const auto* ball = static_cast<const IndentationTrial*>(trials.front().get());
-    Objective objective(std::move(trials), parameters);
-    const VectorX p = parameters.to_unconstrained(theta);
+    parameters.fix("poissons_ratio", nu);
+    PressObjective objective = objective_of(scene, layout, parameters);
+    const VectorX p = parameters.to_unconstrained(parameters.reference());
     if (request_.at("task") == "check") {
-      report["derivative_errors"] = check(objective, p);
+      report["derivative_errors"] = derivative_errors(objective.cost(), p);
       return;
     }
     OptimiserOptions options;
     options.max_iterations = 15;
-    const OptimiserSummary summary = minimise(objective, p, options);
+    const OptimiserSummary summary = minimise(objective.cost(), p, options);
     report["succeeded"] = summary.succeeded, report["reason"] = summary.reason;
     report["iterations"] = summary.iterations, report["evaluations"] = summary.evaluations;
     if (!summary.succeeded) return;
@@ -115,34 +100,18 @@ class Experiment {
     const auto law = press_law(*body_, layout, found);
     const VectorX q = law->table().row(0);
     report["parameters"] = Numbers(q.begin(), q.end());
-    (void)objective.evaluate(summary.p);
-    report["fitted"] = ball->forces();
+    report["fitted"] = predict_curves(*scene, law).front().predicted;
     others(law, report);
-  }
-
-  /// Central differences against the gradient, relative.
-  static json check(Objective& objective, const VectorX& p) {
-    json errors = json::array();
-    const CostEvaluation at = objective.linearise(p);
-    if (!at.succeeded) throw std::runtime_error(at.failure);
-    for (Eigen::Index k = 0; k < p.size(); ++k) {
-      const double h = 1e-4;
-      const double up = objective.evaluate(p + h * VectorX::Unit(p.size(), k)).cost;
-      const double down = objective.evaluate(p - h * VectorX::Unit(p.size(), k)).cost;
-      errors.push_back(std::abs((up - down) / (2.0 * h) / at.gradient[k] - 1.0));
-    }
-    return errors;
   }
 
   void others(const std::shared_ptr<const MaterialLaw>& law, json& report) {
     for (const json& other : request_.value("others", json::array())) {
       const Numbers depths = other.at("depths");
-      const Indentation pushed = push(other.at("radius"), depths, Numbers(depths.size(), 0.0));
-      Indenter indenter(body_, held_, pushed, law, mean_modulus(*body_, *law));
-      json forces = json::array();
-      for (std::size_t d = 0; d < depths.size(); ++d)
-        forces.push_back(indenter.solve(d) ? json(indenter.force(d)) : json());
-      report["others"].push_back({{"radius", pushed.radius}, {"depths", depths}, {"forces", forces}});
+      const auto scene =
+          tested(body_, held_, {{push(other.at("radius"), depths, Numbers(depths.size(), 0.0))}, {}, {}});
+      report["others"].push_back({{"radius", other.at("radius")},
+                                  {"depths", depths},
+                                  {"forces", or_null(predict_curves(*scene, law).front().predicted)}});
     }
   }
 

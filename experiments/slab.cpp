@@ -12,8 +12,8 @@
 #include "elasticity/modulus_field.hpp"
 #include "estimation/optimiser.hpp"
 #include "geometry/primitives.hpp"
-#include "indentation.hpp"
 #include "request.hpp"
+#include "tested_bodies.hpp"
 
 namespace pliant {
 namespace {
@@ -81,8 +81,9 @@ class Experiment {
     for (const json& poke : request_.at("pokes")) {
       const Vector3 normal = vector_of(poke.at("normal")).normalized();
       const auto touch = first_met(body_, vector_of(poke.at("point")), normal);
-      pokes_.push_back({touch.value_or(vector_of(poke.at("point"))), normal, request_.at("tip_radius"),
-                        poke.at("depths"), poke.at("forces"), request_.at("force_noise")});
+      pokes_.push_back(pushed_ball(touch.value_or(vector_of(poke.at("point"))), normal, request_.at("tip_radius"),
+                                   poke.at("depths"), poke.at("forces"), request_.at("force_noise"),
+                                   touch && poke.at("fitted") ? "fit" : "test"));
       meets_.push_back(touch.has_value());
     }
   }
@@ -106,17 +107,18 @@ class Experiment {
     const int terms = request_.at("terms");
     const LawLayout layout({controls, terms});
     ParameterSet parameters = law_parameters(layout, request_.at("start_modulus"));
-    parameters.fix("poisson_ratio", request_.at("poisson_ratio"));
+    parameters.fix("poissons_ratio", request_.at("poisson_ratio"));
     const VectorX theta = parameters.reference();
-    std::vector<Indentation> fitted;
+    StaticTests tests;
     for (std::size_t i = 0; i < pokes_.size(); ++i)
-      if (meets_[i] && request_.at("pokes")[i].at("fitted")) fitted.push_back(pokes_[i]);
-    Objective objective(indentation_trials(body, held_, fitted, layout, parameters.reference()), parameters);
+      if (meets_[i]) tests.indentations.push_back(pokes_[i]);
+    const auto scene = tested(body, held_, std::move(tests));
+    PressObjective objective = objective_of(scene, layout, parameters);
     OptimiserOptions options;
     options.max_iterations = 8;
     options.cost_tolerance = 2e-3;
     const OptimiserSummary summary =
-        minimise(objective, parameters.to_unconstrained(theta), options, [](const Iteration& i) {
+        minimise(objective.cost(), parameters.to_unconstrained(theta), options, [](const Iteration& i) {
           std::fprintf(stderr, "iteration %d: %g\n", i.number, i.cost);
           return true;
         });
@@ -128,19 +130,11 @@ class Experiment {
       const VectorX found = parameters.to_theta(summary.p);
       report["theta"] = Numbers(found.begin(), found.end());
       const auto law = press_law(*body, layout, found);
-      const double modulus = mean_modulus(*body, *law);
-      for (std::size_t i = 0; i < pokes_.size(); ++i) {
-        const Indentation& poke = pokes_[i];
-        if (!meets_[i]) {
-          report["forces"].push_back(std::vector<json>(poke.depths.size()));
-          continue;
-        }
-        Indenter indenter(body, held_, poke, law, modulus);
-        json forces = json::array();
-        for (std::size_t d = 0; d < poke.depths.size(); ++d)
-          forces.push_back(indenter.solve(d) ? json(indenter.force(d)) : json());
-        report["forces"].push_back(forces);
-      }
+      const std::vector<CurvePrediction> predicted = predict_curves(*scene, law);
+      std::size_t next = 0;
+      for (std::size_t i = 0; i < pokes_.size(); ++i)
+        report["forces"].push_back(meets_[i] ? or_null(predicted[next++].predicted)
+                                             : json(std::vector<json>(pokes_[i].curve.depths.size())));
     }
     report["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return report;
@@ -149,7 +143,7 @@ class Experiment {
   json request_;
   Body body_;
   std::vector<int> held_;
-  std::vector<Indentation> pokes_;
+  std::vector<ObservedIndentation> pokes_;
   std::vector<bool> meets_;  ///< whether a poke's line meets the body
 };
 

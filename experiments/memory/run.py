@@ -16,7 +16,7 @@ import common
 
 CELLS = 21  # 2,418 nodes
 CHOICES = {"cells": CELLS, "coarse_cells": 4, "steps": 0.5, "max_iterations": 1, "points_per_frame": 200,
-           "youngs_modulus": 5000, "poisson_ratio.estimate": False}
+           "youngs_modulus": 5000, "poissons_ratio.estimate": False}
 
 
 def adjoint_growth(program):

@@ -26,7 +26,7 @@ LOWER = """
 name = "lower part"
 half_space = { point = [0.0, -0.18, 0.0], normal = [0.0, -1.0, 0.0] }
 """
-GIVEN_POISSON = {"poisson_ratio.estimate": False}  # it stays at the program's own start value
+GIVEN_POISSON = {"poissons_ratio.estimate": False}  # it stays at the program's own start value
 
 # name: (capture, choices)
 FITS = {
@@ -132,7 +132,7 @@ def main():
                                    "truth": value if isinstance(value, (int, float)) else None}
         model = arguments.work / name / "model.toml"
         fits[name] = {"capture": capture, "cells": choices.get("cells", 12), "element": choices.get("element", "hexahedra"), "control_points": choices.get("control_points", 1),
-                      "poisson_is_estimated": choices.get("poisson_ratio.estimate", True), "parameters": parameters,
+                      "poisson_is_estimated": choices.get("poissons_ratio.estimate", True), "parameters": parameters,
                       "field": [{"y": common.number(c[1], 4), "value": common.number(c[3]), "std": common.number(c[4], 2)}
                                 for c in result.get("fields", {}).get("youngs_modulus", {}).get("control_points", [])],
                       "surface_rms": common.number(result["error"]["surface_rms"], 4), "points": result["error"]["points"],

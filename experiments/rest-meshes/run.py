@@ -48,7 +48,7 @@ density = {DENSITY}
 mass = {DENSITY * figures["volume"]!r}
 [material]
 youngs_modulus = {modulus!r}
-poisson_ratio = {POISSON}
+poissons_ratio = {POISSON}
 [world]
 gravity = {[GRAVITY * v for v in unit(down, -1.0)]}
 [simulation]

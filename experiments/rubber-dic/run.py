@@ -173,7 +173,7 @@ def main():
     plans += [(name, 3, {"cells": 48, **choices}, change) for name, (choices, change) in VARIANTS.items()]
     for i, (variant, k, choices, change) in enumerate(plans):
         write_capture(arguments.work / f"capture-{i}", frames, k, **change)
-        choices = {"youngs_modulus.start": MODULUS, "youngs_modulus.estimate": False, "poisson_ratio.prior_std": 5.0, "coarse_cells": 12, **choices}
+        choices = {"youngs_modulus.start": MODULUS, "youngs_modulus.estimate": False, "poissons_ratio.prior_std": 5.0, "coarse_cells": 12, **choices}
         figures = common.fit(arguments.program, arguments.work / f"capture-{i}", arguments.work / f"fit-{i}", choices)
         result = figures["result"]
         nu = result["parameters"]["poisson_ratio"]

@@ -28,7 +28,7 @@ def choices(cells=CELLS["coarse"], steps=0.5, nu=0.49, **more):
     a factor of two of what the frequency of the swing and its decay say."""
     chosen = {"element": "quadratic_tetrahedra", "cells": cells, "coarse_cells": 4, "steps": steps, "solver": "cholmod",
               "starts": 1, "max_iterations": 8, "youngs_modulus": 290000, "mass_damping": 2, "stiffness_damping": 0.0012,
-              "poisson_ratio": nu, "poisson_ratio.estimate": False}
+              "poissons_ratio": nu, "poissons_ratio.estimate": False}
     return {**chosen, **more}
 
 
@@ -53,7 +53,7 @@ class Experiment:
         p = figures["result"]["parameters"]
         value = lambda key: None if static and "damping" in key else common.number(p[key]["value"])
         row = {"label": label, "recording": name, "at_rest": static, "cells": chosen["cells"], "steps": chosen["steps"],
-               "poisson_ratio": chosen["poisson_ratio"], "extra_mass": extra, "released_at": released_at, "youngs_modulus": value("youngs_modulus"),
+               "poisson_ratio": chosen["poissons_ratio"], "extra_mass": extra, "released_at": released_at, "youngs_modulus": value("youngs_modulus"),
                "std": common.number(p["youngs_modulus"]["std"], 2), "mass_damping": value("mass_damping"),
                "stiffness_damping": value("stiffness_damping"), "marker_rms": common.number(figures["result"]["error"]["marker_rms"], 4),
                "converged": figures["exit_code"] == 0, "wall_seconds": figures["wall_seconds"]}

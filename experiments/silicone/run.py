@@ -12,7 +12,7 @@ import common
 import png
 
 POSE = {"sensor_turn.estimate": True, "sensor_shift.estimate": True}
-NEARLY_INCOMPRESSIBLE = {"poisson_ratio": 0.49, "poisson_ratio.estimate": False}
+NEARLY_INCOMPRESSIBLE = {"poissons_ratio": 0.49, "poissons_ratio.estimate": False}
 QUADRATIC = {"element": "quadratic_tetrahedra"}
 TWO_SILICONES = """
 [[region]]
@@ -150,7 +150,7 @@ def main():
                       "parameters": {key: {"value": p["value"], "std": p["std"]} for key, p in result["parameters"].items() if p.get("std") is not None},
                       "correlations": result["identifiability"], "notes": result.get("notes", [])}
         print(name, fits[name]["parameters"].get("youngs_modulus"), flush=True)
-    common.write_results(__file__, {"poisson_ratio": NEARLY_INCOMPRESSIBLE["poisson_ratio"], "fits": fits})
+    common.write_results(__file__, {"poisson_ratio": NEARLY_INCOMPRESSIBLE["poissons_ratio"], "fits": fits})
 
 
 if __name__ == "__main__":

@@ -89,8 +89,8 @@ def main():
         write_capture(arguments.work / str(pressure), pressure, tip, start)
         if not arguments.fit or fits:
             continue
-        choices = {"element": "quadratic_tetrahedra", "cells": 5, "coarse_cells": 4, "poisson_ratio.start": POISSON,
-                   "poisson_ratio.estimate": False, "starts": 1}
+        choices = {"element": "quadratic_tetrahedra", "cells": 5, "coarse_cells": 4, "poissons_ratio.start": POISSON,
+                   "poissons_ratio.estimate": False, "starts": 1}
         figures = common.fit(arguments.program, arguments.work / str(pressure), arguments.work / f"fit-{pressure}", choices,
                              limit=arguments.limit)
         E = figures["result"]["parameters"]["youngs_modulus"]

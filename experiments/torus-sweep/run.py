@@ -13,7 +13,7 @@ sys.path.insert(0, str(HERE.parent))
 import common
 
 COUNT, CELLS = 25, 15.4
-KNOWN = ["poisson_ratio=0.3", "mass_damping=0.1", "stiffness_damping=0.004"]
+KNOWN = ["poissons_ratio=0.3", "mass_damping=0.1", "stiffness_damping=0.004"]
 
 
 def main():

@@ -21,6 +21,17 @@ std::optional<std::pair<std::size_t, std::size_t>> number_field(const std::strin
 
 }  // namespace
 
+const std::vector<std::string>& test_mode_names() {
+  static const std::vector<std::string> names = {"uniaxial", "pure_shear",   "equibiaxial",
+                                                 "biaxial",  "simple_shear", "confined"};
+  return names;
+}
+
+const std::vector<std::string>& stress_measure_names() {
+  static const std::vector<std::string> names = {"first", "second", "cauchy_difference"};
+  return names;
+}
+
 bool FramePattern::is_valid() const { return number_field(pattern).has_value(); }
 
 std::filesystem::path FramePattern::operator()(int frame) const {

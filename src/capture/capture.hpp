@@ -69,6 +69,70 @@ struct Load {
   bool operator==(const Load&) const = default;
 };
 
+/// Rigid probe of a force-depth curve, which slides without friction.
+enum class IndenterShape { Ball, Punch };
+
+/// Force-depth curve: a probe that touches the object is pushed into it along a line, to one depth after the other.
+struct Indentation {
+  std::string name;                           ///< for reports; empty: none
+  IndenterShape probe = IndenterShape::Ball;  ///< a sphere, or a flat-ended cylinder
+  double radius = 0.0;                        ///< [m] of the sphere, or of the cylinder's end
+  Vector3 contact = Vector3::Zero();          ///< [m] point of the undeformed surface that the probe touches first
+  Vector3 direction = -Vector3::UnitY();      ///< unit vector along which the probe advances, into the object
+  std::filesystem::path curve;                ///< absolute; CSV `depth,force,std`
+  std::string role = "fit";                   ///< "fit" or "test"
+  bool operator==(const Indentation&) const = default;
+};
+
+/// Homogeneous deformation of a cube of material. Stretches are along the axes; faces that are not prescribed carry no
+/// stress.
+enum class TestMode {
+  Uniaxial,          ///< stretch along x; y and z free
+  PureShear,         ///< stretch along x, y kept, z free: a wide strip between clamps
+  Equibiaxial,       ///< the same stretch along x and y, z free
+  Biaxial,           ///< stretch along x, a second one along y, z free
+  SimpleShear,       ///< F_xy is the shear; before it the cube is stretched along x by a prestretch, y and z free, and
+                     ///< they stay what they were then
+  ConfinedUniaxial,  ///< stretch along x; y and z kept
+};
+
+/// Stress that a stress-strain curve holds [Pa].
+enum class StressMeasure {
+  First,             ///< nominal: P_xx, of a shear P_xy
+  Second,            ///< nominal: P_yy
+  CauchyDifference,  ///< sigma_xx - sigma_yy
+};
+
+/// Names of the test modes and stress measures in files, in the order of their enumerations.
+const std::vector<std::string>& test_mode_names();
+const std::vector<std::string>& stress_measure_names();
+
+/// Stress-strain curve of a homogeneous specimen of the object's own material.
+struct MaterialCurve {
+  std::string name;  ///< for reports; empty: none
+  TestMode mode = TestMode::Uniaxial;
+  StressMeasure measure = StressMeasure::First;
+  double prestretch = 1.0;      ///< along x, before a simple shear
+  std::filesystem::path curve;  ///< absolute; CSV `stretch,stress,std`, biaxial `stretch,second,stress,std`
+  std::string role = "fit";     ///< "fit" or "test"
+  bool operator==(const MaterialCurve&) const = default;
+};
+
+/// Static measurement between grips: one part of the object is moved to another place and kept there.
+struct Grip {
+  std::string name;                           ///< for reports; empty: none
+  Region region;                              ///< part that is moved, at rest
+  Vector3 displacement = Vector3::Zero();     ///< [m] of that part from rest
+  std::optional<double> force;                ///< [N] of the grip on the object along `force_direction`
+  std::optional<double> force_std;            ///< [N] its standard deviation
+  Vector3 force_direction = Vector3::Zero();  ///< unit vector; zero: along the displacement
+  std::optional<std::filesystem::path> markers, markers_rest;  ///< absolute
+  std::optional<double> markers_std;                           ///< [m] standard deviation of a coordinate
+  std::optional<Vector3> unseen;  ///< unit vector along which the markers' motion was not measured
+  std::string role = "fit";       ///< "fit" or "test"
+  bool operator==(const Grip&) const = default;
+};
+
 /// Facts read from a `capture.toml`, valid as a whole (see docs/formats.md). SI units, world coordinates.
 struct Capture {
   std::filesystem::path folder;  ///< absolute; patterns of the capture are relative to it
@@ -83,6 +147,9 @@ struct Capture {
   std::vector<MarkerTrack> markers;
   std::vector<Press> presses;
   std::vector<Load> loads;
+  std::vector<Indentation> indentations;
+  std::vector<Grip> grips;
+  std::vector<MaterialCurve> material_curves;
 
   int frame_count() const { return scene.timing.frame_count(); }
 };

@@ -42,6 +42,9 @@ void check_has_observations(RuleContext&);
 void check_presses(RuleContext&);
 void check_weights(RuleContext&);
 void check_loads(RuleContext&);
+void check_indentations(RuleContext&);
+void check_grips(RuleContext&);
+void check_material_curves(RuleContext&);
 /// @}
 
 /// @name Rules that open the recording's files
@@ -51,6 +54,8 @@ void check_clouds(RuleContext&);
 void check_markers(RuleContext&);
 void check_press_markers(RuleContext&);
 void check_load_files(RuleContext&);
+void check_curve_files(RuleContext&);
+void check_grip_markers(RuleContext&);
 void check_depth_scale(RuleContext&);
 void check_cameras_see_object(RuleContext&);
 void check_clouds_near_object(RuleContext&);

@@ -288,9 +288,11 @@ void check_noise(RuleContext& context) {
 }
 
 void check_has_observations(RuleContext& context) {
-  for (const char* kind : {"depth", "cloud", "markers", "press", "load"})
+  for (const char* kind : {"depth", "cloud", "markers", "press", "load", "indentation", "grip", "material_curve"})
     if (context.toml.places.has(kind)) return;
-  context.toml.complain("", "no observation", "a block [[depth]], [[cloud]], [[markers]], [[press]] or [[load]]",
+  context.toml.complain("", "no observation",
+                        "a block [[depth]], [[cloud]], [[markers]], [[press]], [[load]], [[indentation]], [[grip]] or "
+                        "[[material_curve]]",
                         "say what was recorded");
 }
 
@@ -313,8 +315,8 @@ void check_presses(RuleContext& context) {
 void complain_of_mass(RuleContext& context, const std::string& key, double mass) {
   const double limit = greatest_load * context.capture.scene.object.total_mass().value_or(largest_object);
   if (mass <= 0 || mass > limit)
-    context.toml.complain(key, "a hung mass of " + text_of(mass, "kg"), "above 0 and at most " + text_of(limit, "kg"),
-                          "masses are in kilograms");
+    context.toml.complain(key, "an attached point mass of " + text_of(mass, "kg"),
+                          "above 0 and at most " + text_of(limit, "kg"), "masses are in kilograms");
 }
 
 void check_weights(RuleContext& context) {
@@ -333,7 +335,7 @@ void check_release(RuleContext& context) {
     context.toml.complain("initial.release_of", "`release_of` without `released`", "released = true",
                           "a weight that hangs in every frame is a block [[weight]]");
   if (capture.scene.world.gravity && capture.scene.world.gravity->norm() == 0)
-    context.toml.complain("initial.release_of", "a hung weight without gravity", "a gravity that pulls at it",
+    context.toml.complain("initial.release_of", "an attached weight without gravity", "a gravity that pulls at it",
                           "remove `release_of`");
   complain_of_mass(context, "initial.release_of.mass", weight->mass);
   complain_off_surface(context, "initial.release_of.at", weight->at);
@@ -355,6 +357,70 @@ void check_loads(RuleContext& context) {
       if (std::ranges::find(capture.depth, name, &DepthCamera::name) == capture.depth.end())
         context.toml.complain(item("load", i, "images"), "no depth camera \"" + name + "\"",
                               "the name of a [[depth]] block");
+  }
+}
+
+void check_indentations(RuleContext& context) {
+  const Capture& capture = context.capture;
+  const auto& surface = capture.scene.object.surface;
+  const double limit = surface ? size_of(*surface) : largest_object;
+  for (std::size_t i = 0; i < capture.indentations.size(); ++i) {
+    const Indentation& test = capture.indentations[i];
+    if (!context.toml.is_sound(item("indentation", i))) continue;
+    if (test.radius <= 0 || test.radius > limit)
+      context.toml.complain(item("indentation", i, "radius"), "a probe's radius of " + text_of(test.radius, "m"),
+                            "above 0 and smaller than the object", "radii are in metres");
+    complain_off_surface(context, item("indentation", i, "contact"), test.contact);
+  }
+}
+
+void check_grips(RuleContext& context) {
+  const Capture& capture = context.capture;
+  const auto& surface = capture.scene.object.surface;
+  const double limit = surface ? size_of(*surface) : largest_object;
+  for (std::size_t i = 0; i < capture.grips.size(); ++i) {
+    const Grip& grip = capture.grips[i];
+    if (!context.toml.is_sound(item("grip", i))) continue;
+    const auto complain = [&](const char* key, const std::string& found, const char* expected, const char* advice) {
+      context.toml.complain(item("grip", i, key), found, expected, advice);
+    };
+    if (const double way = grip.displacement.norm(); way > 10.0 * limit)
+      complain("displacement", "a displacement of " + text_of(way, "m"), "at most ten times the object's size",
+               "displacements are in metres");
+    if (!grip.force && !grip.markers)
+      complain("", "a grip without observation", "`force`, `markers`, or both", "say what was measured");
+    if (grip.force && std::abs(*grip.force) > greatest_force)
+      complain("force", "a force of " + text_of(*grip.force, "N"), "at most 100000 N in size", "forces are in newtons");
+    if (grip.force && grip.force_direction.isZero() && grip.displacement.isZero())
+      complain("force", "a force without direction", "`force_direction`, a unit vector",
+               "a grip that stays where it rests has no displacement to take it from");
+    if (grip.force.has_value() != grip.force_std.has_value())
+      complain("force_std", grip.force ? "`force` without `force_std`" : "`force_std` without `force`", "both",
+               "the standard deviation of the force in newtons");
+    if (grip.force_std && *grip.force_std <= 0)
+      complain("force_std", text_of(*grip.force_std, "N"), "a standard deviation above 0", "");
+    if (grip.markers.has_value() != grip.markers_rest.has_value() ||
+        grip.markers.has_value() != grip.markers_std.has_value())
+      complain("markers", "one or two of `markers`, `markers_rest` and `markers_std`", "all three or none",
+               "name the markers under load and at rest, and the standard deviation of a coordinate in metres");
+    if (grip.markers_std && (*grip.markers_std < least_noise || *grip.markers_std > greatest_noise))
+      complain("markers_std", text_of(*grip.markers_std, "m"), "0.000001 to 0.25 m", "a standard deviation in metres");
+    if (surface && !touches_solid(grip.region, *surface))
+      complain("", "no point of the object lies in this grip", "a region that holds a part of it",
+               "check its unit and its place at rest");
+  }
+}
+
+void check_material_curves(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.material_curves.size(); ++i) {
+    const MaterialCurve& test = context.capture.material_curves[i];
+    if (!context.toml.is_sound(item("material_curve", i))) continue;
+    if (test.prestretch <= 0)
+      context.toml.complain(item("material_curve", i, "prestretch"), text_of(test.prestretch, ""), "above 0",
+                            "1 is the unloaded length");
+    if (test.prestretch != 1.0 && test.mode != TestMode::SimpleShear)
+      context.toml.complain(item("material_curve", i, "prestretch"), "`prestretch` of another test than a simple shear",
+                            "mode = \"simple_shear\"", "remove it");
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "base/files.hpp"
 #include "capture/capture_rules.hpp"
+#include "capture/curves.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/image_io.hpp"
 #include "capture/markers.hpp"
@@ -172,11 +173,16 @@ std::vector<Rule> make_rules() {
           check_weights,
           check_release,
           check_loads,
+          check_indentations,
+          check_grips,
+          check_material_curves,
           check_depth_files,
           check_clouds,
           check_markers,
           check_press_markers,
           check_load_files,
+          check_curve_files,
+          check_grip_markers,
           check_depth_scale,
           check_cameras_see_object,
           check_clouds_near_object};
@@ -338,6 +344,37 @@ void check_load_files(RuleContext& context) {
     } catch (const InputError& error) {
       add_problems(context, item("load", i), error);
     }
+  }
+}
+
+void check_curve_files(RuleContext& context) {
+  const auto check = [&](const std::string& key, const auto& read) {
+    if (!context.toml.is_sound(key)) return;
+    try {
+      read();
+    } catch (const InputError& error) {
+      add_problems(context, key, error);
+    }
+  };
+  const Capture& capture = context.capture;
+  for (std::size_t i = 0; i < capture.indentations.size(); ++i)
+    check(item("indentation", i), [&] { (void)read_force_curve(capture.indentations[i].curve); });
+  for (std::size_t i = 0; i < capture.material_curves.size(); ++i)
+    check(item("material_curve", i), [&] {
+      const MaterialCurve& test = capture.material_curves[i];
+      const StressCurve curve =
+          read_stress_curve(test.curve, test.mode == TestMode::Biaxial, test.mode == TestMode::SimpleShear);
+      if (std::ranges::all_of(curve.stresses, [](double s) { return s == 0.0; }))
+        context.toml.complain(item("material_curve", i, "curve"), "a curve whose stresses are all zero",
+                              "a measured stress", "stresses are in pascals");
+    });
+}
+
+void check_grip_markers(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.grips.size(); ++i) {
+    const Grip& grip = context.capture.grips[i];
+    if (context.toml.is_sound(item("grip", i)) && grip.markers && grip.markers_rest)
+      check_marker_pair(context, item("grip", i), *grip.markers_rest, *grip.markers);
   }
 }
 

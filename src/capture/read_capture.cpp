@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "base/files.hpp"
 #include "base/sha256.hpp"
 #include "capture/capture.hpp"
@@ -29,6 +31,10 @@ class Reader {
     root.each_block("markers", [&](TomlTable& block) { capture_.markers.push_back(read_markers_block(block)); });
     root.each_block("press", [&](TomlTable& block) { capture_.presses.push_back(read_press(block)); });
     root.each_block("load", [&](TomlTable& block) { capture_.loads.push_back(read_load(block)); });
+    root.each_block("indentation", [&](TomlTable& block) { capture_.indentations.push_back(read_indentation(block)); });
+    root.each_block("grip", [&](TomlTable& block) { capture_.grips.push_back(read_grip(block)); });
+    root.each_block("material_curve",
+                    [&](TomlTable& block) { capture_.material_curves.push_back(read_material_curve(block)); });
     root.finish();
     return std::move(capture_);
   }
@@ -36,22 +42,30 @@ class Reader {
  private:
   void read_scene(TomlTable& root) {
     Scene& scene = capture_.scene;
-    root.with_table(
-        "object",
-        [&](TomlTable& object) {
-          read_object_shape(object, files_, scene.object);
-          read_object_facts(object, scene.object);
-        },
-        "[object] with `surface` and `mass`", "");
-    root.with_table(
-        "world", [&](TomlTable& world) { scene.world = read_world(world); }, "[world] with `gravity`, or with `up`",
-        "");
+    const auto read_object = [&](TomlTable& object) {
+      read_object_shape(object, files_, scene.object);
+      read_object_facts(object, scene.object);
+    };
+    const auto read_own_world = [&](TomlTable& world) { scene.world = read_world(world); };
+    if (is_of_curves_alone(root)) {  // a specimen needs neither shape nor place
+      root.with_table("object", read_object);
+      root.with_table("world", read_own_world);
+    } else {
+      root.with_table("object", read_object, "[object] with `surface` and `mass`", "");
+      root.with_table("world", read_own_world, "[world] with `gravity`, or with `up`", "");
+    }
     root.with_table("timing", [&](TomlTable& timing) { scene.timing = read_timing(timing, files_); });
     root.each_block("fixed", [&](TomlTable& block) { scene.fixed.push_back(read_fixed(block, files_)); });
     root.each_block("region", [&](TomlTable& block) { scene.regions.push_back(read_material_region(block, files_)); });
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
     root.with_table("initial", [&](TomlTable& initial) { scene.initial = read_initial(initial); });
+  }
+
+  static bool is_of_curves_alone(const TomlTable& root) {
+    for (const char* other : {"depth", "cloud", "markers", "press", "load", "indentation", "grip"})
+      if (root.has(other)) return false;
+    return root.has("material_curve");
   }
 
   std::optional<fs::path> optional_path(TomlTable& table, const std::string& name) {
@@ -160,6 +174,63 @@ class Reader {
     load.masks = read_paths_by_camera(block, "masks");
     load.role = read_role(block);
     return load;
+  }
+
+  /// Number of a word among those known, 0 and a complaint where it is none of them.
+  int read_word(TomlTable& block, const std::string& name, const std::vector<std::string>& known,
+                std::optional<std::string> text) {
+    const auto found = std::ranges::find(known, text.value_or(known.front()));
+    if (found != known.end()) return int(found - known.begin());
+    std::string list;
+    for (const std::string& word : known) list += (list.empty() ? "\"" : ", \"") + word + "\"";
+    context_.reject(block.key_of(name), "\"" + *text + "\"", "one of " + list);
+    return 0;
+  }
+
+  Indentation read_indentation(TomlTable& block) {
+    Indentation test;
+    test.name = block.optional<std::string>("name").value_or("");
+    test.probe = IndenterShape(
+        read_word(block, "probe", {"ball", "punch"}, block.required<std::string>("probe", "the probe's shape")));
+    test.radius = block.required<double>("radius", "of the ball, or of the punch's flat end, in metres").value_or(0.0);
+    test.contact = block.required<Vector3>("contact", "the point of the undeformed surface that is touched first")
+                       .value_or(Vector3::Zero());
+    test.direction = read_direction(block, "direction", "the direction in which the probe advances, into the object")
+                         .value_or(test.direction);
+    test.curve = required_path(block, "curve");
+    test.role = read_role(block);
+    return test;
+  }
+
+  Grip read_grip(TomlTable& block) {
+    Grip test;
+    test.name = block.optional<std::string>("name").value_or("");
+    if (auto region = read_region(block, files_)) test.region = std::move(*region);
+    test.displacement =
+        block.required<Vector3>("displacement", "of the gripped part from rest in metres").value_or(Vector3::Zero());
+    test.force = block.optional<double>("force");
+    test.force_std = block.optional<double>("force_std");
+    if (block.has("force_direction"))
+      test.force_direction = read_direction(block, "force_direction").value_or(test.force_direction);
+    test.markers = optional_path(block, "markers");
+    test.markers_rest = optional_path(block, "markers_rest");
+    test.markers_std = block.optional<double>("markers_std");
+    if (block.has("unseen")) test.unseen = read_direction(block, "unseen");
+    test.role = read_role(block);
+    return test;
+  }
+
+  MaterialCurve read_material_curve(TomlTable& block) {
+    MaterialCurve test;
+    test.name = block.optional<std::string>("name").value_or("");
+    test.mode = TestMode(read_word(block, "mode", test_mode_names(),
+                                   block.required<std::string>("mode", "how the specimen is deformed")));
+    test.measure =
+        StressMeasure(read_word(block, "measure", stress_measure_names(), block.optional<std::string>("measure")));
+    test.prestretch = block.optional<double>("prestretch").value_or(1.0);
+    test.curve = required_path(block, "curve");
+    test.role = read_role(block);
+    return test;
   }
 
   // images = { front = "load/000.png" }: keys are names of depth cameras.

@@ -291,61 +291,70 @@ std::string millimetres(double metres) {
 
 bool has_forces_to_fit(const Capture& capture) {
   const auto is_fit = [](const auto& item) { return item.role == "fit"; };
-  return std::ranges::any_of(capture.presses, is_fit) || std::ranges::any_of(capture.loads, is_fit);
+  const auto has_force = [&](const Grip& grip) { return is_fit(grip) && grip.force; };
+  return std::ranges::any_of(capture.presses, is_fit) || std::ranges::any_of(capture.loads, is_fit) ||
+         std::ranges::any_of(capture.indentations, is_fit) || std::ranges::any_of(capture.grips, has_force) ||
+         std::ranges::any_of(capture.material_curves, is_fit);
 }
 
-void add_scale(const Capture& capture, Prospects& result) {
+void add_scale(const Capture& capture, Identifiability& result) {
   if (has_forces_to_fit(capture))
-    result.possible.push_back("Pascals are anchored by measured forces: `[[press]]` or `[[load]]`.");
+    result.possible.push_back("The absolute scale of stiffness follows from measured forces or stresses.");
   else if (capture.scene.initial.release_of)
-    result.possible.push_back("Pascals are anchored by the weight from which the object is released.");
+    result.possible.push_back(
+        "The absolute scale of stiffness follows from the weight from which the object is released.");
   else if (capture.scene.object.mass || capture.scene.object.density)
-    result.possible.push_back(std::string("Pascals are anchored by the ") +
+    result.possible.push_back(std::string("The absolute scale of stiffness follows from the ") +
                               (capture.scene.object.mass ? "mass." : "density."));
   else
     result.impossible.push_back(
-        "Nothing anchors pascals: neither mass, density nor a force is known. Only the ratio of stiffness to density "
-        "can "
-        "be estimated; weigh the object and write `mass`.");
+        "The absolute scale of stiffness is not identifiable: neither mass, density nor a force is known. Only the "
+        "ratio "
+        "E/rho of stiffness to density can be estimated; weigh the object and write `mass`.");
 }
 
-void add_stiffness(const Capture& capture, const Survey& seen, Prospects& result) {
+void add_stiffness(const Capture& capture, const Survey& seen, Identifiability& result) {
   const bool is_held = !capture.scene.fixed.empty(), touches = seen.first_contact.has_value();
   const bool has_forces = has_forces_to_fit(capture);
   if (has_forces)
     result.possible.push_back("Stiffness, and Poisson's ratio to some degree: from shapes under known forces.");
   if (capture.scene.timing.times.empty()) return;
   if (capture.scene.timing.is_static) {
-    result.possible.push_back(is_held ? "Stiffness: from how far the held object sags under gravity."
-                                      : "Stiffness, if what carries the object is given: it rests under gravity.");
+    result.possible.push_back(
+        is_held ? "Stiffness: from how far the held object sags under gravity."
+                : "Stiffness is identifiable if the support of the object is specified: it rests under gravity.");
   } else if (!seen.moves) {
-    result.impossible.push_back("The object does not move: neither stiffness nor damping shows in its motion.");
+    result.impossible.push_back(
+        "The object does not move: neither stiffness nor damping is identifiable from its motion.");
   } else if (is_held || capture.scene.initial.released || touches) {
     result.possible.push_back(std::string("Stiffness: from ") +
                               (touches ? "the impact and the motion after it." : "the swinging of the held object."));
   } else if (!has_forces) {
     result.impossible.push_back(
-        "Stiffness does not show: the object neither touches a plane nor is held, and in free fall nothing strains "
+        "Stiffness is not identifiable: the object neither touches a plane nor is held, and in free fall nothing "
+        "strains "
         "it.");
   }
 }
 
-void add_damping(const Capture& capture, const Survey& seen, Prospects& result) {
+void add_damping(const Capture& capture, const Survey& seen, Identifiability& result) {
   if (capture.scene.timing.times.empty())
-    result.impossible.push_back("Damping does not show: under presses and loads the object is at rest.");
+    result.impossible.push_back("Damping is not identifiable: in static tests the object is at rest.");
   else if (capture.scene.timing.is_static)
-    result.impossible.push_back("Damping does not show: the object is at rest in every frame (`static = true`).");
+    result.impossible.push_back("Damping is not identifiable: the object is at rest in every frame (`static = true`).");
   else if (seen.moves && (!capture.scene.fixed.empty() || capture.scene.initial.released || seen.first_contact))
     result.possible.push_back("Damping: from how the motion dies out.");
 }
 
-void add_surroundings(const Capture& capture, const Survey& seen, Prospects& result) {
+void add_surroundings(const Capture& capture, const Survey& seen, Identifiability& result) {
   if (!capture.scene.world.gravity)
     result.possible.push_back("Gravity is unknown and has to be estimated from the motion.");
   if (!capture.scene.initial.known)
     result.possible.push_back("The velocity at the start has to be estimated from the first frames.");
   if (capture.scene.object.shape_is == ShapeIs::Static)
-    result.possible.push_back("The load-free shape is unknown (`shape_is = \"static\"`) and has to be estimated too.");
+    result.possible.push_back(
+        "The stress-free reference shape is unknown (`shape_is = \"static\"`) and is estimated along (inverse "
+        "elastostatics).");
   for (std::size_t i = 0; i < capture.scene.regions.size(); ++i)
     result.possible.push_back("Region \"" + capture.scene.regions[i].name + "\" can have a stiffness of its own.");
   for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
@@ -376,8 +385,14 @@ Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
   return result;
 }
 
-Prospects prospects(const Capture& capture, const Survey& seen) {
-  Prospects result;
+Identifiability identifiability(const Capture& capture, const Survey& seen) {
+  Identifiability result;
+  const bool has_curves = std::ranges::any_of(capture.material_curves, [](const auto& c) { return c.role == "fit"; });
+  if (has_curves && !capture.scene.object.surface) {
+    result.possible.push_back("Stiffness: from stress-strain curves of the material.");
+    add_scale(capture, result);
+    return result;
+  }
   if (!capture.scene.object.surface) {
     result.impossible.push_back(
         "Nothing can be fitted: there is no scan of the object at rest. Scan it all around and write `[object] "
@@ -386,7 +401,7 @@ Prospects prospects(const Capture& capture, const Survey& seen) {
       result.possible.push_back("The seen side of the scene can be split into planes and objects.");
     if (!seen.clouds.empty()) result.possible.push_back("The points can be looked at and measured.");
     add_scale(capture, result);
-    std::erase_if(result.possible, [](const std::string& text) { return text.starts_with("Pascals"); });
+    std::erase_if(result.possible, [](const std::string& text) { return text.starts_with("The absolute scale"); });
     return result;
   }
   add_stiffness(capture, seen, result);

@@ -66,11 +66,12 @@ struct Survey {
 /// Throws InputError where a file cannot be read.
 Survey survey(const Capture& capture, std::span<const ObservedFrame> frames);
 
-/// What can be estimated from a recording, what cannot, and why: plain sentences.
-struct Prospects {
+/// Identifiability of an object's parameters from a recording: what can be estimated, what cannot, and why, in plain
+/// sentences.
+struct Identifiability {
   std::vector<std::string> possible, impossible;
 };
 
-Prospects prospects(const Capture& capture, const Survey& survey);
+Identifiability identifiability(const Capture& capture, const Survey& survey);
 
 }  // namespace pliant

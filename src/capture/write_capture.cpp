@@ -13,6 +13,8 @@ namespace {
 
 const char* text_of(bool value) { return value ? "true" : "false"; }
 
+std::string grip_file(std::size_t i) { return "grip_" + std::to_string(i) + ".txt"; }
+
 // Writes the blocks of a capture.toml; paths come out relative to its folder.
 class Writer {
  public:
@@ -33,6 +35,9 @@ class Writer {
       out_ << "[[markers]]\nrest = " << file_text(track.rest) << "\ntrack = " << file_text(track.track) << "\n\n";
     for (const Press& press : capture.presses) write(press);
     for (const Load& load : capture.loads) write(load);
+    for (const Indentation& test : capture.indentations) write(test);
+    for (std::size_t i = 0; i < capture.grips.size(); ++i) write(capture.grips[i], i);
+    for (const MaterialCurve& test : capture.material_curves) write(test);
   }
 
  private:
@@ -101,6 +106,43 @@ class Writer {
     out_ << "role = " << toml_text(load.role) << "\n\n";
   }
 
+  void write_name(const std::string& name) {
+    if (!name.empty()) out_ << "name = " << toml_text(name) << "\n";
+  }
+
+  void write(const Indentation& test) {
+    out_ << "[[indentation]]\n";
+    write_name(test.name);
+    out_ << "probe = " << (test.probe == IndenterShape::Ball ? "\"ball\"" : "\"punch\"")
+         << "\nradius = " << toml_text(test.radius) << "   # m\ncontact = " << toml_text(test.contact)
+         << "\ndirection = " << toml_text(test.direction) << "\ncurve = " << file_text(test.curve)
+         << "\nrole = " << toml_text(test.role) << "\n\n";
+  }
+
+  void write(const Grip& test, std::size_t i) {
+    out_ << "[[grip]]\n";
+    write_name(test.name);
+    write_region(out_, test.region, grip_file(i));
+    out_ << "displacement = " << toml_text(test.displacement) << "   # m\n";
+    if (test.force) out_ << "force = " << toml_text(*test.force) << "   # N\n";
+    if (test.force_std) out_ << "force_std = " << toml_text(*test.force_std) << "   # N\n";
+    if (!test.force_direction.isZero()) out_ << "force_direction = " << toml_text(test.force_direction) << "\n";
+    write_file_key("markers", test.markers);
+    write_file_key("markers_rest", test.markers_rest);
+    if (test.markers_std) out_ << "markers_std = " << toml_text(*test.markers_std) << "   # m\n";
+    if (test.unseen) out_ << "unseen = " << toml_text(*test.unseen) << "\n";
+    out_ << "role = " << toml_text(test.role) << "\n\n";
+  }
+
+  void write(const MaterialCurve& test) {
+    out_ << "[[material_curve]]\n";
+    write_name(test.name);
+    out_ << "mode = " << toml_text(test_mode_names()[std::size_t(test.mode)])
+         << "\nmeasure = " << toml_text(stress_measure_names()[std::size_t(test.measure)]) << "\n";
+    if (test.prestretch != 1.0) out_ << "prestretch = " << toml_text(test.prestretch) << "\n";
+    out_ << "curve = " << file_text(test.curve) << "\nrole = " << toml_text(test.role) << "\n\n";
+  }
+
   std::ostream& out_;
   fs::path folder_;
 };
@@ -117,6 +159,8 @@ void write_capture(const fs::path& folder, const Capture& capture, const std::st
     write_mesh(written.scene.object.file, *surface);
   }
   write_scene_files(place, capture.scene);
+  for (std::size_t i = 0; i < capture.grips.size(); ++i)
+    write_region_file(place / grip_file(i), capture.grips[i].region);
   write_file(place / "capture.toml", [&](std::ostream& out) { Writer(out, place).write(written, comment); });
 }
 

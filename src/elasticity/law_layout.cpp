@@ -73,13 +73,13 @@ void LawLayout::add_laws(ParameterLayout& layout, const ParameterHandle& first_r
         form_.laws == 1 || owner.find('@') == std::string::npos ? "" : owner.substr(owner.find('@'));
     const auto add = [&](const std::string& name) { return layout.add({name + place, "1", 1, Role::Material}); };
     Blocks blocks;
-    blocks.poissons_ratios = {law == 0 && first_ratio.exists() ? first_ratio : add("poisson_ratio")};
+    blocks.poissons_ratios = {law == 0 && first_ratio.exists() ? first_ratio : add("poissons_ratio")};
     for (int i = 0; i < form_.terms; ++i) {
       const std::string number = "_" + std::to_string(i + 1);
       blocks.exponents.push_back(add("exponent" + number));
       blocks.stiffness_ratios.push_back(i > 0 ? add("stiffness_ratio" + number) : ParameterHandle{});
       if (i > 0)
-        blocks.poissons_ratios.push_back(form_.own_ratios ? add("poisson_ratio" + number)
+        blocks.poissons_ratios.push_back(form_.own_ratios ? add("poissons_ratio" + number)
                                                           : blocks.poissons_ratios.front());
     }
     laws_.push_back(std::move(blocks));
@@ -233,7 +233,7 @@ MatrixX law_parameter_derivatives(const LawForm& form, const VectorX& own) {
 MatrixX law_parameters_by_theta(const Body& body, const LawLayout& layout, const VectorX& theta, int e) {
   const VectorX own = element_numbers(body, layout, theta, e);
   const MatrixX by_own = law_parameter_derivatives(layout.form(), own);
-  MatrixX by_theta = MatrixX::Zero(by_own.rows(), layout.size());
+  MatrixX by_theta = MatrixX::Zero(by_own.rows(), theta.size());
   for (const auto& [number, at, share] : number_shares(body, layout, theta, own, e))
     by_theta.col(at) += share * by_own.col(number);
   return by_theta;

@@ -211,7 +211,7 @@ double beta_of(double nu) { return nu / (1.0 - 2.0 * nu); }
 std::vector<std::string> OgdenLaw::parameter_names() const {
   std::vector<std::string> names;
   for (int i = 1; i <= terms(); ++i)
-    for (const char* name : {"mu_", "exponent_", "poisson_ratio_"}) names.push_back(name + std::to_string(i));
+    for (const char* name : {"mu_", "exponent_", "poissons_ratio_"}) names.push_back(name + std::to_string(i));
   return names;
 }
 

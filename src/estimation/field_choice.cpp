@@ -123,7 +123,7 @@ class FieldChoice {
     // latter where it began.
     const bool is_corrected = estimate_of(*choice_.state)->id.kind == StageKind::Corrected;
     begin.begin->stage = std::max(0, begin.begin->stage - (is_corrected ? 2 : 1));
-    if (const Parameter* nu = parameters.find("poisson_ratio"); nu->estimated)
+    if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated)
       theta[nu->at] = recordings.parameters().reference()[nu->at];
     return begin;
   }

@@ -9,6 +9,7 @@
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_run.hpp"
 #include "estimation/press_fit.hpp"
+#include "estimation/press_scene.hpp"
 #include "estimation/tracking_loop.hpp"
 
 namespace pliant {
@@ -63,7 +64,7 @@ FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOp
 /// Throws InputError where they stand beside what they cannot be fitted with.
 const Capture* presses_alone(const std::vector<RecordedCapture>& recordings,
                              const std::optional<RecordedCapture>& held_out) {
-  const auto it = std::ranges::find_if(recordings, is_of_presses_alone, &RecordedCapture::capture);
+  const auto it = std::ranges::find_if(recordings, is_of_static_tests, &RecordedCapture::capture);
   if (it == recordings.end()) return nullptr;
   const auto refuse = [&](const char* what, const char* advice) {
     throw InputError({{it->capture.file}, what, "a fit of one capture's presses", advice});

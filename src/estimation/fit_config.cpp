@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 #include "scene/toml_table.hpp"
 
 namespace pliant {
@@ -33,8 +34,8 @@ const std::vector<std::pair<std::string, TrackingUse>> tracking_uses = {{"auto",
                                                                         {"off", TrackingUse::Off},
                                                                         {"loop", TrackingUse::Loop},
                                                                         {"both", TrackingUse::Both}};
-const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {{"together", LoadFreeScheme::Together},
-                                                                               {"in_turns", LoadFreeScheme::InTurns}};
+const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {{"monolithic", LoadFreeScheme::Together},
+                                                                               {"staggered", LoadFreeScheme::InTurns}};
 const std::vector<std::pair<std::string, std::optional<ElementKind>>> elements = {
     {"automatic", std::nullopt},
     {"hexahedra", ElementKind::Hexahedron},
@@ -46,28 +47,12 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"linear", FieldOptions::Weights::Linear},
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
-const std::set<std::string> parameter_names = {"youngs_modulus",
-                                               "poisson_ratio",
-                                               "mass_damping",
-                                               "stiffness_damping",
-                                               "density",
-                                               "gravity",
-                                               "linear_velocity",
-                                               "angular_velocity",
-                                               "plane",
-                                               "plane_2",
-                                               "plane_3",
-                                               "plane_4",
-                                               "pull",
-                                               "range_error",
-                                               "sensor_turn",
-                                               "sensor_shift",
-                                               "scan_correction",
-                                               "exponent_1",
-                                               "exponent_2",
-                                               "exponent_3",
-                                               "stiffness_ratio_2",
-                                               "stiffness_ratio_3"};
+const std::set<std::string> parameter_names = {
+    "youngs_modulus",  "poissons_ratio",    "mass_damping",    "stiffness_damping", "density",    "gravity",
+    "linear_velocity", "angular_velocity",  "plane",           "plane_2",           "plane_3",    "plane_4",
+    "friction",        "friction_2",        "friction_3",      "friction_4",        "pull",       "range_error",
+    "sensor_turn",     "sensor_shift",      "scan_correction", "exponent_1",        "exponent_2", "exponent_3",
+    "stiffness_ratio_2", "stiffness_ratio_3"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -150,7 +135,8 @@ Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*membe
 Entry control_points_entry() {
   Entry entry = integer_entry(
       "control_points", "1..500, auto: as many as the recordings support, or default: auto with tracking=both, else 1",
-      "of Young's modulus over the object, where the capture names no regions", &FitOptions::control_points);
+      "number of control points of the field of Young's modulus, where the capture names no regions",
+      &FitOptions::control_points);
   entry.key.type = "whole number or auto";
   entry.key.standard = "default";
   entry.write = [](const FitOptions& o) {
@@ -172,74 +158,91 @@ const std::vector<Entry>& entries() {
                  &FitOptions::cells),
       real_entry("steps", "", "0..16", "time steps per default step; 2 halves the step", &FitOptions::steps),
       integer_entry("refine", "1..3",
-                    "resolutions of mesh and time step at which the estimate is made and extrapolated; 1: no more",
+                    "number of resolutions of mesh and time step for Richardson extrapolation; 1: no extrapolation",
                     &FitOptions::refine),
       integer_entry("points_per_frame", "0, or 10 and more",
-                    "observed points used of each frame, evenly spread; 0: all", &FitOptions::points_per_frame),
-      integer_entry("starts", "1 and more", "best starting points of the scan that are followed", &FitOptions::starts),
-      integer_entry("max_iterations", "1 and more", "of each stage of the optimiser", &FitOptions::max_iterations),
-      real_entry("coarse_cells", "", "4..64", "as cells, of the grid on which starts are followed",
+                    "greatest number of observed points used of each frame, evenly spread; 0: all",
+                    &FitOptions::points_per_frame),
+      integer_entry("starts", "1 and more",
+                    "number of local minimisations, from the best values of the scan over Young's modulus",
+                    &FitOptions::starts),
+      integer_entry("max_iterations", "1 and more", "greatest number of iterations of each stage of the optimiser",
+                    &FitOptions::max_iterations),
+      real_entry("coarse_cells", "", "4..64",
+                 "elements along the longest axis of the coarse grid on which starts are followed",
                  &FitOptions::coarse_cells),
-      integer_entry("scan_per_decade", "1 and more", "values of Young's modulus tried in each decade",
+      integer_entry("scan_per_decade", "1 and more", "values of Young's modulus tried in each decade by the scan",
                     &FitOptions::scan_per_decade),
-      real_entry("wide_band", "object sizes", "0..0.5", "distance at which a point stops counting, in the early stages",
-                 &FitOptions::wide_band),
-      real_entry("fine_band", "object sizes", "0..0.5", "the same, in the last stage", &FitOptions::fine_band),
+      real_entry("wide_band", "object sizes", "0..0.5",
+                 "outlier scale of the robust loss (Tukey's biweight) in the early stages", &FitOptions::wide_band),
+      real_entry("fine_band", "object sizes", "0..0.5",
+                 "outlier scale of the robust loss (Tukey's biweight) in the last stage", &FitOptions::fine_band),
       choice_entry("element",
-                   "what the object is divided into; automatic: hexahedra, or quadratic_tetrahedra where it is unknown "
-                   "where the object is free of load",
+                   "finite elements; automatic: hexahedra, or quadratic_tetrahedra where the stress-free reference "
+                   "shape is unknown",
                    elements, &FitOptions::element),
       choice_entry("tracking",
-                   "track the object and fit its motion, in turns (loop), fit what was seen of its surface (off), or "
-                   "both, keeping what predicts frames left out; auto: both for clouds and several cameras",
+                   "alternate model-based tracking with the fit of the tracked motion (loop), fit the observed surface "
+                   "points (off), "
+                   "or both, keeping what predicts held-out frames better; auto: both for clouds and several cameras",
                    tracking_uses, &FitOptions::tracking),
-      integer_entry("tracking_rounds", "1..10", "of tracking and fitting in turns, at most",
+      integer_entry("tracking_rounds", "1..10", "greatest number of alternations of tracking and fit",
                     &FitOptions::tracking_rounds),
       choice_entry("load_free",
-                   "the load-free shape of an object scanned as it sags and its material: together, or in_turns",
+                   "coupling of the material and the stress-free shape of an object scanned under gravity: monolithic, "
+                   "or staggered",
                    load_free_schemes, &FitOptions::load_free),
-      integer_entry("scan_points", "0..50",
-                    "about which a scan that is only roughly right is corrected; 0: it is right",
+      integer_entry("scan_points", "0..50", "control points of the scan-correction field; 0 disables it",
                     &FitOptions::scan_points),
-      real_entry("scan_std", "object sizes", "0..0.2", "by how much such a scan is expected to err",
+      real_entry("scan_std", "object sizes", "0..0.2", "prior standard deviation of the scan-correction field",
                  &FitOptions::scan_std),
-      choice_entry("integrator", "how time steps are taken: rotations predicted, or fully implicit", integrators,
-                   &FitOptions::integrator),
-      integer_entry("pull_points", "1..50", "about which a released object is pulled until it is let go",
+      choice_entry("integrator",
+                   "time integration: rotations predicted (semi-implicit), or fully implicit by Newton's method",
+                   integrators, &FitOptions::integrator),
+      integer_entry("pull_points", "1..50",
+                    "application points of the unknown loads that hold a released object before its release",
                     &FitOptions::pull_points),
       control_points_entry(),
       real_entry("modulus_variation", "", "0..10",
-                 "prior deviation of ln E over the object's length, where there are control points",
+                 "prior standard deviation of ln E over the object's length, where there are control points",
                  &FitOptions::modulus_variation),
-      choice_entry("control_weights", "how moduli spread between control points", control_weights,
+      choice_entry("control_weights", "interpolation of moduli between control points", control_weights,
                    &FitOptions::control_weights),
-      choice_entry("optimiser", "how the cost is minimised", optimisers, &FitOptions::optimiser),
-      choice_entry("solver", "for the linear system of a time step", solvers, &FitOptions::solver),
+      choice_entry("optimiser", "optimiser of the cost", optimisers, &FitOptions::optimiser),
+      choice_entry("solver", "linear solver of a time step", solvers, &FitOptions::solver),
       real_entry("solver_tolerance", "", "0..1", "relative residual of the iterative solver",
                  &FitOptions::solver_tolerance),
-      real_entry("newmark_theta", "", "0.5..1", "weight of a time step's end; above 0.5 adds numerical damping",
+      real_entry("newmark_theta", "", "0.5..1",
+                 "parameter of Newmark's scheme: weight of a time step's end; above 0.5 adds numerical damping",
                  &FitOptions::newmark_theta),
-      flag_entry(
-          "correct",
-          "estimate what spoils a recording (a sensor's range or pose, gravity's direction) where residuals show it",
-          &FitOptions::correct),
-      flag_entry("hold_strongly", "held regions fix grid nodes instead of using Nitsche's method",
+      flag_entry("correct",
+                 "estimate systematic errors (range bias and extrinsics of sensors, direction of gravity) where a "
+                 "score test on the "
+                 "residuals requires it",
+                 &FitOptions::correct),
+      flag_entry("hold_strongly",
+                 "impose Dirichlet conditions of held regions strongly, by elimination of nodes, instead of weakly by "
+                 "Nitsche's method",
                  &FitOptions::hold_strongly),
       choice_entry(
           "material",
-          "what the object is made of; automatic: linear where it moves or hangs, Ogden's law where presses are all "
+          "material law; automatic: linear elasticity for motions and equilibria, Ogden's law where static tests are all "
           "there is; sampled: the stiffness of each press interpolated in strain space, for presses alone",
           materials, &FitOptions::material),
       integer_entry("law_terms", "0..3",
-                    "of Ogden's law; 0: one where the object moves or hangs, else as many as the presses support",
+                    "number of terms of Ogden's law; 0: one for motions and equilibria, else as many as the static "
+                    "tests support",
                     &FitOptions::law_terms),
-      integer_entry("law_zones", "0..12", "with a law of their own each; 0: as many as the presses support; 1: none",
+      integer_entry("law_zones", "0..12",
+                    "number of zones with a law of their own each; 0: as many as the static tests support; 1: a "
+                    "homogeneous object",
                     &FitOptions::law_zones),
-      real_entry("marker_noise", "m", ">= 0", "of a marker's coordinate under a press; 0: what the residuals say",
+      real_entry("marker_noise", "m", ">= 0",
+                 "standard deviation of a marker's coordinate under a press; 0: estimated from the residuals",
                  &FitOptions::marker_noise),
-      real_entry("basis_tolerance", "", "> 0", "of stress, relative to the greatest, in a sampled material",
+      real_entry("basis_tolerance", "", "> 0", "tolerance of stress, relative to the greatest, of a sampled material",
                  &FitOptions::basis_tolerance),
-      integer_entry("basis_samples", ">= 1", "of an element in a sampled material, at most",
+      integer_entry("basis_samples", ">= 1", "greatest number of samples of an element of a sampled material",
                     &FitOptions::basis_samples),
   };
   return all;
@@ -249,6 +252,13 @@ const Entry* find_entry(const std::string& name) {
   for (const Entry& e : entries())
     if (e.key.name == name) return &e;
   return nullptr;
+}
+
+/// What a choice's value is called now.
+std::string present_value(const std::string& key, const std::string& value) {
+  if (key == "load_free" && value == "together") return "monolithic";
+  if (key == "load_free" && value == "in_turns") return "staggered";
+  return value;
 }
 
 [[noreturn]] void reject_unknown(const std::string& key) {
@@ -303,7 +313,7 @@ const std::vector<FitKey>& fit_keys() {
 }
 
 std::string parameter_key_help() {
-  return "Parameters (youngs_modulus, poisson_ratio, mass_damping, stiffness_damping, density, gravity, "
+  return "Parameters (youngs_modulus, poissons_ratio, mass_damping, stiffness_damping, density, gravity, "
          "linear_velocity,\n"
          "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, exponent_1 .. of Ogden's law, and for what "
          "sensors get wrong "
@@ -325,10 +335,18 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
     if (value == "0") return;
     throw InputError({{}, "seed is \"" + value + "\"", "no seed: nothing in a fit is random", "leave it out"});
   }
+  if (const std::string present = present_value(key, value); present != value) {
+    note_former_word(value, present, key);
+    return set_fit_option(options, key + "=" + present);
+  }
   if (const Entry* entry = find_entry(key)) {
     if (const auto expected = entry->read(options, value))
       throw InputError({{}, key + " is \"" + value + "\"", *expected, ""});
     return;
+  }
+  if (const std::string present = present_name(key); present != key) {
+    note_former_word(key, present, "");
+    return set_fit_option(options, present + "=" + value);
   }
   // The name of a region, control point or sensor stands after an @ and may hold dots itself.
   std::string name = key, part;
@@ -480,7 +498,8 @@ std::string FitOptions::validate() const {
   if (scan_points < 0 || scan_points > 50) return "scan_points must lie in 0..50";
   if (!(scan_std > 0.0 && scan_std <= 0.2)) return "scan_std must lie in (0, 0.2]";
   if (scan_points > 0 && load_free == LoadFreeScheme::InTurns)
-    return "load_free=in_turns holds the shape while it moves parameters: it cannot correct the scan (scan_points)";
+    return "load_free=staggered keeps the shape while it minimises over parameters: it cannot correct the scan "
+           "(scan_points)";
   if (tracking_rounds < 1 || tracking_rounds > 10) return "tracking_rounds must lie in 1..10";
   if (pull_points < 1 || pull_points > 50) return "pull_points must lie in 1..50";
   if (control_points != automatic && control_points != unsaid && (control_points < 1 || control_points > 500))

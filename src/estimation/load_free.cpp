@@ -66,7 +66,7 @@ LoadFree find_load_free(const Capture& capture, const Resolution& resolution, co
                         const VectorX& theta, const ReferenceShapeOptions& options) {
   if (resolution.element == ElementKind::Hexahedron)
     throw InputError({{capture.file},
-                      "hexahedra have no shape free of load but their grid",
+                      "the stress-free reference shape of hexahedra is their regular grid",
                       "tetrahedra",
                       "use element=quadratic_tetrahedra or element=tetrahedra"});
   if (capture.scene.fixed.empty())

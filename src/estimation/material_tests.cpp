@@ -136,6 +136,8 @@ void check_test(const MaterialTest& test) {
     refuse("stretches must be positive and shears finite");
   if (test.mode == TestMode::Biaxial && !std::ranges::all_of(test.second, positive))
     refuse("stretches must be positive");
+  if (!test.std.empty() && (test.std.size() != test.stress.size() || !std::ranges::all_of(test.std, positive)))
+    refuse("a test has as many standard deviations as stresses, above zero, or none");
   if (test.greatest_stress() == 0.0) refuse("all stresses are zero");
 }
 
@@ -193,10 +195,25 @@ double relative_rms(const MaterialTest& test, const std::vector<double>& predict
   return std::sqrt(sum / double(predicted.size())) / test.greatest_stress();
 }
 
-std::shared_ptr<const Body> unit_element() {
+std::vector<double> secant_moduli(const MaterialTest& test) {
+  std::vector<double> secants;
+  for (std::size_t i = 0; i < test.stretch.size(); ++i) {
+    const double strain = test.mode == TestMode::SimpleShear ? test.stretch[i] / 3.0 : test.stretch[i] - 1.0;
+    if (std::abs(strain) > 1e-3 && test.stress[i] / strain > 0.0) secants.push_back(test.stress[i] / strain);
+  }
+  return secants;
+}
+
+std::shared_ptr<const Body> unit_element(int controls) {
   Points nodes(4, 3);
   nodes << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1;
-  return std::make_shared<Body>(make_body(make_tet_mesh(nodes, {{0, 1, 2, 3}})));
+  auto body = std::make_shared<Body>(make_body(make_tet_mesh(nodes, {{0, 1, 2, 3}})));
+  if (controls > 1) {
+    body->modulus.controls = controls;
+    body->modulus.weights = MatrixX::Zero(1, controls);
+    body->modulus.weights(0, 0) = 1.0;
+  }
+  return body;
 }
 
 ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
@@ -210,7 +227,7 @@ ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<do
     if (p.transform == Transform::LogitHalf) p.upper = greatest_poissons_ratio;
   }
   ParameterSet parameters(set.layout(), std::move(list), set.reference());
-  if (poissons_ratio) parameters.fix("poisson_ratio", *poissons_ratio);
+  if (poissons_ratio) parameters.fix("poissons_ratio", *poissons_ratio);
   return parameters;
 }
 
@@ -219,8 +236,20 @@ CurveTrial::CurveTrial(MaterialTest test, int number, const LawLayout& layout, d
     : test_(std::move(test)), number_(number), layout_(layout), noise_(noise) {
   if (!(noise_ > 0.0)) throw std::invalid_argument("curves need a noise above zero");
   check_test(test_);
+  set_layout(layout, parameters);
+}
+
+void CurveTrial::set_layout(const LawLayout& layout, const ParameterSet& parameters) {
+  layout_ = layout;
+  body_ = unit_element(layout.form().controls);
+  bounded_.clear();
+  const std::vector<ParameterHandle> own = layout.all();
   for (const Parameter& p : parameters.parameters())
-    if (p.transform == Transform::Shift) bounded_.push_back(p);
+    if (p.transform == Transform::Shift && std::ranges::find(own, p.at) != own.end()) bounded_.push_back(p);
+}
+
+double CurveTrial::std_of(std::size_t point) const {
+  return test_.std.empty() ? noise_ * test_.greatest_stress() : test_.std[point];
 }
 
 CostEvaluation CurveTrial::run(const VectorX& theta, const MatrixX& directions) {
@@ -231,15 +260,15 @@ CostEvaluation CurveTrial::run(const VectorX& theta, const MatrixX& directions) 
   const auto law = press_law(*body_, layout_, theta);
   const Eigen::Index n = directions.cols();
   const MatrixX by_p = n > 0 ? MatrixX(law_parameters_by_theta(*body_, layout_, theta, 0) * directions) : MatrixX();
-  const double inverse = 1.0 / (noise_ * test_.greatest_stress());
   FrameFit fit;
+  fit.recording = recording_;
   fit.frame = number_;
   fit.independent = double(test_.stretch.size());
   if (n > 0) fit.gradient = VectorX::Zero(n), fit.gauss_newton = MatrixX::Zero(n, n);
   for (std::size_t i = 0; i < test_.stretch.size(); ++i) {
     const TestPoint point = solve_test(*law, 0, test_, i, n > 0);
     if (!point.found) return result.failure = test_.name + ": no state without stress on the free faces", result;
-    const double r = inverse * (point.stress - test_.stress[i]);
+    const double inverse = 1.0 / std_of(i), r = inverse * (point.stress - test_.stress[i]);
     fit.cost += 0.5 * r * r;
     if (n == 0) continue;
     const VectorX J = inverse * (by_p.transpose() * point.by_parameters);
@@ -269,14 +298,11 @@ Objective curve_objective(const std::vector<MaterialTest>& tests, int terms, Par
 
 namespace {
 
-/// A modulus to set out from: the median of the points' secants, as if all were stretched along one axis.
+/// A modulus to set out from: the median of the points' secants.
 double secant_modulus(const std::vector<MaterialTest>& tests) {
   std::vector<double> secants;
   for (const MaterialTest& test : tests)
-    for (std::size_t i = 0; i < test.stretch.size(); ++i) {
-      const double strain = test.mode == TestMode::SimpleShear ? test.stretch[i] / 3.0 : test.stretch[i] - 1.0;
-      if (std::abs(strain) > 1e-3 && test.stress[i] / strain > 0.0) secants.push_back(test.stress[i] / strain);
-    }
+    for (const double secant : secant_moduli(test)) secants.push_back(secant);
   if (secants.empty()) throw std::invalid_argument("no stress of the curves has the sign of its strain");
   std::ranges::nth_element(secants, secants.begin() + std::ptrdiff_t(secants.size() / 2));
   return secants[secants.size() / 2];
@@ -324,6 +350,7 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
       if (!run.succeeded) fit.failure = run.reason;
       if (!run.succeeded || !(run.evaluation.cost < least)) continue;
       least = run.evaluation.cost;
+      fit.converged = run.converged, fit.reason = run.reason;
       fit.theta = objective.parameters().to_theta(run.p);
       fit.succeeded = true;
     }
@@ -332,14 +359,15 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
       break;
     }
     before = fit.theta, fewer = fit.layout;
+    fit.parameters = objective.parameters();
     const CostEvaluation at = objective.evaluate(objective.parameters().to_unconstrained(fit.theta));
-    double squares = 0.0;  // over each curve's greatest stress
+    double squares = 0.0;  // over each curve's greatest stress, where it states no standard deviations
     for (const FrameFit& curve : at.frames) squares += 2.0 * curve.cost * options.noise * options.noise;
     const double n = at.independent_observations(), mean = std::max(squares / n, 1e-30);
     fit.bic = n * std::log(mean) + objective.parameters().dimension() * std::log(n);
     fit.law = press_law(*unit_element(), fit.layout, fit.theta);
     std::vector<CurveFit::Tried> tried = best.tried;
-    tried.push_back({terms, fit.bic, std::sqrt(mean)});
+    tried.push_back({terms, fit.bic, std::sqrt(mean), at.cost});
     falls = fit.bic < best.bic;
     if (falls) best = fit;
     best.tried = std::move(tried);

@@ -2,29 +2,12 @@
 
 #include <optional>
 
+#include "capture/capture.hpp"
 #include "estimation/objective.hpp"
 #include "estimation/optimiser.hpp"
 #include "estimation/press_law.hpp"
 
 namespace pliant {
-
-/// How a cube of a material is deformed. Stretches stand along the axes; faces that nothing leads carry no stress.
-enum class TestMode {
-  Uniaxial,          ///< stretch along x; y and z free
-  PureShear,         ///< stretch along x, y kept, z free: a wide strip between clamps
-  Equibiaxial,       ///< the same stretch along x and y, z free
-  Biaxial,           ///< stretch along x, `second` along y, z free
-  SimpleShear,       ///< F_xy is the shear; before it the cube is stretched along x by `prestretch`, y and z free, and
-                     ///< they stay what they were then
-  ConfinedUniaxial,  ///< stretch along x; y and z kept
-};
-
-/// Which stress a curve holds [Pa].
-enum class StressMeasure {
-  First,             ///< nominal: P_xx, of a shear P_xy
-  Second,            ///< nominal: P_yy
-  CauchyDifference,  ///< sigma_xx - sigma_yy
-};
 
 /// A measured curve: stress over stretch or shear.
 struct MaterialTest {
@@ -35,6 +18,8 @@ struct MaterialTest {
   std::vector<double> stress;   ///< [Pa], as many
   std::vector<double> second;   ///< Biaxial: the stretches along y, as many
   double prestretch = 1.0;      ///< SimpleShear: along x
+  std::vector<double> std =
+      {};  ///< [Pa] standard deviation of each stress, as many; empty: the same part of the greatest
 
   double greatest_stress() const;  ///< [Pa], of any sign
 };
@@ -65,8 +50,12 @@ std::vector<double> predict_test(const MaterialLaw& law, const MaterialTest& tes
 /// holds one.
 double relative_rms(const MaterialTest& test, const std::vector<double>& predicted);
 
+/// Secant moduli of a test's points, as if all were stretched along one axis [Pa]; those that are positive.
+std::vector<double> secant_moduli(const MaterialTest& test);
+
 /// The body of one tetrahedron whose law the curves determine.
-std::shared_ptr<const Body> unit_element();
+/// @param controls  moduli of the object: the element's is the first
+std::shared_ptr<const Body> unit_element(int controls = 1);
 
 /// `law_parameters` of one element, for materials that hardly change their volume too.
 /// @param poissons_ratio      known; nothing: estimated, up to 0.4999
@@ -74,12 +63,12 @@ std::shared_ptr<const Body> unit_element();
 ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
                               bool positive_exponents = false);
 
-/// A stress-strain curve of a material: half the squares of simulated less measured stress over `noise` times the
-/// curve's greatest stress, so that curves count by their points, not by their units. The law is that of one element.
+/// A stress-strain curve of a material: half the squares of simulated less measured stress over the test's standard
+/// deviations or, where it states none, over `noise` times the curve's greatest stress, so that curves count by their
+/// points, not by their units. The law is that of one element: of the first control modulus, where there are several.
 class CurveTrial : public Trial {
  public:
   /// @param number  what the evaluation's frame calls it
-  /// @param layout  of one control and one law
   /// @param noise   standard deviation of a stress, relative to the curve's greatest, > 0
   /// @param parameters  whose exponents keep to their bounds: what lies beyond cannot be simulated
   /// Throws std::invalid_argument where the test is not as `check_test` wants it, or the noise is not positive.
@@ -89,13 +78,20 @@ class CurveTrial : public Trial {
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
   [[nodiscard]] std::unique_ptr<Trial> anew() const override { return std::make_unique<CurveTrial>(*this); }
 
+  /// Goes on with another form of the law.
+  void set_layout(const LawLayout& layout, const ParameterSet& parameters);
+  /// What the evaluation's frame says of its trial (`FrameFit::recording`).
+  void set_recording(int recording) { recording_ = recording; }
+
  private:
+  double std_of(std::size_t point) const;
+
   MaterialTest test_;
-  int number_;
+  int number_, recording_ = 0;
   LawLayout layout_;
   double noise_;
   std::vector<Parameter> bounded_;
-  std::shared_ptr<const Body> body_ = unit_element();
+  std::shared_ptr<const Body> body_;
 };
 
 /// The objective of stress-strain curves.
@@ -117,13 +113,17 @@ struct CurveFitOptions {
 struct CurveFit {
   bool succeeded = false;
   std::string failure;
+  bool converged = false;
+  std::string reason;  ///< why the best start's optimiser stopped
   LawLayout layout;
+  ParameterSet parameters;  ///< of that layout
   VectorX theta;
   std::shared_ptr<const TabulatedLaw> law;  ///< of one element
   double bic = 0.0;                         ///< n ln(sum of squares / n) + k ln n
   struct Tried {
     int terms;
     double bic, rms;  ///< rms of all residuals, over each curve's greatest stress
+    double cost;      ///< with the priors
   };
   std::vector<Tried> tried;  ///< of each number of terms, the best of its starts
 };

@@ -27,9 +27,9 @@ constexpr double start_contrast = 1.8;    // of ln E: one control six times as s
 constexpr int most_rounds = 6, most_iterations = 30;
 constexpr double settled = 3e-3;  // of ln E_k between rounds
 
-struct MatchedTone {
+struct MatchedSinusoid {
   int mode;
-  Tone tone;
+  DampedSinusoid sinusoid;
   double observed, weight;  // ln omega without damping; inverse variance
 };
 
@@ -109,18 +109,19 @@ class Vibrations {
 };
 
 /// Finds the vibrations' oscillations in their coordinates.
-class ToneSearch {
+class SinusoidSearch {
  public:
-  ToneSearch(const ModeCoordinates& coordinates, const Vibrations& vibrations)
+  SinusoidSearch(const ModeCoordinates& coordinates, const Vibrations& vibrations)
       : coordinates_(coordinates), vibrations_(vibrations), doubts_(std::size_t(vibrations.count())) {}
 
-  std::vector<MatchedTone> run() {
-    std::vector<MatchedTone> found;
-    const ToneBand band = resolvable_band(coordinates_.times);
-    std::vector<std::optional<Tone>> alone;
+  std::vector<MatchedSinusoid> run() {
+    std::vector<MatchedSinusoid> found;
+    const FrequencyBand band = resolvable_band(coordinates_.times);
+    std::vector<std::optional<DampedSinusoid>> alone;
     for (int j = 0; j < vibrations_.count(); ++j) {
-      alone.push_back(strongest_tone(coordinates_.times, coordinates_.values.col(j), band));
-      doubts_[std::size_t(j)] = alone.back() ? doubts(*alone.back(), coordinates_.times.size()) : "it does not move";
+      alone.push_back(dominant_sinusoid(coordinates_.times, coordinates_.values.col(j), band));
+      doubts_[std::size_t(j)] =
+          alone.back() ? rejection_reason(*alone.back(), coordinates_.times.size()) : "it does not move";
     }
     const auto power = [&](int j) { return alone[std::size_t(j)] ? alone[std::size_t(j)]->power : 0.0; };
     std::vector<int> order(alone.size());
@@ -131,13 +132,14 @@ class ToneSearch {
         if (doubts_[std::size_t(j)].empty()) found.push_back(matched(j, *alone[std::size_t(j)]));
         continue;
       }
-      const ToneBand near = expected(j, found.front(), band);
-      const auto tone = strongest_tone(coordinates_.times, coordinates_.values.col(j), near, disturbing(j, found));
+      const FrequencyBand near = expected(j, found.front(), band);
+      const auto sinusoid =
+          dominant_sinusoid(coordinates_.times, coordinates_.values.col(j), near, disturbing(j, found));
       doubts_[std::size_t(j)] =
-          tone ? doubts(*tone, coordinates_.times.size()) : "it is too fast or slow for the frames";
-      if (tone && tone->amplitude < least_amplitude * found.front().tone.amplitude)
+          sinusoid ? rejection_reason(*sinusoid, coordinates_.times.size()) : "it is too fast or slow for the frames";
+      if (sinusoid && sinusoid->amplitude < least_amplitude * found.front().sinusoid.amplitude)
         doubts_[std::size_t(j)] = "it hardly moves beside the strongest one";
-      if (doubts_[std::size_t(j)].empty()) found.push_back(matched(j, *tone));
+      if (doubts_[std::size_t(j)].empty()) found.push_back(matched(j, *sinusoid));
     }
     return found;
   }
@@ -145,27 +147,27 @@ class ToneSearch {
   const std::vector<std::string>& doubts_found() const { return doubts_; }
 
  private:
-  static MatchedTone matched(int mode, const Tone& tone) {
-    const double deviation = tone.deviation / tone.natural();
-    return {mode, tone, std::log(tone.natural()), 1.0 / (model_error * model_error + deviation * deviation)};
+  static MatchedSinusoid matched(int mode, const DampedSinusoid& sinusoid) {
+    const double deviation = sinusoid.deviation / sinusoid.natural();
+    return {mode, sinusoid, std::log(sinusoid.natural()), 1.0 / (model_error * model_error + deviation * deviation)};
   }
   /// ln of how much faster the strongest mode is seen to be than modelled.
-  double offset(const MatchedTone& strongest) const {
+  double offset(const MatchedSinusoid& strongest) const {
     return strongest.observed - vibrations_.log_omega(strongest.mode);
   }
-  ToneBand expected(int mode, const MatchedTone& strongest, const ToneBand& band) const {
+  FrequencyBand expected(int mode, const MatchedSinusoid& strongest, const FrequencyBand& band) const {
     const double reach = vibrations_.controls() == 1 ? one_modulus_reach : several_moduli_reach;
     const double middle = vibrations_.log_omega(mode) + offset(strongest);
     return {std::max(band.least, std::exp(middle - reach)), std::min(band.most, std::exp(middle + reach))};
   }
   /// Oscillations of stronger modes that a coordinate may take up because its shape is not quite right, and the
   /// strongest one's second harmonic, which large swings have; not those of modes as fast as this one.
-  std::vector<Tone> disturbing(int mode, const std::vector<MatchedTone>& stronger) const {
-    std::vector<Tone> known;
-    for (const MatchedTone& m : stronger)
+  std::vector<DampedSinusoid> disturbing(int mode, const std::vector<MatchedSinusoid>& stronger) const {
+    std::vector<DampedSinusoid> known;
+    for (const MatchedSinusoid& m : stronger)
       if (std::abs(vibrations_.log_omega(m.mode) - vibrations_.log_omega(mode)) > same_frequency)
-        known.push_back(m.tone);
-    Tone harmonic = stronger.front().tone;
+        known.push_back(m.sinusoid);
+    DampedSinusoid harmonic = stronger.front().sinusoid;
     harmonic.omega *= 2.0, harmonic.decay *= 2.0;
     const double middle = vibrations_.log_omega(mode) + offset(stronger.front());
     if (std::abs(std::log(harmonic.omega) - middle) > same_frequency) known.push_back(harmonic);
@@ -180,29 +182,29 @@ class ToneSearch {
 /// The match as a function of ln E, with modes recognised by their shapes.
 class FrequencyMatch {
  public:
-  FrequencyMatch(Vibrations& vibrations, const std::vector<MatchedTone>& tones, std::vector<Points> shapes)
-      : vibrations_(vibrations), tones_(tones), shapes_(std::move(shapes)) {}
+  FrequencyMatch(Vibrations& vibrations, const std::vector<MatchedSinusoid>& sinusoids, std::vector<Points> shapes)
+      : vibrations_(vibrations), sinusoids_(sinusoids), shapes_(std::move(shapes)) {}
 
-  /// ln (modelled / observed), one a tone; empty where modes cannot be found.
+  /// ln (modelled / observed), one a sinusoid; empty where modes cannot be found.
   VectorX residuals(const VectorX& log_moduli) {
     if (!vibrations_.solve(log_moduli)) return {};
     modes_ = vibrations_.follow(shapes_);
-    VectorX r(Eigen::Index(tones_.size()));
-    for (std::size_t t = 0; t < tones_.size(); ++t)
-      r[Eigen::Index(t)] = vibrations_.log_omega(modes_[std::size_t(tones_[t].mode)]) - tones_[t].observed;
+    VectorX r(Eigen::Index(sinusoids_.size()));
+    for (std::size_t t = 0; t < sinusoids_.size(); ++t)
+      r[Eigen::Index(t)] = vibrations_.log_omega(modes_[std::size_t(sinusoids_[t].mode)]) - sinusoids_[t].observed;
     return r;
   }
   /// Of the residuals last computed, by ln E_k.
   MatrixX jacobian() {
     const MatrixX all = vibrations_.log_derivatives();
-    MatrixX J(Eigen::Index(tones_.size()), all.cols());
-    for (std::size_t t = 0; t < tones_.size(); ++t)
-      J.row(Eigen::Index(t)) = all.row(modes_[std::size_t(tones_[t].mode)]);
+    MatrixX J(Eigen::Index(sinusoids_.size()), all.cols());
+    for (std::size_t t = 0; t < sinusoids_.size(); ++t)
+      J.row(Eigen::Index(t)) = all.row(modes_[std::size_t(sinusoids_[t].mode)]);
     return J;
   }
   VectorX weights() const {
-    VectorX w(Eigen::Index(tones_.size()));
-    for (std::size_t t = 0; t < tones_.size(); ++t) w[Eigen::Index(t)] = tones_[t].weight;
+    VectorX w(Eigen::Index(sinusoids_.size()));
+    for (std::size_t t = 0; t < sinusoids_.size(); ++t) w[Eigen::Index(t)] = sinusoids_[t].weight;
     return w;
   }
   /// Which mode of the last solution each of the shapes is.
@@ -210,7 +212,7 @@ class FrequencyMatch {
 
  private:
   Vibrations& vibrations_;
-  const std::vector<MatchedTone>& tones_;
+  const std::vector<MatchedSinusoid>& sinusoids_;
   std::vector<Points> shapes_;
   std::vector<int> modes_;
 };
@@ -268,20 +270,20 @@ bool match_frequencies(FrequencyMatch& match, const Bounds& bounds, VectorX& q) 
 
 /// alpha and beta >= 0 with decay_j = (alpha + beta omega_j^2) / 2, by least squares of the decays over their
 /// deviations.
-void find_dampings(const std::vector<MatchedTone>& tones, ModalStart& start) {
-  const Tone& strongest = tones.front().tone;
+void find_dampings(const std::vector<MatchedSinusoid>& sinusoids, ModalStart& start) {
+  const DampedSinusoid& strongest = sinusoids.front().sinusoid;
   start.mass_damping = strongest.decay;
   start.stiffness_damping = strongest.decay / std::pow(strongest.natural(), 2);
-  const auto [slow, fast] = std::ranges::minmax_element(tones, {}, &MatchedTone::observed);
+  const auto [slow, fast] = std::ranges::minmax_element(sinusoids, {}, &MatchedSinusoid::observed);
   if (fast->observed - slow->observed < least_spread) return;
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
-  for (const MatchedTone& m : tones) {
-    const Eigen::Vector2d row(0.5, 0.5 * std::pow(m.tone.natural(), 2));
+  for (const MatchedSinusoid& m : sinusoids) {
+    const Eigen::Vector2d row(0.5, 0.5 * std::pow(m.sinusoid.natural(), 2));
     // The decay errs as much as omega, and by a tenth where the model of damping does.
-    const double weight = 1.0 / (std::pow(m.tone.deviation, 2) + std::pow(0.1 * m.tone.decay, 2) + 1e-12);
+    const double weight = 1.0 / (std::pow(m.sinusoid.deviation, 2) + std::pow(0.1 * m.sinusoid.decay, 2) + 1e-12);
     normal += weight * row * row.transpose();
-    rhs += weight * m.tone.decay * row;
+    rhs += weight * m.sinusoid.decay * row;
   }
   Eigen::Vector2d found = normal.fullPivLu().solve(rhs);
   if (found[0] < 0.0) found = {0.0, rhs[1] / normal(1, 1)};
@@ -291,22 +293,24 @@ void find_dampings(const std::vector<MatchedTone>& tones, ModalStart& start) {
   start.dampings_are_told_apart = true;
 }
 
-void describe_modes(const std::vector<MatchedTone>& tones, const std::vector<std::string>& doubts,
+void describe_modes(const std::vector<MatchedSinusoid>& sinusoids, const std::vector<std::string>& doubts,
                     const FrequencyMatch& match, const Vibrations& vibrations, ModalStart& start) {
   double energy = 0.0, weight = 0.0;
-  const auto energy_of = [](const Tone& tone) { return 0.5 * std::pow(tone.natural() * tone.amplitude, 2); };
-  for (const MatchedTone& m : tones) energy += energy_of(m.tone), weight += m.weight;
+  const auto energy_of = [](const DampedSinusoid& sinusoid) {
+    return 0.5 * std::pow(sinusoid.natural() * sinusoid.amplitude, 2);
+  };
+  for (const MatchedSinusoid& m : sinusoids) energy += energy_of(m.sinusoid), weight += m.weight;
   for (int j = 0; j < vibrations.count(); ++j) {
     ObservedMode seen;
     seen.mode = j;
     seen.modelled_frequency = std::exp(vibrations.log_omega(match.modes()[std::size_t(j)])) / (2.0 * std::numbers::pi);
-    const auto found = std::ranges::find(tones, j, &MatchedTone::mode);
-    seen.is_used = found != tones.end();
+    const auto found = std::ranges::find(sinusoids, j, &MatchedSinusoid::mode);
+    seen.is_used = found != sinusoids.end();
     if (seen.is_used) {
-      seen.observed_frequency = found->tone.natural() / (2.0 * std::numbers::pi);
-      seen.relative_deviation = found->tone.deviation / found->tone.natural();
-      seen.damping_ratio = found->tone.damping_ratio();
-      seen.energy = energy_of(found->tone) / energy;
+      seen.observed_frequency = found->sinusoid.natural() / (2.0 * std::numbers::pi);
+      seen.relative_deviation = found->sinusoid.deviation / found->sinusoid.natural();
+      seen.damping_ratio = found->sinusoid.damping_ratio();
+      seen.energy = energy_of(found->sinusoid) / energy;
       seen.weight = found->weight / weight;
     } else {
       seen.reason = doubts[std::size_t(j)];
@@ -319,11 +323,11 @@ void describe_modes(const std::vector<MatchedTone>& tones, const std::vector<std
 struct Round {
   VectorX log_moduli;
   ModeCoordinates coordinates;
-  std::vector<MatchedTone> tones;
+  std::vector<MatchedSinusoid> sinusoids;
   std::vector<std::string> doubts;  // of each mode
-  std::vector<Points> shapes;       // which the coordinates and the tones belong to
+  std::vector<Points> shapes;       // which the coordinates and the sinusoids belong to
   double score =
-      std::numeric_limits<double>::infinity();  // of rounds with equally many tones the closest match is best
+      std::numeric_limits<double>::infinity();  // of rounds with equally many sinusoids the closest match is best
 };
 
 /// From the shapes that belong to ln E = q. `score` stays infinite where nothing swings or modes cannot be found.
@@ -333,16 +337,16 @@ Round run_round(Vibrations& vibrations, const TrackedMotion& motion, ModeProject
   round.log_moduli = q;
   if (!vibrations.solve(q)) return round;
   round.coordinates = vibrations.project(motion, projection);
-  ToneSearch search(round.coordinates, vibrations);
-  round.tones = search.run();
+  SinusoidSearch search(round.coordinates, vibrations);
+  round.sinusoids = search.run();
   round.doubts = search.doubts_found();
   round.shapes = vibrations.shapes();
-  if (round.tones.empty()) return round;
-  FrequencyMatch match(vibrations, round.tones, round.shapes);
+  if (round.sinusoids.empty()) return round;
+  FrequencyMatch match(vibrations, round.sinusoids, round.shapes);
   if (!match_frequencies(match, bounds, round.log_moduli)) return round;
   const VectorX residuals = match.residuals(round.log_moduli);
   if (residuals.size() > 0)
-    round.score = (1.0 + match.weights().dot(residuals.cwiseAbs2())) / double(round.tones.size());
+    round.score = (1.0 + match.weights().dot(residuals.cwiseAbs2())) / double(round.sinusoids.size());
   return round;
 }
 
@@ -425,10 +429,10 @@ ModalStart modal_start(std::shared_ptr<const Body> body, const MotionBlocks& blo
   const Round best = best_round(vibrations, motion, options.projection, bounds);
   start.coordinates = best.coordinates;
   if (best.doubts.empty()) return start.reason = "the body's modes cannot be found", start;
-  if (best.tones.empty())
+  if (best.sinusoids.empty())
     return start.reason = "no vibration of the body is seen; of the lowest one: " + best.doubts.front(), start;
   const VectorX& q = best.log_moduli;
-  FrequencyMatch match(vibrations, best.tones, best.shapes);
+  FrequencyMatch match(vibrations, best.sinusoids, best.shapes);
   const VectorX residuals = match.residuals(q);
   if (residuals.size() == 0) return start.reason = "the body's modes cannot be found", start;
   start.mismatch = mismatch_of(match.weights(), residuals);
@@ -436,13 +440,13 @@ ModalStart modal_start(std::shared_ptr<const Body> body, const MotionBlocks& blo
   const MatrixX J = match.jacobian();
   const MatrixX H = J.transpose() * match.weights().asDiagonal() * J + pull_towards_equal(q.size());
   start.log_deviations = inverse(H).diagonal().cwiseSqrt();
-  describe_modes(best.tones, best.doubts, match, vibrations, start);
-  find_dampings(best.tones, start);
+  describe_modes(best.sinusoids, best.doubts, match, vibrations, start);
+  find_dampings(best.sinusoids, start);
   draw_curves(match, bounds, options.curve_samples, q, start);
   if (q.minCoeff() <= bounds.least || q.maxCoeff() >= bounds.most)
     start.reason = "a modulus lies at the end of the range in which it was sought";
-  else if (int(best.tones.size()) < vibrations.controls())
-    start.reason = std::to_string(best.tones.size()) + " vibrations for " + std::to_string(vibrations.controls()) +
+  else if (int(best.sinusoids.size()) < vibrations.controls())
+    start.reason = std::to_string(best.sinusoids.size()) + " vibrations for " + std::to_string(vibrations.controls()) +
                    " moduli: what they leave open is as if the object were even";
   start.found = true;
   return start;

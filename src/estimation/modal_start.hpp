@@ -1,8 +1,8 @@
 #pragma once
 
+#include "estimation/damped_sinusoid.hpp"
 #include "estimation/mode_coordinates.hpp"
 #include "estimation/problem.hpp"
-#include "estimation/tone.hpp"
 
 namespace pliant {
 
@@ -62,8 +62,8 @@ struct ModalStart {
 /// until the moduli stay: from equal ones, and from each in turn stiffer than the rest. The best match with the most
 /// vibrations counts. Where there are fewer oscillations than moduli, a weak pull towards equal ones decides.
 ///
-/// Modes count by how well their frequency is known (its deviation beside the tone, which falls with the square root of
-/// the energy) and by a model error of 2 %, so that no strong mode drowns out all others.
+/// Modes count by how well their frequency is known (its deviation beside the sinusoid, which falls with the square
+/// root of the energy) and by a model error of 2 %, so that no strong mode drowns out all others.
 ///
 /// The frequencies are those about the shape at rest, without load: an object that sags or swings far stiffens or
 /// softens, which a start may neglect and a fit must not. Nodes are held as with `hold_strongly`.

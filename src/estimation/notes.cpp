@@ -30,9 +30,9 @@ void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
         "Neither mass nor density is known: both pascals and the density follow from the weight that was released.");
   else
     outcome.notes.push_back(
-        "Neither mass nor density is known, so nothing anchors pascals: only the ratio of Young's modulus to density "
-        "is "
-        "measured. The values hold for the density listed; weigh the object to fix them.");
+        "Neither mass nor density is known: the absolute scale of stiffness is not identifiable, only E/rho. The "
+        "values "
+        "hold for the density listed; weigh the object to fix them.");
 }
 
 void say_what_is_inseparable(FitOutcome& outcome) {
@@ -44,9 +44,9 @@ void say_what_is_inseparable(FitOutcome& outcome) {
       const double r = outcome.correlation(Eigen::Index(i), Eigen::Index(j));
       if (std::abs(r) < 0.9) continue;
       char text[64];
-      std::snprintf(text, sizeof text, " (correlation %.2f).", r);
-      outcome.notes.push_back("This recording can hardly tell " + spoken(names[j]) + " and " + spoken(names[i]) +
-                              " apart" + text);
+      std::snprintf(text, sizeof text, " (rho = %.2f).", r);
+      outcome.notes.push_back("The estimates of " + spoken(names[j]) + " and " + spoken(names[i]) +
+                              " are strongly correlated" + text);
     }
 }
 
@@ -81,7 +81,7 @@ void say_if_starts_disagree(FitOutcome& outcome) {
   }
 }
 
-/// Where the object is free of load is not where its scan has it.
+/// The stress-free reference shape is another one than the scan's.
 void say_what_shape(FitOutcome& outcome) {
   for (const RecordingOutcome& r : outcome.recordings) {
     const SimulationOptions& scene = r.discretisation.simulation;
@@ -89,11 +89,12 @@ void say_what_shape(FitOutcome& outcome) {
     const Points moved = r.rest_body->nodes - r.rest_body->scanned_positions();
     char text[64];
     std::snprintf(text, sizeof text, "%.3g mm", 1e3 * moved.rowwise().norm().maxCoeff());
-    outcome.notes.push_back(
-        scene.scan_sags ? "The scan shows the object as it sags; free of load, as the model has it, parts of it "
-                          "lie up to " +
-                              std::string(text) + " elsewhere."
-                        : "The scan was corrected along with the material, by up to " + std::string(text) + ".");
+    outcome.notes.push_back(scene.scan_sags ? "The scan shows the object as it sags; in its stress-free reference "
+                                              "shape, which the model has, parts of it "
+                                              "lie up to " +
+                                                  std::string(text) + " elsewhere."
+                                            : "The scan was corrected along with the material, by up to " +
+                                                  std::string(text) + ".");
   }
 }
 
@@ -143,7 +144,8 @@ void add_law_notes(std::vector<std::string>& notes, const LawOutcome& law, const
     notes.push_back(fmt::format("{}: {}", form_of(tried.form, capture), verdict_on(tried)));
   for (std::size_t c = 0; c < law.cuts.size(); ++c)
     notes.push_back(fmt::format("Zones: {}.", describe(law.cuts[c], int(c) + 1)));
-  notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * law.noise));
+  if (!law.scene->presses.empty())
+    notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * law.noise));
   if (law.sampled) notes.push_back(told(*law.sampled, law.samples));
 }
 

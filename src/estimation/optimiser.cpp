@@ -436,7 +436,7 @@ OptimiserSummary minimise_in_turns(Objective& objective, const OptimiserState& s
   bool first = true;
   for (int done = state.iterations; done < options.max_iterations || first; first = false) {
     if (!objective.hold_shapes(all.p)) {
-      all.reason = "no shape free of load sags into the scan";
+      all.reason = "no stress-free reference shape sags into the scan";
       return all;
     }
     OptimiserOptions turn = options;

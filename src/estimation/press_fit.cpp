@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
+#include "estimation/curve_fit.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
@@ -34,8 +35,9 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The deviation that residuals show, by the median of their sizes.
+/// The deviation that residuals show, by the median of their sizes; the least where there are none.
 double robust_deviation(std::vector<double> residuals, double least) {
+  if (residuals.empty()) return least;
   for (double& r : residuals) r = std::abs(r);
   return std::max(least, 1.4826 * median(std::move(residuals)));
 }
@@ -46,10 +48,11 @@ std::shared_ptr<const Body> with_field(const Body& body, ModulusField field) {
   return copy;
 }
 
-/// Sum of the squares of all residuals [m^2].
-double squares_of(const CostEvaluation& evaluation) {
+/// Sum of the squares of all residuals [m^2]: of markers as they are, of curves over their standard deviations and
+/// times the square of `noise`.
+double squares_of(const CostEvaluation& evaluation, double noise) {
   double sum = 0.0;
-  for (const FrameFit& f : evaluation.frames) sum += f.track_sum_squares;
+  for (const FrameFit& f : evaluation.frames) sum += f.tracks > 0 ? f.track_sum_squares : 2.0 * f.cost * noise * noise;
   return sum;
 }
 
@@ -93,8 +96,16 @@ class PressFit {
     scene_ = std::make_shared<PressScene>(make_press_scene(capture, body));
     for (int i = 0; i < int(scene_->presses.size()); ++i)
       if (scene_->presses[std::size_t(i)].role == "fit") fitted_.push_back(i);
-    if (fitted_.empty())
-      throw InputError({{capture.file}, "no press is to be fitted", "a block [[press]] whose role is \"fit\"", ""});
+    if (fitted_.empty() && !scene_->static_tests().any_to_fit())
+      throw InputError({{capture.file},
+                        "no static test is to be fitted",
+                        "a block [[press]], [[indentation]], [[grip]] or [[material_curve]] whose role is \"fit\"",
+                        ""});
+    if (fitted_.empty() && options.material == MaterialKind::Sampled)
+      throw InputError({{capture.file},
+                        "material=sampled and no press to fit",
+                        "blocks [[press]], whose markers show where the object is how stiff",
+                        "leave out material, or choose ogden, neo_hookean or linear"});
     regions_ = body->modulus.controls > 1;
     noise_ = options.marker_noise > 0.0 ? options.marker_noise : scene_->noise;
   }
@@ -144,6 +155,9 @@ class PressFit {
 
   ParameterSet parameters_of(const Form& form) const {
     ParameterSet set = zone_parameters(form.layout, start_modulus(), options_.modulus_variation);
+    if (const auto known = known_poissons_ratio(options_))
+      for (const Parameter& p : set.parameters())
+        if (p.transform == Transform::LogitHalf) set.fix(p.name, *known);
     if (!form.points.empty())
       set.set_joint_prior(form.layout.modulus_names(),
                           field_precision(form.points, form.scene->body->size(), options_.modulus_variation));
@@ -292,7 +306,8 @@ class PressFit {
       const double n = next->evaluation.independent_observations();
       const auto more = double(next->parameters.dimension() - best_->parameters.dimension());
       tried.evidence =
-          0.5 * n * std::log(squares_of(best_->evaluation) / squares_of(next->evaluation)) - 0.5 * more * std::log(n);
+          0.5 * n * std::log(squares_of(best_->evaluation, noise_) / squares_of(next->evaluation, noise_)) -
+          0.5 * more * std::log(n);
       tried.kept = (options_.law_terms > 0 && layout.form().terms > best_->layout.form().terms) ||
                    tried.evidence > needed_evidence;
     }
@@ -309,7 +324,7 @@ class PressFit {
       const std::string stage = std::to_string(form.terms) + " terms";
       const LawLayout layout = layout_of(form);
       if (!fit_freer(layout, with_term(best_->layout, best_->theta, layout), stage)) break;
-      if (form.own_ratios || stop()) continue;
+      if (form.own_ratios || known_poissons_ratio(options_) || stop()) continue;
       form.own_ratios = true;
       const LawLayout apart = layout_of(form);
       fit_freer(apart, carry_law(best_->layout, best_->theta, apart, as_they_are(form)), stage + " apart");
@@ -324,6 +339,7 @@ class PressFit {
   }
 
   void fit_zones() {
+    if (!scene_->static_tests().curves.empty()) return;  // of a specimen: the object is of one material
     const int most = options_.law_zones > 0 ? options_.law_zones : options_.control_points > 1 ? 1 : most_zones;
     for (int zones = 2; zones <= most; ++zones)
       if (stop() || !fit_zone(zones)) return;
@@ -365,8 +381,9 @@ class PressFit {
       tried.cost = next->evaluation.cost;
       tried.evidence = zone_evidence(next->evaluation, next->parameters, next->parameters.to_unconstrained(next->theta),
                                      layout, from, options_.modulus_variation);
-      tried.kept = is_chosen || (tried.evidence > needed_evidence &&
-                                 squares_of(next->evaluation) < (1.0 - least_gain) * squares_of(best_->evaluation));
+      tried.kept = is_chosen ||
+                   (tried.evidence > needed_evidence &&
+                    squares_of(next->evaluation, noise_) < (1.0 - least_gain) * squares_of(best_->evaluation, noise_));
     }
     conclude(std::move(next), tried, noise, cuts);
     return tried.kept;
@@ -427,7 +444,7 @@ class PressFit {
   }
 
   void fit_fields() {
-    if (options_.control_points == 1) return;
+    if (options_.control_points == 1 || !scene_->static_tests().curves.empty()) return;
     std::vector<int> sizes(field_sizes.begin(), field_sizes.end());
     if (options_.control_points > 1) sizes = {options_.control_points};
     for (const int size : sizes) {
@@ -545,23 +562,12 @@ class PressFit {
     outcome_.converged = e.converged && !interrupted_;
     outcome_.reason = interrupted_ ? "interrupted" : e.reason;
     add_uncertainty(outcome_);
-    outcome_.recordings.push_back(as_recording(e));
+    outcome_.recordings.push_back(as_recording(e.scene->body, e.layout, outcome_));
+    outcome_.recordings.back().discretisation.control_points = e.points;
     for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
     add_law_notes(outcome_.notes, law_, capture_);
     outcome_.law = std::move(law_);
     return std::move(outcome_);
-  }
-
-  static RecordingOutcome as_recording(const Estimate& e) {
-    RecordingOutcome recording;
-    recording.discretisation.body = recording.rest_body = e.scene->body;
-    recording.discretisation.control_points = e.points;
-    MaterialBlocks& material = recording.discretisation.simulation.blocks;
-    material.youngs_moduli.clear();
-    for (int k = 0; k < e.layout.form().controls; ++k) material.youngs_moduli.push_back(e.layout.modulus(k));
-    recording.theta = e.theta;
-    recording.evaluation = e.evaluation;
-    return recording;
   }
 
   FitState::LawSearch& search() { return *all_state_.law; }
@@ -596,19 +602,36 @@ void require_known(const Capture& capture, const FitOptions& options) {
     refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
            "leave out element, or choose tetrahedra or quadratic_tetrahedra");
   if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
-  if (!options.parameters.empty())
-    refuse("choices about single parameters, which fits of presses do not know", "leave them out");
+  for (const auto& [name, choice] : options.parameters)
+    if (name != "poissons_ratio" || !choice.start || choice.estimated != false)
+      refuse("choices about single parameters, of which fits of static tests know a given Poisson's ratio alone",
+             "leave them out, or give poissons_ratio and poissons_ratio.estimate=false");
 }
 
 }  // namespace
 
-bool is_of_presses_alone(const Capture& capture) {
-  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
-  return !capture.presses.empty() && capture.scene.timing.times.empty() && !has_loads;
+std::optional<double> known_poissons_ratio(const FitOptions& options) {
+  const auto known = options.parameters.find("poissons_ratio");
+  if (known == options.parameters.end() || !known->second.start || known->second.estimated != false)
+    return std::nullopt;
+  return (*known->second.start)[0];
+}
+
+RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const LawLayout& layout,
+                              const FitOutcome& outcome) {
+  RecordingOutcome recording;
+  recording.discretisation.body = recording.rest_body = body;
+  MaterialBlocks& material = recording.discretisation.simulation.blocks;
+  material.youngs_moduli.clear();
+  for (int k = 0; k < layout.form().controls; ++k) material.youngs_moduli.push_back(layout.modulus(k));
+  recording.theta = outcome.theta;
+  recording.evaluation = outcome.evaluation;
+  return recording;
 }
 
 FitOutcome fit_presses(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState resume) {
   require_known(capture, options);
+  if (is_of_material_curves(capture)) return fit_material_curves(capture, options);
   return PressFit(capture, options, monitor, std::move(resume)).run();
 }
 

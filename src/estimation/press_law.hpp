@@ -7,8 +7,8 @@
 
 namespace pliant {
 
-/// The parameters of a law at start values: its moduli, "poisson_ratio", "exponent_1", "exponent_2",
-/// "stiffness_ratio_2", "poisson_ratio_2" (where terms have their own), ...
+/// The parameters of a law at start values: its moduli, "poissons_ratio", "exponent_1", "exponent_2",
+/// "stiffness_ratio_2", "poissons_ratio_2" (where terms have their own), ...
 ParameterSet law_parameters(const LawLayout& layout, double youngs_modulus);
 
 /// Appends the parameters of a law's terms beyond a modulus and a Poisson's ratio, exponents first, and sets their

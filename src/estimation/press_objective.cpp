@@ -1,5 +1,8 @@
 #include "estimation/press_objective.hpp"
 
+#include "estimation/grip_trial.hpp"
+#include "estimation/indentation_trial.hpp"
+
 namespace pliant {
 
 namespace {
@@ -28,17 +31,46 @@ std::vector<std::unique_ptr<Trial>> as_trials(std::vector<std::unique_ptr<PressT
 
 }  // namespace
 
+std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<const PressScene>& scene,
+                                                       const std::shared_ptr<PressedMaterial>& material,
+                                                       const ParameterSet& parameters, int recording) {
+  constexpr double unused = 1.0;  // every point of a capture's curve states its standard deviation
+  const StaticTests& tests = scene->static_tests();
+  const VectorX& reference = parameters.reference();
+  std::vector<std::unique_ptr<Trial>> trials;
+  for (int i = 0; i < int(tests.indentations.size()); ++i)
+    if (tests.indentations[std::size_t(i)].role == "fit")
+      trials.push_back(std::make_unique<IndentationTrial>(scene, i, material, reference, recording));
+  for (int i = 0; i < int(tests.grips.size()); ++i)
+    if (tests.grips[std::size_t(i)].role == "fit")
+      trials.push_back(std::make_unique<GripTrial>(scene, i, material, reference, recording));
+  for (int i = 0; i < int(tests.curves.size()); ++i) {
+    if (tests.curves[std::size_t(i)].role != "fit") continue;
+    auto trial =
+        std::make_unique<CurveTrial>(tests.curves[std::size_t(i)].test, i, material->layout(), unused, parameters);
+    trial->set_recording(recording);
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
 PressObjective::PressObjective(std::shared_ptr<const PressScene> scene, const std::vector<int>& presses,
                                const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options)
     : material_(std::make_shared<PressedMaterial>(scene->body, layout)),
       objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {
   auto trials = trials_of(scene, presses, material_, parameters.reference(), options);
   trials_ = pointers(trials);
-  objective_ = Objective(as_trials(std::move(trials)), std::move(parameters));
+  std::vector<std::unique_ptr<Trial>> all = as_trials(std::move(trials));
+  for (std::unique_ptr<Trial>& test : static_test_trials(scene, material_, parameters, 0)) {
+    if (auto* curve = dynamic_cast<CurveTrial*>(test.get())) curves_.push_back(curve);
+    all.push_back(std::move(test));
+  }
+  objective_ = Objective(std::move(all), std::move(parameters));
 }
 
 void PressObjective::set_form(std::shared_ptr<const Body> body, const LawLayout& layout, ParameterSet parameters) {
   material_->set_form(std::move(body), layout);
+  for (CurveTrial* curve : curves_) curve->set_layout(layout, parameters);
   objective_.set_parameters(std::move(parameters));
 }
 

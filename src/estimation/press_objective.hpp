@@ -5,7 +5,14 @@
 
 namespace pliant {
 
-/// The objective of an object's presses: one trial a press, all of one material, whose form can change.
+/// Trials of the curves and grips to fit of a scene.
+/// @param recording  what their frames call it (`FrameFit::recording`)
+std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<const PressScene>& scene,
+                                                       const std::shared_ptr<PressedMaterial>& material,
+                                                       const ParameterSet& parameters, int recording);
+
+/// The objective of an object's presses, and of the curves and grips to fit of its scene: one trial each, all of one
+/// material, whose form can change.
 class PressObjective {
  public:
   /// @param presses  numbers of those that take part
@@ -20,12 +27,13 @@ class PressObjective {
   /// @param body  the same but for its modulus field
   void set_form(std::shared_ptr<const Body> body, const LawLayout& layout, ParameterSet parameters);
   void set_options(const PressTrialOptions& options);
-  /// All residuals of the last evaluation [m], three a point; for the noise.
+  /// All residuals of the presses' points at the last evaluation [m], three a point; for the noise.
   std::vector<double> residuals() const;
 
  private:
   std::shared_ptr<PressedMaterial> material_;
   std::vector<PressTrial*> trials_;  // the objective's
+  std::vector<CurveTrial*> curves_;  // likewise
   Objective objective_;
 };
 

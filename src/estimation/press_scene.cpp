@@ -71,10 +71,16 @@ std::vector<Vector3> without_probe(const ObservedPress& seen) {
 
 }  // namespace
 
+bool is_of_static_tests(const Capture& capture) {
+  const bool has_loads = std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });
+  return (!capture.presses.empty() || has_static_tests(capture)) && capture.scene.timing.times.empty() && !has_loads;
+}
+
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body) {
   PressScene scene;
   scene.held = held_nodes(*body, held_regions(capture.scene));
-  if (scene.held.size() < 3)
+  const bool is_pressed = !capture.presses.empty() || !capture.indentations.empty() || !capture.grips.empty();
+  if (is_pressed && scene.held.size() < 3)
     throw InputError({{capture.file},
                       "nothing holds the object while it is pressed",
                       "a block [[fixed]] that holds nodes of the mesh",
@@ -84,10 +90,16 @@ PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> 
       capture.scene.object.mass ? *capture.scene.object.mass / volume : capture.scene.object.density.value_or(0.0);
   scene.unit_weight = weight_of(*body, 1.0, capture.scene.world.gravity.value_or(Vector3::Zero()));
   scene.noise = 1e-3 * object_size(capture.scene);
+  scene.tests = std::make_shared<StaticTests>(observe_static_tests(capture, *body));
   scene.body = std::move(body);
   for (std::size_t i = 0; i < capture.presses.size(); ++i) scene.presses.push_back(observe_press(capture, i));
   scene.facts = capture.presses;
   return scene;
+}
+
+const StaticTests& PressScene::static_tests() const {
+  static const StaticTests no_tests;
+  return tests ? *tests : no_tests;
 }
 
 PressedBody::PressedBody(const PressScene& scene, int press, std::shared_ptr<const MaterialLaw> law,
@@ -190,6 +202,8 @@ double punch_modulus(const PressScene& scene, double poissons_ratio) {
     moduli.push_back(seen.force.norm() * (1.0 - poissons_ratio * poissons_ratio) /
                      (2.0 * scene.facts[i].contact_radius * seen.greatest_displacement));
   }
+  for (const double modulus : guessed_moduli(scene.static_tests(), *scene.body, poissons_ratio))
+    moduli.push_back(modulus);
   if (moduli.empty()) return 1e4;
   std::ranges::nth_element(moduli, moduli.begin() + std::ptrdiff_t(moduli.size() / 2));
   return moduli[moduli.size() / 2];

@@ -6,6 +6,7 @@
 
 #include "capture/capture.hpp"
 #include "capture/markers.hpp"
+#include "estimation/static_tests.hpp"
 #include "motion/equilibrium.hpp"
 #include "parameters/parameter_set.hpp"
 
@@ -22,6 +23,9 @@ struct ObservedPress {
   double greatest_displacement = 0.0;  ///< [m]
 };
 
+/// Whether static tests with known forces are all that a capture has to fit: no frames, and no load to fit.
+bool is_of_static_tests(const Capture& capture);
+
 /// What presses of one object share, and the presses.
 struct PressScene {
   std::shared_ptr<const Body> body;
@@ -31,13 +35,17 @@ struct PressScene {
   Points unit_weight;        ///< nodal forces [m^4/s^2]: times the density [kg/m^3] [N]
   double density = 0.0;      ///< [kg/m^3]
   std::vector<ObservedPress> presses;
-  std::vector<Press> facts;  ///< of the same presses
+  std::vector<Press> facts;                       ///< of the same presses
+  std::shared_ptr<const StaticTests> tests = {};  ///< curves and grips; null: none
 
   Points dead_load() const { return density * unit_weight; }
+  /// Curves and grips; none where there are none.
+  const StaticTests& static_tests() const;
 };
 
 /// Reads a capture's presses (all roles) around a body of its object.
-/// Throws InputError where nothing holds the object, a press' markers are too few, or its disc covers nothing.
+/// Throws InputError where nothing holds an object that is pressed or gripped, a press' markers are too few, or its
+/// disc covers nothing.
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body);
 
 /// One press, ready to be solved: its rigid contact on the body, led by its force, and its points' embedding.
@@ -86,7 +94,7 @@ std::vector<PressPrediction> predict_presses(const PressScene& scene, const std:
 double marker_noise(const ObservedPress& press);
 
 /// A Young's modulus to set out from [Pa]: that of half spaces under flat punches (Sneddon 1965), E = F (1 - nu^2) /
-/// (2 a u), the median of the presses to fit.
+/// (2 a u), the median of the presses to fit; and what curves and grips to fit say by `guessed_moduli`.
 double punch_modulus(const PressScene& scene, double poissons_ratio);
 
 }  // namespace pliant

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimation/law_derivatives.hpp"
+
 namespace pliant {
 
 PressedMaterial::PressedMaterial(std::shared_ptr<const Body> body, LawLayout layout)
@@ -73,18 +75,6 @@ bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& 
   return true;
 }
 
-template <class Visit>
-void PressTrial::for_parameter_derivatives(const VectorX& theta, Visit&& visit) {
-  const LawLayout& layout = material_->layout();
-  body_.equilibrium().elasticity().for_parameter_derivatives(
-      [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
-        const VectorX own = element_numbers(material_->body(), layout, theta, e);
-        const MatrixX by = by_q * law_parameter_derivatives(layout.form(), own);
-        for (const auto& [number, at, share] : number_shares(material_->body(), layout, theta, own, e))
-          visit(nodes, at, share, by.col(number));
-      });
-}
-
 CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) {
   CostEvaluation result;
   VectorX slope, weight;
@@ -103,12 +93,12 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
   }
   const int n = scene_->body->node_count(), rows = n + body_.equilibrium().contact_count();
   std::vector<Points> forces(blocks.size(), Points::Zero(rows, 3));
-  for_parameter_derivatives(theta,
-                            [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                              Points& force = forces[std::size_t(place[std::size_t(at.first)])];
-                              for (std::size_t a = 0; a < nodes.size(); ++a)
-                                force.row(nodes[a]) -= share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
-                            });
+  for_law_derivatives(body_.equilibrium().elasticity(), *material_, theta,
+                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
+                        Points& force = forces[std::size_t(place[std::size_t(at.first)])];
+                        for (std::size_t a = 0; a < nodes.size(); ++a)
+                          force.row(nodes[a]) -= share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
+                      });
   MatrixX by_parameters(residuals_.size(), Eigen::Index(blocks.size()));
   for (std::size_t k = 0; k < blocks.size(); ++k) {
     const Points& change = body_.equilibrium().response(forces[k]);
@@ -140,13 +130,13 @@ CostEvaluation PressTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   bar.topRows(n) = of_nodes;
   if (body_.has_probe()) bar.row(n) = slope.tail<3>().transpose();
   const Points adjoint = body_.equilibrium().response(bar);
-  for_parameter_derivatives(theta,
-                            [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                              double sum = 0.0;
-                              for (std::size_t a = 0; a < nodes.size(); ++a)
-                                sum -= adjoint.row(nodes[a]).dot(by.template segment<3>(3 * Eigen::Index(a)));
-                              theta_bar[at] += share * sum;
-                            });
+  for_law_derivatives(body_.equilibrium().elasticity(), *material_, theta,
+                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
+                        double sum = 0.0;
+                        for (std::size_t a = 0; a < nodes.size(); ++a)
+                          sum -= adjoint.row(nodes[a]).dot(by.template segment<3>(3 * Eigen::Index(a)));
+                        theta_bar[at] += share * sum;
+                      });
   return result;
 }
 

@@ -67,9 +67,6 @@ class PressTrial : public Trial {
 
   /// The equilibrium and its cost. `slope` and `weight` are those of each coordinate's loss.
   bool compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight);
-  /// Calls visit(element, nodes, parameter, derivative) for the derivatives of the elements' dW/dx by theta.
-  template <class Visit>
-  void for_parameter_derivatives(const VectorX& theta, Visit&& visit);
 
   std::shared_ptr<const PressScene> scene_;
   int press_, number_;

@@ -5,7 +5,7 @@
 #include "capture/markers.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
-#include "estimation/press_trial.hpp"
+#include "estimation/press_objective.hpp"
 
 namespace pliant {
 
@@ -261,7 +261,7 @@ Resolution Recordings::resolution(double cells, double steps) const {
     throw InputError({{front().capture.file},
                       any_sags() ? "the scan was taken sagging (shape_is = \"static\"), and element=hexahedra"
                                  : "scan_points are given, and element=hexahedra",
-                      "tetrahedra: the grid of hexahedra is regular where the object is free of load",
+                      "tetrahedra: the grid of hexahedra is regular in the stress-free reference configuration",
                       "leave out element, or choose quadratic_tetrahedra"});
   r.shape_points = options_.scan_points;
   r.shape_std = options_.scan_std;
@@ -293,7 +293,9 @@ Grid Recordings::grid(double cells, double steps) const {
 std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recording, const Discretisation& d,
                                                           double cells) const {
   const Capture& capture = recording.capture;
-  if (!std::ranges::any_of(capture.presses, [](const Press& p) { return is_fitted(p.role); })) return nullptr;
+  if (!std::ranges::any_of(capture.presses, [](const Press& p) { return is_fitted(p.role); }) &&
+      !has_static_tests_to_fit(capture))
+    return nullptr;
   auto body = d.body;
   if (body->kind == ElementKind::Hexahedron) {
     Resolution tetrahedra = resolution(cells, 1.0);
@@ -357,6 +359,8 @@ void Recordings::add_presses(const Recording& recording, const std::shared_ptr<c
     trials.push_back(std::make_unique<PressTrial>(scene, int(i), material, parameters.reference(),
                                                   PressTrialOptions{noise, outlier_scale}, int(trials.size())));
   }
+  for (std::unique_ptr<Trial>& test : static_test_trials(scene, material, parameters, int(trials.size())))
+    trials.push_back(std::move(test));
 }
 
 ParameterSet Recordings::with_field_prior(ParameterSet parameters, const Grid& grid) const {

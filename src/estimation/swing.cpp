@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimation/tone.hpp"
+#include "estimation/damped_sinusoid.hpp"
 
 namespace pliant {
 
@@ -46,9 +46,9 @@ struct Path {
 
 std::optional<double> swing_of(const Path& path, const Vector3& direction) {
   if (path.times.size() < 8) return std::nullopt;
-  const auto tone = strongest_tone(path.times, path.along(direction), resolvable_band(path.times));
-  if (!tone || !doubts(*tone, path.times.size()).empty()) return std::nullopt;
-  return tone->natural();
+  const auto sinusoid = dominant_sinusoid(path.times, path.along(direction), resolvable_band(path.times));
+  if (!sinusoid || !rejection_reason(*sinusoid, path.times.size()).empty()) return std::nullopt;
+  return sinusoid->natural();
 }
 
 Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<double>& times) {

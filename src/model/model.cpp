@@ -7,6 +7,7 @@
 
 #include "base/csv.hpp"
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
@@ -20,7 +21,7 @@ namespace {
 
 constexpr const char* modulus_field = "youngs_modulus [Pa]";
 constexpr const char* modulus_std_field = "youngs_modulus_std [Pa]";
-constexpr const char* ratio_field = "poisson_ratio";
+constexpr const char* ratio_field = "poissons_ratio";
 constexpr const char* fill_field = "fill";
 
 // ---- writing
@@ -38,7 +39,8 @@ std::string model_toml(const Model& m) {
   out << "# A fitted elastic object, ready to be simulated. All quantities are SI.\n"
          "format = \"model/1\"\nname = "
       << toml_text(m.name)
-      << "\n\n[object]\nsurface = \"surface.ply\"          # free of load, world frame of the recording\n";
+      << "\n\n[object]\nsurface = \"surface.ply\"          # stress-free reference shape, world frame of the "
+         "recording\n";
   if (!m.volume.connectivity.empty())
     out << "volume_mesh = \"model.vtu\"        # elements with the material of each\n";
   line(out, "mass", m.scene.object.mass.value(), "kg");
@@ -50,7 +52,7 @@ std::string model_toml(const Model& m) {
     if (m.law->metric_nu != 0.0) line(out, "metric_nu", m.law->metric_nu, "Poisson's ratio of the norm of strains");
   }
   line(out, "youngs_modulus", m.youngs_modulus, "Pa; the mean where elements differ");
-  line(out, "poisson_ratio", m.poisson_ratio, "-1 .. 0.5");
+  line(out, "poissons_ratio", m.poissons_ratio, "-1 .. 0.5");
   line(out, "mass_damping", m.mass_damping, "Rayleigh, 1/s");
   line(out, "stiffness_damping", m.stiffness_damping, "Rayleigh, s");
   out << "\n";
@@ -78,7 +80,7 @@ void write_volume(const fs::path& path, const ModelVolume& volume) {
     for (const int point : to_vtk_order(volume.kind, std::span(volume.connectivity).subspan(i, points)))
       grid.connectivity.push_back(point);
   grid.cell_data = {
-      {modulus_field, 1, volume.youngs_modulus}, {ratio_field, 1, volume.poisson_ratio}, {fill_field, 1, volume.fill}};
+      {modulus_field, 1, volume.youngs_modulus}, {ratio_field, 1, volume.poissons_ratio}, {fill_field, 1, volume.fill}};
   if (!volume.youngs_modulus_std.empty()) grid.cell_data.push_back({modulus_std_field, 1, volume.youngs_modulus_std});
   write_vtu(path, grid);
 }
@@ -98,7 +100,7 @@ ModelLaw read_law(const fs::path& path, std::string name) {
   std::string header = text.substr(0, text.find_first_of("\r\n"));
   for (std::size_t begin = 0; begin <= header.size();) {
     const std::size_t end = std::min(header.find(',', begin), header.size());
-    law.columns.push_back(header.substr(begin, end - begin));
+    law.columns.push_back(present_name(header.substr(begin, end - begin)));
     begin = end + 1;
   }
   std::vector<Problem> problems;
@@ -134,7 +136,7 @@ class Reader {
     ModelVolume& volume = model_.volume;
     if (volume.youngs_modulus.empty()) {  // of one material
       volume.youngs_modulus.assign(volume.fill.size(), model_.youngs_modulus);
-      volume.poisson_ratio.assign(volume.fill.size(), model_.poisson_ratio);
+      volume.poissons_ratio.assign(volume.fill.size(), model_.poissons_ratio);
     }
     return std::move(model_);
   }
@@ -176,8 +178,8 @@ class Reader {
     if (model_.law) model_.law->metric_nu = metric_nu;
     model_.youngs_modulus = read_number(material, "youngs_modulus",
                                         {.low = 0.0, .low_allowed = false, .meaning = "Young's modulus in pascals"});
-    model_.poisson_ratio = read_number(
-        material, "poisson_ratio",
+    model_.poissons_ratio = read_number(
+        material, "poissons_ratio",
         {.low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"});
     model_.mass_damping = read_number(material, "mass_damping", {.low = 0.0, .meaning = "Rayleigh's, in 1/s"}, 0.0);
     model_.stiffness_damping =
@@ -236,7 +238,8 @@ class Reader {
     volume.youngs_modulus = field(path, grid, modulus_field);
     if (std::ranges::any_of(grid.cell_data, [](const auto& data) { return data.name == modulus_std_field; }))
       volume.youngs_modulus_std = field(path, grid, modulus_std_field);
-    volume.poisson_ratio = field(path, grid, ratio_field);
+    const std::string former = former_name(ratio_field);
+    volume.poissons_ratio = field(path, grid, grid.find_cell_data(former) ? former.c_str() : ratio_field);
     volume.fill = field(path, grid, fill_field);
   }
 

@@ -17,7 +17,7 @@ struct ModelVolume {
   std::vector<int> connectivity;           ///< points of each cell, in this program's order (see to_vtk_order)
   std::vector<double> youngs_modulus;      ///< [Pa], one a cell
   std::vector<double> youngs_modulus_std;  ///< one standard deviation [Pa], one a cell; empty: not known
-  std::vector<double> poisson_ratio;       ///< one a cell
+  std::vector<double> poissons_ratio;      ///< one a cell
   std::vector<double> fill;                ///< part of the cell that the object fills, one a cell
 };
 
@@ -34,12 +34,12 @@ struct ModelLaw {
 /// A fitted object, ready to be simulated. SI units, the capture's world frame.
 struct Model {
   std::string name;
-  /// Situation of the recording: the surface free of load, mass and density both known, frames equally spaced; no
+  /// Situation of the recording: the surface stress-free, mass and density both known, frames equally spaced; no
   /// frames: static.
   Scene scene;
 
   double youngs_modulus = 0.0;     ///< [Pa] > 0; with fields: the volume-weighted mean
-  double poisson_ratio = 0.0;      ///< (-1, 0.5)
+  double poissons_ratio = 0.0;     ///< (-1, 0.5)
   double mass_damping = 0.0;       ///< [1/s] >= 0
   double stiffness_damping = 0.0;  ///< [s] >= 0
 

@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 
 namespace pliant {
 
@@ -123,6 +124,26 @@ Json load_json(const LoadError& error) {
   return json;
 }
 
+Json numbers_json(const std::vector<double>& values) {
+  return list(values, [](double value) { return number(value); });
+}
+
+Json curve_json(const CurvePrediction& curve) {
+  Json json = {{"name", curve.name},
+               {"kind", curve.kind},
+               {"role", curve.role},
+               {"abscissa", curve.abscissa},
+               {"unit", curve.unit},
+               {"at", numbers_json(curve.at)},
+               {"measured", numbers_json(curve.measured)},
+               {"std", numbers_json(curve.std)},
+               {"predicted", numbers_json(curve.predicted)},
+               {"rms", number(curve.rms())},
+               {"relative_rms", number(curve.relative_rms())}};
+  if (!curve.failure.empty()) json["failure"] = curve.failure;
+  return json;
+}
+
 Json tracking_json(const TrackingResult& tracking) {
   const auto held_out = [](const std::optional<HeldOutFramesResult>& h) {
     return h ? Json{{"frames", h->frames}, {"cost", number(h->cost)}, {"surface_rms", number(h->surface_rms)}} : Json();
@@ -169,6 +190,7 @@ class Member {
     for (size_t i = 0; i < json_.size(); ++i) each(Member(json_[i], path_ + "[" + std::to_string(i) + "]", file_));
   }
 
+  bool is_null() const { return json_.is_null(); }
   double number() const { return json_.is_number() ? json_.get<double>() : (fail("a number"), 0.0); }
   long long count() const { return json_.is_number_integer() ? json_.get<long long>() : (fail("a whole number"), 0); }
   bool boolean() const { return json_.is_boolean() ? json_.get<bool>() : (fail("true or false"), false); }
@@ -286,6 +308,19 @@ std::optional<HeldOutFramesResult> read_held_out(const Member& member, const cha
                              optional_number(member[key], "surface_rms")};
 }
 
+CurvePrediction read_curve(const Member& member) {
+  const auto numbers = [&](const char* key) {
+    std::vector<double> values;
+    member[key].each_item([&](const Member& item) { values.push_back(item.is_null() ? NAN : item.number()); });
+    return values;
+  };
+  return {member["name"].string(), member["kind"].string(),
+          member["role"].string(), member["abscissa"].string(),
+          member["unit"].string(), numbers("at"),
+          numbers("measured"),     numbers("std"),
+          numbers("predicted"),    optional_string(member, "failure")};
+}
+
 TrackingResult read_tracking(const Member& member) {
   TrackingResult tracking{member["kept"].string(), optional_string(member, "why"), {}, {}, {}};
   member["rounds"].each_item([&](const Member& m) {
@@ -325,8 +360,10 @@ Result read_all(const Member& top) {
   result.software = {optional_string(software, "name"), optional_string(software, "version"),
                      optional_string(software, "commit")};
   result.capture = {optional_string(capture, "name"), optional_string(capture, "sha256")};
-  top["parameters"].each_key(
-      [&](const std::string& name, const Member& m) { result.parameters.push_back(read_parameter(name, m)); });
+  top["parameters"].each_key([&](const std::string& name, const Member& m) {
+    const std::string present = present_name(name);  // a former name may stand alone, or beside the present one
+    if (!result.find(present)) result.parameters.push_back(read_parameter(present, m));
+  });
   if (top.has("fields"))
     top["fields"].each_key(
         [&](const std::string& name, const Member& m) { result.fields.push_back(read_field(name, m)); });
@@ -342,6 +379,7 @@ Result read_all(const Member& top) {
   if (top.has("resolutions"))
     top["resolutions"].each_item([&](const Member& m) { result.resolutions.push_back(read_resolution(m)); });
   if (top.has("tracking")) result.tracking = read_tracking(top["tracking"]);
+  if (top.has("curves")) top["curves"].each_item([&](const Member& m) { result.curves.push_back(read_curve(m)); });
   if (top.has("time")) result.time = read_time(top["time"]);
   if (top.has("notes")) top["notes"].each_item([&](const Member& m) { result.notes.push_back(m.string()); });
   return result;
@@ -363,6 +401,18 @@ std::string csv_text(const std::string& value) {
 
 }  // namespace
 
+double CurvePrediction::rms() const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < at.size(); ++i) sum += (predicted[i] - measured[i]) * (predicted[i] - measured[i]);
+  return at.empty() ? NAN : std::sqrt(sum / double(at.size()));
+}
+
+double CurvePrediction::relative_rms() const {
+  double greatest = 0.0;
+  for (const double value : measured) greatest = std::max(greatest, std::abs(value));
+  return greatest > 0.0 ? rms() / greatest : NAN;
+}
+
 const ParameterResult* Result::find(const std::string& name) const {
   for (const ParameterResult& parameter : parameters)
     if (parameter.name == name) return &parameter;
@@ -376,7 +426,8 @@ std::string to_json(const Result& result) {
   json["capture"] = {{"name", result.capture.name}, {"sha256", result.capture.sha256}};
   json["parameters"] = Json::object();
   for (const ParameterResult& parameter : result.parameters)
-    json["parameters"][parameter.name] = parameter_json(parameter);
+    for (const std::string& name : {parameter.name, former_name(parameter.name)})
+      if (!name.empty()) json["parameters"][name] = parameter_json(parameter);  // result/1 promises former names
   json["fields"] = Json::object();
   for (const FieldResult& field : result.fields) json["fields"][field.name] = field_json(field);
   json["error"] = error_json(result.error);
@@ -389,6 +440,7 @@ std::string to_json(const Result& result) {
   json["starts"] = list(result.starts, start_json);
   if (!result.resolutions.empty()) json["resolutions"] = list(result.resolutions, resolution_json);
   if (result.tracking) json["tracking"] = tracking_json(*result.tracking);
+  if (!result.curves.empty()) json["curves"] = list(result.curves, curve_json);
   json["time"] = time_json(result.time);
   if (!result.notes.empty()) json["notes"] = result.notes;
   return text(json);
@@ -424,6 +476,7 @@ std::string to_json(const Evaluation& evaluation) {
   return text({{"format", "evaluation/1"},
                {"error", error_json(evaluation.error)},
                {"presses", list(evaluation.presses, static_json)},
+               {"curves", list(evaluation.curves, curve_json)},
                {"loads", list(evaluation.loads, load_json)}});
 }
 

@@ -122,6 +122,18 @@ struct TrackingResult {
   std::optional<HeldOutFramesResult> loop, direct;  ///< where both were tried
 };
 
+/// Curve or measurement between grips beside what a material predicts of it.
+struct CurvePrediction {
+  std::string name, kind, role;       ///< kind: "indentation", "grip force" or "material curve"
+  std::string abscissa, unit;         ///< what the points stand over, like "depth [m]"; the ordinate's unit: N or Pa
+  std::vector<double> at;             ///< depths [m], displacements [m], stretches or shears [-]
+  std::vector<double> measured, std;  ///< [unit], as many
+  std::vector<double> predicted;      ///< [unit], as many; not a number where no equilibrium was found
+  std::string failure;                ///< why not; empty: all points have one
+  double rms() const;                 ///< [unit] of predicted less measured; not a number where one is missing
+  double relative_rms() const;        ///< over the greatest measured size
+};
+
 struct TimeResult {
   double wall_seconds = 0.0;
   long long forward_steps = 0;
@@ -145,6 +157,7 @@ struct Result {
   std::vector<StartResult> starts;
   std::vector<ResolutionResult> resolutions;  ///< where there are several, in the order in which they were used
   std::optional<TrackingResult> tracking;
+  std::vector<CurvePrediction> curves;  ///< force-depth curves, forces of grips and stress-strain curves, of all roles
   TimeResult time;
   std::vector<std::string> notes;  ///< plain sentences for the user
 
@@ -206,6 +219,7 @@ struct Evaluation {
   ErrorResult error;
   std::vector<StaticError> presses;
   std::vector<LoadError> loads;
+  std::vector<CurvePrediction> curves;
 };
 
 std::string to_json(const Evaluation& evaluation);

@@ -359,6 +359,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
   if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
   result.notes = outcome.notes;
+  if (outcome.law) result.curves = predict_curves(*outcome.law->scene, outcome.law->law);
   if (outcome.tracking)
     result.tracking = tracking_result(*outcome.tracking, outcome.recordings.front().discretisation.simulation.blocks);
   return result;
@@ -390,7 +391,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   model.name = capture.name;
   TriangleMesh surface = *capture.scene.object.surface;
   model.youngs_modulus = modulus.mean;
-  model.poisson_ratio = t[blocks.poissons_ratio];
+  model.poissons_ratio = t[blocks.poissons_ratio];
   if (d.simulation.law_layout) model.law = model_law(*law_at(*d.body, *d.simulation.law_layout, t));
   model.mass_damping = t[blocks.mass_damping];
   model.stiffness_damping = t[blocks.stiffness_damping];
@@ -432,7 +433,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   for (int e = 0; e < d.body->element_count(); ++e) {
     model.volume.youngs_modulus.push_back(modulus.value[e]);
     if (modulus.mean_std > 0.0) model.volume.youngs_modulus_std.push_back(modulus.std[e]);
-    model.volume.poisson_ratio.push_back(model.poisson_ratio);
+    model.volume.poissons_ratio.push_back(model.poissons_ratio);
     const bool is_cell = d.body->kind == ElementKind::Hexahedron;
     model.volume.fill.push_back(is_cell ? d.body->element_volume[std::size_t(e)] / std::pow(model.cell_size, 3) : 1.0);
   }
@@ -511,7 +512,7 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   write_result(folder / "result.json", report.result);
   write_convergence(folder / "convergence.csv", history_of(outcome, true));
-  save_model(folder, make_model(capture, outcome));
+  if (capture.scene.object.surface) save_model(folder, make_model(capture, outcome));
   if (outcome.law)
     write_law(folder, *outcome.law, report, tell);
   else

@@ -23,7 +23,7 @@ Model make_model(const Capture& capture, const LawOutcome& outcome) {
   double nu = 0.0;
   for (int e = 0; e < body.element_count(); ++e)
     nu += body.element_volume[std::size_t(e)] / body.volume() * outcome.law->small_strain(e).poissons_ratio;
-  model.poisson_ratio = nu;
+  model.poissons_ratio = nu;
   const double density = outcome.scene->density > 0.0 ? outcome.scene->density : 100.0;
   model.scene.object.density = density;
   model.scene.object.mass = density * body.volume();
@@ -37,7 +37,7 @@ Model make_model(const Capture& capture, const LawOutcome& outcome) {
   for (int e = 0; e < body.element_count(); ++e) {
     const SmallStrainModuli m = outcome.law->small_strain(e);
     model.volume.youngs_modulus.push_back(m.youngs_modulus);
-    model.volume.poisson_ratio.push_back(m.poissons_ratio);
+    model.volume.poissons_ratio.push_back(m.poissons_ratio);
     model.volume.fill.push_back(1.0);
   }
   model.law = model_law(*outcome.law);
@@ -56,10 +56,26 @@ std::vector<StaticError> press_errors(const PressScene& scene, const std::vector
   return errors;
 }
 
-std::vector<StaticError> predict_presses(const Model& model, const Capture& capture) {
+namespace {
+
+void require_tetrahedra(const Model& model) {
   if (model.volume.kind != VtuCell::Tetrahedron && model.volume.kind != VtuCell::QuadraticTetrahedron)
     throw InputError(
         {{}, "a model of hexahedra", "tetrahedra, which rigid bodies can press", "fit with --set element=tetrahedra"});
+}
+
+}  // namespace
+
+std::vector<CurvePrediction> predict_curves(const Model& model, const Capture& capture) {
+  const auto body = model_body(model);
+  if (capture.indentations.empty() && capture.grips.empty())
+    return predict_curves(observed_curves(capture), *law_of(model, *body));
+  require_tetrahedra(model);
+  return predict_curves(make_press_scene(capture, body), law_of(model, *body));
+}
+
+std::vector<StaticError> predict_presses(const Model& model, const Capture& capture) {
+  require_tetrahedra(model);
   const auto body = model_body(model);
   const PressScene scene = make_press_scene(capture, body);
   return press_errors(scene, predict_presses(scene, law_of(model, *body)));
@@ -113,9 +129,9 @@ void write_deformed(const fs::path& folder, const LawOutcome& outcome,
 
 void write_presses(const fs::path& folder, const LawOutcome& outcome,
                    const std::function<void(const char*, int, int)>& progress) {
-  write_file(folder / "presses.csv", presses_csv(outcome));
+  if (!outcome.predictions.empty()) write_file(folder / "presses.csv", presses_csv(outcome));
   if (outcome.sampled) write_file(folder / "basis.csv", basis_csv(*outcome.sampled));
-  write_deformed(folder, outcome, progress);
+  if (!outcome.predictions.empty()) write_deformed(folder, outcome, progress);
 }
 
 }  // namespace pliant

@@ -16,6 +16,9 @@ Model make_model(const Capture& capture, const LawOutcome& outcome);
 std::vector<StaticError> press_errors(const PressScene& scene, const std::vector<PressPrediction>& predictions);
 /// A model's own mesh and material under a capture's presses. Throws InputError for a model of hexahedra.
 std::vector<StaticError> predict_presses(const Model& model, const Capture& capture);
+/// A model's own mesh and material under a capture's force-depth curves, grips and stress-strain curves. Throws
+/// InputError for a model of hexahedra that is to be indented or gripped.
+std::vector<CurvePrediction> predict_curves(const Model& model, const Capture& capture);
 /// "press 3 (test): 1.2 mm rms, 6.1 % of the greatest displacement".
 std::string press_sentence(const StaticError& press);
 

@@ -55,7 +55,7 @@ MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& coun
   };
   MotionBlocks blocks;
   blocks.youngs_moduli.push_back(modulus(0));
-  blocks.poissons_ratio = layout.add({"poisson_ratio", "1", 1, Role::Material});
+  blocks.poissons_ratio = layout.add({"poissons_ratio", "1", 1, Role::Material});
   blocks.mass_damping = layout.add({"mass_damping", "1/s", 1, Role::Damping});
   blocks.stiffness_damping = layout.add({"stiffness_damping", "s", 1, Role::Damping});
   blocks.density = layout.add({"density", "kg/m^3", 1, Role::Inertia});

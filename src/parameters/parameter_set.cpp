@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/old_names.hpp"
+
 namespace pliant {
 
 namespace {
@@ -35,8 +37,9 @@ ParameterSet::ParameterSet(ParameterLayout layout, std::vector<Parameter> parame
 }
 
 const Parameter* ParameterSet::find(const std::string& name) const {
+  const std::string present = present_name(name);
   const auto it =
-      std::find_if(parameters_.begin(), parameters_.end(), [&](const Parameter& p) { return p.name == name; });
+      std::find_if(parameters_.begin(), parameters_.end(), [&](const Parameter& p) { return p.name == present; });
   return it == parameters_.end() ? nullptr : &*it;
 }
 

@@ -131,13 +131,13 @@ std::string starts_sentence(const Result& result) {
 
 std::string spoken_name(const std::string& name) {
   static const std::map<std::string, std::string> spoken{{"youngs_modulus", "Young's modulus"},
-                                                         {"poisson_ratio", "Poisson's ratio"},
+                                                         {"poissons_ratio", "Poisson's ratio"},
                                                          {"mass_damping", "Mass damping"},
                                                          {"stiffness_damping", "Stiffness damping"}};
   const size_t at = name.find('@');
   const std::string base = name.substr(0, at), region = at == std::string::npos ? "" : " (" + name.substr(at + 1) + ")";
   if (const auto found = spoken.find(base); found != spoken.end()) return found->second + region;
-  const size_t number = base.find_last_not_of("0123456789") + 1;  // of a law's term: "poisson_ratio_2"
+  const size_t number = base.find_last_not_of("0123456789") + 1;  // of a law's term: "poissons_ratio_2"
   if (number > 0 && number < base.size() && base[number - 1] == '_')
     if (const auto found = spoken.find(base.substr(0, number - 1)); found != spoken.end())
       return found->second + " " + base.substr(number) + region;

@@ -389,6 +389,36 @@ std::string presses_section(const ReportData& data) {
          "</details>\n";
 }
 
+/// One plot for each curve: measured points, and the model's line.
+std::string curves_section(const std::vector<CurvePrediction>& curves) {
+  std::string body, plots;
+  for (const CurvePrediction& curve : curves) {
+    const std::string name = curve.name + (curve.role == "test" ? " (test)" : "");
+    const double percent = 100.0 * curve.relative_rms();
+    body += fmt::format(
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(name), escape_html(curve.kind),
+        curve.failure.empty() ? readable(curve.rms(), 3) + " " + curve.unit : escape_html(curve.failure),
+        std::isfinite(percent) ? readable(percent, 3) + " %" : "");
+    if (curve.at.size() < 2) continue;
+    std::vector<Series> drawn(2);
+    drawn[0].label = "measured", drawn[0].mark = Mark::Dots;
+    drawn[0].x = curve.at, drawn[0].y = curve.measured;
+    drawn[1].label = "model";
+    for (std::size_t i = 0; i < curve.at.size(); ++i) {
+      if (!std::isfinite(curve.predicted[i])) continue;
+      drawn[1].x.push_back(curve.at[i]);
+      drawn[1].y.push_back(curve.predicted[i]);
+    }
+    if (drawn[1].x.empty()) drawn.pop_back();
+    PlotOptions options;
+    options.x_label = curve.abscissa;
+    options.y_label = curve.unit == "N" ? "force [N]" : "stress [Pa]";
+    plots += "<p>" + escape_html(name) + "</p>\n" + plot_svg(drawn, options);
+  }
+  if (body.empty()) return "";
+  return table("<th></th><th></th><th>model less measured, rms</th><th>of the greatest measured</th>", body) + plots;
+}
+
 std::string loads_table(const std::vector<LoadError>& loads) {
   if (loads.empty()) return "";
   const auto cell = [](const std::optional<double>& length, const std::optional<double>& relative) {
@@ -447,16 +477,17 @@ std::string report_html(const ReportData& data) {
   const std::string recording = escape_html(data.result.capture.name);
   html += "<h1>" + title + "</h1>\n<p class=\"sub\">" + (recording == title ? "" : recording) + "</p>\n";
   html += headline(data.result);
-  html += section("What this means", words(data));
-  html += section("Seen and simulated", pictures(data));
+  html += section("Summary", words(data));
+  html += section("Observed and simulated", pictures(data));
   html += section("Agreement over time", data.residuals.size() > 1 ? residual_plot(data.residuals) : "");
   html += section("Presses", presses_section(data));
-  html += section("Under hung weights", loads_table(data.loads));
-  html += section("How the estimation went", convergence(data));
+  html += section("Force-depth and stress-strain curves", curves_section(data.result.curves));
+  html += section("Static loads", loads_table(data.loads));
+  html += section("Convergence", convergence(data));
   html += section("All parameters", parameter_table(data.result));
-  html += section("Tracking and estimation in turns", tracking_part(data.result));
-  html += section("Mesh and time step", resolutions_table(data.result));
-  html += section("Which parameters go together", correlation_table(data.correlations));
+  html += section("Alternating tracking and estimation", tracking_part(data.result));
+  html += section("Convergence in mesh and time step", resolutions_table(data.result));
+  html += section("Parameter correlations", correlation_table(data.correlations));
   html += section("Starting points", starts_table(data.result));
   html += section("Using the model", usage(data));
   return html + footer(data.result) + "</main></body></html>\n";

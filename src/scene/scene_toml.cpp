@@ -269,7 +269,7 @@ Plane read_plane(TomlTable& block) {
 
 Weight read_weight(TomlTable& block) {
   Weight weight;
-  weight.mass = block.required<double>("mass", "the hung mass in kilograms").value_or(0.0);
+  weight.mass = block.required<double>("mass", "the attached point mass in kilograms").value_or(0.0);
   weight.at = block.required<Vector3>("at", "where it hangs, on the rest surface").value_or(Vector3::Zero());
   return weight;
 }
@@ -323,8 +323,8 @@ void write_toml(std::ostream& out, const Plane& plane) {
 }
 
 void write_toml(std::ostream& out, const Weight& weight) {
-  out << "[[weight]]\nmass = " << toml_text(weight.mass) << "   # kg, hung\nat = " << toml_text(weight.at)
-      << "   # m, on the rest surface\n\n";
+  out << "[[weight]]\nmass = " << toml_text(weight.mass)
+      << "   # kg, attached point mass\nat = " << toml_text(weight.at) << "   # m, on the rest surface\n\n";
 }
 
 void write_toml(std::ostream& out, const Initial& initial) {
@@ -342,6 +342,12 @@ void write_toml(std::ostream& out, const Initial& initial) {
         << ", at = " << toml_text(initial.release_of->at) << " }   # kg and m: hangs until the object is released\n";
   out << "\n";
 }
+
+void write_region(std::ostream& out, const Region& region, const std::string& vertices_file) {
+  out << region_text(region, vertices_file);
+}
+
+void write_region_file(const fs::path& file, const Region& region) { write_vertices(file, region); }
 
 void write_toml_blocks(std::ostream& out, const Scene& scene) {
   for (const Plane& plane : scene.planes) write_toml(out, plane);

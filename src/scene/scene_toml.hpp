@@ -55,6 +55,11 @@ void write_toml(std::ostream& out, const Weight& weight);
 /// Table [object]. @param file  path of the surface or volume mesh as it shall be written; empty: of neither
 void write_toml(std::ostream& out, const Object& object, const std::string& file);
 
+/// A region as text, for a block of another format. @param vertices_file  where a list of vertices shall stand
+void write_region(std::ostream& out, const Region& region, const std::string& vertices_file);
+/// Writes that file where the region is a list of vertices. Throws InputError where it cannot be written.
+void write_region_file(const std::filesystem::path& file, const Region& region);
+
 /// Blocks [[plane]], [[fixed]], [[region]] and [[weight]] of a scene.
 void write_toml_blocks(std::ostream& out, const Scene& scene);
 

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 
 namespace pliant {
 
@@ -223,6 +224,12 @@ TomlTable::TomlTable(const toml::table& table, std::string key, TomlContext& con
 
 const toml::node* TomlTable::find(const std::string& name) {
   asked_.insert(name);
+  if (!table_->contains(name))
+    if (const std::string former = former_name(name); !former.empty() && table_->contains(former)) {
+      asked_.insert(former);
+      note_former_word(former, name, context_->places.file().filename().string());
+      return table_->get(former);
+    }
   return table_->get(name);
 }
 
@@ -240,8 +247,7 @@ std::optional<T> TomlTable::optional(const std::string& name) {
 
 template <class T>
 std::optional<T> TomlTable::required(const std::string& name, const std::string& advice) {
-  if (!has(name)) {
-    find(name);
+  if (!find(name)) {
     const std::string where = key_.empty() ? "the file" : "[" + key_ + "]";
     context_->reject(key_of(name), where + " has no `" + name + "`", "the key `" + name + "`", advice);
     return std::nullopt;

@@ -105,7 +105,7 @@ std::shared_ptr<const MaterialLaw> law_of(const Model& model, const Body& body) 
     const auto i = std::size_t(e);
     const bool has_field = model.volume.youngs_modulus.size() == std::size_t(body.element_count());
     const LambdaAlpha p = lambda_alpha({has_field ? model.volume.youngs_modulus[i] : model.youngs_modulus,
-                                        has_field ? model.volume.poisson_ratio[i] : model.poisson_ratio});
+                                        has_field ? model.volume.poissons_ratio[i] : model.poissons_ratio});
     table.row(e) << p.lambda, p.alpha;
   }
   return std::make_shared<LinearLaw>(std::move(table));

@@ -16,7 +16,7 @@ VectorX model_theta(const Model& model, const Scene& scene, const Vector3& gravi
   VectorX theta = blocks.zero();
   for (std::size_t k = 0; k < blocks.pulls.size(); ++k) theta.segment<3>(blocks.pulls[k]) = scene.initial.pulls[k];
   blocks.set_moduli(theta, model.youngs_modulus);
-  theta[blocks.poissons_ratio] = model.poisson_ratio;
+  theta[blocks.poissons_ratio] = model.poissons_ratio;
   theta[blocks.mass_damping] = model.mass_damping;
   theta[blocks.stiffness_damping] = model.stiffness_damping;
   theta[blocks.density] = model.scene.object.density.value();

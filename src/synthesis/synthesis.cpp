@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "base/files.hpp"
+#include "base/old_names.hpp"
 #include "base/parallel.hpp"
 #include "geometry/mesh_io.hpp"
 #include "rays/ray_scene.hpp"
@@ -113,9 +114,11 @@ std::string truth_json(const Synthesis& s) {
   json["parameters"] = nlohmann::ordered_json::object();
   for (const TrueParameter& p : s.truth) {
     const auto* number = std::get_if<double>(&p.value);
-    json["parameters"][p.name] = {
-        {"value", number ? nlohmann::ordered_json(*number) : vector_json(std::get<Vector3>(p.value))},
-        {"unit", p.unit}};
+    for (const std::string& name : {p.name, former_name(p.name)})
+      if (!name.empty())
+        json["parameters"][name] = {
+            {"value", number ? nlohmann::ordered_json(*number) : vector_json(std::get<Vector3>(p.value))},
+            {"unit", p.unit}};
   }
   json["scan_noise"] = s.scan_noise;
   if (s.write_trajectory) json["trajectory"] = "truth/%06d.ply";

@@ -146,8 +146,8 @@ class Reader {
 
   void read_material(TomlTable& t) {
     scene_.youngs_modulus = read_number(t, "youngs_modulus", positive("in pascals"));
-    scene_.poisson_ratio = read_number(
-        t, "poisson_ratio",
+    scene_.poissons_ratio = read_number(
+        t, "poissons_ratio",
         {.low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"});
     scene_.mass_damping = read_number(t, "mass_damping", at_least_zero("Rayleigh's, in 1/s"), 0.0);
     scene_.stiffness_damping = read_number(t, "stiffness_damping", at_least_zero("Rayleigh's, in s"), 0.0);
@@ -322,7 +322,7 @@ Synthesis synthesise(const SyntheticScene& scene, const Simulate& simulate) {
   s.scan_noise = scene.scan_noise, s.cameras = scene.cameras, s.seed = scene.seed;
   s.write_trajectory = scene.write_trajectory;
   s.truth = {{"youngs_modulus", scene.youngs_modulus, "Pa"},
-             {"poisson_ratio", scene.poisson_ratio, "1"},
+             {"poissons_ratio", scene.poissons_ratio, "1"},
              {"mass_damping", scene.mass_damping, "1/s"},
              {"stiffness_damping", scene.stiffness_damping, "s"},
              {"density", scene.true_density(), "kg/m^3"},

@@ -20,7 +20,7 @@ struct SyntheticScene {
 
   double youngs_modulus = 0.0;        ///< [Pa], outside of all regions
   std::vector<double> region_moduli;  ///< [Pa] of each region
-  double poisson_ratio = 0.0;
+  double poissons_ratio = 0.0;
   double mass_damping = 0.0;       ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;  ///< Rayleigh [s]
 

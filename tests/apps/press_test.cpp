@@ -28,6 +28,10 @@ TEST(Presses, AreFittedEvaluatedAndPredicted) {
   EXPECT_EQ(check.exit_code, 0) << check.err;
   EXPECT_THAT(check.out, HasSubstr("4, of them 1 for test only"));
 
+  const ProgramRun derivatives = run_pliant({"fit", capture, "--check-gradient", "--out", folder / "checked"});
+  EXPECT_EQ(derivatives.exit_code, 0) << derivatives.err << derivatives.out;
+  EXPECT_THAT(derivatives.out, HasSubstr("exponent_1"));
+
   const ProgramRun cut_off = run_pliant({"fit", capture, "--out", out}, "1 term");
   EXPECT_EQ(cut_off.exit_code, 130) << cut_off.err;
   const ProgramRun fit = run_pliant({"fit", capture, "--out", out, "--resume"});

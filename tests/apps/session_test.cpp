@@ -107,8 +107,8 @@ TEST_F(Session, ResultHoldsWhatTheFormatPromises) {
     EXPECT_TRUE(found.contains(key)) << key;
   EXPECT_EQ(found["software"]["name"], "pliant");
   EXPECT_EQ(found["capture"]["sha256"].get<std::string>().size(), 64U);
-  for (const char* name : {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping", "density", "gravity",
-                           "plane", "linear_velocity", "angular_velocity"}) {
+  for (const char* name : {"youngs_modulus", "poissons_ratio", "mass_damping", "stiffness_damping", "density",
+                           "gravity", "plane", "linear_velocity", "angular_velocity"}) {
     ASSERT_TRUE(found["parameters"].contains(name)) << name;
     const json& p = found["parameters"][name];
     EXPECT_TRUE(p.contains("value")) << name;
@@ -188,6 +188,16 @@ TEST_F(Session, EvaluateAgreesWithTheFit) {
   EXPECT_NEAR(evaluated / fitted, 1.0, 0.1) << "more points of the same frames, the same noise";
 }
 
+TEST_F(Session, TheGradientIsCheckedInsteadOfFitting) {
+  const ProgramRun run = run_fit("checked", {"--check-gradient"});
+  EXPECT_EQ(run.exit_code, fine) << run.err << run.out;
+  for (const char* name : {"youngs_modulus", "stiffness_damping", "agree as far as"})
+    EXPECT_THAT(run.out, HasSubstr(name));
+  EXPECT_FALSE(fs::exists(at("checked") + "/result.json"));
+  EXPECT_THAT(read_file(at("checked") + "/gradient.csv"),
+              testing::StartsWith("parameter,step,difference,tangents,adjoint\nyoungs_modulus,0.1"));
+}
+
 TEST_F(Session, TooFewIterationsAreNotConverged) {
   const ProgramRun run = run_fit("short", {"--set", "max_iterations=1", "--set", "optimiser=rprop"});
   EXPECT_EQ(run.exit_code, not_converged) << run.err;
@@ -212,7 +222,7 @@ TEST_F(Session, RefiningRepeatsTheEstimateAndStatesWhatIsLeft) {
   EXPECT_LE(std::abs(change), modulus["mesh_error"].get<double>() + modulus["step_error"].get<double>());
   EXPECT_FALSE(refined["parameters"]["density"].contains("mesh_error")) << "given, not estimated";
   EXPECT_THAT(run.out, HasSubstr("limit"));
-  EXPECT_THAT(read_file(at("refined") + "/report.html"), HasSubstr("Mesh and time step"));
+  EXPECT_THAT(read_file(at("refined") + "/report.html"), HasSubstr("Convergence in mesh and time step"));
 }
 
 class InterruptedRefinement : public Session, public testing::WithParamInterface<const char*> {};

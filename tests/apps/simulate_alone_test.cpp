@@ -27,7 +27,7 @@ TEST(SimulateAlone, WritesAModelsTrajectory) {
   model.scene.object.density = 100.0, model.scene.object.mass = 0.05;
   model.scene.world.gravity = Vector3(0, -9.81, 0);
   model.scene.timing = evenly_timed(60.0, 3);
-  model.youngs_modulus = 3000.0, model.poisson_ratio = 0.3, model.cell_size = 0.02, model.substeps = 4;
+  model.youngs_modulus = 3000.0, model.poissons_ratio = 0.3, model.cell_size = 0.02, model.substeps = 4;
   save_model(folder.path(), model);
   apps::CommandLine line("simulate alone", "", "");
   int exit_code = -1;

@@ -26,7 +26,7 @@ box = { size = [0.2, 0.04, 0.04], facet = 0.02 }
 density = 200.0
 [material]
 youngs_modulus = 2e5
-poisson_ratio = 0.3
+poissons_ratio = 0.3
 mass_damping = 0.2
 stiffness_damping = 0.002
 [world]

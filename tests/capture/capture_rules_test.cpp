@@ -379,6 +379,63 @@ TEST(CaptureRules, CheckLoads) {
               HasSubstr("no depth camera \"back\""));
 }
 
+TEST(CaptureRules, CheckIndentations) {
+  const auto said = [](const std::string& from, const std::string& to, const std::string& curve) {
+    std::string block =
+        "\n[[indentation]]\nprobe = \"ball\"\nradius = 0.01\ncontact = [0, 0, -0.1]\ndirection = [0, 0, 1]\n"
+        "curve = \"depths.csv\"\n";
+    if (!from.empty()) block.replace(block.find(from), from.size(), to);
+    SmallCapture small;
+    small.folder.write("depths.csv", curve);
+    return complaint_of([&] { (void)small.append(block).read(); });
+  };
+  const std::string curve = "depth,force,std\n0.001,0.1,0.01\n0.002,0.3,0.01\n";
+  EXPECT_EQ(said("", "", curve), "");
+  EXPECT_THAT(said("\"ball\"", "\"cone\"", curve), HasSubstr("one of \"ball\", \"punch\""));
+  EXPECT_THAT(said("radius = 0.01", "radius = 10", curve), HasSubstr("a probe's radius of 10 m"));
+  EXPECT_THAT(said("[0, 0, -0.1]", "[0, 0, -0.3]", curve), HasSubstr("off the rest surface"));
+  EXPECT_THAT(said("direction = [0, 0, 1]\n", "", curve), HasSubstr("has no `direction`"));
+  EXPECT_THAT(said("", "", "depth,force\n0.001,0.1\n"), HasSubstr("depth,force,std"));
+  EXPECT_THAT(said("", "", "depth,force,std\n0.002,0.1,0.01\n0.001,0.1,0.01\n"), HasSubstr("depths in metres from 0"));
+  EXPECT_THAT(said("", "", "depth,force,std\n0.002,0.1,0\n"), HasSubstr("depths.csv:2:11"));
+}
+
+TEST(CaptureRules, CheckGrips) {
+  const auto said = [](const std::string& more) {
+    return complaint_of([&] {
+      (void)SmallCapture()
+          .append("\n[[grip]]\nbox = { min = [-1, 0.09, -1], max = [1, 1, 1] }\ndisplacement = [0, 0.01, 0]\n" + more)
+          .read();
+    });
+  };
+  const std::string force = "force = 1.0\nforce_std = 0.01\n";
+  EXPECT_EQ(said(force), "");
+  EXPECT_THAT(said(""), HasSubstr("a grip without observation"));
+  EXPECT_THAT(said("force = 1.0\n"), HasSubstr("`force` without `force_std`"));
+  EXPECT_THAT(said("force = 1.0\nforce_std = 0\n"), HasSubstr("a standard deviation above 0"));
+  EXPECT_THAT(said(force + "markers = \"markers_rest.csv\"\n"), HasSubstr("all three or none"));
+  EXPECT_THAT(said(force + "sphere = { centre = [0, 0, 0], radius = 1 }\n"), HasSubstr("2 regions in one block"));
+  EXPECT_THAT(said(force + "role = \"train\"\n"), HasSubstr("expected \"fit\" or \"test\""));
+}
+
+TEST(CaptureRules, CheckMaterialCurves) {
+  const auto said = [](const std::string& block, const std::string& curve) {
+    test::TemporaryFolder folder;
+    folder.write("curve.csv", curve);
+    folder.write("capture.toml",
+                 "format = \"capture/1\"\nname = \"rubber\"\n[[material_curve]]\ncurve = \"curve.csv\"\n" + block);
+    return complaint_of([&] { (void)read_capture(folder.path()); });
+  };
+  const std::string curve = "stretch,stress,std\n1.1,1000,10\n";
+  EXPECT_EQ(said("mode = \"uniaxial\"\n", curve), "") << "neither shape nor gravity is asked for";
+  EXPECT_THAT(said("mode = \"torsion\"\n", curve), HasSubstr("\"simple_shear\""));
+  EXPECT_THAT(said("mode = \"biaxial\"\n", curve), HasSubstr("stretch,second,stress,std"));
+  EXPECT_THAT(said("mode = \"uniaxial\"\nprestretch = 1.1\n", curve), HasSubstr("of another test"));
+  EXPECT_THAT(said("mode = \"uniaxial\"\n", "stretch,stress,std\n-0.1,1000,10\n"), HasSubstr("curve.csv:2:1"));
+  EXPECT_EQ(said("mode = \"simple_shear\"\n", "stretch,stress,std\n-0.1,-1000,10\n"), "");
+  EXPECT_THAT(said("mode = \"uniaxial\"\n", "stretch,stress,std\n1.1,0,10\n"), HasSubstr("all zero"));
+}
+
 TEST(CaptureRules, CheckRelease) {
   const auto said = [](const std::string& block) {
     return complaint_of([&] { (void)SmallCapture().append("\n[initial]\n" + block).read(); });

@@ -15,9 +15,9 @@ using ::testing::Not;
 
 Survey surveyed(const Capture& capture) { return survey(capture, observe(capture)); }
 
-Prospects prospects_of(const SmallCapture& small) {
+Identifiability identifiability_of(const SmallCapture& small) {
   const Capture capture = small.read();
-  return prospects(capture, surveyed(capture));
+  return identifiability(capture, surveyed(capture));
 }
 
 TEST(SurveyTest, SeesMotionAndPlane) {
@@ -115,37 +115,38 @@ markers_rest = "markers_rest.csv"
   EXPECT_DOUBLE_EQ(seen.loaded_markers->travel, 0.01);
 }
 
-TEST(ProspectsTest, FreeFallShowsNoStiffness) {
-  EXPECT_THAT(prospects_of(SmallCapture()).impossible, Contains(HasSubstr("in free fall nothing strains it")));
+TEST(IdentifiabilityTest, FreeFallShowsNoStiffness) {
+  EXPECT_THAT(identifiability_of(SmallCapture()).impossible, Contains(HasSubstr("in free fall nothing strains it")));
 }
 
-TEST(ProspectsTest, AnImpactShowsStiffnessAndDamping) {
+TEST(IdentifiabilityTest, AnImpactShowsStiffnessAndDamping) {
   SmallCapture small;
   small.edit("point = [0.0, 0.5, 0.0]", "point = [0.0, 0.2, 0.0]");
-  const Prospects result = prospects_of(small);
+  const Identifiability result = identifiability_of(small);
   EXPECT_THAT(result.possible, Contains(HasSubstr("impact")));
   EXPECT_THAT(result.possible, Contains(HasSubstr("Damping")));
   EXPECT_TRUE(result.impossible.empty());
 }
 
-TEST(ProspectsTest, WithoutMassNothingAnchorsPascals) {
+TEST(IdentifiabilityTest, WithoutMassTheScaleOfStiffnessIsNotIdentifiable) {
   SmallCapture small;
   small.edit("mass = 0.8\n", "");
-  EXPECT_THAT(prospects_of(small).impossible, Contains(HasSubstr("Nothing anchors pascals")));
+  EXPECT_THAT(identifiability_of(small).impossible,
+              Contains(HasSubstr("The absolute scale of stiffness is not identifiable")));
 }
 
-TEST(ProspectsTest, StaticShowsNoDamping) {
+TEST(IdentifiabilityTest, StaticShowsNoDamping) {
   SmallCapture small;
   small.edit("start_frame = 1", "static = true");
-  EXPECT_THAT(prospects_of(small).impossible, Contains(HasSubstr("Damping does not show")));
+  EXPECT_THAT(identifiability_of(small).impossible, Contains(HasSubstr("Damping is not identifiable")));
 }
 
-TEST(ProspectsTest, WithoutRestScanNothingCanBeFitted) {
+TEST(IdentifiabilityTest, WithoutRestScanNothingCanBeFitted) {
   SmallCapture small;
   small.edit("surface = \"rest.ply\"\n", "");
-  const Prospects result = prospects_of(small);
+  const Identifiability result = identifiability_of(small);
   EXPECT_THAT(result.impossible, Contains(HasSubstr("Nothing can be fitted")));
-  EXPECT_THAT(result.possible, Not(Contains(HasSubstr("Pascals"))));
+  EXPECT_THAT(result.possible, Not(Contains(HasSubstr("absolute scale"))));
 }
 
 }  // namespace

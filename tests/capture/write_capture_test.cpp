@@ -33,6 +33,9 @@ void expect_same(const Capture& is, const Capture& was) {
   EXPECT_EQ(is.markers, was.markers);
   EXPECT_EQ(is.presses, was.presses);
   EXPECT_EQ(is.loads, was.loads);
+  EXPECT_EQ(is.indentations, was.indentations);
+  EXPECT_EQ(is.grips, was.grips);
+  EXPECT_EQ(is.material_curves, was.material_curves);
 }
 
 Capture written_and_read(const std::filesystem::path& folder, const Capture& capture) {
@@ -100,7 +103,51 @@ mass = 0.2
 at = [0, 0.1, 0]
 markers = "press/000.csv"
 markers_rest = "markers_rest.csv"
+[[indentation]]
+name = "site"
+probe = "punch"
+radius = 0.01
+contact = [0, 0, -0.1]
+direction = [0, 0.6, 0.8]
+curve = "depths.csv"
+[[indentation]]
+probe = "ball"
+radius = 0.02
+contact = [0, 0, -0.1]
+direction = [0, 0, 1]
+curve = "depths.csv"
+role = "test"
+[[grip]]
+vertices = "held.txt"
+displacement = [0.01, 0, 0]
+force = 0.3
+force_std = 0.01
+[[grip]]
+name = "clamp"
+sphere = { centre = [0.1, 0.1, 0.1], radius = 0.01 }
+displacement = [0, 0.01, 0]
+force = -0.3
+force_std = 0.01
+force_direction = [0, 0, 1]
+markers = "press/000.csv"
+markers_rest = "markers_rest.csv"
+markers_std = 0.0002
+unseen = [1, 0, 0]
+role = "test"
+[[material_curve]]
+mode = "biaxial"
+measure = "cauchy_difference"
+curve = "biaxial.csv"
+[[material_curve]]
+name = "sheared"
+mode = "simple_shear"
+prestretch = 0.9
+curve = "shear.csv"
+role = "test"
 )");
+  small.folder.write("depths.csv", "depth,force,std\n0.001,0.1,0.01\n0.002,0.3,0.01\n");
+  small.folder.write("biaxial.csv", "stretch,second,stress,std\n1.1,1.05,1000,10\n");
+  small.folder.write("shear.csv", "stretch,stress,std\n-0.1,-500,10\n0.2,1000,10\n");
 }
 
 TEST(WriteCapture, ComesBackAsItWasRead) {
@@ -109,6 +156,9 @@ TEST(WriteCapture, ComesBackAsItWasRead) {
   const Capture capture = small.read();
   ASSERT_EQ(capture.presses.size(), 2u);
   ASSERT_EQ(capture.loads.size(), 2u);
+  ASSERT_EQ(capture.indentations.size(), 2u);
+  ASSERT_EQ(capture.grips.size(), 2u);
+  ASSERT_EQ(capture.material_curves.size(), 2u);
   ASSERT_EQ(capture.scene.fixed.size(), 2u);
   const Capture again = written_and_read(small.folder.path(), capture);
   expect_same(again, capture);

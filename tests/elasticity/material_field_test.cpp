@@ -136,7 +136,7 @@ TEST(LawLayouts, OfAMotionShareItsModuliAndPoissonsRatio) {
   const MotionBlocks three = add_motion_blocks(others, {.moduli = 3});
   const LawLayout own = LawLayout::of_motion(others, three, {3, 1, 3});
   EXPECT_EQ(own.poissons_ratio(0, 0), three.poissons_ratio);
-  EXPECT_EQ(own.poissons_ratio(0, 2), others.at("poisson_ratio@3"));
+  EXPECT_EQ(own.poissons_ratio(0, 2), others.at("poissons_ratio@3"));
   EXPECT_EQ(own.exponent(0, 1), others.at("exponent_1@2"));
   EXPECT_THROW(LawLayout::of_motion(others, three, {3, 1, 2}), std::invalid_argument);
 }

@@ -41,7 +41,7 @@ struct Reference : ::testing::TestWithParam<std::tuple<Of, bool>> {
     blocks.set_moduli(theta, 3000.0);
     theta[blocks.poissons_ratio] = 0.35;
     for (const auto& [name, value] : std::initializer_list<std::pair<std::string, double>>{
-             {"exponent_1", 5.0}, {"exponent_2", -4.0}, {"stiffness_ratio_2", 0.6}, {"poisson_ratio_2", 0.2}})
+             {"exponent_1", 5.0}, {"exponent_2", -4.0}, {"stiffness_ratio_2", 0.6}, {"poissons_ratio_2", 0.2}})
       if (layout.contains(name)) theta[layout.at(name)] = value;
     forces = material.make_reference_forces(body);
     forces->set_parameters(theta);

@@ -170,7 +170,7 @@ class SeenInEveryWay : public ::testing::Test {
   double estimate(const Parts& parts) const {
     std::vector<std::string> notes;
     FitOptions options;
-    options.parameters["poisson_ratio"] = {VectorX::Constant(1, 0.35), false, {}};
+    options.parameters["poissons_ratio"] = {VectorX::Constant(1, 0.35), false, {}};
     for (const char* damping : {"mass_damping", "stiffness_damping"}) options.parameters[damping].estimated = false;
     options.marker_noise = noise;
     const Recordings recordings({recorded(parts)}, options, notes);

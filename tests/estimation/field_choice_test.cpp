@@ -212,7 +212,7 @@ FitOptions quick() {
   FitOptions options;
   options.cells = options.coarse_cells = 8.0;
   options.control_points = FitOptions::automatic;
-  options.parameters["poisson_ratio"].estimated = false;
+  options.parameters["poissons_ratio"].estimated = false;
   options.starts = 1;
   return options;
 }

@@ -27,7 +27,7 @@ FitOptions changed() {
   o.solver_tolerance = 1e-6;
   o.hold_strongly = true;
   o.parameters["youngs_modulus"].start = VectorX::Constant(1, 5120.25);
-  o.parameters["poisson_ratio"].estimated = false;
+  o.parameters["poissons_ratio"].estimated = false;
   o.parameters["density"].prior_std = 0.125;
   VectorX g(3);
   g << 0.0, -9.5, 0.25;
@@ -108,15 +108,6 @@ TEST(FitConfig, ALawInMotionIsNotTrackedAndSaysSoWhereTrackingIsAskedFor) {
   EXPECT_THAT(unused_choices(options, true, false)[0], HasSubstr("tracker's own elasticity is linear"));
   options.material = MaterialKind::Linear;
   EXPECT_TRUE(unused_choices(options, true, false).empty());
-}
-
-TEST(FitConfig, PressesAloneAreOfOgdensLawWhereNothingIsSaid) {
-  FitOptions options;
-  EXPECT_EQ(press_options(options).material, MaterialKind::Ogden);
-  for (const MaterialKind kind : {MaterialKind::Linear, MaterialKind::NeoHookean, MaterialKind::Sampled}) {
-    options.material = kind;
-    EXPECT_EQ(press_options(options).material, kind);
-  }
 }
 
 TEST(FitConfig, DefaultsRoundTripAndEveryKeyIsWritten) {

@@ -26,7 +26,7 @@ struct Plans : testing::Test {
       return list.back();
     };
     facts.moduli = {add("youngs_modulus", "Pa", 1, Role::Material, true).at};
-    add("poisson_ratio", "1", 1, Role::Material, true);
+    add("poissons_ratio", "1", 1, Role::Material, true);
     facts.density = add("density", "kg/m^3", 1, Role::Inertia, false).at;
     facts.gravity = add("gravity", "m/s^2", 3, Role::Load, false).at;
     add("linear_velocity", "m/s", 3, Role::Initial, true);
@@ -196,7 +196,7 @@ TEST_F(Plans, EstimateFromTheBestStart) {
   EXPECT_EQ(chain[1].band, facts.options.fine_band);
   EXPECT_EQ(chain[1].grid.cells, facts.options.cells);
   EXPECT_EQ(chain[1].iterations, facts.options.max_iterations);
-  EXPECT_THAT(chain[1].free, UnorderedElementsAre("youngs_modulus", "poisson_ratio", "linear_velocity"));
+  EXPECT_THAT(chain[1].free, UnorderedElementsAre("youngs_modulus", "poissons_ratio", "linear_velocity"));
 }
 
 TEST_F(Plans, DoNotRepeatOnTheFullGridWhatTheStartsDidThere) {
@@ -285,9 +285,9 @@ TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
   EXPECT_EQ(pulls.from[0].tail<3>(), Vector3(1.0, 2.0, 3.0));
   EXPECT_EQ(pulls.from[1].tail<3>(), Vector3(0.0, 0.0, 0.0));
   for (std::size_t i = 1; i + 1 < chains[0].size(); ++i)
-    EXPECT_THAT(chains[0][i].free, testing::Not(testing::Contains("poisson_ratio")))
+    EXPECT_THAT(chains[0][i].free, testing::Not(testing::Contains("poissons_ratio")))
         << "it would make up for what others lack";
-  EXPECT_THAT(chains[0].back().free, testing::Contains("poisson_ratio"));
+  EXPECT_THAT(chains[0].back().free, testing::Contains("poissons_ratio"));
   for (const Stage& stage : chains[0]) has_done(record(stage.id, 1.0, 430.0));
   const auto finer = next();
   ASSERT_EQ(finer[0].size(), 2u);

@@ -106,7 +106,7 @@ TEST(LawCaptureFit, FindsOgdensLaw) {
   EXPECT_TRUE(outcome.converged) << outcome.reason;
   EXPECT_EQ(outcome.recordings.front().discretisation.body->kind, ElementKind::QuadraticTetrahedron);
   EXPECT_NEAR(value(outcome, "youngs_modulus"), modulus, 0.03 * modulus);
-  EXPECT_NEAR(value(outcome, "poisson_ratio"), nu, 0.03);
+  EXPECT_NEAR(value(outcome, "poissons_ratio"), nu, 0.03);
   EXPECT_NEAR(value(outcome, "exponent_1"), exponent, 0.1 * exponent);
   EXPECT_THAT(outcome.notes, Contains(HasSubstr("Ogden's law of 1 term")));
   expect_same_motion(seen, outcome, "ogden");
@@ -125,7 +125,7 @@ TEST(LawCaptureFit, FindsANeoHookeanLaw) {
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
   EXPECT_TRUE(outcome.converged) << outcome.reason;
   EXPECT_NEAR(value(outcome, "youngs_modulus"), modulus, 0.03 * modulus);
-  EXPECT_NEAR(value(outcome, "poisson_ratio"), nu, 0.03);
+  EXPECT_NEAR(value(outcome, "poissons_ratio"), nu, 0.03);
   EXPECT_THAT(outcome.notes, Contains(HasSubstr("neo-Hookean")));
   expect_same_motion(seen, outcome, "neo_hookean");
 }

@@ -16,13 +16,13 @@ std::vector<std::string> names_of(const LawLayout& layout) {
 
 TEST(LawLayouts, NameTheNumbersOfALaw) {
   using Names = std::vector<std::string>;
-  EXPECT_EQ(names_of(LawLayout({1, 0})), (Names{"youngs_modulus", "poisson_ratio"}));
+  EXPECT_EQ(names_of(LawLayout({1, 0})), (Names{"youngs_modulus", "poissons_ratio"}));
   EXPECT_EQ(names_of(LawLayout({1, 2})),
-            (Names{"youngs_modulus", "poisson_ratio", "exponent_1", "exponent_2", "stiffness_ratio_2"}));
+            (Names{"youngs_modulus", "poissons_ratio", "exponent_1", "exponent_2", "stiffness_ratio_2"}));
   EXPECT_EQ(names_of(LawLayout({2, 1, 1}, {"youngs_modulus", "youngs_modulus@top"})),
-            (Names{"youngs_modulus", "youngs_modulus@top", "poisson_ratio", "exponent_1"}));
+            (Names{"youngs_modulus", "youngs_modulus@top", "poissons_ratio", "exponent_1"}));
   EXPECT_EQ(names_of(LawLayout({2, 1, 2}, {"youngs_modulus", "youngs_modulus@top"})),
-            (Names{"youngs_modulus", "youngs_modulus@top", "poisson_ratio", "exponent_1", "poisson_ratio@top",
+            (Names{"youngs_modulus", "youngs_modulus@top", "poissons_ratio", "exponent_1", "poissons_ratio@top",
                    "exponent_1@top"}));
   EXPECT_EQ(LawLayout({3, 1}).modulus_names(), (Names{"youngs_modulus@1", "youngs_modulus@2", "youngs_modulus@3"}));
 }
@@ -30,7 +30,7 @@ TEST(LawLayouts, NameTheNumbersOfALaw) {
 TEST(LawLayouts, TermsShareAPoissonsRatioOrHaveTheirOwn) {
   const LawLayout one({1, 3}), own({1, 3, 1, true});
   EXPECT_EQ(one.poissons_ratio(2), one.poissons_ratio());
-  EXPECT_EQ(own.poissons_ratio(2), own.layout().at("poisson_ratio_3"));
+  EXPECT_EQ(own.poissons_ratio(2), own.layout().at("poissons_ratio_3"));
   EXPECT_EQ(own.size(), one.size() + 2);
 }
 

@@ -232,7 +232,7 @@ struct TwoCaptures : ::testing::Test {
 TEST_F(TwoCaptures, ShareTheMaterialAndHaveTheirOwnStartPlanesAndSensors) {
   const JointLayout joint = this->joint();
   for (const std::string shared :
-       {"youngs_modulus", "youngs_modulus@beyond", "poisson_ratio", "mass_damping", "stiffness_damping"}) {
+       {"youngs_modulus", "youngs_modulus@beyond", "poissons_ratio", "mass_damping", "stiffness_damping"}) {
     EXPECT_TRUE(joint.layout.contains(shared)) << shared;
     EXPECT_FALSE(joint.layout.contains(shared + "[2]")) << shared;
   }

@@ -63,7 +63,7 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
 FitOptions quick(TrackingUse tracking) {
   FitOptions options;
   options.cells = options.coarse_cells = 8.0;
-  options.parameters["poisson_ratio"].estimated = false;
+  options.parameters["poissons_ratio"].estimated = false;
   options.starts = 1;
   options.tracking = tracking;
   return options;

@@ -15,7 +15,8 @@ Model full_model() {
   Model m;
   m.name = "a \"soft\" ring \\ with\ttab";
   m.scene.object.surface = make_torus(0.15, 0.06, 12, 8);
-  m.youngs_modulus = 590.1234567890123, m.poisson_ratio = 1.0 / 3.0, m.mass_damping = 0.24, m.stiffness_damping = 0.027;
+  m.youngs_modulus = 590.1234567890123, m.poissons_ratio = 1.0 / 3.0, m.mass_damping = 0.24,
+  m.stiffness_damping = 0.027;
   m.scene.object.density = 95.0, m.scene.object.mass = 0.456;
   m.scene.world.gravity = Vector3(0.1, -9.81, 1e-17);
   m.scene.planes = {{{0, 0.1, 0}, Vector3(0.6, 0.8, 0), false}, {}};
@@ -31,7 +32,7 @@ Model full_model() {
   m.substeps = 4, m.theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;
   m.volume.nodes = Points::Random(12, 3);
   m.volume.connectivity = {0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 8, 9, 10, 11};
-  m.volume.youngs_modulus = {500, 680}, m.volume.poisson_ratio = {0.3, 0.4}, m.volume.fill = {1.0, 0.25};
+  m.volume.youngs_modulus = {500, 680}, m.volume.poissons_ratio = {0.3, 0.4}, m.volume.fill = {1.0, 0.25};
   m.volume.youngs_modulus_std = {20, 35};
   return m;
 }
@@ -46,7 +47,7 @@ TEST(Model, ComesBackAsItWasSaved) {
   for (size_t i = 0; i < m.scene.object.surface->vertices.size(); ++i)
     EXPECT_LT((read.scene.object.surface->vertices[i] - m.scene.object.surface->vertices[i]).norm(), 1e-7);
   EXPECT_EQ(read.youngs_modulus, m.youngs_modulus);
-  EXPECT_EQ(read.poisson_ratio, m.poisson_ratio);
+  EXPECT_EQ(read.poissons_ratio, m.poissons_ratio);
   EXPECT_EQ(read.mass_damping, m.mass_damping);
   EXPECT_EQ(read.stiffness_damping, m.stiffness_damping);
   EXPECT_EQ(read.scene.object.density, m.scene.object.density);
@@ -64,7 +65,7 @@ TEST(Model, ComesBackAsItWasSaved) {
   EXPECT_EQ(read.volume.connectivity, m.volume.connectivity);
   EXPECT_EQ(read.volume.youngs_modulus, m.volume.youngs_modulus);
   EXPECT_EQ(read.volume.youngs_modulus_std, m.volume.youngs_modulus_std);
-  EXPECT_EQ(read.volume.poisson_ratio, m.volume.poisson_ratio);
+  EXPECT_EQ(read.volume.poissons_ratio, m.volume.poissons_ratio);
   EXPECT_EQ(read.volume.fill, m.volume.fill);
 }
 
@@ -85,7 +86,7 @@ TEST(Model, TakesTetrahedraMadeElsewhereAsOfOneMaterial) {
   EXPECT_EQ(read.volume.kind, VtuCell::Tetrahedron);
   EXPECT_EQ(read.volume.connectivity, (std::vector<int>{0, 1, 2, 3})) << "turned";
   EXPECT_EQ(read.volume.youngs_modulus, std::vector<double>{read.youngs_modulus});
-  EXPECT_EQ(read.volume.poisson_ratio, std::vector<double>{read.poisson_ratio});
+  EXPECT_EQ(read.volume.poissons_ratio, std::vector<double>{read.poissons_ratio});
   EXPECT_EQ(read.scene.object.surface->triangles.size(), 4u);
 }
 
@@ -164,7 +165,7 @@ TEST_F(ModelFile, PlacesAreNamedByLineAndColumn) {
 }
 
 TEST_F(ModelFile, RefusesWhatIsOutOfRangeNotFiniteOrMissing) {
-  EXPECT_THAT(after("poisson_ratio     = 0.333", "poisson_ratio = 0.5 # 0.333"), HasSubstr("below 0.5"));
+  EXPECT_THAT(after("poissons_ratio     = 0.333", "poissons_ratio = 0.5 # 0.333"), HasSubstr("below 0.5"));
   EXPECT_THAT(after("density           = 95.0", "density = nan"), HasSubstr("finite"));
   EXPECT_THAT(after("mass              = 0.456", "mass = \"heavy\""), HasSubstr("a number"));
   EXPECT_THAT(after("substeps          = 4", "substeps = 0"), HasSubstr("1 to 100000"));

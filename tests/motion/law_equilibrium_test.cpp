@@ -74,7 +74,7 @@ TEST(LawEquilibrium, OfAStretchedBarIsTheLawsOwn) {
   EXPECT_LT((placement.nodes - expected).norm(), tolerance(1e-7) * expected.norm());
 }
 
-TEST(LawEquilibrium, BalancesTheForceOfAGluedDisc) {
+TEST(LawEquilibrium, BalancesTheForceOfABondedDisc) {
   for (const bool quadratic : {false, true}) {
     const Block block(quadratic);
     Equilibrium equilibrium = block.make();

@@ -28,7 +28,7 @@ struct Predictions : ::testing::Test {
     capture.scene.world.up = Vector3::UnitZ();
     capture.scene.fixed = {{RegionHalfSpace{{-0.499 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
     model.scene.object.surface = capture.scene.object.surface;
-    model.youngs_modulus = 2e5, model.poisson_ratio = 0.3, model.stiffness_damping = 2e-3;
+    model.youngs_modulus = 2e5, model.poissons_ratio = 0.3, model.stiffness_damping = 2e-3;
     model.scene.object.density = 1000.0, model.scene.object.mass = 0.5;
     model.cell_size = edge;
     write_marker_positions(folder / "rest.csv", {{"tip"}, tip.transpose()});

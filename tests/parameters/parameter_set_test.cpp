@@ -194,7 +194,7 @@ TEST(ParameterSet, RolesAreThoseOfTheBlocks) {
 }
 
 TEST(ParameterSet, WhatIsOfTheObjectIsToldByRoleAndUnit) {
-  const std::set<std::string> of_object = {"youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping",
+  const std::set<std::string> of_object = {"youngs_modulus", "poissons_ratio", "mass_damping", "stiffness_damping",
                                            "density"};
   const ParameterSet set = all_estimated();
   for (const Parameter& p : set.parameters()) {

@@ -21,12 +21,12 @@ Model model_with(const MaterialLaw& law) {
   Model m;
   m.name = "pressed";
   m.scene.object.surface = make_torus(0.15, 0.06, 12, 8);
-  m.youngs_modulus = 5000.0, m.poisson_ratio = 0.3, m.scene.object.density = 95.0, m.scene.object.mass = 0.456,
+  m.youngs_modulus = 5000.0, m.poissons_ratio = 0.3, m.scene.object.density = 95.0, m.scene.object.mass = 0.456,
   m.cell_size = 0.02;
   m.volume.kind = VtuCell::Tetrahedron;
   m.volume.nodes = Points::Random(6, 3);
   m.volume.connectivity = {0, 1, 2, 3, 1, 2, 3, 4, 2, 3, 4, 5};
-  m.volume.youngs_modulus = {500, 680, 700}, m.volume.poisson_ratio = {0.3, 0.4, 0.2}, m.volume.fill = {1.0, 1.0, 1.0};
+  m.volume.youngs_modulus = {500, 680, 700}, m.volume.poissons_ratio = {0.3, 0.4, 0.2}, m.volume.fill = {1.0, 1.0, 1.0};
   m.law = model_law(law);
   return m;
 }

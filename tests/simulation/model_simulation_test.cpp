@@ -28,7 +28,7 @@ Model bar() {
   model.scene.fixed = {{RegionHalfSpace{{-0.499 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
   model.scene.planes = {{{0, 0, -0.3}, Vector3::UnitZ(), true}};
   model.scene.weights = {{0.1, {0.5 * length, 0, 0}}};
-  model.youngs_modulus = 2e5, model.poisson_ratio = 0.3, model.stiffness_damping = 2e-3;
+  model.youngs_modulus = 2e5, model.poissons_ratio = 0.3, model.stiffness_damping = 2e-3;
   model.cell_size = edge, model.substeps = substeps, model.theta = 0.6;
   return model;
 }

@@ -85,7 +85,7 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
         theta(VectorX::Zero(all.size())) {
     // Of laws: terms that stiffen in tension and in compression.
     for (const auto& [name, value] : std::initializer_list<std::pair<std::string, double>>{
-             {"exponent_1", 5.0}, {"exponent_2", -4.0}, {"stiffness_ratio_2", 0.6}, {"poisson_ratio_2", 0.2}})
+             {"exponent_1", 5.0}, {"exponent_2", -4.0}, {"stiffness_ratio_2", 0.6}, {"poissons_ratio_2", 0.2}})
       if (all.contains(name)) theta[all.at(name)] = value;
     constexpr std::array moduli = {3000.0, 2000.0, 5000.0};
     for (std::size_t k = 0; k < layout.youngs_moduli.size(); ++k) theta[layout.youngs_moduli[k]] = moduli[k];

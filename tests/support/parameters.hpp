@@ -27,7 +27,7 @@ inline VectorX torus_values(const MotionLayout& layout) {
 inline ParameterSet torus_parameters(const MotionLayout& layout, const VectorX& theta) {
   std::vector<Parameter> list = {
       {"youngs_modulus", "Pa", Transform::Logarithm, layout.youngs_moduli[0], 1.0, 1.0, 1e7},
-      {"poisson_ratio", "1", Transform::LogitHalf, layout.poissons_ratio, 1.0, 0.02, 0.495},
+      {"poissons_ratio", "1", Transform::LogitHalf, layout.poissons_ratio, 1.0, 0.02, 0.495},
       {"mass_damping", "1/s", Transform::Logarithm, layout.mass_damping, 1.0, 1e-4, 1e3},
       {"stiffness_damping", "s", Transform::Logarithm, layout.stiffness_damping, 1.0, 1e-6, 1.0},
       {"density", "kg/m^3", Transform::Logarithm, layout.density, 1.0, 1.0, 1e4},

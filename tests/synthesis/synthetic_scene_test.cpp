@@ -26,7 +26,7 @@ angle_deg = 30.0
 mass = 0.3
 [material]
 youngs_modulus = 2000.0
-poisson_ratio = 0.3
+poissons_ratio = 0.3
 mass_damping = 0.2
 stiffness_damping = 0.004
 [world]
@@ -129,7 +129,7 @@ TEST_F(SceneFile, RefusesWhatMakesNoSense) {
   EXPECT_THAT(after("tube_radius = 0.05", "tube_radius = 0.5"), HasSubstr("tube radius < ring radius"));
   EXPECT_THAT(after("axis = [1.0, 0.0, 0.0]\n", ""), HasSubstr("axis"));
   EXPECT_THAT(after("torus = {", "sphere = { radius = 1.0 }\ntorus = {"), HasSubstr("2 shapes"));
-  EXPECT_THAT(after("poisson_ratio = 0.3", "poisson_ratio = 0.5"), HasSubstr("below 0.5"));
+  EXPECT_THAT(after("poissons_ratio = 0.3", "poissons_ratio = 0.5"), HasSubstr("below 0.5"));
   EXPECT_THAT(after("start_frame = 1", "start_frame = 5"), HasSubstr("0 to 4"));
   EXPECT_THAT(after("structured-light", "magic"), HasSubstr("ideal, structured-light"));
   EXPECT_THAT(after("hole_rate = 0.01", "hole_rate = 1.01"), HasSubstr("at most 1"));

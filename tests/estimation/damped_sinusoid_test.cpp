@@ -1,5 +1,5 @@
 // Frequencies and decays of short, noisy records.
-#include "estimation/tone.hpp"
+#include "estimation/damped_sinusoid.hpp"
 
 #include <gtest/gtest.h>
 
@@ -35,33 +35,33 @@ double decaying(double t, double omega, double decay, double phase) {
 }
 
 /// Without noise the model is exact: what is left is where the search stops.
-TEST(StrongestTone, IsExactWithoutNoise) {
+TEST(DominantSinusoid, IsExactWithoutNoise) {
   for (const double phase : {0.0, 0.7, 2.0})
     for (const double omega : {9.0, 31.7, 120.0})
       for (const double decay : {0.0, 0.4, 2.0}) {
         const Record r = record(120, 0.0, [&](double t) { return 3.0 + 0.5 * decaying(t, omega, decay, phase); });
-        const auto tone = strongest_tone(r.times, r.values, resolvable_band(r.times));
-        ASSERT_TRUE(tone);
-        EXPECT_NEAR(tone->omega, omega, tolerance(1e-4) * omega) << phase << " " << decay;
-        EXPECT_NEAR(tone->decay, decay, tolerance(1e-3)) << phase << " " << omega;
-        EXPECT_NEAR(tone->amplitude, 0.5, tolerance(1e-3));
-        EXPECT_GT(tone->explained, 1.0 - tolerance(1e-5));
-        EXPECT_EQ(doubts(*tone, r.times.size()), "");
+        const auto sinusoid = dominant_sinusoid(r.times, r.values, resolvable_band(r.times));
+        ASSERT_TRUE(sinusoid);
+        EXPECT_NEAR(sinusoid->omega, omega, tolerance(1e-4) * omega) << phase << " " << decay;
+        EXPECT_NEAR(sinusoid->decay, decay, tolerance(1e-3)) << phase << " " << omega;
+        EXPECT_NEAR(sinusoid->amplitude, 0.5, tolerance(1e-3));
+        EXPECT_GT(sinusoid->explained, 1.0 - tolerance(1e-5));
+        EXPECT_EQ(rejection_reason(*sinusoid, r.times.size()), "");
       }
 }
 
-/// Errors are of the size that the tone's own deviation says.
-TEST(StrongestTone, KnowsItsDeviationUnderNoise) {
+/// Errors are of the size that the sinusoid's own deviation says.
+TEST(DominantSinusoid, KnowsItsDeviationUnderNoise) {
   double sum = 0.0;
   int count = 0;
   for (const double omega : {10.0, 17.0, 33.0, 60.0, 90.0, 130.0})
     for (const double phase : {0.1, 0.9, 1.7, 2.6}) {
       const Record r = record(150, 0.2, [&](double t) { return 1.0 + decaying(t, omega, 1.0, phase); });
-      const auto tone = strongest_tone(r.times, r.values, resolvable_band(r.times));
-      ASSERT_TRUE(tone);
-      EXPECT_EQ(doubts(*tone, r.times.size()), "") << omega << " " << phase;
-      EXPECT_NEAR(tone->omega / omega, 1.0, tolerance(0.03));
-      sum += std::pow((tone->omega - omega) / tone->deviation, 2);
+      const auto sinusoid = dominant_sinusoid(r.times, r.values, resolvable_band(r.times));
+      ASSERT_TRUE(sinusoid);
+      EXPECT_EQ(rejection_reason(*sinusoid, r.times.size()), "") << omega << " " << phase;
+      EXPECT_NEAR(sinusoid->omega / omega, 1.0, tolerance(0.03));
+      sum += std::pow((sinusoid->omega - omega) / sinusoid->deviation, 2);
       ++count;
     }
   // The mean square of two dozen unit deviates, which share their noise.
@@ -69,23 +69,23 @@ TEST(StrongestTone, KnowsItsDeviationUnderNoise) {
   EXPECT_LT(sum / count, 3.0);
 }
 
-TEST(StrongestTone, LeavesOutWhatIsKnown) {
+TEST(DominantSinusoid, LeavesOutWhatIsKnown) {
   const auto both = [](double t) { return decaying(t, 30.0, 0.5, 0.3) + 0.2 * decaying(t, 47.0, 1.0, 1.0); };
   const Record r = record(120, 0.02, both);
-  const ToneBand band = resolvable_band(r.times);
-  const auto strong = strongest_tone(r.times, r.values, band);
+  const FrequencyBand band = resolvable_band(r.times);
+  const auto strong = dominant_sinusoid(r.times, r.values, band);
   ASSERT_TRUE(strong);
   EXPECT_NEAR(strong->omega, 30.0, tolerance(0.3));
-  const auto weak = strongest_tone(r.times, r.values, band, {*strong});
+  const auto weak = dominant_sinusoid(r.times, r.values, band, {*strong});
   ASSERT_TRUE(weak);
   EXPECT_NEAR(weak->omega, 47.0, tolerance(0.5));
-  EXPECT_EQ(doubts(*weak, r.times.size()), "");
+  EXPECT_EQ(rejection_reason(*weak, r.times.size()), "");
 }
 
-TEST(StrongestTone, IsDoubtedWhereNothingSwings) {
+TEST(DominantSinusoid, IsDoubtedWhereNothingSwings) {
   const auto doubt = [](const Record& r) {
-    const auto tone = strongest_tone(r.times, r.values, resolvable_band(r.times));
-    return tone ? doubts(*tone, r.times.size()) : "none";
+    const auto sinusoid = dominant_sinusoid(r.times, r.values, resolvable_band(r.times));
+    return sinusoid ? rejection_reason(*sinusoid, r.times.size()) : "none";
   };
   EXPECT_EQ(doubt(record(120, 0.0, [](double) { return 0.0; })), "none");
   EXPECT_NE(doubt(record(120, 1.0, [](double) { return 0.0; })), "");
@@ -95,9 +95,9 @@ TEST(StrongestTone, IsDoubtedWhereNothingSwings) {
   EXPECT_EQ(doubt(record(120, 0.01, [](double t) { return decaying(t, 12.0, 2.0, 0.0); })), "");
 }
 
-TEST(StrongestTone, NeedsTimes) {
-  EXPECT_FALSE(strongest_tone({0.0, 0.1, 0.2}, VectorX::Ones(3), {1.0, 2.0}));
-  EXPECT_FALSE(strongest_tone({}, {}, resolvable_band({})));
+TEST(DominantSinusoid, NeedsTimes) {
+  EXPECT_FALSE(dominant_sinusoid({0.0, 0.1, 0.2}, VectorX::Ones(3), {1.0, 2.0}));
+  EXPECT_FALSE(dominant_sinusoid({}, {}, resolvable_band({})));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "estimation/tone.hpp"
+#include "estimation/damped_sinusoid.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -19,10 +19,10 @@ constexpr double least_explained = 0.3;  // share of the variance ...
 constexpr double noise_explained = 8.0;  // ... or this times ln(n) / n: the highest of n peaks of white noise explains
                                          // about 2 ln(n) / n
 
-/// What a tone of given frequency and decay explains of a signal, about what is fitted along.
+/// What a sinusoid of given frequency and decay explains of a signal, about what is fitted along.
 class Periodogram {
  public:
-  Periodogram(const std::vector<double>& times, const VectorX& signal, const std::vector<Tone>& known)
+  Periodogram(const std::vector<double>& times, const VectorX& signal, const std::vector<DampedSinusoid>& known)
       : t_(Eigen::Map<const VectorX>(times.data(), Eigen::Index(times.size())).array() - times.front()) {
     MatrixX along(t_.size(), 1 + 2 * Eigen::Index(known.size()));
     along.col(0).setOnes();
@@ -77,7 +77,7 @@ class Periodogram {
 };
 
 /// Peak of the periodogram on a grid, between its points by a parabola.
-double grid_peak(const Periodogram& periodogram, const ToneBand& band, double spacing) {
+double grid_peak(const Periodogram& periodogram, const FrequencyBand& band, double spacing) {
   const int count = std::max(3, int(std::ceil((band.most - band.least) / spacing)) + 1);
   const double step = (band.most - band.least) / (count - 1);
   VectorX power(count);
@@ -93,25 +93,26 @@ double grid_peak(const Periodogram& periodogram, const ToneBand& band, double sp
 }
 
 /// Compass search for the best frequency and decay.
-void refine(const Periodogram& periodogram, const ToneBand& band, double width, Tone& tone) {
-  const double most_decay = tone.omega;
-  tone.power = periodogram.power(tone.omega, tone.decay);
+void refine(const Periodogram& periodogram, const FrequencyBand& band, double width, DampedSinusoid& sinusoid) {
+  const double most_decay = sinusoid.omega;
+  sinusoid.power = periodogram.power(sinusoid.omega, sinusoid.decay);
   for (const double decay : {0.5, 1.0, 2.0, 4.0, 8.0, 16.0})
     if (const double d = decay / periodogram.span(); d < most_decay)
-      if (const double power = periodogram.power(tone.omega, d); power > tone.power) tone.power = power, tone.decay = d;
-  double omega_step = 0.25 * width, decay_step = std::max(0.25 * width, 0.5 * tone.decay);
+      if (const double power = periodogram.power(sinusoid.omega, d); power > sinusoid.power)
+        sinusoid.power = power, sinusoid.decay = d;
+  double omega_step = 0.25 * width, decay_step = std::max(0.25 * width, 0.5 * sinusoid.decay);
   for (int i = 0; i < refinements; ++i) {
-    Tone best = tone;
+    DampedSinusoid best = sinusoid;
     for (const auto& [d_omega, d_decay] :
          {std::pair{omega_step, 0.0}, {-omega_step, 0.0}, {0.0, decay_step}, {0.0, -decay_step}}) {
-      Tone trial = tone;
-      trial.omega = std::clamp(tone.omega + d_omega, band.least, band.most);
-      trial.decay = std::clamp(tone.decay + d_decay, 0.0, most_decay);
+      DampedSinusoid trial = sinusoid;
+      trial.omega = std::clamp(sinusoid.omega + d_omega, band.least, band.most);
+      trial.decay = std::clamp(sinusoid.decay + d_decay, 0.0, most_decay);
       trial.power = periodogram.power(trial.omega, trial.decay);
       if (trial.power > best.power) best = trial;
     }
-    if (best.power > tone.power)
-      tone = best;
+    if (best.power > sinusoid.power)
+      sinusoid = best;
     else
       omega_step *= 0.5, decay_step *= 0.5;
   }
@@ -119,9 +120,9 @@ void refine(const Periodogram& periodogram, const ToneBand& band, double width, 
 
 }  // namespace
 
-double Tone::natural() const { return std::hypot(omega, decay); }
+double DampedSinusoid::natural() const { return std::hypot(omega, decay); }
 
-ToneBand resolvable_band(const std::vector<double>& times) {
+FrequencyBand resolvable_band(const std::vector<double>& times) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < times.size(); ++i) intervals.push_back(times[i] - times[i - 1]);
   if (intervals.empty()) return {1.0, 0.0};
@@ -130,39 +131,40 @@ ToneBand resolvable_band(const std::vector<double>& times) {
   return {2.0 * std::numbers::pi / (times.back() - times.front()), nyquist_share * std::numbers::pi / median};
 }
 
-std::optional<Tone> strongest_tone(const std::vector<double>& times, const VectorX& signal, const ToneBand& band,
-                                   const std::vector<Tone>& known) {
+std::optional<DampedSinusoid> dominant_sinusoid(const std::vector<double>& times, const VectorX& signal,
+                                                const FrequencyBand& band, const std::vector<DampedSinusoid>& known) {
   if (times.size() < 6 + 2 * known.size() || !(band.least < band.most)) return {};
   const Periodogram periodogram(times, signal, known);
   const double total = periodogram.total();
   if (!(total > 0.0) || !std::isfinite(total)) return {};
   const double width = 2.0 * std::numbers::pi / periodogram.span(), spacing = width / padding;
-  Tone tone;
-  tone.omega = grid_peak(periodogram, band, spacing);
-  refine(periodogram, band, width, tone);
-  tone.amplitude = periodogram.amplitude(tone.omega, tone.decay);
-  tone.explained = std::clamp(tone.power / total, 0.0, 1.0);
-  tone.is_at_edge = tone.omega < band.least + 0.5 * spacing || tone.omega > band.most - 0.5 * spacing;
-  const double seen = tone.decay > 0.0 ? std::min(periodogram.span(), visible / tone.decay) : periodogram.span();
-  tone.periods = tone.omega * seen / (2.0 * std::numbers::pi);
+  DampedSinusoid sinusoid;
+  sinusoid.omega = grid_peak(periodogram, band, spacing);
+  refine(periodogram, band, width, sinusoid);
+  sinusoid.amplitude = periodogram.amplitude(sinusoid.omega, sinusoid.decay);
+  sinusoid.explained = std::clamp(sinusoid.power / total, 0.0, 1.0);
+  sinusoid.is_at_edge = sinusoid.omega < band.least + 0.5 * spacing || sinusoid.omega > band.most - 0.5 * spacing;
+  const double seen =
+      sinusoid.decay > 0.0 ? std::min(periodogram.span(), visible / sinusoid.decay) : periodogram.span();
+  sinusoid.periods = sinusoid.omega * seen / (2.0 * std::numbers::pi);
   // Curvature of the unexplained sum of squares.
-  const double h = 0.1 * std::max(1.0 / periodogram.span(), tone.decay);
-  const double curvature = (2.0 * tone.power - periodogram.power(tone.omega + h, tone.decay) -
-                            periodogram.power(tone.omega - h, tone.decay)) /
+  const double h = 0.1 * std::max(1.0 / periodogram.span(), sinusoid.decay);
+  const double curvature = (2.0 * sinusoid.power - periodogram.power(sinusoid.omega + h, sinusoid.decay) -
+                            periodogram.power(sinusoid.omega - h, sinusoid.decay)) /
                            (h * h);
   const double freedom = std::max(1.0, double(times.size()) - double(periodogram.unknowns()) - 4.0);
-  const double variance = std::max(0.0, total - tone.power) / freedom;
-  tone.deviation = curvature > 0.0 ? std::sqrt(2.0 * variance / curvature) : width;
-  return tone;
+  const double variance = std::max(0.0, total - sinusoid.power) / freedom;
+  sinusoid.deviation = curvature > 0.0 ? std::sqrt(2.0 * variance / curvature) : width;
+  return sinusoid;
 }
 
-std::string doubts(const Tone& tone, std::size_t samples) {
+std::string rejection_reason(const DampedSinusoid& sinusoid, std::size_t samples) {
   const double n = double(samples);
-  if (tone.explained < std::max(least_explained, std::min(0.9, noise_explained * std::log(n) / n)))
+  if (sinusoid.explained < std::max(least_explained, std::min(0.9, noise_explained * std::log(n) / n)))
     return "no oscillation stands out of its motion";
-  if (tone.is_at_edge) return "its strongest oscillation lies at the edge of what could be its frequency";
-  if (tone.periods < fewest_periods) return "it swings less than one and a half times";
-  if (tone.damping_ratio() > most_damping) return "it settles without swinging";
+  if (sinusoid.is_at_edge) return "its strongest oscillation lies at the edge of what could be its frequency";
+  if (sinusoid.periods < fewest_periods) return "it swings less than one and a half times";
+  if (sinusoid.damping_ratio() > most_damping) return "it settles without swinging";
   return "";
 }
 

@@ -1,0 +1,46 @@
+#include "gradient_check.hpp"
+
+#include <iostream>
+#include <ostream>
+
+#include "base/files.hpp"
+#include "commands.hpp"
+#include "estimation/gradient_check.hpp"
+#include "estimation/press_scene.hpp"
+#include "estimation/start_objective.hpp"
+
+namespace pliant::apps {
+
+namespace {
+
+void write_csv(const std::filesystem::path& path, const GradientCheck& check) {
+  write_file(path, [&](std::ostream& out) {
+    out.precision(17);
+    out << "parameter,step,difference,tangents,adjoint\n";
+    for (const CheckedDerivative& d : check.derivatives)
+      for (std::size_t k = 0; k < d.steps.size(); ++k)
+        out << d.name << "," << d.steps[k] << "," << d.differences[k] << "," << d.by_tangents << "," << d.by_adjoint
+            << "\n";
+  });
+}
+
+}  // namespace
+
+int run_gradient_check(std::vector<RecordedCapture> recordings, const FitOptions& options,
+                       const std::filesystem::path& out) {
+  ObserveOptions observe_options;
+  observe_options.max_points_per_frame = options.points_per_frame;
+  for (RecordedCapture& recording : recordings) {
+    if (is_of_static_tests(recording.capture)) continue;
+    recording.observed =
+        observe(recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
+    stop_if_interrupted();
+  }
+  const StartObjective start = start_objective(std::move(recordings), options);
+  const GradientCheck check = check_gradient(*start.cost, start.p);
+  std::cout << describe(check);
+  write_csv(out / "gradient.csv", check);
+  return check.succeeded && check.agrees() ? Fine : NotConverged;
+}
+
+}  // namespace pliant::apps

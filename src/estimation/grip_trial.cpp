@@ -1,0 +1,185 @@
+#include "estimation/grip_trial.hpp"
+
+#include <algorithm>
+
+#include "base/dense.hpp"
+#include "estimation/law_derivatives.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr int most_parts = 64;  // of the displacement, where the body does not follow it at once
+
+std::vector<int> held_by_all(const PressScene& scene, const ObservedGrip& test) {
+  std::vector<int> held = scene.held;
+  held.insert(held.end(), test.nodes.begin(), test.nodes.end());
+  std::ranges::sort(held);
+  held.erase(std::ranges::unique(held).begin(), held.end());
+  return held;
+}
+
+}  // namespace
+
+GrippedBody::GrippedBody(const PressScene& scene, const ObservedGrip& test, std::shared_ptr<const MaterialLaw> law)
+    : body_(scene.body),
+      test_(test),
+      equilibrium_(scene.body, law, held_by_all(scene, test), {}, EquilibriumOptions{.tolerance = 1e-9}),
+      forces_(LawElasticity::make(scene.body, std::move(law))),
+      markers_(*scene.body, test.rest),
+      dead_load_(scene.dead_load()),
+      direction_(Points::Zero(scene.body->node_count(), 3)) {
+  equilibrium_.set_dead_load(dead_load_);
+  for (const int n : test_.nodes) direction_.row(n) = test_.direction.transpose();
+}
+
+void GrippedBody::set_law(const std::shared_ptr<const MaterialLaw>& law) {
+  equilibrium_.set_law(law);
+  forces_->set_law(law);
+}
+
+bool GrippedBody::lead(double part) {
+  for (const int n : test_.nodes) placement_.nodes.row(n) = body_->nodes.row(n) + part * test_.displacement.transpose();
+  return equilibrium_.solve(placement_).converged;
+}
+
+bool GrippedBody::solve() {
+  if (placement_.nodes.size() > 0 && lead(1.0)) return true;
+  for (int parts = 1; parts <= most_parts; parts *= 4) {
+    placement_ = equilibrium_.rest();
+    bool follows = true;
+    for (int k = 1; k <= parts && follows; ++k) follows = lead(double(k) / parts);
+    if (follows) return true;
+  }
+  placement_ = {};
+  return false;
+}
+
+Points GrippedBody::internal_forces() const {
+  Points forces = Points::Zero(body_->node_count(), 3);
+  (void)forces_->evaluate(placement_.nodes, false);
+  forces_->add_gradient(forces);
+  return forces;
+}
+
+double GrippedBody::force() const { return (internal_forces() - dead_load_).cwiseProduct(direction_).sum(); }
+
+bool GrippedBody::prepare_derivatives() {
+  if (!equilibrium_.prepare_derivatives(placement_)) return false;
+  (void)forces_->evaluate(placement_.nodes, true);
+  BlockMatrix stiffness(body_->pattern);
+  stiffness.set_zero();
+  forces_->add_stiffness(LawElasticity::Stiffness::Exact, 1.0, stiffness);
+  VectorX product;
+  stiffness.multiply(flat(direction_), product);
+  force_by_nodes_ = Eigen::Map<const Points>(product.data(), body_->node_count(), 3);
+  return true;
+}
+
+GripTrial::GripTrial(std::shared_ptr<const PressScene> scene, int grip, std::shared_ptr<PressedMaterial> material,
+                     const VectorX& reference, int number)
+    : scene_(std::move(scene)),
+      grip_(grip),
+      number_(number),
+      material_(std::move(material)),
+      body_(*scene_, test(), material_->law(reference)) {}
+
+const ObservedGrip& GripTrial::test() const { return scene_->tests->grips[std::size_t(grip_)]; }
+
+bool GripTrial::compare(const VectorX& theta, CostEvaluation& result, Points& off, double& pull) {
+  const ObservedGrip& seen = test();
+  body_.set_law(material_->law(theta));
+  result.steps = 1;
+  if (!body_.solve()) return result.failure = seen.name + ": " + body_.failure(), false;
+  FrameFit fit;
+  fit.recording = number_;
+  fit.frame = grip_;
+  off = body_.markers();
+  for (Eigen::Index m = 0; m < off.rows(); ++m)
+    off.row(m) = (seen.seen * (off.row(m).transpose() - seen.loaded[std::size_t(m)])).transpose();
+  fit.tracks = int(off.rows());
+  fit.track_sum_squares = off.squaredNorm();
+  fit.sum_noise_squares = fit.tracks * seen.markers_std * seen.markers_std;
+  off /= seen.markers_std;
+  pull = seen.has_force ? (body_.force() - seen.force) / seen.force_std : 0.0;
+  fit.independent = seen.seen.trace() * fit.tracks + (seen.has_force ? 1.0 : 0.0);
+  fit.cost = result.cost = 0.5 * off.squaredNorm() + 0.5 * pull * pull;
+  result.frames.push_back(std::move(fit));
+  result.succeeded = std::isfinite(result.cost);
+  if (!result.succeeded) result.failure = seen.name + ": the cost is not finite";
+  return result.succeeded;
+}
+
+CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
+  CostEvaluation result;
+  Points off;
+  double pull = 0.0;
+  if (!compare(theta, result, off, pull) || directions.cols() == 0) return result;
+  const ObservedGrip& seen = test();
+  if (!body_.prepare_derivatives()) {
+    result.succeeded = false;
+    return result.failure = seen.name + ": the equilibrium is not stable", result;
+  }
+  const std::vector<ParameterHandle> blocks = material_->layout().all();
+  std::vector<int> place(std::size_t(theta.size()), -1);
+  std::vector<Eigen::Index> rows_of_theta;
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    place[std::size_t(blocks[k].first)] = int(k);
+    rows_of_theta.push_back(blocks[k].first);
+  }
+  std::vector<Points> changes(blocks.size(), Points::Zero(scene_->body->node_count(), 3));  // of dW/dx
+  for_law_derivatives(body_.elasticity(), *material_, theta,
+                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
+                        Points& change = changes[std::size_t(place[std::size_t(at.first)])];
+                        for (std::size_t a = 0; a < nodes.size(); ++a)
+                          change.row(nodes[a]) += share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
+                      });
+  MatrixX by_parameters(off.size() + 1, Eigen::Index(blocks.size()));
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    const Points moved = body_.response(-changes[k]);
+    Points there = body_.embedding().positions(moved);
+    there = (there * seen.seen / seen.markers_std).eval();
+    by_parameters.col(Eigen::Index(k)).head(off.size()) = flat(there);
+    by_parameters(off.size(), Eigen::Index(k)) =
+        seen.has_force
+            ? (body_.direction().cwiseProduct(changes[k]).sum() + body_.force_by_nodes().cwiseProduct(moved).sum()) /
+                  seen.force_std
+            : 0.0;
+  }
+  VectorX residuals(off.size() + 1);
+  residuals << flat(off), pull;
+  const MatrixX J = by_parameters * directions(rows_of_theta, Eigen::all);
+  FrameFit& fit = result.frames.front();
+  fit.gradient = J.transpose() * residuals;
+  fit.gauss_newton = J.transpose() * J;
+  return result;
+}
+
+CostEvaluation GripTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
+  CostEvaluation result;
+  Points off;
+  double pull = 0.0;
+  theta_bar = VectorX::Zero(theta.size());
+  if (!compare(theta, result, off, pull)) return result;
+  const ObservedGrip& seen = test();
+  if (!body_.prepare_derivatives()) {
+    result.succeeded = false;
+    return result.failure = seen.name + ": the equilibrium is not stable", result;
+  }
+  // The cotangents of the markers and of the force, back through the equilibrium: its matrix is symmetric.
+  const double of_force = seen.has_force ? pull / seen.force_std : 0.0;
+  Points bar = of_force * body_.force_by_nodes();
+  for (Eigen::Index m = 0; m < off.rows(); ++m)
+    body_.embedding().add_transpose(int(m), off.row(m).transpose() / seen.markers_std, bar);
+  const Points on_forces = of_force * body_.direction() - body_.response(bar);
+  for_law_derivatives(body_.elasticity(), *material_, theta,
+                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
+                        double sum = 0.0;
+                        for (std::size_t a = 0; a < nodes.size(); ++a)
+                          sum += on_forces.row(nodes[a]).dot(by.template segment<3>(3 * Eigen::Index(a)));
+                        theta_bar[at] += share * sum;
+                      });
+  return result;
+}
+
+}  // namespace pliant

@@ -1,0 +1,69 @@
+#pragma once
+
+#include "estimation/press_trial.hpp"
+#include "estimation/static_tests.hpp"
+
+namespace pliant {
+
+/// A body between grips: some nodes are held, others are moved.
+class GrippedBody {
+ public:
+  GrippedBody(const PressScene& scene, const ObservedGrip& test, std::shared_ptr<const MaterialLaw> law);
+
+  void set_law(const std::shared_ptr<const MaterialLaw>& law);
+  /// To equilibrium, from where it was last or else from rest by steps of the displacement. False: `failure` says why.
+  bool solve();
+  const std::string& failure() const { return equilibrium_.failure(); }
+  /// Force of the grip on the object along the test's direction [N], at the last equilibrium.
+  double force() const;
+  /// Simulated places of the test's markers [m], one row each.
+  Points markers() const { return markers_.positions(placement_.nodes); }
+  const Embedding& embedding() const { return markers_; }
+
+  /// Ready for the calls below. False where the equilibrium is not stable.
+  [[nodiscard]] bool prepare_derivatives();
+  /// Change of the nodes for a change of the forces on them: see `Equilibrium::response`.
+  const Points& response(const Points& forces) { return equilibrium_.response(forces); }
+  /// Change of the measured force for a change of the nodes that are free [N/m], one row a node.
+  const Points& force_by_nodes() const { return force_by_nodes_; }
+  /// The measured force's direction at the nodes that are moved, zero elsewhere.
+  const Points& direction() const { return direction_; }
+  const LawElasticity& elasticity() const { return *forces_; }
+
+ private:
+  bool lead(double part);
+  Points internal_forces() const;
+
+  std::shared_ptr<const Body> body_;
+  const ObservedGrip test_;
+  Equilibrium equilibrium_;
+  std::unique_ptr<LawElasticity> forces_;  // of the nodes, at the last equilibrium
+  Embedding markers_;
+  Points dead_load_, direction_, force_by_nodes_;
+  Placement placement_;
+};
+
+/// Measurement between grips: half the squares of the grip's simulated less measured force, and of the markers' places
+/// in the directions in which they were measured, over their standard deviations. Derivatives are those of the
+/// equilibrium: a back-substitution a parameter, or one for all by the adjoint.
+class GripTrial : public Trial {
+ public:
+  /// @param number  what its frame calls it (`FrameFit::recording`)
+  GripTrial(std::shared_ptr<const PressScene> scene, int grip, std::shared_ptr<PressedMaterial> material,
+            const VectorX& reference, int number = 0);
+
+  [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
+  [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+
+ private:
+  const ObservedGrip& test() const;
+  /// The equilibrium and its cost. `off` are the markers' errors over their standard deviation, `pull` the force's.
+  bool compare(const VectorX& theta, CostEvaluation& result, Points& off, double& pull);
+
+  std::shared_ptr<const PressScene> scene_;
+  int grip_, number_;
+  std::shared_ptr<PressedMaterial> material_;
+  GrippedBody body_;
+};
+
+}  // namespace pliant

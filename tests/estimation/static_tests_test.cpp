@@ -1,0 +1,145 @@
+#include "estimation/static_tests.hpp"
+
+#include <gtest/gtest.h>
+
+#include "estimation/curve_fit.hpp"
+#include "estimation/gradient_check.hpp"
+#include "estimation/press_fit.hpp"
+#include "estimation/start_objective.hpp"
+#include "support/curve_capture.hpp"
+#include "support/tolerance.hpp"
+#include "temporary_folder.hpp"
+
+namespace pliant {
+namespace {
+
+using test::CurveCapture;
+using test::CurveKinds;
+using test::tolerance;
+
+constexpr double modulus = 8000.0, exponent = -5.0, ratio = 0.25;
+
+/// Ogden's law of one term, everywhere.
+struct Truth {
+  Truth() {
+    theta = law_parameters(layout, modulus).reference();
+    theta[layout.exponent(0)] = exponent;
+    theta[layout.poissons_ratio()] = ratio;
+  }
+  std::shared_ptr<const MaterialLaw> law() const { return press_law(*block.body, layout, theta); }
+  std::shared_ptr<const MaterialLaw> element_law() const { return press_law(*unit_element(), layout, theta); }
+  test::PressedBlock block;
+  LawLayout layout{{1, 1}};
+  VectorX theta;
+};
+
+Capture written(const test::TemporaryFolder& folder, double noise, const CurveKinds& kinds) {
+  const Truth truth;
+  const CurveCapture made(folder.path(), truth.law(), truth.element_law(), noise, kinds);
+  return read_capture(folder.path());
+}
+
+class OfEachKind : public ::testing::TestWithParam<CurveKinds> {};
+
+TEST_P(OfEachKind, DerivativesAgreeWithDifferences) {
+  const test::TemporaryFolder folder;
+  std::vector<RecordedCapture> recordings;
+  recordings.push_back({written(folder, 0.02, GetParam()), {}});
+  FitOptions options;
+  const StartObjective start = start_objective(std::move(recordings), options);
+  ASSERT_EQ(start.p.size(), 3);
+  const GradientCheck check = check_gradient(*start.cost, start.p);
+  ASSERT_TRUE(check.succeeded) << check.failure;
+  EXPECT_TRUE(check.agrees()) << describe(check);
+  for (const CheckedDerivative& d : check.derivatives) {
+    EXPECT_EQ(d.verdict, CheckedDerivative::Verdict::Agree) << describe(check);
+    EXPECT_GT(std::abs(d.by_tangents), 1e-3 * d.scale) << d.name;
+    EXPECT_GT(d.scale, 0.0) << d.name;
+  }
+}
+
+TEST_P(OfEachKind, KnownTruthIsFoundWithinWhatIsStated) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.01, GetParam());
+  FitOptions options;
+  options.law_terms = 1, options.law_zones = 1, options.control_points = 1;
+  const FitOutcome found = fit_presses(capture, options);
+  ASSERT_TRUE(found.law) << found.reason;
+  ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
+  EXPECT_TRUE(found.converged) << found.reason;
+  const LawLayout& layout = found.law->layout;
+  EXPECT_EQ(layout.form().terms, 1);
+  const double std = found.std[found.parameters.coordinate(layout.modulus(0))];
+  EXPECT_GT(std, 1e-4);
+  EXPECT_LT(std, 0.1);
+  EXPECT_NEAR(std::log(found.theta[layout.modulus(0)] / modulus), 0.0, tolerance(3.0) * std);
+  const double exponent_std = 4.0 * found.std[found.parameters.coordinate(layout.exponent(0))];
+  EXPECT_NEAR(found.theta[layout.exponent(0)], exponent, tolerance(3.0) * exponent_std);
+  for (const CurvePrediction& curve : predict_curves(*found.law->scene, found.law->law)) {
+    EXPECT_EQ(curve.failure, "") << curve.name;
+    EXPECT_LT(curve.relative_rms(), tolerance(0.05)) << curve_sentence(curve);
+  }
+}
+
+std::string name_of(const ::testing::TestParamInfo<CurveKinds>& kinds) {
+  return !kinds.param.grips ? "Indentations" : !kinds.param.curves ? "Grips" : "All";
+}
+
+INSTANTIATE_TEST_SUITE_P(Tests, OfEachKind,
+                         ::testing::Values(CurveKinds{.grips = false, .curves = false},
+                                           CurveKinds{.indentations = false, .curves = false}, CurveKinds{}),
+                         name_of);
+
+TEST(StaticTests, CurvesAloneNeedNoShape) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.005, {.indentations = false, .grips = false, .has_shape = false});
+  EXPECT_TRUE(is_of_material_curves(capture));
+  const FitOutcome found = fit_presses(capture, {});
+  ASSERT_TRUE(found.law) << found.reason;
+  ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
+  EXPECT_NEAR(found.law->law->small_strain(0).youngs_modulus / modulus, 1.0, tolerance(0.03));
+  EXPECT_NEAR(found.law->law->small_strain(0).poissons_ratio, ratio, tolerance(0.03));
+  const auto predicted = predict_curves(*found.law->scene, found.law->law);
+  ASSERT_EQ(predicted.size(), 3u);
+  EXPECT_EQ(predicted[2].role, "test");
+  EXPECT_EQ(predicted[2].abscissa, "shear");
+  EXPECT_LT(predicted[2].relative_rms(), tolerance(0.05));
+}
+
+TEST(StaticTests, AGivenPoissonsRatioStays) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.01, {.grips = false, .curves = false});
+  FitOptions options;
+  options.law_terms = 1, options.law_zones = 1, options.control_points = 1;
+  options.parameters["poissons_ratio"] = {VectorX::Constant(1, ratio), false, {}};
+  const FitOutcome found = fit_presses(capture, options);
+  ASSERT_TRUE(found.law) << found.reason;
+  ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
+  EXPECT_EQ(found.theta[found.law->layout.poissons_ratio()], ratio);
+  EXPECT_EQ(found.parameters.dimension(), 2);
+}
+
+TEST(StaticTests, GuessesComeNearWhereTheFormulaHolds) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.0, {});
+  const Truth truth;
+  const StaticTests tests = observe_static_tests(capture, *truth.block.body);
+  EXPECT_TRUE(tests.any_to_fit());
+  const std::vector<double> moduli = guessed_moduli(tests, *truth.block.body, ratio);
+  // Two indentations of five depths each, one grip, ten stretches; those of tests are not asked.
+  EXPECT_EQ(moduli.size(), 2u * 5u + 1u + 10u);
+  for (const double guess : moduli) {
+    EXPECT_GT(guess, 0.1 * modulus);
+    EXPECT_LT(guess, 10.0 * modulus);
+  }
+}
+
+TEST(StaticTests, ACaptureWithNothingToFitIsRefused) {
+  const test::TemporaryFolder folder;
+  Capture capture = written(folder, 0.01, {.grips = false, .curves = false});
+  for (Indentation& test : capture.indentations) test.role = "test";
+  EXPECT_THROW((void)fit_presses(capture, {}), InputError);
+}
+
+}  // namespace
+}  // namespace pliant
