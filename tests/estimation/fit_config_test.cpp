@@ -7,6 +7,19 @@
 namespace pliant {
 namespace {
 
+TEST(FitConfig, FormerWordsAreRead) {
+  FitOptions o;
+  set_fit_option(o, "poisson_ratio=0.2");
+  set_fit_option(o, "poisson_ratio@foam.estimate=false");
+  ASSERT_TRUE(o.parameters.contains("poissons_ratio"));
+  EXPECT_EQ((*o.parameters["poissons_ratio"].start)[0], 0.2);
+  EXPECT_EQ(o.parameters["poissons_ratio@foam"].estimated, false);
+  set_fit_option(o, "load_free=in_turns");
+  EXPECT_NE(to_toml(o).find("load_free = \"staggered\""), std::string::npos);
+  set_fit_option(o, "load_free=together");
+  EXPECT_NE(to_toml(o).find("load_free = \"monolithic\""), std::string::npos);
+}
+
 using ::testing::HasSubstr;
 
 FitOptions changed() {
