@@ -189,7 +189,7 @@ TEST(Convergence, IsATableWithNamesAndUnits) {
 TEST(Evaluation, HasTheNamesOfTheFormat) {
   const TemporaryFolder folder;
   write_evaluation(folder / "e.json",
-                   {{0.002, 0.01, std::nullopt, 10}, {{"push 3", "test", 1e-3, 2e-3, 0.02, 0.05}}, {}});
+                   {{0.002, 0.01, std::nullopt, 10}, {{"push 3", "test", 1e-3, 2e-3, 0.02, 0.05}}, {}, {}});
   const auto json = nlohmann::json::parse(read_file(folder / "e.json"));
   EXPECT_EQ(json["format"], "evaluation/1");
   EXPECT_EQ(json["error"]["surface_rms"], 0.002);
@@ -204,7 +204,7 @@ TEST(Evaluation, HasTheNamesOfTheFormat) {
 
 TEST(Evaluation, TellsHowFarLoadsAreOff) {
   const TemporaryFolder folder;
-  write_evaluation(folder / "e.json", {{}, {}, {test::seen_load(), test::failed_load()}});
+  write_evaluation(folder / "e.json", {{}, {}, {test::seen_load(), test::failed_load()}, {}});
   const auto json = nlohmann::json::parse(read_file(folder / "e.json"));
   EXPECT_EQ(json["loads"][0], nlohmann::json({{"name", "load 1"},
                                               {"role", "test"},
