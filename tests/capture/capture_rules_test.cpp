@@ -443,7 +443,8 @@ TEST(CaptureRules, CheckRelease) {
   const std::string good = "release_of = { mass = 0.1, at = [0, 0.1, 0] }";
   EXPECT_EQ(said("released = true\n" + good), "");
   EXPECT_THAT(said(good), HasSubstr("`release_of` without `released`"));
-  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0, at = [0, 0.1, 0] }"), HasSubstr("an attached point mass of 0 kg"));
+  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0, at = [0, 0.1, 0] }"),
+              HasSubstr("an attached point mass of 0 kg"));
   EXPECT_THAT(said("released = true\nrelease_of = { mass = 100, at = [0, 0.1, 0] }"),
               HasSubstr("masses are in kilograms"));
   EXPECT_THAT(said("released = true\nrelease_of = { mass = 0.1, at = [0, 0.5, 0] }"),
