@@ -24,7 +24,7 @@ StartObjective of_static_tests(const Capture& capture, const FitOptions& options
   const int controls = body->modulus.controls;
   const LawLayout layout({controls, choices.material == PressMaterial::Linear ? 0 : 1},
                          controls > 1 ? modulus_names(capture, controls) : std::vector<std::string>{});
-  const ParameterSet parameters = law_parameters(layout, 2.0 * punch_modulus(*scene, 0.3));
+  const ParameterSet parameters = law_parameters(layout, (fitted.empty() ? 1.0 : 2.0) * punch_modulus(*scene, 0.3));
   const double noise = choices.noise > 0.0 ? choices.noise : scene->noise;
   const auto objective =
       std::make_shared<PressObjective>(scene, fitted, layout, parameters, PressTrialOptions{noise, outlier_scale});
