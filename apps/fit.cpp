@@ -15,6 +15,7 @@
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
+#include "estimation/press_scene.hpp"
 #include "gradient_check.hpp"
 #include "output/fit_output.hpp"
 #include "output/press_output.hpp"
@@ -78,16 +79,31 @@ std::string with_prefix(double value, const char* unit) {
   return text;
 }
 
+/// Poisson's ratio and dampings, where the event's parameters have them.
+std::string describe_others(const FitEvent& event) {
+  const auto value = [&](const char* name) { return event.theta[event.layout->at(name)]; };
+  const auto has = [&](const char* name) { return event.layout && event.layout->contains(name); };
+  std::string text;
+  if (has("poissons_ratio")) text += "  nu " + with_prefix(value("poissons_ratio"), "1");
+  if (has("mass_damping") && has("stiffness_damping"))
+    text +=
+        "  damping " + with_prefix(value("mass_damping"), "1/s") + ", " + with_prefix(value("stiffness_damping"), "s");
+  return text;
+}
+
 std::string describe(const FitEvent& event, double seconds) {
-  static const MotionLayout blocks;  // every motion has these blocks in the same places
+  const double rms = event.surface_rms > 0.0 ? event.surface_rms : event.marker_rms;
   char head[160];
-  std::snprintf(head, sizeof head, "%-15s start %d  iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
-                event.start + 1, event.iteration, event.cost, 1e3 * event.surface_rms);
-  std::string text = head;
-  text += "  E " + with_prefix(event.theta[blocks.youngs_moduli.front()], "Pa");
-  text += "  nu " + with_prefix(event.theta[blocks.poissons_ratio], "1");
-  text += "  damping " + with_prefix(event.theta[blocks.mass_damping], "1/s") + ", " +
-          with_prefix(event.theta[blocks.stiffness_damping], "s");
+  if (event.kind == StageKind::Sample)
+    std::snprintf(head, sizeof head, "%-18s %2d iterations  rms %6.2f mm", event.stage.c_str(), event.iteration,
+                  1e3 * rms);
+  else if (event.kind == StageKind::Law)
+    std::snprintf(head, sizeof head, "%-18s iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
+                  event.iteration, event.cost, 1e3 * rms);
+  else
+    std::snprintf(head, sizeof head, "%-15s start %d  iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
+                  event.start + 1, event.iteration, event.cost, 1e3 * rms);
+  std::string text = head + ("  E " + with_prefix(event.youngs_modulus, "Pa")) + describe_others(event);
   if (event.fraction_done > 0.02) {
     char left[40];
     std::snprintf(left, sizeof left, "  about %.0f s left",
@@ -107,65 +123,71 @@ FitOptions read_options(const Arguments& arguments) {
   return options;
 }
 
-void print_result(const Result& result, const FitOutcome& outcome, const fs::path& out, double seconds) {
-  std::cout << result.capture.name << "\n";
-  for (const ParameterResult& p : result.parameters) {
-    if (!p.estimated) continue;
-    if (const auto* value = std::get_if<double>(&p.value)) {
-      std::optional<double> std;
-      if (p.std) std = std::get<double>(*p.std);
-      std::cout << "  " << spoken_name(p.name) << ": " << value_with_uncertainty(*value, std, p.unit);
-      if (p.extrapolated) std::cout << "; " << discretisation_words(p);
-      std::cout << "\n";
-    } else if (const auto* vector = std::get_if<Vector3>(&p.value)) {
-      std::cout << "  " << spoken_name(p.name) << ": " << vector->transpose() << " " << p.unit << "\n";
-    } else if (const auto* plane = std::get_if<PlaneValue>(&p.value)) {
-      std::cout << "  " << spoken_name(p.name) << ": through " << plane->point.transpose() << " m, normal "
-                << plane->normal.transpose() << "\n";
-    }
-  }
-  char line[200];
-  std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points; %s after %.0f s\n",
-                1e3 * result.error.surface_rms.value_or(0.0), result.error.points, outcome.reason.c_str(), seconds);
-  std::cout << line;
-  const auto say_error = [](const RecordingResult& r, const char* what) {
-    char text[200];
-    std::snprintf(text, sizeof text, "  %s%s: ", what, r.name.c_str());
-    std::cout << text;
-    if (r.error.surface_rms) std::cout << 1e3 * *r.error.surface_rms << " mm rms of the surface ";
-    if (r.error.marker_rms) std::cout << 1e3 * *r.error.marker_rms << " mm rms of the markers ";
+void print_parameter(const ParameterResult& p) {
+  if (const auto* value = std::get_if<double>(&p.value)) {
+    std::optional<double> std;
+    if (p.std) std = std::get<double>(*p.std);
+    std::cout << "  " << spoken_name(p.name) << ": " << value_with_uncertainty(*value, std, p.unit);
+    if (p.extrapolated) std::cout << "; " << discretisation_words(p);
     std::cout << "\n";
-  };
-  for (const RecordingResult& r : result.recordings) say_error(r, "");
-  if (result.held_out) say_error(*result.held_out, "held out, ");
-  for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
-  std::cout << "Look at " << (out / "report.html").string() << "; simulate with: pliant simulate "
-            << (out / "model.toml").string() << " --out DIR\n";
+  } else if (const auto* vector = std::get_if<Vector3>(&p.value)) {
+    std::cout << "  " << spoken_name(p.name) << ": " << vector->transpose() << " " << p.unit << "\n";
+  } else if (const auto* plane = std::get_if<PlaneValue>(&p.value)) {
+    std::cout << "  " << spoken_name(p.name) << ": through " << plane->point.transpose() << " m, normal "
+              << plane->normal.transpose() << "\n";
+  }
 }
 
-/// What the fit predicts of a recording that took no part in it.
-RecordingResult score_held_out(const RecordedCapture& held_out, const FitOutcome& outcome, const FitOptions& options,
-                               FitMonitor monitor) {
-  monitor.on_state = {};  // of another fit
-  const FitOutcome scored = score(held_out, outcome, options, monitor);
-  RecordingResult result{held_out.capture.name, held_out.capture.sha256, {}};
-  if (scored.evaluation.succeeded) result.error = surface_errors(scored.evaluation).error;
-  return result;
+void print_error(const RecordingResult& r, const char* what) {
+  std::cout << "  " << what << r.name << ": ";
+  if (r.error.surface_rms) std::cout << 1e3 * *r.error.surface_rms << " mm rms of the surface ";
+  if (r.error.marker_rms) std::cout << 1e3 * *r.error.marker_rms << " mm rms of the markers ";
+  std::cout << "\n";
+}
+
+void print_agreement(const Result& result, const FitOutcome& outcome, double seconds) {
+  if (outcome.law)
+    for (const StaticError& press : press_errors(*outcome.law->scene, outcome.law->predictions))
+      if (press.role == "test") std::cout << "  " << press_sentence(press) << "\n";
+  for (const CurvePrediction& curve : result.curves) std::cout << "  " << curve_sentence(curve) << "\n";
+  char line[200] = "  ";
+  if (outcome.law && result.error.marker_rms)
+    std::snprintf(line, sizeof line, "  markers %.2f mm rms over what was fitted; ", 1e3 * *result.error.marker_rms);
+  else if (!outcome.law)
+    std::snprintf(line, sizeof line, "  surface error %.2f mm rms over %lld points; ",
+                  1e3 * result.error.surface_rms.value_or(0.0), result.error.points);
+  std::cout << line;
+  std::snprintf(line, sizeof line, "%s after %.0f s\n", outcome.reason.c_str(), seconds);
+  std::cout << line;
+  for (const RecordingResult& r : result.recordings) print_error(r, "");
+  if (result.held_out) print_error(*result.held_out, "held out, ");
+}
+
+void print_result(const Result& result, const FitOutcome& outcome, const fs::path& out, double seconds) {
+  std::cout << result.capture.name << "\n";
+  for (const ParameterResult& p : result.parameters)
+    if (p.estimated) print_parameter(p);
+  print_agreement(result, outcome, seconds);
+  for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
+  const std::string model = (out / "model.toml").string();
+  std::cout << "Look at " << (out / "report.html").string();
+  if (is_file(model))
+    std::cout << (outcome.law ? "; press it with: pliant press " + model + " --contact X,Y,Z --force X,Y,Z --out DIR"
+                              : "; simulate with: pliant simulate " + model + " --out DIR");
+  std::cout << "\n";
 }
 
 /// Where the fit in the output folder begins: where an interrupted one was, or anew.
-template <class State>
-State begun(const Arguments& arguments, const FitOptions& options, const std::string& key,
-            State (*read)(const fs::path&, const std::string&), Log& log) {
+FitState begun(const Arguments& arguments, const FitOptions& options, const std::string& key, Log& log) {
   const fs::path out = arguments.out, state_file = out / "state.json";
-  State state;
+  FitState state;
   if (arguments.resume) {
     if (!is_file(state_file))
       throw InputError({{state_file},
                         "there is no interrupted fit to resume",
                         "the state that an interrupted fit leaves",
                         "leave out --resume"});
-    state = read(state_file, key);
+    state = read_fit_state(state_file, key);
     log.line("resuming the fit in " + out.string());
   } else {
     remove_file(state_file);
@@ -191,68 +213,6 @@ int ended(bool converged, bool interrupted, const std::string& words, const fs::
   return converged ? Fine : NotConverged;
 }
 
-std::string describe(const PressFitEvent& event) {
-  char text[160];
-  if (event.stage.starts_with("press"))
-    std::snprintf(text, sizeof text, "%-18s %2d iterations  rms %6.2f mm", event.stage.c_str(), event.iteration,
-                  1e3 * event.marker_rms);
-  else
-    std::snprintf(text, sizeof text, "%-18s iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
-                  event.iteration, event.cost, 1e3 * event.marker_rms);
-  return text + ("  E " + with_prefix(event.youngs_modulus, "Pa"));
-}
-
-void print_result(const Result& result, const PressFitOutcome& outcome, const fs::path& out, double seconds) {
-  std::cout << result.capture.name << "\n";
-  for (const ParameterResult& p : result.parameters) {
-    const auto* value = std::get_if<double>(&p.value);
-    if (!p.estimated || !value) continue;
-    std::optional<double> std;
-    if (p.std) std = std::get<double>(*p.std);
-    std::cout << "  " << spoken_name(p.name) << ": " << value_with_uncertainty(*value, std, p.unit) << "\n";
-  }
-  for (const StaticError& press : press_errors(*outcome.scene, outcome.predictions))
-    if (press.role == "test") std::cout << "  " << press_sentence(press) << "\n";
-  for (const CurvePrediction& curve : result.curves) std::cout << "  " << curve_sentence(curve) << "\n";
-  char line[120];
-  if (result.error.marker_rms)
-    std::snprintf(line, sizeof line, "  markers %.2f mm rms over what was fitted; ", 1e3 * *result.error.marker_rms);
-  std::cout << (result.error.marker_rms ? line : "  ");
-  std::snprintf(line, sizeof line, "%s after %.0f s\n", outcome.reason.c_str(), seconds);
-  std::cout << line;
-  for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
-  std::cout << "Look at " << (out / "report.html").string();
-  if (is_file(out / "model.toml"))
-    std::cout << "; press it with: pliant press " << (out / "model.toml").string()
-              << " --contact X,Y,Z --force X,Y,Z --out DIR";
-  std::cout << "\n";
-}
-
-int run_presses(const Arguments& arguments, const FitOptions& options, const Capture& capture, const std::string& words,
-                Log& log) {
-  const auto begin = Clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  const fs::path out = arguments.out, state_file = out / "state.json";
-  const std::string key = capture.sha256 + "\n" + to_toml(options);
-  PressFitState state = begun(arguments, options, key, read_press_state, log);
-  PressFitMonitor monitor;
-  monitor.on_event = [&](const PressFitEvent& event) { log.live(describe(event)); };
-  monitor.on_state = [&](const PressFitState& s) { write_press_state(state_file, s, key); };
-  monitor.interrupted = [] { return is_interrupted(); };
-  PressFitOutcome outcome = fit_presses(capture, press_options(options), monitor, std::move(state));
-  log.clear_live();
-  for (std::string& note : unused_choices(options, false, true)) outcome.notes.push_back(std::move(note));
-  if (outcome.interrupted && !is_file(state_file)) write_press_state(state_file, {}, key);
-  if (!outcome.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
-  const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
-  const Result result = make_result(capture, outcome, facts);
-  write_press_output(out, capture, outcome, result, facts, show_progress);
-  log.line(outcome.reason);
-  write_file(out / "log.txt", log.text());
-  print_result(result, outcome, out, seconds());
-  return ended(outcome.converged, outcome.interrupted, words, out);
-}
-
 int run(const Arguments& arguments) {
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
@@ -275,25 +235,10 @@ int run(const Arguments& arguments) {
   Log log;
   log.line("pliant " PLIANT_VERSION " fit " + words);
   if (arguments.check_gradient) return run_gradient_check(std::move(recordings), options, out);
-  if (is_of_static_tests(recordings.front().capture)) {
-    const auto refuse = [&](const char* what, const char* advice) {
-      throw InputError({{recordings.front().capture.file}, what, "a fit of one capture's presses", advice});
-    };
-    if (recordings.size() > 1) refuse("presses beside other recordings", "put all presses into one capture");
-    if (held_out) refuse("presses and --hold-out", "give a press role = \"test\"");
-    if (options.element == ElementKind::Hexahedron)
-      refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
-             "leave out element, or choose tetrahedra or quadratic_tetrahedra");
-    if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
-    for (const auto& [name, choice] : options.parameters)
-      if (name != "poissons_ratio" || !choice.start || choice.estimated != false)
-        refuse("choices about single parameters, of which fits of static tests know a given Poisson's ratio alone",
-               "leave them out, or give poissons_ratio and poissons_ratio.estimate=false");
-    return run_presses(arguments, options, recordings.front().capture, words, log);
-  }
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
   const auto read = [&](RecordedCapture& recording) {
+    if (is_of_static_tests(recording.capture)) return;
     recording.observed =
         observe(recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
     stop_if_interrupted();
@@ -303,24 +248,18 @@ int run(const Arguments& arguments) {
 
   const std::string key = fingerprint + to_toml(options);
   const fs::path state_file = out / "state.json";
-  FitState state = begun(arguments, options, key, read_fit_state, log);
+  FitState state = begun(arguments, options, key, log);
 
   FitMonitor monitor;
   monitor.on_event = [&](const FitEvent& event) { log.live(describe(event, seconds())); };
   monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
   monitor.interrupted = [] { return is_interrupted(); };
-  FitOutcome outcome = fit(recordings, options, monitor, std::move(state));
+  const FitOutcome outcome = fit(recordings, options, monitor, std::move(state), std::move(held_out));
   log.clear_live();
-  const bool has_presses =
-      std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
-  for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
   if (outcome.interrupted && !is_file(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
   if (!outcome.evaluation.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
-  RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
-  Result result = make_result(recordings, outcome, facts);
-  if (held_out && !outcome.interrupted) result.held_out = score_held_out(*held_out, outcome, options, monitor);
-  result.time.wall_seconds = facts.wall_seconds = seconds();
-  log.clear_live();
+  const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
+  const Result result = make_result(recordings, outcome, facts);
   write_fit_output(out, recordings, outcome, result, facts, show_progress);
   log.line(outcome.reason);
   write_file(out / "log.txt", log.text());

@@ -44,7 +44,7 @@ int run(const Arguments& arguments) {
   ProbeOptions probe;
   probe.centre = vector_of(arguments.contact);
   probe.radius = arguments.radius;
-  probe.kind = arguments.probe == "disc"    ? ProbeKind::GluedDisc
+  probe.kind = arguments.probe == "disc"    ? ProbeKind::BondedDisc
                : arguments.probe == "punch" ? ProbeKind::Punch
                                             : ProbeKind::Ball;
   if (!arguments.axis.empty()) probe.axis = vector_of(arguments.axis).normalized();

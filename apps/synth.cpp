@@ -45,10 +45,7 @@ VectorX theta_of(const SyntheticScene& synthetic, const MotionLayout& blocks) {
   theta.segment<3>(blocks.gravity) = *scene.world.gravity;
   theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
   theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
-  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
-    theta.segment<3>(blocks.planes[i].point) = scene.planes[i].point;
-    theta.segment<3>(blocks.planes[i].normal) = scene.planes[i].normal;
-  }
+  set_planes(scene.planes, blocks, theta);
   return theta;
 }
 
@@ -60,6 +57,7 @@ SimulationOptions options_of(const SyntheticScene& synthetic, const MotionBlocks
   options.max_dt = 1.0 / (timing.frame_rate * synthetic.substeps);
   options.newmark_theta = synthetic.newmark_theta;
   options.contact = default_contact(body, synthetic.true_density() * body.volume(), scene.world.gravity->norm());
+  options.friction_speed = default_friction_speed(body, scene.world.gravity->norm());
   if (synthetic.contact_stiffness > 0.0) options.contact.stiffness = synthetic.contact_stiffness;
   if (synthetic.contact_smoothing > 0.0) options.contact.smoothing = synthetic.contact_smoothing;
   options.blocks = blocks;

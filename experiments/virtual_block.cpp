@@ -175,7 +175,7 @@ int main(int count, char** arguments) {
   std::vector<Points> truth(all.size());
   std::vector<Vector3> probe(all.size());
   parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
-    PressSession session(body, law, {ProbeKind::GluedDisc, all[i].centre, all[i].radius, {}}, options);
+    PressSession session(body, law, {ProbeKind::BondedDisc, all[i].centre, all[i].radius, {}}, options);
     if (!session.push(all[i].force).converged) {
       std::fprintf(stderr, "press %zu: %s\n", i + 1, session.failure().c_str());
       std::exit(1);

@@ -159,19 +159,19 @@ void MovingProbe(benchmark::State& state, Law&& make, Eigen::Vector3i cells, Pro
   state.counters["failed"] = failed;
   state.SetItemsProcessed(state.iterations());
 }
-BENCHMARK_CAPTURE(MovingProbe, small_sampled_disc, sampled, {7, 6, 7}, ProbeKind::GluedDisc)
+BENCHMARK_CAPTURE(MovingProbe, small_sampled_disc, sampled, {7, 6, 7}, ProbeKind::BondedDisc)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
-BENCHMARK_CAPTURE(MovingProbe, small_ogden_disc, foam, {7, 6, 7}, ProbeKind::GluedDisc)
+BENCHMARK_CAPTURE(MovingProbe, small_ogden_disc, foam, {7, 6, 7}, ProbeKind::BondedDisc)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 BENCHMARK_CAPTURE(MovingProbe, small_ogden_ball, foam, {7, 6, 7}, ProbeKind::Ball)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
-BENCHMARK_CAPTURE(MovingProbe, large_sampled_disc, sampled, {12, 10, 12}, ProbeKind::GluedDisc)
+BENCHMARK_CAPTURE(MovingProbe, large_sampled_disc, sampled, {12, 10, 12}, ProbeKind::BondedDisc)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
-BENCHMARK_CAPTURE(MovingProbe, large_ogden_disc, foam, {12, 10, 12}, ProbeKind::GluedDisc)
+BENCHMARK_CAPTURE(MovingProbe, large_ogden_disc, foam, {12, 10, 12}, ProbeKind::BondedDisc)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 

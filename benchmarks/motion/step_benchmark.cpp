@@ -96,8 +96,8 @@ Motion impact(const std::shared_ptr<const Body>& body, Integrator integrator) {
   std::vector<std::unique_ptr<ForceTerm>> terms;
   terms.push_back(make_elasticity(body, layout));
   terms.push_back(std::make_unique<Gravity>(*body, layout));
-  terms.push_back(std::make_unique<PlaneContact>(body, plane,
-                                                 default_contact(*body, theta[layout.density] * body->volume(), 9.81)));
+  terms.push_back(std::make_unique<RigidContact>(RigidContact::sliding(
+      *body, surface_samples(*body), plane, default_contact(*body, theta[layout.density] * body->volume(), 9.81))));
   return {body, std::move(terms), layout, theta, step_options(default_time_step(*body, 9.81), integrator),
           {},   {0.0, -1.5, 0.0}};
 }

@@ -215,12 +215,14 @@ Points Embedding::positions(const Points& nodes) const {
   return out;
 }
 
-std::vector<int> element_blocks(const Body& body) {
+std::vector<int> element_blocks(const Body& body) { return element_blocks(body, *body.pattern); }
+
+std::vector<int> element_blocks(const Body& body, const BlockPattern& pattern) {
   std::vector<int> blocks;
   blocks.reserve(body.connectivity.size() * std::size_t(body.nodes_per_element()));
   for (int e = 0; e < body.element_count(); ++e)
     for (const int a : body.element(e))
-      for (const int b : body.element(e)) blocks.push_back(body.pattern->find(a, b));
+      for (const int b : body.element(e)) blocks.push_back(pattern.find(a, b));
   return blocks;
 }
 

@@ -152,5 +152,7 @@ class Embedding {
 
 /// Where block (a, b) of an element's N x N blocks goes in the matrix: N x N numbers an element.
 std::vector<int> element_blocks(const Body& body);
+/// The same in a matrix of another pattern that has the body's blocks among others.
+std::vector<int> element_blocks(const Body& body, const BlockPattern& pattern);
 
 }  // namespace pliant

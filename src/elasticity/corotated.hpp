@@ -22,10 +22,15 @@ class Elasticity : public ForceTerm {
   virtual double energy(const Points& z) const = 0;
   /// Mean Cauchy stress of an element at the lag point [Pa].
   virtual Matrix3 cauchy_stress(int element) const = 0;
-  /// Of the lag point.
-  const Polar& rotation(int element) const { return polar_[std::size_t(element)]; }
+  /// Of an element at the lag point.
+  const Polar& rotation(int element) {
+    find_rotations();
+    return polar_[std::size_t(element)];
+  }
 
  protected:
+  /// Sets `polar_` about the lag point, where linearising did not.
+  virtual void find_rotations() {}
   std::vector<Polar> polar_;
 };
 

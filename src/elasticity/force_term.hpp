@@ -1,13 +1,24 @@
 #pragma once
 
+#include <optional>
+
 #include "solvers/block_matrix.hpp"
 
 namespace pliant {
 
+/// The step in which forces act, for those that depend on more than positions: friction on the way since the start,
+/// wind on velocities, led bodies on the time.
+struct StepContext {
+  const Points* start = nullptr;           ///< positions at the step's start [m]; null: at rest, there is no step
+  const Points* start_velocity = nullptr;  ///< velocities there [m/s]
+  double time = 0.0;                       ///< of the step's start [s]
+  double dt = 0.0;                         ///< length of the step [s]
+};
+
 /// A force of the scene, made affine about a lag point p for one linearly implicit step:
 ///   f(z | p) = f_p - K_p z.
-/// Each term knows its force, its matrix, and the two products that differentiation needs; nothing else in the program
-/// differentiates physics. Positions and forces are n x 3 [m], [N].
+/// Each term knows its force, its matrix, its potential where it has one, and the two products that differentiation
+/// needs. Positions and forces are n x 3 [m], [N]; they may have further rows below, where rigid bodies are unknown.
 class ForceTerm {
  public:
   virtual ~ForceTerm() = default;
@@ -24,6 +35,8 @@ class ForceTerm {
 
   /// Takes the term's own parameters out of a parameter vector, by the handles that it was made with.
   virtual void set_parameters(const VectorX& theta) = 0;
+  /// The step that the calls below belong to. What it points to stays alive and unchanged until the next one.
+  virtual void begin_step(const StepContext& step) { (void)step; }
   /// Fixes the lag point; the calls below refer to it.
   virtual void linearise(const Points& lag) = 0;
   /// force += f(z | p)
@@ -35,6 +48,18 @@ class ForceTerm {
   virtual void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
     (void)z, (void)scale, (void)matrix;
   }
+  /// matrix += scale times -df(x | x)/dx, the exact stiffness, at the lag point.
+  /// @param x  the lag point
+  virtual void add_tangent_stiffness(const Points& x, double scale, BlockMatrix& matrix) {
+    add_matrix(scale, matrix);
+    add_lag_matrix(x, scale, matrix);
+  }
+  /// Energy [J] whose negative gradient is f(x | x), at the lag point; nothing for forces that have none.
+  /// @param x  the lag point
+  virtual std::optional<double> potential(const Points& x) {
+    (void)x;
+    return std::nullopt;
+  }
   /// force += df for changes of p, z and theta
   virtual void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                                  Points& force) = 0;
@@ -42,12 +67,25 @@ class ForceTerm {
   virtual void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
                                  VectorX& theta_bar) = 0;
 
-  /// Makes ready for the two products below, about the lag point and z. Most terms do not ask where the object is free
-  /// of load.
+  /// Whether the force depends on the step's start other than through p and z; only then are the two products below
+  /// called.
+  virtual bool sees_start() const { return false; }
+  /// force += df for a change of the step's start, p, z and theta staying as they are.
+  virtual void add_start_tangent(const Points& z, const Points& d_start, const Points& d_start_velocity,
+                                 Points& force) {
+    (void)z, (void)d_start, (void)d_start_velocity, (void)force;
+  }
+  /// Adds the cotangents of the step's start for the cotangent `w` of f.
+  virtual void add_start_adjoint(const Points& z, const Points& w, Points& start_bar, Points& start_velocity_bar) {
+    (void)z, (void)w, (void)start_bar, (void)start_velocity_bar;
+  }
+
+  /// Makes ready for the two products below, about the lag point and z. Most terms do not depend on the
+  /// stress-free reference.
   virtual void linearise_reference(const Points& z) { (void)z; }
-  /// force += df for a change of where the nodes are free of load, p, z and theta staying as they are.
+  /// force += df for a change of the stress-free reference positions, p, z and theta staying as they are.
   virtual void add_reference_tangent(const Points& d_reference, Points& force) { (void)d_reference, (void)force; }
-  /// Adds the cotangent of where they are, for the cotangent `w` of f.
+  /// Adds the cotangent of the reference positions for the cotangent `w` of f.
   virtual void add_reference_adjoint(const Points& w, Points& reference_bar) { (void)w, (void)reference_bar; }
 };
 

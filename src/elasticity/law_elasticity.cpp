@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "base/parallel.hpp"
 #include "elasticity/tet_element.hpp"
@@ -65,6 +66,10 @@ class TetLawElasticity : public LawElasticity {
   void add_force(const Points& z, Points& force) override;
   void add_matrix(double scale, BlockMatrix& matrix) override { add_stiffness(Stiffness::Positive, scale, matrix); }
   void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
+  void add_tangent_stiffness(const Points&, double scale, BlockMatrix& matrix) override {
+    add_stiffness(Stiffness::Exact, scale, matrix);
+  }
+  std::optional<double> potential(const Points&) override { return energy_; }
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
@@ -80,6 +85,12 @@ class TetLawElasticity : public LawElasticity {
   void for_parameter_derivatives(const VisitDerivatives& visit) const override;
   Matrix3 cauchy_stress(int element) const override;
   MatrixX strains() const override;
+  bool set_reference_positions(const Points& reference) override;
+  double least_volume_ratio() const override { return least_volume_ratio_; }
+  void add_reference_matrix(double scale, BlockMatrix& matrix) override;
+
+ protected:
+  void find_rotations() override;
 
  private:
   static constexpr int points = N == 4 ? 1 : 4;
@@ -103,7 +114,20 @@ class TetLawElasticity : public LawElasticity {
     for (int a = 0; a < N; ++a) F.noalias() += x.row(nodes_of(e)[a]).transpose() * gradient.row(a);
     return F;
   }
-  void take_reference();
+  static constexpr int rule_degree = N == 4 ? 1 : 2;
+  Nodes of_element(int e, const Points& all) const {
+    Nodes own;
+    for (int a = 0; a < N; ++a) own.row(a) = all.row(nodes_of(e)[a]);
+    return own;
+  }
+  /// Volumes of all points where the nodes are free of load here.
+  std::vector<double> volumes(const Points& reference) const;
+  void take_reference(const Points& reference);
+  /// Change of a point's stress for G, that of its reference: dX = G of the reference as it is.
+  Matrix3 reference_change(const Point& point, const PointChange& change, const Matrix3& F_z, const Matrix3& G) const {
+    return G.trace() * change.stress - change.stress * G.transpose() -
+           matrix_of(change.by_lag * vec(point.F * G) + change.by_z * vec(F_z * G));
+  }
   /// Calls function(element, number of the point) for all points, in any order and at once.
   template <class Function>
   void for_all_points(Function&& function) const;
@@ -126,9 +150,12 @@ class TetLawElasticity : public LawElasticity {
   std::shared_ptr<const Body> body_;
   std::unique_ptr<MaterialField> field_;  // where the law follows from the parameters
   std::vector<Point> points_;
+  std::vector<double> given_volumes_;  // of the body as it was given
+  double least_volume_ratio_ = 1.0;
   std::vector<int> blocks_;  // N x N an element
   Points lag_, reference_z_;
-  bool is_possible_ = true;  // whether the law knows the deformation of the lag point
+  double energy_ = 0.0;  // at the last `evaluate`; infinite where the law knows no such deformation
+  bool has_rotations_ = false;
   mutable std::vector<Projection> projections_;
   mutable bool has_projections_ = false;
   std::vector<PointChange> changes_;
@@ -143,33 +170,53 @@ TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::sha
   const int count = body_->element_count();
   points_.resize(std::size_t(count) * points);
   polar_.resize(std::size_t(count));
-  for (int e = 0; e < count; ++e)
-    for (int a = 0; a < N; ++a)
-      for (int b = 0; b < N; ++b)
-        blocks_.push_back((pattern ? *pattern : *body_->pattern).find(nodes_of(e)[a], nodes_of(e)[b]));
-  take_reference();
+  blocks_ = element_blocks(*body_, pattern ? *pattern : *body_->pattern);
+  given_volumes_ = volumes(body_->nodes);
+  take_reference(body_->nodes);
 }
 
 template <int N>
-void TetLawElasticity<N>::take_reference() {
-  const auto rule = tet_quadrature(N == 4 ? 1 : 2);
+std::vector<double> TetLawElasticity<N>::volumes(const Points& reference) const {
+  const auto rule = tet_quadrature(rule_degree);
+  std::vector<double> all;
   for (int e = 0; e < body_->element_count(); ++e) {
-    Nodes X;
-    for (int a = 0; a < N; ++a) X.row(a) = body_->nodes.row(nodes_of(e)[a]);
+    const Nodes X = of_element(e, reference);
+    for (const TetQuadraturePoint& at : rule)
+      all.push_back(at.weight * Matrix3(X.transpose() * tet_shape_derivatives<N>(at.at)).determinant() / 6.0);
+  }
+  return all;
+}
+
+template <int N>
+void TetLawElasticity<N>::take_reference(const Points& reference) {
+  const auto rule = tet_quadrature(rule_degree);
+  const std::vector<double> all = volumes(reference);
+  for (int e = 0; e < body_->element_count(); ++e) {
+    const Nodes X = of_element(e, reference);
     for (int q = 0; q < points; ++q) {
-      Point& point = points_[std::size_t(e * points + q)];
-      const auto& at = rule[std::size_t(q)];
-      point.volume = at.weight * (X.transpose() * tet_shape_derivatives<N>(at.at)).determinant() / 6.0;
-      point.gradient = tet_gradients<N>(X, at.at);
+      const auto p = std::size_t(e * points + q);
+      points_[p].volume = all[p];
+      points_[p].gradient = tet_gradients<N>(X, rule[std::size_t(q)].at);
     }
   }
+  has_projections_ = has_changes_ = false;
 }
 
 template <int N>
 void TetLawElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
   body_ = std::move(body);
-  take_reference();
-  has_projections_ = has_changes_ = false;
+  take_reference(body_->nodes);
+}
+
+template <int N>
+bool TetLawElasticity<N>::set_reference_positions(const Points& reference) {
+  const std::vector<double> all = volumes(reference);
+  least_volume_ratio_ = std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; p < all.size(); ++p)
+    least_volume_ratio_ = std::min(least_volume_ratio_, all[p] / given_volumes_[p]);
+  if (!(least_volume_ratio_ > 0.0)) return false;
+  take_reference(reference);
+  return true;
 }
 
 template <int N>
@@ -208,7 +255,7 @@ double TetLawElasticity<N>::evaluate(const Points& x, bool with_tangent) {
   });
   double energy = 0.0;
   for (const Point& point : points_) energy += point.volume * point.stress.energy;
-  return std::isnan(energy) ? std::numeric_limits<double>::infinity() : energy;
+  return energy_ = std::isnan(energy) ? std::numeric_limits<double>::infinity() : energy;
 }
 
 template <int N>
@@ -315,9 +362,15 @@ double TetLawElasticity<N>::energy(const Points& z) const {
 
 template <int N>
 void TetLawElasticity<N>::linearise(const Points& lag) {
-  is_possible_ = std::isfinite(evaluate(lag, true));
+  evaluate(lag, true);
   lag_ = lag;
-  for (int e = 0; e < body_->element_count(); ++e) {  // rotations, for who asks
+  has_rotations_ = false;
+}
+
+template <int N>
+void TetLawElasticity<N>::find_rotations() {
+  if (std::exchange(has_rotations_, true)) return;
+  for (int e = 0; e < body_->element_count(); ++e) {
     Matrix3 F = Matrix3::Zero();
     double volume = 0.0;
     for (int q = 0; q < points; ++q) {
@@ -347,7 +400,7 @@ void TetLawElasticity<N>::add_product(const Points& d, double scale, Points& pro
 
 template <int N>
 void TetLawElasticity<N>::add_force(const Points& z, Points& force) {
-  if (!is_possible_) {
+  if (!std::isfinite(energy_)) {
     force.setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
   }
@@ -482,12 +535,30 @@ void TetLawElasticity<N>::add_reference_tangent(const Points& d_reference, Point
     for (int q = 0; q < points; ++q) {
       const std::size_t p = std::size_t(e * points + q);
       const Point& point = points_[p];
-      const Matrix3 G = deformation(e, point.gradient, d_reference);
-      const Matrix3 of_lag = point.F * G, of_z = deformation(e, point.gradient, reference_z_) * G;
-      const Matrix3 stress = G.trace() * all[p].stress - all[p].stress * G.transpose() -
-                             matrix_of(all[p].by_lag * vec(of_lag) + all[p].by_z * vec(of_z));
-      subtract(e, point, stress, force);
+      const Matrix3 F_z = deformation(e, point.gradient, reference_z_);
+      subtract(e, point, reference_change(point, all[p], F_z, deformation(e, point.gradient, d_reference)), force);
     }
+}
+
+/// The same for each coordinate of each node: G = e_i g_b^T.
+template <int N>
+void TetLawElasticity<N>::add_reference_matrix(double scale, BlockMatrix& matrix) {
+  const std::vector<PointChange>& all = changes(reference_z_, false);
+  for (int e = 0; e < body_->element_count(); ++e) {
+    const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e * points + q);
+      const Point& point = points_[p];
+      const Matrix3 F_z = deformation(e, point.gradient, reference_z_);
+      for (int b = 0; b < N; ++b)
+        for (int i = 0; i < 3; ++i) {
+          const Matrix3 G = Vector3::Unit(i) * point.gradient.row(b);
+          const Matrix3 stress = (scale * point.volume) * reference_change(point, all[p], F_z, G);
+          for (int a = 0; a < N; ++a)
+            Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).col(i) -= stress * point.gradient.row(a).transpose();
+        }
+    }
+  }
 }
 
 /// The transpose of the above.

@@ -55,6 +55,15 @@ class LawElasticity : public Elasticity {
   /// Mean over each element's points of S - I, F = R S, there; elements x 6.
   virtual MatrixX strains() const = 0;
 
+  /// From now on the nodes are free of load here, n x 3 [m]. False, and nothing changes, where an element would have no
+  /// positive volume at a quadrature point; `least_volume_ratio` is that of these positions all the same.
+  [[nodiscard]] virtual bool set_reference_positions(const Points& reference) = 0;
+  /// Smallest ratio of a quadrature point's volume to that in the body as it was given.
+  virtual double least_volume_ratio() const = 0;
+  /// matrix += scale times the derivative of the force by where the nodes are free of load, p, z and theta staying as
+  /// they are: what `add_reference_tangent` multiplies by. Not symmetric.
+  virtual void add_reference_matrix(double scale, BlockMatrix& matrix) = 0;
+
  protected:
   explicit LawElasticity(std::shared_ptr<const MaterialLaw> law) : law_(std::move(law)) {}
   std::shared_ptr<const MaterialLaw> law_;

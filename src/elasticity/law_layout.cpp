@@ -107,6 +107,18 @@ LawLayout LawLayout::of_motion(ParameterLayout& layout, const MaterialBlocks& bl
   return law;
 }
 
+LawLayout LawLayout::moved(const std::function<ParameterHandle(const ParameterHandle&)>& there) const {
+  LawLayout law = *this;
+  law.layout_ = {};
+  const auto move = [&](std::vector<ParameterHandle>& handles) {
+    for (ParameterHandle& at : handles)
+      if (at.exists()) at = there(at);
+  };
+  move(law.moduli_);
+  for (Blocks& blocks : law.laws_) move(blocks.poissons_ratios), move(blocks.exponents), move(blocks.stiffness_ratios);
+  return law;
+}
+
 std::vector<ParameterHandle> LawLayout::numbers(int law) const {
   std::vector<ParameterHandle> all = {modulus(law), poissons_ratio(0, law)};
   for (int i = 0; i < form_.terms; ++i) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -40,6 +41,10 @@ class LawLayout {
   /// @param form  `controls` is ignored: the blocks say how many there are
   /// Throws std::invalid_argument as the constructor does, and where a name is taken.
   static LawLayout of_motion(ParameterLayout& layout, const MaterialBlocks& blocks, LawForm form);
+
+  /// The same law in the vectors of another layout; `layout()` of what is returned is empty.
+  /// @param there  says where a handle's numbers stand in them
+  LawLayout moved(const std::function<ParameterHandle(const ParameterHandle&)>& there) const;
 
   const LawForm& form() const { return form_; }
   const ParameterLayout& layout() const { return layout_; }

@@ -5,19 +5,21 @@
 
 namespace pliant {
 
-/// Corotational forces of tetrahedra as a function of where their nodes are free of load, the deformed positions z and
-/// those that rotations lag behind at, p, being known (Wang 2015, eq. 1 and appendix):
+/// Elastic forces of tetrahedra as a function of where their nodes are free of load, the deformed positions z and the
+/// lag point p of those forces being known. Those of a material law are `LawElasticity`'s (`BodyMaterial`), corotated
+/// ones (Wang 2015, eq. 1 and appendix)
 ///   f_a = -E_e R integral of C : (R^T F - I) g_a,   F = sum_b z_b g_b^T,  R the rotation of sum_b p_b (mean g_b)^T,
 /// where volumes, gradients g and rotations all follow from X. Hexahedra do not take part: their grid is regular when
 /// it is free of load. Positions and forces are n x 3 [m], [N].
 class ReferenceForces {
  public:
-  /// Throws std::invalid_argument for a body of hexahedra.
+  /// Corotated ones. Throws std::invalid_argument for a body of hexahedra.
   static std::unique_ptr<ReferenceForces> make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks);
   virtual ~ReferenceForces() = default;
 
   virtual void set_parameters(const VectorX& theta) = 0;
   /// Fixes X, p and z; the calls below refer to them. False where an element of X has no positive volume somewhere.
+  /// Forces are not numbers where a law knows no such deformation.
   [[nodiscard]] virtual bool linearise(const Points& X, const Points& p, const Points& z) = 0;
   /// At rest both are x.
   [[nodiscard]] bool linearise(const Points& X, const Points& x) { return linearise(X, x, x); }
@@ -29,7 +31,7 @@ class ReferenceForces {
   virtual void add_tangent(const Points& d_reference, Points& force) const = 0;
   /// The cotangent of X for the cotangent `w` of f is added.
   virtual void add_adjoint(const Points& w, Points& reference_bar) const = 0;
-  /// From the reference to p, of an element.
+  /// From the reference to p, of an element as a whole.
   virtual const Matrix3& rotation(int element) const = 0;
   /// Smallest ratio of a volume at a quadrature point to that in the body as it was given.
   virtual double least_volume_ratio() const = 0;

@@ -48,4 +48,18 @@ CostEvaluation CostEvaluation::of_recording(int recording) const {
   return one;
 }
 
+std::vector<CostEvaluation> CostFunction::evaluate(std::span<const VectorX> points, const OnEvaluated& on_evaluated) {
+  std::vector<CostEvaluation> all(points.size());
+  bool goes_on = true;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!goes_on) {
+      all[i].failure = "left out";
+      continue;
+    }
+    all[i] = evaluate(points[i]);
+    if (on_evaluated) goes_on = on_evaluated(i, all[i]);
+  }
+  return all;
+}
+
 }  // namespace pliant

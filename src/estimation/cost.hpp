@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,12 @@ class CostFunction {
   virtual const ParameterSet& parameters() const = 0;
   /// Cost alone.
   [[nodiscard]] virtual CostEvaluation evaluate(const VectorX& p) = 0;
+  /// Told that an evaluation is done, with its number; from any thread. False: those that have not begun are left out.
+  using OnEvaluated = std::function<bool(std::size_t, const CostEvaluation&)>;
+  /// Costs of several vectors, in their order: here one after the other.
+  /// @param on_evaluated  called after each; may be empty. What it leaves out fails ("left out")
+  [[nodiscard]] virtual std::vector<CostEvaluation> evaluate(std::span<const VectorX> points,
+                                                             const OnEvaluated& on_evaluated = {});
   /// Cost, gradient and Gauss-Newton matrix: for few parameters.
   [[nodiscard]] virtual CostEvaluation linearise(const VectorX& p) = 0;
   /// Cost and gradient: any number of parameters.

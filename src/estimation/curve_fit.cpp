@@ -11,11 +11,11 @@ namespace pliant {
 
 namespace {
 
-std::shared_ptr<const PressScene> scene_of(const Capture& capture, const PressFitOptions& options) {
+std::shared_ptr<const PressScene> scene_of(const Capture& capture, const FitOptions& options) {
   if (capture.scene.object.surface) {
     Resolution resolution;
     resolution.cells = options.cells;
-    resolution.element = options.quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
+    resolution.element = options.element.value_or(ElementKind::Tetrahedron);
     std::vector<Vector3> control_points;
     auto body = std::make_shared<Body>(*make_body_of(capture.scene, SignedDistance(), resolution, control_points));
     body->modulus = unit_element()->modulus;  // a specimen tells of one material
@@ -34,21 +34,22 @@ std::shared_ptr<const PressScene> scene_of(const Capture& capture, const PressFi
 
 }  // namespace
 
-PressFitOutcome fit_material_curves(const Capture& capture, const PressFitOptions& options) {
-  if (options.material == PressMaterial::Sampled)
+FitOutcome fit_material_curves(const Capture& capture, const FitOptions& options) {
+  if (options.material == MaterialKind::Sampled)
     throw InputError({{capture.file},
                       "material=sampled and no press to fit",
                       "blocks [[press]], whose markers show where the object is how stiff",
                       "leave out material, or choose ogden or linear"});
-  PressFitOutcome outcome;
-  outcome.scene = scene_of(capture, options);
+  FitOutcome outcome;
+  LawOutcome law;
+  law.scene = scene_of(capture, options);
   std::vector<MaterialTest> fitted;
-  for (const ObservedCurve& curve : outcome.scene->static_tests().curves)
+  for (const ObservedCurve& curve : law.scene->static_tests().curves)
     if (curve.role == "fit") fitted.push_back(curve.test);
   CurveFitOptions choices;
-  choices.poissons_ratio = options.poissons_ratio;
-  if (options.terms > 0) choices.max_terms = options.terms;
-  if (options.material == PressMaterial::Linear) choices.max_terms = 0;
+  choices.poissons_ratio = known_poissons_ratio(options);
+  if (options.law_terms > 0) choices.max_terms = options.law_terms;
+  if (options.material == MaterialKind::Linear) choices.max_terms = 0;
   CurveFit fit;
   try {
     fit = fit_curves(fitted, choices);
@@ -60,28 +61,29 @@ PressFitOutcome fit_material_curves(const Capture& capture, const PressFitOption
   }
   double before = 0.0;
   for (const CurveFit::Tried& tried : fit.tried) {
-    const bool is_first = outcome.tried.empty();
+    const bool is_first = law.tried.empty();
     const double evidence = is_first ? std::numeric_limits<double>::infinity() : 0.5 * (before - tried.bic);
     before = tried.bic;
     const bool kept = fit.succeeded && tried.terms <= fit.layout.form().terms;
-    outcome.tried.push_back({{1, tried.terms}, tried.cost, evidence, kept});
+    law.tried.push_back({{1, tried.terms}, tried.cost, evidence, kept});
   }
   outcome.reason = fit.succeeded ? fit.reason : fit.failure;
   if (!fit.succeeded) return outcome;
-  outcome.layout = fit.layout;
+  law.layout = fit.layout;
   outcome.parameters = fit.parameters;
   outcome.parameters.set_reference(fit.theta);
   outcome.theta = fit.theta;
   Objective objective = curve_objective(fitted, fit.layout.form().terms, outcome.parameters, choices.noise);
   outcome.evaluation = objective.linearise(outcome.parameters.to_unconstrained(fit.theta));
-  outcome.start_cost = fit.tried.front().cost;
-  outcome.law = press_law(*outcome.scene->body, fit.layout, fit.theta);
-  outcome.covariance = parameter_covariance(outcome.evaluation);
-  outcome.std = outcome.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const VectorX inverse = outcome.std.cwiseMax(1e-300).cwiseInverse();
-  outcome.correlation = inverse.asDiagonal() * outcome.covariance * inverse.asDiagonal();
-  outcome.succeeded = outcome.evaluation.succeeded;
+  outcome.start_cost = fit.tried.front().cost, outcome.final_cost = outcome.evaluation.cost;
+  law.law = press_law(*law.scene->body, fit.layout, fit.theta);
+  if (outcome.evaluation.succeeded) add_uncertainty(outcome);
   outcome.converged = fit.converged;
+  outcome.cells = options.cells;
+  outcome.recordings.push_back(as_recording(law.scene->body, law.layout, outcome));
+  for (std::string& note : unused_choices(options, false, false)) outcome.notes.push_back(std::move(note));
+  add_law_notes(outcome.notes, law, capture);
+  outcome.law = std::move(law);
   return outcome;
 }
 

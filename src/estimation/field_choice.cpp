@@ -9,6 +9,7 @@
 
 #include "base/error.hpp"
 #include "estimation/field_evidence.hpp"
+#include "estimation/fit_run.hpp"
 #include "estimation/recordings.hpp"
 
 namespace pliant {
@@ -103,17 +104,14 @@ class FieldChoice {
     const MatrixX moduli = carried_over(body, field_of(body, best().control_points), body.modulus);
     const JointLayout before = layout_of(best().control_points), after = layout_of(count);
     const auto change = [&](VectorX& theta) { theta = changed(before, theta, after, moduli); };
-    FitState begin = *choice_.state;
+    FitState begin = begun_from(*choice_.state);
     begin.controls = count;
-    VectorX theta = begin.refined.front().theta;
-    begin.refined.clear();
+    for (StageRecord& r : begin.done) change(r.from), change(r.theta);
+    VectorX& theta = begin.begin->theta;
     change(theta);
-    if (begin.motion) change(*begin.motion);
-    for (FitStart& s : begin.starts) change(s.start), change(s.final);
-    begin.fine = FitState::Fine{begin.fine ? begin.fine->stage : 0, theta, {}};
     ParameterSet parameters = recordings.parameters();
-    if (begin.corrected)
-      for (const std::string& name : begin.corrected->parameters) parameters.set_estimated(name, true);
+    if (const StageRecord* test = find_record(begin.done, {StageKind::Test}))
+      for (const std::string& name : test->corrected) parameters.set_estimated(name, true);
     parameters.set_reference(theta);
     Objective objective =
         recordings.objective(grid, parameters, options_.fine_band, [](const Recording& r) { return r.last_frame; });
@@ -123,11 +121,10 @@ class FieldChoice {
     if (e.succeeded) promised.log_bayes_factor = log_bayes_factor(e, objective.parameters(), p, moduli);
     // Dampings and, above all, Poisson's ratio made up for what the coarser field lacks: a stage earlier, and the
     // latter where it began.
-    FitState::Fine& fine = *begin.fine;
-    fine.stage = std::max(0, fine.stage - (begin.corrected && !begin.corrected->parameters.empty() ? 2 : 1));
-    if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated) {
-      fine.reference[nu->at] = recordings.parameters().reference()[nu->at];
-    }
+    const bool is_corrected = estimate_of(*choice_.state)->id.kind == StageKind::Corrected;
+    begin.begin->stage = std::max(0, begin.begin->stage - (is_corrected ? 2 : 1));
+    if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated)
+      theta[nu->at] = recordings.parameters().reference()[nu->at];
     return begin;
   }
 
@@ -149,9 +146,6 @@ class FieldChoice {
     if (count == 1) tried.log_bayes_factor = 0.0;
     if (count == 1 || tried.log_bayes_factor > strong_evidence) {
       choice_.best = int(choice_.tried.size());
-      reached_.refined = {{options_.cells, options_.steps,
-                           outcome.recordings.front().discretisation.body->element_count(), outcome.theta,
-                           outcome.final_cost, outcome.converged, outcome.reason}};
       choice_.state = std::make_shared<FitState>(reached_);
     }
     choice_.tried.push_back(tried);
@@ -165,7 +159,7 @@ class FieldChoice {
     options.refine = refine;
     reached_ = from;
     const auto tell = [&](FitEvent& event) {
-      if (count > 1 && from.refined.empty()) event.stage = points(count);
+      if (count > 1 && event.kind != StageKind::Finer) event.stage = points(count);
     };
     FitMonitor monitor = monitor_;
     monitor.on_event = [&](FitEvent event) {
@@ -177,7 +171,7 @@ class FieldChoice {
       reached_ = state;
       if (saves) save();
     };
-    FitOutcome outcome = fit(recordings_, options, monitor, from);
+    FitOutcome outcome = fit_motions(recordings_, options, monitor, from);
     for (FitEvent& event : outcome.history) tell(event);
     histories_.emplace_back(count, outcome.history);
     forward_steps_ += outcome.forward_steps;
@@ -259,7 +253,7 @@ MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusFi
 FitOutcome fit_with_chosen_field(const std::vector<RecordedCapture>& recordings, const FitOptions& options,
                                  const FitMonitor& monitor, FitState resume) {
   if (!recordings.front().capture.scene.regions.empty())
-    return fit(recordings, with_controls(options, 1), monitor, std::move(resume));
+    return fit_motions(recordings, with_controls(options, 1), monitor, std::move(resume));
   return FieldChoice(recordings, options, monitor, std::move(resume)).run();
 }
 

@@ -8,9 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "estimation/optimiser.hpp"
+#include "estimation/fit_stage.hpp"
+#include "estimation/law_zones.hpp"
 #include "estimation/problem.hpp"
-#include "estimation/refinement.hpp"
+#include "estimation/sample_fit.hpp"
 #include "tracking/tracker.hpp"
 
 namespace pliant {
@@ -29,11 +30,13 @@ enum class TrackingUse {
   Both,       ///< each from a part of the frames; the one that predicts the others better is kept
 };
 
-/// What a fit of presses looks for.
-enum class PressMaterial {
-  Ogden,    ///< one smooth law, its modulus a field: fitted to all presses at once
-  Linear,   ///< one E and nu for all strains: the average fit to compare with
-  Sampled,  ///< the stiffness of each press, interpolated in strain space (Bickel 2009)
+/// What an object is taken to be made of.
+enum class MaterialKind {
+  Automatic,   ///< linear where it moves or hangs, Ogden's law where it is pressed alone
+  Linear,      ///< one E and nu for all strains
+  NeoHookean,  ///< the same two numbers, for great strains
+  Ogden,       ///< one smooth law of a few terms, its modulus a field: fitted to all that was seen at once
+  Sampled,     ///< presses alone: the stiffness of each, interpolated in strain space (Bickel 2009)
 };
 
 /// Choices about a fit; none of them is needed. `validate` answers in words.
@@ -73,9 +76,12 @@ struct FitOptions {
   /// Whether a correction of sensors or of gravity's direction is estimated where the residuals ask for it.
   bool correct = true;
   bool hold_strongly = false;  ///< eliminate nodes in held regions instead of Nitsche's method
+  MaterialKind material = MaterialKind::Automatic;
+  /// Of Ogden's law, 1..3; 0: one where the object moves, else as many as the presses support.
+  int law_terms = 0;
+  /// The law of an object that moves or hangs; none: corotated linear elasticity.
+  std::optional<LawForm> law_of_motion() const;
   /// Of presses with known force.
-  PressMaterial material = PressMaterial::Ogden;
-  int law_terms = 0;              ///< of Ogden's law, 1..3; 0: as many as the presses support
   int law_zones = 0;              ///< with a law of their own each, 1..12; 0: as many as the presses support
   double marker_noise = 0.0;      ///< of a coordinate [m]; 0: what the residuals say
   double basis_tolerance = 0.02;  ///< of a sampled material's stress, > 0
@@ -92,23 +98,20 @@ struct FitOptions {
   std::string validate() const;
 };
 
-/// What a step of a fit belongs to.
-enum class StageKind {
-  Motion,  ///< the motion or pose at the start
-  Scan,    ///< a trial of one Young's modulus: no iteration
-  Coarse,  ///< a start that is followed on the coarse grid
-  Fine,    ///< the estimate on the full grid, and its repetitions
-};
-
 /// A step of the fit, for progress and convergence.csv.
 struct FitEvent {
   StageKind kind = StageKind::Fine;
-  std::string stage;  ///< for people: "motion", "scan", "coarse", "fine", "18 cells", "round 2: fine"
-  int start = 0;      ///< which start
+  /// For people: "motion", "scan", "coarse", "fine", "18 cells", "round 2: fine"; "linear", "1 term", "2 terms apart",
+  /// "3 zones", "a law a region", "8 control points", "press 3".
+  std::string stage;
+  int start = 0;  ///< which start
   int iteration = 0;
   double cost = 0.0, damping = 0.0, surface_rms = 0.0;
-  VectorX theta;
-  double fraction_done = 0.0;  ///< a guess at how much of the whole is done
+  VectorX theta;                ///< of `layout`; of a sample empty
+  double fraction_done = 0.0;   ///< a guess at how much of the whole is done; 0: there is none
+  double marker_rms = 0.0;      ///< [m] of the points of presses
+  double youngs_modulus = 0.0;  ///< [Pa] of the object's own material; of presses the mean
+  std::shared_ptr<const ParameterLayout> layout = {};
 };
 
 /// One start that was followed.
@@ -140,29 +143,27 @@ struct TrackingRound {
   int controls = 1;             ///< control moduli of `theta`
 };
 
+/// One form of the law of a pressed object that was fitted.
+struct TriedLaw {
+  LawForm form;
+  double cost = 0.0;      ///< infinite where it cannot be fitted
+  double evidence = 0.0;  ///< for it against the best before: fall of half the BIC for terms, ln of the Bayes factor
+                          ///< for zones and control points
+  bool kept = false;
+};
+
 /// Where a fit stands, to go on after an interruption.
 struct FitState {
-  int controls = 1;  ///< control moduli of the parameter vectors below
-  /// Young's modulus and cost; infinite where it cannot be simulated. One alone: that of the swing that was seen.
-  std::vector<std::pair<double, double>> scan;
-  std::optional<VectorX> motion;  ///< theta after the first stage
-  std::vector<FitStart> starts;   ///< those that are done
-  /// The stage on the full grid that was under way.
-  struct Fine {
-    int stage = 0;             ///< of those on the full grid, then of the repetitions
-    VectorX reference;         ///< theta at the beginning of the stage
-    OptimiserState optimiser;  ///< p is empty before the first iteration
+  int controls = 1;                        ///< control moduli of the parameter vectors below
+  std::vector<StageRecord> done;           ///< stages in the order in which they ended
+  std::optional<StageUnderWay> under_way;  ///< of those on the full grid
+  /// Where the stages on the full grid begin, if not with the best start: what came before was taken over from another
+  /// fit.
+  struct Beginning {
+    VectorX theta;
+    int stage = 0;  ///< number of the first one; that with corrections comes last
   };
-  std::optional<Fine> fine;
-  /// What the residuals asked to be corrected; no parameters: nothing.
-  struct Corrected {
-    std::vector<std::string> parameters;
-    std::string what;             ///< for people
-    double cost, youngs_modulus;  ///< before, [Pa]
-  };
-  std::optional<Corrected> corrected;
-  std::vector<RefinedEstimate> refined;  ///< repetitions that are done, after the first estimate
-  std::vector<std::string> notes;        ///< on how the fit began
+  std::optional<Beginning> begin;
   /// Where the number of control points is chosen: all above is the fit with one of them.
   struct FieldChoice {
     std::vector<TriedField> tried;          ///< that are done
@@ -181,6 +182,20 @@ struct FitState {
     bool keeps_loop = true;                  ///< in the last phase
   };
   std::optional<Tracking> tracking;
+  /// Where the law of a pressed object is looked for.
+  struct LawSearch {
+    struct Done {
+      TriedLaw tried;
+      std::vector<ZoneCut> cuts;
+      VectorX theta;  ///< empty: it cannot be fitted
+      double noise = 0.0;
+    };
+    std::vector<Done> done;            ///< forms that were tried, in order
+    OptimiserState under_way;          ///< of the next; p is empty: not begun
+    std::vector<ZoneCut> cuts;         ///< of its zones
+    std::vector<PressSample> samples;  ///< of the sampled material: presses that are done, in order
+  };
+  std::optional<LawSearch> law;
 };
 
 /// A recording, and what its sensors saw.
@@ -214,10 +229,31 @@ struct RecordingOutcome {
   std::shared_ptr<const Body> rest_body;  ///< the body where it is free of load
 };
 
+/// The law that was fitted to an object's presses, and what it predicts of them.
+struct LawOutcome {
+  std::shared_ptr<const PressScene> scene;
+  std::shared_ptr<const MaterialLaw> law;
+  LawLayout layout;
+  double noise = 0.0;         ///< deviation of a marker's coordinate [m]
+  std::vector<ZoneCut> cuts;  ///< of the zones, one after the other
+  std::vector<TriedLaw> tried;
+  std::optional<SampledMaterial> sampled;  ///< with `samples`, one a press that was fitted
+  std::vector<PressSample> samples;
+  std::vector<PressPrediction> predictions;  ///< of all presses, tests too; empty where it was interrupted
+};
+
+/// A recording that took no part in the fit, as the estimate predicts it: only its own start, planes and sensors were
+/// estimated.
+struct HeldOutRecording {
+  std::string name, sha256;   ///< of the capture
+  CostEvaluation evaluation;  ///< may have failed
+};
+
 struct FitOutcome {
-  ParameterSet parameters;     ///< as used, with the reference at the solution
-  VectorX theta, start_theta;  ///< of all recordings, by the layout of `parameters`
-  VectorX std;                 ///< of each unconstrained coordinate
+  ParameterSet parameters;  ///< as used, with the reference at the solution
+  VectorX theta;            ///< of all recordings, by the layout of `parameters`
+  VectorX start_theta;      ///< likewise; empty where the fit began with another form of the law
+  VectorX std;              ///< of each unconstrained coordinate
   MatrixX covariance, correlation;
   double start_cost = 0.0, final_cost = 0.0;
   CostEvaluation evaluation;  ///< at the solution, all points of the fit
@@ -229,6 +265,8 @@ struct FitOutcome {
   bool converged = false, interrupted = false;
   std::string reason;
   std::optional<TrackingOutcome> tracking;
+  std::optional<LawOutcome> law;             ///< where presses are all that was fitted
+  std::optional<HeldOutRecording> held_out;  ///< where there was one, and the fit was not interrupted
   std::vector<TriedField> fields;  ///< where the number of control points was chosen: those tried, in their order
   std::vector<std::string> notes;  ///< plain sentences
   long long forward_steps = 0;
@@ -242,25 +280,28 @@ struct FitMonitor {
   std::function<bool()> interrupted;
 };
 
-/// Estimates the unknown parameters of an object from recordings of it: its pose or motion at the start from the first
-/// frames where that is unknown, a scan over decades of Young's modulus on a coarse grid, the best starts followed
-/// there in a wide band and a growing horizon, then the best on the full grid in a narrow band and, where asked,
-/// again at finer resolutions. Recordings share the
-/// object's material (moduli, Poisson's ratio, dampings and, where it is estimated, density); each has its own start,
-/// planes and sensors, named with "[2]" and so on from the second recording.
-/// @param resume  what an interrupted fit of the same recordings and options had done
-/// Throws InputError where a recording cannot be fitted, with the reason.
+/// Estimates the unknown parameters of an object from what recordings hold of it.
+///
+/// Motions and equilibria: its pose or motion at the start from the first frames where that is unknown, a scan over
+/// decades of Young's modulus on a coarse grid, the best starts followed there in a wide band and a growing horizon,
+/// then the best on the full grid in a narrow band and, where asked, again at finer resolutions. Loads and presses of
+/// the same recordings take part. Recordings share the object's material (moduli, Poisson's ratio, dampings and, where
+/// it is estimated, density); each has its own start, planes and sensors, named with "[2]" and so on from the second
+/// recording.
+///
+/// Presses alone, of one recording: the law of the object (`fit_presses`).
+/// @param resume    what an interrupted fit of the same recordings and options had done
+/// @param held_out  a recording that takes no part in the fit, and is predicted by the estimate
+/// Throws InputError where a recording cannot be fitted, or not together with the others, with the reason.
 FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor = {},
-               FitState resume = {});
-
-/// How well a fitted material predicts a recording that was kept out: only the recording's own start, planes and
-/// sensors are estimated, from its own observations.
-FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
-                 const FitMonitor& monitor = {});
+               FitState resume = {}, std::optional<RecordedCapture> held_out = {});
 
 /// Standard deviations of the estimate from the curvature of the cost and the scatter of the frames' gradients
 /// (sandwich estimate; gradients of neighbouring frames may be correlated, Newey and West 1987), never below what the
 /// curvature alone gives.
 MatrixX parameter_covariance(const CostEvaluation& evaluation);
+
+/// Takes covariance, standard deviations and correlation from an outcome's evaluation, which has derivatives.
+void add_uncertainty(FitOutcome& outcome);
 
 }  // namespace pliant

@@ -25,8 +25,11 @@ const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", S
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
-const std::vector<std::pair<std::string, PressMaterial>> press_materials = {
-    {"ogden", PressMaterial::Ogden}, {"linear", PressMaterial::Linear}, {"sampled", PressMaterial::Sampled}};
+const std::vector<std::pair<std::string, MaterialKind>> materials = {{"automatic", MaterialKind::Automatic},
+                                                                     {"linear", MaterialKind::Linear},
+                                                                     {"neo_hookean", MaterialKind::NeoHookean},
+                                                                     {"ogden", MaterialKind::Ogden},
+                                                                     {"sampled", MaterialKind::Sampled}};
 const std::vector<std::pair<std::string, TrackingUse>> tracking_uses = {{"auto", TrackingUse::Automatic},
                                                                         {"off", TrackingUse::Off},
                                                                         {"loop", TrackingUse::Loop},
@@ -45,11 +48,11 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
 const std::set<std::string> parameter_names = {
-    "youngs_modulus", "poissons_ratio", "mass_damping",    "stiffness_damping",
-    "density",        "gravity",        "linear_velocity", "angular_velocity",
-    "plane",          "plane_2",        "plane_3",         "plane_4",
-    "pull",           "range_error",    "sensor_turn",     "sensor_shift",
-    "scan_correction"};
+    "youngs_modulus",    "poissons_ratio",   "mass_damping",    "stiffness_damping", "density",    "gravity",
+    "linear_velocity",   "angular_velocity", "plane",           "plane_2",           "plane_3",    "plane_4",
+    "friction",          "friction_2",       "friction_3",      "friction_4",        "pull",       "range_error",
+    "sensor_turn",       "sensor_shift",     "scan_correction", "exponent_1",        "exponent_2", "exponent_3",
+    "stiffness_ratio_2", "stiffness_ratio_3"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -221,12 +224,14 @@ const std::vector<Entry>& entries() {
                  "impose Dirichlet conditions of held regions strongly, by elimination of nodes, instead of weakly by "
                  "Nitsche's method",
                  &FitOptions::hold_strongly),
-      choice_entry(
-          "material",
-          "material law of static tests with known forces: Ogden's, one linear law, or the stiffness of each press "
-          "interpolated in strain space",
-          press_materials, &FitOptions::material),
-      integer_entry("law_terms", "0..3", "number of terms of Ogden's law; 0: as many as the static tests support",
+      choice_entry("material",
+                   "material law; automatic: linear elasticity for motions and equilibria, Ogden's law where static "
+                   "tests are all "
+                   "there is; sampled: the stiffness of each press interpolated in strain space, for presses alone",
+                   materials, &FitOptions::material),
+      integer_entry("law_terms", "0..3",
+                    "number of terms of Ogden's law; 0: one for motions and equilibria, else as many as the static "
+                    "tests support",
                     &FitOptions::law_terms),
       integer_entry("law_zones", "0..12",
                     "number of zones with a law of their own each; 0: as many as the static tests support; 1: a "
@@ -310,7 +315,8 @@ const std::vector<FitKey>& fit_keys() {
 std::string parameter_key_help() {
   return "Parameters (youngs_modulus, poissons_ratio, mass_damping, stiffness_damping, density, gravity, "
          "linear_velocity,\n"
-         "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, and for what sensors get wrong "
+         "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, exponent_1 .. of Ogden's law, and for what "
+         "sensors get wrong "
          "range_error@SENSOR,\n"
          "sensor_turn@SENSOR, sensor_shift@SENSOR; [2] after a name means the second recording's) have three keys "
          "each:\n"
@@ -401,8 +407,8 @@ void read_fit_options(const std::filesystem::path& path, FitOptions& options) {
 }
 
 std::vector<std::string> unused_choices(const FitOptions& options, bool has_motion, bool has_presses) {
-  static const std::set<std::string> of_laws = {"material", "law_terms", "law_zones", "basis_tolerance",
-                                                "basis_samples"};
+  static const std::set<std::string> of_pressed_laws = {"law_zones", "basis_tolerance", "basis_samples"};
+  static const std::set<std::string> of_tracking = {"tracking", "tracking_rounds"};
   static const std::set<std::string> of_presses = {
       "cells",        "element",   "control_points", "modulus_variation", "material",     "max_iterations",
       "marker_noise", "law_terms", "law_zones",      "basis_tolerance",   "basis_samples"};
@@ -412,8 +418,13 @@ std::vector<std::string> unused_choices(const FitOptions& options, bool has_moti
     const std::string& name = e.key.name;
     if (e.write(options) == e.write(standard)) continue;
     const char* why = nullptr;
-    if (has_motion && of_laws.contains(name))
-      why = has_presses ? "where an object moves, its law is linear" : "it concerns presses with known force";
+    if (has_motion && of_pressed_laws.contains(name))
+      why = has_presses ? "it concerns objects that are pressed alone" : "it concerns presses with known force";
+    else if (has_motion && name == "law_terms" && options.material != MaterialKind::Ogden)
+      why = "it concerns Ogden's law, material=ogden";
+    else if (has_motion && options.law_of_motion() && of_tracking.contains(name) &&
+             options.tracking != TrackingUse::Off)
+      why = "the tracker's own elasticity is linear, and the material is not";
     else if (has_motion && !has_presses && name == "marker_noise")
       why = "it concerns presses with known force";
     else if (!has_motion && !of_presses.contains(name))
@@ -497,6 +508,7 @@ std::string FitOptions::validate() const {
   if (const auto modulus = parameters.find("youngs_modulus");
       control_points == automatic && modulus != parameters.end() && modulus->second.estimated == false)
     return "control_points = auto asks how Young's modulus varies, youngs_modulus.estimate = false keeps it as it is";
+  if (law_terms < 0 || law_terms > 3) return "law_terms must lie in 0..3";
   if (refine < 1 || refine > 3) return "refine must lie in 1..3";
   if (const double finest = cells * std::pow(Refinement::mesh_ratio, refine - 1); finest > 64.0)
     return "refine takes " + text_of(cells) + " cells to " + text_of(finest) + ", more than 64: begin with fewer";
@@ -506,7 +518,18 @@ std::string FitOptions::validate() const {
     return "bands must lie in (0, 0.5)";
   if (!(newmark_theta >= 0.5 && newmark_theta < 1.0)) return "newmark_theta must lie in [0.5, 1)";
   if (!(solver_tolerance > 0.0 && solver_tolerance < 1.0)) return "solver_tolerance must lie in (0, 1)";
+  if (law_terms < 0 || law_terms > 3) return "law_terms must lie in 1..3, or be 0: as many as the presses support";
+  if (law_zones < 0 || law_zones > 12) return "law_zones must lie in 1..12, or be 0: as many as the presses support";
+  if (law_zones > 1 && control_points > 1) return "law_zones and control_points cannot both be chosen";
+  if (!(marker_noise >= 0.0)) return "marker_noise must not be negative";
+  if (!(basis_tolerance > 0.0) || basis_samples < 1) return "basis_tolerance must be positive, basis_samples >= 1";
   return "";
+}
+
+std::optional<LawForm> FitOptions::law_of_motion() const {
+  if (material == MaterialKind::NeoHookean) return LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean};
+  if (material == MaterialKind::Ogden) return LawForm{1, std::max(1, law_terms)};
+  return std::nullopt;
 }
 
 void apply_overrides(ParameterSet& parameters, const FitOptions& options) {

@@ -18,7 +18,7 @@ const std::vector<FitKey>& fit_keys();
 std::string parameter_key_help();
 
 /// Sets one key from "key=value" (the form of `--set`). Parameters: "youngs_modulus=5000" is a start value,
-/// "poisson_ratio.estimate=false" a choice, "density.prior_std=0.1" a prior's width.
+/// "poissons_ratio.estimate=false" a choice, "density.prior_std=0.1" a prior's width.
 /// Throws InputError for an unknown key (with the nearest known one) or a value of another type.
 void set_fit_option(FitOptions& options, const std::string& assignment);
 

@@ -1,12 +1,24 @@
 #include "estimation/fit_run.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
-#include <cstdio>
+#include <limits>
+#include <tuple>
+
+#include "base/error.hpp"
+#include "base/parallel.hpp"
+#include "estimation/corrections.hpp"
+#include "estimation/fit_starts.hpp"
+#include "estimation/load_free.hpp"
+#include "estimation/notes.hpp"
 
 namespace pliant {
 
 namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
 
 /// The overload that goes on from a state.
 OptimiserSummary minimise_from(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
@@ -14,76 +26,478 @@ OptimiserSummary minimise_from(Objective& objective, const OptimiserState& state
   return minimise(objective, state, options, on_iteration);
 }
 
+OptimiserState start_of(const ParameterSet& parameters) {
+  return {0, parameters.to_unconstrained(parameters.reference()), {}};
+}
+
+int last_frame(const Horizon& horizon, const Recording& r) {
+  switch (horizon.until) {
+    case Horizon::Until::Start:
+      return 0;
+    case Horizon::Until::Beginning:  // the pose of a released object shows in the frames before, a velocity only after
+      return r.is_released() ? 0 : std::max(2, int(horizon.part * r.last_frame));
+    case Horizon::Until::Part:
+      break;
+  }
+  return horizon.part < 1.0 ? r.horizon(horizon.part) : r.last_frame;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 }  // namespace
 
-std::string in_three_digits(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
+FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor,
+               FitState state)
+    : options_(options),
+      monitor_(monitor),
+      state_(std::move(state)),
+      recordings_(std::move(recorded), options_, outcome_.notes),
+      layout_(std::make_shared<ParameterLayout>(recordings_.parameters().layout())),
+      plan_(facts()) {
+  state_.controls = recordings_.controls();
 }
 
-FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& fit_options, const FitMonitor& fit_monitor,
-               FitState from)
-    : options(fit_options),
-      monitor(fit_monitor),
-      state(std::move(from)),
-      recordings(std::move(recorded), options, outcome.notes),
-      parameters(recordings.parameters()),
-      coarse(recordings.grid(options.coarse_cells, options.steps)),
-      fine(recordings.grid(options.cells, options.steps)) {
-  state.controls = recordings.controls();
+// What the plan depends on --------------------------------------------------------------------------------------------
+
+const Grid& FitRun::grid(const Spacing& spacing) {
+  const auto it = std::ranges::find_if(
+      grids_, [&](const auto& g) { return g->cells == spacing.cells && g->steps == spacing.steps; });
+  if (it != grids_.end()) return **it;
+  grids_.push_back(std::make_unique<Grid>(recordings_.grid(spacing.cells, spacing.steps)));
+  return *grids_.back();
 }
 
-ParameterSet FitRun::fixed_at(const VectorX& theta) const {
-  std::vector<Parameter> list = parameters.parameters();
-  for (Parameter& p : list) p.estimated = false;
-  return {parameters.layout(), std::move(list), theta};
+std::optional<double> FitRun::given_start(const std::string& name) const {
+  const auto change = options_.parameters.find(name);
+  if (change == options_.parameters.end() || !change->second.start) return std::nullopt;
+  return (*change->second.start)[0];
 }
 
-VectorX FitRun::without_pulls(VectorX theta) const {
-  for (const Parameter& p : parameters.parameters())
-    if (p.estimated && is_pull(p)) theta.segment<3>(p.at) = p.scale * p.prior_mean;
-  return theta;
+double FitRun::carrying_modulus(const VectorX& theta) {
+  double modulus = 0.0;
+  const Grid& coarse = grid({options_.coarse_cells, options_.steps});
+  for (const Discretisation& d : coarse.recording)
+    if (d.simulation.scan_sags)
+      modulus =
+          std::max(modulus, pliant::carrying_modulus(d.body, d.simulation, theta, [this] { return is_interrupted(); }));
+  return modulus;
+}
+
+PlanFacts FitRun::facts() {
+  PlanFacts f;
+  f.options = options_;
+  f.parameters = recordings_.parameters();
+  f.moduli = recordings_.material().youngs_moduli;
+  const Recording& first = recordings_.front();
+  f.density = first.blocks.motion.density, f.gravity = first.blocks.motion.gravity;
+  f.size = first.size;
+  f.swings = recordings_.any_released();
+  f.is_scanned = !given_start("youngs_modulus");
+  // Moduli of regions and control points begin where the object's own does, but for those that the user has given.
+  VectorX theta = f.parameters.reference();
+  const double own = theta[f.moduli.front()];
+  const std::vector<std::string> names = modulus_names(first.capture, recordings_.controls());
+  f.relative_moduli = VectorX::Ones(recordings_.controls());
+  for (int k = 0; k < recordings_.controls(); ++k)
+    f.relative_moduli[k] = given_start(names[std::size_t(k)]).value_or(own) / own;
+  recordings_.set_moduli(theta, own * f.relative_moduli);
+  // An object that was scanned as it sags has to be stiff enough for its scan before anything can be tried.
+  if (f.is_scanned) f.carrying_modulus = carrying_modulus(theta);
+  if (f.carrying_modulus > 0.0) recordings_.set_moduli(theta, f.carrying_modulus * f.relative_moduli);
+  f.parameters.set_reference(theta);
+  f.repetitions = refined_spacings({options_.cells, options_.steps}, options_.refine, recordings_.any_meshed_here(),
+                                   !recordings_.all_static());
+  constexpr double hardly = 0.8;  // of the elements
+  const Grid &coarse = grid({options_.coarse_cells, options_.steps}), &fine = grid({options_.cells, options_.steps});
+  f.coarse_is_as_fine = true;
+  for (std::size_t i = 0; i < fine.recording.size(); ++i)
+    f.coarse_is_as_fine = f.coarse_is_as_fine &&
+                          coarse.recording[i].body->element_count() >= hardly * fine.recording[i].body->element_count();
+  return f;
+}
+
+// The loop ------------------------------------------------------------------------------------------------------------
+
+void FitRun::execute() {
+  while (!interrupted_) {
+    const std::vector<StageChain> chains = plan_.next(state_);
+    if (chains.empty()) return;
+    for (const StageChain& chain : chains)
+      for (const Stage& stage : chain) (void)grid(stage.grid);  // made before threads ask for it
+    parallel_tasks(chains.size(), [&](std::size_t i) { run_chain(chains[i]); });
+  }
+}
+
+void FitRun::run_chain(const StageChain& chain) {
+  VectorX theta;
+  int counted = chain.front().iterations_before;
+  for (Stage stage : chain) {
+    if (is_interrupted()) {
+      interrupted_ = true;
+      return;
+    }
+    if (stage.from.empty()) stage.from = {theta};
+    stage.iterations_before = counted;
+    std::optional<StageRecord> record = run_stage(stage);
+    if (!record) return;
+    theta = record->theta, counted += counted_iterations(*record);
+    const bool ends = !record->succeeded && stage.id.kind != StageKind::Motion;
+    keep(std::move(*record));
+    if (ends) return;
+  }
+}
+
+std::optional<StageRecord> FitRun::run_stage(const Stage& stage) {
+  bool is_cut = false;
+  StageRecord record = [&] {
+    switch (stage.id.kind) {
+      case StageKind::Swing:
+        return find_swing(stage);
+      case StageKind::Scan:
+        return scan(stage, is_cut);
+      case StageKind::Pulls:
+        return find_pulls(stage, is_cut);
+      case StageKind::Test:
+        return test_corrections(stage);
+      default:
+        return minimise_stage(stage, is_cut);
+    }
+  }();
+  if (!is_cut) return record;
+  const std::lock_guard lock(mutex_);
+  interrupted_ = true;
+  partial_.push_back(std::move(record));
+  return std::nullopt;
+}
+
+void FitRun::keep(StageRecord record) {
+  const std::lock_guard lock(mutex_);
+  if (is_on_full_grid(record.id.kind)) state_.under_way.reset();
+  state_.done.push_back(std::move(record));
+  save();
+}
+
+void FitRun::save() {
+  if (monitor_.on_state) monitor_.on_state(state_);
+}
+
+/// What a scan or a repetition has reached is nothing yet.
+FitState FitRun::reached() const {
+  FitState reached = state_;
+  for (const StageRecord& r : partial_)
+    if (r.id.kind != StageKind::Scan && r.id.kind != StageKind::Finer) reached.done.push_back(r);
+  return reached;
 }
 
 void FitRun::emit(FitEvent event) {
   event.fraction_done /= all_work();
-  const std::lock_guard lock(mutex);
-  if (monitor.on_event) monitor.on_event(event);
-  outcome.history.push_back(std::move(event));
-}
-
-OptimiserSummary FitRun::optimise(Objective& objective, const OptimiserState& from, StageKind kind,
-                                  const std::string& stage, int start, int iterations, int& counter, double done_from,
-                                  double done_to, const std::function<void(const OptimiserState&)>& on_state) {
-  OptimiserOptions o;
-  o.kind = options.optimiser;
-  o.max_iterations = iterations;
-  const int first = counter;
-  counter += from.iterations;
-  const bool in_turns = options.load_free == LoadFreeScheme::InTurns && recordings.any_sags();
-  OptimiserSummary s = (in_turns ? minimise_in_turns : minimise_from)(objective, from, o, [&](const Iteration& i) {
-    ++counter;
-    if (on_state) on_state(i.state());
-    const double part = double(counter - first) / iterations;
-    emit({kind, stage, start, counter, i.cost, i.damping, i.surface_rms, objective.parameters().to_theta(i.p),
-          done_from + (done_to - done_from) * std::min(1.0, part)});
-    return !interrupted();
-  });
-  const std::lock_guard lock(mutex);
-  outcome.forward_steps += s.steps;
-  return s;
-}
-
-std::vector<Spacing> FitRun::repetitions() const {
-  return refined_spacings({options.cells, options.steps}, options.refine, recordings.any_meshed_here(),
-                          !recordings.all_static());
+  event.youngs_modulus = event.theta[recordings_.material().youngs_moduli.front()];
+  event.layout = layout_;
+  const std::lock_guard lock(mutex_);
+  if (monitor_.on_event) monitor_.on_event(event);
+  outcome_.history.push_back(std::move(event));
 }
 
 double FitRun::all_work() const {
   double all = 1.0;
-  for (const Spacing& s : repetitions()) all += work(s);
+  for (const Spacing& s : plan_.facts().repetitions) all += plan_.work(s);
   return all;
+}
+
+// Stages --------------------------------------------------------------------------------------------------------------
+
+ParameterSet FitRun::parameters_of(const Stage& stage, const VectorX& theta) const {
+  ParameterSet set = plan_.facts().parameters;
+  for (const Parameter& p : plan_.facts().parameters.parameters())
+    set.set_estimated(p.name, std::ranges::find(stage.free, p.name) != stage.free.end());
+  set.set_reference(theta);
+  return set;
+}
+
+Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const {
+  return recordings_.objective(grid, parameters, stage.band,
+                               [&](const Recording& r) { return last_frame(stage.horizon, r); });
+}
+
+OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, const OptimiserState& from) {
+  OptimiserOptions o;
+  o.kind = options_.optimiser;
+  o.max_iterations = stage.iterations;
+  const bool saves = is_on_full_grid(stage.id.kind) && !interrupted_;  // a last look is no state to go on from
+  const bool in_turns = options_.load_free == LoadFreeScheme::InTurns && recordings_.any_sags();
+  int iterations = from.iterations;
+  OptimiserSummary s = (in_turns ? minimise_in_turns : minimise_from)(objective, from, o, [&](const Iteration& i) {
+    ++iterations;
+    if (saves) {
+      state_.under_way = {stage.id, stage.from.front(), i.state()};
+      save();
+    }
+    FitEvent event{stage.id.kind, stage.name, stage.id.start, stage.iterations_before + iterations,
+                   i.cost,        i.damping,  i.surface_rms,  objective.parameters().to_theta(i.p)};
+    const double part = std::min(1.0, double(iterations) / stage.iterations);
+    event.fraction_done = stage.done_from + (stage.done_to - stage.done_from) * part;
+    emit(std::move(event));
+    return !is_interrupted();
+  });
+  const std::lock_guard lock(mutex_);
+  outcome_.forward_steps += s.steps;
+  return s;
+}
+
+StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
+  const bool goes_on = state_.under_way && state_.under_way->id == stage.id && !interrupted_;
+  const VectorX& from = goes_on ? state_.under_way->from : stage.from.front();
+  const ParameterSet parameters = parameters_of(stage, from);
+  Objective objective = objective_of(stage, parameters, grid(stage.grid));
+  Stage own = stage;
+  own.from = {from};
+  const bool has_begun = goes_on && state_.under_way->optimiser.p.size() > 0;
+  OptimiserSummary s = optimise(objective, own, has_begun ? state_.under_way->optimiser : start_of(parameters));
+  is_cut = s.interrupted;
+  StageRecord record{stage.id, stage.name, from, from};
+  record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
+  record.iterations = s.iterations;
+  record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
+  record.elements = grid(stage.grid).recording.front().body->element_count();
+  if (s.succeeded) record.theta = parameters.to_theta(s.p);
+  if (is_on_full_grid(stage.id.kind)) ended_.push_back({stage.id, std::move(s.evaluation)});
+  return record;
+}
+
+StageRecord FitRun::find_pulls(const Stage& stage, bool& is_cut) {
+  StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
+  record.cost = infinite;
+  record.succeeded = true;  // without them the next stage looks for them
+  for (const VectorX& from : stage.from) {
+    const ParameterSet pulls = parameters_of(stage, from);
+    Objective objective = objective_of(stage, pulls, grid(stage.grid));
+    OptimiserOptions o;
+    o.max_iterations = stage.iterations;
+    const OptimiserSummary s =
+        minimise(objective, start_of(pulls), o, [&](const Iteration&) { return !is_interrupted(); });
+    outcome_.forward_steps += s.steps;
+    is_cut = is_cut || s.interrupted;
+    record.iterations += s.iterations;
+    if (!s.succeeded || !(s.evaluation.cost < record.cost)) continue;
+    record.cost = s.evaluation.cost;
+    record.theta = pulls.to_theta(s.p);
+  }
+  return record;
+}
+
+StageRecord FitRun::find_swing(const Stage& stage) {
+  StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
+  record.succeeded = true;
+  if (auto found = seen_swing(recordings_, plan_.facts(), grid(stage.grid), stage.from.front())) {
+    record.converged = true;
+    record.theta = std::move(found->theta);
+    record.told = std::move(found->told);
+  }
+  return record;
+}
+
+namespace {
+
+/// All moduli are free, whatever was assumed about them beforehand, and nothing else is.
+ParameterSet moduli_alone(const ParameterSet& parameters, const VectorX& theta) {
+  std::vector<Parameter> list;
+  for (const Parameter& p : parameters.parameters()) {
+    if (!is_modulus(p)) continue;
+    list.push_back(p);
+    list.back().estimated = true;
+    list.back().prior_std = infinite;
+  }
+  return {parameters.layout(), std::move(list), theta};
+}
+
+/// At rest every softer body hangs lower and costs more equilibria: from stiff to soft, until it is clear that the
+/// valley was passed, or that nothing softer can hold itself up.
+void evaluate_downwards(Objective& objective, std::span<const VectorX> points,
+                        const std::function<bool(std::size_t, const CostEvaluation&)>& on_evaluated) {
+  double least = infinite;
+  int worse = 0;
+  bool goes_on = true;
+  for (std::size_t i = points.size(); i-- > 0 && goes_on && worse < 2;) {
+    const CostEvaluation e = objective.evaluate(points.subspan(i, 1)).front();
+    const double cost = e.succeeded ? e.cost : infinite;
+    worse = cost > 1.2 * least ? worse + 1 : 0;
+    goes_on = on_evaluated(i, e) && std::isfinite(cost);
+    least = std::min(least, cost);
+  }
+}
+
+}  // namespace
+
+StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
+  StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
+  record.succeeded = true;
+  const VectorX& theta = stage.from.front();
+  Objective objective = objective_of(stage, parameters_of(stage, theta), grid(stage.grid));
+  const ParameterSet moduli = moduli_alone(plan_.facts().parameters, theta);
+  objective.set_parameters(moduli);
+  std::vector<VectorX> trials, points;
+  for (const double modulus : stage.trials) {
+    trials.push_back(plan_.with_modulus(theta, modulus, state_.done));
+    points.push_back(moduli.to_unconstrained(trials.back()));
+    record.trials.emplace_back(trials.back()[plan_.facts().moduli.front()], infinite);
+  }
+  std::atomic<int> done = 0;
+  const auto tell = [&](std::size_t i, const CostEvaluation& e) {
+    if (e.succeeded) record.trials[i].second = e.cost;
+    FitEvent event{StageKind::Scan, stage.name, 0, int(i) + 1, e.cost, 0.0, e.surface_rms(), trials[i]};
+    const double part = double(++done) / double(trials.size());
+    event.fraction_done = stage.done_from + (stage.done_to - stage.done_from) * part;
+    emit(std::move(event));
+    return !is_interrupted();
+  };
+  if (recordings_.all_static())
+    evaluate_downwards(objective, points, tell);
+  else
+    (void)objective.evaluate(points, tell);
+  is_cut = is_interrupted();
+  if (!is_cut && best_of_scan(record.trials, 1).empty())
+    throw InputError({{recordings_.front().capture.file},
+                      "no stiffness between " + in_three_digits(stage.trials.front()) +
+                          " Pa and ten thousand times that can be simulated",
+                      "",
+                      "check mass, gravity and the size of the scan"});
+  return record;
+}
+
+/// What was not estimated and spoils the recordings, as their residuals at the estimate show.
+StageRecord FitRun::test_corrections(const Stage& stage) {
+  const VectorX& theta = stage.from.front();
+  StageRecord record{stage.id, stage.name, theta, theta};
+  record.succeeded = true;
+  if (const StageRecord* estimate = plan_.estimate(state_.done)) record.cost = estimate->cost;
+  std::vector<std::string> chosen;
+  for (const auto& [name, change] : options_.parameters) chosen.push_back(name);
+  const std::vector<Correction> possible = possible_corrections(plan_.facts().parameters, chosen);
+  ParameterSet with_all = plan_.facts().parameters;
+  for (const Correction& c : possible)
+    for (const std::string& name : c.parameters) with_all.set_estimated(name, true);
+  with_all.set_reference(theta);
+  Objective objective = objective_of(stage, with_all, grid(stage.grid));
+  const CostEvaluation e = objective.linearise(with_all.to_unconstrained(theta));
+  if (!e.succeeded) return record;
+  for (const NeededCorrection& needed : needed_corrections(e, with_all, possible, e.independent_observations())) {
+    record.told += (record.told.empty() ? "" : " and ") + needed.correction.what;
+    for (const std::string& name : needed.correction.parameters) record.corrected.push_back(name);
+  }
+  return record;
+}
+
+// What came out -------------------------------------------------------------------------------------------------------
+
+FitOutcome FitRun::run() {
+  execute();
+  FitState end = reached();
+  if (interrupted_ && !plan_.estimate(end.done)) {
+    bool is_cut = false;
+    end.done.push_back(minimise_stage(plan_.last_look(end), is_cut));
+  }
+  finish(end.done);
+  return std::move(outcome_);
+}
+
+void FitRun::finish(const std::vector<StageRecord>& done) {
+  // Starts run side by side; their history is told in an order that does not depend on who was faster.
+  std::ranges::stable_sort(outcome_.history, {},
+                           [](const FitEvent& e) { return std::tuple(e.kind, e.start, e.iteration); });
+  const StageRecord* first = plan_.estimate(done);
+  if (first) say_corrections(done, *first);
+  const auto failed =
+      std::ranges::find_if(done, [](const StageRecord& r) { return is_on_full_grid(r.id.kind) && !r.succeeded; });
+  const StageRecord& last = first ? refined(done, *first) : *failed;
+  const Grid& at = grid(spacing_of(last));
+  ParameterSet parameters = plan_.estimated(done);
+  parameters.set_reference(last.theta);
+  outcome_.starts = plan_.starts(done);
+  outcome_.start_theta = plan_.start_theta(done);
+  outcome_.cells = at.cells;
+  outcome_.converged = last.converged && !interrupted_;
+  outcome_.reason = interrupted_ ? "interrupted" : last.reason;
+  outcome_.theta = last.theta;
+  outcome_.parameters = recordings_.with_field_prior(parameters, at);
+  outcome_.final_cost = last.cost;
+  Stage narrow{last.id, last.name, spacing_of(last)};
+  narrow.band = options_.fine_band;
+  outcome_.start_cost = objective_of(narrow, parameters_of(narrow, outcome_.start_theta), at).evaluate(VectorX(0)).cost;
+  outcome_.evaluation = evaluation_of(last, narrow, parameters);
+  for (std::size_t r = 0; r < recordings_.all().size(); ++r) {
+    const Discretisation& d = at.recording[r];
+    outcome_.recordings.push_back({d, outcome_.theta, outcome_.evaluation.of_recording(int(r)),
+                                   Simulation(d.body, d.simulation).rest_body(outcome_.theta)});
+  }
+  if (outcome_.evaluation.succeeded && parameters.dimension() > 0) add_uncertainty(outcome_);
+  if (outcome_.evaluation.succeeded && !interrupted_) time_steps(narrow, parameters);
+  if (const StageRecord* swing = find_record(done, {StageKind::Swing}); swing && !swing->told.empty())
+    outcome_.notes.push_back(swing->told);
+  std::vector<const Capture*> captures;
+  for (const Recording& r : recordings_.all()) captures.push_back(&r.capture);
+  add_notes(outcome_, captures);
+}
+
+/// With derivatives; that of the optimiser where it ran here.
+CostEvaluation FitRun::evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters) {
+  const auto ended = std::ranges::find(ended_, record.id, &Ended::id);
+  const bool is_whole = ended != ended_.end() &&
+                        (!record.succeeded || parameters.dimension() == 0 || ended->evaluation.gauss_newton.size() > 0);
+  if (is_whole) return std::move(ended->evaluation);
+  return objective_of(narrow, parameters, grid(narrow.grid)).linearise(parameters.to_unconstrained(record.theta));
+}
+
+void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate) {
+  const StageRecord* test = find_record(done, {StageKind::Test});
+  if (!test || test->corrected.empty()) return;
+  outcome_.notes.push_back(
+      "The residuals showed that " + test->told +
+      " needed correction, which was estimated along with the "
+      "material: the cost fell from " +
+      in_three_digits(test->cost) + " to " + in_three_digits(estimate.cost) + ". Without it Young's modulus was " +
+      in_three_digits(test->theta[plan_.facts().moduli.front()]) + " Pa; correct = false leaves it so.");
+}
+
+Spacing FitRun::spacing_of(const StageRecord& record) const {
+  if (record.id.kind == StageKind::Finer) return plan_.facts().repetitions[std::size_t(record.id.number)];
+  return {options_.cells, options_.steps};
+}
+
+/// The estimate on the finest mesh; that at all resolutions goes into the outcome.
+const StageRecord& FitRun::refined(const std::vector<StageRecord>& done, const StageRecord& first) {
+  std::vector<const StageRecord*> all = {&first};
+  for (const StageRecord& r : done) {
+    if (r.id.kind != StageKind::Finer) continue;
+    if (r.succeeded)
+      all.push_back(&r);
+    else
+      outcome_.notes.push_back("The estimate could not be repeated at " + r.name + ": " + r.reason + ".");
+  }
+  if (options_.refine <= 1 || (all.size() == 1 && interrupted_)) return first;
+  std::vector<RefinedEstimate> estimates;
+  for (const StageRecord* r : all) {
+    const Spacing spacing = spacing_of(*r);
+    estimates.push_back({spacing.cells, spacing.steps, r->elements, r->theta, r->cost, r->converged, r->reason});
+  }
+  outcome_.refinement = extrapolate(std::move(estimates), plan_.estimated(done));
+  return *all[std::size_t(outcome_.refinement.finest)];
+}
+
+void FitRun::time_steps(const Stage& narrow, const ParameterSet& parameters) {
+  Objective objective =
+      recordings_.objective(grid(narrow.grid), parameters, narrow.band, [](const Recording&) { return 20; });
+  const VectorX p = parameters.to_unconstrained(parameters.reference());
+  auto begin = std::chrono::steady_clock::now();
+  const CostEvaluation forward = objective.evaluate(p);
+  const double forward_seconds = seconds_since(begin);
+  begin = std::chrono::steady_clock::now();
+  const CostEvaluation both = objective.gradient(p);
+  const double both_seconds = seconds_since(begin);
+  if (forward.steps == 0 || both.steps == 0) return;
+  outcome_.ms_per_forward_step = 1000.0 * forward_seconds / forward.steps;
+  outcome_.ms_per_adjoint_step = 1000.0 * std::max(0.0, both_seconds - forward_seconds) / both.steps;
 }
 
 }  // namespace pliant

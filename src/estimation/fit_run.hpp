@@ -1,70 +1,91 @@
 #pragma once
 
-#include <cmath>
+#include <atomic>
 #include <functional>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "estimation/fit.hpp"
+#include "estimation/fit_plan.hpp"
 #include "estimation/recordings.hpp"
 
 namespace pliant {
 
-/// What the parts of a fit share: its recordings, where it stands, and what it has found. Internal to `fit`.
-struct FitRun {
+/// Carries out a plan: asks it for stages, runs them, keeps their records in the state, tells and saves what is done,
+/// and stops where it is interrupted. Internal to `fit`.
+class FitRun {
+ public:
   /// Throws InputError where a recording cannot be fitted, with the reason.
   FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, FitState state);
 
-  /// Whether any object is let go and swings.
-  bool swings() const { return recordings.any_released(); }
-  /// The same parameters at another theta, none estimated.
-  ParameterSet fixed_at(const VectorX& theta) const;
-  /// With the pulls that hold a released object as they are expected beforehand.
-  VectorX without_pulls(VectorX theta) const;
-  /// Whether a parameter is a force that holds a released object until it is let go.
-  static bool is_pull(const Parameter& p) { return p.role == Role::Initial && p.is_auxiliary; }
-  static OptimiserState start_of(const ParameterSet& parameters) {
-    return {0, parameters.to_unconstrained(parameters.reference()), {}};
-  }
-
-  bool interrupted() const { return monitor.interrupted && monitor.interrupted(); }
-  /// Tells and keeps it; from any thread.
-  void emit(FitEvent event);
-  void save_state() {
-    if (monitor.on_state) monitor.on_state(state);
-  }
-
-  /// One minimisation, told as iterations from `counter` on, which it moves on; from any thread.
-  /// @param on_state  after each iteration; may be empty
-  OptimiserSummary optimise(Objective& objective, const OptimiserState& from, StageKind kind, const std::string& stage,
-                            int start, int iterations, int& counter, double done_from, double done_to,
-                            const std::function<void(const OptimiserState&)>& on_state = {});
-
-  /// On finer grids, after the first estimate.
-  std::vector<Spacing> repetitions() const;
-  /// Of a repetition, in units of the first estimate's: a warm start needs few iterations.
-  double work(const Spacing& s) const { return 0.3 * s.steps / options.steps * std::pow(s.cells / options.cells, 3); }
-
-  FitOptions options;
-  FitMonitor monitor;
-  FitState state;
-  FitOutcome outcome;
-  Recordings recordings;
-  ParameterSet parameters;
-  Grid coarse, fine;
-  std::mutex mutex;  ///< of the outcome's history and steps, and of the monitor
+  /// To the end of the plan, or until it is interrupted, and what came out.
+  /// Throws InputError where no stiffness can be simulated.
+  FitOutcome run();
 
  private:
+  /// Until the plan has no more stages.
+  void execute();
+  void run_chain(const StageChain& chain);
+  /// Nothing where it was interrupted: `partial_` has what it reached.
+  std::optional<StageRecord> run_stage(const Stage& stage);
+  StageRecord minimise_stage(const Stage& stage, bool& is_interrupted);
+  StageRecord find_pulls(const Stage& stage, bool& is_interrupted);
+  StageRecord find_swing(const Stage& stage);
+  StageRecord scan(const Stage& stage, bool& is_interrupted);
+  StageRecord test_corrections(const Stage& stage);
+
+  /// One minimisation, told as iterations of the stage; from any thread.
+  OptimiserSummary optimise(Objective& objective, const Stage& stage, const OptimiserState& from);
+  ParameterSet parameters_of(const Stage& stage, const VectorX& theta) const;
+  Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const;
+  const Grid& grid(const Spacing& spacing);
+
+  bool is_interrupted() const { return monitor_.interrupted && monitor_.interrupted(); }
+  /// Tells and keeps it; from any thread.
+  void emit(FitEvent event);
+  void keep(StageRecord record);
+  void save();
+
+  PlanFacts facts();
+  /// The modulus that is enough for scans that sag [Pa]; 0: there are none.
+  double carrying_modulus(const VectorX& theta);
+  std::optional<double> given_start(const std::string& name) const;
   double all_work() const;
+
+  /// The state with what was interrupted among its records.
+  FitState reached() const;
+
+  void finish(const std::vector<StageRecord>& done);
+  CostEvaluation evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters);
+  void say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate);
+  const StageRecord& refined(const std::vector<StageRecord>& done, const StageRecord& first);
+  Spacing spacing_of(const StageRecord& record) const;
+  void time_steps(const Stage& narrow, const ParameterSet& parameters);
+
+  /// What the optimiser found at the end of a stage on the full grid.
+  struct Ended {
+    StageId id;
+    CostEvaluation evaluation;
+  };
+
+  FitOptions options_;
+  FitMonitor monitor_;
+  FitState state_;
+  FitOutcome outcome_;
+  Recordings recordings_;
+  std::shared_ptr<const ParameterLayout> layout_;
+  std::vector<std::unique_ptr<Grid>> grids_;
+  FitPlan plan_;
+  std::vector<StageRecord> partial_;  // of stages that were interrupted
+  std::vector<Ended> ended_;          // in this run
+  std::atomic<bool> interrupted_ = false;
+  std::mutex mutex_;  // of all above that stages write, and of the monitor
 };
 
-/// Where the stages on the full grid may begin, into the outcome's `starts`: how the object moves at first, a scan over
-/// decades of Young's modulus or the swing that was seen, and the best values followed on the coarse grid. Goes on from
-/// the state. Throws InputError where no stiffness can be simulated.
-void find_starts(FitRun& run);
-
-/// For people.
-std::string in_three_digits(double value);
+/// The fit of motions and equilibria: what `fit` does where there is more than presses.
+FitOutcome fit_motions(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
+                       FitState resume);
 
 }  // namespace pliant

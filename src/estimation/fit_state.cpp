@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/7";
+constexpr const char* format = "fit-state/9";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -79,80 +79,6 @@ FitState::Tracking to_tracking(const Json& json) {
   return tracking;
 }
 
-Json to_json(const FitState& state) {
-  Json json = {
-      {"controls", state.controls}, {"scan", Json::array()}, {"starts", Json::array()}, {"notes", state.notes}};
-  for (const auto& [modulus, cost] : state.scan) json["scan"].push_back({modulus, from_cost(cost)});
-  for (const FitStart& s : state.starts)
-    json["starts"].push_back({{"start", from_vector(s.start)},
-                              {"final", from_vector(s.final)},
-                              {"start_cost", from_cost(s.start_cost)},
-                              {"cost", from_cost(s.cost)},
-                              {"iterations", s.iterations},
-                              {"converged", s.converged},
-                              {"reason", s.reason}});
-  if (state.motion) json["motion"] = from_vector(*state.motion);
-  if (const auto& fine = state.fine)
-    json["fine"] = {{"stage", fine->stage},
-                    {"reference", from_vector(fine->reference)},
-                    {"iterations", fine->optimiser.iterations},
-                    {"p", from_vector(fine->optimiser.p)},
-                    {"memory", from_vector(fine->optimiser.memory)}};
-  if (const auto& c = state.corrected)
-    json["corrected"] = {{"parameters", c->parameters},
-                         {"what", c->what},
-                         {"cost", from_cost(c->cost)},
-                         {"youngs_modulus", c->youngs_modulus}};
-  json["refined"] = Json::array();
-  for (const RefinedEstimate& e : state.refined)
-    json["refined"].push_back({{"cells", e.cells},
-                               {"steps", e.steps},
-                               {"elements", e.elements},
-                               {"theta", from_vector(e.theta)},
-                               {"cost", from_cost(e.cost)},
-                               {"converged", e.converged},
-                               {"reason", e.reason}});
-  if (state.field) json["field"] = from_field(*state.field);
-  if (state.tracking) json["tracking"] = from_tracking(*state.tracking);
-  return json;
-}
-
-FitState to_state(const Json& json) {
-  FitState state;
-  state.controls = json.at("controls").get<int>();
-  for (const Json& entry : json.at("scan")) state.scan.emplace_back(entry.at(0).get<double>(), to_cost(entry.at(1)));
-  for (const Json& s : json.at("starts"))
-    state.starts.push_back({to_vector(s.at("start")), to_vector(s.at("final")), to_cost(s.at("start_cost")),
-                            to_cost(s.at("cost")), s.at("iterations").get<int>(), s.at("converged").get<bool>(),
-                            s.at("reason").get<std::string>()});
-  if (json.contains("motion")) state.motion = to_vector(json["motion"]);
-  if (json.contains("fine")) {
-    const Json& fine = json["fine"];
-    state.fine = {fine.at("stage").get<int>(),
-                  to_vector(fine.at("reference")),
-                  {fine.at("iterations").get<int>(), to_vector(fine.at("p")), to_vector(fine.at("memory"))}};
-  }
-  if (json.contains("corrected")) {
-    const Json& c = json["corrected"];
-    state.corrected = {c.at("parameters").get<std::vector<std::string>>(), c.at("what").get<std::string>(),
-                       to_cost(c.at("cost")), c.at("youngs_modulus").get<double>()};
-  }
-  for (const Json& e : json.at("refined"))
-    state.refined.push_back({e.at("cells").get<double>(), e.at("steps").get<double>(), e.at("elements").get<int>(),
-                             to_vector(e.at("theta")), to_cost(e.at("cost")), e.at("converged").get<bool>(),
-                             e.at("reason").get<std::string>()});
-  state.notes = json.at("notes").get<std::vector<std::string>>();
-  if (json.contains("field")) state.field = to_field(json["field"]);
-  if (json.contains("tracking")) state.tracking = to_tracking(json["tracking"]);
-  return state;
-}
-
-}  // namespace
-
-namespace {
-
-constexpr const char* press_format = "press-fit-state/3";
-
 Json from_matrix(const MatrixX& m) {
   return {{"rows", m.rows()}, {"values", std::vector<double>(m.data(), m.data() + m.size())}};
 }
@@ -200,64 +126,142 @@ std::vector<ZoneCut> to_cuts(const Json& json) {
   return cuts;
 }
 
-Json to_json(const PressFitState& state) {
+Json from_optimiser(const OptimiserState& o) {
+  return {{"iterations", o.iterations}, {"p", from_vector(o.p)}, {"memory", from_vector(o.memory)}};
+}
+OptimiserState to_optimiser(const Json& json) {
+  return {json.at("iterations").get<int>(), to_vector(json.at("p")), to_vector(json.at("memory"))};
+}
+
+Json from_law(const FitState::LawSearch& law) {
   Json json = {{"done", Json::array()}, {"samples", Json::array()}};
-  for (const PressFitState::Done& d : state.done)
-    json["done"].push_back({{"terms", d.form.terms},
-                            {"controls", d.form.controls},
-                            {"laws", d.form.laws},
-                            {"own_ratios", d.form.own_ratios},
+  for (const FitState::LawSearch::Done& d : law.done)
+    json["done"].push_back({{"terms", d.tried.form.terms},
+                            {"controls", d.tried.form.controls},
+                            {"laws", d.tried.form.laws},
+                            {"own_ratios", d.tried.form.own_ratios},
+                            {"neo_hookean", d.tried.form.two_numbers == TwoNumberLaw::NeoHookean},
+                            {"cost", from_cost(d.tried.cost)},
+                            {"against", from_cost(-d.tried.evidence)},
+                            {"kept", d.tried.kept},
                             {"cuts", from_cuts(d.cuts)},
                             {"theta", from_vector(d.theta)},
-                            {"cost", from_cost(d.cost)},
-                            {"against", from_cost(-d.evidence)},
-                            {"noise", d.noise},
-                            {"kept", d.kept}});
-  for (const PressSample& s : state.samples) json["samples"].push_back(from_sample(s));
-  json["under_way"] = {{"iterations", state.under_way.iterations},
-                       {"p", from_vector(state.under_way.p)},
-                       {"memory", from_vector(state.under_way.memory)},
-                       {"cuts", from_cuts(state.cuts)}};
+                            {"noise", d.noise}});
+  for (const PressSample& s : law.samples) json["samples"].push_back(from_sample(s));
+  json["under_way"] = from_optimiser(law.under_way);
+  json["cuts"] = from_cuts(law.cuts);
   return json;
 }
 
-PressFitState to_press_state(const Json& json) {
-  PressFitState state;
+FitState::LawSearch to_law(const Json& json) {
+  FitState::LawSearch law;
   for (const Json& d : json.at("done"))
-    state.done.push_back({{d.at("controls").get<int>(), d.at("terms").get<int>(), d.at("laws").get<int>(),
-                           d.at("own_ratios").get<bool>()},
-                          to_cuts(d.at("cuts")),
-                          to_vector(d.at("theta")),
-                          to_cost(d.at("cost")),
-                          -to_cost(d.at("against")),
-                          d.at("noise").get<double>(),
-                          d.at("kept").get<bool>()});
-  for (const Json& s : json.at("samples")) state.samples.push_back(to_sample(s));
-  const Json& under_way = json.at("under_way");
-  state.under_way = {under_way.at("iterations").get<int>(), to_vector(under_way.at("p")),
-                     to_vector(under_way.at("memory"))};
-  state.cuts = to_cuts(under_way.at("cuts"));
+    law.done.push_back({{{d.at("controls").get<int>(), d.at("terms").get<int>(), d.at("laws").get<int>(),
+                          d.at("own_ratios").get<bool>(),
+                          d.at("neo_hookean").get<bool>() ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear},
+                         to_cost(d.at("cost")),
+                         -to_cost(d.at("against")),
+                         d.at("kept").get<bool>()},
+                        to_cuts(d.at("cuts")),
+                        to_vector(d.at("theta")),
+                        d.at("noise").get<double>()});
+  for (const Json& s : json.at("samples")) law.samples.push_back(to_sample(s));
+  law.under_way = to_optimiser(json.at("under_way"));
+  law.cuts = to_cuts(json.at("cuts"));
+  return law;
+}
+
+Json from_id(const StageId& id) { return {int(id.kind), id.start, id.number}; }
+StageId to_id(const Json& json) {
+  const int kind = json.at(0).get<int>();
+  if (kind < 0 || kind > int(StageKind::Sample)) throw std::runtime_error("a stage of an unknown kind");
+  return {StageKind(kind), json.at(1).get<int>(), json.at(2).get<int>()};
+}
+
+Json from_record(const StageRecord& r) {
+  Json json = {{"stage", from_id(r.id)},
+               {"name", r.name},
+               {"from", from_vector(r.from)},
+               {"theta", from_vector(r.theta)},
+               {"start_cost", from_cost(r.start_cost)},
+               {"cost", from_cost(r.cost)},
+               {"iterations", r.iterations},
+               {"succeeded", r.succeeded},
+               {"converged", r.converged},
+               {"reason", r.reason},
+               {"elements", r.elements},
+               {"corrected", r.corrected},
+               {"told", r.told},
+               {"trials", Json::array()}};
+  for (const auto& [modulus, cost] : r.trials) json["trials"].push_back({modulus, from_cost(cost)});
+  return json;
+}
+
+StageRecord to_record(const Json& json) {
+  StageRecord r;
+  r.id = to_id(json.at("stage"));
+  r.name = json.at("name").get<std::string>();
+  r.from = to_vector(json.at("from")), r.theta = to_vector(json.at("theta"));
+  r.start_cost = to_cost(json.at("start_cost")), r.cost = to_cost(json.at("cost"));
+  r.iterations = json.at("iterations").get<int>();
+  r.succeeded = json.at("succeeded").get<bool>(), r.converged = json.at("converged").get<bool>();
+  r.reason = json.at("reason").get<std::string>();
+  r.elements = json.at("elements").get<int>();
+  r.corrected = json.at("corrected").get<std::vector<std::string>>();
+  r.told = json.at("told").get<std::string>();
+  for (const Json& t : json.at("trials")) r.trials.emplace_back(t.at(0).get<double>(), to_cost(t.at(1)));
+  return r;
+}
+
+Json to_json(const FitState& state) {
+  Json json = {{"controls", state.controls}, {"done", Json::array()}};
+  for (const StageRecord& r : state.done) json["done"].push_back(from_record(r));
+  if (const auto& stage = state.under_way)
+    json["under_way"] = {{"stage", from_id(stage->id)},
+                         {"from", from_vector(stage->from)},
+                         {"optimiser", from_optimiser(stage->optimiser)}};
+  if (const auto& begin = state.begin) json["begin"] = {{"theta", from_vector(begin->theta)}, {"stage", begin->stage}};
+  if (state.field) json["field"] = from_field(*state.field);
+  if (state.tracking) json["tracking"] = from_tracking(*state.tracking);
+  if (state.law) json["law"] = from_law(*state.law);
+  return json;
+}
+
+FitState to_state(const Json& json) {
+  FitState state;
+  state.controls = json.at("controls").get<int>();
+  for (const Json& r : json.at("done")) state.done.push_back(to_record(r));
+  if (json.contains("under_way")) {
+    const Json& stage = json["under_way"];
+    state.under_way = {to_id(stage.at("stage")), to_vector(stage.at("from")), to_optimiser(stage.at("optimiser"))};
+  }
+  if (json.contains("begin"))
+    state.begin = {to_vector(json["begin"].at("theta")), json["begin"].at("stage").get<int>()};
+  if (json.contains("field")) state.field = to_field(json["field"]);
+  if (json.contains("tracking")) state.tracking = to_tracking(json["tracking"]);
+  if (json.contains("law")) state.law = to_law(json["law"]);
   return state;
 }
 
-void write_state(const std::filesystem::path& path, Json json, const char* kind, const std::string& key) {
-  json["format"] = kind;
+}  // namespace
+
+void write_fit_state(const std::filesystem::path& path, const FitState& state, const std::string& key) {
+  Json json = to_json(state);
+  json["format"] = format;
   json["key"] = key;
   write_file(path, json.dump(1));
 }
 
-/// The state of that kind and key, as `make` understands it.
-template <class Make>
-auto read_state(const std::filesystem::path& path, const char* kind, const std::string& key, const Make& make) {
+FitState read_fit_state(const std::filesystem::path& path, const std::string& key) {
   try {
     const Json json = Json::parse(read_file(path));
-    if (json.at("format") != kind) throw std::runtime_error("another format");
+    if (json.at("format") != format) throw std::runtime_error("another format");
     if (json.at("key") != key)
       throw InputError({{path},
                         "the interrupted fit was of another capture or with other choices",
                         "the same ones",
                         "leave out --resume to start anew, or give the same capture and options"});
-    return make(json);
+    return to_state(json);
   } catch (const InputError&) {
     throw;
   } catch (const std::exception& error) {
@@ -266,24 +270,6 @@ auto read_state(const std::filesystem::path& path, const char* kind, const std::
                       "",
                       "leave out --resume to start anew"});
   }
-}
-
-}  // namespace
-
-void write_fit_state(const std::filesystem::path& path, const FitState& state, const std::string& key) {
-  write_state(path, to_json(state), format, key);
-}
-
-FitState read_fit_state(const std::filesystem::path& path, const std::string& key) {
-  return read_state(path, format, key, [](const Json& json) { return to_state(json); });
-}
-
-void write_press_state(const std::filesystem::path& path, const PressFitState& state, const std::string& key) {
-  write_state(path, to_json(state), press_format, key);
-}
-
-PressFitState read_press_state(const std::filesystem::path& path, const std::string& key) {
-  return read_state(path, press_format, key, [](const Json& json) { return to_press_state(json); });
 }
 
 }  // namespace pliant

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "estimation/press_fit.hpp"
+#include "estimation/fit.hpp"
 
 namespace pliant {
 
@@ -12,9 +12,5 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
 
 /// Reads it back. Throws InputError where the file is damaged or belongs to another capture or other options.
 FitState read_fit_state(const std::filesystem::path& path, const std::string& key);
-
-/// The same of a fit of presses.
-void write_press_state(const std::filesystem::path& path, const PressFitState& state, const std::string& key);
-PressFitState read_press_state(const std::filesystem::path& path, const std::string& key);
 
 }  // namespace pliant

@@ -47,7 +47,7 @@ double carrying_modulus(const std::shared_ptr<const Body>& body, const Simulatio
   ReferenceShapeOptions options;
   options.by_parts = false;
   options.max_iterations = 30;
-  ReferenceShapeSolver shape(body, held, scene.blocks, options);
+  ReferenceShapeSolver shape(body, held, scene_material(scene), scene.blocks, options);
   const Points load = scan_load(*body, scene.blocks, theta, scene.weights);
   const auto scale = [&](double factor) { scene.blocks.scale_moduli(theta, factor); };
   const LinearStatics statics(body, held, scene.blocks, theta);

@@ -76,6 +76,7 @@ class CurveTrial : public Trial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  [[nodiscard]] std::unique_ptr<Trial> anew() const override { return std::make_unique<CurveTrial>(*this); }
 
   /// Goes on with another form of the law.
   void set_layout(const LawLayout& layout, const ParameterSet& parameters);

@@ -23,6 +23,8 @@ class MotionTrial::Comparison {
       least_size_ = std::max(least_size_, Eigen::Index(block.first + block.size));
   }
 
+  const ObservedMotion& motion() const { return motion_; }
+  int number() const { return number_; }
   bool hold_shape(const VectorX& theta) { return simulation_.hold_shape(theta).empty(); }
 
   CostEvaluation run(const VectorX& theta, const MatrixX& all_directions);
@@ -314,5 +316,9 @@ CostEvaluation MotionTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
 }
 
 bool MotionTrial::hold_shape(const VectorX& theta) { return comparison_->hold_shape(theta); }
+
+std::unique_ptr<Trial> MotionTrial::anew() const {
+  return std::make_unique<MotionTrial>(comparison_->motion(), comparison_->number());
+}
 
 }  // namespace pliant

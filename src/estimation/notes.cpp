@@ -1,10 +1,15 @@
 #include "estimation/notes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace pliant {
+
+std::string in_three_digits(double value) { return fmt::format("{:.3g}", value); }
 
 namespace {
 
@@ -93,9 +98,59 @@ void say_what_shape(FitOutcome& outcome) {
   }
 }
 
+std::string spoken_law(const LawForm& form) {
+  if (form.terms == 0) return form.two_numbers == TwoNumberLaw::NeoHookean ? "a neo-Hookean law" : "a linear law";
+  return fmt::format("Ogden's law of {} term{}{}", form.terms, form.terms == 1 ? "" : "s",
+                     form.own_ratios ? " with Poisson's ratios of their own" : "");
+}
+
+void say_what_law(FitOutcome& outcome) {
+  const std::optional<LawLayout>& law = outcome.recordings.front().discretisation.simulation.law_layout;
+  if (law)
+    outcome.notes.push_back("The material is " + spoken_law(law->form()) +
+                            "; Young's modulus and Poisson's ratio are those of small strains.");
+}
+
+std::string form_of(const LawForm& form, const Capture& capture) {
+  const std::string law = spoken_law(form);
+  if (form.laws > 1)
+    return law + fmt::format(", one for each of {} {}", form.laws, capture.scene.regions.empty() ? "zones" : "regions");
+  return form.controls > 1 ? law + fmt::format(" with {} moduli", form.controls) : law;
+}
+
+std::string verdict_on(const TriedLaw& tried) {
+  const bool was_fitted = std::isfinite(tried.cost);
+  const char* verdict = tried.kept ? "kept" : was_fitted ? "not kept" : "not fitted";
+  if (!std::isfinite(tried.evidence)) return tried.kept ? "tried first" : verdict;
+  return fmt::format("{}, ln of the evidence for it {:.1f}{}", verdict, tried.evidence,
+                     was_fitted ? "" : " by what a step promises");
+}
+
+std::string told(const SampledMaterial& sampled, const std::vector<PressSample>& samples) {
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  for (const PressSample& s : samples) least = std::min(least, s.weight), most = std::max(most, s.weight);
+  return fmt::format(
+      "The sampled material has {:.1f} samples an element, from {} presses; the weight of smoothness was chosen by "
+      "the noise in each, between {:.3g} and {:.3g}. Its stress misses that of the presses' own fields by "
+      "{:.1f} % of the greatest, root mean square. The parameters above are those of the law that it is smooth "
+      "about.",
+      sampled.mean_samples, samples.size(), least, most, 100.0 * sampled.stress_misfit);
+}
+
 }  // namespace
 
+void add_law_notes(std::vector<std::string>& notes, const LawOutcome& law, const Capture& capture) {
+  for (const TriedLaw& tried : law.tried)
+    notes.push_back(fmt::format("{}: {}", form_of(tried.form, capture), verdict_on(tried)));
+  for (std::size_t c = 0; c < law.cuts.size(); ++c)
+    notes.push_back(fmt::format("Zones: {}.", describe(law.cuts[c], int(c) + 1)));
+  if (!law.scene->presses.empty())
+    notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * law.noise));
+  if (law.sampled) notes.push_back(told(*law.sampled, law.samples));
+}
+
 void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures) {
+  say_what_law(outcome);
   say_what_anchors(outcome, *captures.front());
   if (outcome.correlation.size() > 0) {
     say_what_is_inseparable(outcome);

@@ -4,7 +4,13 @@
 
 namespace pliant {
 
+/// For people.
+std::string in_three_digits(double value);
+
 /// Adds plain sentences about what the estimate can and cannot be trusted for.
 void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures);
+
+/// What forms of a law were tried, its zones and its noise, in plain sentences.
+void add_law_notes(std::vector<std::string>& notes, const LawOutcome& law, const Capture& capture);
 
 }  // namespace pliant

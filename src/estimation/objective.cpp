@@ -1,6 +1,7 @@
 #include "estimation/objective.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <stdexcept>
 
@@ -66,11 +67,38 @@ CostEvaluation Objective::run(const VectorX& p, bool with_tangents) {
 
 bool Objective::hold_shapes(const VectorX& p) {
   const VectorX theta = parameters_.to_theta(p);
+  held_ = p;
   return std::ranges::all_of(trials_, [&](const auto& trial) { return trial->hold_shape(theta); });
 }
 
 CostEvaluation Objective::evaluate(const VectorX& p) { return run(p, false); }
 CostEvaluation Objective::linearise(const VectorX& p) { return run(p, true); }
+
+std::optional<Objective> Objective::anew() const {
+  std::vector<std::unique_ptr<Trial>> trials;
+  for (const auto& trial : trials_) {
+    trials.push_back(trial->anew());
+    if (!trials.back()) return std::nullopt;
+  }
+  Objective same(std::move(trials), parameters_);
+  if (held_.size() > 0 && !same.hold_shapes(held_)) return std::nullopt;
+  return same;
+}
+
+std::vector<CostEvaluation> Objective::evaluate(std::span<const VectorX> points, const OnEvaluated& on_evaluated) {
+  if (!anew()) return CostFunction::evaluate(points, on_evaluated);
+  std::vector<CostEvaluation> all(points.size());
+  std::atomic<bool> goes_on = true;
+  parallel_tasks(points.size(), [&](std::size_t i) {
+    if (!goes_on) {
+      all[i].failure = "left out";
+      return;
+    }
+    all[i] = anew()->run(points[i], false);
+    if (on_evaluated && !on_evaluated(i, all[i])) goes_on = false;
+  });
+  return all;
+}
 
 CostEvaluation Objective::gradient(const VectorX& p) {
   const VectorX theta = parameters_.to_theta(p);

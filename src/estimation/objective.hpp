@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "estimation/motion_trial.hpp"
@@ -30,18 +31,26 @@ class Objective : public CostFunction {
   [[nodiscard]] bool hold_shapes(const VectorX& p);
 
   [[nodiscard]] CostEvaluation evaluate(const VectorX& p) override;
+  /// Side by side, each with trials of its own that nothing was run of yet: what one costs depends neither on the
+  /// others nor on what was evaluated before. Where a trial cannot be had anew, one after the other with the
+  /// objective's own.
+  [[nodiscard]] std::vector<CostEvaluation> evaluate(std::span<const VectorX> points,
+                                                     const OnEvaluated& on_evaluated = {}) override;
   /// By tangents.
   [[nodiscard]] CostEvaluation linearise(const VectorX& p) override;
   /// By the adjoint.
   [[nodiscard]] CostEvaluation gradient(const VectorX& p) override;
 
  private:
+  /// The same objective as if nothing had been run yet; nothing where a trial cannot be had anew.
+  std::optional<Objective> anew() const;
   CostEvaluation run(const VectorX& p, bool with_tangents);
   /// The priors, and what the trials say, summed in their order.
   CostEvaluation sum(const VectorX& p, std::vector<CostEvaluation> parts, bool has_gradient, bool has_matrix) const;
 
   ParameterSet parameters_;
   std::vector<std::unique_ptr<Trial>> trials_;
+  VectorX held_;  // p that shapes are held at; empty: they follow
 };
 
 }  // namespace pliant

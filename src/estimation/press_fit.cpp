@@ -7,12 +7,15 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "estimation/curve_fit.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
+#include "estimation/fit_config.hpp"
+#include "estimation/notes.hpp"
 #include "estimation/problem.hpp"
 
 namespace pliant {
@@ -75,8 +78,9 @@ VectorX with_term(const LawLayout& from, const VectorX& theta, const LawLayout& 
 
 class PressFit {
  public:
-  PressFit(const Capture& capture, const PressFitOptions& options, const PressFitMonitor& monitor, PressFitState state)
-      : capture_(capture), options_(options), monitor_(monitor), state_(std::move(state)) {
+  PressFit(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState state)
+      : capture_(capture), options_(options), monitor_(monitor), all_state_(std::move(state)) {
+    if (!all_state_.law) all_state_.law.emplace();
     if (const std::string wrong = options.validate(); !wrong.empty())
       throw InputError({{capture.file}, wrong, "", "see `pliant fit --help`"});
     if (!capture.scene.object.surface)
@@ -86,7 +90,7 @@ class PressFit {
                         "scan the object and name the mesh in capture.toml"});
     Resolution resolution;
     resolution.cells = options.cells;
-    resolution.element = options.quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
+    resolution.element = options.element.value_or(ElementKind::Tetrahedron);
     std::vector<Vector3> control_points;
     const auto body = make_body_of(capture.scene, SignedDistance(), resolution, control_points);
     scene_ = std::make_shared<PressScene>(make_press_scene(capture, body));
@@ -97,21 +101,20 @@ class PressFit {
                         "no static test is to be fitted",
                         "a block [[press]], [[indentation]], [[grip]] or [[material_curve]] whose role is \"fit\"",
                         ""});
-    if (fitted_.empty() && options.material == PressMaterial::Sampled)
+    if (fitted_.empty() && options.material == MaterialKind::Sampled)
       throw InputError({{capture.file},
                         "material=sampled and no press to fit",
                         "blocks [[press]], whose markers show where the object is how stiff",
-                        "leave out material, or choose ogden or linear"});
+                        "leave out material, or choose ogden, neo_hookean or linear"});
     regions_ = body->modulus.controls > 1;
-    noise_ = options.noise > 0.0 ? options.noise : scene_->noise;
+    noise_ = options.marker_noise > 0.0 ? options.marker_noise : scene_->noise;
   }
 
-  PressFitOutcome run() {
-    outcome_.scene = scene_;
-    const bool is_linear = options_.material == PressMaterial::Linear;
-    const int first = is_linear ? 0 : options_.material == PressMaterial::Sampled ? 1 : std::max(1, options_.terms);
-    if (!fit_first(is_linear ? 0 : std::min(first, 1))) return finish();
-    if (options_.material == PressMaterial::Ogden) {
+  FitOutcome run() {
+    const bool has_two_numbers =
+        options_.material == MaterialKind::Linear || options_.material == MaterialKind::NeoHookean;
+    if (!fit_first(has_two_numbers ? 0 : 1)) return finish();
+    if (options_.material == MaterialKind::Ogden || options_.material == MaterialKind::Automatic) {
       fit_terms(2);
       if (regions_)
         fit_laws_of_regions();
@@ -120,7 +123,7 @@ class PressFit {
       fit_terms(3);  // an object of several materials looks like one of more terms
       if (!regions_ && best_->layout.form().laws == 1) fit_fields();
     }
-    if (!interrupted_ && options_.material == PressMaterial::Sampled) fit_samples();
+    if (!interrupted_ && options_.material == MaterialKind::Sampled) fit_samples();
     return finish();
   }
 
@@ -152,9 +155,9 @@ class PressFit {
 
   ParameterSet parameters_of(const Form& form) const {
     ParameterSet set = zone_parameters(form.layout, start_modulus(), options_.modulus_variation);
-    if (options_.poissons_ratio)
+    if (const auto known = known_poissons_ratio(options_))
       for (const Parameter& p : set.parameters())
-        if (p.transform == Transform::LogitHalf) set.fix(p.name, *options_.poissons_ratio);
+        if (p.transform == Transform::LogitHalf) set.fix(p.name, *known);
     if (!form.points.empty())
       set.set_joint_prior(form.layout.modulus_names(),
                           field_precision(form.points, form.scene->body->size(), options_.modulus_variation));
@@ -174,7 +177,7 @@ class PressFit {
     o.max_iterations = is_brief ? brief_iterations : options_.max_iterations;
     o.damps_long_steps = true;
     OptimiserState from;
-    if (!is_brief) from = std::exchange(state_.under_way, {}), state_.cuts = form.cuts;
+    if (!is_brief) from = std::exchange(search().under_way, {}), search().cuts = form.cuts;
     if (from.p.size() != e.parameters.dimension()) from = {0, e.parameters.to_unconstrained(theta), {}};
     OptimiserSummary s;
     // Twice: contact is as stiff, and outliers weigh as little, as the law and the noise at the beginning say.
@@ -190,12 +193,12 @@ class PressFit {
       objective.emplace(std::move(*next));
       if (!s.succeeded) break;
       e.parameters.set_reference(e.parameters.to_theta(s.p));
-      if (!is_brief && options_.noise <= 0.0)
+      if (!is_brief && options_.marker_noise <= 0.0)
         noise_ = robust_deviation(objective->residuals(), 1e-6 * scene_->body->size());
       objective->set_options({noise_, outlier_scale});
       from = {0, s.p, {}};
     }
-    if (!is_brief) state_.under_way = {}, state_.cuts.clear();
+    if (!is_brief) search().under_way = {}, search().cuts.clear();
     if (!s.succeeded) {
       if (!is_brief) outcome_.notes.push_back(stage + ": " + s.reason);
       return std::nullopt;
@@ -212,14 +215,16 @@ class PressFit {
   }
 
   void keep_under_way(OptimiserState state, const std::vector<ZoneCut>& cuts) {
-    state_.under_way = std::move(state);
-    state_.cuts = cuts;
-    if (monitor_.on_state) monitor_.on_state(state_);
+    search().under_way = std::move(state);
+    search().cuts = cuts;
+    save();
   }
 
   void report(const std::string& stage, int iteration, double cost, const PressObjective& objective,
               const VectorX& theta, const LawLayout& layout) {
-    PressFitEvent event{stage, iteration, cost, 0.0, 0.0};
+    FitEvent event;
+    event.kind = StageKind::Law, event.stage = stage, event.iteration = iteration, event.cost = cost;
+    event.theta = theta, event.layout = std::make_shared<ParameterLayout>(layout.layout());
     const std::vector<double> residuals = objective.residuals();
     double sum = 0.0;
     for (const double r : residuals) sum += r * r;
@@ -228,8 +233,7 @@ class PressFit {
     const int controls = layout.form().controls;
     for (int k = 0; k < controls; ++k) log += std::log(theta[layout.modulus(k)]) / controls;
     event.youngs_modulus = std::exp(log);
-    if (monitor_.on_event) monitor_.on_event(event);
-    outcome_.history.push_back(event);
+    emit(std::move(event));
   }
 
   Estimate begun(const Form& form, const VectorX& theta) const {
@@ -242,19 +246,19 @@ class PressFit {
   }
 
   /// What an interrupted fit had done of this form, if anything.
-  const PressFitState::Done* done_before(const LawForm& form) const {
-    const auto it = std::ranges::find(state_.done, form, &PressFitState::Done::form);
-    return it == state_.done.end() ? nullptr : &*it;
+  const FitState::LawSearch::Done* done_before(const LawForm& form) const {
+    const auto it =
+        std::ranges::find(search().done, form, [](const FitState::LawSearch::Done& d) { return d.tried.form; });
+    return it == search().done.end() ? nullptr : &*it;
   }
 
   /// Keeps the estimate as the best, where it is that, and writes down that it was tried.
   void conclude(std::optional<Estimate> next, const TriedLaw& tried, double noise_before,
                 const std::vector<ZoneCut>& cuts = {}) {
-    outcome_.tried.push_back(tried);
+    law_.tried.push_back(tried);
     if (!interrupted_ && !done_before(tried.form)) {
-      state_.done.push_back(
-          {tried.form, cuts, next ? next->theta : VectorX(), tried.cost, tried.evidence, noise_, tried.kept});
-      if (monitor_.on_state) monitor_.on_state(state_);
+      search().done.push_back({tried, cuts, next ? next->theta : VectorX(), noise_});
+      save();
     }
     if (tried.kept)
       best_ = std::move(next);
@@ -276,8 +280,12 @@ class PressFit {
   }
 
   bool fit_first(int terms) {
-    const Form form{layout_of({scene_->body->modulus.controls, terms}), scene_};
-    auto first = estimate(form, parameters_of(form).reference(), terms == 0 ? "linear" : "1 term");
+    const bool is_neo_hookean = options_.material == MaterialKind::NeoHookean;
+    const LawForm law{scene_->body->modulus.controls, terms, 1, false,
+                      is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear};
+    const Form form{layout_of(law), scene_};
+    const char* const stage = terms > 0 ? "1 term" : is_neo_hookean ? "neo-Hookean" : "linear";
+    auto first = estimate(form, parameters_of(form).reference(), stage);
     if (terms == 1 && scene_->static_tests().any_to_fit() && !done_before(form.layout.form()) && !stop())
       try_other_sign(form, first);
     if (!first) {
@@ -314,23 +322,23 @@ class PressFit {
       tried.evidence =
           0.5 * n * std::log(squares_of(best_->evaluation, noise_) / squares_of(next->evaluation, noise_)) -
           0.5 * more * std::log(n);
-      tried.kept =
-          (options_.terms > 0 && layout.form().terms > best_->layout.form().terms) || tried.evidence > needed_evidence;
+      tried.kept = (options_.law_terms > 0 && layout.form().terms > best_->layout.form().terms) ||
+                   tried.evidence > needed_evidence;
     }
     conclude(std::move(next), tried, noise, form.cuts);
     return tried.kept && !interrupted_;
   }
 
   void fit_terms(int most) {
-    if (options_.terms > 0) most = std::min(most, options_.terms);
+    if (options_.law_terms > 0) most = std::min(most, options_.law_terms);
     while (best_->layout.form().terms < most && !stop()) {
       LawForm form = best_->layout.form();
       ++form.terms;
-      if (std::ranges::find(outcome_.tried, form, &TriedLaw::form) != outcome_.tried.end()) break;
+      if (std::ranges::find(law_.tried, form, &TriedLaw::form) != law_.tried.end()) break;
       const std::string stage = std::to_string(form.terms) + " terms";
       const LawLayout layout = layout_of(form);
       if (!fit_freer(layout, with_term(best_->layout, best_->theta, layout), stage)) break;
-      if (form.own_ratios || options_.poissons_ratio || stop()) continue;
+      if (form.own_ratios || known_poissons_ratio(options_) || stop()) continue;
       form.own_ratios = true;
       const LawLayout apart = layout_of(form);
       fit_freer(apart, carry_law(best_->layout, best_->theta, apart, as_they_are(form)), stage + " apart");
@@ -346,26 +354,26 @@ class PressFit {
 
   void fit_zones() {
     if (!scene_->static_tests().curves.empty()) return;  // of a specimen: the object is of one material
-    const int most = options_.zones > 0 ? options_.zones : options_.control_points > 1 ? 1 : most_zones;
+    const int most = options_.law_zones > 0 ? options_.law_zones : options_.control_points > 1 ? 1 : most_zones;
     for (int zones = 2; zones <= most; ++zones)
       if (stop() || !fit_zone(zones)) return;
   }
 
   /// One zone more than there are. False where that is not kept.
   bool fit_zone(int zones) {
-    const bool is_chosen = options_.zones > 0;
+    const bool is_chosen = options_.law_zones > 0;
     const LawForm form{zones, best_->layout.form().terms, zones, best_->layout.form().own_ratios};
     const LawLayout layout = layout_of(form);
     std::optional<PromisedCut> promised;
     std::vector<ZoneCut> cuts = best_->cuts;
-    const PressFitState::Done* done = done_before(form);
+    const FitState::LawSearch::Done* done = done_before(form);
     if (done && !done->cuts.empty()) {
       cuts = done->cuts;
     } else if (done) {
-      outcome_.tried.push_back({form, done->cost, done->evidence, done->kept});
+      law_.tried.push_back(done->tried);
       return false;
-    } else if (state_.under_way.p.size() > 0 && int(state_.cuts.size()) == zones - 1) {
-      cuts = state_.cuts;
+    } else if (search().under_way.p.size() > 0 && int(search().cuts.size()) == zones - 1) {
+      cuts = search().cuts;
     } else {
       PressObjective objective = objective_of(*best_);
       promised = most_promising_cut(objective, *best_->scene, best_->layout, best_->theta, best_->cuts,
@@ -427,12 +435,12 @@ class PressFit {
         noise_ = e.noise;
     }
     e.start_cost = start_cost;
-    state_.under_way = {}, state_.cuts.clear();
+    search().under_way = {}, search().cuts.clear();
   }
 
   /// A law of its own for each region, against one shape of the law for all.
   void fit_laws_of_regions() {
-    if (options_.zones == 1 || stop()) return;
+    if (options_.law_zones == 1 || stop()) return;
     const double noise = noise_;
     const LawForm& one = best_->layout.form();
     const LawLayout layout = layout_of({one.controls, one.terms, one.controls, one.own_ratios});
@@ -444,7 +452,7 @@ class PressFit {
       tried.evidence =
           own_laws_evidence(next->evaluation, next->parameters, next->parameters.to_unconstrained(next->theta), layout,
                             options_.modulus_variation);
-      tried.kept = options_.zones > 1 || tried.evidence > needed_evidence;
+      tried.kept = options_.law_zones > 1 || tried.evidence > needed_evidence;
     }
     conclude(std::move(next), tried, noise);
   }
@@ -481,8 +489,7 @@ class PressFit {
     TriedLaw tried{layout.form(), infinite, -infinite, false};
     std::optional<Estimate> next;
     const bool is_chosen = options_.control_points > 1;
-    if (const auto* done = done_before(layout.form()); done && done->theta.size() == 0)
-      tried.cost = done->cost, tried.evidence = done->evidence;
+    if (const auto* done = done_before(layout.form()); done && done->theta.size() == 0) tried = done->tried;
     if (is_chosen || done_before(layout.form()) || promises(form, start, carried, tried)) {
       next = estimate(form, start, std::to_string(size) + " control points");
       if (next) {
@@ -515,7 +522,7 @@ class PressFit {
     SampleFitOptions options;
     options.noise = noise_;
     options.max_iterations = options_.max_iterations;
-    std::vector<PressSample>& samples = state_.samples;
+    std::vector<PressSample>& samples = search().samples;
     std::mutex mutex;
     // A few at a time, so that an interruption loses little.
     const std::size_t batch = 4;
@@ -526,20 +533,21 @@ class PressFit {
         SampleFitOptions own = options;
         const ObservedPress& seen = scene_->presses[std::size_t(fitted_[i])];
         // The misfit of one law for all is no noise: what a press' markers show by themselves is, where that is less.
-        if (options_.noise <= 0.0)
+        if (options_.marker_noise <= 0.0)
           own.noise = std::min(noise_, std::max(marker_noise(seen), 1e-3 * seen.greatest_displacement));
         part[i - begin] = fit_sample(*scene_, fitted_[i], start, smoothness, own);
       });
       for (PressSample& sample : part) {
-        PressFitEvent event{"press " + std::to_string(samples.size() + 1), sample.iterations, sample.weight, sample.rms,
-                            start.youngs_modulus};
-        if (monitor_.on_event) monitor_.on_event(event);
-        outcome_.history.push_back(event);
+        FitEvent event;
+        event.kind = StageKind::Sample, event.stage = "press " + std::to_string(samples.size() + 1);
+        event.iteration = sample.iterations, event.cost = sample.weight, event.marker_rms = sample.rms;
+        event.youngs_modulus = start.youngs_modulus;
+        emit(std::move(event));
         samples.push_back(std::move(sample));
       }
-      if (monitor_.on_state) monitor_.on_state(state_);
+      save();
     }
-    outcome_.samples = samples;
+    law_.samples = samples;
     std::vector<MaterialSample> usable;
     for (std::size_t i = 0; i < samples.size(); ++i)
       if (samples[i].succeeded)
@@ -548,82 +556,95 @@ class PressFit {
         outcome_.notes.push_back(fmt::format("{} takes no part in the sampled material: {}",
                                              scene_->presses[std::size_t(fitted_[i])].name, samples[i].failure));
     if (usable.empty()) return;
-    outcome_.sampled = sample_material(usable, options_.basis);
+    law_.sampled = sample_material(usable, {options_.basis_tolerance, options_.basis_samples});
   }
 
-  PressFitOutcome finish() {
+  FitOutcome finish() {
     outcome_.interrupted = interrupted_;
+    outcome_.cells = options_.cells;
     if (!best_) return std::move(outcome_);
     Estimate& e = *best_;
-    outcome_.scene = e.scene;
-    outcome_.layout = e.layout;
+    law_.scene = e.scene, law_.layout = e.layout, law_.noise = e.noise, law_.cuts = e.cuts;
+    law_.law = press_law(*e.scene->body, e.layout, e.theta);
+    if (law_.sampled) law_.law = law_.sampled->law;
+    if (!interrupted_) law_.predictions = predict_presses(*e.scene, law_.law);
     outcome_.theta = e.theta;
     outcome_.parameters = e.parameters;
     outcome_.parameters.set_reference(e.theta);
     outcome_.evaluation = e.evaluation;
-    outcome_.noise = e.noise;
-    outcome_.start_cost = e.start_cost;
-    outcome_.control_points = e.points;
-    outcome_.cuts = e.cuts;
+    outcome_.start_cost = e.start_cost, outcome_.final_cost = e.evaluation.cost;
     outcome_.converged = e.converged && !interrupted_;
     outcome_.reason = interrupted_ ? "interrupted" : e.reason;
-    outcome_.covariance = parameter_covariance(e.evaluation);
-    outcome_.std = outcome_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-    const VectorX inverse = outcome_.std.cwiseMax(1e-300).cwiseInverse();
-    outcome_.correlation = inverse.asDiagonal() * outcome_.covariance * inverse.asDiagonal();
-    outcome_.law = press_law(*e.scene->body, e.layout, e.theta);
-    if (outcome_.sampled) outcome_.law = outcome_.sampled->law;
-    if (!interrupted_) outcome_.predictions = predict_presses(*e.scene, outcome_.law);
-    outcome_.succeeded = true;
+    add_uncertainty(outcome_);
+    outcome_.recordings.push_back(as_recording(e.scene->body, e.layout, outcome_));
+    outcome_.recordings.back().discretisation.control_points = e.points;
+    for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
+    add_law_notes(outcome_.notes, law_, capture_);
+    outcome_.law = std::move(law_);
     return std::move(outcome_);
   }
 
+  FitState::LawSearch& search() { return *all_state_.law; }
+  const FitState::LawSearch& search() const { return *all_state_.law; }
+  void save() {
+    if (monitor_.on_state) monitor_.on_state(all_state_);
+  }
+  void emit(FitEvent event) {
+    if (monitor_.on_event) monitor_.on_event(event);
+    outcome_.history.push_back(std::move(event));
+  }
+
   const Capture& capture_;
-  PressFitOptions options_;
-  const PressFitMonitor& monitor_;
-  PressFitState state_;
+  FitOptions options_;
+  const FitMonitor& monitor_;
+  FitState all_state_;
   std::shared_ptr<const PressScene> scene_;
   std::vector<int> fitted_;
   bool regions_ = false, interrupted_ = false;
   double noise_ = 0.0;
   std::optional<Estimate> best_;
-  PressFitOutcome outcome_;
+  LawOutcome law_;
+  FitOutcome outcome_;
 };
+
+/// What presses do not know is refused; what they merely do not use is told (`unused_choices`).
+void require_known(const Capture& capture, const FitOptions& options) {
+  const auto refuse = [&](const char* what, const char* advice) {
+    throw InputError({{capture.file}, what, "a fit of one capture's presses", advice});
+  };
+  if (options.element == ElementKind::Hexahedron)
+    refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
+           "leave out element, or choose tetrahedra or quadratic_tetrahedra");
+  if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
+  for (const auto& [name, choice] : options.parameters)
+    if (name != "poissons_ratio" || !choice.start || choice.estimated != false)
+      refuse("choices about single parameters, of which fits of static tests know a given Poisson's ratio alone",
+             "leave them out, or give poissons_ratio and poissons_ratio.estimate=false");
+}
 
 }  // namespace
 
-std::string PressFitOptions::validate() const {
-  if (!(cells >= 2.0 && cells <= 64.0)) return "cells must lie in 2..64";
-  if (terms < 0 || terms > 3) return "law_terms must lie in 1..3, or be 0: as many as the presses support";
-  if (zones < 0 || zones > 12) return "law_zones must lie in 1..12, or be 0: as many as the presses support";
-  if (zones > 1 && control_points > 1) return "law_zones and control_points cannot both be chosen";
-  if (control_points < 0 || control_points > 500) return "control_points must lie in 1..500, or be auto";
-  if (!(modulus_variation > 0.0 && modulus_variation <= 10.0)) return "modulus_variation must lie in (0, 10]";
-  if (!(noise >= 0.0)) return "marker_noise must not be negative";
-  if (max_iterations < 1) return "max_iterations must be at least 1";
-  if (!(basis.tolerance > 0.0) || basis.max_samples < 1) return "basis_tolerance must be positive, basis_samples >= 1";
-  return {};
+std::optional<double> known_poissons_ratio(const FitOptions& options) {
+  const auto known = options.parameters.find("poissons_ratio");
+  if (known == options.parameters.end() || !known->second.start || known->second.estimated != false)
+    return std::nullopt;
+  return (*known->second.start)[0];
 }
 
-PressFitOptions press_options(const FitOptions& options) {
-  PressFitOptions o;
-  o.material = options.material;
-  o.cells = options.cells;
-  o.quadratic = options.element == ElementKind::QuadraticTetrahedron;
-  o.terms = options.law_terms;
-  o.zones = options.law_zones;
-  o.control_points = std::max(0, options.control_points);
-  o.modulus_variation = options.modulus_variation;
-  o.noise = options.marker_noise;
-  o.max_iterations = options.max_iterations;
-  if (const auto known = options.parameters.find("poissons_ratio"); known != options.parameters.end())
-    if (known->second.start && known->second.estimated == false) o.poissons_ratio = (*known->second.start)[0];
-  o.basis = {options.basis_tolerance, options.basis_samples};
-  return o;
+RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const LawLayout& layout,
+                              const FitOutcome& outcome) {
+  RecordingOutcome recording;
+  recording.discretisation.body = recording.rest_body = body;
+  MaterialBlocks& material = recording.discretisation.simulation.blocks;
+  material.youngs_moduli.clear();
+  for (int k = 0; k < layout.form().controls; ++k) material.youngs_moduli.push_back(layout.modulus(k));
+  recording.theta = outcome.theta;
+  recording.evaluation = outcome.evaluation;
+  return recording;
 }
 
-PressFitOutcome fit_presses(const Capture& capture, const PressFitOptions& options, const PressFitMonitor& monitor,
-                            PressFitState resume) {
+FitOutcome fit_presses(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState resume) {
+  require_known(capture, options);
   if (is_of_material_curves(capture)) return fit_material_curves(capture, options);
   return PressFit(capture, options, monitor, std::move(resume)).run();
 }

@@ -45,7 +45,7 @@ ObservedPress observe_press(const Capture& capture, std::size_t i) {
 }
 
 RigidContact contact_of(const PressScene& scene, const Press& press, double youngs_modulus) {
-  ProbeOptions probe{press.glued ? ProbeKind::GluedDisc : ProbeKind::Punch, press.contact_centre, press.contact_radius,
+  ProbeOptions probe{press.glued ? ProbeKind::BondedDisc : ProbeKind::Punch, press.contact_centre, press.contact_radius,
                      press.probe ? press.probe->normal : press.force.normalized()};
   return probe_contact(*scene.body, probe, youngs_modulus);
 }

@@ -26,12 +26,24 @@ void PressedMaterial::set_form(std::shared_ptr<const Body> body, LawLayout layou
 
 PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
                        const VectorX& reference, const PressTrialOptions& options, int number)
+    : PressTrial(std::move(scene), press, material,
+                 ContactMaterial{material->law(reference), mean_modulus(material->body(), *material->law(reference))},
+                 options, number) {}
+
+PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
+                       const ContactMaterial& contact, const PressTrialOptions& options, int number)
     : scene_(std::move(scene)),
       press_(press),
       number_(number),
       material_(std::move(material)),
       options_(options),
-      body_(*scene_, press, material_->law(reference), mean_modulus(material_->body(), *material_->law(reference))) {}
+      contact_(contact),
+      body_(*scene_, press, contact_.law, contact_.youngs_modulus) {}
+
+std::unique_ptr<Trial> PressTrial::anew() const {
+  const auto material = std::make_shared<PressedMaterial>(material_->shared_body(), material_->layout());
+  return std::unique_ptr<Trial>(new PressTrial(scene_, press_, material, contact_, options_, number_));
+}
 
 bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight) {
   const ObservedPress& seen = scene_->presses[std::size_t(press_)];

@@ -50,12 +50,21 @@ class PressTrial : public Trial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  [[nodiscard]] std::unique_ptr<Trial> anew() const override;
 
   void set_options(const PressTrialOptions& options) { options_ = options; }
   /// Residuals of the last run [m], n x 3.
   const Points& residuals() const { return residuals_; }
 
  private:
+  /// How stiff the contact is: the law at the reference, and its mean modulus [Pa].
+  struct ContactMaterial {
+    std::shared_ptr<const MaterialLaw> law;
+    double youngs_modulus = 0.0;
+  };
+  PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
+             const ContactMaterial& contact, const PressTrialOptions& options, int number);
+
   /// The equilibrium and its cost. `slope` and `weight` are those of each coordinate's loss.
   bool compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight);
 
@@ -63,6 +72,7 @@ class PressTrial : public Trial {
   int press_, number_;
   std::shared_ptr<PressedMaterial> material_;
   PressTrialOptions options_;
+  ContactMaterial contact_;
   PressedBody body_;
   Points residuals_;
 };

@@ -5,6 +5,7 @@
 
 #include "base/error.hpp"
 #include "capture/markers.hpp"
+#include "estimation/press_law.hpp"
 
 namespace pliant {
 
@@ -93,6 +94,7 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.mismatch = make_mismatch(capture, d.distance, d.body, resolution, tracked);
   d.mismatch.sensors = blocks.sensors;
   d.simulation = make_simulation(capture.scene, *d.body, resolution, blocks.motion, parameters, settings);
+  d.simulation.law_layout = blocks.law;
   return d;
 }
 
@@ -117,7 +119,8 @@ std::vector<std::string> modulus_names(const Capture& capture, int controls) {
   return names;
 }
 
-CaptureParameters default_parameters(const Capture& capture, double volume, int controls, int pulls, int shapes) {
+CaptureParameters default_parameters(const Capture& capture, double volume, int controls, int pulls, int shapes,
+                                     const std::optional<LawForm>& law) {
   const double size = object_size(capture.scene);
   const double gravity = capture.scene.world.gravity ? capture.scene.world.gravity->norm() : gravity_guess;
   const double density = capture.scene.object.mass      ? *capture.scene.object.mass / volume
@@ -134,6 +137,7 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
       modulus_names(capture, controls));
   for (const std::string& sensor : sensor_names(capture)) blocks.sensors.push_back(add_sensor_blocks(layout, sensor));
   const MotionBlocks& m = blocks.motion;
+  if (law) blocks.law = LawLayout::of_motion(layout, m, *law);
   VectorX theta = VectorX::Zero(layout.size());
   m.set_moduli(theta, 20.0 * stress);
   theta[m.poissons_ratio] = 0.35;
@@ -169,13 +173,14 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   const bool moves = !capture.scene.initial.known && !capture.scene.timing.is_static;
   p.push_back(vector(layout, m.linear_velocity, speed, m.linear_velocity.vector(theta) / speed, 3.0, moves));
   p.push_back(vector(layout, m.angular_velocity, 1.0 / time, m.angular_velocity.vector(theta) * time, 3.0, moves));
+  set_planes(capture.scene.planes, m, theta);
   for (std::size_t i = 0; i < m.planes.size(); ++i) {
-    theta.segment<3>(m.planes[i].point) = capture.scene.planes[i].point;
-    theta.segment<3>(m.planes[i].normal) = capture.scene.planes[i].normal;
     Parameter plane = vector(layout, m.planes[i].whole(), size, Vector3::Zero(), 0.2, !capture.scene.planes[i].known);
     plane.transform = Transform::PlanePosition;
     plane.origin = theta.segment<6>(m.planes[i].whole());
     p.push_back(std::move(plane));
+    p.push_back(
+        scalar(layout, m.planes[i].friction, Transform::Shift, 0.0, 5.0, capture.scene.planes[i].friction, 0.5, false));
   }
   for (std::size_t k = 0; k < m.pulls.size(); ++k) {
     if (k < capture.scene.initial.pulls.size()) theta.segment<3>(m.pulls[k]) = capture.scene.initial.pulls[k];
@@ -194,6 +199,7 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     p.push_back(vector(layout, correction, 1.0, Vector3::Zero(), 1.0, true));
     p.back().is_auxiliary = true;
   }
+  for (int number = 0; law && number < law->laws; ++number) add_term_parameters(layout, *blocks.law, number, theta, p);
   return {ParameterSet(std::move(layout), std::move(p), std::move(theta)), std::move(blocks)};
 }
 

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "capture/capture.hpp"
@@ -34,6 +35,7 @@ Mismatch make_mismatch(const Capture& capture, const std::shared_ptr<const Signe
 struct CaptureBlocks {
   MotionBlocks motion;
   std::vector<SensorBlocks> sensors;
+  std::optional<LawLayout> law = {};  ///< of the object; none: corotated linear elasticity
 };
 
 /// Body, scene and mismatch of a capture.
@@ -63,8 +65,10 @@ struct CaptureParameters {
 /// @param controls  control moduli of the body: `modulus_names` tells what they are called
 /// @param pulls     that hold a released object: "pull@1", ... (see `Pull`)
 /// @param shapes    of the scan's correction: "scan_correction@1", ... (see `ShapeField`)
+/// @param law       of the object, whose own numbers ("exponent_1", ...) come last and are estimated under wide priors;
+///                  none: corotated linear elasticity
 CaptureParameters default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0,
-                                     int shapes = 0);
+                                     int shapes = 0, const std::optional<LawForm>& law = std::nullopt);
 
 /// What corrections of sensors apply to: each depth camera by its name, "clouds" and "markers".
 std::vector<std::string> sensor_names(const Capture& capture);

@@ -17,10 +17,15 @@ bool has_fitted_loads(const Capture& capture) {
   return std::ranges::any_of(capture.loads, [](const Load& load) { return is_fitted(load.role); });
 }
 
-void require_fittable(const Capture& capture) {
+void require_fittable(const Capture& capture, const FitOptions& options) {
   const auto refuse = [&](const std::string& found, const std::string& advice) {
     throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
   };
+  if (options.material == MaterialKind::Sampled)
+    throw InputError({{capture.file},
+                      "the object moves or hangs, and material=sampled",
+                      "material=linear, neo_hookean or ogden: stiffness is sampled under presses alone",
+                      "leave out material, or fit a capture that has nothing but presses"});
   if (!capture.scene.object.surface) refuse("there is no scan of the object at rest", "add [object] surface");
   if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty() && !has_fitted_loads(capture))
     refuse("there are no depth cameras, no clouds and no markers", "");
@@ -153,7 +158,8 @@ JointLayout join(const std::vector<CaptureParameters>& recordings, bool shares_d
       const ParameterHandle block = joint.layout.at(joint.name_of(name, r));
       return {block.first + handle.first - own.at(name).first, handle.size};
     };
-    CaptureBlocks blocks{recordings[r].blocks.motion.moved(there), {}};
+    CaptureBlocks blocks{recordings[r].blocks.motion.moved(there), {}, {}};
+    if (recordings[r].blocks.law) blocks.law = recordings[r].blocks.law->moved(there);
     for (const SensorBlocks& sensor : recordings[r].blocks.sensors) blocks.sensors.push_back(sensor.moved(there));
     joint.blocks.push_back(std::move(blocks));
   }
@@ -165,8 +171,8 @@ JointLayout joint_layout(const std::vector<RecordedCapture>& recordings, const F
   Resolution resolution;
   resolution.pulls = options.pull_points;
   for (const RecordedCapture& r : recordings)
-    parameters.push_back(
-        default_parameters(r.capture, 1.0, controls, pull_count(r.capture.scene, resolution), options.scan_points));
+    parameters.push_back(default_parameters(r.capture, 1.0, controls, pull_count(r.capture.scene, resolution),
+                                            options.scan_points, options.law_of_motion()));
   return join(parameters, shares_density(parameters, options));
 }
 
@@ -202,7 +208,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                                          std::vector<std::string>& notes) {
   recording.capture = std::move(recorded.capture);
   Capture& capture = recording.capture;
-  require_fittable(capture);
+  require_fittable(capture, options_);
   if (capture.scene.timing.times.empty())
     capture.scene.timing.times = {0.0}, capture.scene.timing.is_static = true;  // loads and presses alone
   for (const Load& load : capture.loads)
@@ -231,9 +237,9 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
     recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
                                     recording.observations->back().frame);
   recording.distance = capture_distance(capture, widest_band());
-  CaptureParameters parameters =
-      default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
-                         pull_count(capture.scene, resolution(0.0, options_.steps)), options_.scan_points);
+  CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
+                                                    pull_count(capture.scene, resolution(0.0, options_.steps)),
+                                                    options_.scan_points, options_.law_of_motion());
   trust_planes_seen(parameters, planes_seen);
   return parameters;
 }
@@ -243,7 +249,14 @@ double Recordings::widest_band() const { return std::max(options_.wide_band, opt
 Resolution Recordings::resolution(double cells, double steps) const {
   Resolution r;
   const bool moves_reference = any_sags() || options_.scan_points > 0;
-  r.element = options_.element.value_or(moves_reference ? ElementKind::QuadraticTetrahedron : ElementKind::Hexahedron);
+  const bool has_law = options_.law_of_motion().has_value();
+  r.element = options_.element.value_or(moves_reference || has_law ? ElementKind::QuadraticTetrahedron
+                                                                   : ElementKind::Hexahedron);
+  if (has_law && r.element == ElementKind::Hexahedron)
+    throw InputError({{front().capture.file},
+                      "a material law, and element=hexahedra",
+                      "tetrahedra: hexahedra are linear in turning frames",
+                      "leave out element, or choose quadratic_tetrahedra; or leave out material"});
   if (moves_reference && r.element == ElementKind::Hexahedron)
     throw InputError({{front().capture.file},
                       any_sags() ? "the scan was taken sagging (shape_is = \"static\"), and element=hexahedra"
@@ -336,7 +349,8 @@ void Recordings::add_loads(const Recording& recording, const Discretisation& d, 
 void Recordings::add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
                              const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const {
   constexpr double outlier_scale = 6.0, least_noise = 1e-4;  // deviations; times the object's size
-  const auto material = std::make_shared<PressedMaterial>(scene->body, LawLayout::linear(recording.blocks.motion));
+  const LawLayout law = recording.blocks.law.value_or(LawLayout::linear(recording.blocks.motion));
+  const auto material = std::make_shared<PressedMaterial>(scene->body, law);
   for (std::size_t i = 0; i < scene->presses.size(); ++i) {
     const ObservedPress& seen = scene->presses[i];
     if (!is_fitted(seen.role)) continue;

@@ -11,10 +11,9 @@ namespace {
 constexpr double outlier_scale = 6.0;  // standard deviations of a press's coordinate
 
 StartObjective of_static_tests(const Capture& capture, const FitOptions& options) {
-  const PressFitOptions choices = press_options(options);
   Resolution resolution;
-  resolution.cells = choices.cells;
-  resolution.element = choices.quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
+  resolution.cells = options.cells;
+  resolution.element = options.element.value_or(ElementKind::Tetrahedron);
   std::vector<Vector3> control_points;
   const auto body = make_body_of(capture.scene, SignedDistance(), resolution, control_points);
   const auto scene = std::make_shared<PressScene>(make_press_scene(capture, body));
@@ -22,10 +21,12 @@ StartObjective of_static_tests(const Capture& capture, const FitOptions& options
   for (int i = 0; i < int(scene->presses.size()); ++i)
     if (scene->presses[std::size_t(i)].role == "fit") fitted.push_back(i);
   const int controls = body->modulus.controls;
-  const LawLayout layout({controls, choices.material == PressMaterial::Linear ? 0 : 1},
+  const bool is_neo_hookean = options.material == MaterialKind::NeoHookean;
+  const int terms = is_neo_hookean || options.material == MaterialKind::Linear ? 0 : 1;
+  const LawLayout layout({controls, terms, 1, false, is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear},
                          controls > 1 ? modulus_names(capture, controls) : std::vector<std::string>{});
   const ParameterSet parameters = law_parameters(layout, (fitted.empty() ? 1.0 : 2.0) * punch_modulus(*scene, 0.3));
-  const double noise = choices.noise > 0.0 ? choices.noise : scene->noise;
+  const double noise = options.marker_noise > 0.0 ? options.marker_noise : scene->noise;
   const auto objective =
       std::make_shared<PressObjective>(scene, fitted, layout, parameters, PressTrialOptions{noise, outlier_scale});
   return {{objective, &objective->cost()}, parameters.to_unconstrained(parameters.reference())};

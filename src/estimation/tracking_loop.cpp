@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "estimation/fit_run.hpp"
 #include "estimation/followed.hpp"
 #include "estimation/recordings.hpp"
 
@@ -25,6 +26,7 @@ std::string text_of(const char* format, double value) {
 }
 
 TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOptions& options) {
+  if (options.law_of_motion()) return TrackingUse::Off;  // the tracker's own elasticity is linear
   if (options.tracking != TrackingUse::Automatic) return options.tracking;
   const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
     const Capture& c = r.capture;
@@ -167,7 +169,7 @@ class TrackingLoop {
       reached_ = state;
       save(state);
     };
-    FitOutcome outcome = fit(recordings, options, monitor, std::move(from));
+    FitOutcome outcome = fit_motions(recordings, options, monitor, std::move(from));
     for (FitEvent& event : outcome.history) {
       event.stage = name + ": " + event.stage;
       history_.emplace_back(controls_of(outcome), event);
@@ -176,19 +178,14 @@ class TrackingLoop {
     return outcome;
   }
 
-  /// The state that a fit has reached, with its estimate: a fit that goes on from it returns that.
-  FitState concluded(const FitOutcome& outcome) const {
-    FitState state = reached_.field && reached_.field->state ? *reached_.field->state : reached_;
-    state.refined = {{outcome.cells, options_.steps, outcome.recordings.front().discretisation.body->element_count(),
-                      outcome.theta, outcome.final_cost, outcome.converged, outcome.reason}};
-    return state;
-  }
+  /// The state that the fit has reached: one that goes on from it returns its estimate.
+  FitState concluded() const { return reached_.field && reached_.field->state ? *reached_.field->state : reached_; }
 
   /// And one that looks again from there, with other observations.
-  static FitState from_there(FitState state, const VectorX& theta) {
-    state.refined.clear();
-    if (state.fine) state.fine->reference = theta, state.fine->optimiser = {};
-    return state;
+  static FitState from_there(const FitState& state, const VectorX& theta) {
+    FitState begun = begun_from(state);
+    begun.begin->theta = theta;
+    return begun;
   }
 
   /// A parameter vector of all recordings with another number of control moduli: their mean in the logarithm where it
@@ -242,7 +239,7 @@ class TrackingLoop {
     VectorX theta = is_first ? VectorX() : state_.rounds.back().theta;
     FitOptions options = without_start(is_first ? options_ : with_chosen_controls(options_, controls));
     FitState from = std::exchange(left_, {});
-    bool is_resumed = !from.scan.empty() || from.motion || from.fine;
+    bool is_resumed = !from.done.empty() || from.under_way || from.begin;
     while (int(state_.rounds.size()) < options_.tracking_rounds) {
       const int round = int(state_.rounds.size());
       const std::vector<VectorX> own = theta.size() == 0 ? known_at_first() : to_follow_with(theta, controls);
@@ -261,7 +258,7 @@ class TrackingLoop {
       described_round.theta = theta, described_round.controls = controls;
       described_round.fit_rms = outcome_->evaluation.track_rms();
       described_round.change = change(moduli_before, layout_of(controls).blocks.front().motion.moduli(theta));
-      state_.loop = std::make_shared<FitState>(concluded(*outcome_));
+      state_.loop = std::make_shared<FitState>(concluded());
       state_.rounds.push_back(std::move(described_round));
       save({});
       if (state_.rounds.back().change < settled) break;
@@ -299,7 +296,7 @@ class TrackingLoop {
       outcome_ = std::move(*direct_);
       return false;
     }
-    if (direct_->evaluation.succeeded) state_.direct = std::make_shared<FitState>(concluded(*direct_));
+    if (direct_->evaluation.succeeded) state_.direct = std::make_shared<FitState>(concluded());
     if (!outcome_ && !resume_loop()) return stop(std::move(direct_));
     result_.loop = score(*outcome_), result_.direct = score(*direct_);
     state_.keeps_loop =
@@ -341,7 +338,7 @@ class TrackingLoop {
   /// The better one again, from where it is, with all frames.
   FitOutcome last() {
     const std::shared_ptr<const FitState> best = state_.keeps_loop ? state_.loop : state_.direct;
-    const VectorX& theta = best->refined.front().theta;
+    const VectorX& theta = estimate_of(*best)->theta;
     FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
     options = with_chosen_controls(std::move(options), best->controls);
     std::vector<FollowedRecording> all;
@@ -351,7 +348,7 @@ class TrackingLoop {
       stop(std::move(state_.keeps_loop ? outcome_ : direct_));
       return told(std::move(*outcome_));
     }
-    const bool goes_on = left_.fine.has_value();
+    const bool goes_on = left_.begin.has_value();
     FitState from = goes_on ? std::exchange(left_, {}) : from_there(*best, theta);
     FitOutcome outcome =
         fit_once(state_.keeps_loop ? followed_captures(all_) : all_, options, std::move(from), "all frames", 0.9, 1.0);

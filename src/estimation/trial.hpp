@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "estimation/cost.hpp"
 
 namespace pliant {
@@ -26,6 +28,10 @@ class Trial {
     (void)theta;
     return true;
   }
+
+  /// The same trial as if nothing had been run yet, for another thread; null where there can be only one. Shapes that
+  /// are held are not held in it.
+  [[nodiscard]] virtual std::unique_ptr<Trial> anew() const { return nullptr; }
 };
 
 }  // namespace pliant

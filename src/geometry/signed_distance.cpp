@@ -51,6 +51,31 @@ SignedDistance::Sample SignedDistance::sample(const Vector3& point) const {
   return s;
 }
 
+Matrix3 SignedDistance::hessian(const Vector3& point) const {
+  Vector3 t, outside;
+  const float* c = corner(point, t, outside);
+  const std::array<std::size_t, 3> stride = {1, std::size_t(size_.x()),
+                                             std::size_t(size_.x()) * std::size_t(size_.y())};
+  Matrix3 H = Matrix3::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    if (outside[i] != 0.0 || outside[j] != 0.0) continue;
+    const auto twist = [&](const float* at) {
+      return double(at[0]) - double(at[stride[std::size_t(i)]]) - double(at[stride[std::size_t(j)]]) +
+             double(at[stride[std::size_t(i)] + stride[std::size_t(j)]]);
+    };
+    H(i, j) = H(j, i) = ((1.0 - t[k]) * twist(c) + t[k] * twist(c + stride[std::size_t(k)])) / (spacing_ * spacing_);
+  }
+  const double distance = outside.norm();
+  if (distance == 0.0) return H;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      if (outside[i] == 0.0 || outside[j] == 0.0) continue;
+      H(i, j) = ((i == j ? 1.0 : 0.0) - outside[i] * outside[j] / (distance * distance)) / distance;
+    }
+  return H;
+}
+
 double SignedDistance::value(const Vector3& point) const { return sample(point).value; }
 
 }  // namespace pliant

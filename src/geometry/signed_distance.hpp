@@ -25,6 +25,9 @@ class SignedDistance {
 
   [[nodiscard]] double value(const Vector3& point) const;
   [[nodiscard]] Sample sample(const Vector3& point) const;
+  /// Second derivatives of the interpolant [1/m]: the mixed ones; where the gradient jumps, at the grid's planes, those
+  /// of one side.
+  [[nodiscard]] Matrix3 hessian(const Vector3& point) const;
 
   double spacing() const { return spacing_; }
   /// Box of the grid, not of the object.

@@ -2,8 +2,15 @@
 
 namespace pliant {
 
+std::optional<double> DeadLoad::potential(const Points& x) {
+  force_.setZero(x.rows(), 3);
+  add_force(x, force_);
+  const Eigen::Index n = rest_.rows();
+  return -force_.topRows(n).cwiseProduct(x.topRows(n) - rest_).sum();
+}
+
 Gravity::Gravity(const Body& body, const MotionBlocks& blocks)
-    : density_block_(blocks.density), gravity_block_(blocks.gravity) {
+    : DeadLoad(body.nodes), density_block_(blocks.density), gravity_block_(blocks.gravity) {
   Points ones = Points::Ones(body.node_count(), 3), sum = Points::Zero(body.node_count(), 3);
   body.add_mass_product(1.0, ones, sum);
   nodal_volume_ = sum.col(0);
@@ -30,7 +37,7 @@ void Gravity::add_force_adjoint(const Points&, const Points& w, Points&, Points&
 }
 
 HungWeights::HungWeights(const Body& body, const std::vector<HungWeight>& weights, const ParameterHandle& gravity)
-    : gravity_block_(gravity) {
+    : DeadLoad(body.nodes), gravity_block_(gravity) {
   std::vector<Vector3> at;
   for (const HungWeight& weight : weights) {
     at.push_back(weight.at);

@@ -6,16 +6,43 @@
 
 namespace pliant {
 
-/// Weight: f = rho M1 g.
-class Gravity : public ForceTerm {
+/// A force that does not depend on where the object is. Its potential is -f . (x - X).
+class DeadLoad : public ForceTerm {
  public:
-  Gravity(const Body& body, const MotionBlocks& blocks);
+  /// @param rest  where the potential is zero, n x 3 [m]; positions may have further rows
+  explicit DeadLoad(Points rest) : rest_(std::move(rest)) {}
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
-  void set_parameters(const VectorX& theta) override;
   void linearise(const Points&) override {}
-  void add_force(const Points& z, Points& force) override;
   void add_matrix(double, BlockMatrix&) override {}
+  std::optional<double> potential(const Points& x) override;
+
+ private:
+  Points rest_, force_;
+};
+
+/// Forces at nodes that are given as they are.
+class NodalLoad : public DeadLoad {
+ public:
+  explicit NodalLoad(const Body& body) : DeadLoad(body.nodes), forces_(Points::Zero(body.node_count(), 3)) {}
+  /// @param forces  n x 3 [N]
+  void set_forces(Points forces) { forces_ = std::move(forces); }
+  const Points& forces() const { return forces_; }
+  void set_parameters(const VectorX&) override {}
+  void add_force(const Points&, Points& force) override { force.topRows(forces_.rows()) += forces_; }
+  void add_force_tangent(const Points&, const Points&, const Points&, const VectorX&, Points&) override {}
+  void add_force_adjoint(const Points&, const Points&, Points&, Points&, VectorX&) override {}
+
+ private:
+  Points forces_;
+};
+
+/// Weight: f = rho M1 g.
+class Gravity : public DeadLoad {
+ public:
+  Gravity(const Body& body, const MotionBlocks& blocks);
+  void set_parameters(const VectorX& theta) override;
+  void add_force(const Points& z, Points& force) override;
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
@@ -34,7 +61,7 @@ struct HungWeight {
 };
 
 /// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is the stepper's (`Stepper::carry`).
-class HungWeights : public ForceTerm {
+class HungWeights : public DeadLoad {
  public:
   /// @param gravity  3, [m/s^2]
   HungWeights(const Body& body, const std::vector<HungWeight>& weights, const ParameterHandle& gravity);
@@ -42,12 +69,8 @@ class HungWeights : public ForceTerm {
   const std::vector<double>& masses() const { return mass_; }
   /// Nothing hangs while it is not active.
   void set_active(bool active) { is_active_ = active; }
-  Lag lag() const override { return Lag::Rotation; }
-  At at() const override { return At::End; }
   void set_parameters(const VectorX& theta) override { gravity_ = gravity_block_.vector(theta); }
-  void linearise(const Points&) override {}
   void add_force(const Points& z, Points& force) override;
-  void add_matrix(double, BlockMatrix&) override {}
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;

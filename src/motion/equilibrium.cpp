@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
+
+#include "motion/body_forces.hpp"
+#include "motion/continuation.hpp"
+#include "motion/statics.hpp"
 
 namespace pliant {
 
@@ -42,6 +46,67 @@ std::shared_ptr<const BlockPattern> with_rigid_bodies(const Body& body, const st
   return pattern;
 }
 
+/// What drives rigid bodies under force control: F on each, and the linear guide that it may keep to, a stiff spring
+/// across its axis. A force on the rows below the nodes'.
+class Drives : public ForceTerm {
+ public:
+  explicit Drives(int first_row, std::size_t count) : first_row_(first_row), controls_(count) {}
+  void set_controls(const std::vector<ProbeControl>& controls) { controls_ = controls; }
+  void set_guide_stiffness(double stiffness) { guide_stiffness_ = stiffness; }
+
+  Lag lag() const override { return Lag::Rotation; }
+  At at() const override { return At::End; }
+  void set_parameters(const VectorX&) override {}
+  void linearise(const Points&) override {}
+  void add_force(const Points& z, Points& force) override {
+    for_driven([&](Eigen::Index row, const ProbeControl& c) {
+      Vector3 f = c.force;
+      if (c.axis) f -= guide_stiffness_ * off_axis(c, z.row(row).transpose());
+      force.row(row) += f.transpose();
+    });
+  }
+  void add_matrix(double scale, BlockMatrix& matrix) override {
+    for_driven([&](Eigen::Index row, const ProbeControl& c) {
+      if (!c.axis) return;
+      const int diagonal = matrix.pattern().diagonal[std::size_t(row)];
+      Eigen::Map<Matrix3>(matrix.block(diagonal)) +=
+          scale * guide_stiffness_ * (Matrix3::Identity() - *c.axis * c.axis->transpose());
+    });
+  }
+  std::optional<double> potential(const Points& x) override {
+    double sum = 0.0;
+    for_driven([&](Eigen::Index row, const ProbeControl& c) {
+      const Vector3 u = x.row(row).transpose();
+      sum -= c.force.dot(u);
+      if (c.axis) sum += 0.5 * guide_stiffness_ * off_axis(c, u).squaredNorm();
+    });
+    return sum;
+  }
+  void add_force_tangent(const Points&, const Points&, const Points& d_z, const VectorX&, Points& force) override {
+    for_driven([&](Eigen::Index row, const ProbeControl& c) {
+      if (c.axis) force.row(row) -= guide_stiffness_ * across(*c.axis, d_z.row(row).transpose()).transpose();
+    });
+  }
+  void add_force_adjoint(const Points&, const Points& w, Points&, Points& z_bar, VectorX&) override {
+    for_driven([&](Eigen::Index row, const ProbeControl& c) {
+      if (c.axis) z_bar.row(row) -= guide_stiffness_ * across(*c.axis, w.row(row).transpose()).transpose();
+    });
+  }
+
+ private:
+  static Vector3 across(const Vector3& axis, const Vector3& v) { return v - axis * axis.dot(v); }
+  static Vector3 off_axis(const ProbeControl& c, const Vector3& u) { return across(*c.axis, u - c.translation); }
+  template <class Visit>
+  void for_driven(Visit&& visit) const {
+    for (std::size_t c = 0; c < controls_.size(); ++c)
+      if (controls_[c].kind == ProbeControl::Kind::Force) visit(first_row_ + Eigen::Index(c), controls_[c]);
+  }
+
+  int first_row_;
+  std::vector<ProbeControl> controls_;
+  double guide_stiffness_ = 0.0;
+};
+
 }  // namespace
 
 class Equilibrium::Solver {
@@ -55,10 +120,11 @@ class Equilibrium::Solver {
         controls_(contacts_.size()),
         pattern_(with_rigid_bodies(*body_, contacts_)),
         elasticity_(LawElasticity::make(body_, std::move(law), pattern_)),
-        matrix_(pattern_),
-        factor_(make_linear_solver(pattern_, {best_direct_kind(), 1e-10, 1})) {
+        load_(*body_),
+        drives_(n(), contacts_.size()),
+        statics_(body_, terms(), statics_options(), pattern_) {
+    for (std::size_t c = 0; c < contacts_.size(); ++c) contacts_[c].set_row(*body_, n() + int(c), *pattern_);
     dead_load_ = Points::Zero(n(), 3);
-    find_contact_blocks();
   }
 
   int n() const { return body_->node_count(); }
@@ -88,306 +154,85 @@ class Equilibrium::Solver {
   }
 
   SolveSummary solve(Placement& placement) {
-    Points z = joined(placement);
-    failure_.clear();
-    SolveSummary summary = follow(z, load_at(now(), 1.0));
-    if (!summary.converged) summary = in_steps(z = joined(placement), placement, summary.iterations);
-    placement = parted(z);
-    if (summary.converged) failure_.clear();
-    return summary;
-  }
-
-  SolveSummary in_steps(Points& z, const Placement& from, int iterations) {
-    // The start: what balances the placement's own pose, which bodies led to a place define by where they are.
-    Load begin{Points::Zero(n(), 3), controls_};
-    for (std::size_t c = 0; c < contacts_.size(); ++c) {
-      begin.controls[c].force = contacts_[c].force(from.nodes, from.translations.row(Eigen::Index(c)).transpose());
-      begin.controls[c].translation = from.translations.row(Eigen::Index(c)).transpose();
-    }
-    double done = 0.0, step = 0.5;
-    const double least = std::ldexp(1.0, -options_.max_halvings - 1);
-    Points good = z;
+    std::optional<Load> begin;
+    LoadContinuation steps({.first = 1.0, .least = std::ldexp(1.0, -options_.max_halvings - 1)});
+    Points good = joined(placement);
     SolveSummary summary;
-    while (done < 1.0) {
-      step = std::min(step, 1.0 - done);
-      z = good;
-      summary = follow(z, load_at(begin, done + step));
+    int iterations = 0;
+    failure_.clear();
+    while (const auto share = steps.next()) {
+      Points z = good;
+      if (*share < 1.0 && !begin) begin = balanced_by(placement);
+      summary = follow(z, *share < 1.0 ? load_at(*begin, *share) : Load{dead_load_, controls_});
       iterations += summary.iterations;
-      if (summary.converged) {
-        done += step, good = z, step *= 1.5;
-      } else if ((step *= 0.5) < least) {
-        z = good;
-        failure_ += "; the load was followed up to " + std::to_string(int(100.0 * done)) + " %";
-        break;
-      }
+      if (summary.converged) good = z;
+      steps.report(summary.converged ? LoadContinuation::Outcome::Carried : LoadContinuation::Outcome::NotFollowed);
     }
+    if (!steps.is_complete())
+      failure_ =
+          statics_.failure() + "; the load was followed up to " + std::to_string(int(100.0 * steps.carried())) + " %";
+    placement = parted(good);
     summary.iterations = iterations;
     return summary;
   }
 
+  /// What balances the placement's own pose: there is no other load, and bodies are where they are.
+  Load balanced_by(const Placement& placement) const {
+    Load begin{Points::Zero(n(), 3), controls_};
+    for (std::size_t c = 0; c < contacts_.size(); ++c) {
+      begin.controls[c].force =
+          contacts_[c].force(placement.nodes, placement.translations.row(Eigen::Index(c)).transpose());
+      begin.controls[c].translation = placement.translations.row(Eigen::Index(c)).transpose();
+    }
+    return begin;
+  }
+
   /// Newton's method under one load.
   SolveSummary follow(Points& z, const Load& load) {
-    place_led(z, load);
-    SolveSummary summary;
-    double energy = evaluate(z, load, true);
-    if (!std::isfinite(energy)) {
-      failure_ = "the energy is not finite at the initial configuration";
-      return summary;
-    }
-    for (;; ++summary.iterations) {
-      const double scale = assemble_gradient(z, load);
-      summary.residual = gradient_.norm() / scale;
-      if (summary.residual <= options_.tolerance) {
-        summary.converged = true;
-        return summary;
-      }
-      if (summary.iterations == options_.max_iterations) {
-        failure_ = "no equilibrium within " + std::to_string(options_.max_iterations) + " iterations";
-        return summary;
-      }
-      right_ = -flat(gradient_);
-      if (!step_by_last_factor(z, load)) {
-        if (!factorise(z, load, LawElasticity::Stiffness::Exact) &&
-            !factorise(z, load, LawElasticity::Stiffness::Positive) && !factorise_lifted()) {
-          failure_ = "the stiffness matrix is singular: insufficient Dirichlet constraints";
-          return summary;
-        }
-        factor_->solve(right_, step_);
-      }
-      const double slope = flat(gradient_).dot(step_);
-      if (!std::isfinite(slope) || slope >= 0.0) {
-        failure_ = "the stiffness is nearly singular";
-        return summary;
-      }
-      // What rounding leaves of the energy says nothing about steps that are smaller.
-      const double rounding = 1e-13 * (std::abs(energies_.elastic) + energies_.contact + std::abs(energies_.total));
-      const double last_norm = gradient_.norm();
-      double share = first_share();
-      bool moved = false;
-      for (int halving = 0; halving < 40; ++halving, share *= 0.5) {
-        trial_ = z + share * as_points(step_);
-        const double trial_energy = evaluate(trial_, load, true);
-        if (!std::isfinite(trial_energy)) continue;
-        bool accepted = trial_energy <= energy + 1e-4 * share * slope;
-        if (!accepted && -share * slope < 1e3 * rounding) {
-          assemble_gradient(trial_, load);
-          accepted = gradient_.norm() < last_norm;
-        }
-        if (!accepted) continue;
-        z.swap(trial_);
-        energy = trial_energy;
-        moved = true;
-        break;
-      }
-      if (!moved) {
-        evaluate(z, load, true);
-        assemble_gradient(z, load);
-        summary.converged = summary.residual < 1e3 * options_.tolerance;  // as far as rounding lets it
-        if (!summary.converged) failure_ = "no step lowers the energy";
-        return summary;
-      }
-    }
-  }
-
-  /// A rigid body that slides must not jump through the object.
-  double first_share() const {
-    if (std::ranges::all_of(contacts_, &RigidContact::is_glued)) return 1.0;
-    const double longest = as_points(step_).rowwise().norm().maxCoeff(), most = 0.1 * body_->size();
-    return longest > most ? most / longest : 1.0;
-  }
-
-  /// Loads as they are asked for.
-  Load now() const { return {dead_load_, controls_}; }
-
-  void place_led(Points& z, const Load& load) const {
     for (std::size_t c = 0; c < contacts_.size(); ++c)
       if (load.controls[c].kind == ProbeControl::Kind::Position)
         z.row(n() + Eigen::Index(c)) = load.controls[c].translation.transpose();
+    set_load(load);
+    return statics_.solve(z);
   }
 
-  double evaluate(const Points& z, const Load& load, bool with_tangent) {
-    x_ = z.topRows(n());
-    energies_ = {};
-    energies_.elastic = elasticity_->evaluate(x_, with_tangent);
-    if (!std::isfinite(energies_.elastic)) return energies_.elastic;
-    double loads = -load.dead.cwiseProduct(x_ - body_->nodes).sum();
-    for (std::size_t c = 0; c < contacts_.size(); ++c) {
-      const RigidContact& contact = contacts_[c];
-      const Vector3 u = z.row(n() + Eigen::Index(c)).transpose();
-      for (int i = 0; i < contact.points().point_count(); ++i)
-        energies_.contact += contact.potential(i, contact.points().position(i, x_) - u, false).energy;
-      const ProbeControl& control = load.controls[c];
-      if (control.kind == ProbeControl::Kind::Position) continue;
-      loads -= control.force.dot(u);
-      if (control.axis)
-        loads += 0.5 * guide_stiffness() * off_axis(*control.axis, u - control.translation).squaredNorm();
-    }
-    return energies_.total = energies_.elastic + energies_.contact + loads;
-  }
-
-  static Vector3 off_axis(const Vector3& axis, const Vector3& offset) { return offset - axis * axis.dot(offset); }
-  /// A guide is much stiffer than the object.
-  double guide_stiffness() const {
-    const double E = elasticity_->law().small_strain(0).youngs_modulus;
-    return 1e4 * E * body_->size();
-  }
-
-  /// Sets gradient_ (zero for what is held) at the last evaluation; returns the size of the forces that meet in it.
-  double assemble_gradient(const Points& z, const Load& load) {
-    gradient_ = Points::Zero(rows(), 3);
-    x_ = z.topRows(n());
-    nodal_ = Points::Zero(n(), 3);
-    elasticity_->add_gradient(nodal_);
-    double scale = nodal_.squaredNorm() + load.dead.squaredNorm();
-    nodal_ -= load.dead;
-    for (std::size_t c = 0; c < contacts_.size(); ++c) {
-      const RigidContact& contact = contacts_[c];
-      const Vector3 u = z.row(n() + Eigen::Index(c)).transpose();
-      Vector3 sum = Vector3::Zero();
-      double size = 0.0;
-      for (int i = 0; i < contact.points().point_count(); ++i) {
-        const auto p = contact.potential(i, contact.points().position(i, x_) - u, false);
-        if (p.energy == 0.0 && !contact.is_glued()) continue;  // does not touch
-        contact.points().add_transpose(i, p.gradient, nodal_);
-        sum -= p.gradient;
-        size += p.gradient.norm();
-      }
-      scale += size * size;
-      const ProbeControl& control = load.controls[c];
-      if (control.kind == ProbeControl::Kind::Position) continue;
-      scale += control.force.squaredNorm();
-      sum -= control.force;
-      if (control.axis) sum += guide_stiffness() * off_axis(*control.axis, u - control.translation);
-      gradient_.row(n() + Eigen::Index(c)) = sum.transpose();
-    }
-    gradient_.topRows(n()) = nodal_;
-    for (const int node : held_) gradient_.row(node).setZero();
-    return std::max(std::sqrt(scale), smallest_force());
-  }
-  /// Forces that meet count at least as that which strains the object by a thousandth.
-  double smallest_force() const {
-    const double size = body_->size();
-    return 1e-3 * elasticity_->law().small_strain(0).youngs_modulus * size * size;
-  }
-
-  /// Newton's step by conjugate gradients with the last factorisation as preconditioner. False where there is none,
-  /// they take too long, or the Hessian is not positive definite along the way. CHOLMOD keeps its factors when the
-  /// matrix changes.
-  bool step_by_last_factor(const Points& z, const Load& load) {
-    constexpr int most = 12;
-    if (!options_.reuse_factor || !has_factor_) return false;
-    assemble(z, load, LawElasticity::Stiffness::Exact);
-    step_.setZero(right_.size());
-    cg_r_ = right_;
-    factor_->solve(cg_r_, cg_z_);
-    cg_p_ = cg_z_;
-    double rz = cg_r_.dot(cg_z_);
-    const double aim = 1e-4 * cg_r_.norm();
-    for (int k = 0; k < most; ++k) {
-      matrix_.multiply(cg_p_, cg_product_);
-      const double curvature = cg_p_.dot(cg_product_);
-      if (!(curvature > 0.0)) return false;
-      const double a = rz / curvature;
-      step_ += a * cg_p_;
-      cg_r_ -= a * cg_product_;
-      if (cg_r_.norm() <= aim) return true;
-      factor_->solve(cg_r_, cg_z_);
-      const double next = cg_r_.dot(cg_z_);
-      cg_p_ = cg_z_ + next / rz * cg_p_;
-      rz = next;
-    }
-    return false;
-  }
-
-  bool factorise(const Points& z, const Load& load, LawElasticity::Stiffness which) {
-    assemble(z, load, which);
-    return has_factor_ = factor_->factorise(matrix_);
-  }
-
-  void assemble(const Points& z, const Load& load, LawElasticity::Stiffness which) {
-    matrix_.set_zero();
-    elasticity_->add_stiffness(which, 1.0, matrix_);
-    const bool positive = which == LawElasticity::Stiffness::Positive;
-    for (std::size_t c = 0; c < contacts_.size(); ++c) add_contact(z, load, c, positive);
-    for (const int node : held_) matrix_.constrain(node);
+  void set_load(const Load& load) {
+    const double E = elasticity_->law().small_strain(0).youngs_modulus, size = body_->size();
+    load_.set_forces(load.dead);
+    drives_.set_controls(load.controls);
+    drives_.set_guide_stiffness(1e4 * E * size);          // a guide is much stiffer than the object
+    statics_.set_smallest_force(1e-3 * E * size * size);  // that which strains the object by a thousandth
+    std::vector<int> held = held_;
     for (std::size_t c = 0; c < contacts_.size(); ++c)
-      if (load.controls[c].kind == ProbeControl::Kind::Position) matrix_.constrain(n() + int(c));
+      if (load.controls[c].kind == ProbeControl::Kind::Position) held.push_back(n() + int(c));
+    statics_.hold(std::move(held));
   }
 
-  void add_contact(const Points& z, const Load& load, std::size_t c, bool positive) {
-    const RigidContact& contact = contacts_[c];
-    const int probe = n() + int(c), stride = contact.points().nodes_per_point();
-    const Vector3 u = z.row(probe).transpose();
-    const std::vector<int>& where = contact_blocks_[c];
-    Matrix3 all = Matrix3::Zero();
-    for (int i = 0; i < contact.points().point_count(); ++i) {
-      const auto p = contact.potential(i, contact.points().position(i, x_) - u, positive);
-      if (p.energy == 0.0 && !contact.is_glued()) continue;  // does not touch
-      const auto weights = contact.points().weights(i);
-      const int* blocks = where.data() + std::size_t(i) * std::size_t((stride + 2) * stride);
-      for (int a = 0; a < stride; ++a) {
-        if (blocks[a] < 0) continue;  // weighs nothing
-        for (int b = 0; b < stride; ++b)
-          if (const int block = blocks[(2 + b) * stride + a]; block >= 0)
-            Eigen::Map<Matrix3>(matrix_.block(block)) += weights[a] * weights[b] * p.hessian;
-        Eigen::Map<Matrix3>(matrix_.block(blocks[a])) -= weights[a] * p.hessian;
-        Eigen::Map<Matrix3>(matrix_.block(blocks[stride + a])) -= weights[a] * p.hessian;
-      }
-      all += p.hessian;
-    }
-    const ProbeControl& control = load.controls[c];
-    if (control.kind == ProbeControl::Kind::Force && control.axis)
-      all += guide_stiffness() * (Matrix3::Identity() - *control.axis * control.axis->transpose());
-    Eigen::Map<Matrix3>(matrix_.block(pattern_->diagonal[probe])) += all;
-  }
-
-  /// The positive stiffness at hand, its diagonal raised until it can be factorised: a body that touches nothing yet
-  /// can move freely.
-  bool factorise_lifted() {
-    double mean = 0.0;
-    for (const int d : pattern_->diagonal) mean += Eigen::Map<const Matrix3>(matrix_.block(d)).trace();
-    mean /= 3.0 * rows();
-    for (double lift = 1e-8; lift < 1e2; lift *= 100.0) {
-      for (const int d : pattern_->diagonal) Eigen::Map<Matrix3>(matrix_.block(d)).diagonal().array() += lift * mean;
-      if (factor_->factorise(matrix_)) return true;
-    }
-    return false;
-  }
-
-  /// Of each sample: blocks (node, probe), (probe, node), and (a, b) of its nodes; -1 for nodes that weigh nothing.
-  void find_contact_blocks() {
-    for (std::size_t c = 0; c < contacts_.size(); ++c) {
-      const Embedding& points = contacts_[c].points();
-      const int probe = n() + int(c), stride = points.nodes_per_point();
-      std::vector<int>& blocks = contact_blocks_.emplace_back();
-      for (int i = 0; i < points.point_count(); ++i) {
-        const auto nodes = points.nodes(i);
-        const auto weights = points.weights(i);
-        const auto weighs = [&](int a) { return std::abs(weights[std::size_t(a)]) > 1e-12; };
-        for (int a = 0; a < stride; ++a) blocks.push_back(weighs(a) ? pattern_->find(nodes[a], probe) : -1);
-        for (int a = 0; a < stride; ++a) blocks.push_back(weighs(a) ? pattern_->find(probe, nodes[a]) : -1);
-        for (int b = 0; b < stride; ++b)
-          for (int a = 0; a < stride; ++a)
-            blocks.push_back(weighs(a) && weighs(b) ? pattern_->find(nodes[a], nodes[b]) : -1);
-      }
-    }
+  Energies energies(const Points& z) {
+    Energies energies;
+    energies.elastic = *elasticity_->potential(z);
+    for (RigidContact& contact : contacts_) energies.contact += *contact.potential(z);
+    energies.total = energies.elastic + energies.contact + *load_.potential(z) + *drives_.potential(z);
+    return energies;
   }
 
   bool prepare_derivatives(const Placement& placement) {
-    const Points z = joined(placement);
-    if (!std::isfinite(evaluate(z, now(), true))) return false;
-    return factorise(z, now(), LawElasticity::Stiffness::Exact);
+    set_load({dead_load_, controls_});
+    return statics_.prepare_derivatives(joined(placement));
   }
 
-  const Points& response(const Points& forces) {
-    right_ = flat(forces);
-    auto rows_of = as_points(right_);
-    for (const int node : held_) rows_of.row(node).setZero();
-    for (std::size_t c = 0; c < contacts_.size(); ++c)
-      if (controls_[c].kind == ProbeControl::Kind::Position) rows_of.row(n() + Eigen::Index(c)).setZero();
-    factor_->solve(right_, step_);
-    response_ = as_points(step_);
-    return response_;
+  std::vector<ForceTerm*> terms() {
+    std::vector<ForceTerm*> all = {elasticity_.get(), &load_, &drives_};
+    for (RigidContact& contact : contacts_) all.push_back(&contact);
+    return all;
+  }
+  /// A rigid body that slides must not jump through the object.
+  StaticsOptions statics_options() const {
+    StaticsOptions o;
+    o.newton = {options_.tolerance, options_.max_iterations};
+    o.reuse_factor = options_.reuse_factor;
+    if (!std::ranges::all_of(contacts_, &RigidContact::is_bonded)) o.longest_step = 0.1 * body_->size();
+    return o;
   }
 
   std::shared_ptr<const Body> body_;
@@ -397,12 +242,10 @@ class Equilibrium::Solver {
   std::vector<ProbeControl> controls_;
   std::shared_ptr<const BlockPattern> pattern_;
   std::unique_ptr<LawElasticity> elasticity_;
-  BlockMatrix matrix_;
-  std::unique_ptr<LinearSolver> factor_;
-  std::vector<std::vector<int>> contact_blocks_;
-  Points dead_load_, x_, nodal_, gradient_, trial_, response_;
-  VectorX right_, step_, cg_r_, cg_z_, cg_p_, cg_product_;
-  bool has_factor_ = false;
+  NodalLoad load_;
+  Drives drives_;
+  Statics statics_;
+  Points dead_load_;
   Energies energies_;
   std::string failure_;
 };
@@ -430,7 +273,11 @@ Placement Equilibrium::rest() const {
   return placement;
 }
 
-SolveSummary Equilibrium::solve(Placement& placement) { return solver_->solve(placement); }
+SolveSummary Equilibrium::solve(Placement& placement) {
+  const SolveSummary summary = solver_->solve(placement);
+  if (summary.converged) solver_->energies_ = solver_->energies(solver_->joined(placement));
+  return summary;
+}
 const std::string& Equilibrium::failure() const { return solver_->failure_; }
 const Equilibrium::Energies& Equilibrium::energies() const { return solver_->energies_; }
 Vector3 Equilibrium::contact_force(int contact, const Placement& placement) const {
@@ -439,6 +286,6 @@ Vector3 Equilibrium::contact_force(int contact, const Placement& placement) cons
 }
 LawElasticity& Equilibrium::elasticity() { return *solver_->elasticity_; }
 bool Equilibrium::prepare_derivatives(const Placement& placement) { return solver_->prepare_derivatives(placement); }
-const Points& Equilibrium::response(const Points& forces) { return solver_->response(forces); }
+const Points& Equilibrium::response(const Points& forces) { return solver_->statics_.response(forces); }
 
 }  // namespace pliant

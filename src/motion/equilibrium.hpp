@@ -6,21 +6,22 @@
 #include <vector>
 
 #include "elasticity/law_elasticity.hpp"
+#include "motion/newton.hpp"
 #include "motion/rigid_contact.hpp"
 #include "solvers/linear_solver.hpp"
 
 namespace pliant {
 
-/// How a rigid body is led.
+/// Control of a rigid body: by force or by displacement.
 struct ProbeControl {
   enum class Kind {
-    Force,     ///< it is where the object balances `force`
+    Force,     ///< its translation is unknown: where the object balances `force`
     Position,  ///< it is at `translation`
   };
   Kind kind = Kind::Force;
   Vector3 force = Vector3::Zero();        ///< [N], of the rigid body on the object
-  Vector3 translation = Vector3::Zero();  ///< [m]; led by force along an axis: of the line that it stays on
-  /// Unit: led by force the body keeps to a line along it, as a linear guide does. Nothing: it goes where it will.
+  Vector3 translation = Vector3::Zero();  ///< [m]; under force control along an axis: of the line
+  /// Unit: under force control the body keeps to a line along it, as a linear guide does. Nothing: unconstrained.
   std::optional<Vector3> axis;
 };
 
@@ -33,7 +34,7 @@ struct Placement {
 struct EquilibriumOptions {
   double tolerance = 1e-9;  ///< of the forces that are left, relative to those that meet, (0, 1)
   int max_iterations = 60;  ///< of Newton's method, a step of the load; >= 1
-  int max_halvings = 8;     ///< of the load's steps, where it does not follow
+  int max_halvings = 8;     ///< of the load's steps, where Newton's method does not follow
   /// Keep the last factorisation while conjugate gradients with it solve Newton's system in a few iterations: for many
   /// equilibria that follow each other closely.
   bool reuse_factor = false;
@@ -41,10 +42,9 @@ struct EquilibriumOptions {
 
 /// The object at rest under dead loads and rigid bodies: the minimum of
 ///   W(x) - f . x + sum over rigid bodies (potential of the contact - F . u)
-/// over nodes x and the translations u of bodies that are led by force, by Newton's method on the exact Hessian, with
-/// what makes it positive definite where it is not, and backtracking on the energy. Loads that it does not follow at
-/// once are applied in steps (incremental loading, Bickel 2009, section 3.4), each to full convergence. One instance
-/// for one thread.
+/// over nodes x and the translations u of bodies under force control (`Statics`). Loads that Newton's method does not
+/// follow at once are applied in steps (`LoadContinuation`: incremental loading, Bickel 2009, section 3.4), each to
+/// full convergence. One instance for one thread.
 class Equilibrium {
  public:
   /// @param held  nodes that stay where a placement has them; there must be enough to hold the object

@@ -45,7 +45,7 @@ SolveSummary PressSession::move_to(const Vector3& displacement) {
 
 SolveSummary PressSession::push(const Vector3& force) {
   ProbeControl control{ProbeControl::Kind::Force, force, Vector3::Zero(), {}};
-  if (probe_.kind != ProbeKind::GluedDisc) {
+  if (probe_.kind != ProbeKind::BondedDisc) {
     control.axis = *probe_.axis;
     control.force = *probe_.axis * probe_.axis->dot(force);
   }

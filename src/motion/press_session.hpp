@@ -1,7 +1,7 @@
 #pragma once
 
+#include "motion/contact_defaults.hpp"
 #include "motion/equilibrium.hpp"
-#include "motion/probe_contact.hpp"
 
 namespace pliant {
 

@@ -43,7 +43,7 @@ VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const st
 
 Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, const std::vector<int>& held,
            const MotionBlocks& blocks)
-    : pull_blocks_(blocks.pulls), material_(blocks) {
+    : DeadLoad(body->nodes), pull_blocks_(blocks.pulls), material_(blocks) {
   const VectorX volume = volume_of_nodes(*body);
   const double reach = width * points.size;
   const auto n = Eigen::Index(points.at.size());

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
-#include "elasticity/force_term.hpp"
+#include "motion/body_forces.hpp"
 #include "parameters/motion_blocks.hpp"
 
 namespace pliant {
@@ -25,7 +25,7 @@ std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const st
 /// with w_k a Gaussian about point k, V_n the node's volume, and s_k (of each axis) such that a unit c_k would move the
 /// object by its size, by linear elasticity from rest. E_0 is the geometric mean of the control moduli, so that the
 /// pose hardly depends on how stiff the object is thought to be.
-class Pull : public ForceTerm {
+class Pull : public DeadLoad {
  public:
   /// @param points  see `far_points`
   /// @param held    nodes that stay where they are
@@ -37,12 +37,8 @@ class Pull : public ForceTerm {
   /// Nothing pulls while it is not active.
   void set_active(bool active) { is_active_ = active; }
 
-  Lag lag() const override { return Lag::Rotation; }
-  At at() const override { return At::End; }
   void set_parameters(const VectorX& theta) override;
-  void linearise(const Points&) override {}
   void add_force(const Points& z, Points& force) override;
-  void add_matrix(double, BlockMatrix&) override {}
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;

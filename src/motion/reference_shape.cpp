@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/error.hpp"
-#include "elasticity/corotated.hpp"
+#include "motion/continuation.hpp"
 
 namespace pliant {
 
@@ -32,13 +32,15 @@ std::string percent(double share) {
 }  // namespace
 
 ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held,
-                                           const MotionBlocks& blocks, const ReferenceShapeOptions& options)
+                                           BodyMaterial material, const MotionBlocks& blocks,
+                                           const ReferenceShapeOptions& options)
     : body_(std::move(body)),
       held_(std::move(held)),
+      material_(std::move(material)),
       blocks_(blocks),
       scan_(body_->scanned_positions()),
       options_(options),
-      forces_(ReferenceForces::make(body_, blocks)),
+      forces_(material_.make_reference_forces(body_)),
       solver_(body_->pattern),
       turning_(body_, options.solver),
       jacobian_(body_->pattern),
@@ -175,7 +177,7 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
 
 bool ReferenceShapeSolver::holds_still(const VectorX& theta, const Points& X) {
   const auto reference = std::make_shared<Body>(with_reference(*body_, X));
-  const auto elasticity = make_elasticity(reference, blocks_);
+  const auto elasticity = material_.make_elasticity(reference);
   elasticity->set_parameters(theta);
   elasticity->linearise(scan_);
   matrix_.set_zero();
@@ -212,40 +214,28 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
     }
     return a;
   };
-  Attempt whole = try_share(1.0, guess ? *guess : scan);
-  if (!whole.converged && guess) whole = try_share(1.0, scan);
-  take(whole, whole.converged ? 1.0 : 0.0);
-  shape.found = whole.converged;
-  if (shape.found || !options_.by_parts || options_.scheme != ReferenceScheme::PseudoTransient)
-    return shape.reason = whole.reason, shape;
-  // Part by part, from what the part before gave. Where forces find no balance a shorter stride may help. Where they do
-  // but the shape gives way, only less load helps: that limit is closed in on, and tried once more from nearby.
-  shape.reason = whole.reason;
+  // Part by part, from what the part before gave. Where forces find no balance a shorter step of the load may help.
+  // Where they do but the shape gives way, only less load helps: that limit is closed in on, and tried once more from
+  // nearby.
+  const bool in_parts = options_.by_parts && options_.scheme == ReferenceScheme::PseudoTransient;
+  LoadContinuation steps({.first = 1.0, .growth = 1.0, .least = least_share, .least_relative = least_stride});
   Points from = scan;
-  double done = 0.0, limit = whole.gives_way ? 1.0 : std::numeric_limits<double>::infinity(), stride = 0.5;
-  const auto least = [&] { return std::max(least_share, least_stride * done); };
-  const auto below_limit = [&] { return done > 0.0 ? 0.5 * (limit - done) : 0.25 * limit; };
-  if (whole.gives_way) stride = below_limit();
-  while (stride >= least()) {
-    const double share = std::min(1.0, done + stride);
-    const Attempt part = try_share(share, from, share < 2.0 * done ? next_step : first_step);
-    if (part.converged) {
-      if (share >= limit) limit = std::numeric_limits<double>::infinity(), stride *= 2.0;
-      done = share;
-      from = part.X;
-      take(part, done);
-      if (done == 1.0) {
-        shape.found = true;
-        shape.reason.clear();
-        return shape;
-      }
-      if (std::isfinite(limit)) stride = limit - done > 2.0 * least() ? below_limit() : std::max(limit - done, least());
-      continue;
-    }
-    shape.reason = part.reason;
-    if (part.gives_way) limit = std::min(limit, share);
-    stride = part.gives_way ? below_limit() : 0.5 * (share - done);
+  while (const auto share = steps.next()) {
+    const bool is_whole = shape.X.rows() == 0;
+    const double done = steps.carried();
+    Attempt part = try_share(*share, is_whole && guess ? *guess : from, *share < 2.0 * done ? next_step : first_step);
+    if (is_whole && guess && !part.converged) part = try_share(*share, scan);
+    if (part.converged || is_whole) take(part, part.converged ? *share : 0.0);
+    if (part.converged) from = part.X;
+    if (!part.converged) shape.reason = part.reason;
+    steps.report(part.converged   ? LoadContinuation::Outcome::Carried
+                 : part.gives_way ? LoadContinuation::Outcome::TooMuch
+                                  : LoadContinuation::Outcome::NotFollowed);
+    if (!in_parts) break;
   }
+  shape.found = steps.is_complete();
+  if (shape.found) shape.reason.clear();
+  if (shape.found || !in_parts) return shape;
   shape.reason = "this material carries " + percent(shape.carried) + " of the load: " + shape.reason;
   return shape;
 }

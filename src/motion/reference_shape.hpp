@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "elasticity/reference_forces.hpp"
+#include "elasticity/material.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/turning_step.hpp"
 #include "solvers/general_solver.hpp"
@@ -50,10 +50,15 @@ class ReferenceShapeSolver {
  public:
   /// @param body  of tetrahedra, as scanned
   /// @param held  nodes that something else holds, at least three
-  /// @param blocks  of material and density in the parameter vectors below
+  /// @param material  of the body
+  /// @param blocks    of the parameter vectors below; the density is among them
   /// Throws std::invalid_argument for a body of hexahedra, and InputError where fewer nodes are held.
+  ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held, BodyMaterial material,
+                       const MotionBlocks& blocks, const ReferenceShapeOptions& options = {});
+  /// Of corotated linear elasticity.
   ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held, const MotionBlocks& blocks,
-                       const ReferenceShapeOptions& options = {});
+                       const ReferenceShapeOptions& options = {})
+      : ReferenceShapeSolver(std::move(body), std::move(held), BodyMaterial(blocks), blocks, options) {}
 
   /// Where the nodes truly were when they were scanned, n x 3 [m], if not where the body has them. Held ones are to
   /// stay where they are.
@@ -97,6 +102,7 @@ class ReferenceShapeSolver {
 
   std::shared_ptr<const Body> body_;
   std::vector<int> held_;
+  BodyMaterial material_;
   MotionBlocks blocks_;
   Points scan_;
   ReferenceShapeOptions options_;

@@ -63,7 +63,8 @@ MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector
 }
 
 RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
-                     const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks)
+                     const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks,
+                     const BodyMaterial& material)
     : body_(std::move(body)),
       free_(body_),
       held_(held),
@@ -79,8 +80,8 @@ RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& h
   ReferenceShapeOptions options;
   options.by_parts = false;
   options.max_iterations = most_iterations;
-  solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, blocks_, options);
-  elasticity_ = make_elasticity(body_, blocks_);
+  solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, material, blocks_, options);
+  elasticity_ = material.make_elasticity(body_);
   terms_.push_back(std::make_unique<Gravity>(*body_, blocks_));
   if (!weights.empty()) terms_.push_back(std::make_unique<HungWeights>(*body_, weights, blocks_.gravity));
 }

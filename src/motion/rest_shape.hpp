@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "elasticity/corotated.hpp"
+#include "elasticity/material.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/reference_shape.hpp"
 
@@ -32,9 +32,11 @@ class RestShape {
   /// @param held    nodes that stay where the scan has them
   /// @param sags    whether the scan was taken under gravity and these weights
   /// @param basis   see `shape_basis`; no columns: the scan is exact
-  /// @param blocks  of the correction, one a column of the basis, and of material and load
+  /// @param blocks  of the correction, one a column of the basis, and of the load
+  /// @param material  of the body
   RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
-            const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks);
+            const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks,
+            const BodyMaterial& material);
 
   /// Finds them for theta, from those found before. Empty, or why there are none.
   [[nodiscard]] std::string find(const VectorX& theta);

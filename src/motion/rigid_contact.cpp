@@ -1,146 +1,312 @@
 #include "motion/rigid_contact.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 
 namespace pliant {
 
-namespace {
-
-struct Face {
-  std::array<Vector3, 3> corners;
-  Vector3 normal() const { return (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized(); }
-  double area() const { return 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm(); }
-  Vector3 at(double b1, double b2) const {
-    return corners[0] + b1 * (corners[1] - corners[0]) + b2 * (corners[2] - corners[0]);
-  }
-};
-
-std::vector<Face> boundary_faces(const Body& body) {
-  const auto* mesh = std::get_if<TetMesh>(&body.mesh);
-  if (!mesh) throw std::invalid_argument("rigid contacts are for tetrahedra");
-  std::vector<Face> faces;
-  for (const auto& f : mesh->boundary)
-    faces.push_back(
-        {{mesh->nodes.row(f[0]).transpose(), mesh->nodes.row(f[1]).transpose(), mesh->nodes.row(f[2]).transpose()}});
-  return faces;
-}
-
-/// Visits the centres of n^2 equal triangles.
-template <class Visit>
-void cut(const Face& face, int n, Visit&& visit) {
-  const double area = face.area() / double(n * n);
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n - i; ++j) {
-      visit(face.at((i + 1.0 / 3.0) / n, (j + 1.0 / 3.0) / n), area);
-      if (j < n - i - 1) visit(face.at((i + 2.0 / 3.0) / n, (j + 2.0 / 3.0) / n), area);
-    }
-}
-
-double squared_distance(const Face& f, const Vector3& p) {  // Ericson 2004, 5.1.5, by its Voronoi regions
-  const Vector3 ab = f.corners[1] - f.corners[0], ac = f.corners[2] - f.corners[0], ap = p - f.corners[0];
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  const auto to = [&](double b1, double b2) { return (p - f.at(b1, b2)).squaredNorm(); };
-  if (d1 <= 0.0 && d2 <= 0.0) return to(0, 0);
-  const Vector3 bp = p - f.corners[1];
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return to(1, 0);
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return to(d1 / (d1 - d3), 0);
-  const Vector3 cp = p - f.corners[2];
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return to(0, 1);
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return to(0, d2 / (d2 - d6));
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return to(1.0 - w, w);
-  }
-  const double sum = va + vb + vc;
-  return to(vb / sum, vc / sum);
-}
-
-}  // namespace
-
-ContactSamples boundary_samples(const Body& body, int cuts) {
-  ContactSamples samples;
-  for (const Face& face : boundary_faces(body))
-    cut(face, cuts, [&](const Vector3& point, double area) {
-      samples.rest.push_back(point);
-      samples.area.push_back(area);
-    });
-  return samples;
-}
-
-ContactSamples disc_samples(const Body& body, const Vector3& centre, double radius) {
-  const std::vector<Face> faces = boundary_faces(body);
-  double nearest = std::numeric_limits<double>::infinity();
-  Vector3 normal = Vector3::UnitZ();
-  for (const Face& face : faces)
-    if (const double d = squared_distance(face, centre); d < nearest) nearest = d, normal = face.normal();
-  ContactSamples samples;
-  const double spacing = radius / 12.0;
-  for (const Face& face : faces) {
-    if (face.normal().dot(normal) < 0.5 || squared_distance(face, centre) > radius * radius) continue;
-    const int n = std::clamp(int(std::ceil(std::sqrt(2.0 * face.area()) / spacing)), 1, 64);
-    cut(face, n, [&](const Vector3& point, double area) {
-      if ((point - centre).squaredNorm() > radius * radius) return;
-      samples.rest.push_back(point);
-      samples.area.push_back(area);
-    });
-  }
-  return samples;
-}
-
 RigidContact::RigidContact(const Body& body, const ContactSamples& samples)
-    : points_(body, samples.rest), rest_(samples.rest), area_(samples.area) {}
+    : points_(body, samples.rest), rest_(samples.rest), area_(samples.area), blocks_(element_blocks(body)) {
+  active_.reserve(rest_.size());
+}
 
-RigidContact RigidContact::glued(const Body& body, const ContactSamples& samples, double stiffness) {
+RigidContact RigidContact::bonded(const Body& body, const ContactSamples& samples, double stiffness) {
+  if (!(stiffness > 0.0)) throw std::invalid_argument("a bonded contact needs a positive stiffness");
   RigidContact contact(body, samples);
-  contact.stiffness_ = stiffness;
+  contact.penalty_.stiffness = stiffness;
   return contact;
 }
 
 RigidContact RigidContact::sliding(const Body& body, const ContactSamples& samples,
-                                   std::shared_ptr<const RigidShape> shape, double stiffness, double smoothing) {
+                                   std::shared_ptr<const RigidShape> shape, const Penalty& penalty) {
+  if (!(penalty.stiffness > 0.0) || !(penalty.smoothing > 0.0))
+    throw std::invalid_argument("contact needs a positive stiffness and smoothing length");
   RigidContact contact(body, samples);
   contact.shape_ = std::move(shape);
-  contact.stiffness_ = stiffness;
-  contact.smoothing_ = smoothing;
+  contact.penalty_ = penalty;
+  return contact;
+}
+
+RigidContact RigidContact::sliding(const Body& body, const ContactSamples& samples, const PlaneBlock& plane,
+                                   const Penalty& penalty) {
+  RigidContact contact = sliding(body, samples, nullptr, penalty);
+  contact.plane_ = plane;
   return contact;
 }
 
 double RigidContact::area() const { return std::accumulate(area_.begin(), area_.end(), 0.0); }
 
-/// Pressure k (s - d)^2 / (4 s) for |d| < s, -k d below.
+void RigidContact::set_friction(double coefficient, double speed) {
+  if (!(coefficient >= 0.0) || !(speed > 0.0))
+    throw std::invalid_argument("friction needs a coefficient that is not negative and a positive speed");
+  friction_ = coefficient;
+  friction_speed_ = speed;
+}
+
+void RigidContact::set_row(const Body& body, int row, const BlockPattern& pattern) {
+  row_ = row;
+  blocks_ = element_blocks(body, pattern);
+  row_diagonal_ = pattern.diagonal[std::size_t(row)];
+  links_.clear();
+  for (int i = 0; i < points_.point_count(); ++i) {
+    const auto nodes = points_.nodes(i);
+    const auto weights = points_.weights(i);
+    const auto weighs = [&](std::size_t a) { return std::abs(weights[a]) > 1e-12; };
+    for (std::size_t a = 0; a < nodes.size(); ++a) links_.push_back(weighs(a) ? pattern.find(nodes[a], row) : -1);
+    for (std::size_t a = 0; a < nodes.size(); ++a) links_.push_back(weighs(a) ? pattern.find(row, nodes[a]) : -1);
+  }
+}
+
+void RigidContact::set_parameters(const VectorX& theta) {
+  if (!plane_) return;
+  plane_point_ = plane_->point.vector(theta);
+  plane_normal_ = plane_->normal.vector(theta);
+  if (plane_->friction.exists()) friction_ = theta[plane_->friction];
+}
+
+void RigidContact::begin_step(const StepContext& step) {
+  start_ = step.start;
+  threshold_ = friction_speed_ * step.dt;
+}
+
+bool RigidContact::may_rub() const {
+  return start_ && friction_speed_ > 0.0 && (friction_ > 0.0 || (plane_ && plane_->friction.exists()));
+}
+
+RigidShape::Sample RigidContact::surface(const Vector3& y) const {
+  if (shape_) return shape_->sample(y);
+  return {plane_normal_.dot(y - plane_point_), plane_normal_, Matrix3::Zero()};
+}
+
+Vector3 RigidContact::relative(int point, const Points& positions) const {
+  const Vector3 x = points_.position(point, positions);
+  return row_ < 0 ? Vector3(x - translation_) : Vector3(x - positions.row(row_).transpose());
+}
+
+Vector3 RigidContact::relative_change(int point, const Points& changes) const {
+  const Vector3 x = points_.position(point, changes);
+  return row_ < 0 ? x : Vector3(x - changes.row(row_).transpose());
+}
+
+void RigidContact::scatter(int point, const Vector3& vector, Points& out) const {
+  points_.add_transpose(point, vector, out);
+  if (row_ >= 0) out.row(row_) -= vector.transpose();
+}
+
+void RigidContact::scatter_block(int point, const Matrix3& block, BlockMatrix& matrix) const {
+  const auto w = points_.weights(point);
+  const int n = points_.nodes_per_point();
+  const int* blocks = blocks_.data() + std::size_t(points_.element(point)) * std::size_t(n * n);
+  for (int a = 0; a < n; ++a)
+    for (int b = 0; b < n; ++b)
+      Eigen::Map<Matrix3>(matrix.block(blocks[n * a + b])) += w[std::size_t(a)] * w[std::size_t(b)] * block;
+  if (row_ < 0) return;
+  const int* links = links_.data() + std::size_t(point) * std::size_t(2 * n);
+  for (int a = 0; a < n; ++a) {
+    if (links[a] < 0) continue;
+    Eigen::Map<Matrix3>(matrix.block(links[a])) -= w[std::size_t(a)] * block;
+    Eigen::Map<Matrix3>(matrix.block(links[n + a])) -= w[std::size_t(a)] * block;
+  }
+  Eigen::Map<Matrix3>(matrix.block(row_diagonal_)) += block;
+}
+
+template <class Visit>
+void RigidContact::for_bonded(Visit&& visit) const {
+  for (int i = 0; i < points_.point_count(); ++i) visit(i, penalty_.stiffness * area_[std::size_t(i)]);
+}
+
+void RigidContact::linearise(const Points& lag) {
+  if (is_bonded()) return;
+  active_.clear();
+  const double reach = penalty_.reach();
+  const bool has_friction = may_rub();
+  for (int p = 0; p < points_.point_count(); ++p) {
+    const Vector3 y = relative(p, lag);
+    if (plane_ && plane_normal_.dot(y - plane_point_) > reach) continue;
+    const RigidShape::Sample at = surface(y);
+    if (at.distance > reach) continue;
+    const Penalty::Value value = penalty_.pressure_at(at.distance);
+    const double a = area_[std::size_t(p)];
+    Active c;
+    c.point = p, c.y = y, c.normal = at.gradient, c.bend = at.hessian, c.gap = at.distance;
+    c.force = a * value.pressure, c.slope = a * value.slope, c.curvature = a * value.curvature;
+    if (has_friction) {
+      c.start = relative(p, *start_);
+      c.per_normal = 1.0 / c.normal.norm();
+      c.axis = c.per_normal * c.normal;
+      c.axis_way = c.axis.dot(y - c.start);
+      c.way = c.across(y - c.start);
+      c.length = std::sqrt(c.way.squaredNorm() + threshold_ * threshold_);
+      c.drag = friction_ * c.force / c.length;
+    }
+    active_.push_back(c);
+  }
+}
+
+RigidContact::Offsets RigidContact::offsets(const Active& c, const Points& z) const {
+  const Vector3 y = relative(c.point, z);
+  Offsets o;
+  o.q = y - c.y;
+  o.c = c.normal.dot(o.q);
+  o.normal = c.axis.dot(y - c.start);
+  o.slid = c.across(y - c.start);
+  return o;
+}
+
+void RigidContact::add_force(const Points& z, Points& force) {
+  if (is_bonded())
+    for_bonded([&](int i, double k) { scatter(i, -k * (relative(i, z) - rest_[std::size_t(i)]), force); });
+  for (const Active& c : active_) {
+    const Offsets o = offsets(c, z);
+    Vector3 f = (c.force + c.slope * o.c) * c.normal;
+    if (c.drag > 0.0) f -= c.drag * o.slid;
+    scatter(c.point, f, force);
+  }
+}
+
+void RigidContact::add_matrix(double scale, BlockMatrix& matrix) {
+  if (is_bonded()) for_bonded([&](int i, double k) { scatter_block(i, scale * k * Matrix3::Identity(), matrix); });
+  for (const Active& c : active_) {
+    const Matrix3 nn = c.normal * c.normal.transpose();
+    Matrix3 block = -scale * c.slope * nn;
+    if (c.drag > 0.0) block += scale * c.drag * (Matrix3::Identity() - c.axis * c.axis.transpose());
+    scatter_block(c.point, block, matrix);
+  }
+}
+
+/// Of the force's affine form by the lag point, with D = dn/dy:
+///   normal:    n (C c n + S D q)^T + (F + S c) D
+///   friction:  -slid (d drag)^T + drag ((m.w) A + m (A^T w)^T), w = y_z - start, drag = mu F / r, m = n / |n|, A =
+///   dm/dy
+void RigidContact::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
+  for (const Active& c : active_) {
+    const Offsets o = offsets(c, z);
+    Matrix3 change = c.normal * (c.curvature * o.c * c.normal + c.slope * (c.bend * o.q)).transpose() +
+                     (c.force + c.slope * o.c) * c.bend;
+    if (c.drag > 0.0) {
+      const Matrix3 bend = c.per_normal * (c.bend - c.axis * (c.axis.transpose() * c.bend));
+      const Vector3 by_length = (c.way - c.axis_way * (bend.transpose() * c.way)) / c.length;
+      const Vector3 by_drag = (friction_ * c.slope * c.normal - c.drag * by_length) / c.length;
+      const Vector3 w = o.slid + o.normal * c.axis;
+      change += c.drag * (o.normal * bend + c.axis * (bend.transpose() * w).transpose()) - o.slid * by_drag.transpose();
+    }
+    if (!change.isZero(0.0)) scatter_block(c.point, -scale * change, matrix);
+  }
+}
+
+std::optional<double> RigidContact::potential(const Points& x) {
+  if (rubs()) return std::nullopt;
+  double sum = 0.0;
+  if (is_bonded())
+    for_bonded([&](int i, double k) { sum += 0.5 * k * (relative(i, x) - rest_[std::size_t(i)]).squaredNorm(); });
+  for (const Active& c : active_) sum += area_[std::size_t(c.point)] * penalty_.at(c.gap).energy;
+  return sum;
+}
+
+void RigidContact::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                                     Points& force) {
+  if (is_bonded()) for_bonded([&](int i, double k) { scatter(i, -k * relative_change(i, d_z), force); });
+  const Vector3 d_point = plane_ ? plane_->point.vector(d_theta) : Vector3::Zero();
+  const Vector3 d_plane_normal = plane_ ? plane_->normal.vector(d_theta) : Vector3::Zero();
+  const double d_friction = plane_ && plane_->friction.exists() ? d_theta[plane_->friction] : 0.0;
+  const bool adds_friction = d_friction != 0.0 && may_rub();
+  for (const Active& c : active_) {
+    const Offsets o = offsets(c, z);
+    const Vector3 d_y = relative_change(c.point, d_lag), d_end = relative_change(c.point, d_z);
+    const Vector3 d_from_plane = d_y - d_point;
+    const Vector3 d_normal = c.bend * d_from_plane + d_plane_normal;
+    const double d_gap = c.normal.dot(d_from_plane) + d_plane_normal.dot(c.y - plane_point_);
+    const double d_c = d_normal.dot(o.q) + c.normal.dot(d_end - d_y);
+    Vector3 f = (c.curvature * o.c * d_gap + c.slope * (d_gap + d_c)) * c.normal + (c.force + c.slope * o.c) * d_normal;
+    if (c.drag > 0.0) {
+      const Vector3 d_axis = c.axis_change(d_normal), w = o.slid + o.normal * c.axis;
+      const double d_length = (c.way.dot(d_y) - c.way.dot(d_axis) * c.axis_way) / c.length;
+      const double d_drag = (friction_ * c.slope * d_gap - c.drag * d_length) / c.length;
+      f -= d_drag * o.slid + c.drag * (c.across(d_end) - o.normal * d_axis - d_axis.dot(w) * c.axis);
+    }
+    if (adds_friction) f -= d_friction * c.force / c.length * o.slid;
+    scatter(c.point, f, force);
+  }
+}
+
+void RigidContact::add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
+                                     VectorX& theta_bar) {
+  if (is_bonded()) for_bonded([&](int i, double k) { scatter(i, -k * relative_change(i, w), z_bar); });
+  Vector3 point_bar = Vector3::Zero(), plane_normal_bar = Vector3::Zero();
+  double friction_bar = 0.0;
+  for (const Active& c : active_) {
+    const Offsets o = offsets(c, z);
+    const Vector3 v = relative_change(c.point, w);
+    const double along = v.dot(c.normal);
+    double gap_bar = (c.curvature * o.c + c.slope) * along;
+    Vector3 end_bar = c.slope * along * c.normal, y_bar = -end_bar;
+    Vector3 normal_bar = (c.force + c.slope * o.c) * v + c.slope * along * o.q;
+    if (may_rub()) {
+      const double drag_bar = -o.slid.dot(v);
+      friction_bar += drag_bar * c.force / c.length;
+      if (c.drag > 0.0) {
+        const Vector3 w_z = o.slid + o.normal * c.axis;
+        end_bar -= c.drag * c.across(v);
+        Vector3 axis_bar = c.drag * (o.normal * v + c.axis.dot(v) * w_z);
+        gap_bar += drag_bar * friction_ * c.slope / c.length;
+        const double length_bar = -drag_bar * c.drag / c.length;
+        y_bar += length_bar / c.length * c.way;
+        axis_bar -= length_bar * c.axis_way / c.length * c.way;
+        normal_bar += c.axis_change(axis_bar);
+      }
+    }
+    const Vector3 from_plane_bar = c.bend * normal_bar + gap_bar * c.normal;
+    y_bar += from_plane_bar;
+    point_bar -= from_plane_bar;
+    plane_normal_bar += normal_bar + gap_bar * (c.y - plane_point_);
+    scatter(c.point, y_bar, lag_bar);
+    scatter(c.point, end_bar, z_bar);
+  }
+  if (!plane_) return;
+  theta_bar.segment<3>(plane_->point) += point_bar;
+  theta_bar.segment<3>(plane_->normal) += plane_normal_bar;
+  if (plane_->friction.exists()) theta_bar[plane_->friction] += friction_bar;
+}
+
+void RigidContact::add_start_tangent(const Points& z, const Points& d_start, const Points&, Points& force) {
+  for (const Active& c : active_) {
+    if (!(c.drag > 0.0)) continue;
+    const Offsets o = offsets(c, z);
+    const Vector3 change = relative_change(c.point, d_start);
+    const double d_drag = c.drag * c.way.dot(change) / (c.length * c.length);
+    scatter(c.point, c.drag * c.across(change) - d_drag * o.slid, force);
+  }
+}
+
+void RigidContact::add_start_adjoint(const Points& z, const Points& w, Points& start_bar, Points&) {
+  for (const Active& c : active_) {
+    if (!(c.drag > 0.0)) continue;
+    const Offsets o = offsets(c, z);
+    const Vector3 v = relative_change(c.point, w);
+    const double drag_bar = -o.slid.dot(v);
+    scatter(c.point, c.drag * c.across(v) + drag_bar * c.drag / (c.length * c.length) * c.way, start_bar);
+  }
+}
+
 RigidContact::Potential RigidContact::potential(int i, const Vector3& y, bool positive) const {
   Potential p;
-  const double weight = stiffness_ * area_[std::size_t(i)], s = smoothing_;
-  if (!shape_) {
+  const double area = area_[std::size_t(i)];
+  if (is_bonded()) {
+    const double k = penalty_.stiffness * area;
     const Vector3 offset = y - rest_[std::size_t(i)];
-    p.energy = 0.5 * weight * offset.squaredNorm();
-    p.gradient = weight * offset;
-    p.hessian = weight * Matrix3::Identity();
+    p.energy = 0.5 * k * offset.squaredNorm();
+    p.gradient = k * offset;
+    p.hessian = k * Matrix3::Identity();
     return p;
   }
-  const RigidShape::Sample at = shape_->sample(y);
-  const double d = at.distance;
-  if (d >= s) return p;
-  double energy, pressure, slope;
-  if (d > -s) {
-    const double depth = s - d;
-    energy = depth * depth * depth / (12.0 * s), pressure = depth * depth / (4.0 * s), slope = depth / (2.0 * s);
-  } else {
-    energy = 0.5 * d * d + s * s / 6.0, pressure = -d, slope = 1.0;
-  }
-  p.energy = weight * energy;
-  p.gradient = -weight * pressure * at.gradient;
-  p.hessian = weight * slope * at.gradient * at.gradient.transpose();
-  if (!positive) p.hessian -= weight * pressure * at.hessian;
+  const RigidShape::Sample at = surface(y);
+  if (at.distance >= penalty_.reach()) return p;
+  const Penalty::Value value = penalty_.at(at.distance);
+  p.energy = area * value.energy;
+  p.gradient = -area * value.pressure * at.gradient;
+  p.hessian = -area * value.slope * at.gradient * at.gradient.transpose();
+  if (!positive) p.hessian -= area * value.pressure * at.hessian;
   return p;
 }
 

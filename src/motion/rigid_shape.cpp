@@ -73,7 +73,7 @@ class Grid : public RigidShape {
   Grid(SignedDistance distance, bool hollow) : distance_(std::move(distance)), sign_(hollow ? -1.0 : 1.0) {}
   Sample sample(const Vector3& p) const override {
     const SignedDistance::Sample s = distance_.sample(p);
-    return {sign_ * s.value, sign_ * s.gradient, Matrix3::Zero()};
+    return {sign_ * s.value, sign_ * s.gradient, sign_ * distance_.hessian(p)};
   }
 
  private:

@@ -28,7 +28,8 @@ std::shared_ptr<const RigidShape> rigid_capsule(const Vector3& from, const Vecto
 /// @param axis  along which it points, out of that end
 /// @param edge  radius by which the rim is rounded, in (0, radius]
 std::shared_ptr<const RigidShape> rigid_punch(const Vector3& tip, const Vector3& axis, double radius, double edge);
-/// Any closed mesh, or its outside (`hollow`: an object that lies in a mould). Its curvature is not known.
+/// Any closed mesh as its signed distance on a grid, or its outside (`hollow`: an object that lies in a mould).
+/// Gradient and curvature are those of the interpolated distance: the gradient jumps a little from cell to cell.
 std::shared_ptr<const RigidShape> rigid_grid(SignedDistance distance, bool hollow = false);
 
 }  // namespace pliant

@@ -7,9 +7,8 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
-#include "elasticity/corotated.hpp"
-#include "elasticity/law_elasticity.hpp"
 #include "motion/body_forces.hpp"
+#include "motion/continuation.hpp"
 
 namespace pliant {
 
@@ -28,6 +27,13 @@ PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) 
   return {there.empty() ? all : far_points(all, there, count), body.size()};
 }
 
+std::unique_ptr<ForceTerm> plane_contact(const Body& body, const PlaneBlock& plane, const SimulationOptions& options) {
+  auto contact =
+      std::make_unique<RigidContact>(RigidContact::sliding(body, surface_samples(body), plane, options.contact));
+  if (options.friction_speed > 0.0) contact->set_friction(0.0, options.friction_speed);
+  return contact;
+}
+
 std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const Body>& body,
                                                    const SimulationOptions& options, Elasticity*& elasticity,
                                                    FixedRegions*& fixed, Pull*& pull, HungWeights*& let_go) {
@@ -36,8 +42,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   elasticity = elastic.get();
   terms.push_back(std::move(elastic));
   terms.push_back(std::make_unique<Gravity>(*body, options.blocks));
-  for (const PlaneBlock& plane : options.blocks.planes)
-    terms.push_back(std::make_unique<PlaneContact>(body, plane, options.contact));
+  for (const PlaneBlock& plane : options.blocks.planes) terms.push_back(plane_contact(*body, plane, options));
   if (!options.weights.empty())
     terms.push_back(std::make_unique<HungWeights>(*body, options.weights, options.blocks.gravity));
   if (!options.released_weights.empty()) {
@@ -68,11 +73,6 @@ SimulationOptions completed(SimulationOptions options) {
   if (!options.law && !options.law_layout) return options;
   if (options.law && options.law_layout)
     throw std::invalid_argument("a material is given as it is or by the parameter vector, not both");
-  if (options.scan_sags)
-    throw InputError({{},
-                      "an object of a material law that was scanned as it sags",
-                      "its load-free shape, which is found for linear materials alone",
-                      "give the load-free shape, or a linear material"});
   options.integrator = Integrator::Newton;
   return options;
 }
@@ -85,11 +85,13 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
       stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_), options_.blocks,
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
                 options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
+      statics_(body_, stepper_.terms(), {.newton = options_.newton, .solver = options_.solver.kind}),
       rest_(body_->scanned_positions()) {
   if (holds_strongly(*body_, options_)) {
     stepper_.hold(eliminated_nodes(*body_, options_));
+    statics_.hold(eliminated_nodes(*body_, options_));
   } else {
-    stepper_.anchor(held_nodes(*body_, options_.holds));
+    statics_.anchor(held_nodes(*body_, options_.holds));
   }
   if (!options_.weights.empty()) {
     const HungWeights hung(*body_, options_.weights, options_.blocks.gravity);
@@ -99,14 +101,17 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   if (options_.scan_sags || !options_.shape.points.empty()) {
     const std::vector<int> held = held_nodes(*body_, options_.holds);
     shape_ = std::make_unique<RestShape>(body_, held, options_.scan_sags, options_.weights,
-                                         shape_basis(*body_, options_.shape, held), options_.blocks);
+                                         shape_basis(*body_, options_.shape, held), options_.blocks,
+                                         scene_material(options_));
   }
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->scanned_positions().rowwise() - body_->centre_of_mass().transpose();
   for (int frame = 1; frame < frame_count() && !options_.is_static; ++frame) {
     const double interval = options_.times[frame] - options_.times[frame - 1];
     const int steps = std::max(1, int(std::ceil(interval / options_.max_dt - 1e-9)));
-    for (int s = 1; s <= steps; ++s) plan_.push_back({interval / steps, s == steps ? frame : -1});
+    for (int s = 1; s <= steps; ++s)
+      plan_.push_back(
+          {options_.times[frame - 1] + (s - 1) * interval / steps, interval / steps, s == steps ? frame : -1});
   }
 }
 
@@ -178,7 +183,7 @@ std::vector<State> Simulation::start_tangents(const State& start, const MatrixX&
     const VectorX direction = directions.col(c);
     tangents.push_back({Points::Zero(rest_.rows(), 3), velocities(direction)});  // velocities are linear in theta
     if (!shape.scan.empty()) tangents.back().x = shape.scan[std::size_t(c)];
-    if (starts_held()) tangents.back().x = stepper_.equilibrium_tangent(start.x, direction, shape.of(std::size_t(c)));
+    if (starts_held()) tangents.back().x = statics_.tangent(start.x, direction, shape.of(std::size_t(c)));
   }
   hold_start(false);
   return tangents;
@@ -192,8 +197,8 @@ bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& th
   }
   if (starts_held()) {
     hold_start(true);
-    const bool ready = stepper_.prepare_equilibrium_derivatives(start.x);
-    if (ready) stepper_.equilibrium_adjoint(start.x, bar.x, theta_bar, follows_shape() ? &reference_bar_ : nullptr);
+    const bool ready = statics_.prepare_derivatives(start.x);
+    if (ready) statics_.adjoint(start.x, bar.x, theta_bar, follows_shape() ? &reference_bar_ : nullptr);
     hold_start(false);
     if (!ready) return false;
   }
@@ -241,47 +246,48 @@ void Simulation::move_holds(double from, double to, Points& positions) {
   if (fixed_regions_) fixed_regions_->move_to(there);
 }
 
+bool Simulation::settle(Points& x, RolloutSummary& summary) {
+  const SolveSummary solved = statics_.solve(x);
+  summary.solver_iterations += solved.iterations;
+  ++summary.steps;
+  return solved.converged && statics_.prepare_derivatives(x);
+}
+
 bool Simulation::find_equilibrium(const VectorX& parameters, State& state, RolloutSummary& summary) {
-  constexpr double smallest = 1.0 / 256.0, largest_turn = 0.4;
+  constexpr double largest_turn = 0.4;  // [rad] of a held region, a step of the load
   constexpr int most_iterations = 400;
   if (last_equilibrium_.rows() > 0 && !options_.is_static) {  // that of parameters that may be near
     state = {last_equilibrium_, Points::Zero(rest_.rows(), 3)};
-    const SolveSummary solved = stepper_.equilibrium(state.x);
-    summary.solver_iterations += solved.iterations;
-    ++summary.steps;
-    if (solved.converged) return last_equilibrium_ = state.x, true;
+    if (settle(state.x, summary)) return last_equilibrium_ = state.x, true;
   }
   double turn = 0.0;
   for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
   state = {shape_ ? shape_->scan() : body_->scanned_positions(), Points::Zero(rest_.rows(), 3)};
   const double longest = turn > 0.0 ? std::min(1.0, largest_turn / turn) : 1.0;
-  double done = 0.0, stride = longest;
-  while (done < 1.0) {
-    const double share = std::min(1.0, done + stride);
+  LoadContinuation steps({.first = longest, .largest = longest, .shrink = 0.4, .least = 1.0 / 256.0});
+  while (const auto share = steps.next()) {
     VectorX part = parameters;
-    part.segment<3>(options_.blocks.gravity) *= share;
-    for (const ParameterHandle& pull : options_.blocks.pulls) part.segment<3>(pull) *= share;
+    part.segment<3>(options_.blocks.gravity) *= *share;
+    for (const ParameterHandle& pull : options_.blocks.pulls) part.segment<3>(pull) *= *share;
     Points x = state.x;
     stepper_.set_parameters(part);
-    move_holds(done, share, x);
-    const SolveSummary solved = stepper_.equilibrium(x);
-    summary.solver_iterations += solved.iterations;
-    ++summary.steps;
-    if (solved.converged) {
-      state.x = x;
-      done = share;
-      stride = std::min(1.5 * stride, longest);
-    } else if ((stride *= 0.4) < smallest || summary.solver_iterations > most_iterations) {
-      summary.failure = "no equilibrium was found beyond " + std::to_string(100.0 * done) +
-                        " % of the load: the material may be too soft to hold the object up";
-      return false;
-    }
+    move_holds(steps.carried(), *share, x);
+    const bool is_carried = settle(x, summary);
+    if (is_carried) state.x = x;
+    steps.report(is_carried ? LoadContinuation::Outcome::Carried : LoadContinuation::Outcome::NotFollowed);
+    if (!is_carried && summary.solver_iterations > most_iterations) break;
+  }
+  if (!steps.is_complete()) {
+    summary.failure = "no equilibrium was found beyond " + std::to_string(100.0 * steps.carried()) +
+                      " % of the load: the material may be too soft to hold the object up";
+    return false;
   }
   last_equilibrium_ = state.x;
   return true;
 }
 
 bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary& summary) {
+  stepper_.set_time(plan.time);
   stepper_.set_time_step(plan.dt);
   if (!stepper_.prepare(state)) {
     summary.failure =
@@ -314,8 +320,8 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   if (options_.is_static) {
     if (!find_equilibrium(parameters, state, summary)) return summary;
     for (Eigen::Index c = 0; c < directions.cols(); ++c)
-      tangents.push_back({stepper_.equilibrium_tangent(state.x, directions.col(c), shape.of(std::size_t(c))),
-                          Points::Zero(rest_.rows(), 3)});
+      tangents.push_back(
+          {statics_.tangent(state.x, directions.col(c), shape.of(std::size_t(c))), Points::Zero(rest_.rows(), 3)});
     for (int frame = 0; frame <= std::min(last_frame, frame_count() - 1); ++frame) {
       ++summary.frames;
       if (!on_frame(frame, state, tangents)) break;
@@ -366,7 +372,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       if (!cost(frame, state)) return summary.failure = "the cost failed", summary;
       cotangent(frame, state, x_bar);
     }
-    stepper_.equilibrium_adjoint(state.x, x_bar, theta_bar, reference_bar);
+    statics_.adjoint(state.x, x_bar, theta_bar, reference_bar);
     if (reference_bar) {
       if (!shape_->prepare_derivatives()) return summary.failure = "the load-free shape has no derivatives", summary;
       shape_->adjoint(Points::Zero(rest_.rows(), 3), reference_bar_, theta_bar);
@@ -416,6 +422,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     }
     const State& start = segment.back();
     if (plan_[s].frame_after >= 0) cotangent(plan_[s].frame_after, state, bar.x);
+    stepper_.set_time(plan_[s].time);
     stepper_.set_time_step(plan_[s].dt);
     delta_ = state.x - start.x;
     if (!stepper_.prepare_derivatives(start, delta_))
@@ -432,11 +439,15 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   return summary;
 }
 
+BodyMaterial scene_material(const SimulationOptions& options) {
+  if (options.law_layout) return BodyMaterial(*options.law_layout);
+  if (options.law) return BodyMaterial(options.law);
+  return BodyMaterial(static_cast<const MaterialBlocks&>(options.blocks));
+}
+
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body,
                                              const SimulationOptions& options) {
-  if (options.law_layout) return LawElasticity::make(body, *options.law_layout);
-  if (options.law) return LawElasticity::make(body, options.law);
-  return make_elasticity(body, options.blocks);
+  return scene_material(options).make_elasticity(body);
 }
 
 std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,
@@ -462,13 +473,6 @@ std::vector<int> eliminated_nodes(const Body& body, const SimulationOptions& opt
                       "regions that hold a part of it",
                       "move them onto the object, make them larger, or use smaller elements"});
   return held;
-}
-
-ContactOptions default_contact(const Body& body, double mass, double gravity) {
-  const double size = body.size();
-  double projected = 0.0;  // a convex body's mean projected area is a quarter of its surface
-  for (const SurfacePoint& point : body.surface) projected += 0.25 * point.area;
-  return {mass * gravity / (projected * 1e-4 * size), 1e-3 * size};
 }
 
 double default_time_step(const Body& body, double gravity) { return 0.0125 * std::sqrt(body.size() / gravity); }

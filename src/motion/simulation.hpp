@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
-#include "elasticity/law_layout.hpp"
+#include "elasticity/material.hpp"
 #include "motion/body_forces.hpp"
+#include "motion/contact_defaults.hpp"
 #include "motion/fixed_regions.hpp"
-#include "motion/plane_contact.hpp"
 #include "motion/pull.hpp"
 #include "motion/rest_shape.hpp"
+#include "motion/statics.hpp"
 #include "motion/stepper.hpp"
 
 namespace pliant {
@@ -25,7 +26,9 @@ struct SimulationOptions {
   SolverOptions solver;
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
-  ContactOptions contact;
+  Penalty contact;              ///< of the surface with every plane
+  double friction_speed = 0.0;  ///< below which friction fades to nothing [m/s]; 0: there is none, whatever its
+                                ///< coefficients
   /// Where the parameter vectors of the motion have what it depends on: obstacles are its planes, and where it has
   /// pulls the motion starts at rest in the equilibrium under them (see `Pull`).
   MotionBlocks blocks = MotionLayout();
@@ -38,8 +41,7 @@ struct SimulationOptions {
   std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
-  /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then. Not together
-  /// with a scan that sags.
+  /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then.
   std::shared_ptr<const MaterialLaw> law;
   std::optional<LawLayout> law_layout;  ///< with handles of the parameter vectors (`LawLayout::of_motion`)
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
@@ -57,8 +59,7 @@ struct RolloutSummary {
 /// copies are cheap to make with the same body.
 class Simulation {
  public:
-  /// Throws std::invalid_argument where options contradict each other or the body, InputError for a law together with
-  /// a scan that sags.
+  /// Throws std::invalid_argument where options contradict each other or the body.
   Simulation(std::shared_ptr<const Body> body, SimulationOptions options);
 
   const Body& body() const { return *body_; }
@@ -93,7 +94,7 @@ class Simulation {
 
  private:
   struct StepPlan {
-    double dt;
+    double time, dt;  ///< of its start, and its length [s]
     int frame_after;  ///< frame reached by this step, -1: none
   };
   /// False where the object cannot be free of load anywhere: the summary says so.
@@ -120,6 +121,8 @@ class Simulation {
   /// The equilibrium of static scenes and of pulled objects: at once where Newton's method gets there from rest, else
   /// by steps of the load, gravity, pulls and the holds' displacement together, as large as it follows.
   bool find_equilibrium(const VectorX& theta, State& state, RolloutSummary& summary);
+  /// To the equilibrium under the parameters at hand, with the matrix of its derivatives. False where there is none.
+  [[nodiscard]] bool settle(Points& x, RolloutSummary& summary);
   /// Moves the held regions from one part of their way to another, and the whole body's positions along with them: each
   /// node as the regions move, by inverse square distance from them.
   void move_holds(double from, double to, Points& positions);
@@ -137,6 +140,7 @@ class Simulation {
   std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;
+  Statics statics_;                   // of the stepper's forces
   std::unique_ptr<RestShape> shape_;  // where theta says where the body is free of load
   bool shape_is_held_ = false;
   Points reference_bar_;     // likewise, of the reverse sweep
@@ -145,6 +149,9 @@ class Simulation {
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;
 };
+
+/// What a scene's body is made of.
+BodyMaterial scene_material(const SimulationOptions& options);
 
 /// The elasticity of a scene's body.
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body, const SimulationOptions& options);
@@ -155,11 +162,6 @@ std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const
 
 /// Nodes that a simulation of the scene eliminates; the others in held regions are held by forces.
 std::vector<int> eliminated_nodes(const Body& body, const SimulationOptions& options);
-
-/// Stiffness and smoothing of contact that suit an object of this size and weight: its weight on its projected area
-/// presses it in by 1e-4 of its size, and contact sets in over 1e-3 of it: the smallest that steps of the default
-/// length resolve. Softer contact lets the object hover and rebound more than a rigid floor does.
-ContactOptions default_contact(const Body& body, double mass, double gravity);
 
 /// The longest step that suits an object of this size falling under this gravity.
 double default_time_step(const Body& body, double gravity);

@@ -15,6 +15,7 @@ Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<F
       stiffness_damping_block_(blocks.stiffness_damping),
       density_block_(blocks.density),
       options_(options),
+      newton_(options.newton),
       matrix_(body_->pattern) {
   if (!(options.dt > 0.0)) throw std::invalid_argument("the time step must be positive");
   if (!(options.newmark_theta >= 0.5 && options.newmark_theta < 1.0))
@@ -60,7 +61,15 @@ Stepper::Scheme Stepper::scheme() const {
   return s;
 }
 
-Stepper::Scheme Stepper::static_scheme() { return {{1.0, 1.0, 1.0}, {1.0, 1.0}, {0.0, 0.0}, 1.0, false}; }
+std::vector<ForceTerm*> Stepper::terms() const {
+  std::vector<ForceTerm*> all;
+  for (const auto& term : terms_) all.push_back(term.get());
+  return all;
+}
+
+void Stepper::begin(const State& start) {
+  for (auto& term : terms_) term->begin_step({&start.x, &start.v, time_, options_.dt});
+}
 
 void Stepper::set_points_at(const Scheme& s, const Points& x, const Points& delta) {
   for (const auto at : all_ats) points_at_[std::size_t(at)] = x + s.at[std::size_t(at)] * delta;
@@ -88,7 +97,6 @@ void Stepper::add_inertia(double scale, const Points& v, Points& out) const {
 
 void Stepper::set_mass_matrix(const Scheme& s, BlockMatrix& matrix) const {
   matrix.set_zero();
-  if (!s.has_mass) return;
   const double m = mass_factor();
   for (std::size_t b = 0; b < body_->mass.size(); ++b) {
     double* block = matrix.block(int(b));
@@ -108,6 +116,7 @@ void Stepper::set_mass_matrix(const Scheme& s, BlockMatrix& matrix) const {
 
 bool Stepper::prepare(const State& start) {
   if (!start.x.allFinite() || !start.v.allFinite()) return false;
+  begin(start);
   if (is_newton()) return true;
   const Scheme s = scheme();
   for (const auto lag : all_lags) lag_[std::size_t(lag)] = start.x + s.prediction[std::size_t(lag)] * start.v;
@@ -116,6 +125,7 @@ bool Stepper::prepare(const State& start) {
 
 bool Stepper::prepare(const State& start, const Points& delta) {
   if (!start.x.allFinite() || !delta.allFinite()) return false;
+  begin(start);
   for (const auto lag : all_lags) {
     const double share = lag == ForceTerm::Lag::Rotation ? options_.newmark_theta : options_.contact_weight;
     lag_[std::size_t(lag)] = start.x + share * delta;
@@ -138,7 +148,9 @@ SolveSummary Stepper::solve(const State& start, Points& delta) {
     inertia_.setZero();
     add_inertia(1.0 / options_.newmark_theta, start.v, inertia_);
     clear_held(delta);
-    return newton(scheme(), start.x, inertia_, delta);
+    start_ = &start.x;
+    rounding_ = 0.0;
+    return newton_.solve(*this, delta);
   }
   force_.setZero();
   for (auto& term : terms_) term->add_force(start.x, force_);
@@ -173,15 +185,19 @@ void Stepper::linearise(const Scheme& s, const Points& x, const Points& delta) {
   for (auto& term : terms_) term->linearise(lag_[std::size_t(term->lag())]);
 }
 
-double Stepper::residual(const Scheme& s, const Points& x, const Points& delta, const Points& inertia,
-                         double& force_scale) {
-  set_points_at(s, x, delta);
-  residual_ = -inertia;
-  force_scale = inertia.norm();
-  if (s.has_mass) {
-    body_->add_mass_product(mass_factor(), delta, residual_);
-    add_carried(1.0 / (options_.newmark_theta * s.dt), delta, residual_);
-  }
+std::optional<double> Stepper::linearise(const Points& delta) {
+  delta_ = delta;
+  linearise(scheme(), *start_, delta_);
+  return std::nullopt;
+}
+
+NewtonProblem::Residual Stepper::residual() {
+  const Scheme s = scheme();
+  set_points_at(s, *start_, delta_);
+  residual_ = -inertia_;
+  double force_scale = inertia_.norm();
+  body_->add_mass_product(mass_factor(), delta_, residual_);
+  add_carried(1.0 / (options_.newmark_theta * s.dt), delta_, residual_);
   for (auto& term : terms_) {
     force_.setZero();
     term->add_force(points_at_[std::size_t(term->at())], force_);
@@ -189,12 +205,11 @@ double Stepper::residual(const Scheme& s, const Points& x, const Points& delta, 
     residual_ -= s.dt * force_;
   }
   clear_held(residual_);
-  return residual_.norm();
+  return {residual_.norm(), force_scale};
 }
 
-bool Stepper::factorise_exact(const Scheme& s, const Points& x, const Points& delta) {
+bool Stepper::factorise_exact(const Scheme& s) {
   GeneralSolver& solver = general();
-  set_points_at(s, x, delta);
   set_mass_matrix(s, matrix_);
   for (auto& term : terms_) term->add_matrix(s.dt * s.at[std::size_t(term->at())], matrix_);
   exact_matrix_ = matrix_;
@@ -211,86 +226,26 @@ bool Stepper::factorise_exact(const Scheme& s, const Points& x, const Points& de
   return solver.factorise(exact_matrix_, matrix_);
 }
 
-double Stepper::prepare_move(const Scheme& s, const Points& x, const Points& delta) {
-  constexpr double hardly = 1e-3, farthest = 1.0;  // [rad]
-  turns_ = false;
-  if (s.has_mass) return 1.0;
-  if (!turning_) turning_ = std::make_unique<TurningStep>(body_, options_.solver.kind);
-  if (!turning_->fix(held_.empty() ? anchors_ : held_)) return 1.0;
-  const double angle = turning_->prepare(x + delta, step_);
-  // A straight step is as good for small angles, and free of rounding.
-  turns_ = angle > hardly;
-  return std::min(1.0, farthest / angle);
+std::string Stepper::find_step(Points& step) {
+  if (!factorise_exact(scheme())) return "the step's matrix cannot be factorised";
+  right_ = -flat(residual_);
+  general_->solve(right_, solution_, 1e-4);
+  step = as_points(std::as_const(solution_));
+  return {};
 }
 
-void Stepper::move(const Points& x, const Points& delta, double share) {
-  if (!turns_) {
-    trial_ = delta + share * step_;
-    return;
-  }
-  turning_->move(share, trial_);
-  trial_ -= x;
-}
-
-SolveSummary Stepper::newton(const Scheme& s, const Points& x, const Points& inertia, Points& delta) {
-  SolveSummary summary;
-  double force_scale = 0.0;
-  linearise(s, x, delta);
-  double r = residual(s, x, delta, inertia, force_scale);
-  rounding_ = 0.0;
-  const double size = body_->size();
-  for (; summary.iterations < options_.newton.max_iterations; ++summary.iterations) {
-    if (!std::isfinite(r)) return summary;
-    summary.residual = force_scale > 0.0 ? r / force_scale : 0.0;
-    if (summary.residual <= options_.newton.tolerance || r <= rounding_) {
-      summary.converged = true;
-      return summary;
-    }
-    if (!factorise_exact(s, x, delta)) return summary;
-    // Where the exact matrix is indefinite, Newton's step leads to whatever point has no force, or nowhere. The
-    // matrix with rotations kept leads downhill.
-    const bool is_exact = s.has_mass || general_->symmetric_part_is_definite();
-    const auto solve_for = [&](double tolerance, VectorX& y) {
-      if (is_exact)
-        general_->solve(-flat(residual_), y, tolerance);
-      else
-        general_->precondition(-flat(residual_), y);
-    };
-    VectorX direction;
-    solve_for(1e-4, direction);
-    step_ = as_points(std::as_const(direction));
-    if (!step_.allFinite()) return summary;
-    // Newton's next step after so small a one would be below rounding, which may leave more force than the tolerance:
-    // stiff bodies under small loads.
-    if (step_.cwiseAbs().maxCoeff() < 1e-11 * size) {
-      delta += step_;
-      summary.converged = true;
-      return summary;
-    }
-    // Natural monotonicity (Deuflhard 2004, section 3.3): a share of the step is good where the next step from there,
-    // with the matrix at hand, is shorter. Residuals themselves may rise on the way to the solution, by orders of
-    // magnitude for slender or nearly incompressible bodies.
-    const double length = step_.norm();
-    double share = prepare_move(s, x, delta);
-    for (int halving = 0;; ++halving, share *= 0.5) {
-      move(x, delta, share);
-      linearise(s, x, trial_);
-      r = residual(s, x, trial_, inertia, force_scale);
-      if (std::isfinite(r)) {
-        solve_for(1e-2, direction);
-        if (direction.norm() <= (1.0 - 0.25 * share) * length) break;
-      }
-      if (halving == 12) return summary;
-    }
-    delta = trial_;
-  }
-  return summary;
+double Stepper::next_step_length() {
+  right_ = -flat(residual_);
+  general_->solve(right_, solution_, 1e-2);
+  return solution_.norm();
 }
 
 bool Stepper::prepare_derivatives(const State& start, const Points& delta) {
   if (!is_newton()) return prepare(start);
+  begin(start);
   linearise(scheme(), start.x, delta);
-  return factorise_exact(scheme(), start.x, delta);
+  set_points_at(scheme(), start.x, delta);
+  return factorise_exact(scheme());
 }
 
 void Stepper::solve_derivative(const Points& b, Points& y, GeneralSolver::Side side) {
@@ -318,6 +273,7 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
     term->add_force_tangent(points_at_[std::size_t(term->at())], d_lag_[std::size_t(term->lag())],
                             blended ? d_blended_ : change.x, d_theta, d_force_);
     if (d_reference) term->add_reference_tangent(*d_reference, d_force_);
+    if (term->sees_start()) term->add_start_tangent(points_at_[std::size_t(term->at())], change.x, change.v, d_force_);
   }
   d_force_ *= dt;
   mass_part_ = density_ / t * change.v;
@@ -377,53 +333,13 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
     const auto at = std::size_t(term->at());
     term->add_force_adjoint(points_at_[at], w_, lag_bar_[std::size_t(term->lag())], bar_at_[at], theta_bar);
     if (reference_bar) term->add_reference_adjoint(w_, *reference_bar);
+    if (term->sees_start()) term->add_start_adjoint(points_at_[at], w_, bar.x, bar.v);
   }
   theta_bar[stiffness_damping_block_] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
   for (const Points& p : bar_at_) bar.x += p;
   for (const auto lag : all_lags) {
     bar.x += lag_bar_[std::size_t(lag)];
     bar.v += s.prediction[std::size_t(lag)] * lag_bar_[std::size_t(lag)];
-  }
-}
-
-SolveSummary Stepper::equilibrium(Points& x) {
-  const Scheme s = static_scheme();
-  inertia_.setZero();
-  Points delta = Points::Zero(x.rows(), 3);
-  SolveSummary summary = newton(s, x, inertia_, delta);
-  x += delta;
-  if (summary.converged) summary.converged = prepare_equilibrium_derivatives(x);
-  return summary;
-}
-
-bool Stepper::prepare_equilibrium_derivatives(const Points& x) {
-  const Points none = Points::Zero(x.rows(), 3);
-  linearise(static_scheme(), x, none);
-  for (auto& term : terms_) term->linearise_reference(x);
-  return factorise_exact(static_scheme(), x, none);
-}
-
-Points Stepper::equilibrium_tangent(const Points& x, const VectorX& d_theta, const Points* d_reference) {
-  const Points none = Points::Zero(x.rows(), 3);
-  d_force_.setZero();
-  for (auto& term : terms_) {
-    term->add_force_tangent(x, none, none, d_theta, d_force_);
-    if (d_reference) term->add_reference_tangent(*d_reference, d_force_);
-  }
-  clear_held(d_force_);
-  Points change;
-  solve_derivative(d_force_, change, GeneralSolver::Side::Plain);
-  return change;
-}
-
-void Stepper::equilibrium_adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar, Points* reference_bar) {
-  force_ = x_bar;
-  clear_held(force_);
-  solve_derivative(force_, w_, GeneralSolver::Side::Transposed);
-  clear_held(w_);
-  for (auto& term : terms_) {
-    term->add_force_adjoint(x, w_, lag_bar_[std::size_t(term->lag())], bar_at_[std::size_t(term->at())], theta_bar);
-    if (reference_bar) term->add_reference_adjoint(w_, *reference_bar);
   }
 }
 

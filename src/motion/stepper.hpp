@@ -6,7 +6,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
-#include "motion/turning_step.hpp"
+#include "motion/newton.hpp"
 #include "parameters/motion_blocks.hpp"
 #include "solvers/general_solver.hpp"
 #include "solvers/linear_solver.hpp"
@@ -21,11 +21,6 @@ struct State {
 enum class Integrator {
   Lagged,  ///< rotations and contact predicted from the start: one linear solve a step (Weiss 2020)
   Newton,  ///< fully implicit with the exact corotational stiffness (Wang 2015)
-};
-
-struct NewtonOptions {
-  double tolerance = 1e-9;  ///< of the residual, relative to the forces that meet in it, (0, 1)
-  int max_iterations = 60;  ///< >= 1
 };
 
 struct StepOptions {
@@ -50,13 +45,9 @@ struct StepOptions {
 /// One linear system a step; its tangent and adjoint solve with the same (symmetric) matrix.
 ///
 /// The fully implicit scheme is the same equation with lag points that move along: rotations are those of x + theta
-/// Delta (the implicit midpoint for theta = 1/2), contact is that of x + w Delta. It is solved by Newton's method with
-/// backtracking; tangent and adjoint follow from the implicit function theorem with the exact, slightly unsymmetric
-/// matrix.
-///
-/// At rest the equation is sum of f(x | x) = 0, without mass and with every force at the unknown position:
-/// `equilibrium`.
-class Stepper {
+/// Delta (the implicit midpoint for theta = 1/2), contact is that of x + w Delta. It is solved by `Newton`; tangent and
+/// adjoint follow from the implicit function theorem with the exact, slightly unsymmetric matrix.
+class Stepper : private NewtonProblem {
  public:
   /// Terms may share data; they belong to this stepper and are used by one thread.
   /// @param blocks  of dampings and density
@@ -64,13 +55,15 @@ class Stepper {
           const StepOptions& options);
 
   const StepOptions& options() const { return options_; }
+  /// The forces, for equilibria between steps (`Statics`). Steps are to be prepared again afterwards.
+  std::vector<ForceTerm*> terms() const;
   /// For frames that are not equally far apart.
   void set_time_step(double dt) { options_.dt = dt; }
+  /// Time [s] of the start of the steps to come, for forces that change with it.
+  void set_time(double time) { time_ = time; }
   void set_parameters(const VectorX& theta);
   /// Nodes that stay where they are (strong Dirichlet elimination).
   void hold(std::vector<int> nodes) { held_ = std::move(nodes); }
-  /// Nodes that hardly move though nothing eliminates them: on the way to an equilibrium parts turn about them.
-  void anchor(std::vector<int> nodes) { anchors_ = std::move(nodes); }
   /// Point masses that move along with points of the body: they add the inertia sum_i m_i w_i w_i^T, w_i the points'
   /// weights, to the body's, and neither weight nor damping. One mass [kg] a point.
   void carry(Embedding points, std::vector<double> masses);
@@ -98,16 +91,6 @@ class Stepper {
   /// Makes ready for derivatives by the reference, after `prepare_derivatives`.
   void prepare_reference_derivatives(const State& start, const Points& delta);
 
-  /// Positions without acceleration, from a guess, by Newton's method; held nodes stay where the guess has them. After
-  /// a success the derivatives below refer to it. Not converged: says so, and x is the best found.
-  [[nodiscard]] SolveSummary equilibrium(Points& x);
-  /// Makes ready for them again after steps were taken. False where the matrix cannot be factorised.
-  [[nodiscard]] bool prepare_equilibrium_derivatives(const Points& x);
-  /// Change of the equilibrium for a change of theta and, where given, of where the nodes are free of load.
-  Points equilibrium_tangent(const Points& x, const VectorX& d_theta, const Points* d_reference = nullptr);
-  /// theta_bar and, where given, reference_bar += the cotangents for one of the equilibrium's positions.
-  void equilibrium_adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar, Points* reference_bar = nullptr);
-
   const BlockMatrix& matrix() const { return matrix_; }
 
  private:
@@ -116,12 +99,10 @@ class Stepper {
     std::array<double, 3> at;
     std::array<double, 2> lag, prediction;
     double dt = 1.0;
-    bool has_mass = true;
   };
   Scheme scheme() const;
   /// Assembles and factorises the lagged step's matrix about the lag points at hand.
   [[nodiscard]] bool factorise(const Scheme& scheme);
-  static Scheme static_scheme();
   /// Sets `points_at_` to the positions x + s Delta at which terms act.
   void set_points_at(const Scheme& scheme, const Points& x, const Points& delta);
   double mass_factor() const { return density_ * (1.0 / (options_.newmark_theta * options_.dt) + mass_damping_); }
@@ -133,17 +114,19 @@ class Stepper {
   void set_mass_matrix(const Scheme& scheme, BlockMatrix& matrix) const;
   /// Linearises every term where its lag point is for this Delta.
   void linearise(const Scheme& scheme, const Points& x, const Points& delta);
-  /// Residual of the implicit equation at Delta, with terms linearised there; `force_scale` is what met in it.
-  double residual(const Scheme& scheme, const Points& x, const Points& delta, const Points& inertia,
-                  double& force_scale);
-  /// The exact matrix about Delta, with terms linearised there, factorised.
-  [[nodiscard]] bool factorise_exact(const Scheme& scheme, const Points& x, const Points& delta);
-  /// Chooses how Newton's step_ is taken: with parts of the body turned on the way to an equilibrium, else straight.
-  /// Returns the largest share of it that makes sense.
-  double prepare_move(const Scheme& scheme, const Points& x, const Points& delta);
-  /// trial_ = that share of step_ beyond Delta.
-  void move(const Points& x, const Points& delta, double share);
-  SolveSummary newton(const Scheme& scheme, const Points& x, const Points& inertia, Points& delta);
+  /// The exact matrix of the implicit equation about Delta, with terms linearised there, factorised.
+  [[nodiscard]] bool factorise_exact(const Scheme& scheme);
+  void begin(const State& start);
+
+  // The implicit equation of Delta.
+  std::optional<double> linearise(const Points& delta) override;
+  Residual residual() override;
+  double residual_rounding() const override { return rounding_; }
+  std::string find_step(Points& step) override;
+  double slope(const Points& step) const override { return residual_.cwiseProduct(step).sum(); }
+  double next_step_length() override;
+  double size() const override { return body_->size(); }
+
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
   void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
   bool is_newton() const { return options_.integrator == Integrator::Newton; }
@@ -153,9 +136,10 @@ class Stepper {
   std::vector<std::unique_ptr<ForceTerm>> terms_;
   ParameterHandle mass_damping_block_, stiffness_damping_block_, density_block_;
   StepOptions options_;
-  std::vector<int> held_, anchors_;
-  std::unique_ptr<TurningStep> turning_;
-  bool turns_ = false;
+  std::vector<int> held_;
+  double time_ = 0.0;
+  Newton newton_;
+  const Points* start_ = nullptr;  // of the implicit equation being solved
   Embedding carried_;
   std::vector<double> carried_mass_;
   double mass_damping_ = 0.0, stiffness_damping_ = 0.0, density_ = 0.0;
@@ -166,8 +150,8 @@ class Stepper {
   std::unique_ptr<GeneralSolver> general_;
   std::array<Points, 3> points_at_, bar_at_;     // by ForceTerm::At
   std::array<Points, 2> lag_, d_lag_, lag_bar_;  // by ForceTerm::Lag
-  Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, trial_, step_;
-  VectorX solution_;
+  Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, delta_;
+  VectorX solution_, right_;
   std::array<VectorX, 2> adjoint_solution_;  // of the last adjoint steps with these parameters: guesses of the next
   int adjoint_solutions_ = 0;
 };

@@ -13,6 +13,7 @@
 #include "output/track_output.hpp"
 #include "report/gallery.hpp"
 #include "report/report.hpp"
+#include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
 
@@ -82,8 +83,17 @@ void add_correlations(Result& result, const FitOutcome& outcome) {
                    [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
 }
 
+/// Forms of a law have numbers of their own each: what they have in common.
+ConvergenceHistory law_history(const FitOutcome& outcome) {
+  ConvergenceHistory history{{"youngs_modulus", "marker_rms"}, {"Pa", "m"}, {}};
+  for (const FitEvent& e : outcome.history)
+    history.rows.push_back({e.start, e.iteration, e.stage, e.cost, e.damping, {e.youngs_modulus, e.marker_rms}});
+  return history;
+}
+
 /// @param with_trials  whether the trials of a scan are among the rows: they are no iterations
 ConvergenceHistory history_of(const FitOutcome& outcome, bool with_trials) {
+  if (outcome.law) return law_history(outcome);
   ConvergenceHistory history;
   std::vector<const Parameter*> shown;
   for (const Parameter& p : outcome.parameters.parameters())
@@ -111,6 +121,7 @@ std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks,
   for (std::size_t i = 0; i < planes.size(); ++i) {
     planes[i].point = blocks.planes[i].point.vector(theta);
     planes[i].normal = blocks.planes[i].normal.vector(theta);
+    planes[i].friction = theta[blocks.planes[i].friction];
   }
   return planes;
 }
@@ -312,7 +323,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   for (const Parameter& p : outcome.parameters.parameters()) {
     ParameterResult r{p.name, value_of(p, outcome.theta), p.unit, {}, {}, p.estimated};
     if (p.estimated) {
-      r.start = value_of(p, outcome.start_theta);
+      if (outcome.start_theta.size() > 0) r.start = value_of(p, outcome.start_theta);
       if (has_std) r.std = std_of(p, outcome.std, jacobian, at);
       if (refinement.mesh_error.size() > 0) r.mesh_error = std_of(p, refinement.mesh_error, jacobian, at);
       if (refinement.step_error.size() > 0) r.step_error = std_of(p, refinement.step_error, jacobian, at);
@@ -339,11 +350,16 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
     result.starts.push_back(std::move(r));
   }
   add_resolutions(result, outcome);
+  if (const auto& held_out = outcome.held_out) {
+    result.held_out = {held_out->name, held_out->sha256, {}};
+    if (held_out->evaluation.succeeded) result.held_out->error = surface_errors(held_out->evaluation).error;
+  }
   result.time.wall_seconds = facts.wall_seconds;
   result.time.forward_steps = outcome.forward_steps;
   if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
   if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
   result.notes = outcome.notes;
+  if (outcome.law) result.curves = predict_curves(*outcome.law->scene, outcome.law->law);
   if (outcome.tracking)
     result.tracking = tracking_result(*outcome.tracking, outcome.recordings.front().discretisation.simulation.blocks);
   return result;
@@ -361,6 +377,7 @@ World world_of(const Vector3& gravity) {
 }  // namespace
 
 Model make_model(const Capture& capture, const FitOutcome& outcome) {
+  if (outcome.law) return make_model(capture, *outcome.law);
   const RecordingOutcome& first = outcome.recordings.front();
   Discretisation free = first.discretisation;
   free.body = first.rest_body;
@@ -375,6 +392,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   TriangleMesh surface = *capture.scene.object.surface;
   model.youngs_modulus = modulus.mean;
   model.poissons_ratio = t[blocks.poissons_ratio];
+  if (d.simulation.law_layout) model.law = model_law(*law_at(*d.body, *d.simulation.law_layout, t));
   model.mass_damping = t[blocks.mass_damping];
   model.stiffness_damping = t[blocks.stiffness_damping];
   const double mass = t[blocks.density] * enclosed_volume(*capture.scene.object.surface);
@@ -437,24 +455,16 @@ CaptureScene make_scene(const Model& model, const Capture& recorded) {
           std::move(made.theta)};
 }
 
-void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
-                      const Result& result, const RunFacts& facts,
-                      const std::function<void(const char*, int, int)>& progress) {
-  const auto tell = [&](const char* what, int done, int total) {
-    if (progress) progress(what, done, total);
-  };
+namespace {
+
+using Progress = std::function<void(const char*, int, int)>;
+
+void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
+                  ReportData& report, const Progress& tell) {
   const Capture& capture = recordings.front().capture;
   const RecordingOutcome& first = outcome.recordings.front();
-  ReportData report;
-  report.title = capture.name;
-  report.result = result;
-  report.convergence = drawn_history(outcome);
-  write_result(folder / "result.json", report.result);
-  write_convergence(folder / "convergence.csv", history_of(outcome, true));
-  save_model(folder, make_model(capture, outcome));
   write_trajectory(folder, first.discretisation.body, first.discretisation.simulation, first.theta,
                    [&](int done, int total) { return tell("trajectory", done, total), true; });
-  report.capture_path = facts.capture_path;
   for (const auto& f : surface_errors(first.evaluation).frames) {
     const int frame = f.frame + capture.scene.timing.start_frame;
     report.residuals.push_back({frame, capture.scene.timing.times[std::size_t(frame)], f.rms, f.points, f.noise});
@@ -463,18 +473,52 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
   report.loads = predict_loads(capture, {first.discretisation, outcome.parameters.layout(), first.theta});
   std::erase_if(report.loads, [](const LoadError& load) { return load.role != "test"; });
   tell("loads", 1, 1);
-  if (outcome.correlation.size() > 0)
-    report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   tell("pictures", 0, 1);
   add_pictures(report, gallery_of(recordings.front(), first));
   tell("pictures", 1, 1);
-  write_report(folder / "report.html", report);
-  if (!outcome.tracking) return;
+}
+
+void write_law(const fs::path& folder, const LawOutcome& law, ReportData& report, const Progress& tell) {
+  write_presses(folder, law, tell);
+  report.presses = press_errors(*law.scene, law.predictions);
+  for (const ObservedPress& press : law.scene->presses) report.press_forces.push_back(press.force.norm());
+  if (law.sampled) report.basis_errors = law.sampled->error_by_size;
+}
+
+void write_tracks(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
+                  const Progress& tell) {
   for (std::size_t i = 0; i < outcome.tracking->tracks.size(); ++i) {
     const std::string name = recordings.size() == 1 ? "track" : "track-" + std::to_string(i + 1);
     write_track(folder / name, recordings[i].capture, recordings[i].observed, *outcome.tracking->tracks[i],
-                outcome.recordings[i].discretisation.simulation.blocks, outcome.recordings[i].theta, true, progress);
+                outcome.recordings[i].discretisation.simulation.blocks, outcome.recordings[i].theta, true, tell);
   }
+}
+
+}  // namespace
+
+void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
+                      const Result& result, const RunFacts& facts,
+                      const std::function<void(const char*, int, int)>& progress) {
+  const Progress tell = [&](const char* what, int done, int total) {
+    if (progress) progress(what, done, total);
+  };
+  const Capture& capture = recordings.front().capture;
+  ReportData report;
+  report.title = capture.name;
+  report.capture_path = facts.capture_path;
+  report.result = result;
+  report.convergence = drawn_history(outcome);
+  if (outcome.correlation.size() > 0)
+    report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
+  write_result(folder / "result.json", report.result);
+  write_convergence(folder / "convergence.csv", history_of(outcome, true));
+  if (capture.scene.object.surface) save_model(folder, make_model(capture, outcome));
+  if (outcome.law)
+    write_law(folder, *outcome.law, report, tell);
+  else
+    write_motion(folder, recordings, outcome, report, tell);
+  write_report(folder / "report.html", report);
+  if (outcome.tracking) write_tracks(folder, recordings, outcome, tell);
 }
 
 }  // namespace pliant

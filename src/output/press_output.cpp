@@ -2,15 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "elasticity/law_elasticity.hpp"
-#include "motion/probe_contact.hpp"
-#include "report/report.hpp"
+#include "motion/contact_defaults.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
@@ -19,61 +14,7 @@ namespace pliant {
 
 namespace fs = std::filesystem;
 
-Result make_result(const Capture& capture, const PressFitOutcome& outcome, const RunFacts& facts) {
-  FitOutcome fit;
-  fit.parameters = outcome.parameters;
-  fit.theta = outcome.theta;
-  fit.start_theta = outcome.parameters.reference();
-  fit.std = outcome.std, fit.covariance = outcome.covariance, fit.correlation = outcome.correlation;
-  fit.evaluation = outcome.evaluation;
-  fit.start_cost = outcome.start_cost, fit.final_cost = outcome.evaluation.cost;
-  fit.converged = outcome.converged, fit.interrupted = outcome.interrupted, fit.reason = outcome.reason;
-  fit.notes = outcome.notes;
-  for (const TriedLaw& tried : outcome.tried) {
-    const LawForm& l = tried.form;
-    const std::string form = l.terms == 0 ? "a linear law"
-                                          : fmt::format("Ogden's law of {} term{}{}", l.terms, l.terms == 1 ? "" : "s",
-                                                        l.own_ratios ? " with Poisson's ratios of their own" : "");
-    const std::string field =
-        l.laws > 1 ? fmt::format(", one for each of {} {}", l.laws, capture.scene.regions.empty() ? "zones" : "regions")
-        : l.controls > 1 ? fmt::format(" with {} moduli", l.controls)
-                         : "";
-    const char* verdict = tried.kept ? "kept" : std::isfinite(tried.cost) ? "not kept" : "not fitted";
-    fit.notes.push_back(std::isfinite(tried.evidence)
-                            ? fmt::format("{}{}: {}, ln of the evidence for it {:.1f}{}", form, field, verdict,
-                                          tried.evidence, std::isfinite(tried.cost) ? "" : " by what a step promises")
-                            : fmt::format("{}{}: {}", form, field, tried.kept ? "tried first" : verdict));
-  }
-  for (std::size_t c = 0; c < outcome.cuts.size(); ++c)
-    fit.notes.push_back(fmt::format("Zones: {}.", describe(outcome.cuts[c], int(c) + 1)));
-  if (!outcome.scene->presses.empty())
-    fit.notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * outcome.noise));
-  if (outcome.sampled) {
-    double least = std::numeric_limits<double>::infinity(), most = 0.0;
-    for (const PressSample& s : outcome.samples) least = std::min(least, s.weight), most = std::max(most, s.weight);
-    fit.notes.push_back(fmt::format(
-        "The sampled material has {:.1f} samples an element, from {} presses; the weight of smoothness was chosen by "
-        "the noise in each, between {:.3g} and {:.3g}. Its stress misses that of the presses' own fields by "
-        "{:.1f} % of the greatest, root mean square. The parameters above are those of the law that it is smooth "
-        "about.",
-        outcome.sampled->mean_samples, outcome.samples.size(), least, most, 100.0 * outcome.sampled->stress_misfit));
-  }
-  RecordingOutcome recording;
-  recording.discretisation.body = outcome.scene->body;
-  recording.discretisation.control_points = outcome.control_points;
-  MaterialBlocks& material = recording.discretisation.simulation.blocks;
-  material.youngs_moduli.clear();
-  for (int k = 0; k < outcome.layout.form().controls; ++k) material.youngs_moduli.push_back(outcome.layout.modulus(k));
-  recording.theta = outcome.theta;
-  fit.recordings.push_back(std::move(recording));
-  Result result = make_result(std::vector<RecordedCapture>{{capture, {}}}, fit, facts);
-  result.curves = predict_curves(*outcome.scene, outcome.law);
-  // Where the fit began was another form of the law.
-  for (ParameterResult& parameter : result.parameters) parameter.start.reset();
-  return result;
-}
-
-Model make_model(const Capture& capture, const PressFitOutcome& outcome) {
+Model make_model(const Capture& capture, const LawOutcome& outcome) {
   const Body& body = *outcome.scene->body;
   Model model;
   model.name = capture.name;
@@ -150,7 +91,7 @@ std::string press_sentence(const StaticError& press) {
 
 namespace {
 
-std::string presses_csv(const PressFitOutcome& outcome) {
+std::string presses_csv(const LawOutcome& outcome) {
   std::string text = "press,role,force [N],greatest displacement [m],marker rms [m],marker max [m],relative error\n";
   for (std::size_t i = 0; i < outcome.predictions.size(); ++i) {
     const ObservedPress& seen = outcome.scene->presses[i];
@@ -168,14 +109,7 @@ std::string basis_csv(const SampledMaterial& material) {
   return text;
 }
 
-ConvergenceHistory history_of(const PressFitOutcome& outcome) {
-  ConvergenceHistory history{{"youngs_modulus", "marker_rms"}, {"Pa", "m"}, {}};
-  for (const PressFitEvent& e : outcome.history)
-    history.rows.push_back({0, e.iteration, e.stage, e.cost, 0.0, {e.youngs_modulus, e.marker_rms}});
-  return history;
-}
-
-void write_deformed(const fs::path& folder, const PressFitOutcome& outcome,
+void write_deformed(const fs::path& folder, const LawOutcome& outcome,
                     const std::function<void(const char*, int, int)>& progress) {
   std::vector<PvdEntry> entries;
   const auto elasticity = LawElasticity::make(outcome.scene->body, outcome.law);
@@ -193,27 +127,11 @@ void write_deformed(const fs::path& folder, const PressFitOutcome& outcome,
 
 }  // namespace
 
-void write_press_output(const fs::path& folder, const Capture& capture, const PressFitOutcome& outcome,
-                        const Result& result, const RunFacts& facts,
-                        const std::function<void(const char*, int, int)>& progress) {
-  const ConvergenceHistory history = history_of(outcome);
-  write_result(folder / "result.json", result);
-  if (capture.scene.object.surface) save_model(folder, make_model(capture, outcome));
-  write_convergence(folder / "convergence.csv", history);
+void write_presses(const fs::path& folder, const LawOutcome& outcome,
+                   const std::function<void(const char*, int, int)>& progress) {
   if (!outcome.predictions.empty()) write_file(folder / "presses.csv", presses_csv(outcome));
   if (outcome.sampled) write_file(folder / "basis.csv", basis_csv(*outcome.sampled));
   if (!outcome.predictions.empty()) write_deformed(folder, outcome, progress);
-  ReportData report;
-  report.title = capture.name;
-  report.capture_path = facts.capture_path;
-  report.result = result;
-  report.convergence = history;
-  report.presses = press_errors(*outcome.scene, outcome.predictions);
-  for (const ObservedPress& press : outcome.scene->presses) report.press_forces.push_back(press.force.norm());
-  if (outcome.sampled) report.basis_errors = outcome.sampled->error_by_size;
-  if (outcome.correlation.size() > 0)
-    report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
-  write_report(folder / "report.html", report);
 }
 
 }  // namespace pliant

@@ -1,13 +1,16 @@
 #pragma once
 
-#include "estimation/press_fit.hpp"
-#include "output/fit_output.hpp"
+#include <filesystem>
+#include <functional>
+
+#include "estimation/fit.hpp"
+#include "model/model.hpp"
+#include "model/result.hpp"
 
 namespace pliant {
 
-/// A fit of presses as the files tell it.
-Result make_result(const Capture& capture, const PressFitOutcome& outcome, const RunFacts& facts);
-Model make_model(const Capture& capture, const PressFitOutcome& outcome);
+/// The model of a law that was fitted to presses, in their capture's scene.
+Model make_model(const Capture& capture, const LawOutcome& outcome);
 
 /// How a material predicts a capture's presses, in their order.
 std::vector<StaticError> press_errors(const PressScene& scene, const std::vector<PressPrediction>& predictions);
@@ -19,10 +22,9 @@ std::vector<CurvePrediction> predict_curves(const Model& model, const Capture& c
 /// "press 3 (test): 1.2 mm rms, 6.1 % of the greatest displacement".
 std::string press_sentence(const StaticError& press);
 
-/// Writes the output folder of a fit of presses: result.json, the model, convergence.csv, presses.csv, presses.pvd with
-/// a deformed mesh for each press, and report.html.
-void write_press_output(const std::filesystem::path& folder, const Capture& capture, const PressFitOutcome& outcome,
-                        const Result& result, const RunFacts& facts,
-                        const std::function<void(const char*, int, int)>& progress = {});
+/// Writes what a fit leaves of its presses: presses.csv, presses.pvd with a deformed mesh for each press, and of a
+/// sampled material basis.csv.
+void write_presses(const std::filesystem::path& folder, const LawOutcome& outcome,
+                   const std::function<void(const char*, int, int)>& progress = {});
 
 }  // namespace pliant

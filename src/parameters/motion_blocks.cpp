@@ -20,7 +20,10 @@ std::vector<ParameterHandle> MotionBlocks::all() const {
   std::vector<ParameterHandle> handles = youngs_moduli;
   handles.insert(handles.end(), {poissons_ratio, mass_damping, stiffness_damping, density, gravity, linear_velocity,
                                  angular_velocity});
-  for (const PlaneBlock& plane : planes) handles.push_back(plane.whole());
+  for (const PlaneBlock& plane : planes) {
+    handles.push_back(plane.whole());
+    if (plane.friction.exists()) handles.push_back(plane.friction);
+  }
   handles.insert(handles.end(), pulls.begin(), pulls.end());
   handles.insert(handles.end(), scan_corrections.begin(), scan_corrections.end());
   return handles;
@@ -32,7 +35,9 @@ MotionBlocks MotionBlocks::moved(const std::function<ParameterHandle(const Param
   for (ParameterHandle* handle : {&other.poissons_ratio, &other.mass_damping, &other.stiffness_damping, &other.density,
                                   &other.gravity, &other.linear_velocity, &other.angular_velocity})
     *handle = there(*handle);
-  for (PlaneBlock& plane : other.planes) plane = {there(plane.point), there(plane.normal)};
+  for (PlaneBlock& plane : other.planes)
+    plane = {there(plane.point), there(plane.normal),
+             plane.friction.exists() ? there(plane.friction) : ParameterHandle{}};
   for (ParameterHandle& pull : other.pulls) pull = there(pull);
   for (ParameterHandle& correction : other.scan_corrections) correction = there(correction);
   return other;
@@ -60,7 +65,9 @@ MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& coun
   for (int i = 0; i < counts.planes; ++i) {
     const ParameterHandle plane =
         layout.add({i == 0 ? "plane" : "plane_" + std::to_string(i + 1), "", 6, Role::Obstacle});
-    blocks.planes.push_back({{plane.first, 3}, {plane.first + 3, 3}});
+    const ParameterHandle friction =
+        layout.add({i == 0 ? "friction" : "friction_" + std::to_string(i + 1), "1", 1, Role::Obstacle});
+    blocks.planes.push_back({{plane.first, 3}, {plane.first + 3, 3}, friction});
   }
   for (int k = 0; k < counts.pulls; ++k)
     blocks.pulls.push_back(layout.add({"pull@" + std::to_string(k + 1), "1", 3, Role::Initial}));

@@ -21,11 +21,13 @@ struct MaterialBlocks {
   VectorX moduli(const VectorX& theta) const;
 };
 
-/// A plane's block: six numbers.
+/// A plane's blocks: six numbers of its place, and one of its friction.
 struct PlaneBlock {
-  ParameterHandle point;   ///< 3, [m]
-  ParameterHandle normal;  ///< 3, unit length
+  ParameterHandle point;     ///< 3, [m]
+  ParameterHandle normal;    ///< 3, unit length
+  ParameterHandle friction;  ///< Coulomb's coefficient [-]; may not exist: none
 
+  /// The six numbers of its place.
   ParameterHandle whole() const { return {point.first, point.size + normal.size}; }
 };
 

@@ -60,6 +60,7 @@ struct Plane {
   Vector3 point = Vector3::Zero();    ///< [m]
   Vector3 normal = Vector3::UnitY();  ///< unit length, to the side where the object may be
   bool known = true;                  ///< false: a rough guess, to be estimated
+  double friction = 0.0;              ///< Coulomb's coefficient [-], >= 0
   bool operator==(const Plane&) const = default;
 };
 

@@ -84,13 +84,15 @@ ModelLaw model_law(const MaterialLaw& law) {
 
 std::shared_ptr<const MaterialLaw> make_law(const ModelLaw& law, int elements) try {
   if (law.name == "sampled") return sampled_law(law, elements);
-  if (law.name != "ogden" && law.name != "linear") refuse("the law \"" + law.name + "\"", "ogden, linear or sampled");
+  if (law.name != "ogden" && law.name != "neo_hookean" && law.name != "linear")
+    refuse("the law \"" + law.name + "\"", "ogden, neo_hookean, linear or sampled");
   if (int(law.rows.size()) != elements)
     refuse(fmt::format("{} rows", law.rows.size()), fmt::format("one for each of {} elements", elements));
   MatrixX table(elements, Eigen::Index(law.columns.size()) - 1);
   for (int e = 0; e < elements; ++e)
     for (Eigen::Index k = 0; k < table.cols(); ++k) table(e, k) = law.rows[std::size_t(e)][std::size_t(k) + 1];
   if (law.name == "linear") return std::make_shared<LinearLaw>(std::move(table));
+  if (law.name == "neo_hookean") return std::make_shared<NeoHookeanLaw>(std::move(table));
   return std::make_shared<OgdenLaw>(std::move(table));
 } catch (const std::invalid_argument& error) {
   refuse(error.what(), "the parameters of a material");

@@ -23,10 +23,7 @@ VectorX model_theta(const Model& model, const Scene& scene, const Vector3& gravi
   theta.segment<3>(blocks.gravity) = gravity;
   theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
   theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
-  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
-    theta.segment<3>(blocks.planes[i].point) = scene.planes[i].point;
-    theta.segment<3>(blocks.planes[i].normal) = scene.planes[i].normal;
-  }
+  set_planes(scene.planes, blocks, theta);
   return theta;
 }
 

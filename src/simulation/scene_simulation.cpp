@@ -123,6 +123,14 @@ ShapeField shape_field(const Scene& scene, const Resolution& resolution) {
 
 }  // namespace
 
+void set_planes(const std::vector<Plane>& planes, const MotionBlocks& blocks, VectorX& theta) {
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    theta.segment<3>(blocks.planes[i].point) = planes[i].point;
+    theta.segment<3>(blocks.planes[i].normal) = planes[i].normal;
+    theta[blocks.planes[i].friction] = planes[i].friction;
+  }
+}
+
 SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
                                   const MotionBlocks& blocks, const VectorX& theta, const SimulationOptions& settings) {
   SimulationOptions simulation = settings;
@@ -138,6 +146,7 @@ SimulationOptions make_simulation(const Scene& scene, const Body& body, const Re
   simulation.max_dt /= resolution.steps;
   simulation.blocks = blocks;
   simulation.contact = default_contact(body, theta[blocks.density] * body.volume(), gravity);
+  simulation.friction_speed = default_friction_speed(body, gravity);
   for (const Weight& weight : scene.weights) simulation.weights.push_back({weight.at, weight.mass});
   if (const auto& weight = scene.initial.release_of; weight && scene.initial.released)
     simulation.released_weights.push_back({weight->at, weight->mass});

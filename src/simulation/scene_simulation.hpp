@@ -59,6 +59,9 @@ std::vector<Hold> held_regions(const std::vector<FixedRegion>& fixed, const Tria
 /// Number of pulls of a scene's motion: none where it is not released, or from under a known weight.
 int pull_count(const Scene& scene, const Resolution& resolution);
 
+/// Puts a scene's planes into a parameter vector: places and coefficients of friction.
+void set_planes(const std::vector<Plane>& planes, const MotionBlocks& blocks, VectorX& theta);
+
 /// How a body moves in a scene: its instants and time step, what it touches, what holds and loads it.
 /// @param blocks    of the motion's parameters, with the scene's planes
 /// @param theta     by those blocks; its density and gravity scale contact

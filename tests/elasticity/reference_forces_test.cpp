@@ -1,6 +1,10 @@
 #include "elasticity/reference_forces.hpp"
 
-#include "elasticity/corotated.hpp"
+#include <optional>
+#include <string>
+#include <tuple>
+
+#include "elasticity/material.hpp"
 #include "support/bodies.hpp"
 #include "support/dense.hpp"
 #include "support/derivatives.hpp"
@@ -11,16 +15,35 @@ namespace {
 
 using test::tolerance;
 
-/// Linear and quadratic tetrahedra of two materials, bent in the world and free of load elsewhere than in the scan.
-struct Reference : ::testing::TestWithParam<bool> {
+struct Of {
+  std::string name;
+  std::optional<LawForm> law;  ///< none: corotated
+  friend void PrintTo(const Of& of, std::ostream* out) { *out << of.name; }
+};
+const std::vector<Of> materials = {{"Corotated", std::nullopt},
+                                   {"LinearLaw", LawForm{1, 0}},
+                                   {"NeoHookean", LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean}},
+                                   {"Ogden", LawForm{1, 2, 1, true}}};
+
+/// Linear and quadratic tetrahedra of every material, half of them three times as stiff, bent in the world and free of
+/// load elsewhere than in the scan.
+struct Reference : ::testing::TestWithParam<std::tuple<Of, bool>> {
   Reference() {
-    Body made = *test::tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, GetParam());
+    Body made = *test::tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, std::get<bool>(GetParam()));
     for (std::size_t e = 0; e < made.modulus.relative.size(); e += 2) made.modulus.relative[e] = 3.0;
     body = std::make_shared<Body>(std::move(made));
-    theta = layout.zero();
-    layout.set_moduli(theta, 3000.0);
-    theta[layout.poissons_ratio] = 0.35;
-    forces = ReferenceForces::make(body, layout);
+    ParameterLayout layout;
+    const MotionBlocks blocks = add_motion_blocks(layout, {});
+    material = BodyMaterial(static_cast<const MaterialBlocks&>(blocks));
+    if (const auto& form = std::get<Of>(GetParam()).law)
+      material = BodyMaterial(LawLayout::of_motion(layout, blocks, *form));
+    theta = VectorX::Zero(layout.size());
+    blocks.set_moduli(theta, 3000.0);
+    theta[blocks.poissons_ratio] = 0.35;
+    for (const auto& [name, value] : std::initializer_list<std::pair<std::string, double>>{
+             {"exponent_1", 5.0}, {"exponent_2", -4.0}, {"stiffness_ratio_2", 0.6}, {"poissons_ratio_2", 0.2}})
+      if (layout.contains(name)) theta[layout.at(name)] = value;
+    forces = material.make_reference_forces(body);
     forces->set_parameters(theta);
     X = test::deformed(body->nodes, 0.1, 0.2);
     x = test::deformed(body->nodes, 0.25, 1.7);
@@ -32,7 +55,7 @@ struct Reference : ::testing::TestWithParam<bool> {
     forces->add_force(f);
     return f;
   }
-  MotionLayout layout;
+  BodyMaterial material{MaterialBlocks{}};
   std::shared_ptr<const Body> body;
   VectorX theta;
   std::unique_ptr<ReferenceForces> forces;
@@ -42,7 +65,7 @@ struct Reference : ::testing::TestWithParam<bool> {
 /// The same law as that of the moving body, by other formulas.
 TEST_P(Reference, ForcesAreThoseOfABodyWithThatReference) {
   for (const Points& reference : {body->nodes, X}) {
-    const auto elasticity = make_elasticity(std::make_shared<Body>(with_reference(*body, reference)), layout);
+    const auto elasticity = material.make_elasticity(std::make_shared<Body>(with_reference(*body, reference)));
     elasticity->set_parameters(theta);
     elasticity->linearise(x);
     Points expected = Points::Zero(x.rows(), 3);
@@ -100,13 +123,50 @@ TEST_P(Reference, MassAndPlacesStayWithTheScan) {
     EXPECT_LT((at.row(i).transpose() - points[std::size_t(i)]).norm(), tolerance(1e-14));
 }
 
-INSTANTIATE_TEST_SUITE_P(Tetrahedra, Reference, ::testing::Bool(),
-                         [](const auto& quadratic) { return quadratic.param ? "quadratic" : "linear"; });
+INSTANTIATE_TEST_SUITE_P(Tetrahedra, Reference, ::testing::Combine(::testing::ValuesIn(materials), ::testing::Bool()),
+                         [](const auto& c) {
+                           return std::get<Of>(c.param).name + (std::get<bool>(c.param) ? "Quadratic" : "Linear");
+                         });
 
 TEST(ReferenceForces, HexahedraTakeNoPart) {
   const auto body = test::box_body(Vector3(0.4, 0.2, 0.2), 0.1);
   EXPECT_THROW((void)ReferenceForces::make(body, MotionLayout()), std::invalid_argument);
+  const LawLayout law({1, 1});
+  EXPECT_THROW((void)BodyMaterial(law).make_reference_forces(body), std::invalid_argument);
   EXPECT_THROW((void)with_reference(*body, body->nodes), std::invalid_argument);
+}
+
+/// Where p is not z the affine force counts: what stiffness damping makes of a step.
+TEST(LawReferenceForces, TheMatrixIsTheTangentWhereTheLagPointIsElsewhere) {
+  const auto body = test::tet_body({0.2, 0.1, 0.12}, {2, 1, 1}, true);
+  const LawLayout law({1, 0, 1, false, TwoNumberLaw::NeoHookean});
+  VectorX theta(law.size());
+  theta[law.modulus(0)] = 3000.0;
+  theta[law.poissons_ratio()] = 0.35;
+  const auto forces = BodyMaterial(law).make_reference_forces(body);
+  forces->set_parameters(theta);
+  ASSERT_TRUE(forces->linearise(test::deformed(body->nodes, 0.1, 0.2), test::deformed(body->nodes, 0.3, 1.7),
+                                test::deformed(body->nodes, 0.28, 1.75)));
+  const Points direction = test::deformed(body->nodes, 0.3, -0.4);
+  Points tangent = Points::Zero(direction.rows(), 3);
+  forces->add_tangent(direction, tangent);
+  BlockMatrix matrix(body->pattern);
+  forces->add_matrix(1.0, matrix);
+  EXPECT_LT((test::dense(matrix) * flat(direction) - flat(tangent)).norm(), tolerance(1e-12) * tangent.norm());
+}
+
+TEST(BodyMaterial, NamesTheParametersThatItDependsOn) {
+  ParameterLayout layout;
+  const MotionBlocks blocks = add_motion_blocks(layout, {});
+  const LawLayout law = LawLayout::of_motion(layout, blocks, {1, 1});
+  const BodyMaterial corotated(static_cast<const MaterialBlocks&>(blocks)), ogden(law),
+      given(law_at(*test::tet_body({0.2, 0.1, 0.1}, {1, 1, 1}, false), LawLayout({1, 0}), Eigen::Vector2d(1e3, 0.3)));
+  EXPECT_TRUE(corotated.is_corotated());
+  EXPECT_EQ(corotated.parameters(), (std::vector<ParameterHandle>{blocks.youngs_moduli[0], blocks.poissons_ratio}));
+  EXPECT_FALSE(ogden.is_corotated());
+  EXPECT_EQ(ogden.parameters(),
+            (std::vector<ParameterHandle>{blocks.youngs_moduli[0], blocks.poissons_ratio, layout.at("exponent_1")}));
+  EXPECT_TRUE(given.parameters().empty());
 }
 
 }  // namespace

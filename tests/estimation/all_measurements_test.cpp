@@ -2,6 +2,7 @@
 // force-depth curves and stress-strain curves.
 // Each kind of measurement is made of a material of its own stiffness: what takes part in the fit draws the estimate
 // towards its own.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <random>
@@ -13,6 +14,8 @@
 #include "estimation/press_scene.hpp"
 #include "estimation/recordings.hpp"
 #include "geometry/primitives.hpp"
+#include "input_errors.hpp"
+#include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
@@ -261,6 +264,74 @@ TEST_F(SeenInEveryWay, EachKindOfMeasurementDrawsTheEstimateToItsOwnStiffness) {
     EXPECT_NEAR(others / modulus, 1.0, tolerance(0.04)) << kinds[k].first;
     // The least share is that of one press beside two sagging motions; the optimiser comes within 1e-7.
     EXPECT_GT(all, (1.0 + 1e-4) * others) << kinds[k].first << " stiffer than the rest takes no part";
+  }
+}
+
+/// What stands beside a motion is of the motion's law.
+TEST_F(SeenInEveryWay, PressesAndLoadsBesideAMotionFollowItsLaw) {
+  record({});
+  std::vector<std::string> notes;
+  FitOptions options;
+  options.material = MaterialKind::Ogden;
+  options.marker_noise = noise;
+  const Recordings recordings({recorded({false, true, true, true})}, options, notes);
+  ParameterSet set = recordings.parameters();
+  const Parameter* exponent = set.find("exponent_1");
+  ASSERT_TRUE(exponent && exponent->estimated);
+  VectorX theta = set.reference();
+  recordings.material().set_moduli(theta, modulus);
+  set.set_reference(theta);
+  const Grid grid = recordings.grid(4.0, 1.0);
+  EXPECT_EQ(grid.recording.front().body->kind, ElementKind::QuadraticTetrahedron);
+  EXPECT_EQ(grid.presses.front()->body, grid.recording.front().body);
+  Objective objective = recordings.objective(grid, set, 0.2, [](const Recording&) { return 2; });
+  const VectorX p = set.to_unconstrained(theta);
+  const CostEvaluation e = objective.linearise(p);
+  ASSERT_TRUE(e.succeeded) << e.failure;
+  const Eigen::Index at = set.coordinate(exponent->at);
+  ASSERT_GE(e.frames.size(), 4u);
+  for (const FrameFit& frame : e.frames)  // nothing is strained yet in the first
+    if (frame.recording > 0 || frame.frame > 0) {
+      EXPECT_NE(frame.gradient[at], 0.0) << frame.recording;
+    }
+  const auto cost = [&](double h) {
+    return VectorX(VectorX::Constant(1, objective.evaluate(p + h * VectorX::Unit(p.size(), at)).cost));
+  };
+  EXPECT_LT(test::best_relative_error(cost, VectorX::Constant(1, e.gradient[at]), 0.1), tolerance(1e-4));
+}
+
+TEST_F(SeenInEveryWay, WhatDoesNotSuitALawIsRefused) {
+  record({});
+  const auto refusal = [&](const FitOptions& options) {
+    return test::complaint_of([&] {
+      std::vector<std::string> notes;
+      (void)Recordings({recorded({})}, options, notes);
+    });
+  };
+  FitOptions options;
+  options.material = MaterialKind::Sampled;
+  EXPECT_THAT(refusal(options), ::testing::HasSubstr("presses alone"));
+  options.material = MaterialKind::NeoHookean;
+  options.element = ElementKind::Hexahedron;
+  EXPECT_THAT(refusal(options), ::testing::HasSubstr("quadratic_tetrahedra"));
+}
+
+/// The numbers of the law belong to the object: two recordings share them.
+TEST_F(SeenInEveryWay, RecordingsOfOneObjectShareTheLaw) {
+  record({});
+  FitOptions options;
+  options.material = MaterialKind::Ogden;
+  options.law_terms = 2;
+  const JointLayout joint = joint_layout({recorded({}), recorded({})}, options, 1);
+  for (const char* name : {"exponent_1", "exponent_2", "stiffness_ratio_2"}) {
+    EXPECT_TRUE(joint.layout.contains(name));
+    EXPECT_FALSE(joint.layout.contains(std::string(name) + "[2]"));
+  }
+  for (const CaptureBlocks& blocks : joint.blocks) {
+    ASSERT_TRUE(blocks.law);
+    EXPECT_EQ(blocks.law->all(), joint.blocks.front().law->all());
+    EXPECT_EQ(blocks.law->modulus(0), blocks.motion.youngs_moduli.front());
+    EXPECT_EQ(blocks.law->exponent(1), joint.layout.at("exponent_2"));
   }
 }
 

@@ -1,6 +1,7 @@
 #include "estimation/fit_config.hpp"
 
 #include "estimation/fit_state.hpp"
+#include "estimation/press_fit.hpp"
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
@@ -91,6 +92,35 @@ TEST(FitConfig, ChoicesThatAreNotUsedAreNamed) {
   EXPECT_THAT(presses[0], HasSubstr("steps = 2"));
   ASSERT_EQ(both.size(), 1u);
   EXPECT_THAT(both[0], HasSubstr("law_terms = 2"));
+}
+
+TEST(FitConfig, TheMaterialOfAMotionIsALawOfItsForm) {
+  FitOptions options;
+  EXPECT_FALSE(options.law_of_motion());
+  set_fit_option(options, "material=linear");
+  EXPECT_FALSE(options.law_of_motion());
+  set_fit_option(options, "material=neo_hookean");
+  EXPECT_EQ(options.law_of_motion(), (LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean}));
+  set_fit_option(options, "material=ogden");
+  EXPECT_EQ(options.law_of_motion(), (LawForm{1, 1}));
+  set_fit_option(options, "law_terms=2");
+  EXPECT_EQ(options.law_of_motion(), (LawForm{1, 2}));
+  EXPECT_TRUE(unused_choices(options, true, false).empty());
+  options.law_terms = 4;
+  EXPECT_THAT(options.validate(), HasSubstr("law_terms"));
+  EXPECT_THAT(test::complaint_of([&] { set_fit_option(options, "material=jelly"); }), HasSubstr("neo_hookean"));
+}
+
+TEST(FitConfig, ALawInMotionIsNotTrackedAndSaysSoWhereTrackingIsAskedFor) {
+  FitOptions options;
+  options.material = MaterialKind::Ogden;
+  options.tracking = TrackingUse::Off;
+  EXPECT_TRUE(unused_choices(options, true, false).empty());
+  options.tracking = TrackingUse::Loop;
+  ASSERT_EQ(unused_choices(options, true, false).size(), 1u);
+  EXPECT_THAT(unused_choices(options, true, false)[0], HasSubstr("tracker's own elasticity is linear"));
+  options.material = MaterialKind::Linear;
+  EXPECT_TRUE(unused_choices(options, true, false).empty());
 }
 
 TEST(FitConfig, DefaultsRoundTripAndEveryKeyIsWritten) {
@@ -212,22 +242,31 @@ TEST(Overrides, RefusesWhatIsNotThere) { EXPECT_THROW(overridden({"range_error@m
 FitState some_state() {
   FitState state;
   state.controls = 3;
-  state.scan = {{100.0, 2.5}, {1000.0, std::numeric_limits<double>::infinity()}, {1.0 / 3.0, 1e-300}};
-  state.motion = VectorX::LinSpaced(20, -1.0, 3.0) / 7.0;
-  FitStart start;
-  start.start = VectorX::Constant(4, 0.1);
-  start.final = VectorX::Constant(4, 1.0 / 3.0);
-  start.start_cost = 12.0;
-  start.cost = std::numeric_limits<double>::infinity();
-  start.iterations = 7;
-  start.converged = true;
+  StageRecord scan{{StageKind::Scan}, "scan", VectorX::LinSpaced(20, -1.0, 3.0) / 7.0, VectorX::Constant(20, 0.1)};
+  scan.trials = {{100.0, 2.5}, {1000.0, std::numeric_limits<double>::infinity()}, {1.0 / 3.0, 1e-300}};
+  scan.succeeded = true;
+  StageRecord start{{StageKind::Coarse, 1, 3}, "coarse", VectorX::Constant(4, 0.1), VectorX::Constant(4, 1.0 / 3.0)};
+  start.start_cost = 12.0, start.cost = std::numeric_limits<double>::infinity();
+  start.iterations = 7, start.converged = true, start.elements = 800;
   start.reason = "steps became \"short\"";
-  state.starts = {start, start};
-  state.fine = {
-      1, VectorX::Constant(20, 2.0 / 7.0), {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
-  state.corrected = {{"sensor_turn@front", "sensor_shift@front"}, "the pose of front", 12.5, 1e4 / 3.0};
-  state.refined = {{12.0, 1.0, 800, VectorX::Constant(3, 1.0 / 3.0), 8.5, true, "cost settled"},
-                   {12.0, 2.0, 800, VectorX::Constant(3, 2.0 / 3.0), 8.25, false, "too many iterations"}};
+  StageRecord test{{StageKind::Test}, "test", VectorX::Constant(4, 0.1), VectorX::Constant(4, 0.1)};
+  test.corrected = {"sensor_turn@front", "sensor_shift@front"}, test.told = "the pose of front";
+  state.done = {scan, start, test};
+  state.under_way = {{StageKind::Fine, 1, 0},
+                     VectorX::Constant(20, 2.0 / 7.0),
+                     {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
+  state.begin = {VectorX::Constant(20, 5.0 / 7.0), 2};
+  FitState::LawSearch& law = state.law.emplace();
+  law.done = {{{{2, 1, 2, true}, 1.0 / 3.0, -std::numeric_limits<double>::infinity(), false},
+               {{0, ZoneCut::By::Depth, 1e-3 / 3.0}},
+               VectorX::Constant(6, 1.0 / 9.0),
+               1e-4 / 3.0}};
+  law.under_way = {3, VectorX::Constant(6, 1.0 / 11.0), VectorX::Constant(2, 1e-9 / 3.0)};
+  law.cuts = {{0, ZoneCut::By::X, 0.1}, {1, ZoneCut::By::Y, -1.0 / 3.0}};
+  law.samples.emplace_back();
+  law.samples[0].succeeded = true, law.samples[0].weight = 1.0 / 7.0, law.samples[0].iterations = 5;
+  law.samples[0].sample.strains = MatrixX::Constant(2, 6, 1.0 / 3.0);
+  law.samples[0].sample.p = {{100.0 / 3.0, 0.3}, {200.0 / 3.0, 0.4}};
   return state;
 }
 
@@ -237,36 +276,52 @@ TEST(FitState, RoundTripsToTheLastBit) {
   write_fit_state(folder / "state.json", written, "key");
   const FitState read = read_fit_state(folder / "state.json", "key");
   EXPECT_EQ(read.controls, 3);
-  EXPECT_EQ(read.scan, written.scan);
-  EXPECT_EQ(*read.motion, *written.motion);
-  ASSERT_TRUE(read.fine.has_value());
-  EXPECT_EQ(read.fine->stage, 1);
-  EXPECT_EQ(read.fine->reference, written.fine->reference);
-  EXPECT_EQ(read.fine->optimiser.iterations, 4);
-  EXPECT_EQ(read.fine->optimiser.p, written.fine->optimiser.p);
-  EXPECT_EQ(read.fine->optimiser.memory, written.fine->optimiser.memory);
-  ASSERT_EQ(read.starts.size(), 2u);
-  EXPECT_EQ(read.starts[1].start, written.starts[1].start);
-  EXPECT_EQ(read.starts[1].final, written.starts[1].final);
-  EXPECT_EQ(read.starts[1].start_cost, 12.0);
-  EXPECT_EQ(read.starts[1].cost, written.starts[1].cost);
-  EXPECT_EQ(read.starts[1].iterations, 7);
-  EXPECT_TRUE(read.starts[1].converged);
-  EXPECT_EQ(read.starts[1].reason, written.starts[1].reason);
-  ASSERT_TRUE(read.corrected.has_value());
-  EXPECT_EQ(read.corrected->parameters, written.corrected->parameters);
-  EXPECT_EQ(read.corrected->what, "the pose of front");
-  EXPECT_EQ(read.corrected->cost, 12.5);
-  EXPECT_EQ(read.corrected->youngs_modulus, 1e4 / 3.0);
-  ASSERT_EQ(read.refined.size(), 2u);
-  EXPECT_EQ(read.refined[1].theta, written.refined[1].theta);
-  EXPECT_EQ(read.refined[1].steps, 2.0);
-  EXPECT_EQ(read.refined[1].elements, 800);
-  EXPECT_EQ(read.refined[0].cost, 8.5);
-  EXPECT_FALSE(read.refined[1].converged);
-  EXPECT_EQ(read.refined[1].reason, "too many iterations");
+  ASSERT_EQ(read.done.size(), written.done.size());
+  for (std::size_t i = 0; i < read.done.size(); ++i) {
+    const StageRecord &r = read.done[i], &w = written.done[i];
+    EXPECT_EQ(r.id, w.id);
+    EXPECT_EQ(r.name, w.name);
+    EXPECT_EQ(r.from, w.from);
+    EXPECT_EQ(r.theta, w.theta);
+    EXPECT_EQ(r.start_cost, w.start_cost);
+    EXPECT_EQ(r.cost, w.cost);
+    EXPECT_EQ(r.iterations, w.iterations);
+    EXPECT_EQ(r.succeeded, w.succeeded);
+    EXPECT_EQ(r.converged, w.converged);
+    EXPECT_EQ(r.reason, w.reason);
+    EXPECT_EQ(r.elements, w.elements);
+    EXPECT_EQ(r.trials, w.trials);
+    EXPECT_EQ(r.corrected, w.corrected);
+    EXPECT_EQ(r.told, w.told);
+  }
+  ASSERT_TRUE(read.under_way.has_value());
+  EXPECT_EQ(read.under_way->id, written.under_way->id);
+  EXPECT_EQ(read.under_way->from, written.under_way->from);
+  EXPECT_EQ(read.under_way->optimiser.iterations, 4);
+  EXPECT_EQ(read.under_way->optimiser.p, written.under_way->optimiser.p);
+  EXPECT_EQ(read.under_way->optimiser.memory, written.under_way->optimiser.memory);
+  ASSERT_TRUE(read.begin.has_value());
+  EXPECT_EQ(read.begin->theta, written.begin->theta);
+  EXPECT_EQ(read.begin->stage, 2);
+  ASSERT_TRUE(read.law.has_value());
+  ASSERT_EQ(read.law->done.size(), 1u);
+  const FitState::LawSearch::Done &done = read.law->done[0], &done_written = written.law->done[0];
+  EXPECT_EQ(done.tried.form, done_written.tried.form);
+  EXPECT_EQ(done.tried.cost, done_written.tried.cost);
+  EXPECT_EQ(done.tried.evidence, done_written.tried.evidence);
+  EXPECT_EQ(done.cuts, done_written.cuts);
+  EXPECT_EQ(done.theta, done_written.theta);
+  EXPECT_EQ(done.noise, done_written.noise);
+  EXPECT_EQ(read.law->under_way.p, written.law->under_way.p);
+  EXPECT_EQ(read.law->under_way.memory, written.law->under_way.memory);
+  EXPECT_EQ(read.law->cuts, written.law->cuts);
+  ASSERT_EQ(read.law->samples.size(), 1u);
+  EXPECT_EQ(read.law->samples[0].sample.strains, written.law->samples[0].sample.strains);
+  EXPECT_EQ(read.law->samples[0].sample.p[1].alpha, 0.4);
+  EXPECT_EQ(read.law->samples[0].weight, 1.0 / 7.0);
   write_fit_state(folder / "empty.json", {}, "key");
-  EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").motion.has_value());
+  EXPECT_TRUE(read_fit_state(folder / "empty.json", "key").done.empty());
+  EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").law.has_value());
 }
 
 TEST(FitState, RefusesAnotherKeyAndDamage) {
@@ -280,10 +335,10 @@ TEST(FitState, RefusesAnotherKeyAndDamage) {
     EXPECT_NE(
         test::complaint_of([&] { (void)read_fit_state(folder.write("cut.json", whole.substr(0, length)), "key"); }), "")
         << length;
-  for (const char* text : {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})",
-                           R"({"format": "fit-state/0", "key": "key", "scan": [], "starts": []})",
-                           R"({"format": "fit-state/1", "key": "key", "scan": [[1]], "starts": []})",
-                           R"({"format": "fit-state/1", "key": "key", "scan": [], "starts": [], "fine": ["x"]})"})
+  for (const char* text :
+       {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})", R"({"format": "fit-state/9", "key": "key"})",
+        R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [1]})",
+        R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [], "under_way": ["x"]})"})
     EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder.write("bad.json", text), "key"); }), "") << text;
 }
 

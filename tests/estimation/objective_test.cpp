@@ -1,5 +1,6 @@
 #include "estimation/objective.hpp"
 
+#include "base/parallel.hpp"
 #include "support/derivatives.hpp"
 #include "support/recordings.hpp"
 #include "support/tolerance.hpp"
@@ -160,6 +161,40 @@ TEST(Objective, PointsBeyondTheBandCostAConstantAndNothingMore) {
   EXPECT_EQ(costs[0], costs[1]);
   EXPECT_GT(costs[0], clean + 100.0);
   EXPECT_LT(costs[0], clean + RobustLoss{0.03}.outlier() / 1e-6 + 1e-6);
+}
+
+TEST(Objective, SeveralVectorsAtOnceCostWhatEachCostsAlone) {
+  const test::Recording recording = test::torus_recording(cell_size, 4, 1, 1e-3);
+  ParameterSet parameters = recording.parameters;
+  parameters.set_estimated("youngs_modulus", true);
+  parameters.set_estimated("mass_damping", true);
+  Objective objective = recording.objective(parameters);
+  std::vector<VectorX> points;
+  for (const double step : {-0.4, 0.0, 0.3, 0.7})
+    points.push_back(parameters.to_unconstrained(recording.truth) + VectorX::Constant(2, step));
+  (void)objective.linearise(points.front());  // what was run before leaves no trace
+  const std::vector<CostEvaluation> together = objective.evaluate(points);
+  ASSERT_EQ(together.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    ASSERT_TRUE(together[i].succeeded) << together[i].failure;
+    EXPECT_EQ(together[i].cost, objective.evaluate(points[i]).cost) << i;
+    EXPECT_EQ(together[i].frames.size(), 4u);
+    if (i > 0) {
+      EXPECT_NE(together[i].cost, together[0].cost);
+    }
+  }
+}
+
+TEST(Objective, EvaluationsThatHaveNotBegunCanBeLeftOut) {
+  const test::Recording recording = test::torus_recording(cell_size, 3, 1, 1e-3);
+  Objective objective = recording.objective(recording.parameters);
+  const ThreadLimit one(1);
+  const std::vector<VectorX> points(3, VectorX(0));
+  const auto after_the_first = [](std::size_t, const CostEvaluation&) { return false; };
+  const std::vector<CostEvaluation> some = objective.evaluate(points, after_the_first);
+  ASSERT_EQ(some.size(), 3u);
+  EXPECT_EQ(std::ranges::count(some, true, &CostEvaluation::succeeded), 1);
+  EXPECT_EQ(std::ranges::count(some, "left out", &CostEvaluation::failure), 2);
 }
 
 TEST(Objective, AFailedSimulationIsReportedNotThrown) {

@@ -204,6 +204,7 @@ class BoundedQuadratic : public CostFunction {
     set_ = ParameterSet(std::move(layout), std::move(list), VectorX::Zero(b_.size()));
   }
   const ParameterSet& parameters() const override { return set_; }
+  using CostFunction::evaluate;
   CostEvaluation evaluate(const VectorX& x) override {
     CostEvaluation e;
     e.succeeded = true;
@@ -220,6 +221,22 @@ class BoundedQuadratic : public CostFunction {
   VectorX b_;
   ParameterSet set_;
 };
+
+TEST(CostFunction, EvaluatesSeveralVectorsOneAfterTheOther) {
+  BoundedQuadratic cost(MatrixX::Identity(2, 2), Eigen::Vector2d(1.0, 0.5));
+  const std::vector<VectorX> points = {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(1.0, 0.5),
+                                       Eigen::Vector2d(-1.0, 1.0)};
+  std::vector<std::size_t> order;
+  const std::vector<CostEvaluation> all = cost.evaluate(points, [&](std::size_t i, const CostEvaluation&) {
+    order.push_back(i);
+    return i < 1;
+  });
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_EQ(order, (std::vector<std::size_t>{0, 1}));
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(all[i].cost, cost.evaluate(points[i]).cost);
+  EXPECT_FALSE(all[2].succeeded);
+  EXPECT_EQ(all[2].failure, "left out");
+}
 
 TEST(LevenbergMarquardt, ANumberAtItsBoundDoesNotHoldUpTheOthers) {
   // The first wants to go to 1000; the second's minimum with the first at 1 is 0.5.

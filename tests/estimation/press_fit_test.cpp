@@ -1,13 +1,15 @@
 #include "estimation/press_fit.hpp"
 
 #include "base/error.hpp"
-#include "estimation/fit_state.hpp"
+#include "input_errors.hpp"
+#include "support/interruption.hpp"
 #include "support/press_capture.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant {
 namespace {
 
+using test::complaint_of;
 using test::PressedBlock;
 using test::TemporaryFolder;
 using test::write_press_capture;
@@ -33,19 +35,22 @@ struct PressedLayers : ::testing::Test {
     capture = read_capture(write_press_capture(folder.path(), block.scene(presses, law, 1e-4), 1));
   }
 
-  static PressFitOptions of_two_zones() {
-    PressFitOptions options;
-    options.zones = 2;
-    options.terms = 1;
+  static FitOptions of_two_zones() {
+    FitOptions options;
+    options.law_zones = 2;
+    options.law_terms = 1;
     return options;
   }
-  static void expect_same(const PressFitOutcome& resumed, const PressFitOutcome& whole) {
-    ASSERT_TRUE(resumed.succeeded) << resumed.reason;
-    EXPECT_EQ(resumed.cuts, whole.cuts);
+  FitOutcome fitted(const FitOptions& options = {}, const FitMonitor& monitor = {}, FitState resume = {}) const {
+    return fit({{capture, {}}}, options, monitor, std::move(resume));
+  }
+  static void expect_same(const FitOutcome& resumed, const FitOutcome& whole) {
+    ASSERT_TRUE(resumed.evaluation.succeeded) << resumed.reason;
+    EXPECT_EQ(resumed.law->cuts, whole.law->cuts);
     EXPECT_NEAR(resumed.evaluation.cost, whole.evaluation.cost, 1e-3 * whole.evaluation.cost);
   }
 
-  const PressFitOptions two_zones = of_two_zones();
+  const FitOptions two_zones = of_two_zones();
   TemporaryFolder folder;
   PressedBlock block{{5, 4, 5}};
   ZoneCut border{0, ZoneCut::By::Y, 1e-3};  // cells are 25 mm high
@@ -54,8 +59,10 @@ struct PressedLayers : ::testing::Test {
 };
 
 TEST_F(PressedLayers, AreFoundWithTheirLawsAndPredictAnotherPress) {
-  const PressFitOutcome fit = fit_presses(capture, {});
-  ASSERT_TRUE(fit.succeeded) << fit.reason;
+  const FitOutcome outcome = fitted();
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  ASSERT_TRUE(outcome.law);
+  const LawOutcome& fit = *outcome.law;
   EXPECT_GE(fit.cuts.size(), 1u);
   ASSERT_EQ(fit.predictions.size(), 8u);
   for (const PressPrediction& p : fit.predictions) EXPECT_TRUE(p.succeeded) << p.failure;
@@ -74,9 +81,10 @@ TEST_F(PressedLayers, OfOneLawEachWhereTheCaptureNamesThem) {
   std::string text = read_file(capture.file);
   text += "[[region]]\nname = \"top\"\nbox = { min = [-1.0, 0.0, -1.0], max = [1.0, 1.0, 1.0] }\n";
   folder.write("capture.toml", text);
-  const PressFitOutcome fit = fit_presses(read_capture(capture.file), {});
-  ASSERT_TRUE(fit.succeeded) << fit.reason;
-  EXPECT_EQ(fit.layout.form().laws, 2);
+  capture = read_capture(capture.file);
+  const FitOutcome fit = fitted();
+  ASSERT_TRUE(fit.evaluation.succeeded) << fit.reason;
+  EXPECT_EQ(fit.law->layout.form().laws, 2);
   const Parameter* exponent = fit.parameters.find("exponent_1@top");
   ASSERT_TRUE(exponent);
   EXPECT_NEAR(fit.theta[exponent->at], -6.0, 1.5);
@@ -84,55 +92,50 @@ TEST_F(PressedLayers, OfOneLawEachWhereTheCaptureNamesThem) {
 }
 
 TEST_F(PressedLayers, AFitIsResumedWhereItWasInterrupted) {
-  const PressFitOutcome whole = fit_presses(capture, two_zones);
-  ASSERT_TRUE(whole.succeeded) << whole.reason;
+  const FitOutcome whole = fitted(two_zones);
+  ASSERT_TRUE(whole.evaluation.succeeded) << whole.reason;
   for (const char* stage : {"1 term", "2 zones"}) {
-    PressFitState left;
-    bool came = false;
-    PressFitMonitor monitor;
-    monitor.on_event = [&](const PressFitEvent& event) { came = came || event.stage == stage; };
-    monitor.on_state = [&](const PressFitState& state) { left = state; };
-    monitor.interrupted = [&] { return came; };
-    const PressFitOutcome part = fit_presses(capture, two_zones, monitor);
+    test::Interruption interruption(stage);
+    const FitOutcome part = fitted(two_zones, interruption.monitor());
     EXPECT_TRUE(part.interrupted);
-    EXPECT_TRUE(part.predictions.empty());
-    write_press_state(folder / "state.json", left, "key");
+    ASSERT_TRUE(part.law);
+    EXPECT_TRUE(part.law->predictions.empty());
     int events = 0;
-    monitor = {};
-    monitor.on_event = [&](const PressFitEvent& event) { events += event.stage == "1 term"; };
-    const PressFitOutcome resumed =
-        fit_presses(capture, two_zones, monitor, read_press_state(folder / "state.json", "key"));
+    FitMonitor monitor;
+    monitor.on_event = [&](const FitEvent& event) { events += event.stage == "1 term"; };
+    const FitOutcome resumed = fitted(two_zones, monitor, interruption.left());
     EXPECT_EQ(events > 0, std::string(stage) == "1 term") << "what is done is not done again";
     expect_same(resumed, whole);
     EXPECT_LT((resumed.theta.array() / whole.theta.array() - 1.0).abs().maxCoeff(), 0.02);
   }
-  EXPECT_THROW(read_press_state(folder / "state.json", "another key"), InputError);
 }
 
 TEST_F(PressedLayers, AnInterruptionWhileCutsMoveKeepsTheEstimate) {
-  const PressFitOutcome whole = fit_presses(capture, two_zones);
-  ASSERT_TRUE(whole.succeeded) << whole.reason;
+  const FitOutcome whole = fitted(two_zones);
+  ASSERT_TRUE(whole.evaluation.succeeded) << whole.reason;
   // The stage's iterations begin again for the second round, and then for the first cut that is tried elsewhere.
   int begun = 0;
-  PressFitState left;
-  PressFitMonitor monitor;
-  monitor.on_event = [&](const PressFitEvent& e) { begun += e.stage == "2 zones" && e.iteration == 1; };
-  monitor.on_state = [&](const PressFitState& state) { left = state; };
+  FitState left;
+  FitMonitor monitor;
+  monitor.on_event = [&](const FitEvent& e) { begun += e.stage == "2 zones" && e.iteration == 1; };
+  monitor.on_state = [&](const FitState& state) { left = state; };
   monitor.interrupted = [&] { return begun == 3; };
-  const PressFitOutcome part = fit_presses(capture, two_zones, monitor);
+  const FitOutcome part = fitted(two_zones, monitor);
   ASSERT_TRUE(part.interrupted) << "no cut was tried elsewhere: the test would prove nothing";
-  EXPECT_EQ(left.cuts.size(), 1u);
-  EXPECT_GT(left.under_way.p.size(), 0);
-  const PressFitOutcome resumed = fit_presses(capture, two_zones, {}, left);
+  ASSERT_TRUE(left.law);
+  EXPECT_EQ(left.law->cuts.size(), 1u);
+  EXPECT_GT(left.law->under_way.p.size(), 0);
+  const FitOutcome resumed = fitted(two_zones, {}, left);
   expect_same(resumed, whole);
 }
 
 TEST_F(PressedLayers, AreSampledPressByPress) {
-  PressFitOptions options;
-  options.material = PressMaterial::Sampled;
-  const PressFitOutcome fit = fit_presses(capture, options);
-  ASSERT_TRUE(fit.succeeded) << fit.reason;
-  ASSERT_TRUE(fit.sampled);
+  FitOptions options;
+  options.material = MaterialKind::Sampled;
+  const FitOutcome outcome = fitted(options);
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  ASSERT_TRUE(outcome.law && outcome.law->sampled);
+  const LawOutcome& fit = *outcome.law;
   EXPECT_EQ(fit.samples.size(), 7u);
   EXPECT_EQ(fit.law->name(), "sampled");
   const ObservedPress& unseen = fit.scene->presses.back();
@@ -146,10 +149,28 @@ TEST(PressFit, RefusesACaptureWithoutPressesToFit) {
   const auto law = press_law(*block.body, layout, law_parameters(layout, 9000.0).reference());
   const Capture capture =
       read_capture(write_press_capture(folder.path(), block.scene({PressedBlock::presses()[0]}, law), 1));
-  EXPECT_THROW(fit_presses(capture, {}), InputError);
-  PressFitOptions options;
-  options.zones = 3, options.control_points = 4;
+  EXPECT_THAT(complaint_of([&] { (void)fit({{capture, {}}}, {}); }), HasSubstr("no press is to be fitted"));
+  FitOptions options;
+  options.law_zones = 3, options.control_points = 4;
   EXPECT_THAT(options.validate(), HasSubstr("cannot both"));
+}
+
+TEST_F(PressedLayers, AreRefusedBesideWhatTheyCannotBeFittedWith) {
+  const auto refusal = [&](const FitOptions& options, int captures = 1, bool holds_out = false) {
+    const std::vector<RecordedCapture> all(std::size_t(captures), RecordedCapture{capture, {}});
+    return complaint_of([&] {
+      (void)fit(all, options, {}, {}, holds_out ? std::optional(RecordedCapture{capture, {}}) : std::nullopt);
+    });
+  };
+  EXPECT_THAT(refusal({}, 2), HasSubstr("presses beside other recordings"));
+  EXPECT_THAT(refusal({}, 1, true), HasSubstr("--hold-out"));
+  FitOptions hexahedra, refined, given;
+  hexahedra.element = ElementKind::Hexahedron;
+  EXPECT_THAT(refusal(hexahedra), HasSubstr("element=hexahedra"));
+  refined.refine = 2;
+  EXPECT_THAT(refusal(refined), HasSubstr("--refine"));
+  given.parameters["youngs_modulus"].start = VectorX::Constant(1, 1e4);
+  EXPECT_THAT(refusal(given), HasSubstr("single parameters"));
 }
 
 }  // namespace

@@ -61,12 +61,13 @@ TEST_P(OfEachKind, DerivativesAgreeWithDifferences) {
 TEST_P(OfEachKind, KnownTruthIsFoundWithinWhatIsStated) {
   const test::TemporaryFolder folder;
   const Capture capture = written(folder, 0.01, GetParam());
-  PressFitOptions options;
-  options.terms = 1, options.zones = 1, options.control_points = 1;
-  const PressFitOutcome found = fit_presses(capture, options);
-  ASSERT_TRUE(found.succeeded) << found.reason;
+  FitOptions options;
+  options.law_terms = 1, options.law_zones = 1, options.control_points = 1;
+  const FitOutcome found = fit_presses(capture, options);
+  ASSERT_TRUE(found.law) << found.reason;
+  ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
   EXPECT_TRUE(found.converged) << found.reason;
-  const LawLayout& layout = found.layout;
+  const LawLayout& layout = found.law->layout;
   EXPECT_EQ(layout.form().terms, 1);
   const double std = found.std[found.parameters.coordinate(layout.modulus(0))];
   EXPECT_GT(std, 1e-4);
@@ -74,7 +75,7 @@ TEST_P(OfEachKind, KnownTruthIsFoundWithinWhatIsStated) {
   EXPECT_NEAR(std::log(found.theta[layout.modulus(0)] / modulus), 0.0, tolerance(3.0) * std);
   const double exponent_std = 4.0 * found.std[found.parameters.coordinate(layout.exponent(0))];
   EXPECT_NEAR(found.theta[layout.exponent(0)], exponent, tolerance(3.0) * exponent_std);
-  for (const CurvePrediction& curve : predict_curves(*found.scene, found.law)) {
+  for (const CurvePrediction& curve : predict_curves(*found.law->scene, found.law->law)) {
     EXPECT_EQ(curve.failure, "") << curve.name;
     EXPECT_LT(curve.relative_rms(), tolerance(0.05)) << curve_sentence(curve);
   }
@@ -93,11 +94,12 @@ TEST(StaticTests, CurvesAloneNeedNoShape) {
   const test::TemporaryFolder folder;
   const Capture capture = written(folder, 0.005, {.indentations = false, .grips = false, .has_shape = false});
   EXPECT_TRUE(is_of_material_curves(capture));
-  const PressFitOutcome found = fit_presses(capture, {});
-  ASSERT_TRUE(found.succeeded) << found.reason;
-  EXPECT_NEAR(found.law->small_strain(0).youngs_modulus / modulus, 1.0, tolerance(0.03));
-  EXPECT_NEAR(found.law->small_strain(0).poissons_ratio, ratio, tolerance(0.03));
-  const auto predicted = predict_curves(*found.scene, found.law);
+  const FitOutcome found = fit_presses(capture, {});
+  ASSERT_TRUE(found.law) << found.reason;
+  ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
+  EXPECT_NEAR(found.law->law->small_strain(0).youngs_modulus / modulus, 1.0, tolerance(0.03));
+  EXPECT_NEAR(found.law->law->small_strain(0).poissons_ratio, ratio, tolerance(0.03));
+  const auto predicted = predict_curves(*found.law->scene, found.law->law);
   ASSERT_EQ(predicted.size(), 3u);
   EXPECT_EQ(predicted[2].role, "test");
   EXPECT_EQ(predicted[2].abscissa, "shear");
@@ -107,12 +109,13 @@ TEST(StaticTests, CurvesAloneNeedNoShape) {
 TEST(StaticTests, AGivenPoissonsRatioStays) {
   const test::TemporaryFolder folder;
   const Capture capture = written(folder, 0.01, {.grips = false, .curves = false});
-  PressFitOptions options;
-  options.terms = 1, options.zones = 1, options.control_points = 1;
-  options.poissons_ratio = ratio;
-  const PressFitOutcome found = fit_presses(capture, options);
-  ASSERT_TRUE(found.succeeded) << found.reason;
-  EXPECT_EQ(found.theta[found.layout.poissons_ratio()], ratio);
+  FitOptions options;
+  options.law_terms = 1, options.law_zones = 1, options.control_points = 1;
+  options.parameters["poissons_ratio"] = {VectorX::Constant(1, ratio), false, {}};
+  const FitOutcome found = fit_presses(capture, options);
+  ASSERT_TRUE(found.law) << found.reason;
+  ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
+  EXPECT_EQ(found.theta[found.law->layout.poissons_ratio()], ratio);
   EXPECT_EQ(found.parameters.dimension(), 2);
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "estimation/fit_config.hpp"
+#include "estimation/fit_plan.hpp"
 #include "geometry/primitives.hpp"
 #include "support/interruption.hpp"
 
@@ -193,7 +194,7 @@ TEST(TrackingLoop, InterruptedAsItFollowsEndsWithTheBestSoFar) {
   ASSERT_TRUE(at_last.came());
   const FitState left = at_last.left();
   const auto& best = left.tracking->keeps_loop ? left.tracking->loop : left.tracking->direct;
-  expect_best_so_far(outcome, best->refined.front().theta, few);
+  expect_best_so_far(outcome, estimate_of(*best)->theta, few);
   expect_nothing(fit({bar}, one_round, interrupted_at_once(), left));
 
   // The points were fitted before, and the rounds' estimate is looked for again to compare with.
@@ -202,7 +203,7 @@ TEST(TrackingLoop, InterruptedAsItFollowsEndsWithTheBestSoFar) {
   points.tracking->phase = Phase::Direct, points.tracking->direct.reset();
   const FitOutcome direct = fit({bar}, one_round, interrupted_at_once(), points);
   EXPECT_TRUE(direct.interrupted);
-  EXPECT_EQ(direct.theta, points.refined.front().theta);
+  EXPECT_EQ(direct.theta, estimate_of(points)->theta);
 }
 
 TEST(TrackingLoop, GoesOnUntilNoModulusChanges) {

@@ -6,8 +6,8 @@
 #include "elasticity/sampled_law.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
-#include "motion/plane_contact.hpp"
 #include "motion/pull.hpp"
+#include "motion/rigid_contact.hpp"
 #include "support/force_terms.hpp"
 
 namespace pliant {
@@ -24,6 +24,8 @@ Handles of_material(const MotionBlocks& blocks) {
   return all.push_back(blocks.poissons_ratio), all;
 }
 Handles of_plane(const MotionBlocks& blocks) { return {blocks.planes[1].whole()}; }
+Handles of_rough_plane(const MotionBlocks& blocks) { return {blocks.planes[1].whole(), blocks.planes[1].friction}; }
+Handles of_nothing(const MotionBlocks&) { return {}; }
 Handles of_pulls(const MotionBlocks& blocks) {
   Handles all = blocks.pulls;
   all.insert(all.end(), blocks.youngs_moduli.begin(), blocks.youngs_moduli.end());
@@ -75,12 +77,91 @@ void add_laws(std::vector<Family>& list) {
       const auto body = [box, form] { return form.moduli == 1 ? box() : with_three_moduli(*box()); };
       list.push_back({form.name + elements, body,
                       [](auto of, const test::SceneBlocks& blocks) { return LawElasticity::make(of, blocks.law); },
-                      true, true, of_law, true, true, form.form});
+                      true, true, of_law, true, true, form.form, true});
     }
-    list.push_back({"SampledLaw" + elements, box,
-                    [](auto of, const test::SceneBlocks&) { return LawElasticity::make(of, sampled(*of)); }, true, true,
-                    [](const auto&) { return Handles(); }, true, true});
+    list.push_back({"SampledLaw" + elements,
+                    box,
+                    [](auto of, const test::SceneBlocks&) { return LawElasticity::make(of, sampled(*of)); },
+                    true,
+                    true,
+                    of_nothing,
+                    true,
+                    true,
+                    {},
+                    true});
   }
+}
+
+/// Every contact: with a plane out of the parameter vector, with shapes that are fixed, led or where forces bring them,
+/// smooth and rough, and bonded.
+void add_contacts(std::vector<Family>& list) {
+  struct Kind {
+    std::string name;
+    std::function<RigidContact(const Body&, const MotionBlocks&)> make;
+    bool is_of_plane = false, is_sliding = true;
+  };
+  const Penalty soft{2e5, 0.01}, sharp{2e5, 0.02, Penalty::Onset::Quadratic};
+  const auto shape = [](const std::shared_ptr<const RigidShape>& rigid, const Penalty& penalty) {
+    return [rigid, penalty](const Body& body, const MotionBlocks&) {
+      return RigidContact::sliding(body, surface_samples(body), rigid, penalty);
+    };
+  };
+  const auto egg = [](const Vector3& p) { return p.cwiseQuotient(Vector3(1.0, 1.3, 0.8)).norm() - 0.08; };
+  const SignedDistance grid({Vector3::Constant(-0.5), Vector3::Constant(0.5)}, 0.031, egg);
+  const std::vector<Kind> kinds = {
+      {"Plane",
+       [soft](const Body& body, const MotionBlocks& blocks) {
+         return RigidContact::sliding(body, surface_samples(body), blocks.planes[1], soft);
+       },
+       true},
+      {"HalfSpace", shape(rigid_half_space({0.0, 0.01, 0.0}, {0.2, 1.0, -0.1}), soft)},
+      {"Ball", shape(rigid_ball({0.05, 0.06, 0.02}, 0.09), soft)},
+      {"SharpBall", shape(rigid_ball({0.05, 0.06, 0.02}, 0.09), sharp)},
+      {"Capsule", shape(rigid_capsule({-0.05, 0.03, 0.0}, {0.06, 0.05, 0.03}, 0.06), soft)},
+      {"Punch", shape(rigid_punch({0.0, 0.01, 0.0}, {0.1, -1.0, 0.2}, 0.06, 0.01), soft)},
+      {"Mesh", shape(rigid_grid(grid), soft)},
+      {"Mould", shape(rigid_grid(grid, true), soft)},
+      {"Bond",
+       [](const Body& body, const MotionBlocks&) { return RigidContact::bonded(body, surface_samples(body), 1e5); },
+       false, false}};
+  const auto box = [] { return test::tet_body({0.24, 0.1, 0.24}, {3, 2, 3}, false); };
+  const auto add = [&](std::string name, const Kind& kind, auto body, const auto& change, bool is_rough, bool has_row) {
+    Family family{std::move(name),
+                  body,
+                  [kind, change](auto of, const MotionBlocks& blocks) {
+                    auto contact = std::make_unique<RigidContact>(kind.make(*of, blocks));
+                    change(*contact, *of);
+                    return contact;
+                  },
+                  kind.is_sliding,
+                  true,
+                  kind.is_of_plane ? (is_rough ? of_rough_plane : of_plane) : of_nothing,
+                  kind.is_sliding};
+    family.has_potential = true;  // at rest, where nothing rubs
+    family.sees_start = is_rough;
+    family.has_row = has_row;
+    list.push_back(std::move(family));
+  };
+  const auto as_it_is = [](RigidContact&, const Body&) {};
+  const auto led = [](RigidContact& contact, const Body&) { contact.set_translation({0.01, -0.02, 0.005}); };
+  const auto rough = [](RigidContact& contact, const Body&) { contact.set_friction(0.7, 0.5); };
+  const auto unknown = [](RigidContact& contact, const Body& body) {
+    contact.set_row(body, body.node_count(), *test::with_row(body));
+  };
+  for (const Kind& kind : kinds) {
+    add(kind.name + "Contact", kind, box, as_it_is, false, false);
+    if (kind.is_sliding) add("Rough" + kind.name + "Contact", kind, box, rough, true, false);
+    if (kind.is_of_plane) continue;
+    add("Led" + kind.name + "Contact", kind, box, led, false, false);
+    add("Unknown" + kind.name + "Contact", kind, box, unknown, false, true);
+    if (!kind.is_sliding) continue;
+    const auto both = [=](RigidContact& contact, const Body& body) { rough(contact, body), unknown(contact, body); };
+    add("RoughUnknown" + kind.name + "Contact", kind, box, both, true, true);
+  }
+  const auto quadratic = [] { return test::tet_body({0.24, 0.1, 0.24}, {3, 2, 3}, true); };
+  add("PlaneContactOfHexahedra", kinds.front(), small_torus, as_it_is, false, false);
+  add("RoughPlaneContactOfHexahedra", kinds.front(), small_torus, rough, true, false);
+  add("PlaneContactOfQuadraticTetrahedra", kinds.front(), quadratic, as_it_is, false, false);
 }
 
 std::vector<Family> families() {
@@ -102,14 +183,10 @@ std::vector<Family> families() {
         "ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); },
         kind.name.ends_with("Tetrahedra")));
   add_laws(list);
+  add_contacts(list);
   const auto box = [](bool quadratic) {
     return [quadratic] { return test::tet_body({0.24, 0.1, 0.24}, {3, 2, 3}, quadratic); };
   };
-  const auto contact = [](auto body, const MotionBlocks& blocks) {
-    return std::make_unique<PlaneContact>(body, blocks.planes[1], ContactOptions{2e5, 0.01});
-  };
-  list.push_back({"PlaneContactOfTetrahedra", box(false), contact, true, true, of_plane});
-  list.push_back({"PlaneContactOfQuadraticTetrahedra", box(true), contact, true, true, of_plane});
   const auto pull = [](auto body, const MotionBlocks& blocks) {
     std::vector<int> held;
     std::vector<Vector3> all, there;
@@ -121,20 +198,34 @@ std::vector<Family> families() {
     }
     return std::make_unique<Pull>(body, PullPoints{far_points(all, there, pulls), body->size()}, held, blocks);
   };
-  list.push_back({"Pull", box(true), pull, false, false, of_pulls});
-  list.push_back({"PullOfThreeModuli", [] { return with_three_moduli(*small_torus()); }, pull, false, false, of_pulls});
+  const auto three = [] { return with_three_moduli(*small_torus()); };
+  list.push_back({"Pull", box(true), pull, false, false, of_pulls, false, false, {}, true});
+  list.push_back({"PullOfThreeModuli", three, pull, false, false, of_pulls, false, false, {}, true});
   const std::vector<Family> others = {
-      {"Gravity", small_torus,
-       [](auto body, const MotionBlocks& blocks) { return std::make_unique<Gravity>(*body, blocks); }, false, false,
-       of_weight},
-      {"HungWeights", small_torus,
+      {"Gravity",
+       small_torus,
+       [](auto body, const MotionBlocks& blocks) { return std::make_unique<Gravity>(*body, blocks); },
+       false,
+       false,
+       of_weight,
+       false,
+       false,
+       {},
+       true},
+      {"HungWeights",
+       small_torus,
        [](auto body, const MotionBlocks& blocks) {
          return std::make_unique<HungWeights>(
              *body, std::vector<HungWeight>{{Vector3(0.1, 0.0, 0.01), 0.2}, {Vector3(-0.12, 0.01, 0.0), 0.05}},
              blocks.gravity);
        },
-       false, false, of_gravity},
-      {"PlaneContact", small_torus, contact, true, true, of_plane},
+       false,
+       false,
+       of_gravity,
+       false,
+       false,
+       {},
+       true},
       {"FixedRegions", small_torus,
        [](auto body, const MotionBlocks& blocks) {
          const Matrix3 R = Eigen::AngleAxisd(0.8, Vector3(1, -1, 2).normalized()).toRotationMatrix();
@@ -149,14 +240,26 @@ std::vector<Family> families() {
   return list;
 }
 
+/// The battery's poses have tangents with negative eigenvalues: it tests what the damping leaves out of them, too.
+TEST_P(ForceTerms, PosesOfLawsHaveNegativeTangents) {
+  auto* const law = dynamic_cast<LawElasticity*>(term.get());
+  if (!law) return;
+  law->set_parameters(theta);
+  law->linearise(lag);
+  BlockMatrix exact(body->pattern), positive(body->pattern);
+  law->add_stiffness(LawElasticity::Stiffness::Exact, 1.0, exact);
+  law->add_stiffness(LawElasticity::Stiffness::Positive, 1.0, positive);
+  EXPECT_GT((test::dense(positive) - test::dense(exact)).norm(), 1e-3 * test::dense(exact).norm());
+}
+
 INSTANTIATE_TEST_SUITE_P(All, ForceTerms, ::testing::ValuesIn(families()),
                          [](const auto& member) { return member.param.name; });
 
 /// The battery's contact sees both sides of the switch, and pulls nowhere.
-TEST(PlaneContact, PushesOutwardsOnBothSidesOfItsSwitch) {
+TEST(RigidContact, PushesOutwardsOnBothSidesOfItsSwitch) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
   const MotionLayout layout({.planes = 1});
-  PlaneContact contact(body, layout.planes[0], {2e5, 0.001});
+  RigidContact contact = RigidContact::sliding(*body, surface_samples(*body), layout.planes[0], {2e5, 0.001});
   VectorX theta = layout.zero();
   theta.segment<3>(layout.planes[0].normal) = Vector3::UnitY();
   const Points& X = body->reference_positions();
@@ -178,11 +281,13 @@ TEST(PlaneContact, PushesOutwardsOnBothSidesOfItsSwitch) {
   EXPECT_NEAR(last, 2e5 * depth, 0.03 * last);
 }
 
-TEST(PlaneContact, RefusesNoStiffness) {
+TEST(RigidContact, RefusesNoStiffness) {
   const auto body = test::torus_body(0.1, 0.04, 0.05);
   const MotionLayout layout({.planes = 1});
-  EXPECT_THROW(PlaneContact(body, layout.planes[0], {0.0, 0.01}), std::invalid_argument);
-  EXPECT_THROW(PlaneContact(body, layout.planes[0], {1.0, 0.0}), std::invalid_argument);
+  const ContactSamples samples = surface_samples(*body);
+  EXPECT_THROW(RigidContact::sliding(*body, samples, layout.planes[0], {0.0, 0.01}), std::invalid_argument);
+  EXPECT_THROW(RigidContact::sliding(*body, samples, layout.planes[0], {1.0, 0.0}), std::invalid_argument);
+  EXPECT_THROW(RigidContact::bonded(*body, samples, 0.0), std::invalid_argument);
 }
 
 TEST(FixedRegions, RefusesARegionBesideTheObject) {

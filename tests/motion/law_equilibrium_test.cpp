@@ -1,6 +1,6 @@
 #include "elasticity/sampled_law.hpp"
+#include "motion/contact_defaults.hpp"
 #include "motion/equilibrium.hpp"
-#include "motion/probe_contact.hpp"
 #include "support/bodies.hpp"
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
@@ -26,15 +26,15 @@ std::vector<int> nodes_where(const Body& body, const std::function<bool(const Ve
 
 /// A block on a floor that holds it, with a disc glued on top, or a ball above it.
 struct Block {
-  explicit Block(bool quadratic = false, bool glued = true)
+  explicit Block(bool quadratic = false, bool bonded = true)
       : body(test::tet_body({0.2, 0.1, 0.2}, {8, 4, 8}, quadratic, 0.1)),
         held(nodes_where(*body, [](const Vector3& p) { return p.y() < -0.0499; })) {
-    if (glued) {
+    if (bonded) {
       contacts.push_back(
-          RigidContact::glued(*body, disc_samples(*body, {0.02, 0.05, -0.01}, 0.03), glued_stiffness(7000.0, 0.01)));
+          RigidContact::bonded(*body, disc_samples(*body, {0.02, 0.05, -0.01}, 0.03), bond_stiffness(7000.0, 0.01)));
     } else {
-      contacts.push_back(
-          RigidContact::sliding(*body, boundary_samples(*body, 4), rigid_ball({0.01, 0.09, 0.0}, 0.04), 1e6, 5e-4));
+      contacts.push_back(RigidContact::sliding(*body, boundary_samples(*body, 4), rigid_ball({0.01, 0.09, 0.0}, 0.04),
+                                               Penalty{1e6, 5e-4, Penalty::Onset::Quadratic}));
     }
   }
   Equilibrium make(std::shared_ptr<const MaterialLaw> law = nullptr) const {
@@ -74,7 +74,7 @@ TEST(LawEquilibrium, OfAStretchedBarIsTheLawsOwn) {
   EXPECT_LT((placement.nodes - expected).norm(), tolerance(1e-7) * expected.norm());
 }
 
-TEST(LawEquilibrium, BalancesTheForceOfAGluedDisc) {
+TEST(LawEquilibrium, BalancesTheForceOfABondedDisc) {
   for (const bool quadratic : {false, true}) {
     const Block block(quadratic);
     Equilibrium equilibrium = block.make();
@@ -134,9 +134,10 @@ TEST(LawEquilibrium, OnARigidBodyInsideSlides) {
   const auto held = nodes_where(*body, [](const Vector3& p) { return p.x() < -0.0599; });
   std::vector<RigidContact> contacts;
   contacts.push_back(RigidContact::sliding(*body, boundary_samples(*body, 3),
-                                           rigid_half_space({0.0, -0.025, 0.0}, {0.0, 1.0, 0.0}), 3e6, 2e-4));
+                                           rigid_half_space({0.0, -0.025, 0.0}, {0.0, 1.0, 0.0}),
+                                           Penalty{3e6, 2e-4, Penalty::Onset::Quadratic}));
   contacts.push_back(
-      RigidContact::glued(*body, disc_samples(*body, {0.02, 0.025, 0.0}, 0.02), glued_stiffness(7000.0, 0.01)));
+      RigidContact::bonded(*body, disc_samples(*body, {0.02, 0.025, 0.0}, 0.02), bond_stiffness(7000.0, 0.01)));
   Equilibrium equilibrium(body, ogden(*body, foam), held, contacts);
   equilibrium.set_control(0, {ProbeControl::Kind::Position, {}, {}, {}});
   equilibrium.set_control(1, {ProbeControl::Kind::Force, {0.4, -3.0, 0.0}, {}, {}});

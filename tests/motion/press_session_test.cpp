@@ -24,7 +24,7 @@ struct Session : ::testing::Test {
 };
 
 TEST_F(Session, SmallMovesTakeFewIterations) {
-  for (const ProbeKind kind : {ProbeKind::GluedDisc, ProbeKind::Punch, ProbeKind::Ball}) {
+  for (const ProbeKind kind : {ProbeKind::BondedDisc, ProbeKind::Punch, ProbeKind::Ball}) {
     PressSession session = make(kind);
     int most = 0;
     for (int k = 1; k <= 20; ++k) {
@@ -33,20 +33,20 @@ TEST_F(Session, SmallMovesTakeFewIterations) {
       most = std::max(most, s.iterations);
       EXPECT_LT(s.residual, 1e-6);
     }
-    EXPECT_LE(most, kind == ProbeKind::GluedDisc ? 5 : 15);
+    EXPECT_LE(most, kind == ProbeKind::BondedDisc ? 5 : 15);
     EXPECT_LT(session.force().y(), -2.0);
   }
 }
 
 TEST_F(Session, PushingAndMovingAgree) {
-  PressSession by_force = make(ProbeKind::GluedDisc), by_place = make(ProbeKind::GluedDisc);
+  PressSession by_force = make(ProbeKind::BondedDisc), by_place = make(ProbeKind::BondedDisc);
   ASSERT_TRUE(by_force.push({1.0, -12.0, 0.0}).converged);
   ASSERT_TRUE(by_place.move_to(by_force.displacement()).converged);
   EXPECT_LT((by_place.force() - Vector3(1.0, -12.0, 0.0)).norm(), tolerance(1e-3));
 }
 
 TEST_F(Session, AFailedPushLeavesTheLastEquilibrium) {
-  PressSession session = make(ProbeKind::GluedDisc);
+  PressSession session = make(ProbeKind::BondedDisc);
   ASSERT_TRUE(session.push({0.0, -5.0, 0.0}).converged);
   const Points before = session.nodes();
   EXPECT_FALSE(session.push({0.0, std::nan(""), 0.0}).converged);
@@ -55,7 +55,7 @@ TEST_F(Session, AFailedPushLeavesTheLastEquilibrium) {
 }
 
 TEST_F(Session, AProbeInTheAirIsRefused) {
-  EXPECT_THROW(PressSession(body, law, {ProbeKind::GluedDisc, {0.0, 0.3, 0.0}, 0.03, {}}, options), InputError);
+  EXPECT_THROW(PressSession(body, law, {ProbeKind::BondedDisc, {0.0, 0.3, 0.0}, 0.03, {}}, options), InputError);
 }
 
 TEST(SurfaceFollower, FollowsAffineDeformationsExactlyAndOthersSmoothly) {

@@ -16,8 +16,10 @@ using test::hanging::length;
 
 /// A clamped bar as it sags under its own weight: its load-free shape is straight, and known.
 struct Sagging : Hanging {
-  Sagging(bool quadratic, double youngs_modulus)
+  /// @param law  of the bar; null: corotated linear elasticity
+  Sagging(bool quadratic, double youngs_modulus, const LawForm* law = nullptr)
       : Hanging(test::tet_body({length, edge, edge}, Eigen::Vector3i(24, 2, 2) / (quadratic ? 2 : 1), quadratic, 0.0)) {
+    if (law) set_law(*law);
     layout.set_moduli(theta, youngs_modulus);
     straight = body->nodes;
     sagged = positions(theta);
@@ -28,6 +30,14 @@ struct Sagging : Hanging {
     weighed.mass = body->mass;
     scanned = std::make_shared<Body>(std::move(weighed));
     held = held_nodes(*body, options.holds);
+  }
+  /// Its numbers follow the motion's blocks, which stay where they are.
+  void set_law(const LawForm& form) {
+    ParameterLayout all = layout.layout();
+    options.law_layout = LawLayout::of_motion(all, layout, form);
+    theta = carry(layout.layout(), theta, all, VectorX::Zero(all.size()));
+    for (int i = 0; i < form.terms; ++i) theta[options.law_layout->exponent(i)] = i == 0 ? 8.0 : -5.0;
+    for (int i = 1; i < form.terms; ++i) theta[options.law_layout->stiffness_ratio(i)] = 0.7;
   }
   Points straight, sagged;
   std::shared_ptr<const Body> scanned;
@@ -47,6 +57,23 @@ TEST_P(ReferenceShapes, ASaggingBarWasStraight) {
     EXPECT_LT(shape.residual, 1e-7);
     EXPECT_EQ(shape.carried, 1.0);
     EXPECT_LT((shape.X - scene.straight).rowwise().norm().maxCoeff(), 1e-5 * length) << "sag " << sag;
+  }
+}
+
+/// So was one of any other law.
+TEST_P(ReferenceShapes, ASaggingBarOfALawWasStraight) {
+  for (const LawForm& law : {LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean}, LawForm{1, 2}}) {
+    const Sagging scene(GetParam(), 2e6, &law);
+    const double sag = (scene.sagged - scene.straight).rowwise().norm().maxCoeff();
+    ASSERT_GT(sag, 0.1 * length);
+    ReferenceShapeSolver solver(scene.scanned, scene.held, scene_material(scene.options), scene.layout);
+    const Points load = scan_load(*scene.scanned, scene.layout, scene.theta, {});
+    const ReferenceShape shape = solver.find(scene.theta, load);
+    ASSERT_TRUE(shape.found) << shape.reason;
+    EXPECT_LT((shape.X - scene.straight).rowwise().norm().maxCoeff(), 1e-5 * length) << "sag " << sag;
+    VectorX soft = scene.theta;
+    soft[scene.layout.youngs_moduli[0]] = 1e4;
+    EXPECT_THAT(solver.find(soft, load).reason, ::testing::HasSubstr("carries"));
   }
 }
 

@@ -86,8 +86,9 @@ struct Contact : ::testing::TestWithParam<bool> {
   Contact() : body(test::tet_body({0.2, 0.1, 0.12}, {3, 2, 2}, false)), contact(make()) {}
   RigidContact make() const {
     const ContactSamples s = disc_samples(*body, {0.0, 0.05, 0.0}, 0.03);
-    if (GetParam()) return RigidContact::glued(*body, s, 1e5);
-    return RigidContact::sliding(*body, s, rigid_ball({0.0, 0.07, 0.0}, 0.0225), 1e5, 0.004);
+    if (GetParam()) return RigidContact::bonded(*body, s, 1e5);
+    return RigidContact::sliding(*body, s, rigid_ball({0.0, 0.07, 0.0}, 0.0225),
+                                 Penalty{1e5, 0.004, Penalty::Onset::Quadratic});
   }
   std::shared_ptr<const Body> body;
   RigidContact contact;
@@ -121,7 +122,7 @@ TEST_P(Contact, ForceIsThatOfAllSamples) {
   EXPECT_LT(contact.force(body->nodes, u).y(), 0.0);  // pressed from above
 }
 INSTANTIATE_TEST_SUITE_P(Kinds, Contact, ::testing::Values(true, false),
-                         [](const auto& c) { return c.param ? "Glued" : "Sliding"; });
+                         [](const auto& c) { return c.param ? "Bonded" : "Sliding"; });
 
 }  // namespace
 }  // namespace pliant

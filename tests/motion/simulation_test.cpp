@@ -50,8 +50,12 @@ TEST(Simulation, SceneFliesHitsAndReturns) {
 /// A parameter of theta, and the integrator.
 class Sensitivity : public ::testing::TestWithParam<std::tuple<int, Integrator>> {
  protected:
+  Sensitivity() : scene(scene_for(last + 1, std::get<1>(GetParam()))) {
+    scene.options.friction_speed = 0.2;  // the plane is rough
+    scene.theta[scene.layout.planes[0].friction] = 0.3;
+  }
   int index() const { return std::get<0>(GetParam()); }
-  test::TorusScene scene = scene_for(last + 1, std::get<1>(GetParam()));
+  test::TorusScene scene;
 };
 
 TEST_P(Sensitivity, TangentMatchesCentralDifferences) {

@@ -265,7 +265,8 @@ TEST(Stepper, RepeatedLaggedStepsConvergeToTheImplicitStep) {
   for (const double blend : {0.51, 0.999}) {
     const auto make = [&](Integrator integrator) {
       auto terms = Stepped::terms(body, scene.layout);
-      terms.push_back(std::make_unique<PlaneContact>(body, scene.layout.planes[0], scene.options.contact));
+      terms.push_back(std::make_unique<RigidContact>(
+          RigidContact::sliding(*body, surface_samples(*body), scene.layout.planes[0], scene.options.contact)));
       StepOptions options = step_options(1.0 / 120.0, blend);
       options.integrator = integrator;
       options.newton.tolerance = 1e-13;
@@ -364,7 +365,7 @@ TEST(Simulation, FramesMayBeUnequallyFarApart) {
 }
 
 /// A sphere set down softly on a plane, and strongly damped.
-TEST(PlaneContact, CarriesTheWeightOfABodyAtRest) {
+TEST(RigidContact, CarriesTheWeightOfABodyAtRest) {
   const double radius = 0.05, weight_density = 200.0;
   const auto body = std::make_shared<const Body>(make_body(test::sphere_grid(radius, 0.025)));
   SimulationOptions options;
@@ -387,7 +388,7 @@ TEST(PlaneContact, CarriesTheWeightOfABodyAtRest) {
   State end;
   ASSERT_TRUE(simulation.run(theta, [&](int, const State& state, auto) { return end = state, true; }).succeeded);
   ASSERT_LT(end.v.cwiseAbs().maxCoeff(), 1e-3) << "it has not come to rest";
-  PlaneContact contact(body, with_plane.planes[0], options.contact);
+  RigidContact contact = RigidContact::sliding(*body, surface_samples(*body), with_plane.planes[0], options.contact);
   contact.set_parameters(theta);
   contact.linearise(end.x);
   ASSERT_GT(contact.active_count(), 0);

@@ -42,6 +42,11 @@ std::shared_ptr<const MaterialLaw> linear() {
   q << 5000.0, 1000.0, 7000.0, 1.0 / 3.0, 900.0, 300.0;
   return std::make_shared<LinearLaw>(q);
 }
+std::shared_ptr<const MaterialLaw> neo_hookean() {
+  MatrixX q(elements, 2);
+  for (int e = 0; e < elements; ++e) q.row(e) << 2000.0 + 300.0 * e, 4000.0 - 100.0 * e;
+  return std::make_shared<NeoHookeanLaw>(q);
+}
 std::shared_ptr<const MaterialLaw> sampled() {
   std::vector<MaterialSample> samples(5);
   for (std::size_t k = 0; k < samples.size(); ++k) {
@@ -80,8 +85,8 @@ TEST_P(KeptLaw, PullsBackAsBeforeItWasSaved) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Laws, KeptLaw, ::testing::Values(&ogden, &linear, &sampled), [](const auto& c) {
-  return c.param == &ogden ? "Ogden" : c.param == &linear ? "Linear" : "Sampled";
+INSTANTIATE_TEST_SUITE_P(Laws, KeptLaw, ::testing::Values(&ogden, &linear, &neo_hookean, &sampled), [](const auto& c) {
+  return c.param == &ogden ? "Ogden" : c.param == &linear ? "Linear" : c.param == &sampled ? "Sampled" : "NeoHookean";
 });
 
 TEST(KeptLaws, ThatAreDamagedAreToldWithWhatToDo) {
@@ -92,7 +97,7 @@ TEST(KeptLaws, ThatAreDamagedAreToldWithWhatToDo) {
   EXPECT_THAT(refusal(good, elements + 1), HasSubstr("one for each of 4 elements"));
   ModelLaw other = good;
   other.name = "gent";
-  EXPECT_THAT(refusal(other), HasSubstr("ogden, linear or sampled"));
+  EXPECT_THAT(refusal(other), HasSubstr("ogden, neo_hookean, linear or sampled"));
   other = good;
   other.rows[1][3] = 0.7;
   EXPECT_THAT(refusal(other), HasSubstr("nu < 1/2"));

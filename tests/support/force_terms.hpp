@@ -42,7 +42,38 @@ struct Family {
   bool has_lag_matrix = false;
   bool depends_on_reference = false;  ///< an `Elasticity` with derivatives by where the nodes are free of load
   std::optional<LawForm> law = {};    ///< whose blocks the parameter vector has too
+  bool has_potential = false;
+  bool sees_start = false;  ///< depends on the step's start by itself
+  bool has_row = false;     ///< acts on a row below the nodes', of a rigid body whose place is unknown: `with_row`
 };
+
+/// The body's pattern with a row for a rigid body, which meets all nodes.
+inline std::shared_ptr<const BlockPattern> with_row(const Body& body) {
+  const BlockPattern& own = *body.pattern;
+  auto pattern = std::make_shared<BlockPattern>();
+  pattern->rows = own.rows + 1;
+  pattern->row_start.push_back(0);
+  const auto end_row = [&] { pattern->row_start.push_back(int(pattern->column.size())); };
+  for (int row = 0; row < own.rows; ++row) {
+    for (int b = own.row_start[std::size_t(row)]; b < own.row_start[std::size_t(row) + 1]; ++b) {
+      if (own.column[std::size_t(b)] == row) pattern->diagonal.push_back(int(pattern->column.size()));
+      pattern->column.push_back(own.column[std::size_t(b)]);
+    }
+    pattern->column.push_back(own.rows);
+    end_row();
+  }
+  for (int column = 0; column <= own.rows; ++column) pattern->column.push_back(column);
+  pattern->diagonal.push_back(int(pattern->column.size()) - 1);
+  end_row();
+  return pattern;
+}
+
+/// Positions of the nodes with that of a rigid body below.
+inline Points with_row(const Points& nodes, const Vector3& translation) {
+  Points all(nodes.rows() + 1, 3);
+  all << nodes, translation.transpose();
+  return all;
+}
 
 inline void PrintTo(const Family& family, std::ostream* out) { *out << family.name; }
 
@@ -67,12 +98,24 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
     theta.segment<3>(layout.planes[0].point) = Vector3(-1, 0, 0);
     theta.segment<3>(layout.planes[1].normal) = Vector3(0.2, 0.9, -0.3).normalized();
     theta.segment<3>(layout.planes[1].point) = Vector3(0.01, 0.0, -0.02);  // through the middle: gaps of both signs
+    theta[layout.planes[1].friction] = 0.4;
     theta.segment<3>(layout.pulls[0]) = Vector3(0.1, -0.2, 0.05);
     theta.segment<3>(layout.pulls[1]) = Vector3(0.02, 0.15, -0.1);
     lag = deformed(body->reference_positions(), 0.3);
     z = deformed(body->reference_positions(), 0.28, 1.93);
     d_lag = deformed(body->reference_positions(), 0.6, -0.7);
     d_z = deformed(body->reference_positions(), 0.9, 0.6);
+    start = deformed(body->reference_positions(), 0.2, 1.85);
+    d_start = deformed(body->reference_positions(), 0.4, 2.2);
+    d_start_velocity = deformed(body->reference_positions(), 0.8, -1.1);
+    if (GetParam().has_row) {
+      lag = with_row(lag, {0.01, -0.005, 0.003}), z = with_row(z, {0.012, -0.006, 0.001});
+      d_lag = with_row(d_lag, {0.1, 0.2, -0.1}), d_z = with_row(d_z, {-0.1, 0.05, 0.2});
+      start = with_row(start, {0.0, 0.002, 0.0}), d_start = with_row(d_start, {0.05, -0.1, 0.1});
+      d_start_velocity = with_row(d_start_velocity, {0.0, 0.3, 0.1});
+    }
+    start_velocity = 3.0 * (lag - start);
+    pattern = GetParam().has_row ? with_row(*body) : body->pattern;
   }
 
   SceneBlocks add_blocks() {
@@ -85,17 +128,34 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
 
   Points force(const Points& at_lag, const Points& at_z, const VectorX& at_theta) {
     term->set_parameters(at_theta);
-    term->linearise(at_lag);
+    linearise(at_lag);
     Points f = Points::Zero(at_z.rows(), 3);
     term->add_force(at_z, f);
     return f;
   }
   Points tangent(const Points& change_lag, const Points& change_z, const VectorX& change_theta) {
     term->set_parameters(theta);
-    term->linearise(lag);
+    linearise(lag);
     Points df = Points::Zero(z.rows(), 3);
     term->add_force_tangent(z, change_lag, change_z, change_theta, df);
     return df;
+  }
+  /// In the step at hand.
+  void linearise(const Points& at_lag) {
+    term->begin_step({&start, &start_velocity, 0.1, 0.01});
+    term->linearise(at_lag);
+  }
+  /// Of f(x | x), at rest: there is no step.
+  Points static_force(const Points& x) {
+    term->begin_step({});
+    term->linearise(x);
+    Points f = Points::Zero(x.rows(), 3);
+    term->add_force(x, f);
+    return f;
+  }
+  Points any(double amount, double angle) const {
+    const Points nodes = deformed(body->reference_positions(), amount, angle);
+    return GetParam().has_row ? with_row(nodes, {0.1, -0.3, 0.2}) : nodes;
   }
   Points none() const { return Points::Zero(z.rows(), 3); }
 
@@ -111,7 +171,8 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
   SceneBlocks layout;
   std::unique_ptr<ForceTerm> term;
   VectorX theta;
-  Points lag, z, d_lag, d_z;
+  Points lag, z, d_lag, d_z, start, start_velocity, d_start, d_start_velocity;
+  std::shared_ptr<const BlockPattern> pattern;
 };
 
 // Bottom of the V of central differences: truncation h^2 against rounding 1e-16 / h.
@@ -127,7 +188,7 @@ TEST_P(ForceTerms, AddsToWhatIsThere) {
 
 TEST_P(ForceTerms, MatrixIsMinusTheDerivativeByPosition) {
   const VectorX change = flat(Points(force(lag, z + d_z, theta) - force(lag, z, theta)));
-  BlockMatrix K(body->pattern);
+  BlockMatrix K(pattern);
   term->add_matrix(3.0, K);
   const MatrixX whole = dense(K);
   EXPECT_LE((whole - whole.transpose()).norm(), tolerance(1e-13) * whole.norm());
@@ -168,8 +229,8 @@ TEST_P(ForceTerms, TangentByEveryParameter) {
 
 TEST_P(ForceTerms, AdjointIsTheTransposeOfTheTangent) {
   term->set_parameters(theta);
-  term->linearise(lag);
-  const Points w = deformed(body->reference_positions(), -0.8, 2.9);
+  linearise(lag);
+  const Points w = any(-0.8, 2.9);
   Points lag_bar = none(), z_bar = none();
   VectorX theta_bar = VectorX::Zero(theta.size());
   term->add_force_adjoint(z, w, lag_bar, z_bar, theta_bar);
@@ -190,33 +251,92 @@ TEST_P(ForceTerms, AdjointIsTheTransposeOfTheTangent) {
 TEST_P(ForceTerms, LagMatrixIsMinusTheDerivativeByLagPoint) {
   term->set_parameters(theta);
   const auto product = [&](const Points& at_lag, const Points& at_z) {
-    term->linearise(at_lag);
-    BlockMatrix K(body->pattern);
+    linearise(at_lag);
+    BlockMatrix K(pattern);
     term->add_lag_matrix(at_z, 3.0, K);
     VectorX y;
     K.multiply(flat(d_lag), y);
     return y;
   };
-  // Contact gives its share where it is needed, with the lag point at z itself: there is none.
   const bool is_elastic = GetParam().has_lag_matrix;
   const Points& at_lag = is_elastic ? lag : z;
   const VectorX y = product(at_lag, z);
-  term->linearise(at_lag);
+  linearise(at_lag);
   Points df = none();
   term->add_force_tangent(z, d_lag, none(), VectorX::Zero(theta.size()), df);
   EXPECT_EQ(df.norm() > 0.0, is_elastic);
   EXPECT_LE((y + 3.0 * flat(df)).norm(), tolerance(1e-11) * df.norm());
 }
 
+TEST_P(ForceTerms, TangentByTheStepsStart) {
+  term->set_parameters(theta);
+  linearise(lag);
+  ASSERT_EQ(term->sees_start(), GetParam().sees_start);
+  if (!GetParam().sees_start) return;
+  Points df = none();
+  term->add_start_tangent(z, d_start, d_start_velocity, df);
+  ASSERT_GT(df.norm(), 0.0);
+  const Points start_here = start, velocity_here = start_velocity;
+  const auto along = [&](double s) -> VectorX {
+    start = start_here + s * d_start, start_velocity = velocity_here + s * d_start_velocity;
+    return flat(force(lag, z, theta));
+  };
+  EXPECT_LT(best_relative_error(along, flat(df), 0.1), tolerance(difference_error));
+  EXPECT_GT(best_relative_error(along, 1.001 * flat(df), 0.1), 1e-4) << "a wrong derivative would pass";
+  start = start_here, start_velocity = velocity_here;
+  linearise(lag);
+  const Points w = any(-0.8, 2.9);
+  Points start_bar = none(), velocity_bar = none();
+  term->add_start_adjoint(z, w, start_bar, velocity_bar);
+  const double by_adjoint = start_bar.cwiseProduct(d_start).sum() + velocity_bar.cwiseProduct(d_start_velocity).sum();
+  EXPECT_LE(std::abs(by_adjoint - w.cwiseProduct(df).sum()), tolerance(1e-12) * w.norm() * df.norm());
+}
+
+TEST_P(ForceTerms, ForceIsMinusTheGradientOfThePotential) {
+  term->set_parameters(theta);
+  const Points f = static_force(lag);
+  ASSERT_EQ(term->potential(lag).has_value(), GetParam().has_potential);
+  if (!GetParam().has_potential) return;
+  const auto along = [&](double s) -> VectorX {
+    const Points x = lag + s * d_lag;
+    term->linearise(x);
+    return VectorX::Constant(1, *term->potential(x));
+  };
+  const VectorX slope = VectorX::Constant(1, -f.cwiseProduct(d_lag).sum());
+  ASSERT_NE(slope[0], 0.0);
+  EXPECT_LT(best_relative_error(along, slope, 0.1), tolerance(difference_error));
+  EXPECT_GT(best_relative_error(along, 1.001 * slope, 0.1), 1e-4) << "a wrong force would pass";
+}
+
+/// The exact stiffness of f(x | x), which is symmetric where there is a potential.
+TEST_P(ForceTerms, TangentStiffnessIsMinusTheDerivativeAtRest) {
+  term->set_parameters(theta);
+  (void)static_force(lag);
+  BlockMatrix K(pattern);
+  K.set_zero();
+  term->add_tangent_stiffness(lag, 3.0, K);
+  VectorX y;
+  K.multiply(flat(d_lag), y);
+  ASSERT_EQ(y.norm() > 0.0, GetParam().depends_on_position);
+  if (GetParam().has_potential) {
+    const MatrixX whole = dense(K);
+    EXPECT_LE((whole - whole.transpose()).norm(), tolerance(1e-12) * whole.norm());
+  }
+  if (!GetParam().depends_on_position) return;
+  const auto along = [&](double s) -> VectorX { return -3.0 * flat(static_force(lag + s * d_lag)); };
+  EXPECT_LT(best_relative_error(along, y, 0.1), tolerance(difference_error));
+  EXPECT_GT(best_relative_error(along, 1.001 * y, 0.1), 1e-4) << "a wrong stiffness would pass";
+}
+
 /// The force with the nodes free of load elsewhere, the lag point, z and theta the same; then both products.
 TEST_P(ForceTerms, DerivativesByTheReference) {
   Points reference_bar = none(), by_reference = none();
   const Points& X = body->reference_positions();
-  const Points d_X = deformed(X, 0.5, 0.4), w = deformed(X, -0.8, 2.9);
+  const Points d_X = deformed(X, 0.5, 0.4), w = any(-0.8, 2.9);
   auto* elasticity = dynamic_cast<Elasticity*>(term.get());
   if (elasticity && GetParam().depends_on_reference) elasticity->set_reference(body);
   term->set_parameters(theta);
-  term->linearise(lag);
+  linearise(lag);
   term->linearise_reference(z);
   term->add_reference_tangent(d_X, by_reference);
   term->add_reference_adjoint(w, reference_bar);

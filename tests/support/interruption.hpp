@@ -1,13 +1,15 @@
 #pragma once
 
+#include <unistd.h>
+
 #include <atomic>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <utility>
 
 #include "estimation/fit.hpp"
 #include "estimation/fit_state.hpp"
-#include "temporary_folder.hpp"
 
 namespace pliant::test {
 
@@ -35,9 +37,11 @@ class Interruption {
   bool came() const { return came_; }
   /// As it is read back from a file.
   FitState left() const {
-    const TemporaryFolder folder;
-    write_fit_state(folder / "state.json", left_, "key");
-    return read_fit_state(folder / "state.json", "key");
+    const auto file = std::filesystem::temp_directory_path() / ("pliant.state." + std::to_string(::getpid()) + ".json");
+    write_fit_state(file, left_, "key");
+    FitState read = read_fit_state(file, "key");
+    std::filesystem::remove(file);
+    return read;
   }
 
  private:

@@ -1,0 +1,65 @@
+#include "elasticity/material.hpp"
+
+#include <utility>
+
+namespace pliant {
+
+namespace {
+
+/// The forces of a law as a function of where the body is free of load.
+class LawReferenceForces : public ReferenceForces {
+ public:
+  explicit LawReferenceForces(std::unique_ptr<LawElasticity> elasticity) : elasticity_(std::move(elasticity)) {}
+
+  void set_parameters(const VectorX& theta) override { elasticity_->set_parameters(theta); }
+  bool linearise(const Points& X, const Points& p, const Points& z) override {
+    if (!elasticity_->set_reference_positions(X)) return false;
+    elasticity_->linearise(p);
+    elasticity_->linearise_reference(z);
+    z_ = z;
+    return true;
+  }
+  void add_force(Points& force) const override { elasticity_->add_force(z_, force); }
+  void add_matrix(double scale, BlockMatrix& matrix) const override {
+    elasticity_->add_reference_matrix(scale, matrix);
+  }
+  void add_tangent(const Points& d_reference, Points& force) const override {
+    elasticity_->add_reference_tangent(d_reference, force);
+  }
+  void add_adjoint(const Points& w, Points& reference_bar) const override {
+    elasticity_->add_reference_adjoint(w, reference_bar);
+  }
+  const Matrix3& rotation(int element) const override { return elasticity_->rotation(element).R; }
+  double least_volume_ratio() const override { return elasticity_->least_volume_ratio(); }
+
+ private:
+  std::unique_ptr<LawElasticity> elasticity_;
+  Points z_;
+};
+
+}  // namespace
+
+std::vector<ParameterHandle> BodyMaterial::parameters() const {
+  if (const auto* layout = std::get_if<LawLayout>(&kind_)) return layout->all();
+  const auto* blocks = std::get_if<MaterialBlocks>(&kind_);
+  if (!blocks) return {};
+  std::vector<ParameterHandle> all = blocks->youngs_moduli;
+  all.push_back(blocks->poissons_ratio);
+  return all;
+}
+
+std::unique_ptr<Elasticity> BodyMaterial::make_elasticity(const std::shared_ptr<const Body>& body) const {
+  if (const auto* blocks = std::get_if<MaterialBlocks>(&kind_)) return pliant::make_elasticity(body, *blocks);
+  if (const auto* layout = std::get_if<LawLayout>(&kind_)) return LawElasticity::make(body, *layout);
+  return LawElasticity::make(body, std::get<std::shared_ptr<const MaterialLaw>>(kind_));
+}
+
+std::unique_ptr<ReferenceForces> BodyMaterial::make_reference_forces(const std::shared_ptr<const Body>& body) const {
+  if (const auto* blocks = std::get_if<MaterialBlocks>(&kind_)) return ReferenceForces::make(body, *blocks);
+  if (const auto* layout = std::get_if<LawLayout>(&kind_))
+    return std::make_unique<LawReferenceForces>(LawElasticity::make(body, *layout));
+  return std::make_unique<LawReferenceForces>(
+      LawElasticity::make(body, std::get<std::shared_ptr<const MaterialLaw>>(kind_)));
+}
+
+}  // namespace pliant

@@ -1,0 +1,440 @@
+#include "estimation/fit_plan.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "estimation/notes.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+bool is_pull(const Parameter& p) { return p.role == Role::Initial && p.is_auxiliary; }
+bool is_of_start(const Parameter& p) { return p.role == Role::Initial || p.role == Role::Load; }
+/// Poisson's ratios and exponents: what shapes a law, where moduli scale it.
+bool shapes_law(const Parameter& p) { return p.role == Role::Material && p.unit != "Pa"; }
+
+/// Whether what comes after a stage can be tried where it fails: the motion at the start is a help only.
+bool ends_at_failure(const StageRecord& record) { return !record.succeeded && record.id.kind != StageKind::Motion; }
+
+/// Failed, and nothing can follow.
+bool has_failed(const std::vector<StageRecord>& done, StageKind kind) {
+  return std::ranges::any_of(done, [&](const StageRecord& r) { return r.id.kind == kind && !r.succeeded; });
+}
+
+/// The stages of a chain that are not done; none where one has failed.
+StageChain left_of(StageChain chain, const std::vector<StageRecord>& done) {
+  std::size_t first = 0;
+  const StageRecord* before = nullptr;
+  for (; first < chain.size(); ++first) {
+    const StageRecord* record = find_record(done, chain[first].id);
+    if (!record) break;
+    if (ends_at_failure(*record)) return {};
+    before = record;
+  }
+  StageChain left(chain.begin() + std::ptrdiff_t(first), chain.end());
+  if (!left.empty() && before) {
+    left.front().from = {before->theta};
+    left.front().iterations_before = chain.front().iterations_before;
+    for (std::size_t i = 0; i < first; ++i)
+      left.front().iterations_before += counted_iterations(*find_record(done, chain[i].id));
+  }
+  return left;
+}
+
+}  // namespace
+
+bool is_on_full_grid(StageKind kind) {
+  return kind == StageKind::Fine || kind == StageKind::Corrected || kind == StageKind::Finer;
+}
+
+int counted_iterations(const StageRecord& record) { return record.id.kind == StageKind::Pulls ? 0 : record.iterations; }
+
+const StageRecord* find_record(const std::vector<StageRecord>& done, const StageId& id) {
+  const auto it = std::ranges::find(done, id, &StageRecord::id);
+  return it == done.end() ? nullptr : &*it;
+}
+
+const StageRecord* estimate_of(const FitState& state) {
+  const StageRecord* last = nullptr;
+  for (const StageRecord& r : state.done)
+    if (is_on_full_grid(r.id.kind) && r.succeeded) last = &r;
+  return last;
+}
+
+FitState begun_from(const FitState& state) {
+  FitState begun = state;
+  begun.under_way.reset();
+  begun.begin = FitState::Beginning{estimate_of(state)->theta, 0};
+  for (const StageRecord& r : state.done)
+    if (r.id.kind == StageKind::Fine || r.id.kind == StageKind::Corrected) begun.begin->stage = r.id.number;
+  std::erase_if(begun.done,
+                [](const StageRecord& r) { return is_on_full_grid(r.id.kind) || r.id.kind == StageKind::Pulls; });
+  return begun;
+}
+
+std::vector<double> best_of_scan(const std::vector<std::pair<double, double>>& trials, int most) {
+  constexpr double hopeless = 4.0;  // times the lowest cost
+  std::vector<int> order(trials.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto cost = [&](int i) { return trials[std::size_t(i)].second; };
+  const auto is_valley = [&](int i) {
+    return (i == 0 || cost(i) <= cost(i - 1)) && (i + 1 == int(order.size()) || cost(i) <= cost(i + 1));
+  };
+  std::ranges::stable_sort(order, [&](int a, int b) {
+    if (is_valley(a) != is_valley(b)) return is_valley(a);
+    return cost(a) < cost(b);
+  });
+  double least = infinite;
+  for (const auto& trial : trials) least = std::min(least, trial.second);
+  std::vector<double> best;
+  for (const int i : order) {
+    if (int(best.size()) >= most || !std::isfinite(cost(i))) break;
+    if (cost(i) <= hopeless * least) best.push_back(trials[std::size_t(i)].first);
+  }
+  return best;
+}
+
+std::vector<StageChain> FitPlan::next(const FitState& state) const {
+  const Records& done = state.done;
+  if (!state.begin) {
+    if (StageChain chain = left_of(motion(0, facts_.parameters.reference()), done); !chain.empty()) return {chain};
+    const StageRecord* swung = find_record(done, {StageKind::Swing});
+    if (facts_.is_scanned && !swung) return {{swing(before_starts(done))}};
+    if (swung && swung->converged) {
+      // The pose before a release was found for another stiffness, which sags otherwise: it is looked for anew.
+      StageChain chain = left_of(motion(2, without_pulls(swung->theta)), done);
+      if (!chain.empty()) return {chain};
+    } else if (swung && !find_record(done, {StageKind::Scan})) {
+      return {{scan(before_starts(done))}};
+    }
+    std::vector<StageChain> starts;
+    const int count = int(start_moduli(done).size());
+    for (int i = 0; i < count; ++i)
+      if (StageChain chain = left_of(start(i, done), done); !chain.empty()) starts.push_back(std::move(chain));
+    if (!starts.empty()) return starts;
+  }
+  if (StageChain chain = left_of(fine(done, state.begin), done); !chain.empty()) return {chain};
+  if (has_failed(done, StageKind::Fine)) return {};
+  const StageRecord* first = estimate(done);
+  if (first && facts_.options.correct && !find_record(done, {StageKind::Test})) return {{test(*first)}};
+  if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
+  if (has_failed(done, StageKind::Corrected)) return {};
+  if (StageChain chain = finer(done); !chain.empty()) return {chain};
+  return {};
+}
+
+Stage FitPlan::last_look(const FitState& state) const {
+  StageChain chain = corrected(state.done, state.begin);
+  if (chain.empty()) chain = fine(state.done, state.begin);
+  Stage last = chain.back();
+  last.from = {state.begin ? state.begin->theta : best_start(state.done).first};
+  for (const StageRecord& r : state.done)
+    if (r.id.kind == StageKind::Pulls || r.id.kind == StageKind::Fine) last.from = {r.theta};
+  last.iterations = 1;
+  last.iterations_before = iterations_on_full_grid(state.done);
+  return last;
+}
+
+// Stages ----------------------------------------------------------------------------------------------------------
+
+StageChain FitPlan::motion(int first, const VectorX& from) const {
+  const std::vector<std::string> free = names(is_of_start);
+  if (free.empty()) return {};
+  StageChain chain;
+  for (int i = 0; i < 2; ++i) {
+    Stage stage{{StageKind::Motion, 0, first + i}, "motion", {facts_.options.coarse_cells, facts_.options.steps}};
+    stage.horizon = {Horizon::Until::Beginning, i == 0 ? 1.0 / 8 : 1.0 / 4};
+    stage.band = facts_.options.wide_band, stage.iterations = 12;
+    stage.free = free;
+    stage.done_to = 0.05;
+    chain.push_back(std::move(stage));
+  }
+  chain.front().from = {from};
+  return chain;
+}
+
+Stage FitPlan::swing(const VectorX& from) const {
+  Stage stage{{StageKind::Swing}, "swing", {facts_.options.coarse_cells, facts_.options.steps}};
+  stage.from = {from};
+  stage.done_from = stage.done_to = 0.05;
+  return stage;
+}
+
+namespace {
+
+/// Swings out of step are as wrong as any other: the valley about the truth narrows as more of them are seen.
+std::vector<double> growing_horizon(bool swings) {
+  return swings ? std::vector{0.12, 0.25, 0.5, 1.0} : std::vector{0.6, 1.0};
+}
+
+/// Of the stages on the full grid; the last one is in the narrow band.
+std::vector<double> fine_horizons(bool swings) {
+  return swings ? std::vector{0.25, 0.5, 1.0, 1.0} : std::vector{1.0, 1.0};
+}
+
+}  // namespace
+
+/// Over decades of the stress under the object's own weight.
+Stage FitPlan::scan(const VectorX& from) const {
+  const FitOptions& options = facts_.options;
+  Stage stage{{StageKind::Scan}, "scan", {options.coarse_cells, options.steps}};
+  stage.band = options.wide_band;
+  if (facts_.swings) stage.horizon.part = growing_horizon(true).front();
+  stage.from = {from};
+  const double g = std::max(facts_.gravity.vector(from).norm(), 0.1);
+  const double stress =
+      facts_.carrying_modulus > 0.0 ? 0.25 * facts_.carrying_modulus : from[facts_.density] * g * facts_.size;
+  const int per_decade = options.scan_per_decade * (facts_.swings ? 2 : 1);
+  for (int i = 0; i <= 4 * per_decade; ++i) stage.trials.push_back(stress * std::pow(10.0, double(i) / per_decade));
+  stage.done_from = 0.05, stage.done_to = 0.15;
+  return stage;
+}
+
+StageChain FitPlan::start(int index, const Records& done) const {
+  StageChain chain;
+  const std::vector<double> horizons = growing_horizon(facts_.swings);
+  for (std::size_t i = 0; i < horizons.size(); ++i) {
+    const bool last = i + 1 == horizons.size();
+    Stage stage{{StageKind::Coarse, index, int(i)}, "coarse", {facts_.options.coarse_cells, facts_.options.steps}};
+    stage.horizon.part = horizons[i];
+    stage.band = facts_.options.wide_band, stage.iterations = last ? 10 : 5;
+    // Poisson's ratio is told from the rest only once the fit is close.
+    stage.free = names([](const Parameter& p) { return !shapes_law(p); });
+    stage.done_from = 0.15 + 0.3 * (last ? 0.4 : 0.0), stage.done_to = stage.done_from + 0.15;
+    chain.push_back(std::move(stage));
+  }
+  const VectorX theta = before_starts(done);
+  const double modulus = start_moduli(done)[std::size_t(index)];
+  chain.front().from = {facts_.is_scanned ? with_modulus(theta, modulus, done) : theta};
+  return chain;
+}
+
+/// Pulls that hold the pose before a release on one mesh bend another one otherwise: they are looked for anew, from
+/// those at hand and from none.
+Stage FitPlan::pulls(const VectorX& from, const Spacing& grid, int number) const {
+  Stage stage{{StageKind::Pulls, 0, number}, "pulls", grid};
+  stage.horizon.until = Horizon::Until::Start;
+  stage.band = facts_.options.wide_band, stage.iterations = 24;
+  stage.free = names(is_pull);
+  stage.from = {from, without_pulls(from)};
+  return stage;
+}
+
+/// Thin objects are meshed by their thickness, however few cells are asked for: starts were then followed on the full
+/// grid already, and the last stage is enough.
+StageChain FitPlan::fine(const Records& done, const std::optional<FitState::Beginning>& begin) const {
+  const FitOptions& options = facts_.options;
+  const Spacing grid{options.cells, options.steps};
+  const std::vector<double> horizons = fine_horizons(facts_.swings);
+  const double share = 0.15 / double(horizons.size() - 1);
+  const bool is_last_one_corrected = begin && !needed_corrections(done).empty();
+  const auto [start, index] = best_start(done);
+  const VectorX from = begin ? begin->theta : start;
+  StageChain chain;
+  if (!begin && !names(is_pull).empty()) chain.push_back(pulls(from, grid, 0));
+  for (std::size_t i = 0; i < horizons.size(); ++i) {
+    const bool is_narrow = i + 1 == horizons.size(), is_last = is_narrow && !is_last_one_corrected;
+    if ((!is_last && facts_.coarse_is_as_fine) || (begin && int(i) < begin->stage)) continue;
+    Stage stage{{StageKind::Fine, index, int(i)}, is_narrow ? "fine" : "fine, wide band", grid};
+    stage.horizon.part = horizons[i];
+    stage.band = is_narrow ? options.fine_band : options.wide_band;
+    stage.iterations = is_narrow ? options.max_iterations : std::max(1, options.max_iterations / 4);
+    stage.free = free_at_last(done);
+    // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
+    if (facts_.swings && !is_last)
+      for (const std::string& name : names(shapes_law)) std::erase(stage.free, name);
+    stage.done_from = is_narrow ? 0.6 : 0.45 + share * double(i);
+    stage.done_to = is_narrow ? 0.9 : stage.done_from + share;
+    chain.push_back(std::move(stage));
+  }
+  if (!chain.empty() && chain.front().from.empty()) chain.front().from = {from};
+  return chain;
+}
+
+Stage FitPlan::test(const StageRecord& estimate) const {
+  Stage stage{{StageKind::Test}, "test", {facts_.options.cells, facts_.options.steps}};
+  stage.band = facts_.options.fine_band;
+  stage.from = {estimate.theta};
+  stage.done_from = stage.done_to = 0.9;
+  return stage;
+}
+
+StageChain FitPlan::corrected(const Records& done, const std::optional<FitState::Beginning>& begin) const {
+  if (needed_corrections(done).empty()) return {};
+  const StageRecord* fine = narrow(done);
+  if (!fine && !begin) return {};
+  const FitOptions& options = facts_.options;
+  const int number = int(fine_horizons(facts_.swings).size());
+  Stage stage{{StageKind::Corrected, best_start(done).second, number}, "corrected", {options.cells, options.steps}};
+  stage.band = options.fine_band, stage.iterations = options.max_iterations;
+  stage.iterations_before = iterations_on_full_grid(done);
+  stage.free = free_at_last(done);
+  stage.from = {fine ? fine->theta : begin->theta};
+  stage.done_from = 0.9, stage.done_to = 1.0;
+  return {stage};
+}
+
+/// The next repetition, from where the one before ended.
+StageChain FitPlan::finer(const Records& done) const {
+  const StageRecord* before = estimate(done);
+  double from = 1.0;
+  for (std::size_t i = 0; i < facts_.repetitions.size() && before; ++i) {
+    const Spacing& grid = facts_.repetitions[i];
+    Stage stage{{StageKind::Finer, before->id.start, int(i)},
+                grid.cells == facts_.options.cells ? in_three_digits(grid.steps) + " x steps"
+                                                   : in_three_digits(grid.cells) + " cells",
+                grid};
+    stage.done_from = from, from = stage.done_to = from + work(grid);
+    if (const StageRecord* record = find_record(done, stage.id)) {
+      if (!record->succeeded) return {};
+      before = record;
+      continue;
+    }
+    stage.band = facts_.options.fine_band, stage.iterations = facts_.options.max_iterations;
+    stage.free = free_at_last(done);
+    StageChain chain;
+    if (!names(is_pull).empty()) chain.push_back(pulls(before->theta, grid, int(i) + 1));
+    chain.push_back(std::move(stage));
+    if (chain.front().from.empty()) chain.front().from = {before->theta};
+    chain.front().iterations_before = iterations_on_full_grid(done);
+    return left_of(std::move(chain), done);
+  }
+  return {};
+}
+
+// What the records say ----------------------------------------------------------------------------------------------
+
+VectorX FitPlan::before_starts(const Records& done) const {
+  const StageRecord* swung = find_record(done, {StageKind::Swing});
+  const bool has_swung = swung && swung->converged;
+  VectorX theta = has_swung ? without_pulls(swung->theta) : facts_.parameters.reference();
+  for (const int number : has_swung ? std::array{2, 3} : std::array{0, 1})
+    if (const StageRecord* motion = find_record(done, {StageKind::Motion, 0, number})) theta = motion->theta;
+  return theta;
+}
+
+std::vector<double> FitPlan::start_moduli(const Records& done) const {
+  const StageRecord* swung = find_record(done, {StageKind::Swing});
+  if (!facts_.is_scanned || (swung && swung->converged)) return {before_starts(done)[facts_.moduli.front()]};
+  const StageRecord* scan = find_record(done, {StageKind::Scan});
+  return scan ? best_of_scan(scan->trials, facts_.options.starts) : std::vector<double>{};
+}
+
+VectorX FitPlan::relative_moduli(const Records& done) const {
+  const StageRecord* swung = find_record(done, {StageKind::Swing});
+  if (!swung || !swung->converged) return facts_.relative_moduli;
+  const VectorX theta = before_starts(done);
+  VectorX moduli{Eigen::Index(facts_.moduli.size())};
+  for (std::size_t k = 0; k < facts_.moduli.size(); ++k) moduli[Eigen::Index(k)] = theta[facts_.moduli[k]];
+  return moduli / moduli[0];
+}
+
+VectorX FitPlan::with_modulus(VectorX theta, double youngs_modulus, const Records& done) const {
+  const VectorX moduli = youngs_modulus * relative_moduli(done);
+  for (std::size_t k = 0; k < facts_.moduli.size(); ++k) theta[facts_.moduli[k]] = moduli[Eigen::Index(k)];
+  return theta;
+}
+
+VectorX FitPlan::without_pulls(VectorX theta) const {
+  for (const Parameter& p : facts_.parameters.parameters())
+    if (p.estimated && is_pull(p)) theta.segment<3>(p.at) = p.scale * p.prior_mean;
+  return theta;
+}
+
+VectorX FitPlan::start_theta(const Records& done) const {
+  const std::vector<double> moduli = start_moduli(done);
+  const VectorX& theta = facts_.parameters.reference();
+  return facts_.is_scanned && !moduli.empty() ? with_modulus(theta, moduli.front(), done) : theta;
+}
+
+std::vector<FitStart> FitPlan::starts(const Records& done) const {
+  std::vector<FitStart> all;
+  const int count = int(start_moduli(done).size());
+  for (int i = 0; i < count; ++i) {
+    const StageChain chain = start(i, done);
+    FitStart one;
+    one.start = one.final = chain.front().from.front();
+    one.cost = infinite;
+    one.reason = "not begun";
+    for (const Stage& stage : chain) {
+      const StageRecord* r = find_record(done, stage.id);
+      if (!r) break;
+      if (stage.id.number == 0) one.start_cost = r->start_cost;
+      one.iterations += r->iterations, one.converged = r->converged, one.reason = r->reason;
+      one.cost = r->succeeded ? r->cost : infinite;
+      one.final = r->theta;
+    }
+    all.push_back(std::move(one));
+  }
+  return all;
+}
+
+std::pair<VectorX, int> FitPlan::best_start(const Records& done) const {
+  const std::vector<FitStart> all = starts(done);
+  const auto best = std::ranges::min_element(all, {}, &FitStart::cost);
+  if (best == all.end()) return {before_starts(done), 0};
+  return {std::isfinite(best->cost) ? best->final : before_starts(done), int(best - all.begin())};
+}
+
+std::vector<std::string> FitPlan::needed_corrections(const Records& done) const {
+  const StageRecord* test = find_record(done, {StageKind::Test});
+  return test ? test->corrected : std::vector<std::string>{};
+}
+
+ParameterSet FitPlan::estimated(const Records& done) const {
+  ParameterSet set = facts_.parameters;
+  for (const std::string& name : needed_corrections(done)) set.set_estimated(name, true);
+  return set;
+}
+
+const StageRecord* FitPlan::narrow(const Records& done) const {
+  const int number = int(fine_horizons(facts_.swings).size()) - 1;
+  const auto it = std::ranges::find_if(
+      done, [&](const StageRecord& r) { return r.id.kind == StageKind::Fine && r.id.number == number; });
+  return it == done.end() || !it->succeeded ? nullptr : &*it;
+}
+
+const StageRecord* FitPlan::estimate(const Records& done) const {
+  const auto it = std::ranges::find(done, StageKind::Corrected, [](const StageRecord& r) { return r.id.kind; });
+  if (it != done.end()) return it->succeeded ? &*it : nullptr;
+  return narrow(done);
+}
+
+std::vector<const StageRecord*> FitPlan::repetitions(const Records& done) const {
+  std::vector<const StageRecord*> all;
+  for (const StageRecord& r : done)
+    if (r.id.kind == StageKind::Finer && r.succeeded) all.push_back(&r);
+  return all;
+}
+
+double FitPlan::work(const Spacing& s) const {
+  return 0.3 * s.steps / facts_.options.steps * std::pow(s.cells / facts_.options.cells, 3);
+}
+
+std::vector<std::string> FitPlan::names(const std::function<bool(const Parameter&)>& matches) const {
+  std::vector<std::string> all;
+  for (const Parameter& p : facts_.parameters.parameters())
+    if (p.estimated && matches(p)) all.push_back(p.name);
+  return all;
+}
+
+std::vector<std::string> FitPlan::free_at_last(const Records& done) const {
+  std::vector<std::string> all = names([](const Parameter&) { return true; });
+  for (const std::string& name : needed_corrections(done)) all.push_back(name);
+  return all;
+}
+
+int FitPlan::iterations_on_full_grid(const Records& done) const {
+  int count = 0;
+  for (const StageRecord& r : done)
+    if (is_on_full_grid(r.id.kind)) count += r.iterations;
+  return count;
+}
+
+}  // namespace pliant

@@ -1,0 +1,100 @@
+#pragma once
+
+#include "estimation/fit.hpp"
+
+namespace pliant {
+
+/// What the plan of a fit depends on, beside what was done: facts about the recordings, and the choices.
+struct PlanFacts {
+  FitOptions options;
+  ParameterSet parameters;              ///< where the fit begins, with the choices
+  std::vector<ParameterHandle> moduli;  ///< of the object
+  ParameterHandle density, gravity;     ///< of the first recording
+  double size = 0.0;                    ///< of the object [m]
+  VectorX relative_moduli;              ///< of scan and starts, the first one's being one
+  bool is_scanned = true;               ///< Young's modulus is looked for
+  double carrying_modulus = 0.0;        ///< [Pa] that is enough for a scan that sags; 0: no scan does
+  bool swings = false;                  ///< some object is let go
+  bool coarse_is_as_fine = false;       ///< starts are followed on the full grid already
+  std::vector<Spacing> repetitions;     ///< on finer grids, after the first estimate
+};
+
+/// The stages of a fit of motions and equilibria: how the object moves at first; the swing that was seen, or a scan
+/// over decades of Young's modulus; the best values followed on the coarse grid, wide band, horizon growing as the
+/// early frames match; the best of them on the full grid, first in the wide band; a test of which corrections the
+/// residuals ask for, and the estimate with them; repetitions on finer grids.
+class FitPlan {
+ public:
+  explicit FitPlan(PlanFacts facts) : facts_(std::move(facts)) {}
+
+  /// What is next, chains side by side; none: all is done.
+  /// @param state  its records alone are read, and where it begins
+  std::vector<StageChain> next(const FitState& state) const;
+  /// One look at what was reached where a fit is interrupted before its estimate: the last stage from the best so far.
+  Stage last_look(const FitState& state) const;
+
+  /// Where the estimate begins: all its moduli at the first start.
+  VectorX start_theta(const std::vector<StageRecord>& done) const;
+  /// The starts that were followed.
+  std::vector<FitStart> starts(const std::vector<StageRecord>& done) const;
+  /// The parameters that are estimated at last, with the corrections that were found to be needed.
+  ParameterSet estimated(const std::vector<StageRecord>& done) const;
+  /// The first estimate, before any repetition, and the repetitions that succeeded; null where there is none.
+  const StageRecord* estimate(const std::vector<StageRecord>& done) const;
+  std::vector<const StageRecord*> repetitions(const std::vector<StageRecord>& done) const;
+  /// Of a repetition, in units of the first estimate's: a warm start needs few iterations.
+  double work(const Spacing& spacing) const;
+
+  const PlanFacts& facts() const { return facts_; }
+  /// theta with all moduli of the object, relative to each other as the starts have them.
+  VectorX with_modulus(VectorX theta, double youngs_modulus, const std::vector<StageRecord>& done) const;
+  /// theta with the pulls that hold a released object as they are expected beforehand.
+  VectorX without_pulls(VectorX theta) const;
+
+ private:
+  using Records = std::vector<StageRecord>;
+
+  StageChain motion(int first, const VectorX& from) const;
+  Stage swing(const VectorX& from) const;
+  Stage scan(const VectorX& from) const;
+  /// One start on the coarse grid.
+  StageChain start(int index, const Records& done) const;
+  Stage pulls(const VectorX& from, const Spacing& grid, int number) const;
+  StageChain fine(const Records& done, const std::optional<FitState::Beginning>& begin) const;
+  Stage test(const StageRecord& estimate) const;
+  StageChain corrected(const Records& done, const std::optional<FitState::Beginning>& begin) const;
+  StageChain finer(const Records& done) const;
+
+  /// Where the fit is before any start is followed.
+  VectorX before_starts(const Records& done) const;
+  std::vector<double> start_moduli(const Records& done) const;
+  /// The start that fits best.
+  std::pair<VectorX, int> best_start(const Records& done) const;
+  VectorX relative_moduli(const Records& done) const;
+  std::vector<std::string> names(const std::function<bool(const Parameter&)>& matches) const;
+  std::vector<std::string> needed_corrections(const Records& done) const;
+  /// The estimate in the narrow band, before any corrections.
+  const StageRecord* narrow(const Records& done) const;
+  std::vector<std::string> free_at_last(const Records& done) const;
+  int iterations_on_full_grid(const Records& done) const;
+
+  PlanFacts facts_;
+};
+
+/// The record of a stage; null where it is not done.
+const StageRecord* find_record(const std::vector<StageRecord>& done, const StageId& id);
+
+/// The last estimate of a state on the full grid or a finer one; null where there is none.
+const StageRecord* estimate_of(const FitState& state);
+/// A fit that looks again from the estimate of another one: what came before the full grid stands, and the last stage
+/// on the full grid is done anew. The state has an estimate.
+FitState begun_from(const FitState& state);
+
+/// Iterations that are counted on in the stages after it.
+int counted_iterations(const StageRecord& record);
+
+/// Moduli to follow, at most so many: every start is a valley of the scan before it is merely low, since neighbours
+/// lead to the same place; valleys far above the lowest are left out.
+std::vector<double> best_of_scan(const std::vector<std::pair<double, double>>& trials, int most);
+
+}  // namespace pliant

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <compare>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimation/optimiser.hpp"
+#include "estimation/refinement.hpp"
+
+namespace pliant {
+
+/// What a stage of a fit is for.
+enum class StageKind {
+  Motion,     ///< the motion or pose at the start
+  Swing,      ///< the stiffness of the swing that was seen; no iterations
+  Scan,       ///< a trial of each of several Young's moduli: no iteration
+  Coarse,     ///< a start that is followed on the coarse grid
+  Pulls,      ///< what holds a released object, on another grid
+  Fine,       ///< the estimate on the full grid
+  Test,       ///< which corrections the residuals ask for; no iterations
+  Corrected,  ///< the estimate together with those
+  Finer,      ///< the estimate again with finer steps or on a finer grid
+  Law,        ///< a form of the law of a pressed object
+  Sample,     ///< the stiffness of each element that one press shows: all its iterations in one step
+};
+
+/// Whether a stage makes the estimate, on the full grid or a finer one.
+bool is_on_full_grid(StageKind kind);
+
+struct StageId {
+  StageKind kind = StageKind::Fine;
+  int start = 0;   ///< which start it belongs to
+  int number = 0;  ///< of those of its kind and start
+  auto operator<=>(const StageId&) const = default;
+};
+
+/// How far into each recording a stage compares.
+struct Horizon {
+  enum class Until {
+    Part,       ///< a part of the recording, as `Recording::horizon` has it
+    Beginning,  ///< a part, at least two frames; of a released object the frames before its release
+    Start,      ///< the first frame
+  };
+  Until until = Until::Part;
+  double part = 1.0;
+  bool operator==(const Horizon&) const = default;
+};
+
+/// A stage of a fit, as data: what is simulated and compared, what is estimated, and from where.
+struct Stage {
+  StageId id;
+  std::string name;  ///< for people
+  Spacing grid;
+  Horizon horizon = {};
+  double band = 0.0;  ///< outlier scale, times the object's size
+  int iterations = 0;
+  int iterations_before = 0;           ///< of its start, that are counted on
+  std::vector<std::string> free = {};  ///< parameters that are estimated
+  std::vector<VectorX> from = {};      ///< theta; of several the best end counts; empty: where the stage before ended
+  std::vector<double> trials = {};     ///< of a scan: Young's moduli of the object's own material [Pa]
+  double done_from = 0.0, done_to = 0.0;  ///< how much of the whole is done before and after it
+};
+
+/// Stages one after the other, each from where the one before ended.
+using StageChain = std::vector<Stage>;
+
+/// A stage that is done.
+struct StageRecord {
+  StageId id;
+  std::string name;                     ///< for people
+  VectorX from, theta;                  ///< where it began and ended
+  double start_cost = 0.0, cost = 0.0;  ///< infinite where it could not be simulated
+  int iterations = 0;
+  bool succeeded = false;
+  bool converged = false;   ///< of a search for a swing: one was found
+  std::string reason = {};  ///< why it ended
+  int elements = 0;         ///< of the first recording's body
+  /// Of a scan: Young's moduli and costs; infinite where it cannot be simulated.
+  std::vector<std::pair<double, double>> trials = {};
+  std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction
+  std::string told = {};                    ///< for people: the swing that was found, what needs correction
+};
+
+/// A stage that was interrupted.
+struct StageUnderWay {
+  StageId id;
+  VectorX from;  ///< theta
+  OptimiserState optimiser;
+};
+
+}  // namespace pliant

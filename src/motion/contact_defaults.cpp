@@ -1,0 +1,71 @@
+#include "motion/contact_defaults.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "base/error.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double bond = 10.0;              // stiffness of a bonded disc and of a punch, in layers of elements
+constexpr double ball_stiffness = 100.0;   // of a ball, which touches a small part of an element
+constexpr double punch_smoothing = 0.005;  // over which pressure sets in, in radii
+constexpr double ball_smoothing = 0.01;    // likewise
+constexpr double punch_rim = 0.05;         // radius of the rounded rim, in radii
+constexpr auto quadratic = Penalty::Onset::Quadratic;  // of probes: at a distance they do not touch
+constexpr int fewest_cuts = 4, most_cuts = 8;          // of a face, for the samples where contact acts
+
+RigidContact bonded_disc(const Body& body, const ProbeOptions& probe, double youngs_modulus) {
+  const ContactSamples disc = disc_samples(body, probe.centre, probe.radius);
+  if (disc.rest.empty()) {
+    std::ostringstream found;
+    found.precision(4);
+    found << "the disc at (" << probe.centre.x() << ", " << probe.centre.y() << ", " << probe.centre.z()
+          << ") m touches nothing of the object";
+    throw InputError({{},
+                      found.str(),
+                      "a contact whose centre lies on the surface at rest",
+                      "correct where the probe touches the object"});
+  }
+  return RigidContact::bonded(body, disc, bond_stiffness(youngs_modulus, mean_edge(body)));
+}
+
+}  // namespace
+
+Penalty default_contact(const Body& body, double mass, double gravity) {
+  const double size = body.size();
+  double projected = 0.0;  // a convex body's mean projected area is a quarter of its surface
+  for (const SurfacePoint& point : body.surface) projected += 0.25 * point.area;
+  return {mass * gravity / (projected * 1e-4 * size), 1e-3 * size};
+}
+
+double default_friction_speed(const Body& body, double gravity) { return std::sqrt(2e-4 * gravity * body.size()); }
+
+Vector3 probe_axis(const Body& body, const ProbeOptions& probe) {
+  if (probe.axis) return probe.axis->normalized();
+  const auto nearest = std::ranges::min_element(
+      body.surface, {}, [&](const SurfacePoint& p) { return (p.position - probe.centre).squaredNorm(); });
+  return -nearest->normal;
+}
+
+RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double youngs_modulus) {
+  if (probe.kind == ProbeKind::BondedDisc) return bonded_disc(body, probe, youngs_modulus);
+  const Vector3 axis = probe_axis(body, probe);
+  const double edge = mean_edge(body), radius = probe.radius;
+  const ContactSamples samples = boundary_samples(body, std::clamp(int(2.0 * edge / radius), fewest_cuts, most_cuts));
+  if (probe.kind == ProbeKind::Ball)
+    return RigidContact::sliding(body, samples, rigid_ball(probe.centre - radius * axis, radius),
+                                 Penalty{ball_stiffness * youngs_modulus / edge, ball_smoothing * radius, quadratic});
+  return RigidContact::sliding(body, samples, rigid_punch(probe.centre, axis, radius, punch_rim * radius),
+                               Penalty{bond_stiffness(youngs_modulus, edge), punch_smoothing * radius, quadratic});
+}
+
+double bond_stiffness(double youngs_modulus, double edge) { return bond * youngs_modulus / edge; }
+
+/// A regular tetrahedron of edge a has the volume a^3 / (6 sqrt 2).
+double mean_edge(const Body& body) { return std::cbrt(6.0 * std::sqrt(2.0) * body.volume() / body.element_count()); }
+
+}  // namespace pliant

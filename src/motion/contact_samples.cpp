@@ -1,0 +1,108 @@
+#include "motion/contact_samples.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace pliant {
+
+namespace {
+
+struct Face {
+  std::array<Vector3, 3> corners;
+  Vector3 normal() const { return (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized(); }
+  double area() const { return 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm(); }
+  Vector3 at(double b1, double b2) const {
+    return corners[0] + b1 * (corners[1] - corners[0]) + b2 * (corners[2] - corners[0]);
+  }
+};
+
+std::vector<Face> boundary_faces(const Body& body) {
+  const auto* mesh = std::get_if<TetMesh>(&body.mesh);
+  if (!mesh) throw std::invalid_argument("rigid contacts are for tetrahedra");
+  std::vector<Face> faces;
+  for (const auto& f : mesh->boundary)
+    faces.push_back(
+        {{mesh->nodes.row(f[0]).transpose(), mesh->nodes.row(f[1]).transpose(), mesh->nodes.row(f[2]).transpose()}});
+  return faces;
+}
+
+/// Visits the centres of n^2 equal triangles.
+template <class Visit>
+void cut(const Face& face, int n, Visit&& visit) {
+  const double area = face.area() / double(n * n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n - i; ++j) {
+      visit(face.at((i + 1.0 / 3.0) / n, (j + 1.0 / 3.0) / n), area);
+      if (j < n - i - 1) visit(face.at((i + 2.0 / 3.0) / n, (j + 2.0 / 3.0) / n), area);
+    }
+}
+
+double squared_distance(const Face& f, const Vector3& p) {  // Ericson 2004, 5.1.5, by its Voronoi regions
+  const Vector3 ab = f.corners[1] - f.corners[0], ac = f.corners[2] - f.corners[0], ap = p - f.corners[0];
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
+  const auto to = [&](double b1, double b2) { return (p - f.at(b1, b2)).squaredNorm(); };
+  if (d1 <= 0.0 && d2 <= 0.0) return to(0, 0);
+  const Vector3 bp = p - f.corners[1];
+  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0.0 && d4 <= d3) return to(1, 0);
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return to(d1 / (d1 - d3), 0);
+  const Vector3 cp = p - f.corners[2];
+  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0.0 && d5 <= d6) return to(0, 1);
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return to(0, d2 / (d2 - d6));
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
+    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return to(1.0 - w, w);
+  }
+  const double sum = va + vb + vc;
+  return to(vb / sum, vc / sum);
+}
+
+}  // namespace
+
+ContactSamples surface_samples(const Body& body) {
+  ContactSamples samples;
+  for (const SurfacePoint& point : body.surface) {
+    samples.rest.push_back(point.position);
+    samples.area.push_back(point.area);
+  }
+  return samples;
+}
+
+ContactSamples boundary_samples(const Body& body, int cuts) {
+  ContactSamples samples;
+  for (const Face& face : boundary_faces(body))
+    cut(face, cuts, [&](const Vector3& point, double area) {
+      samples.rest.push_back(point);
+      samples.area.push_back(area);
+    });
+  return samples;
+}
+
+ContactSamples disc_samples(const Body& body, const Vector3& centre, double radius) {
+  const std::vector<Face> faces = boundary_faces(body);
+  double nearest = std::numeric_limits<double>::infinity();
+  Vector3 normal = Vector3::UnitZ();
+  for (const Face& face : faces)
+    if (const double d = squared_distance(face, centre); d < nearest) nearest = d, normal = face.normal();
+  ContactSamples samples;
+  const double spacing = radius / 12.0;
+  for (const Face& face : faces) {
+    if (face.normal().dot(normal) < 0.5 || squared_distance(face, centre) > radius * radius) continue;
+    const int n = std::clamp(int(std::ceil(std::sqrt(2.0 * face.area()) / spacing)), 1, 64);
+    cut(face, n, [&](const Vector3& point, double area) {
+      if ((point - centre).squaredNorm() > radius * radius) return;
+      samples.rest.push_back(point);
+      samples.area.push_back(area);
+    });
+  }
+  return samples;
+}
+
+}  // namespace pliant

@@ -1,0 +1,221 @@
+#include "motion/statics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace pliant {
+
+Statics::Statics(std::shared_ptr<const Body> body, std::vector<ForceTerm*> terms, const StaticsOptions& options,
+                 std::shared_ptr<const BlockPattern> pattern)
+    : body_(std::move(body)),
+      terms_(std::move(terms)),
+      options_(options),
+      pattern_(pattern ? std::move(pattern) : body_->pattern),
+      newton_(options.newton),
+      matrix_(pattern_) {}
+
+void Statics::clear_held(Points& points) const {
+  for (const int row : held_) points.row(row).setZero();
+}
+
+void Statics::constrain(BlockMatrix& matrix) const {
+  for (const int row : held_) matrix.constrain(row);
+}
+
+SolveSummary Statics::solve(Points& x) {
+  rounding_ = 0.0;
+  return newton_.solve(*this, x);
+}
+
+std::optional<double> Statics::linearise(const Points& x) {
+  x_ = x;
+  double sum = 0.0;
+  has_energy_ = true;
+  energy_scale_ = 0.0;
+  for (ForceTerm* term : terms_) {
+    term->begin_step({});
+    term->linearise(x_);
+    if (!has_energy_) continue;
+    const std::optional<double> energy = term->potential(x_);
+    has_energy_ = energy.has_value();
+    if (!has_energy_) continue;
+    sum += *energy;
+    energy_scale_ += std::abs(*energy);
+    if (!std::isfinite(sum)) return sum;  // no such state: the other terms do not matter
+  }
+  return has_energy_ ? std::optional(sum) : std::nullopt;
+}
+
+NewtonProblem::Residual Statics::residual() {
+  residual_.setZero(rows(), 3);
+  force_.resize(rows(), 3);
+  double scale = 0.0;
+  for (ForceTerm* term : terms_) {
+    force_.setZero();
+    term->add_force(x_, force_);
+    scale += force_.norm();
+    residual_ -= force_;
+  }
+  clear_held(residual_);
+  return {residual_.norm(), std::max(scale, options_.smallest_force)};
+}
+
+void Statics::assemble_exact() {
+  matrix_.set_zero();
+  for (ForceTerm* term : terms_) term->add_tangent_stiffness(x_, 1.0, matrix_);
+  constrain(matrix_);
+}
+
+void Statics::assemble_positive() {
+  matrix_.set_zero();
+  for (ForceTerm* term : terms_) term->add_matrix(1.0, matrix_);
+  constrain(matrix_);
+}
+
+bool Statics::solve_with_last_factor() {
+  constexpr int most = 12;
+  if (!options_.reuse_factor || !has_factor_) return false;
+  assemble_exact();
+  // Direct factorisations are kept when the matrix changes.
+  return conjugate_gradients_.solve(matrix_, *factor_, right_, solution_, 1e-4, most).converged;
+}
+
+bool Statics::factorise_lifted() {
+  double mean = 0.0;
+  for (const int d : pattern_->diagonal) mean += Eigen::Map<const Matrix3>(matrix_.block(d)).trace();
+  mean /= 3.0 * rows();
+  for (double lift = 1e-8; lift < 1e2; lift *= 100.0) {
+    for (const int d : pattern_->diagonal) Eigen::Map<Matrix3>(matrix_.block(d)).diagonal().array() += lift * mean;
+    if (factor_->factorise(matrix_)) return true;
+  }
+  return false;
+}
+
+bool Statics::factorise_general() {
+  if (!general_) {
+    general_ = std::make_unique<GeneralSolver>(pattern_, options_.solver);
+    positive_ = BlockMatrix(pattern_);
+  }
+  positive_.set_zero();
+  for (ForceTerm* term : terms_) term->add_matrix(1.0, positive_);
+  matrix_ = positive_;
+  for (ForceTerm* term : terms_) term->add_lag_matrix(x_, 1.0, matrix_);
+  constrain(positive_);
+  constrain(matrix_);
+  double squares = 0.0;
+  for (const int diagonal : pattern_->diagonal)
+    for (int d = 0; d < 3; ++d) squares += std::pow(matrix_.block(diagonal)[4 * d], 2);
+  rounding_ = std::sqrt(squares) * body_->size() * std::numeric_limits<double>::epsilon();
+  if (!general_->factorise(matrix_, positive_)) return false;
+  // Where the exact matrix is indefinite, Newton's step leads to whatever point has no force, or nowhere. The matrix
+  // with lag points kept leads downhill.
+  is_exact_ = general_->symmetric_part_is_definite();
+  return true;
+}
+
+std::string Statics::find_step(Points& step) {
+  constexpr const char* singular = "the stiffness matrix is singular: insufficient Dirichlet constraints";
+  right_ = -flat(residual_);
+  if (has_energy_) {
+    if (!factor_) factor_ = make_linear_solver(pattern_, {best_direct_kind(), 1e-10, 1});
+    if (!solve_with_last_factor()) {
+      assemble_exact();
+      has_factor_ = factor_->factorise(matrix_);
+      if (!has_factor_) {
+        assemble_positive();
+        has_factor_ = factor_->factorise(matrix_) || factorise_lifted();
+      }
+      if (!has_factor_) return singular;
+      factor_->solve(right_, solution_);
+    }
+  } else {
+    if (!factorise_general()) return singular;
+    if (is_exact_)
+      general_->solve(right_, solution_, 1e-4);
+    else
+      general_->precondition(right_, solution_);
+  }
+  step = as_points(std::as_const(solution_));
+  return {};
+}
+
+double Statics::next_step_length() {
+  right_ = -flat(residual_);
+  if (is_exact_)
+    general_->solve(right_, solution_, 1e-2);
+  else
+    general_->precondition(right_, solution_);
+  return solution_.norm();
+}
+
+double Statics::prepare_move(const Points& x, const Points& step) {
+  constexpr double hardly = 1e-3, farthest = 1.0;  // [rad]
+  turns_ = false;
+  double share = 1.0;
+  if (options_.longest_step > 0.0) share = std::min(share, options_.longest_step / step.rowwise().norm().maxCoeff());
+  if (has_energy_) return share;
+  if (!turning_) turning_ = std::make_unique<TurningStep>(body_, options_.solver);
+  if (!turning_->fix(held_.empty() ? anchors_ : held_)) return share;
+  const double angle = turning_->prepare(x, step);
+  // A straight step is as good for small angles, and free of rounding.
+  turns_ = angle > hardly;
+  return std::min(share, farthest / angle);
+}
+
+void Statics::move(const Points& x, const Points& step, double share, Points& out) {
+  if (turns_)
+    turning_->move(share, out);
+  else
+    out = x + share * step;
+}
+
+bool Statics::prepare_derivatives(const Points& x) {
+  if (const auto energy = linearise(x); energy && !std::isfinite(*energy)) return false;
+  for (ForceTerm* term : terms_) term->linearise_reference(x_);
+  if (!has_energy_) return factorise_general();
+  if (!factor_) factor_ = make_linear_solver(pattern_, {best_direct_kind(), 1e-10, 1});
+  assemble_exact();
+  return has_factor_ = factor_->factorise(matrix_);
+}
+
+void Statics::solve_derivative(const Points& b, GeneralSolver::Side side) {
+  right_ = flat(b);
+  if (has_energy_)
+    factor_->solve(right_, solution_);
+  else
+    general_->solve(right_, solution_, 1e-12, side);
+}
+
+const Points& Statics::response(const Points& forces) {
+  force_ = forces;
+  clear_held(force_);
+  solve_derivative(force_, GeneralSolver::Side::Plain);
+  response_ = as_points(std::as_const(solution_));
+  return response_;
+}
+
+Points Statics::tangent(const Points& x, const VectorX& d_theta, const Points* d_reference) {
+  const Points none = Points::Zero(rows(), 3);
+  Points d_force = none;
+  for (ForceTerm* term : terms_) {
+    term->add_force_tangent(x, none, none, d_theta, d_force);
+    if (d_reference) term->add_reference_tangent(*d_reference, d_force);
+  }
+  return response(d_force);
+}
+
+void Statics::adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar, Points* reference_bar) {
+  force_ = x_bar;
+  clear_held(force_);
+  solve_derivative(force_, GeneralSolver::Side::Transposed);
+  Points w = as_points(std::as_const(solution_)), ignored = Points::Zero(rows(), 3);
+  clear_held(w);
+  for (ForceTerm* term : terms_) {
+    term->add_force_adjoint(x, w, ignored, ignored, theta_bar);
+    if (reference_bar) term->add_reference_adjoint(w, *reference_bar);
+  }
+}
+
+}  // namespace pliant

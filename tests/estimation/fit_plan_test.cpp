@@ -1,0 +1,354 @@
+// Plans are functions of what was done: no simulation is needed to see what comes next.
+#include "estimation/fit_plan.hpp"
+
+#include <cmath>
+
+#include "estimation/fit_state.hpp"
+
+namespace pliant {
+namespace {
+
+using testing::ElementsAre;
+using testing::UnorderedElementsAre;
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+struct Plans : testing::Test {
+  Plans() {
+    ParameterLayout layout;
+    std::vector<Parameter> list;
+    const auto add = [&](const char* name, const char* unit, int size, Role role, bool estimated) -> Parameter& {
+      Parameter p;
+      p.name = name, p.unit = unit, p.estimated = estimated;
+      p.transform = size == 1 ? Transform::Logarithm : Transform::Vector;
+      p.at = layout.add({name, unit, size, role});
+      list.push_back(p);
+      return list.back();
+    };
+    facts.moduli = {add("youngs_modulus", "Pa", 1, Role::Material, true).at};
+    add("poissons_ratio", "1", 1, Role::Material, true);
+    facts.density = add("density", "kg/m^3", 1, Role::Inertia, false).at;
+    facts.gravity = add("gravity", "m/s^2", 3, Role::Load, false).at;
+    add("linear_velocity", "m/s", 3, Role::Initial, true);
+    add("range_error@front", "m", 1, Role::Sensor, false);
+    VectorX theta = VectorX::Zero(layout.size());
+    theta[facts.moduli[0]] = 1e4, theta[1] = 0.3, theta[facts.density] = 200.0;
+    theta.segment<3>(facts.gravity) = Vector3(0.0, -10.0, 0.0);
+    facts.parameters = ParameterSet(layout, list, theta);
+    facts.relative_moduli = VectorX::Ones(1);
+    facts.size = 0.1;
+    facts.options.scan_per_decade = 2, facts.options.starts = 2;
+  }
+
+  std::vector<StageChain> next() const { return FitPlan(facts).next(state); }
+  const Stage& only(const std::vector<StageChain>& chains) const {
+    EXPECT_EQ(chains.size(), 1u);
+    return chains.front().front();
+  }
+  VectorX theta(double modulus) const {
+    VectorX t = facts.parameters.reference();
+    t[facts.moduli[0]] = modulus;
+    return t;
+  }
+  StageRecord record(const StageId& id, double cost, double modulus = 1e4) const {
+    StageRecord r{id, "", theta(modulus), theta(modulus)};
+    r.cost = cost, r.succeeded = std::isfinite(cost), r.iterations = 3;
+    return r;
+  }
+  void has_done(StageRecord r) { state.done.push_back(std::move(r)); }
+  void has_moved() {
+    has_done(record({StageKind::Motion, 0, 0}, 9.0));
+    has_done(record({StageKind::Motion, 0, 1}, 8.0));
+  }
+  /// Valleys at 400 Pa and at 4e4 Pa, the first one lower.
+  void has_scanned() {
+    has_moved();
+    has_done(record({StageKind::Swing}, 0.0));
+    StageRecord scan = record({StageKind::Scan}, 0.0);
+    scan.trials = {{2e2, 5.0}, {4e2, 3.0}, {4e3, 6.0}, {4e4, 4.0}, {4e5, infinite}};
+    has_done(scan);
+  }
+  void has_followed(double first = 2.5, double second = 3.5) {
+    has_scanned();
+    for (const int number : {0, 1}) {
+      has_done(record({StageKind::Coarse, 0, number}, first, 410.0 + number));
+      has_done(record({StageKind::Coarse, 1, number}, second, 4.1e4));
+    }
+  }
+  void has_estimated() {
+    has_followed();
+    has_done(record({StageKind::Fine, 0, 0}, 2.0, 420.0));
+    has_done(record({StageKind::Fine, 0, 1}, 1.5, 430.0));
+  }
+
+  PlanFacts facts;
+  FitState state;
+};
+
+TEST_F(Plans, BeginWithTheMotionAtTheStart) {
+  const std::vector<StageChain> chains = next();
+  ASSERT_EQ(chains.size(), 1u);
+  ASSERT_EQ(chains[0].size(), 2u);
+  EXPECT_EQ(chains[0][0].id, (StageId{StageKind::Motion, 0, 0}));
+  EXPECT_THAT(chains[0][0].free, ElementsAre("linear_velocity"));
+  EXPECT_EQ(chains[0][0].horizon.until, Horizon::Until::Beginning);
+  EXPECT_EQ(chains[0][0].from.front(), facts.parameters.reference());
+  EXPECT_TRUE(chains[0][1].from.empty()) << "from where the one before ends";
+  EXPECT_GT(chains[0][1].horizon.part, chains[0][0].horizon.part);
+}
+
+TEST_F(Plans, GoOnWhereAChainWasInterrupted) {
+  has_done(record({StageKind::Motion, 0, 0}, 9.0, 7e3));
+  const auto chains = next();
+  ASSERT_EQ(chains[0].size(), 1u);
+  const Stage& stage = only(chains);
+  EXPECT_EQ(stage.id.number, 1);
+  EXPECT_EQ(stage.from.front(), theta(7e3));
+  EXPECT_EQ(stage.iterations_before, 3);
+}
+
+TEST_F(Plans, ScanWhereNoSwingWasSeen) {
+  has_moved();
+  EXPECT_EQ(only(next()).id.kind, StageKind::Swing);
+  has_done(record({StageKind::Swing}, 0.0));
+  const auto chains = next();
+  const Stage& scan = only(chains);
+  EXPECT_EQ(scan.id.kind, StageKind::Scan);
+  ASSERT_EQ(scan.trials.size(), 9u) << "four decades, two values each";
+  EXPECT_DOUBLE_EQ(scan.trials.front(), 200.0 * 10.0 * 0.1) << "the stress under its own weight";
+  EXPECT_NEAR(scan.trials.back() / scan.trials.front(), 1e4, 1e-8);
+}
+
+TEST_F(Plans, BeginAtTheSwingThatWasSeen) {
+  has_moved();
+  StageRecord swing = record({StageKind::Swing}, 0.0, 5e3);
+  swing.converged = true;
+  has_done(swing);
+  const auto anew = next();
+  EXPECT_EQ(only(anew).id, (StageId{StageKind::Motion, 0, 2})) << "the motion is looked for anew";
+  EXPECT_EQ(only(anew).from.front(), theta(5e3));
+  has_done(record({StageKind::Motion, 0, 2}, 9.0, 5e3));
+  has_done(record({StageKind::Motion, 0, 3}, 8.0, 5e3));
+  const auto chains = next();
+  const Stage& start = only(chains);
+  EXPECT_EQ(start.id, (StageId{StageKind::Coarse, 0, 0}));
+  EXPECT_EQ(start.from.front(), theta(5e3));
+  EXPECT_EQ(FitPlan(facts).start_theta(state.done), theta(5e3));
+}
+
+TEST_F(Plans, BeginWhereTheUserSays) {
+  facts.is_scanned = false;
+  has_moved();
+  const auto chains = next();
+  const Stage& start = only(chains);
+  EXPECT_EQ(start.id, (StageId{StageKind::Coarse, 0, 0}));
+  EXPECT_EQ(start.from.front(), facts.parameters.reference());
+}
+
+TEST_F(Plans, FollowTheValleysOfAScanSideBySide) {
+  has_scanned();
+  const auto chains = next();
+  ASSERT_EQ(chains.size(), 2u);
+  EXPECT_EQ(chains[0].front().from.front(), theta(4e2));
+  EXPECT_EQ(chains[1].front().from.front(), theta(4e4));
+  for (const StageChain& chain : chains) {
+    EXPECT_EQ(chain.size(), 2u);
+    for (const Stage& stage : chain) EXPECT_THAT(stage.free, UnorderedElementsAre("youngs_modulus", "linear_velocity"));
+    EXPECT_EQ(chain.back().horizon.part, 1.0);
+  }
+  EXPECT_EQ(FitPlan(facts).start_theta(state.done), theta(4e2));
+}
+
+TEST_F(Plans, OfObjectsThatSwingLookAtThemLongerAndLonger) {
+  facts.swings = true;
+  has_scanned();
+  for (const StageChain& chain : next()) {
+    ASSERT_EQ(chain.size(), 4u);
+    for (std::size_t i = 1; i < chain.size(); ++i) EXPECT_GT(chain[i].horizon.part, chain[i - 1].horizon.part);
+  }
+}
+
+TEST_F(Plans, LeaveOutAStartThatFailed) {
+  has_scanned();
+  has_done(record({StageKind::Coarse, 0, 0}, infinite));
+  const auto chains = next();
+  EXPECT_EQ(only(chains).id, (StageId{StageKind::Coarse, 1, 0})) << "the other one goes on";
+  has_done(record({StageKind::Coarse, 1, 0}, 4.0));
+  has_done(record({StageKind::Coarse, 1, 1}, 3.9, 3e4));
+  const auto fine = next();
+  EXPECT_EQ(only(fine).id.start, 1);
+  EXPECT_EQ(only(fine).from.front(), theta(3e4));
+  const std::vector<FitStart> starts = FitPlan(facts).starts(state.done);
+  EXPECT_EQ(starts[0].cost, infinite);
+  EXPECT_EQ(starts[1].cost, 3.9);
+  EXPECT_EQ(starts[1].iterations, 6);
+}
+
+TEST_F(Plans, EstimateFromTheBestStart) {
+  has_followed(3.5, 2.5);
+  const auto chains = next();
+  ASSERT_EQ(chains.size(), 1u);
+  const StageChain& chain = chains[0];
+  ASSERT_EQ(chain.size(), 2u);
+  EXPECT_EQ(chain[0].from.front(), theta(4.1e4));
+  EXPECT_EQ(chain[0].id.start, 1);
+  EXPECT_EQ(chain[0].band, facts.options.wide_band);
+  EXPECT_EQ(chain[1].band, facts.options.fine_band);
+  EXPECT_EQ(chain[1].grid.cells, facts.options.cells);
+  EXPECT_EQ(chain[1].iterations, facts.options.max_iterations);
+  EXPECT_THAT(chain[1].free, UnorderedElementsAre("youngs_modulus", "poissons_ratio", "linear_velocity"));
+}
+
+TEST_F(Plans, DoNotRepeatOnTheFullGridWhatTheStartsDidThere) {
+  facts.coarse_is_as_fine = true;
+  has_followed();
+  const auto chains = next();
+  ASSERT_EQ(chains[0].size(), 1u);
+  EXPECT_EQ(only(chains).band, facts.options.fine_band);
+}
+
+TEST_F(Plans, EndWithTheEstimateWhereNothingElseIsAsked) {
+  facts.options.correct = false;
+  has_estimated();
+  EXPECT_TRUE(next().empty());
+  EXPECT_EQ(FitPlan(facts).estimate(state.done)->theta, theta(430.0));
+}
+
+TEST_F(Plans, EndWhereTheEstimateFails) {
+  has_followed();
+  has_done(record({StageKind::Fine, 0, 0}, infinite));
+  EXPECT_TRUE(next().empty());
+  EXPECT_EQ(FitPlan(facts).estimate(state.done), nullptr);
+}
+
+TEST_F(Plans, CorrectWhatTheTestFinds) {
+  has_estimated();
+  const auto tests = next();
+  EXPECT_EQ(only(tests).id.kind, StageKind::Test);
+  EXPECT_EQ(only(tests).from.front(), theta(430.0));
+  StageRecord test = record({StageKind::Test}, 1.5, 430.0);
+  state.done.push_back(test);
+  EXPECT_TRUE(next().empty()) << "nothing to correct";
+  state.done.back().corrected = {"range_error@front"};
+  const auto chains = next();
+  const Stage& corrected = only(chains);
+  EXPECT_EQ(corrected.id.kind, StageKind::Corrected);
+  EXPECT_THAT(corrected.free, testing::Contains("range_error@front"));
+  EXPECT_EQ(corrected.from.front(), theta(430.0));
+  EXPECT_EQ(corrected.iterations_before, 6);
+  EXPECT_TRUE(FitPlan(facts).estimated(state.done).find("range_error@front")->estimated);
+  has_done(record(corrected.id, 1.0, 440.0));
+  EXPECT_TRUE(next().empty());
+  EXPECT_EQ(FitPlan(facts).estimate(state.done)->theta, theta(440.0));
+}
+
+TEST_F(Plans, RepeatTheEstimateFinerOneAfterTheOther) {
+  facts.options.correct = false;
+  facts.repetitions = {{12.0, 2.0}, {18.0, 1.0}};
+  has_estimated();
+  const auto first = next();
+  EXPECT_EQ(only(first).name, "2 x steps");
+  EXPECT_EQ(only(first).from.front(), theta(430.0));
+  has_done(record({StageKind::Finer, 0, 0}, 1.4, 432.0));
+  const auto second = next();
+  EXPECT_EQ(only(second).name, "18 cells");
+  EXPECT_EQ(only(second).from.front(), theta(432.0));
+  EXPECT_GT(only(second).done_from, only(first).done_from);
+  has_done(record({StageKind::Finer, 0, 1}, infinite));
+  EXPECT_TRUE(next().empty());
+}
+
+TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
+  ParameterLayout layout = facts.parameters.layout();
+  std::vector<Parameter> list = facts.parameters.parameters();
+  Parameter pull;
+  pull.name = "pull@1", pull.unit = "N", pull.transform = Transform::Vector, pull.estimated = pull.is_auxiliary = true;
+  pull.at = layout.add({"pull@1", "N", 3, Role::Initial});
+  pull.prior_mean = Vector3::Zero();
+  list.push_back(pull);
+  VectorX reference = facts.parameters.reference();
+  reference.conservativeResize(layout.size());
+  reference.tail<3>() = Vector3(1.0, 2.0, 3.0);
+  facts.parameters = ParameterSet(layout, list, reference);
+  facts.repetitions = {{18.0, 1.0}};
+  facts.options.correct = false, facts.swings = true;
+  has_followed();
+  for (const int number : {2, 3})
+    for (const int start : {0, 1}) has_done(record({StageKind::Coarse, start, number}, 2.0, 415.0));
+  const auto chains = next();
+  ASSERT_EQ(chains[0].size(), 5u);
+  const Stage& pulls = only(chains);
+  EXPECT_EQ(pulls.id.kind, StageKind::Pulls);
+  EXPECT_THAT(pulls.free, ElementsAre("pull@1"));
+  EXPECT_EQ(pulls.horizon.until, Horizon::Until::Start);
+  ASSERT_EQ(pulls.from.size(), 2u) << "from those at hand and from none";
+  EXPECT_EQ(pulls.from[0].tail<3>(), Vector3(1.0, 2.0, 3.0));
+  EXPECT_EQ(pulls.from[1].tail<3>(), Vector3(0.0, 0.0, 0.0));
+  for (std::size_t i = 1; i + 1 < chains[0].size(); ++i)
+    EXPECT_THAT(chains[0][i].free, testing::Not(testing::Contains("poissons_ratio")))
+        << "it would make up for what others lack";
+  EXPECT_THAT(chains[0].back().free, testing::Contains("poissons_ratio"));
+  for (const Stage& stage : chains[0]) has_done(record(stage.id, 1.0, 430.0));
+  const auto finer = next();
+  ASSERT_EQ(finer[0].size(), 2u);
+  EXPECT_EQ(only(finer).id.kind, StageKind::Pulls);
+  EXPECT_EQ(only(finer).grid.cells, 18.0);
+}
+
+TEST_F(Plans, BegunFromAnotherFitLookAgainAtTheLastStage) {
+  has_estimated();
+  has_done(record({StageKind::Test}, 1.5));
+  state = begun_from(state);
+  ASSERT_TRUE(state.begin);
+  EXPECT_EQ(state.begin->theta, theta(430.0));
+  state.begin->theta = theta(500.0);
+  const auto chains = next();
+  ASSERT_EQ(chains[0].size(), 1u);
+  EXPECT_EQ(only(chains).id, (StageId{StageKind::Fine, 0, 1}));
+  EXPECT_EQ(only(chains).from.front(), theta(500.0));
+  has_done(record({StageKind::Fine, 0, 1}, 1.2, 510.0));
+  EXPECT_TRUE(next().empty()) << "what was tested is not tested again";
+  EXPECT_EQ(FitPlan(facts).starts(state.done).size(), 2u);
+}
+
+TEST_F(Plans, BegunFromACorrectedFitGoOnWithItsCorrections) {
+  has_estimated();
+  has_done(record({StageKind::Test}, 1.5, 430.0));
+  state.done.back().corrected = {"range_error@front"};
+  has_done(record({StageKind::Corrected, 0, 2}, 1.0, 440.0));
+  state = begun_from(state);
+  const auto chains = next();
+  EXPECT_EQ(only(chains).id, (StageId{StageKind::Corrected, 0, 2}));
+  EXPECT_EQ(only(chains).from.front(), theta(440.0));
+  state.begin->stage = 0;
+  const auto all = next();
+  ASSERT_EQ(all[0].size(), 2u);
+  EXPECT_THAT(all[0].front().free, testing::Contains("range_error@front"));
+}
+
+TEST_F(Plans, LookOnceAtWhatWasReachedWhereTheyAreInterrupted) {
+  has_moved();
+  Stage look = FitPlan(facts).last_look(state);
+  EXPECT_EQ(look.id, (StageId{StageKind::Fine, 0, 1}));
+  EXPECT_EQ(look.iterations, 1);
+  EXPECT_EQ(look.band, facts.options.fine_band);
+  state = {};
+  has_followed();
+  EXPECT_EQ(FitPlan(facts).last_look(state).from.front(), theta(411.0));
+  has_done(record({StageKind::Fine, 0, 0}, 2.0, 420.0));
+  EXPECT_EQ(FitPlan(facts).last_look(state).from.front(), theta(420.0));
+}
+
+TEST(BestOfScan, AreValleysFirst) {
+  const std::vector<std::pair<double, double>> trials = {{1.0, 3.0}, {2.0, 1.0}, {3.0, 1.5}, {4.0, 2.0}, {5.0, 1.9}};
+  EXPECT_THAT(best_of_scan(trials, 2), ElementsAre(2.0, 5.0)) << "a neighbour of the lowest leads to the same place";
+  EXPECT_THAT(best_of_scan(trials, 3), ElementsAre(2.0, 5.0, 3.0));
+}
+
+TEST(BestOfScan, LeavesOutWhatIsHopelessAndWhatCannotBeSimulated) {
+  EXPECT_THAT(best_of_scan({{1.0, 1.0}, {2.0, 9.0}, {3.0, 4.5}}, 3), ElementsAre(1.0));
+  EXPECT_THAT(best_of_scan({{1.0, infinite}, {2.0, infinite}}, 3), ElementsAre());
+}
+
+}  // namespace
+}  // namespace pliant
