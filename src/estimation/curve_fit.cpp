@@ -4,7 +4,9 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
+#include "estimation/fit_config.hpp"
 #include "estimation/material_tests.hpp"
+#include "estimation/notes.hpp"
 #include "estimation/problem.hpp"
 
 namespace pliant {
