@@ -17,7 +17,7 @@ NAMES = ["youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]
 # name: (whether the scan is said to be load-free, choices)
 FITS = {
     "together": (False, {}),
-    "in-turns": (False, {"load_free": "in_turns"}),
+    "in-turns": (False, {"load_free": "staggered"}),
     "scan-load-free": (True, {"element": "tetrahedra", "steps": 0.5, "starts": 1}),  # no cell of the hexahedra holds the stalk
 }
 

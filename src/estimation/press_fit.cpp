@@ -163,7 +163,7 @@ class PressFit {
                           field_precision(form.points, form.scene->body->size(), options_.modulus_variation));
     return set;
   }
-  double start_modulus() const { return 2.0 * punch_modulus(*scene_, 0.3); }
+  double start_modulus() const { return (fitted_.empty() ? 1.0 : 2.0) * punch_modulus(*scene_, 0.3); }
 
   bool stop() { return interrupted_ = interrupted_ || (monitor_.interrupted && monitor_.interrupted()); }
 
@@ -286,6 +286,8 @@ class PressFit {
     const Form form{layout_of(law), scene_};
     const char* const stage = terms > 0 ? "1 term" : is_neo_hookean ? "neo-Hookean" : "linear";
     auto first = estimate(form, parameters_of(form).reference(), stage);
+    if (terms == 1 && scene_->static_tests().any_to_fit() && !done_before(form.layout.form()) && !stop())
+      try_other_sign(form, first);
     if (!first) {
       outcome_.reason = outcome_.notes.empty() ? "the start cannot be evaluated" : outcome_.notes.back();
       return false;
@@ -293,6 +295,18 @@ class PressFit {
     const TriedLaw tried{form.layout.form(), first->evaluation.cost, infinite, true};
     conclude(std::move(first), tried, noise_);
     return !interrupted_;
+  }
+
+  /// Curves of growing load fit exponents of either sign, each in a valley of its own: keeps the better.
+  void try_other_sign(const Form& form, std::optional<Estimate>& first) {
+    const double noise = noise_;
+    VectorX start = parameters_of(form).reference();
+    start[form.layout.exponent(0)] *= -2.0;
+    auto other = minimised(form, start, "1 term");
+    if (other && (!first || squares_of(other->evaluation, noise) < squares_of(first->evaluation, noise)))
+      first = std::move(other);
+    else
+      noise_ = noise;
   }
 
   /// More terms, or Poisson's ratios of their own for them. False where that is not kept.

@@ -25,7 +25,7 @@ StartObjective of_static_tests(const Capture& capture, const FitOptions& options
   const int terms = is_neo_hookean || options.material == MaterialKind::Linear ? 0 : 1;
   const LawLayout layout({controls, terms, 1, false, is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear},
                          controls > 1 ? modulus_names(capture, controls) : std::vector<std::string>{});
-  const ParameterSet parameters = law_parameters(layout, 2.0 * punch_modulus(*scene, 0.3));
+  const ParameterSet parameters = law_parameters(layout, (fitted.empty() ? 1.0 : 2.0) * punch_modulus(*scene, 0.3));
   const double noise = options.marker_noise > 0.0 ? options.marker_noise : scene->noise;
   const auto objective =
       std::make_shared<PressObjective>(scene, fitted, layout, parameters, PressTrialOptions{noise, outlier_scale});

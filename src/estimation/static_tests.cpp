@@ -70,6 +70,18 @@ ObservedIndentation observe_indentation(const Capture& capture, std::size_t i) {
   return {name_or(test.name, "indentation", i), test.role, probe, read_force_curve(test.curve)};
 }
 
+/// Points of the first third of a curve, at least one, whose force is beyond doubt: where depths are great the material
+/// may stiffen.
+std::vector<std::size_t> first_clear_points(const ForceCurve& curve) {
+  constexpr double clear = 3.0;  // standard deviations
+  std::vector<std::size_t> points;
+  for (std::size_t i = 0; i < curve.depths.size(); ++i) {
+    if (!points.empty() && 3 * i >= curve.depths.size()) break;
+    if (curve.forces[i] > clear * curve.stds[i]) points.push_back(i);
+  }
+  return points;
+}
+
 double indentation_modulus(const ObservedIndentation& test, std::size_t i, double poissons_ratio) {
   const double a = test.probe.radius, depth = test.curve.depths[i], plane = 1.0 - poissons_ratio * poissons_ratio;
   if (test.probe.kind == ProbeKind::Ball) return 0.75 * test.curve.forces[i] * plane / (std::sqrt(a * depth) * depth);
@@ -129,8 +141,8 @@ std::vector<double> guessed_moduli(const StaticTests& tests, const Body& body, d
     if (std::isfinite(modulus) && modulus > 0.0) moduli.push_back(modulus);
   };
   for (const ObservedIndentation& test : tests.indentations)
-    for (std::size_t i = 0; is_fitted(test.role) && i < test.curve.depths.size(); ++i)
-      add(indentation_modulus(test, i, poissons_ratio));
+    if (is_fitted(test.role))
+      for (const std::size_t i : first_clear_points(test.curve)) add(indentation_modulus(test, i, poissons_ratio));
   for (const ObservedGrip& test : tests.grips) {
     if (!is_fitted(test.role) || !test.has_force) continue;
     const double way = test.displacement.dot(test.direction), length = body.size();

@@ -443,7 +443,8 @@ TEST(CaptureRules, CheckRelease) {
   const std::string good = "release_of = { mass = 0.1, at = [0, 0.1, 0] }";
   EXPECT_EQ(said("released = true\n" + good), "");
   EXPECT_THAT(said(good), HasSubstr("`release_of` without `released`"));
-  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0, at = [0, 0.1, 0] }"), HasSubstr("a hung mass of 0 kg"));
+  EXPECT_THAT(said("released = true\nrelease_of = { mass = 0, at = [0, 0.1, 0] }"),
+              HasSubstr("an attached point mass of 0 kg"));
   EXPECT_THAT(said("released = true\nrelease_of = { mass = 100, at = [0, 0.1, 0] }"),
               HasSubstr("masses are in kilograms"));
   EXPECT_THAT(said("released = true\nrelease_of = { mass = 0.1, at = [0, 0.5, 0] }"),
@@ -454,7 +455,7 @@ TEST(CaptureRules, CheckRelease) {
   EXPECT_THAT(said("released = true\nrelease_of = 0.1"), HasSubstr("release_of"));
   SmallCapture weightless;
   weightless.edit("[0.0, 9.81, 0.0]", "[0.0, 0.0, 0.0]").append("\n[initial]\nreleased = true\n" + good);
-  EXPECT_THAT(complaint_of([&] { (void)weightless.read(); }), HasSubstr("a hung weight without gravity"));
+  EXPECT_THAT(complaint_of([&] { (void)weightless.read(); }), HasSubstr("an attached weight without gravity"));
   SmallCapture small;
   const Capture capture = small.append("\n[initial]\nreleased = true\n" + good).read();
   ASSERT_TRUE(capture.scene.initial.release_of);
@@ -467,7 +468,7 @@ TEST(CaptureRules, CheckWeights) {
     return complaint_of([&] { (void)SmallCapture().append("\n[[weight]]\n" + block).read(); });
   };
   EXPECT_EQ(said("mass = 0.1\nat = [0, 0.1, 0]"), "");
-  EXPECT_THAT(said("mass = 0\nat = [0, 0.1, 0]"), HasSubstr("a hung mass of 0 kg"));
+  EXPECT_THAT(said("mass = 0\nat = [0, 0.1, 0]"), HasSubstr("an attached point mass of 0 kg"));
   EXPECT_THAT(said("mass = 100\nat = [0, 0.1, 0]"), HasSubstr("masses are in kilograms"));
   EXPECT_THAT(said("mass = 0.1\nat = [0, 0.5, 0]"), HasSubstr("off the rest surface"));
   EXPECT_THAT(said("mass = 0.1"), HasSubstr("at"));

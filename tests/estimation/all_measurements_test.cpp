@@ -1,4 +1,5 @@
-// One capture that shows an object by depth, followed markers, weights that hang from it, and presses with known force.
+// One capture that shows an object by depth, followed markers, weights that hang from it, presses with known force,
+// force-depth curves and stress-strain curves.
 // Each kind of measurement is made of a material of its own stiffness: what takes part in the fit draws the estimate
 // towards its own.
 #include <gmock/gmock.h>
@@ -6,6 +7,7 @@
 
 #include <random>
 
+#include "capture/curves.hpp"
 #include "capture/markers.hpp"
 #include "estimation/fit.hpp"
 #include "estimation/press_law.hpp"
@@ -28,12 +30,13 @@ constexpr OptimiserOptions converged{.step_tolerance = 1e-7, .cost_tolerance = 1
 
 /// How stiff the material is that a kind of measurement sees.
 struct Truths {
-  double depth = modulus, markers = modulus, loads = modulus, presses = modulus;
+  double depth = modulus, markers = modulus, loads = modulus, presses = modulus, indentations = modulus,
+         curves = modulus;
 };
 
 /// What of the capture takes part.
 struct Parts {
-  bool depth = true, markers = true, loads = true, presses = true;
+  bool depth = true, markers = true, loads = true, presses = true, indentations = true, curves = true;
 };
 
 /// A bar along x, clamped at its low end and let go straight.
@@ -123,6 +126,8 @@ class SeenInEveryWay : public ::testing::Test {
       write("load.csv", there);
     });
     record_press(truths.presses);
+    record_indentation(truths.indentations);
+    record_curve(truths.curves);
   }
 
   void record_press(double youngs_modulus) {
@@ -151,6 +156,42 @@ class SeenInEveryWay : public ::testing::Test {
     press_ = press;
   }
 
+  void record_indentation(double youngs_modulus) {
+    indentation_.contact = Vector3(0.05, 0.5 * edge, 0.0);
+    indentation_.direction = -Vector3::UnitY();
+    indentation_.radius = 0.02;
+    indentation_.curve = folder_ / "depths.csv";
+    write_force_curve(indentation_.curve, {{1e-3, 2e-3}, {1.0, 1.0}, {1.0, 1.0}});
+    Capture tested = capture_;
+    tested.indentations = {indentation_};
+    Resolution resolution;
+    resolution.cells = 10.0;
+    resolution.element = ElementKind::Tetrahedron;
+    std::vector<Vector3> control_points;
+    const PressScene scene =
+        make_press_scene(tested, make_body_of(tested.scene, SignedDistance(), resolution, control_points));
+    const LawLayout layout({1, 0});
+    const auto law = press_law(*scene.body, layout, law_parameters(layout, youngs_modulus).reference());
+    const CurvePrediction there = predict_curves(scene, law).front();
+    ASSERT_EQ(there.failure, "");
+    const double std = 0.01 * there.predicted.back();
+    ForceCurve curve{there.at, there.predicted, {std, std}};
+    for (double& force : curve.forces) force += std * normal_(random_);
+    write_force_curve(indentation_.curve, curve);
+  }
+
+  void record_curve(double youngs_modulus) {
+    curve_.curve = folder_ / "tension.csv";
+    const LawLayout layout({1, 0});
+    const VectorX theta = law_parameters(layout, youngs_modulus).reference();
+    MaterialTest test;
+    test.stretch = {0.97, 1.03, 1.05};
+    test.stress = predict_test(*press_law(*unit_element(), layout, theta), test);
+    const double std = 0.01 * test.greatest_stress();
+    for (double& stress : test.stress) stress += std * normal_(random_);
+    write_stress_curve(curve_.curve, {test.stretch, {}, test.stress, {std, std, std}});
+  }
+
   RecordedCapture recorded(const Parts& parts) const {
     RecordedCapture r{capture_, {}, {}};
     if (parts.depth) r.observed = observed_;
@@ -163,6 +204,8 @@ class SeenInEveryWay : public ::testing::Test {
       r.capture.loads = {load};
     }
     if (parts.presses) r.capture.presses = {*press_};
+    if (parts.indentations) r.capture.indentations = {indentation_};
+    if (parts.curves) r.capture.material_curves = {curve_};
     return r;
   }
 
@@ -190,6 +233,8 @@ class SeenInEveryWay : public ::testing::Test {
   std::vector<Vector3> markers_;
   std::vector<ObservedFrame> observed_;
   std::optional<Press> press_;
+  Indentation indentation_;
+  MaterialCurve curve_;
   std::mt19937 random_{4};
   std::normal_distribution<double> normal_;
 };
@@ -197,17 +242,17 @@ class SeenInEveryWay : public ::testing::Test {
 TEST_F(SeenInEveryWay, OneMaterialIsFoundByAllMeasurementsTogetherAndByEach) {
   record({});
   EXPECT_NEAR(estimate({}) / modulus, 1.0, tolerance(0.03));
-  EXPECT_NEAR(estimate({true, false, false, false}) / modulus, 1.0, tolerance(0.05));
-  EXPECT_NEAR(estimate({false, true, false, false}) / modulus, 1.0, tolerance(0.05));
-  EXPECT_NEAR(estimate({false, false, true, false}) / modulus, 1.0, tolerance(0.05));
+  EXPECT_NEAR(estimate({true, false, false, false, false, false}) / modulus, 1.0, tolerance(0.05));
+  EXPECT_NEAR(estimate({false, true, false, false, false, false}) / modulus, 1.0, tolerance(0.05));
+  EXPECT_NEAR(estimate({false, false, true, false, false, false}) / modulus, 1.0, tolerance(0.05));
 }
 
 TEST_F(SeenInEveryWay, EachKindOfMeasurementDrawsTheEstimateToItsOwnStiffness) {
-  const std::vector<std::pair<const char*, double Truths::*>> kinds = {{"depth", &Truths::depth},
-                                                                       {"markers", &Truths::markers},
-                                                                       {"loads", &Truths::loads},
-                                                                       {"presses", &Truths::presses}};
-  const std::vector<bool Parts::*> parts = {&Parts::depth, &Parts::markers, &Parts::loads, &Parts::presses};
+  const std::vector<std::pair<const char*, double Truths::*>> kinds = {
+      {"depth", &Truths::depth},     {"markers", &Truths::markers},           {"loads", &Truths::loads},
+      {"presses", &Truths::presses}, {"indentations", &Truths::indentations}, {"curves", &Truths::curves}};
+  const std::vector<bool Parts::*> parts = {&Parts::depth,   &Parts::markers,      &Parts::loads,
+                                            &Parts::presses, &Parts::indentations, &Parts::curves};
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     Truths truths;
     truths.*kinds[k].second = 1.5 * modulus;

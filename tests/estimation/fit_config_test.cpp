@@ -8,6 +8,19 @@
 namespace pliant {
 namespace {
 
+TEST(FitConfig, FormerWordsAreRead) {
+  FitOptions o;
+  set_fit_option(o, "poisson_ratio=0.2");
+  set_fit_option(o, "poisson_ratio@foam.estimate=false");
+  ASSERT_TRUE(o.parameters.contains("poissons_ratio"));
+  EXPECT_EQ((*o.parameters["poissons_ratio"].start)[0], 0.2);
+  EXPECT_EQ(o.parameters["poissons_ratio@foam"].estimated, false);
+  set_fit_option(o, "load_free=in_turns");
+  EXPECT_NE(to_toml(o).find("load_free = \"staggered\""), std::string::npos);
+  set_fit_option(o, "load_free=together");
+  EXPECT_NE(to_toml(o).find("load_free = \"monolithic\""), std::string::npos);
+}
+
 using ::testing::HasSubstr;
 
 FitOptions changed() {
@@ -322,10 +335,10 @@ TEST(FitState, RefusesAnotherKeyAndDamage) {
     EXPECT_NE(
         test::complaint_of([&] { (void)read_fit_state(folder.write("cut.json", whole.substr(0, length)), "key"); }), "")
         << length;
-  for (const char* text : {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})",
-                           R"({"format": "fit-state/9", "key": "key"})",
-                           R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [1]})",
-                           R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [], "under_way": ["x"]})"})
+  for (const char* text :
+       {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})", R"({"format": "fit-state/9", "key": "key"})",
+        R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [1]})",
+        R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [], "under_way": ["x"]})"})
     EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder.write("bad.json", text), "key"); }), "") << text;
 }
 

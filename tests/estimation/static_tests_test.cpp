@@ -71,7 +71,7 @@ TEST_P(OfEachKind, KnownTruthIsFoundWithinWhatIsStated) {
   EXPECT_EQ(layout.form().terms, 1);
   const double std = found.std[found.parameters.coordinate(layout.modulus(0))];
   EXPECT_GT(std, 1e-4);
-  EXPECT_LT(std, 0.1);
+  EXPECT_LT(std, 0.3);
   EXPECT_NEAR(std::log(found.theta[layout.modulus(0)] / modulus), 0.0, tolerance(3.0) * std);
   const double exponent_std = 4.0 * found.std[found.parameters.coordinate(layout.exponent(0))];
   EXPECT_NEAR(found.theta[layout.exponent(0)], exponent, tolerance(3.0) * exponent_std);
@@ -126,8 +126,8 @@ TEST(StaticTests, GuessesComeNearWhereTheFormulaHolds) {
   const StaticTests tests = observe_static_tests(capture, *truth.block.body);
   EXPECT_TRUE(tests.any_to_fit());
   const std::vector<double> moduli = guessed_moduli(tests, *truth.block.body, ratio);
-  // Two indentations of five depths each, one grip, ten stretches; those of tests are not asked.
-  EXPECT_EQ(moduli.size(), 2u * 5u + 1u + 10u);
+  // The first two of five depths of each of two indentations, one grip, ten stretches; those of tests are not asked.
+  EXPECT_EQ(moduli.size(), 2u * 2u + 1u + 10u);
   for (const double guess : moduli) {
     EXPECT_GT(guess, 0.1 * modulus);
     EXPECT_LT(guess, 10.0 * modulus);

@@ -69,6 +69,22 @@ TEST(Model, ComesBackAsItWasSaved) {
   EXPECT_EQ(read.volume.fill, m.volume.fill);
 }
 
+TEST(Model, FormerNamesAreRead) {
+  const TemporaryFolder folder;
+  const Model m = full_model();
+  save_model(folder.path(), m);
+  for (const char* name : {"model.toml", "model.vtu"}) {
+    std::string text = read_file(folder / name);
+    const std::string present = "poissons_ratio";
+    const auto at = text.find(present);
+    ASSERT_NE(at, std::string::npos) << name;
+    folder.write(name, text.replace(at, present.size(), "poisson_ratio"));
+  }
+  const Model read = load_model(folder / "model.toml");
+  EXPECT_EQ(read.poissons_ratio, m.poissons_ratio);
+  EXPECT_EQ(read.volume.poissons_ratio, m.volume.poissons_ratio);
+}
+
 TEST(Model, TakesTetrahedraMadeElsewhereAsOfOneMaterial) {
   const TemporaryFolder folder;
   save_model(folder.path(), full_model());
@@ -165,7 +181,7 @@ TEST_F(ModelFile, PlacesAreNamedByLineAndColumn) {
 }
 
 TEST_F(ModelFile, RefusesWhatIsOutOfRangeNotFiniteOrMissing) {
-  EXPECT_THAT(after("poissons_ratio     = 0.333", "poissons_ratio = 0.5 # 0.333"), HasSubstr("below 0.5"));
+  EXPECT_THAT(after("poissons_ratio    = 0.333", "poissons_ratio = 0.5 # 0.333"), HasSubstr("below 0.5"));
   EXPECT_THAT(after("density           = 95.0", "density = nan"), HasSubstr("finite"));
   EXPECT_THAT(after("mass              = 0.456", "mass = \"heavy\""), HasSubstr("a number"));
   EXPECT_THAT(after("substeps          = 4", "substeps = 0"), HasSubstr("1 to 100000"));

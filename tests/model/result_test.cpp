@@ -42,6 +42,38 @@ Result full_result() {
   return r;
 }
 
+TEST(Result, PoissonsRatioHasItsFormerNameToo) {
+  const TemporaryFolder folder;
+  Result result = full_result();
+  result.parameters.push_back({"poissons_ratio", 0.3, "1", 0.01, std::nullopt, true});
+  write_result(folder / "result.json", result);
+  const std::string text = read_file(folder / "result.json");
+  for (const char* name : {"\"poissons_ratio\"", "\"poisson_ratio\""}) EXPECT_THAT(text, HasSubstr(name));
+  EXPECT_EQ(read_result(folder / "result.json").parameters.size(), result.parameters.size());
+  const std::string former = std::string(text).erase(
+      text.find("    \"poissons_ratio\""), text.find("    \"poisson_ratio\"") - text.find("    \"poissons_ratio\""));
+  folder.write("former.json", former);
+  const Result read = read_result(folder / "former.json");
+  ASSERT_NE(read.find("poissons_ratio"), nullptr);
+  EXPECT_EQ(std::get<double>(read.find("poissons_ratio")->value), 0.3);
+}
+
+TEST(Result, CurvesComeBack) {
+  const TemporaryFolder folder;
+  Result result = full_result();
+  result.curves = {
+      {"site", "indentation", "test", "depth [m]", "N", {1e-3, 2e-3}, {0.1, 0.3}, {0.01, 0.01}, {0.13, 0.26}, ""},
+      {"tension", "material curve", "fit", "stretch", "Pa", {1.1}, {9.0}, {1.0}, {NAN}, "none"}};
+  write_result(folder / "result.json", result);
+  const Result read = read_result(folder / "result.json");
+  ASSERT_EQ(read.curves.size(), 2u);
+  EXPECT_EQ(to_json(read), to_json(result));
+  EXPECT_NEAR(read.curves[0].rms(), 0.035355, 1e-5);
+  EXPECT_NEAR(read.curves[0].relative_rms(), 0.117851, 1e-5);
+  EXPECT_TRUE(std::isnan(read.curves[1].rms()));
+  EXPECT_EQ(read.curves[1].failure, "none");
+}
+
 TEST(Result, ComesBackAsItWasWritten) {
   const TemporaryFolder folder;
   const auto path = folder / "result.json";
