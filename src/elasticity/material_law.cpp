@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "elasticity/polar.hpp"
+#include "elasticity/third_derivatives.hpp"
 
 namespace pliant {
 
@@ -271,6 +272,23 @@ void OgdenLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& o
       out.tangent(at(k, m), at(k, m)) = out.tangent(at(m, k), at(m, k)) = same;
       out.tangent(at(k, m), at(m, k)) = out.tangent(at(m, k), at(k, m)) = other;
     }
+}
+
+/// Each term is one of the stretches one by one and one of ln J: 2 mu / (a^2 b) (exp(-a b ln J) - 1).
+Matrix9 OgdenLaw::tangent_derivative(int e, const Matrix3& F, const Matrix3& dF) const {
+  const Principal p = principal(F);
+  if (!p.is_valid) return Matrix9::Constant(std::numeric_limits<double>::quiet_NaN());
+  const double log_J = p.stretch.array().log().sum();
+  OddPowers powers;
+  double first = 0.0, second = 0.0, third = 0.0;  // by ln J
+  for (int i = 0; i < terms(); ++i) {
+    const double a = table_(e, 3 * i + 1), ab = a * beta_of(table_(e, 3 * i + 2)), factor = 2.0 * table_(e, 3 * i) / a;
+    const double bulk = factor * std::exp(-ab * log_J);
+    powers.add(factor, a - 1.0);
+    first -= bulk, second += ab * bulk, third -= ab * ab * bulk;
+  }
+  return spectral_tangent_change(powers, p.stretch, p.U, p.V, dF) +
+         volumetric_tangent_change(first, second, third, F, dF);
 }
 
 void OgdenLaw::parameter_derivatives(int e, const Matrix3& F, std::span<Matrix3> out) const {

@@ -110,6 +110,7 @@ class OgdenLaw : public TabulatedLaw {
   std::vector<std::string> parameter_names() const override;
   void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override;
   void parameter_derivatives(int element, const Matrix3& F, std::span<Matrix3> out) const override;
+  Matrix9 tangent_derivative(int element, const Matrix3& F, const Matrix3& dF) const override;
   SmallStrainModuli small_strain(int element) const override;
 
  protected:

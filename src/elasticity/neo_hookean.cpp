@@ -3,19 +3,11 @@
 #include <limits>
 #include <stdexcept>
 
-#include "elasticity/material_law.hpp"
+#include "elasticity/third_derivatives.hpp"
 
 namespace pliant {
 
 namespace {
-
-/// Sum over pairs of A(i, l) B(k, j), symmetric in A and B: with A = B = G the derivative of G = F^-T is minus it.
-void add_crossed(double factor, const Matrix3& A, const Matrix3& B, Matrix9& tangent) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k)
-        for (int l = 0; l < 3; ++l) tangent(i + 3 * j, k + 3 * l) += factor * A(i, l) * B(k, j);
-}
 
 auto vec(const Matrix3& m) { return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(m.data()); }
 
@@ -58,13 +50,7 @@ void NeoHookeanLaw::parameter_derivatives(int, const Matrix3& F, std::span<Matri
 Matrix9 NeoHookeanLaw::tangent_derivative(int e, const Matrix3& F, const Matrix3& dF) const {
   const double mu = table_(e, 0), lambda = table_(e, 1), J = F.determinant();
   if (!(J > 0.0)) return Matrix9::Constant(std::numeric_limits<double>::quiet_NaN());
-  const Matrix3 G = F.inverse().transpose(), dG = -G * dF.transpose() * G;
-  const double factor = mu - lambda * std::log(J);
-  Matrix9 change = lambda * (vec(dG) * vec(G).transpose() + vec(G) * vec(dG).transpose());
-  add_crossed(-lambda * G.cwiseProduct(dF).sum(), G, G, change);
-  add_crossed(factor, dG, G, change);
-  add_crossed(factor, G, dG, change);
-  return change;
+  return volumetric_tangent_change(lambda * std::log(J) - mu, lambda, 0.0, F, dF);
 }
 
 void NeoHookeanLaw::parameter_derivative_changes(int, const Matrix3& F, const Matrix3& dF,

@@ -36,8 +36,10 @@ Capture thrown_bar() {
 FitOptions quick(MaterialKind material) {
   FitOptions options;
   options.material = material;
-  options.cells = options.coarse_cells = 6.0;
-  options.starts = 1;
+  options.cells = options.coarse_cells = 5.0;
+  options.steps = 0.45;
+  options.correct = false;
+  options.parameters["youngs_modulus"].start = VectorX::Constant(1, 0.7 * modulus);
   return options;
 }
 
@@ -55,7 +57,7 @@ RecordedCapture recorded(const FitOptions& of) {
   if (p.blocks.law->form().terms > 0) theta[p.blocks.law->exponent(0)] = exponent;
   Resolution resolution;
   resolution.element = ElementKind::QuadraticTetrahedron;
-  resolution.cells = 10.0, resolution.steps = 4.0;
+  resolution.cells = 8.0, resolution.steps = 1.8;
   const Discretisation d = discretise(capture, capture_distance(capture, 0.2), resolution, p.blocks, theta);
   for (const double x : {-0.05, 0.0, 0.05, 0.1})
     for (const double y : {-0.5 * edge, 0.5 * edge})
