@@ -9,7 +9,7 @@
 
 #include "base/error.hpp"
 #include "estimation/field_evidence.hpp"
-#include "estimation/fit_run.hpp"
+#include "estimation/fit_plan.hpp"
 #include "estimation/recordings.hpp"
 
 namespace pliant {
@@ -38,207 +38,175 @@ VectorX changed(const JointLayout& from, const VectorX& theta, const JointLayout
   return with_moduli(from, theta, to, (M * logs).array().exp());
 }
 
-class FieldChoice {
- public:
-  FieldChoice(const std::vector<RecordedCapture>& recordings, const FitOptions& options, const FitMonitor& monitor,
-              FitState resume)
-      : recordings_(recordings), options_(options), monitor_(monitor), left_(std::move(resume)) {
-    if (left_.field) choice_ = *left_.field;
-    left_.field.reset();
-    resumed_ = choice_.under_way;
-  }
-
-  FitOutcome run() {
-    while (!is_decided()) {
-      const int count = numbers[choice_.tried.size()];
-      std::optional<FitState> begin = beginning_of(count);
-      if (!begin) continue;
-      choice_.under_way = count;
-      const int done = int(choice_.tried.size());
-      FitOutcome outcome = fit_once(count, *begin, 1, done_before(done), done_before(done + 1), true);
-      if (count == 1 && (outcome.interrupted || !outcome.evaluation.succeeded)) return outcome;
-      if (outcome.interrupted) return best_so_far();
-      judge(count, outcome);
-    }
-    const int count = best().control_points;
-    const FitState from = resumed_ == count ? left_ : *choice_.state;  // the former where this one was interrupted
-    choice_.under_way = count;
-    return told(fit_once(count, from, options_.refine, done_before(int(choice_.tried.size())), 1.0, true));
-  }
-
- private:
-  const TriedField& best() const { return choice_.tried[std::size_t(choice_.best)]; }
-
-  /// Two numbers in a row were not worth it, or points would be closer than elements.
-  bool is_decided() const {
-    const std::size_t done = choice_.tried.size();
-    return done > 0 && (done == numbers.size() || int(done) - choice_.best > 2 || numbers[done] > options_.cells);
-  }
-
-  /// A guess at how much is done after so many fields.
-  static double done_before(int fields) { return 0.95 * (1.0 - std::pow(0.6, fields)); }
-
-  /// Nothing where one step promises too little.
-  std::optional<FitState> beginning_of(int count) {
-    if (count == 1 || resumed_ == count) {
-      resumed_ = 0;
-      return left_;
-    }
-    TriedField promised{count, false, std::numeric_limits<double>::infinity(), impossible};
-    FitState begin;
-    try {
-      begin = with_field(count, promised);
-    } catch (const InputError&) {  // the mesh has no room for so many points
-    }
-    if (promised.log_bayes_factor > strong_evidence) return begin;
-    choice_.tried.push_back(promised);
-    return std::nullopt;
-  }
-
-  /// The best fit's state as one of another field, and what one step promises of that.
-  FitState with_field(int count, TriedField& promised) {
-    std::vector<std::string> unused;
-    const Recordings recordings(recordings_, with_controls(options_, count), unused);
-    const Grid grid = recordings.grid(options_.cells, options_.steps);
-    const Body& body = *grid.recording.front().body;
-    const MatrixX moduli = carried_over(body, field_of(body, best().control_points), body.modulus);
-    const JointLayout before = layout_of(best().control_points), after = layout_of(count);
-    const auto change = [&](VectorX& theta) { theta = changed(before, theta, after, moduli); };
-    FitState begin = begun_from(*choice_.state);
-    begin.controls = count;
-    for (StageRecord& r : begin.done) change(r.from), change(r.theta);
-    VectorX& theta = begin.begin->theta;
-    change(theta);
-    ParameterSet parameters = recordings.parameters();
-    if (const StageRecord* test = find_record(begin.done, {StageKind::Test}))
-      for (const std::string& name : test->corrected) parameters.set_estimated(name, true);
-    parameters.set_reference(theta);
-    Objective objective =
-        recordings.objective(grid, parameters, options_.fine_band, [](const Recording& r) { return r.last_frame; });
-    const VectorX p = parameters.to_unconstrained(theta);
-    const CostEvaluation e = objective.linearise(p);
-    forward_steps_ += e.steps;
-    if (e.succeeded) promised.log_bayes_factor = log_bayes_factor(e, objective.parameters(), p, moduli);
-    // Dampings and, above all, Poisson's ratio made up for what the coarser field lacks: a stage earlier, and the
-    // latter where it began.
-    const bool is_corrected = estimate_of(*choice_.state)->id.kind == StageKind::Corrected;
-    begin.begin->stage = std::max(0, begin.begin->stage - (is_corrected ? 2 : 1));
-    if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated)
-      theta[nu->at] = recordings.parameters().reference()[nu->at];
-    return begin;
-  }
-
-  JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }
-
-  ModulusField field_of(const Body& body, int count) const {
-    return control_field(body, recordings_.front().capture.scene, {count, options_.control_weights}).field;
-  }
-
-  void judge(int count, const FitOutcome& outcome) {
-    TriedField tried{count, true, outcome.final_cost, impossible};
-    if (count > 1 && outcome.evaluation.succeeded) {
-      const Body& body = *outcome.recordings.front().discretisation.body;
-      const VectorX p = outcome.parameters.to_unconstrained(outcome.theta);
-      tried.log_bayes_factor =
-          log_bayes_factor(outcome.evaluation, outcome.parameters, p,
-                           carried_over(body, field_of(body, best().control_points), body.modulus));
-    }
-    if (count == 1) tried.log_bayes_factor = 0.0;
-    if (count == 1 || tried.log_bayes_factor > strong_evidence) {
-      choice_.best = int(choice_.tried.size());
-      choice_.state = std::make_shared<FitState>(reached_);
-    }
-    choice_.tried.push_back(tried);
-    choice_.under_way = 0;
-    reached_ = *choice_.state;
-    save();
-  }
-
-  FitOutcome fit_once(int count, const FitState& from, int refine, double done_from, double done_to, bool saves) {
-    FitOptions options = with_controls(options_, count);
-    options.refine = refine;
-    reached_ = from;
-    const auto tell = [&](FitEvent& event) {
-      if (count > 1 && event.kind != StageKind::Finer) event.stage = points(count);
-    };
-    FitMonitor monitor = monitor_;
-    monitor.on_event = [&](FitEvent event) {
-      event.fraction_done = done_from + (done_to - done_from) * event.fraction_done;
-      tell(event);
-      if (monitor_.on_event) monitor_.on_event(event);
-    };
-    monitor.on_state = [&](const FitState& state) {
-      reached_ = state;
-      if (saves) save();
-    };
-    FitOutcome outcome = fit_motions(recordings_, options, monitor, from);
-    for (FitEvent& event : outcome.history) tell(event);
-    histories_.emplace_back(count, outcome.history);
-    forward_steps_ += outcome.forward_steps;
-    return outcome;
-  }
-
-  void save() {
-    if (!monitor_.on_state) return;
-    FitState state = reached_;
-    state.field = choice_;
-    monitor_.on_state(state);
-  }
-
-  /// After an interruption, whose state stays as it is.
-  FitOutcome best_so_far() {
-    FitOutcome outcome = told(fit_once(best().control_points, *choice_.state, 1, 1.0, 1.0, false));
-    outcome.interrupted = true, outcome.converged = false, outcome.reason = "interrupted";
-    return outcome;
-  }
-
-  /// With all that was done on the way.
-  FitOutcome told(FitOutcome outcome) {
-    outcome.forward_steps = forward_steps_;
-    outcome.fields = choice_.tried;
-    outcome.history.clear();
-    const Body& body = *outcome.recordings.front().discretisation.body;
-    const JointLayout layout = layout_of(body.modulus.controls);
-    for (auto& [count, events] : histories_) {
-      const JointLayout own = layout_of(count);
-      const MatrixX moduli = carried_over(body, field_of(body, count), body.modulus);
-      for (FitEvent& event : events) {
-        event.theta = changed(own, event.theta, layout, moduli);
-        outcome.history.push_back(std::move(event));
-      }
-    }
-    outcome.notes.insert(outcome.notes.begin(), explained());
-    return outcome;
-  }
-
-  std::string explained() const {
-    std::string text = "Young's modulus was given " + points(best().control_points) +
-                       ", as many as the recordings support. Logarithm of the evidence";
-    int before = 1;
-    for (std::size_t i = 1; i < choice_.tried.size(); ++i) {
-      const TriedField& tried = choice_.tried[i];
-      const bool is_possible = std::isfinite(tried.log_bayes_factor);
-      text += std::string(i == 1 ? "" : ",") + " of " + points(tried.control_points) + " over " +
-              std::to_string(before) + ": " +
-              (is_possible ? text_of(tried.log_bayes_factor, "%+.1f") : "cannot be simulated");
-      if (is_possible && !tried.estimated) text += " (promised by one step)";
-      if (tried.estimated && tried.log_bayes_factor > strong_evidence) before = tried.control_points;
-    }
-    return text + ". More points need more than " + text_of(strong_evidence, "%.0f") + ".";
-  }
-
-  const std::vector<RecordedCapture>& recordings_;
-  FitOptions options_;
-  FitMonitor monitor_;
-  FitState::FieldChoice choice_;
-  FitState left_;     // by an interruption
-  FitState reached_;  // by the fit that runs
-  int resumed_ = 0;   // control points of the fit that was interrupted, until it goes on
-  std::vector<std::pair<int, std::vector<FitEvent>>> histories_;  // by number of control points
-  long long forward_steps_ = 0;
-};
+/// A guess at how much is done after so many fields.
+double done_before(int fields) { return 0.95 * (1.0 - std::pow(0.6, fields)); }
 
 }  // namespace
+
+FieldChoice::FieldChoice(std::vector<RecordedCapture> recordings, const FitOptions& options, FitState resume)
+    : recordings_(std::move(recordings)), options_(options), left_(std::move(resume.pass)) {
+  if (resume.field) choice_ = std::move(*resume.field);
+  resumed_ = choice_.under_way;
+}
+
+std::optional<Pass> FieldChoice::next() {
+  if (is_done()) return std::nullopt;
+  while (!is_cut_ && !is_decided()) {
+    const int count = numbers[choice_.tried.size()];
+    const std::optional<PassState> begin = beginning_of(count);
+    if (!begin) continue;
+    choice_.under_way = count_ = count;
+    const int done = int(choice_.tried.size());
+    return pass_of(count, *begin, 1, done_before(done), done_before(done + 1));
+  }
+  is_last_ = true;
+  count_ = best().control_points;
+  if (is_cut_) {
+    Pass look = pass_of(count_, *choice_.state, 1, 1.0, 1.0);
+    look.is_saved = false;
+    return look;
+  }
+  const PassState from = resumed_ == count_ ? left_ : *choice_.state;  // the former where this one was interrupted
+  choice_.under_way = count_;
+  return pass_of(count_, from, options_.refine, done_before(int(choice_.tried.size())), 1.0);
+}
+
+bool FieldChoice::take(FitOutcome outcome, PassState reached) {
+  histories_.emplace_back(count_, outcome.history);
+  forward_steps_ += outcome.forward_steps;
+  if (is_last_) {
+    outcome_ = told(std::move(outcome));
+    if (is_cut_) outcome_->interrupted = true, outcome_->converged = false, outcome_->reason = "interrupted";
+    return false;
+  }
+  if (count_ == 1 && (outcome.interrupted || !outcome.evaluation.succeeded)) {
+    outcome_ = std::move(outcome);
+    return false;
+  }
+  is_cut_ = outcome.interrupted;
+  if (is_cut_) return false;
+  judge(outcome, std::move(reached));
+  return true;
+}
+
+/// Two numbers in a row were not worth it, or points would be closer than elements.
+bool FieldChoice::is_decided() const {
+  const std::size_t done = choice_.tried.size();
+  return done > 0 && (done == numbers.size() || int(done) - choice_.best > 2 || numbers[done] > options_.cells);
+}
+
+std::optional<PassState> FieldChoice::beginning_of(int count) {
+  if (count == 1 || resumed_ == count) {
+    resumed_ = 0;
+    return left_;
+  }
+  TriedField promised{count, false, std::numeric_limits<double>::infinity(), impossible};
+  PassState begin;
+  try {
+    begin = with_field(count, promised);
+  } catch (const InputError&) {  // the mesh has no room for so many points
+  }
+  if (promised.log_bayes_factor > strong_evidence) return begin;
+  choice_.tried.push_back(promised);
+  return std::nullopt;
+}
+
+PassState FieldChoice::with_field(int count, TriedField& promised) {
+  std::vector<std::string> unused;
+  const Recordings recordings(recordings_, with_controls(options_, count), unused);
+  const Grid grid = recordings.grid(options_.cells, options_.steps);
+  const Body& body = *grid.recording.front().body;
+  const MatrixX moduli = carried_over(body, field_of(body, best().control_points), body.modulus);
+  const JointLayout before = layout_of(best().control_points), after = layout_of(count);
+  const auto change = [&](VectorX& theta) { theta = changed(before, theta, after, moduli); };
+  PassState begin = begun_from(*choice_.state);
+  begin.controls = count;
+  for (StageRecord& r : begin.done) change(r.from), change(r.theta);
+  VectorX& theta = begin.begin->theta;
+  change(theta);
+  ParameterSet parameters = recordings.parameters();
+  if (const StageRecord* test = find_record(begin.done, {StageKind::Test}))
+    for (const std::string& name : test->corrected) parameters.set_estimated(name, true);
+  parameters.set_reference(theta);
+  Objective objective =
+      recordings.objective(grid, parameters, options_.fine_band, [](const Recording& r) { return r.last_frame; });
+  const VectorX p = parameters.to_unconstrained(theta);
+  const CostEvaluation e = objective.linearise(p);
+  forward_steps_ += e.steps;
+  if (e.succeeded) promised.log_bayes_factor = log_bayes_factor(e, objective.parameters(), p, moduli);
+  // Dampings and, above all, Poisson's ratio made up for what the coarser field lacks: a stage earlier, and the
+  // latter where it began.
+  const bool is_corrected = estimate_of(*choice_.state)->id.kind == StageKind::Corrected;
+  begin.begin->stage = std::max(0, begin.begin->stage - (is_corrected ? 2 : 1));
+  if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated)
+    theta[nu->at] = recordings.parameters().reference()[nu->at];
+  return begin;
+}
+
+ModulusField FieldChoice::field_of(const Body& body, int count) const {
+  return control_field(body, recordings_.front().capture.scene, {count, options_.control_weights}).field;
+}
+
+void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {
+  TriedField tried{count_, true, outcome.final_cost, impossible};
+  if (count_ > 1 && outcome.evaluation.succeeded) {
+    const Body& body = *outcome.recordings.front().discretisation.body;
+    const VectorX p = outcome.parameters.to_unconstrained(outcome.theta);
+    tried.log_bayes_factor = log_bayes_factor(outcome.evaluation, outcome.parameters, p,
+                                              carried_over(body, field_of(body, best().control_points), body.modulus));
+  }
+  if (count_ == 1) tried.log_bayes_factor = 0.0;
+  if (count_ == 1 || tried.log_bayes_factor > strong_evidence) {
+    choice_.best = int(choice_.tried.size());
+    choice_.state = std::move(reached);
+  }
+  choice_.tried.push_back(tried);
+  choice_.under_way = 0;
+}
+
+Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const {
+  Pass pass;
+  pass.recordings = recordings_;
+  pass.options = with_controls(options_, count);
+  pass.options.refine = refine;
+  pass.begin = from;
+  if (count > 1) pass.stage = points(count);
+  pass.done_from = done_from, pass.done_to = done_to;
+  return pass;
+}
+
+FitOutcome FieldChoice::told(FitOutcome outcome) {
+  outcome.forward_steps = forward_steps_;
+  outcome.fields = choice_.tried;
+  outcome.history.clear();
+  const Body& body = *outcome.recordings.front().discretisation.body;
+  const JointLayout layout = layout_of(body.modulus.controls);
+  for (auto& [count, events] : histories_) {
+    const JointLayout own = layout_of(count);
+    const MatrixX moduli = carried_over(body, field_of(body, count), body.modulus);
+    for (FitEvent& event : events) {
+      event.theta = changed(own, event.theta, layout, moduli);
+      outcome.history.push_back(std::move(event));
+    }
+  }
+  outcome.notes.insert(outcome.notes.begin(), explained());
+  return outcome;
+}
+
+std::string FieldChoice::explained() const {
+  std::string text = "Young's modulus was given " + points(best().control_points) +
+                     ", as many as the recordings support. Logarithm of the evidence";
+  int before = 1;
+  for (std::size_t i = 1; i < choice_.tried.size(); ++i) {
+    const TriedField& tried = choice_.tried[i];
+    const bool is_possible = std::isfinite(tried.log_bayes_factor);
+    text += std::string(i == 1 ? "" : ",") + " of " + points(tried.control_points) + " over " + std::to_string(before) +
+            ": " + (is_possible ? text_of(tried.log_bayes_factor, "%+.1f") : "cannot be simulated");
+    if (is_possible && !tried.estimated) text += " (promised by one step)";
+    if (tried.estimated && tried.log_bayes_factor > strong_evidence) before = tried.control_points;
+  }
+  return text + ". More points need more than " + text_of(strong_evidence, "%.0f") + ".";
+}
 
 MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusField& to) {
   const Eigen::Map<const VectorX> volume(body.element_volume.data(), Eigen::Index(body.element_volume.size()));
@@ -248,13 +216,6 @@ MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusFi
     return root.asDiagonal() * field.weights;
   };
   return weighted(to).colPivHouseholderQr().solve(weighted(from));
-}
-
-FitOutcome fit_with_chosen_field(const std::vector<RecordedCapture>& recordings, const FitOptions& options,
-                                 const FitMonitor& monitor, FitState resume) {
-  if (!recordings.front().capture.scene.regions.empty())
-    return fit_motions(recordings, with_controls(options, 1), monitor, std::move(resume));
-  return FieldChoice(recordings, options, monitor, std::move(resume)).run();
 }
 
 }  // namespace pliant

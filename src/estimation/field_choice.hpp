@@ -1,17 +1,55 @@
 #pragma once
 
-#include "estimation/fit.hpp"
+#include <utility>
+
+#include "estimation/fit_pass.hpp"
+#include "estimation/recordings.hpp"
 
 namespace pliant {
 
-/// A fit with as many control points of Young's modulus as the recordings support. The homogeneous object is fitted
-/// first; then fields of 2, 3, 4, 6, 8, ... points, each from the best one so far and only where one step of Gauss and
-/// Newton promises enough. A field of more points is kept where there is strong evidence of what it has beyond the best
-/// one before (`log_bayes_factor` above `strong_evidence`); two numbers in a row without it end the search. Where the
-/// capture names regions they are the field, and there is nothing to choose.
-/// @param resume  see `fit`; the state of an interrupted choice goes on with the field that was under way
-FitOutcome fit_with_chosen_field(const std::vector<RecordedCapture>& recordings, const FitOptions& options,
-                                 const FitMonitor& monitor, FitState resume);
+/// Plans a fit with as many control points of Young's modulus as the recordings support. The homogeneous object is
+/// fitted first; then fields of 2, 3, 4, 6, 8, ... points, each from the best one so far and only where one step of
+/// Gauss and Newton promises enough. A field of more points is kept where there is strong evidence of what it has
+/// beyond the best one before (`log_bayes_factor` above `strong_evidence`); two numbers in a row without it end the
+/// search, and the best one is repeated where the options ask for that.
+class FieldChoice : public PassPlanner {
+ public:
+  /// @param resume  the state of an interrupted choice goes on with the field that was under way
+  FieldChoice(std::vector<RecordedCapture> recordings, const FitOptions& options, FitState resume);
+
+  std::optional<Pass> next() override;
+  bool take(FitOutcome outcome, PassState reached) override;
+  bool is_done() const override { return outcome_.has_value(); }
+  void write(FitState& state) const override { state.field = choice_; }
+  FitOutcome outcome() override { return std::move(*outcome_); }
+
+ private:
+  const TriedField& best() const { return choice_.tried[std::size_t(choice_.best)]; }
+  bool is_decided() const;
+  /// Where a fit with so many points begins; nothing where one step promises too little.
+  std::optional<PassState> beginning_of(int count);
+  /// The best fit's state as one of another field, and what one step promises of that.
+  PassState with_field(int count, TriedField& promised);
+  Pass pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const;
+  void judge(const FitOutcome& outcome, PassState reached);
+  /// With all that was done on the way.
+  FitOutcome told(FitOutcome outcome);
+  std::string explained() const;
+  JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }
+  ModulusField field_of(const Body& body, int count) const;
+
+  std::vector<RecordedCapture> recordings_;
+  FitOptions options_;
+  FitState::FieldChoice choice_;
+  PassState left_;        // by an interruption
+  int resumed_ = 0;       // control points of the fit that was interrupted, until it goes on
+  int count_ = 0;         // of the pass that was handed out last
+  bool is_last_ = false;  // that pass
+  bool is_cut_ = false;   // interrupted, and the best so far is looked at
+  std::optional<FitOutcome> outcome_;
+  std::vector<std::pair<int, std::vector<FitEvent>>> histories_;  // by number of control points
+  long long forward_steps_ = 0;
+};
 
 /// ln of the Bayes factor B above which evidence is called strong: 2 ln B > 6 (Kass and Raftery 1995).
 inline constexpr double strong_evidence = 3.0;

@@ -4,10 +4,9 @@
 
 #include "base/dense.hpp"
 #include "base/error.hpp"
-#include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
-#include "estimation/fit_run.hpp"
+#include "estimation/fit_pass.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/press_scene.hpp"
 #include "estimation/tracking_loop.hpp"
@@ -31,20 +30,11 @@ void add_uncertainty(FitOutcome& outcome) {
   outcome.correlation = inverse.asDiagonal() * outcome.covariance * inverse.asDiagonal();
 }
 
-FitOutcome fit_motions(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
-                       FitState resume) {
-  if (tracks(recordings, options)) return fit_with_tracking(recordings, options, monitor, std::move(resume));
-  if (options.control_points == FitOptions::automatic)
-    return fit_with_chosen_field(recordings, options, monitor, std::move(resume));
-  return FitRun(std::move(recordings), options, monitor, std::move(resume)).run();
-}
-
 namespace {
 
 /// How well a fitted material predicts a recording that was kept out: only its own start, planes and sensors are
 /// estimated, from its own observations.
-FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options,
-                 const FitMonitor& monitor) {
+OnePass pass_of_held_out(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options) {
   FitOptions fixed = options;
   fixed.tracking = TrackingUse::Off;
   fixed.cells = fitted.cells, fixed.refine = 1;
@@ -55,9 +45,14 @@ FitOutcome score(RecordedCapture held_out, const FitOutcome& fitted, const FitOp
     change.estimated = false;
     if (p.name != "density" || p.estimated) change.start = VectorX::Constant(1, fitted.theta[p.at]);
   }
-  std::vector<RecordedCapture> one;
-  one.push_back(std::move(held_out));
-  return fit_motions(std::move(one), fixed, monitor, {});
+  return {{std::move(held_out)}, fixed, {}};
+}
+
+std::unique_ptr<PassPlanner> planner_of(std::vector<RecordedCapture> recordings, const FitOptions& options,
+                                        const FitMonitor& monitor, FitState resume) {
+  if (tracks(recordings, options))
+    return planner_of_tracking(std::move(recordings), options, monitor.interrupted, std::move(resume));
+  return planner_of_points(std::move(recordings), options, std::move(resume));
 }
 
 /// The capture whose presses are all that there is to fit; null where more than presses is fitted.
@@ -85,13 +80,14 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
     return fit_presses(*capture, options, monitor, std::move(resume));
   const bool has_presses =
       std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
-  FitOutcome outcome = fit_motions(std::move(recordings), options, monitor, std::move(resume));
+  FitOutcome outcome = carry_out(*planner_of(std::move(recordings), options, monitor, std::move(resume)), monitor);
   for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
   if (held_out && outcome.evaluation.succeeded && !outcome.interrupted) {
     FitMonitor of_another_fit = monitor;
     of_another_fit.on_state = {};
     outcome.held_out = {held_out->capture.name, held_out->capture.sha256, {}};
-    outcome.held_out->evaluation = score(std::move(*held_out), outcome, options, of_another_fit).evaluation;
+    OnePass pass = pass_of_held_out(std::move(*held_out), outcome, options);
+    outcome.held_out->evaluation = carry_out(pass, of_another_fit).evaluation;
   }
   return outcome;
 }

@@ -154,32 +154,23 @@ struct TriedLaw {
 
 /// Where a fit stands, to go on after an interruption.
 struct FitState {
-  int controls = 1;                        ///< control moduli of the parameter vectors below
-  std::vector<StageRecord> done;           ///< stages in the order in which they ended
-  std::optional<StageUnderWay> under_way;  ///< of those on the full grid
-  /// Where the stages on the full grid begin, if not with the best start: what came before was taken over from another
-  /// fit.
-  struct Beginning {
-    VectorX theta;
-    int stage = 0;  ///< number of the first one; that with corrections comes last
-  };
-  std::optional<Beginning> begin;
-  /// Where the number of control points is chosen: all above is the fit with one of them.
+  PassState pass;  ///< that was under way
+  /// Where the number of control points is chosen: the pass is the fit with one of them.
   struct FieldChoice {
-    std::vector<TriedField> tried;          ///< that are done
-    int best = 0;                           ///< of those tried
-    std::shared_ptr<const FitState> state;  ///< of the best one's fit, with its estimate in `refined`
-    int under_way = 0;                      ///< control points of the fit that was under way; 0: none
+    std::vector<TriedField> tried;   ///< that are done
+    int best = 0;                    ///< of those tried
+    std::optional<PassState> state;  ///< of the best one's fit, with its estimate
+    int under_way = 0;               ///< control points of the fit that was under way; 0: none
   };
   std::optional<FieldChoice> field;
-  /// Where the object is tracked: all above is the fit that was under way.
+  /// Where the object is tracked.
   struct Tracking {
     enum class Phase { Loop, Direct, Last };
     Phase phase = Phase::Loop;
-    std::vector<TrackingRound> rounds;       ///< that are done
-    std::shared_ptr<const FitState> loop;    ///< of the last of them, with its estimate
-    std::shared_ptr<const FitState> direct;  ///< of the fit to the points, with its estimate
-    bool keeps_loop = true;                  ///< in the last phase
+    std::vector<TrackingRound> rounds;  ///< that are done
+    std::optional<PassState> loop;      ///< of the last of them, with its estimate
+    std::optional<PassState> direct;    ///< of the fit to the points, with its estimate
+    bool keeps_loop = true;             ///< in the last phase
   };
   std::optional<Tracking> tracking;
   /// Where the law of a pressed object is looked for.

@@ -60,17 +60,17 @@ const StageRecord* find_record(const std::vector<StageRecord>& done, const Stage
   return it == done.end() ? nullptr : &*it;
 }
 
-const StageRecord* estimate_of(const FitState& state) {
+const StageRecord* estimate_of(const PassState& state) {
   const StageRecord* last = nullptr;
   for (const StageRecord& r : state.done)
     if (is_on_full_grid(r.id.kind) && r.succeeded) last = &r;
   return last;
 }
 
-FitState begun_from(const FitState& state) {
-  FitState begun = state;
+PassState begun_from(const PassState& state) {
+  PassState begun = state;
   begun.under_way.reset();
-  begun.begin = FitState::Beginning{estimate_of(state)->theta, 0};
+  begun.begin = PassState::Beginning{estimate_of(state)->theta, 0};
   for (const StageRecord& r : state.done)
     if (r.id.kind == StageKind::Fine || r.id.kind == StageKind::Corrected) begun.begin->stage = r.id.number;
   std::erase_if(begun.done,
@@ -100,7 +100,7 @@ std::vector<double> best_of_scan(const std::vector<std::pair<double, double>>& t
   return best;
 }
 
-std::vector<StageChain> FitPlan::next(const FitState& state) const {
+std::vector<StageChain> FitPlan::next(const PassState& state) const {
   const Records& done = state.done;
   if (!state.begin) {
     if (StageChain chain = left_of(motion(0, facts_.parameters.reference()), done); !chain.empty()) return {chain};
@@ -129,7 +129,7 @@ std::vector<StageChain> FitPlan::next(const FitState& state) const {
   return {};
 }
 
-Stage FitPlan::last_look(const FitState& state) const {
+Stage FitPlan::last_look(const PassState& state) const {
   StageChain chain = corrected(state.done, state.begin);
   if (chain.empty()) chain = fine(state.done, state.begin);
   Stage last = chain.back();
@@ -228,7 +228,7 @@ Stage FitPlan::pulls(const VectorX& from, const Spacing& grid, int number) const
 
 /// Thin objects are meshed by their thickness, however few cells are asked for: starts were then followed on the full
 /// grid already, and the last stage is enough.
-StageChain FitPlan::fine(const Records& done, const std::optional<FitState::Beginning>& begin) const {
+StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beginning>& begin) const {
   const FitOptions& options = facts_.options;
   const Spacing grid{options.cells, options.steps};
   const std::vector<double> horizons = fine_horizons(facts_.swings);
@@ -265,7 +265,7 @@ Stage FitPlan::test(const StageRecord& estimate) const {
   return stage;
 }
 
-StageChain FitPlan::corrected(const Records& done, const std::optional<FitState::Beginning>& begin) const {
+StageChain FitPlan::corrected(const Records& done, const std::optional<PassState::Beginning>& begin) const {
   if (needed_corrections(done).empty()) return {};
   const StageRecord* fine = narrow(done);
   if (!fine && !begin) return {};

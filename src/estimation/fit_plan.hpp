@@ -29,9 +29,9 @@ class FitPlan {
 
   /// What is next, chains side by side; none: all is done.
   /// @param state  its records alone are read, and where it begins
-  std::vector<StageChain> next(const FitState& state) const;
+  std::vector<StageChain> next(const PassState& state) const;
   /// One look at what was reached where a fit is interrupted before its estimate: the last stage from the best so far.
-  Stage last_look(const FitState& state) const;
+  Stage last_look(const PassState& state) const;
 
   /// Where the estimate begins: all its moduli at the first start.
   VectorX start_theta(const std::vector<StageRecord>& done) const;
@@ -60,9 +60,9 @@ class FitPlan {
   /// One start on the coarse grid.
   StageChain start(int index, const Records& done) const;
   Stage pulls(const VectorX& from, const Spacing& grid, int number) const;
-  StageChain fine(const Records& done, const std::optional<FitState::Beginning>& begin) const;
+  StageChain fine(const Records& done, const std::optional<PassState::Beginning>& begin) const;
   Stage test(const StageRecord& estimate) const;
-  StageChain corrected(const Records& done, const std::optional<FitState::Beginning>& begin) const;
+  StageChain corrected(const Records& done, const std::optional<PassState::Beginning>& begin) const;
   StageChain finer(const Records& done) const;
 
   /// Where the fit is before any start is followed.
@@ -85,10 +85,10 @@ class FitPlan {
 const StageRecord* find_record(const std::vector<StageRecord>& done, const StageId& id);
 
 /// The last estimate of a state on the full grid or a finer one; null where there is none.
-const StageRecord* estimate_of(const FitState& state);
+const StageRecord* estimate_of(const PassState& state);
 /// A fit that looks again from the estimate of another one: what came before the full grid stands, and the last stage
 /// on the full grid is done anew. The state has an estimate.
-FitState begun_from(const FitState& state);
+PassState begun_from(const PassState& state);
 
 /// Iterations that are counted on in the stages after it.
 int counted_iterations(const StageRecord& record);

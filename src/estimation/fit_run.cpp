@@ -49,7 +49,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor,
-               FitState state)
+               PassState state)
     : options_(options),
       monitor_(monitor),
       state_(std::move(state)),
@@ -180,12 +180,12 @@ void FitRun::keep(StageRecord record) {
 }
 
 void FitRun::save() {
-  if (monitor_.on_state) monitor_.on_state(state_);
+  if (monitor_.on_state) monitor_.on_state({state_, {}, {}, {}});
 }
 
 /// What a scan or a repetition has reached is nothing yet.
-FitState FitRun::reached() const {
-  FitState reached = state_;
+PassState FitRun::reached() const {
+  PassState reached = state_;
   for (const StageRecord& r : partial_)
     if (r.id.kind != StageKind::Scan && r.id.kind != StageKind::Finer) reached.done.push_back(r);
   return reached;
@@ -393,7 +393,7 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
 
 FitOutcome FitRun::run() {
   execute();
-  FitState end = reached();
+  PassState end = reached();
   if (interrupted_ && !plan_.estimate(end.done)) {
     bool is_cut = false;
     end.done.push_back(minimise_stage(plan_.last_look(end), is_cut));
@@ -417,6 +417,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   outcome_.starts = plan_.starts(done);
   outcome_.start_theta = plan_.start_theta(done);
   outcome_.cells = at.cells;
+  outcome_.interrupted = interrupted_;
   outcome_.converged = last.converged && !interrupted_;
   outcome_.reason = interrupted_ ? "interrupted" : last.reason;
   outcome_.theta = last.theta;
@@ -443,8 +444,8 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
 /// With derivatives; that of the optimiser where it ran here.
 CostEvaluation FitRun::evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters) {
   const auto ended = std::ranges::find(ended_, record.id, &Ended::id);
-  const bool is_whole = ended != ended_.end() &&
-                        (!record.succeeded || parameters.dimension() == 0 || ended->evaluation.gauss_newton.size() > 0);
+  const bool is_whole =
+      ended != ended_.end() && (!record.succeeded || ended->evaluation.gauss_newton.rows() == parameters.dimension());
   if (is_whole) return std::move(ended->evaluation);
   return objective_of(narrow, parameters, grid(narrow.grid)).linearise(parameters.to_unconstrained(record.theta));
 }

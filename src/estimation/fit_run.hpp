@@ -13,12 +13,12 @@
 
 namespace pliant {
 
-/// Carries out a plan: asks it for stages, runs them, keeps their records in the state, tells and saves what is done,
-/// and stops where it is interrupted. Internal to `fit`.
+/// Carries out the plan of one pass: asks it for stages, runs them, keeps their records in the state, tells and saves
+/// what is done, and stops where it is interrupted. Internal to `fit`.
 class FitRun {
  public:
   /// Throws InputError where a recording cannot be fitted, with the reason.
-  FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, FitState state);
+  FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, PassState state);
 
   /// To the end of the plan, or until it is interrupted, and what came out.
   /// Throws InputError where no stiffness can be simulated.
@@ -55,7 +55,7 @@ class FitRun {
   double all_work() const;
 
   /// The state with what was interrupted among its records.
-  FitState reached() const;
+  PassState reached() const;
 
   void finish(const std::vector<StageRecord>& done);
   CostEvaluation evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters);
@@ -72,7 +72,7 @@ class FitRun {
 
   FitOptions options_;
   FitMonitor monitor_;
-  FitState state_;
+  PassState state_;
   FitOutcome outcome_;
   Recordings recordings_;
   std::shared_ptr<const ParameterLayout> layout_;
@@ -83,9 +83,5 @@ class FitRun {
   std::atomic<bool> interrupted_ = false;
   std::mutex mutex_;  // of all above that stages write, and of the monitor
 };
-
-/// The fit of motions and equilibria: what `fit` does where there is more than presses.
-FitOutcome fit_motions(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
-                       FitState resume);
 
 }  // namespace pliant

@@ -83,11 +83,25 @@ struct StageRecord {
   std::string told = {};                    ///< for people: the swing that was found, what needs correction
 };
 
-/// A stage that was interrupted.
+/// A stage that is under way.
 struct StageUnderWay {
   StageId id;
   VectorX from;  ///< theta
   OptimiserState optimiser;
+};
+
+/// Where a pass through the stages of a plan stands.
+struct PassState {
+  int controls = 1;                        ///< control moduli of the parameter vectors below
+  std::vector<StageRecord> done;           ///< in the order in which they ended
+  std::optional<StageUnderWay> under_way;  ///< of those on the full grid
+  /// Where the stages on the full grid begin, if not with the best start: what came before was taken over from another
+  /// pass.
+  struct Beginning {
+    VectorX theta;
+    int stage = 0;  ///< number of the first one; that with corrections comes last
+  };
+  std::optional<Beginning> begin;
 };
 
 }  // namespace pliant

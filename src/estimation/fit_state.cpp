@@ -24,8 +24,8 @@ double to_cost(const Json& json) {
 }
 Json from_cost(double cost) { return std::isfinite(cost) ? Json(cost) : Json(); }
 
-Json to_json(const FitState& state);
-FitState to_state(const Json& json);
+Json from_pass(const PassState& pass);
+PassState to_pass(const Json& json);
 
 Json from_field(const FitState::FieldChoice& field) {
   Json json = {{"tried", Json::array()}, {"best", field.best}, {"under_way", field.under_way}};
@@ -34,7 +34,7 @@ Json from_field(const FitState::FieldChoice& field) {
                              {"estimated", t.estimated},
                              {"cost", from_cost(t.cost)},
                              {"against", from_cost(-t.log_bayes_factor)}});
-  if (field.state) json["state"] = to_json(*field.state);
+  if (field.state) json["state"] = from_pass(*field.state);
   return json;
 }
 
@@ -45,7 +45,7 @@ FitState::FieldChoice to_field(const Json& json) {
   for (const Json& t : json.at("tried"))
     field.tried.push_back({t.at("control_points").get<int>(), t.at("estimated").get<bool>(), to_cost(t.at("cost")),
                            -to_cost(t.at("against"))});
-  if (json.contains("state")) field.state = std::make_shared<FitState>(to_state(json["state"]));
+  if (json.contains("state")) field.state = to_pass(json["state"]);
   return field;
 }
 
@@ -60,8 +60,8 @@ Json from_tracking(const FitState::Tracking& tracking) {
                               {"lost", r.lost},
                               {"theta", from_vector(r.theta)},
                               {"controls", r.controls}});
-  if (tracking.loop) json["loop"] = to_json(*tracking.loop);
-  if (tracking.direct) json["direct"] = to_json(*tracking.direct);
+  if (tracking.loop) json["loop"] = from_pass(*tracking.loop);
+  if (tracking.direct) json["direct"] = from_pass(*tracking.direct);
   return json;
 }
 
@@ -74,8 +74,8 @@ FitState::Tracking to_tracking(const Json& json) {
                                r.at("confidence").get<double>(), r.at("fit_rms").get<double>(),
                                r.at("change").get<double>(), r.at("lost").get<bool>(), to_vector(r.at("theta")),
                                r.at("controls").get<int>()});
-  if (json.contains("loop")) tracking.loop = std::make_shared<FitState>(to_state(json["loop"]));
-  if (json.contains("direct")) tracking.direct = std::make_shared<FitState>(to_state(json["direct"]));
+  if (json.contains("loop")) tracking.loop = to_pass(json["loop"]);
+  if (json.contains("direct")) tracking.direct = to_pass(json["direct"]);
   return tracking;
 }
 
@@ -213,14 +213,31 @@ StageRecord to_record(const Json& json) {
   return r;
 }
 
-Json to_json(const FitState& state) {
-  Json json = {{"controls", state.controls}, {"done", Json::array()}};
-  for (const StageRecord& r : state.done) json["done"].push_back(from_record(r));
-  if (const auto& stage = state.under_way)
+Json from_pass(const PassState& pass) {
+  Json json = {{"controls", pass.controls}, {"done", Json::array()}};
+  for (const StageRecord& r : pass.done) json["done"].push_back(from_record(r));
+  if (const auto& stage = pass.under_way)
     json["under_way"] = {{"stage", from_id(stage->id)},
                          {"from", from_vector(stage->from)},
                          {"optimiser", from_optimiser(stage->optimiser)}};
-  if (const auto& begin = state.begin) json["begin"] = {{"theta", from_vector(begin->theta)}, {"stage", begin->stage}};
+  if (const auto& begin = pass.begin) json["begin"] = {{"theta", from_vector(begin->theta)}, {"stage", begin->stage}};
+  return json;
+}
+
+PassState to_pass(const Json& json) {
+  PassState pass;
+  pass.controls = json.at("controls").get<int>();
+  for (const Json& r : json.at("done")) pass.done.push_back(to_record(r));
+  if (json.contains("under_way")) {
+    const Json& stage = json["under_way"];
+    pass.under_way = {to_id(stage.at("stage")), to_vector(stage.at("from")), to_optimiser(stage.at("optimiser"))};
+  }
+  if (json.contains("begin")) pass.begin = {to_vector(json["begin"].at("theta")), json["begin"].at("stage").get<int>()};
+  return pass;
+}
+
+Json to_json(const FitState& state) {
+  Json json = {{"pass", from_pass(state.pass)}};
   if (state.field) json["field"] = from_field(*state.field);
   if (state.tracking) json["tracking"] = from_tracking(*state.tracking);
   if (state.law) json["law"] = from_law(*state.law);
@@ -229,14 +246,7 @@ Json to_json(const FitState& state) {
 
 FitState to_state(const Json& json) {
   FitState state;
-  state.controls = json.at("controls").get<int>();
-  for (const Json& r : json.at("done")) state.done.push_back(to_record(r));
-  if (json.contains("under_way")) {
-    const Json& stage = json["under_way"];
-    state.under_way = {to_id(stage.at("stage")), to_vector(stage.at("from")), to_optimiser(stage.at("optimiser"))};
-  }
-  if (json.contains("begin"))
-    state.begin = {to_vector(json["begin"].at("theta")), json["begin"].at("stage").get<int>()};
+  state.pass = to_pass(json.at("pass"));
   if (json.contains("field")) state.field = to_field(json["field"]);
   if (json.contains("tracking")) state.tracking = to_tracking(json["tracking"]);
   if (json.contains("law")) state.law = to_law(json["law"]);

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/error.hpp"
-#include "estimation/fit_run.hpp"
+#include "estimation/fit_plan.hpp"
 #include "estimation/followed.hpp"
 #include "estimation/recordings.hpp"
 
@@ -36,14 +36,16 @@ TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOpti
   return suits ? TrackingUse::Both : TrackingUse::Off;
 }
 
-class TrackingLoop {
+/// Rounds of tracking and fits to what was tracked; where points are fitted too, those, and the better one of the two
+/// with all frames.
+class TrackingLoop : public PassPlanner {
  public:
-  TrackingLoop(const std::vector<RecordedCapture>& recordings, const FitOptions& options, const FitMonitor& monitor,
+  TrackingLoop(std::vector<RecordedCapture> recordings, const FitOptions& options, std::function<bool()> interrupted,
                FitState resume)
-      : all_(recordings),
+      : all_(std::move(recordings)),
         options_(options),
-        monitor_(monitor),
-        is_both_(use_of(recordings, options) == TrackingUse::Both) {
+        interrupted_(std::move(interrupted)),
+        is_both_(use_of(all_, options) == TrackingUse::Both) {
     options_.tracking = TrackingUse::Off;
     if (resume.tracking) {
       state_ = *resume.tracking;
@@ -54,17 +56,40 @@ class TrackingLoop {
     for (const RecordedCapture& r : is_both_ ? training_ : all_) followed_.emplace_back(r, options_, notes_);
   }
 
-  FitOutcome run() {
-    if (state_.phase == Phase::Loop && !loop()) return told(std::move(*outcome_));
-    if (!is_both_) {
-      if (!outcome_) resume_loop();
-      return told(std::move(*outcome_));
+  std::optional<Pass> next() override {
+    while (!is_done()) {
+      if (!inner_) begin_part();
+      if (!inner_) continue;
+      if (std::optional<Pass> pass = inner_->next()) return as_part(std::move(*pass));
     }
-    if (state_.phase == Phase::Direct && !direct()) return told(std::move(*outcome_));
-    return last();
+    return std::nullopt;
   }
 
+  bool take(FitOutcome outcome, PassState reached) override {
+    const bool is_kept = inner_->take(std::move(outcome), reached);
+    if (!inner_->is_done()) return is_kept;
+    FitState stands;
+    inner_->write(stands);
+    FitOutcome whole = inner_->outcome();
+    const bool is_over = whole.interrupted || part_ == Part::Last;
+    inner_.reset();
+    for (const FitEvent& event : whole.history) history_.emplace_back(controls_of(whole), event);
+    forward_steps_ += whole.forward_steps;
+    end_part(std::move(whole), stands.field && stands.field->state ? *stands.field->state : std::move(reached));
+    return !is_over;
+  }
+
+  bool is_done() const override { return final_.has_value(); }
+  void write(FitState& state) const override {
+    state.tracking = state_;
+    state.field.reset();
+    if (inner_) inner_->write(state);
+  }
+  FitOutcome outcome() override { return told(std::move(*final_)); }
+
  private:
+  enum class Part { Round, RoundsAgain, Points, Last };
+
   void split(const RecordedCapture& r) {
     RecordedCapture training{r.capture, {}, {}}, held_out = training;
     for (const ObservedFrame& frame : r.observed) {
@@ -75,14 +100,7 @@ class TrackingLoop {
     held_out_.push_back(std::move(held_out));
   }
 
-  bool interrupted() const { return monitor_.interrupted && monitor_.interrupted(); }
-
-  void save(const FitState& under_way) {
-    if (!monitor_.on_state) return;
-    FitState state = under_way;
-    state.tracking = state_;
-    monitor_.on_state(state);
-  }
+  bool interrupted() const { return interrupted_ && interrupted_(); }
 
   JointLayout layout_of(int controls) const { return joint_layout(all_, options_, controls); }
   /// Control moduli that the object is followed with.
@@ -116,11 +134,10 @@ class TrackingLoop {
     return true;
   }
 
-  /// Interrupted as it followed: the end is what was reached before, which may be nothing. False.
-  bool stop(std::optional<FitOutcome> reached) {
-    outcome_ = reached ? std::move(reached) : FitOutcome{};
-    outcome_->interrupted = true, outcome_->converged = false, outcome_->reason = "interrupted";
-    return false;
+  /// Interrupted as it followed: the end is what was reached before, which may be nothing.
+  void stop(std::optional<FitOutcome> reached) {
+    final_ = reached ? std::move(reached) : FitOutcome{};
+    final_->interrupted = true, final_->converged = false, final_->reason = "interrupted";
   }
 
   std::vector<RecordedCapture> followed_captures(const std::vector<RecordedCapture>& recordings) const {
@@ -155,36 +172,24 @@ class TrackingLoop {
     return round;
   }
 
-  /// One fit, told as a part of the whole.
-  FitOutcome fit_once(const std::vector<RecordedCapture>& recordings, const FitOptions& options, FitState from,
-                      const std::string& name, double done_from, double done_to) {
-    reached_ = from;
-    FitMonitor monitor = monitor_;
-    monitor.on_event = [&](FitEvent event) {
-      event.fraction_done = done_from + (done_to - done_from) * event.fraction_done;
-      event.stage = name + ": " + event.stage;
-      if (monitor_.on_event) monitor_.on_event(event);
-    };
-    monitor.on_state = [&](const FitState& state) {
-      reached_ = state;
-      save(state);
-    };
-    FitOutcome outcome = fit_motions(recordings, options, monitor, std::move(from));
-    for (FitEvent& event : outcome.history) {
-      event.stage = name + ": " + event.stage;
-      history_.emplace_back(controls_of(outcome), event);
-    }
-    forward_steps_ += outcome.forward_steps;
-    return outcome;
+  /// A pass of a part, told as such.
+  Pass as_part(Pass pass) const {
+    pass.name = name_ + ": " + pass.name;
+    pass.done_from = done_from_ + (done_to_ - done_from_) * pass.done_from;
+    pass.done_to = done_from_ + (done_to_ - done_from_) * pass.done_to;
+    return pass;
   }
 
-  /// The state that the fit has reached: one that goes on from it returns its estimate.
-  FitState concluded() const { return reached_.field && reached_.field->state ? *reached_.field->state : reached_; }
+  void begin(Part part, const std::string& name, double done_from, double done_to,
+             std::vector<RecordedCapture> recordings, const FitOptions& options, FitState from) {
+    part_ = part, name_ = name, done_from_ = done_from, done_to_ = done_to;
+    inner_ = planner_of_points(std::move(recordings), options, std::move(from));
+  }
 
-  /// And one that looks again from there, with other observations.
-  static FitState from_there(const FitState& state, const VectorX& theta) {
-    FitState begun = begun_from(state);
-    begun.begin->theta = theta;
+  /// A fit that looks again from an estimate, with other observations.
+  static FitState from_there(const PassState& state, const VectorX& theta) {
+    FitState begun{begun_from(state), {}, {}, {}};
+    begun.pass.begin->theta = theta;
     return begun;
   }
 
@@ -230,53 +235,111 @@ class TrackingLoop {
   }
 
   double share(int round) const { return (is_both_ ? 0.5 : 1.0) * round / options_.tracking_rounds; }
+  const std::vector<RecordedCapture>& looped() const { return is_both_ ? training_ : all_; }
 
-  /// False where it was interrupted or failed: the outcome says so.
-  bool loop() {
-    const std::vector<RecordedCapture>& recordings = is_both_ ? training_ : all_;
-    const bool is_first = state_.rounds.empty();
-    int controls = is_first ? followed_controls() : state_.rounds.back().controls;
-    VectorX theta = is_first ? VectorX() : state_.rounds.back().theta;
-    FitOptions options = without_start(is_first ? options_ : with_chosen_controls(options_, controls));
-    FitState from = std::exchange(left_, {});
-    bool is_resumed = !from.done.empty() || from.under_way || from.begin;
-    while (int(state_.rounds.size()) < options_.tracking_rounds) {
-      const int round = int(state_.rounds.size());
-      const std::vector<VectorX> own = theta.size() == 0 ? known_at_first() : to_follow_with(theta, controls);
-      if (!follow(followed_, own)) return stop(std::move(outcome_));
-      TrackingRound described_round = described(own.front());
-      if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
-      is_resumed = false;
-      outcome_ = fit_once(followed_captures(recordings), options, std::exchange(from, {}),
-                          "round " + std::to_string(round + 1), share(round), share(round + 1));
-      if (outcome_->interrupted || !outcome_->evaluation.succeeded) return false;
-      const VectorX moduli_before = theta.size() == 0 ? followed_.front().material().moduli(own.front())
-                                                      : layout_of(controls).blocks.front().motion.moduli(theta);
-      controls = controls_of(*outcome_);
-      theta = outcome_->theta;
-      options = without_start(with_chosen_controls(options_, controls));
-      described_round.theta = theta, described_round.controls = controls;
-      described_round.fit_rms = outcome_->evaluation.track_rms();
-      described_round.change = change(moduli_before, layout_of(controls).blocks.front().motion.moduli(theta));
-      state_.loop = std::make_shared<FitState>(concluded());
-      state_.rounds.push_back(std::move(described_round));
-      save({});
-      if (state_.rounds.back().change < settled) break;
+  /// What is left to do, or the end.
+  void begin_part() {
+    if (state_.phase == Phase::Loop) return begin_round();
+    if (state_.phase == Phase::Direct && is_both_ && !direct_)
+      return begin(Part::Points, "points", 0.5, 0.9, training_, for_points(options_), std::exchange(left_, {}));
+    if (state_.phase != Phase::Last && !loop_) return begin_rounds_again();
+    if (!is_both_) {
+      final_ = std::move(loop_);
+      return;
     }
-    if (!outcome_ && !resume_loop()) return false;
-    state_.phase = Phase::Direct;
-    save({});
-    return true;
+    begin_last();
   }
 
-  /// All rounds were done before an interruption. False where there was another one.
-  bool resume_loop() {
+  void begin_round() {
+    const bool is_first = state_.rounds.empty();
+    const int round = int(state_.rounds.size()),
+              controls = is_first ? followed_controls() : state_.rounds.back().controls;
+    const VectorX theta = is_first ? VectorX() : state_.rounds.back().theta;
+    const std::vector<VectorX> own = is_first ? known_at_first() : to_follow_with(theta, controls);
+    if (!follow(followed_, own)) return stop(std::move(loop_));
+    round_ = described(own.front());
+    moduli_before_ = is_first ? followed_.front().material().moduli(own.front())
+                              : layout_of(controls).blocks.front().motion.moduli(theta);
+    FitState from = std::exchange(left_, {});
+    const bool is_resumed = !from.pass.done.empty() || from.pass.under_way || from.pass.begin;
+    if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
+    begin(Part::Round, "round " + std::to_string(round + 1), share(round), share(round + 1),
+          followed_captures(looped()), without_start(is_first ? options_ : with_chosen_controls(options_, controls)),
+          std::move(from));
+  }
+
+  /// All rounds were done before an interruption.
+  void begin_rounds_again() {
     const TrackingRound& round = state_.rounds.back();
-    if (!follow(followed_, to_follow_with(round.theta, round.controls))) return stop({});
-    outcome_ =
-        fit_once(followed_captures(is_both_ ? training_ : all_),
-                 with_chosen_controls(without_start(options_), round.controls), *state_.loop, "rounds", 0.5, 0.5);
-    return true;
+    if (!follow(followed_, to_follow_with(round.theta, round.controls))) return stop(std::move(direct_));
+    begin(Part::RoundsAgain, "rounds", 0.5, 0.5, followed_captures(looped()),
+          with_chosen_controls(without_start(options_), round.controls), {*state_.loop, {}, {}, {}});
+  }
+
+  /// The better one again, from where it is, with all frames.
+  void begin_last() {
+    const PassState& best = state_.keeps_loop ? *state_.loop : *state_.direct;
+    const VectorX theta = estimate_of(best)->theta;
+    FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
+    options = with_chosen_controls(std::move(options), best.controls);
+    std::vector<FollowedRecording> all;
+    std::vector<std::string> ignored;
+    for (const RecordedCapture& r : all_) all.emplace_back(r, options_, ignored);
+    if (!follow(all, to_follow_with(theta, best.controls))) return stop(std::move(state_.keeps_loop ? loop_ : direct_));
+    FitState from = left_.pass.begin ? std::exchange(left_, {}) : from_there(best, theta);
+    begin(Part::Last, "all frames", 0.9, 1.0, state_.keeps_loop ? followed_captures(all_) : all_, options,
+          std::move(from));
+  }
+
+  void end_part(FitOutcome outcome, PassState reached) {
+    switch (part_) {
+      case Part::Round:
+        return end_round(std::move(outcome), std::move(reached));
+      case Part::RoundsAgain:
+        loop_ = std::move(outcome);
+        break;
+      case Part::Points:
+        if (outcome.interrupted) {
+          final_ = std::move(outcome);
+          return;
+        }
+        if (outcome.evaluation.succeeded) state_.direct = std::move(reached);
+        direct_ = std::move(outcome);
+        break;
+      case Part::Last:
+        final_ = with_choice_of_points(std::move(outcome));
+        return;
+    }
+    if (state_.phase == Phase::Direct && loop_ && direct_) compare();
+  }
+
+  void end_round(FitOutcome outcome, PassState reached) {
+    if (outcome.interrupted || !outcome.evaluation.succeeded) {
+      final_ = std::move(outcome);
+      return;
+    }
+    round_.theta = outcome.theta, round_.controls = controls_of(outcome);
+    round_.fit_rms = outcome.evaluation.track_rms();
+    round_.change = change(moduli_before_, layout_of(round_.controls).blocks.front().motion.moduli(outcome.theta));
+    state_.loop = std::move(reached);
+    state_.rounds.push_back(round_);
+    loop_ = std::move(outcome);
+    if (round_.change < settled || int(state_.rounds.size()) >= options_.tracking_rounds) state_.phase = Phase::Direct;
+  }
+
+  /// Both estimates by the frames that were left out.
+  void compare() {
+    result_.loop = score(*loop_), result_.direct = score(*direct_);
+    state_.keeps_loop =
+        !result_.direct->succeeded || (result_.loop->succeeded && result_.loop->cost < result_.direct->cost);
+    state_.phase = Phase::Last;
+  }
+
+  FitOutcome with_choice_of_points(FitOutcome outcome) const {
+    if (state_.keeps_loop || !direct_) return outcome;
+    outcome.fields = direct_->fields;
+    if (!outcome.fields.empty()) outcome.notes.insert(outcome.notes.begin(), direct_->notes.front());
+    return outcome;
   }
 
   /// Of ln E by an estimate, the greatest of all moduli; by their mean in the logarithm where there were fewer or more.
@@ -288,22 +351,6 @@ class TrackingLoop {
       greatest = std::max(greatest, std::abs(std::log(after[k]) - from));
     }
     return greatest;
-  }
-
-  bool direct() {
-    direct_ = fit_once(training_, for_points(options_), std::exchange(left_, {}), "points", 0.5, 0.9);
-    if (direct_->interrupted) {
-      outcome_ = std::move(*direct_);
-      return false;
-    }
-    if (direct_->evaluation.succeeded) state_.direct = std::make_shared<FitState>(concluded());
-    if (!outcome_ && !resume_loop()) return stop(std::move(direct_));
-    result_.loop = score(*outcome_), result_.direct = score(*direct_);
-    state_.keeps_loop =
-        !result_.direct->succeeded || (result_.loop->succeeded && result_.loop->cost < result_.direct->cost);
-    state_.phase = Phase::Last;
-    save({});
-    return true;
   }
 
   HeldOutFrames score(const FitOutcome& outcome) const {
@@ -333,30 +380,6 @@ class TrackingLoop {
     return Objective(d.mismatch, d.body, d.simulation, observations,
                      ParameterSet(outcome.parameters.layout(), {}, outcome.theta), o)
         .evaluate(VectorX(0));
-  }
-
-  /// The better one again, from where it is, with all frames.
-  FitOutcome last() {
-    const std::shared_ptr<const FitState> best = state_.keeps_loop ? state_.loop : state_.direct;
-    const VectorX& theta = estimate_of(*best)->theta;
-    FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
-    options = with_chosen_controls(std::move(options), best->controls);
-    std::vector<FollowedRecording> all;
-    std::vector<std::string> ignored;
-    for (const RecordedCapture& r : all_) all.emplace_back(r, options_, ignored);
-    if (!follow(all, to_follow_with(theta, best->controls))) {
-      stop(std::move(state_.keeps_loop ? outcome_ : direct_));
-      return told(std::move(*outcome_));
-    }
-    const bool goes_on = left_.begin.has_value();
-    FitState from = goes_on ? std::exchange(left_, {}) : from_there(*best, theta);
-    FitOutcome outcome =
-        fit_once(state_.keeps_loop ? followed_captures(all_) : all_, options, std::move(from), "all frames", 0.9, 1.0);
-    if (!state_.keeps_loop && direct_) {
-      outcome.fields = direct_->fields;
-      if (!outcome.fields.empty()) outcome.notes.insert(outcome.notes.begin(), direct_->notes.front());
-    }
-    return told(std::move(outcome));
   }
 
   /// With all that was done on the way; the agreement is that with the points.
@@ -414,18 +437,25 @@ class TrackingLoop {
                            : " was kept and finished with all frames.");
   }
 
-  const std::vector<RecordedCapture>& all_;
+  std::vector<RecordedCapture> all_;
   FitOptions options_;
-  FitMonitor monitor_;
+  std::function<bool()> interrupted_;
   bool is_both_;
   std::vector<RecordedCapture> training_, held_out_;
   std::vector<FollowedRecording> followed_;
   std::vector<std::string> notes_;  // of reading the recordings, which the fits tell too
   FitState::Tracking state_;
-  FitState left_;     // by an interruption
-  FitState reached_;  // by the fit that runs
+  FitState left_;  // by an interruption
   std::vector<std::shared_ptr<const Track>> tracks_;
-  std::optional<FitOutcome> outcome_, direct_;
+  // The part under way.
+  Part part_ = Part::Round;
+  std::unique_ptr<PassPlanner> inner_;
+  std::string name_;
+  double done_from_ = 0.0, done_to_ = 1.0;
+  TrackingRound round_;
+  VectorX moduli_before_;
+  // What came out.
+  std::optional<FitOutcome> loop_, direct_, final_;
   TrackingOutcome result_;
   std::vector<std::pair<int, FitEvent>> history_;  // with the number of control moduli
   long long forward_steps_ = 0;
@@ -458,9 +488,9 @@ TrackedPoints supported_points(const Track& track, double size) {
   return tracked;
 }
 
-FitOutcome fit_with_tracking(const std::vector<RecordedCapture>& recordings, const FitOptions& options,
-                             const FitMonitor& monitor, FitState resume) {
-  return TrackingLoop(recordings, options, monitor, std::move(resume)).run();
+std::unique_ptr<PassPlanner> planner_of_tracking(std::vector<RecordedCapture> recordings, const FitOptions& options,
+                                                 std::function<bool()> interrupted, FitState resume) {
+  return std::make_unique<TrackingLoop>(std::move(recordings), options, std::move(interrupted), std::move(resume));
 }
 
 }  // namespace pliant

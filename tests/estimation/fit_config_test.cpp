@@ -10,8 +10,8 @@ namespace {
 
 TEST(FitConfig, FormerWordsAreRead) {
   FitOptions o;
-  set_fit_option(o, "poisson_ratio=0.2");
-  set_fit_option(o, "poisson_ratio@foam.estimate=false");
+  set_fit_option(o, "poissons_ratio=0.2");
+  set_fit_option(o, "poissons_ratio@foam.estimate=false");
   ASSERT_TRUE(o.parameters.contains("poissons_ratio"));
   EXPECT_EQ((*o.parameters["poissons_ratio"].start)[0], 0.2);
   EXPECT_EQ(o.parameters["poissons_ratio@foam"].estimated, false);
@@ -241,7 +241,7 @@ TEST(Overrides, RefusesWhatIsNotThere) { EXPECT_THROW(overridden({"range_error@m
 
 FitState some_state() {
   FitState state;
-  state.controls = 3;
+  state.pass.controls = 3;
   StageRecord scan{{StageKind::Scan}, "scan", VectorX::LinSpaced(20, -1.0, 3.0) / 7.0, VectorX::Constant(20, 0.1)};
   scan.trials = {{100.0, 2.5}, {1000.0, std::numeric_limits<double>::infinity()}, {1.0 / 3.0, 1e-300}};
   scan.succeeded = true;
@@ -251,11 +251,11 @@ FitState some_state() {
   start.reason = "steps became \"short\"";
   StageRecord test{{StageKind::Test}, "test", VectorX::Constant(4, 0.1), VectorX::Constant(4, 0.1)};
   test.corrected = {"sensor_turn@front", "sensor_shift@front"}, test.told = "the pose of front";
-  state.done = {scan, start, test};
-  state.under_way = {{StageKind::Fine, 1, 0},
-                     VectorX::Constant(20, 2.0 / 7.0),
-                     {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
-  state.begin = {VectorX::Constant(20, 5.0 / 7.0), 2};
+  state.pass.done = {scan, start, test};
+  state.pass.under_way = {{StageKind::Fine, 1, 0},
+                          VectorX::Constant(20, 2.0 / 7.0),
+                          {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
+  state.pass.begin = {VectorX::Constant(20, 5.0 / 7.0), 2};
   FitState::LawSearch& law = state.law.emplace();
   law.done = {{{{2, 1, 2, true}, 1.0 / 3.0, -std::numeric_limits<double>::infinity(), false},
                {{0, ZoneCut::By::Depth, 1e-3 / 3.0}},
@@ -275,10 +275,10 @@ TEST(FitState, RoundTripsToTheLastBit) {
   const FitState written = some_state();
   write_fit_state(folder / "state.json", written, "key");
   const FitState read = read_fit_state(folder / "state.json", "key");
-  EXPECT_EQ(read.controls, 3);
-  ASSERT_EQ(read.done.size(), written.done.size());
-  for (std::size_t i = 0; i < read.done.size(); ++i) {
-    const StageRecord &r = read.done[i], &w = written.done[i];
+  EXPECT_EQ(read.pass.controls, 3);
+  ASSERT_EQ(read.pass.done.size(), written.pass.done.size());
+  for (std::size_t i = 0; i < read.pass.done.size(); ++i) {
+    const StageRecord &r = read.pass.done[i], &w = written.pass.done[i];
     EXPECT_EQ(r.id, w.id);
     EXPECT_EQ(r.name, w.name);
     EXPECT_EQ(r.from, w.from);
@@ -294,15 +294,15 @@ TEST(FitState, RoundTripsToTheLastBit) {
     EXPECT_EQ(r.corrected, w.corrected);
     EXPECT_EQ(r.told, w.told);
   }
-  ASSERT_TRUE(read.under_way.has_value());
-  EXPECT_EQ(read.under_way->id, written.under_way->id);
-  EXPECT_EQ(read.under_way->from, written.under_way->from);
-  EXPECT_EQ(read.under_way->optimiser.iterations, 4);
-  EXPECT_EQ(read.under_way->optimiser.p, written.under_way->optimiser.p);
-  EXPECT_EQ(read.under_way->optimiser.memory, written.under_way->optimiser.memory);
-  ASSERT_TRUE(read.begin.has_value());
-  EXPECT_EQ(read.begin->theta, written.begin->theta);
-  EXPECT_EQ(read.begin->stage, 2);
+  ASSERT_TRUE(read.pass.under_way.has_value());
+  EXPECT_EQ(read.pass.under_way->id, written.pass.under_way->id);
+  EXPECT_EQ(read.pass.under_way->from, written.pass.under_way->from);
+  EXPECT_EQ(read.pass.under_way->optimiser.iterations, 4);
+  EXPECT_EQ(read.pass.under_way->optimiser.p, written.pass.under_way->optimiser.p);
+  EXPECT_EQ(read.pass.under_way->optimiser.memory, written.pass.under_way->optimiser.memory);
+  ASSERT_TRUE(read.pass.begin.has_value());
+  EXPECT_EQ(read.pass.begin->theta, written.pass.begin->theta);
+  EXPECT_EQ(read.pass.begin->stage, 2);
   ASSERT_TRUE(read.law.has_value());
   ASSERT_EQ(read.law->done.size(), 1u);
   const FitState::LawSearch::Done &done = read.law->done[0], &done_written = written.law->done[0];
@@ -320,7 +320,7 @@ TEST(FitState, RoundTripsToTheLastBit) {
   EXPECT_EQ(read.law->samples[0].sample.p[1].alpha, 0.4);
   EXPECT_EQ(read.law->samples[0].weight, 1.0 / 7.0);
   write_fit_state(folder / "empty.json", {}, "key");
-  EXPECT_TRUE(read_fit_state(folder / "empty.json", "key").done.empty());
+  EXPECT_TRUE(read_fit_state(folder / "empty.json", "key").pass.done.empty());
   EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").law.has_value());
 }
 
@@ -337,8 +337,8 @@ TEST(FitState, RefusesAnotherKeyAndDamage) {
         << length;
   for (const char* text :
        {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})", R"({"format": "fit-state/9", "key": "key"})",
-        R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [1]})",
-        R"({"format": "fit-state/9", "key": "key", "controls": 1, "done": [], "under_way": ["x"]})"})
+        R"({"format": "fit-state/9", "key": "key", "pass": {"controls": 1, "done": [1]}})",
+        R"({"format": "fit-state/9", "key": "key", "pass": {"controls": 1, "done": [], "under_way": ["x"]}})"})
     EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder.write("bad.json", text), "key"); }), "") << text;
 }
 

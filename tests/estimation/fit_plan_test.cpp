@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include "estimation/fit_state.hpp"
-
 namespace pliant {
 namespace {
 
@@ -82,7 +80,7 @@ struct Plans : testing::Test {
   }
 
   PlanFacts facts;
-  FitState state;
+  PassState state;
 };
 
 TEST_F(Plans, BeginWithTheMotionAtTheStart) {

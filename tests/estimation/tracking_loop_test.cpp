@@ -198,12 +198,11 @@ TEST(TrackingLoop, InterruptedAsItFollowsEndsWithTheBestSoFar) {
   expect_nothing(fit({bar}, one_round, interrupted_at_once(), left));
 
   // The points were fitted before, and the rounds' estimate is looked for again to compare with.
-  FitState points = *left.tracking->direct;
-  points.tracking = left.tracking;
+  FitState points{*left.tracking->direct, {}, left.tracking, {}};
   points.tracking->phase = Phase::Direct, points.tracking->direct.reset();
   const FitOutcome direct = fit({bar}, one_round, interrupted_at_once(), points);
   EXPECT_TRUE(direct.interrupted);
-  EXPECT_EQ(direct.theta, estimate_of(points)->theta);
+  EXPECT_EQ(direct.theta, estimate_of(points.pass)->theta);
 }
 
 TEST(TrackingLoop, GoesOnUntilNoModulusChanges) {

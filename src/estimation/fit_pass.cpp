@@ -1,0 +1,71 @@
+#include "estimation/fit_pass.hpp"
+
+#include "estimation/field_choice.hpp"
+#include "estimation/fit_run.hpp"
+
+namespace pliant {
+
+namespace {
+
+void rename(const Pass& pass, FitEvent& event) {
+  if (!pass.stage.empty() && event.kind != StageKind::Finer) event.stage = pass.stage;
+  event.stage = pass.name + event.stage;
+}
+
+}  // namespace
+
+FitOutcome carry_out(PassPlanner& planner, const FitMonitor& monitor) {
+  FitState state;
+  const auto save = [&] {
+    planner.write(state);
+    if (monitor.on_state) monitor.on_state(state);
+  };
+  while (std::optional<Pass> pass = planner.next()) {
+    PassState reached = pass->begin;
+    FitMonitor of_pass;
+    of_pass.interrupted = monitor.interrupted;
+    of_pass.on_event = [&](FitEvent event) {
+      event.fraction_done = pass->done_from + (pass->done_to - pass->done_from) * event.fraction_done;
+      rename(*pass, event);
+      if (monitor.on_event) monitor.on_event(event);
+    };
+    of_pass.on_state = [&](const FitState& s) {
+      reached = s.pass;
+      if (!pass->is_saved) return;
+      state.pass = s.pass;
+      save();
+    };
+    FitOutcome outcome = FitRun(pass->recordings, pass->options, of_pass, pass->begin).run();
+    for (FitEvent& event : outcome.history) rename(*pass, event);
+    const bool was_interrupted = outcome.interrupted;
+    if (!planner.take(std::move(outcome), std::move(reached)) || was_interrupted) continue;
+    state.pass = {};
+    save();
+  }
+  return planner.outcome();
+}
+
+OnePass::OnePass(std::vector<RecordedCapture> recordings, const FitOptions& options, PassState begin) {
+  pass_.recordings = std::move(recordings), pass_.options = options, pass_.begin = std::move(begin);
+}
+
+std::optional<Pass> OnePass::next() {
+  if (outcome_) return std::nullopt;
+  return pass_;
+}
+
+bool OnePass::take(FitOutcome outcome, PassState) {
+  outcome_ = std::move(outcome);
+  return false;
+}
+
+std::unique_ptr<PassPlanner> planner_of_points(std::vector<RecordedCapture> recordings, const FitOptions& options,
+                                               FitState resume) {
+  if (options.control_points == FitOptions::automatic && recordings.front().capture.scene.regions.empty())
+    return std::make_unique<FieldChoice>(std::move(recordings), options, std::move(resume));
+  FitOptions given = options;
+  if (given.control_points == FitOptions::automatic) given.control_points = 1;  // the regions are the field
+  return std::make_unique<OnePass>(std::move(recordings), given, std::move(resume.pass));
+}
+
+}  // namespace pliant
