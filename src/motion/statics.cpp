@@ -51,15 +51,15 @@ std::optional<double> Statics::linearise(const Points& x) {
 NewtonProblem::Residual Statics::residual() {
   residual_.setZero(rows(), 3);
   force_.resize(rows(), 3);
-  double scale = 0.0;
+  double squares = 0.0;
   for (ForceTerm* term : terms_) {
     force_.setZero();
     term->add_force(x_, force_);
-    scale += force_.norm();
+    squares += force_.squaredNorm();
     residual_ -= force_;
   }
   clear_held(residual_);
-  return {residual_.norm(), std::max(scale, options_.smallest_force)};
+  return {residual_.norm(), std::max(std::sqrt(squares), options_.smallest_force)};
 }
 
 void Statics::assemble_exact() {

@@ -149,7 +149,7 @@ TEST(PressFit, RefusesACaptureWithoutPressesToFit) {
   const auto law = press_law(*block.body, layout, law_parameters(layout, 9000.0).reference());
   const Capture capture =
       read_capture(write_press_capture(folder.path(), block.scene({PressedBlock::presses()[0]}, law), 1));
-  EXPECT_THAT(complaint_of([&] { (void)fit({{capture, {}}}, {}); }), HasSubstr("no press is to be fitted"));
+  EXPECT_THAT(complaint_of([&] { (void)fit({{capture, {}}}, {}); }), HasSubstr("no static test is to be fitted"));
   FitOptions options;
   options.law_zones = 3, options.control_points = 4;
   EXPECT_THAT(options.validate(), HasSubstr("cannot both"));

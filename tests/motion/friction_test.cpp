@@ -11,6 +11,9 @@ namespace {
 using test::tolerance;
 
 constexpr double gravity = 9.81, angle = 0.4;  // [m/s^2], [rad]
+/// Below about this speed friction is less than Coulomb's [m/s]: `default_friction_speed`. A few times as much is what
+/// starts and stops may differ by.
+const double fades = std::sqrt(2e-4 * gravity * 0.12);
 
 /// Of a stiff flat block that is let go on a slope: how fast it goes down, and sinks away from it, at the end [m/s].
 struct End {
@@ -62,22 +65,22 @@ TEST_P(Slope, SlidesWithTheAccelerationOfARigidBlock) {
   for (const double friction : {0.0, 0.1, 0.25}) {
     const double seconds = 0.5, expected = seconds * gravity * (std::sin(angle) - friction * std::cos(angle));
     const End end = slide(friction, seconds);
-    EXPECT_NEAR(end.along, expected, tolerance(0.02) * expected) << friction;
+    EXPECT_NEAR(end.along, expected, friction > 0.0 ? 3.0 * fades : tolerance(0.005) * expected) << friction;
+    EXPECT_GT(0.5 * gravity * friction * std::cos(angle), friction > 0.0 ? 9.0 * fades : -1.0) << "it shows";
     EXPECT_LT(std::abs(end.away), 0.02);
   }
 }
 
 TEST_P(Slope, SticksWhereFrictionCarriesIt) {
   const End end = slide(0.7, 0.5);  // tan(0.4) = 0.42
-  const double creeps = std::sqrt(2e-4 * gravity * 0.12);
-  EXPECT_LT(std::abs(end.along), 2.0 * creeps);
-  EXPECT_GT(gravity * std::sin(angle) * 0.5, 20.0 * creeps) << "without friction it would have gone";
+  EXPECT_LT(std::abs(end.along), 2.0 * fades);
+  EXPECT_GT(gravity * std::sin(angle) * 0.5, 20.0 * fades) << "without friction it would have gone";
 }
 
 TEST_P(Slope, StopsWhatGoesUp) {
-  const double expected = -0.6 + 0.1 * gravity * (std::sin(angle) + 0.2 * std::cos(angle));  // still going up
-  EXPECT_LT(expected, 0.0);
-  EXPECT_NEAR(slide(0.2, 0.1, -0.6).along, expected, tolerance(0.03) * 0.6);
+  const double expected = -0.9 + 0.1 * gravity * (std::sin(angle) + 0.4 * std::cos(angle));  // still going up
+  EXPECT_LT(expected, -10.0 * fades);
+  EXPECT_NEAR(slide(0.4, 0.1, -0.9).along, expected, 3.0 * fades);
 }
 
 INSTANTIATE_TEST_SUITE_P(Bodies, Slope,
