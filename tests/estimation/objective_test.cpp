@@ -178,7 +178,7 @@ TEST(Objective, SeveralVectorsAtOnceCostWhatEachCostsAlone) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     ASSERT_TRUE(together[i].succeeded) << together[i].failure;
     EXPECT_EQ(together[i].cost, objective.evaluate(points[i]).cost) << i;
-    EXPECT_EQ(together[i].frames.size(), 4u);
+    EXPECT_EQ(together[i].frames.size(), objective.evaluate(points[i]).frames.size());
     if (i > 0) {
       EXPECT_NE(together[i].cost, together[0].cost);
     }
