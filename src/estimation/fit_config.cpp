@@ -48,10 +48,10 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
 const std::set<std::string> parameter_names = {
-    "youngs_modulus",  "poissons_ratio",    "mass_damping",    "stiffness_damping", "density",    "gravity",
-    "linear_velocity", "angular_velocity",  "plane",           "plane_2",           "plane_3",    "plane_4",
-    "friction",        "friction_2",        "friction_3",      "friction_4",        "pull",       "range_error",
-    "sensor_turn",     "sensor_shift",      "scan_correction", "exponent_1",        "exponent_2", "exponent_3",
+    "youngs_modulus",    "poissons_ratio",   "mass_damping",    "stiffness_damping", "density",    "gravity",
+    "linear_velocity",   "angular_velocity", "plane",           "plane_2",           "plane_3",    "plane_4",
+    "friction",          "friction_2",       "friction_3",      "friction_4",        "pull",       "range_error",
+    "sensor_turn",       "sensor_shift",     "scan_correction", "exponent_1",        "exponent_2", "exponent_3",
     "stiffness_ratio_2", "stiffness_ratio_3"};
 
 std::string text_of(double value) {
@@ -224,11 +224,11 @@ const std::vector<Entry>& entries() {
                  "impose Dirichlet conditions of held regions strongly, by elimination of nodes, instead of weakly by "
                  "Nitsche's method",
                  &FitOptions::hold_strongly),
-      choice_entry(
-          "material",
-          "material law; automatic: linear elasticity for motions and equilibria, Ogden's law where static tests are all "
-          "there is; sampled: the stiffness of each press interpolated in strain space, for presses alone",
-          materials, &FitOptions::material),
+      choice_entry("material",
+                   "material law; automatic: linear elasticity for motions and equilibria, Ogden's law where static "
+                   "tests are all "
+                   "there is; sampled: the stiffness of each press interpolated in strain space, for presses alone",
+                   materials, &FitOptions::material),
       integer_entry("law_terms", "0..3",
                     "number of terms of Ogden's law; 0: one for motions and equilibria, else as many as the static "
                     "tests support",

@@ -285,7 +285,7 @@ class PressFit {
                       is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear};
     const Form form{layout_of(law), scene_};
     const char* const stage = terms > 0 ? "1 term" : is_neo_hookean ? "neo-Hookean" : "linear";
-    auto first = estimate(form, parameters_of(form).reference(), stage);
+    auto first = estimate(form, scaled(form, parameters_of(form).reference()), stage);
     if (terms == 1 && scene_->static_tests().any_to_fit() && !done_before(form.layout.form()) && !stop())
       try_other_sign(form, first);
     if (!first) {
@@ -297,12 +297,28 @@ class PressFit {
     return !interrupted_;
   }
 
+  /// Where forces were measured at given depths: the start with the moduli that fit them best, whatever else the law
+  /// has. Steps of all its numbers at once would make exponents pay for a wrong scale.
+  VectorX scaled(const Form& form, const VectorX& start) {
+    if (!scene_->static_tests().any_to_fit() || done_before(form.layout.form())) return start;
+    Estimate e = begun(form, start);
+    const std::vector<Parameter> all = e.parameters.parameters();
+    for (const Parameter& p : all)
+      if (p.unit != "Pa") e.parameters.set_estimated(p.name, false);
+    PressObjective objective = objective_of(e);
+    OptimiserOptions o;
+    o.max_iterations = brief_iterations;
+    const OptimiserSummary s = minimise(objective.cost(), {0, e.parameters.to_unconstrained(start), {}}, o,
+                                        [&](const Iteration&) { return !stop(); });
+    return s.succeeded ? e.parameters.to_theta(s.p) : start;
+  }
+
   /// Curves of growing load fit exponents of either sign, each in a valley of its own: keeps the better.
   void try_other_sign(const Form& form, std::optional<Estimate>& first) {
     const double noise = noise_;
     VectorX start = parameters_of(form).reference();
     start[form.layout.exponent(0)] *= -2.0;
-    auto other = minimised(form, start, "1 term");
+    auto other = minimised(form, scaled(form, start), "1 term");
     if (other && (!first || squares_of(other->evaluation, noise) < squares_of(first->evaluation, noise)))
       first = std::move(other);
     else

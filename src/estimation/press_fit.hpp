@@ -12,14 +12,14 @@ RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const Law
 /// Poisson's ratio where the choices give it and keep it; nothing: it is estimated.
 std::optional<double> known_poissons_ratio(const FitOptions& options);
 
-/// Estimates an object's material from static tests with known forces (presses, force-depth curves, measurements between
-/// grips, stress-strain curves): Ogden's law of one term from the stiffness of a punch
-/// on a half space, more terms, and Poisson's ratios of their own for them, as long as the Bayesian information
-/// criterion falls; then zones of laws of their own, cut one after the other where that promises most, as long as the
-/// evidence supports them (`log_bayes_factor`) and each takes three per cent off the squares of the residuals, or,
-/// where a capture names regions, a law for each of them; and where no zone is kept, control points of Young's modulus
-/// by their evidence. The noise is what the residuals say, robustly. For a sampled material the law of one term is what
-/// each press's field is smooth about.
+/// Estimates an object's material from static tests with known forces (presses, force-depth curves, measurements
+/// between grips, stress-strain curves): Ogden's law of one term from the stiffness of a punch on a half space, more
+/// terms, and Poisson's ratios of their own for them, as long as the Bayesian information criterion falls; then zones
+/// of laws of their own, cut one after the other where that promises most, as long as the evidence supports them
+/// (`log_bayes_factor`) and each takes three per cent off the squares of the residuals, or, where a capture names
+/// regions, a law for each of them; and where no zone is kept, control points of Young's modulus by their evidence. The
+/// noise is what the residuals say, robustly. For a sampled material the law of one term is what each press's field is
+/// smooth about.
 /// @return  with `FitOutcome::law`
 /// Throws InputError where the capture has no static test to fit or cannot be fitted, or where options are chosen that
 /// static tests do not know.

@@ -8,8 +8,8 @@
 #include "capture/curves.hpp"
 #include "estimation/material_tests.hpp"
 #include "model/result.hpp"
-#include "motion/equilibrium.hpp"
 #include "motion/contact_defaults.hpp"
+#include "motion/equilibrium.hpp"
 
 namespace pliant {
 
