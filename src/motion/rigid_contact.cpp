@@ -119,58 +119,82 @@ void RigidContact::for_bonded(Visit&& visit) const {
 void RigidContact::linearise(const Points& lag) {
   if (is_bonded()) return;
   active_.clear();
+  details_.clear();
   const double reach = penalty_.reach();
-  const bool has_friction = may_rub();
+  const bool rubbing = rubs();
   for (int p = 0; p < points_.point_count(); ++p) {
     const Vector3 y = relative(p, lag);
-    if (plane_ && plane_normal_.dot(y - plane_point_) > reach) continue;
-    const RigidShape::Sample at = surface(y);
-    if (at.distance > reach) continue;
-    const Penalty::Value value = penalty_.pressure_at(at.distance);
-    const double a = area_[std::size_t(p)];
-    Active c;
-    c.point = p, c.y = y, c.normal = at.gradient, c.bend = at.hessian, c.gap = at.distance;
-    c.force = a * value.pressure, c.slope = a * value.slope, c.curvature = a * value.curvature;
-    if (has_friction) {
-      c.start = relative(p, *start_);
-      c.per_normal = 1.0 / c.normal.norm();
-      c.axis = c.per_normal * c.normal;
-      c.axis_way = c.axis.dot(y - c.start);
-      c.way = c.across(y - c.start);
-      c.length = std::sqrt(c.way.squaredNorm() + threshold_ * threshold_);
-      c.drag = friction_ * c.force / c.length;
+    if (shape_) {
+      const RigidShape::Sample at = shape_->sample(y);
+      if (at.distance > reach) continue;
+      touch(p, y, at.distance, at.gradient);
+      details_.emplace_back().bend = at.hessian;
+    } else {
+      const double gap = plane_normal_.dot(y - plane_point_);
+      if (gap > reach) continue;
+      touch(p, y, gap, plane_normal_);
+      if (rubbing) details_.emplace_back();
     }
-    active_.push_back(c);
+    if (rubbing) add_friction(active_.back(), details_.back());
   }
 }
 
-RigidContact::Offsets RigidContact::offsets(const Active& c, const Points& z) const {
+void RigidContact::touch(int point, const Vector3& y, double gap, const Vector3& normal) {
+  const Penalty::Value value = penalty_.pressure_at(gap);
+  const double a = area_[std::size_t(point)];
+  active_.push_back({point, y, normal, gap, a * value.pressure, a * value.slope, a * value.curvature});
+}
+
+void RigidContact::add_friction(const Active& c, Detail& m) const {
+  m.start = relative(c.point, *start_);
+  m.per_normal = 1.0 / c.normal.norm();
+  m.axis = m.per_normal * c.normal;
+  m.axis_way = m.axis.dot(c.y - m.start);
+  m.way = m.across(c.y - m.start);
+  m.length = std::sqrt(m.way.squaredNorm() + threshold_ * threshold_);
+  m.drag = friction_ * c.force / m.length;
+}
+
+RigidContact::Detail RigidContact::detail(std::size_t i) const {
+  Detail m;
+  if (!details_.empty()) m = details_[i];
+  if (may_rub() && !rubs()) add_friction(active_[i], m);
+  return m;
+}
+
+RigidContact::Offsets RigidContact::offsets(const Active& c, const Detail& m, const Points& z) const {
   const Vector3 y = relative(c.point, z);
   Offsets o;
   o.q = y - c.y;
   o.c = c.normal.dot(o.q);
-  o.normal = c.axis.dot(y - c.start);
-  o.slid = c.across(y - c.start);
+  o.normal = m.axis.dot(y - m.start);
+  o.slid = m.across(y - m.start);
   return o;
 }
 
 void RigidContact::add_force(const Points& z, Points& force) {
   if (is_bonded())
     for_bonded([&](int i, double k) { scatter(i, -k * (relative(i, z) - rest_[std::size_t(i)]), force); });
-  for (const Active& c : active_) {
-    const Offsets o = offsets(c, z);
-    Vector3 f = (c.force + c.slope * o.c) * c.normal;
-    if (c.drag > 0.0) f -= c.drag * o.slid;
+  const bool rubbing = rubs();
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    const Active& c = active_[i];
+    const Vector3 y = relative(c.point, z);
+    Vector3 f = (c.force + c.slope * c.normal.dot(y - c.y)) * c.normal;
+    if (rubbing) f -= details_[i].drag * details_[i].across(y - details_[i].start);
     scatter(c.point, f, force);
   }
 }
 
 void RigidContact::add_matrix(double scale, BlockMatrix& matrix) {
   if (is_bonded()) for_bonded([&](int i, double k) { scatter_block(i, scale * k * Matrix3::Identity(), matrix); });
-  for (const Active& c : active_) {
-    const Matrix3 nn = c.normal * c.normal.transpose();
-    Matrix3 block = -scale * c.slope * nn;
-    if (c.drag > 0.0) block += scale * c.drag * (Matrix3::Identity() - c.axis * c.axis.transpose());
+  const bool rubbing = rubs();
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    const Active& c = active_[i];
+    Matrix3 block = -scale * c.slope * c.normal * c.normal.transpose();
+    if (rubbing) {
+      const Detail& m = details_[i];
+      block += scale * m.drag * (Matrix3::Identity() - m.axis * m.axis.transpose());
+    }
     scatter_block(c.point, block, matrix);
   }
 }
@@ -180,18 +204,22 @@ void RigidContact::add_matrix(double scale, BlockMatrix& matrix) {
 ///   friction:  -slid (d drag)^T + drag ((m.w) A + m (A^T w)^T), w = y_z - start, drag = mu F / r, m = n / |n|, A =
 ///   dm/dy
 void RigidContact::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
-  for (const Active& c : active_) {
-    const Offsets o = offsets(c, z);
-    Matrix3 change = c.normal * (c.curvature * o.c * c.normal + c.slope * (c.bend * o.q)).transpose() +
-                     (c.force + c.slope * o.c) * c.bend;
-    if (c.drag > 0.0) {
-      const Matrix3 bend = c.per_normal * (c.bend - c.axis * (c.axis.transpose() * c.bend));
-      const Vector3 by_length = (c.way - c.axis_way * (bend.transpose() * c.way)) / c.length;
-      const Vector3 by_drag = (friction_ * c.slope * c.normal - c.drag * by_length) / c.length;
-      const Vector3 w = o.slid + o.normal * c.axis;
-      change += c.drag * (o.normal * bend + c.axis * (bend.transpose() * w).transpose()) - o.slid * by_drag.transpose();
+  const Detail none;
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    const Active& c = active_[i];
+    const Detail& m = details_.empty() ? none : details_[i];
+    const Offsets o = offsets(c, m, z);
+    if (details_.empty() && o.c == 0.0) continue;
+    Matrix3 change = c.normal * (c.curvature * o.c * c.normal + c.slope * (m.bend * o.q)).transpose() +
+                     (c.force + c.slope * o.c) * m.bend;
+    if (m.drag > 0.0) {
+      const Matrix3 bend = m.per_normal * (m.bend - m.axis * (m.axis.transpose() * m.bend));
+      const Vector3 by_length = (m.way - m.axis_way * (bend.transpose() * m.way)) / m.length;
+      const Vector3 by_drag = (friction_ * c.slope * c.normal - m.drag * by_length) / m.length;
+      const Vector3 w = o.slid + o.normal * m.axis;
+      change += m.drag * (o.normal * bend + m.axis * (bend.transpose() * w).transpose()) - o.slid * by_drag.transpose();
     }
-    if (!change.isZero(0.0)) scatter_block(c.point, -scale * change, matrix);
+    scatter_block(c.point, -scale * change, matrix);
   }
 }
 
@@ -210,22 +238,26 @@ void RigidContact::add_force_tangent(const Points& z, const Points& d_lag, const
   const Vector3 d_point = plane_ ? plane_->point.vector(d_theta) : Vector3::Zero();
   const Vector3 d_plane_normal = plane_ ? plane_->normal.vector(d_theta) : Vector3::Zero();
   const double d_friction = plane_ && plane_->friction.exists() ? d_theta[plane_->friction] : 0.0;
-  const bool adds_friction = d_friction != 0.0 && may_rub();
-  for (const Active& c : active_) {
-    const Offsets o = offsets(c, z);
+  const bool has_details = shape_ || rubs() || (d_friction != 0.0 && may_rub());
+  const Detail none;
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    const Active& c = active_[i];
+    const Detail m = has_details ? detail(i) : none;
+    const Offsets o = offsets(c, m, z);
     const Vector3 d_y = relative_change(c.point, d_lag), d_end = relative_change(c.point, d_z);
     const Vector3 d_from_plane = d_y - d_point;
-    const Vector3 d_normal = c.bend * d_from_plane + d_plane_normal;
+    Vector3 d_normal = d_plane_normal;
+    if (shape_) d_normal += m.bend * d_from_plane;
     const double d_gap = c.normal.dot(d_from_plane) + d_plane_normal.dot(c.y - plane_point_);
     const double d_c = d_normal.dot(o.q) + c.normal.dot(d_end - d_y);
     Vector3 f = (c.curvature * o.c * d_gap + c.slope * (d_gap + d_c)) * c.normal + (c.force + c.slope * o.c) * d_normal;
-    if (c.drag > 0.0) {
-      const Vector3 d_axis = c.axis_change(d_normal), w = o.slid + o.normal * c.axis;
-      const double d_length = (c.way.dot(d_y) - c.way.dot(d_axis) * c.axis_way) / c.length;
-      const double d_drag = (friction_ * c.slope * d_gap - c.drag * d_length) / c.length;
-      f -= d_drag * o.slid + c.drag * (c.across(d_end) - o.normal * d_axis - d_axis.dot(w) * c.axis);
+    if (m.drag > 0.0) {
+      const Vector3 d_axis = m.axis_change(d_normal), w = o.slid + o.normal * m.axis;
+      const double d_length = (m.way.dot(d_y) - m.way.dot(d_axis) * m.axis_way) / m.length;
+      const double d_drag = (friction_ * c.slope * d_gap - m.drag * d_length) / m.length;
+      f -= d_drag * o.slid + m.drag * (m.across(d_end) - o.normal * d_axis - d_axis.dot(w) * m.axis);
     }
-    if (adds_friction) f -= d_friction * c.force / c.length * o.slid;
+    if (has_details && may_rub()) f -= d_friction * c.force / m.length * o.slid;
     scatter(c.point, f, force);
   }
 }
@@ -235,28 +267,33 @@ void RigidContact::add_force_adjoint(const Points& z, const Points& w, Points& l
   if (is_bonded()) for_bonded([&](int i, double k) { scatter(i, -k * relative_change(i, w), z_bar); });
   Vector3 point_bar = Vector3::Zero(), plane_normal_bar = Vector3::Zero();
   double friction_bar = 0.0;
-  for (const Active& c : active_) {
-    const Offsets o = offsets(c, z);
+  const bool rubbing = may_rub();
+  const Detail none;
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    const Active& c = active_[i];
+    const Detail m = shape_ || rubbing ? detail(i) : none;
+    const Offsets o = offsets(c, m, z);
     const Vector3 v = relative_change(c.point, w);
     const double along = v.dot(c.normal);
     double gap_bar = (c.curvature * o.c + c.slope) * along;
     Vector3 end_bar = c.slope * along * c.normal, y_bar = -end_bar;
     Vector3 normal_bar = (c.force + c.slope * o.c) * v + c.slope * along * o.q;
-    if (may_rub()) {
+    if (rubbing) {
       const double drag_bar = -o.slid.dot(v);
-      friction_bar += drag_bar * c.force / c.length;
-      if (c.drag > 0.0) {
-        const Vector3 w_z = o.slid + o.normal * c.axis;
-        end_bar -= c.drag * c.across(v);
-        Vector3 axis_bar = c.drag * (o.normal * v + c.axis.dot(v) * w_z);
-        gap_bar += drag_bar * friction_ * c.slope / c.length;
-        const double length_bar = -drag_bar * c.drag / c.length;
-        y_bar += length_bar / c.length * c.way;
-        axis_bar -= length_bar * c.axis_way / c.length * c.way;
-        normal_bar += c.axis_change(axis_bar);
+      friction_bar += drag_bar * c.force / m.length;
+      if (m.drag > 0.0) {
+        const Vector3 w_z = o.slid + o.normal * m.axis;
+        end_bar -= m.drag * m.across(v);
+        Vector3 axis_bar = m.drag * (o.normal * v + m.axis.dot(v) * w_z);
+        gap_bar += drag_bar * friction_ * c.slope / m.length;
+        const double length_bar = -drag_bar * m.drag / m.length;
+        y_bar += length_bar / m.length * m.way;
+        axis_bar -= length_bar * m.axis_way / m.length * m.way;
+        normal_bar += m.axis_change(axis_bar);
       }
     }
-    const Vector3 from_plane_bar = c.bend * normal_bar + gap_bar * c.normal;
+    Vector3 from_plane_bar = gap_bar * c.normal;
+    if (shape_) from_plane_bar += m.bend * normal_bar;
     y_bar += from_plane_bar;
     point_bar -= from_plane_bar;
     plane_normal_bar += normal_bar + gap_bar * (c.y - plane_point_);
@@ -270,22 +307,24 @@ void RigidContact::add_force_adjoint(const Points& z, const Points& w, Points& l
 }
 
 void RigidContact::add_start_tangent(const Points& z, const Points& d_start, const Points&, Points& force) {
-  for (const Active& c : active_) {
-    if (!(c.drag > 0.0)) continue;
-    const Offsets o = offsets(c, z);
+  for (std::size_t i = 0; i < active_.size() && rubs(); ++i) {
+    const Active& c = active_[i];
+    const Detail& m = details_[i];
+    const Offsets o = offsets(c, m, z);
     const Vector3 change = relative_change(c.point, d_start);
-    const double d_drag = c.drag * c.way.dot(change) / (c.length * c.length);
-    scatter(c.point, c.drag * c.across(change) - d_drag * o.slid, force);
+    const double d_drag = m.drag * m.way.dot(change) / (m.length * m.length);
+    scatter(c.point, m.drag * m.across(change) - d_drag * o.slid, force);
   }
 }
 
 void RigidContact::add_start_adjoint(const Points& z, const Points& w, Points& start_bar, Points&) {
-  for (const Active& c : active_) {
-    if (!(c.drag > 0.0)) continue;
-    const Offsets o = offsets(c, z);
+  for (std::size_t i = 0; i < active_.size() && rubs(); ++i) {
+    const Active& c = active_[i];
+    const Detail& m = details_[i];
+    const Offsets o = offsets(c, m, z);
     const Vector3 v = relative_change(c.point, w);
     const double drag_bar = -o.slid.dot(v);
-    scatter(c.point, c.drag * c.across(v) + drag_bar * c.drag / (c.length * c.length) * c.way, start_bar);
+    scatter(c.point, m.drag * m.across(v) + drag_bar * m.drag / (m.length * m.length) * m.way, start_bar);
   }
 }
 

@@ -87,11 +87,14 @@ class RigidContact : public ForceTerm {
  private:
   /// A sample that is touched, about the lag point.
   struct Active {
-    int point = 0;
-    Vector3 y = Vector3::Zero(), normal = Vector3::Zero();
+    int point;
+    Vector3 y, normal;
+    double gap;                      // [m]
+    double force, slope, curvature;  // a p(gap) and its derivatives by the gap
+  };
+  /// What curved shapes and friction add to that.
+  struct Detail {
     Matrix3 bend = Matrix3::Zero();                          // of the distance: dn/dy
-    double gap = 0.0;                                        // [m]
-    double force = 0.0, slope = 0.0, curvature = 0.0;        // a p(gap) and its derivatives by the gap
     Vector3 start = Vector3::Zero(), way = Vector3::Zero();  // y at the step's start, and T (y - start)
     double drag = 0.0, length = 1.0;                         // mu a p / length, length = sqrt(|way|^2 + s^2)
     Vector3 axis = Vector3::Zero();           // n / |n|: gradients of interpolated distances are no units
@@ -115,7 +118,13 @@ class RigidContact : public ForceTerm {
   /// The transpose of `relative_change`.
   void scatter(int point, const Vector3& vector, Points& out) const;
   void scatter_block(int point, const Matrix3& block, BlockMatrix& matrix) const;
-  Offsets offsets(const Active& c, const Points& z) const;
+  Offsets offsets(const Active& c, const Detail& m, const Points& z) const;
+  /// Adds an active sample.
+  void touch(int point, const Vector3& y, double gap, const Vector3& normal);
+  /// Adds what friction needs to a sample's details.
+  void add_friction(const Active& c, Detail& m) const;
+  /// Details of an active sample, with friction where there may be some.
+  Detail detail(std::size_t i) const;
   template <class Visit>
   void for_bonded(Visit&& visit) const;
 
@@ -133,6 +142,7 @@ class RigidContact : public ForceTerm {
       links_;  // of each sample's nodes: blocks (node, row), then (row, node); -1 for those that weigh nothing
   const Points* start_ = nullptr;
   std::vector<Active> active_;
+  std::vector<Detail> details_;  // of the active samples; empty for a smooth plane
 };
 
 }  // namespace pliant
