@@ -120,22 +120,16 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
     result.succeeded = false;
     return result.failure = seen.name + ": the equilibrium is not stable", result;
   }
-  const std::vector<ParameterHandle> blocks = material_->layout().all();
-  std::vector<int> place(std::size_t(theta.size()), -1);
-  std::vector<Eigen::Index> rows_of_theta;
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
-    place[std::size_t(blocks[k].first)] = int(k);
-    rows_of_theta.push_back(blocks[k].first);
-  }
-  std::vector<Points> changes(blocks.size(), Points::Zero(scene_->body->node_count(), 3));  // of dW/dx
+  const LawNumbers numbers(material_->layout(), theta.size());
+  std::vector<Points> changes(numbers.count(), Points::Zero(scene_->body->node_count(), 3));  // of dW/dx
   for_law_derivatives(body_.elasticity(), *material_, theta,
                       [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                        Points& change = changes[std::size_t(place[std::size_t(at.first)])];
+                        Points& change = changes[numbers[at]];
                         for (std::size_t a = 0; a < nodes.size(); ++a)
                           change.row(nodes[a]) += share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
                       });
-  MatrixX by_parameters(off.size() + 1, Eigen::Index(blocks.size()));
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
+  MatrixX by_parameters(off.size() + 1, Eigen::Index(numbers.count()));
+  for (std::size_t k = 0; k < numbers.count(); ++k) {
     const Points moved = body_.response(-changes[k]);
     Points there = body_.embedding().positions(moved);
     there = (there * seen.seen / seen.markers_std).eval();
@@ -148,7 +142,7 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
   }
   VectorX residuals(off.size() + 1);
   residuals << flat(off), pull;
-  const MatrixX J = by_parameters * directions(rows_of_theta, Eigen::all);
+  const MatrixX J = by_parameters * directions(numbers.rows, Eigen::all);
   FrameFit& fit = result.frames.front();
   fit.gradient = J.transpose() * residuals;
   fit.gauss_newton = J.transpose() * J;

@@ -19,4 +19,20 @@ void for_law_derivatives(const LawElasticity& elasticity, const PressedMaterial&
   });
 }
 
+/// Numbers of a law among those of a parameter vector, each with its place in the law's order.
+struct LawNumbers {
+  /// @param size  of the parameter vector
+  LawNumbers(const LawLayout& layout, Eigen::Index size) : place(std::size_t(size), -1) {
+    for (const ParameterHandle& number : layout.all()) {
+      place[std::size_t(number.first)] = int(rows.size());
+      rows.push_back(number.first);
+    }
+  }
+  std::size_t count() const { return rows.size(); }
+  std::size_t operator[](const ParameterHandle& number) const { return std::size_t(place[std::size_t(number.first)]); }
+
+  std::vector<int> place;          ///< of each number of the parameter vector; -1: none of the law's
+  std::vector<Eigen::Index> rows;  ///< in the parameter vector, of each number of the law
+};
+
 }  // namespace pliant

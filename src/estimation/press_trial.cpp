@@ -84,30 +84,24 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
     return result.failure = scene_->presses[std::size_t(press_)].name + ": the equilibrium is not stable", result;
   }
   // Changes of the forces -dW/dx by each of the law's parameters.
-  const std::vector<ParameterHandle> blocks = material_->layout().all();
-  std::vector<int> place(std::size_t(theta.size()), -1);
-  std::vector<Eigen::Index> rows_of_theta;
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
-    place[std::size_t(blocks[k].first)] = int(k);
-    rows_of_theta.push_back(blocks[k].first);
-  }
+  const LawNumbers numbers(material_->layout(), theta.size());
   const int n = scene_->body->node_count(), rows = n + body_.equilibrium().contact_count();
-  std::vector<Points> forces(blocks.size(), Points::Zero(rows, 3));
+  std::vector<Points> forces(numbers.count(), Points::Zero(rows, 3));
   for_law_derivatives(body_.equilibrium().elasticity(), *material_, theta,
                       [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                        Points& force = forces[std::size_t(place[std::size_t(at.first)])];
+                        Points& force = forces[numbers[at]];
                         for (std::size_t a = 0; a < nodes.size(); ++a)
                           force.row(nodes[a]) -= share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
                       });
-  MatrixX by_parameters(residuals_.size(), Eigen::Index(blocks.size()));
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
+  MatrixX by_parameters(residuals_.size(), Eigen::Index(numbers.count()));
+  for (std::size_t k = 0; k < numbers.count(); ++k) {
     const Points& change = body_.equilibrium().response(forces[k]);
     Points moved = Points::Zero(residuals_.rows(), 3);
     moved.topRows(body_.embedding().point_count()) = body_.embedding().positions(change.topRows(n));
     if (body_.has_probe()) moved.row(moved.rows() - 1) = change.row(n);
     by_parameters.col(Eigen::Index(k)) = flat(moved);
   }
-  const MatrixX J = by_parameters * directions(rows_of_theta, Eigen::all);
+  const MatrixX J = by_parameters * directions(numbers.rows, Eigen::all);
   FrameFit& fit = result.frames.front();
   fit.gradient = J.transpose() * slope;
   fit.gauss_newton = J.transpose() * weight.asDiagonal() * J;
