@@ -5,7 +5,10 @@ target_compile_options(pliant_options INTERFACE -Wall -Wextra -Wpedantic -Wshado
 # GCC 12 sees overlapping and endless copies in "text" + std::string where there are none (its bugs 105329 and 105651).
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(pliant_options INTERFACE -Wno-restrict -Wno-maybe-uninitialized -Wno-psabi
-    -Wno-stringop-overflow -Wno-stringop-overread -Wno-array-bounds)
+    -Wno-stringop-overflow -Wno-stringop-overread -Wno-array-bounds -Wno-uninitialized)
+endif()
+if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(pliant_options INTERFACE -Wno-subobject-linkage) # takes the sources of a batch for headers
 endif()
 if(PLIANT_WARNINGS_AS_ERRORS)
   target_compile_options(pliant_options INTERFACE -Werror)

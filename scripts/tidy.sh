@@ -9,7 +9,7 @@ if ! command -v clang-tidy > /dev/null; then
   echo "tidy: clang-tidy is missing: apt-get install clang-tidy" >&2
   exit 1
 fi
-cmake --preset release -B build/tidy > /dev/null
+cmake --preset release -B build/tidy -DCMAKE_UNITY_BUILD=OFF > /dev/null
 
 names=("$@")
 [[ $# -gt 0 ]] || names=(src apps tests benchmarks experiments)

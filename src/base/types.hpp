@@ -4,9 +4,13 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace pliant {
+
+inline constexpr double infinite = std::numeric_limits<double>::infinity();
+inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix3d;

@@ -49,6 +49,9 @@ struct MarkerTrack {
   bool operator==(const MarkerTrack&) const = default;
 };
 
+/// Whether a measurement of this role enters a fit, not only its tests.
+inline bool is_fitted(const std::string& role) { return role == "fit"; }
+
 struct Press {
   Vector3 force = Vector3::Zero();           ///< [N], the whole force of the probe on the object
   Vector3 contact_centre = Vector3::Zero();  ///< on the undeformed surface

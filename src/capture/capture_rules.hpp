@@ -19,6 +19,14 @@ struct RuleContext {
 /// One thing that a valid capture must satisfy. A rule skips what an earlier one or the reader found broken.
 using Rule = void (*)(RuleContext&);
 
+/// @name Words of the rules' complaints
+/// @{
+std::string text_of(double value, const char* unit);  ///< four digits and the unit
+std::string text_of(const Vector3& v);                ///< "[x, y, z]" of four digits each
+/// A key of the i-th entry of an array of tables, "name[i].key"; the entry itself without a key.
+std::string item(const char* name, std::size_t i, const char* key = "");
+/// @}
+
 /// @name Rules about the facts alone
 /// @{
 void check_surface_is_solid(RuleContext&);

@@ -12,19 +12,6 @@
 
 namespace pliant {
 
-namespace {
-
-// Plausible ranges. Each is far wider than any soft object, and narrower than a slip of a factor 1000.
-constexpr double smallest_object = 1e-3, largest_object = 10.0;      // [m]
-constexpr double least_density = 3.0, greatest_density = 25e3;       // [kg/m^3] foam to metal
-constexpr double least_gravity = 1.0, greatest_gravity = 30.0;       // [m/s^2] the Moon to Jupiter
-constexpr double shortest_interval = 1e-5, longest_interval = 10.0;  // [s] between frames
-constexpr double fastest = 100.0, fastest_spin = 1000.0;             // [m/s], [rad/s]
-constexpr double least_noise = 1e-6, greatest_noise = 0.25;          // [m]
-constexpr double greatest_force = 1e5;                               // [N]
-constexpr double greatest_load = 100.0;                              // times the object's own mass
-constexpr double surface_tolerance = 0.05;                           // of the object's size
-
 std::string text_of(double value, const char* unit) {
   char text[64];
   std::snprintf(text, sizeof text, "%.4g %s", value, unit);
@@ -37,9 +24,22 @@ std::string text_of(const Vector3& v) {
   return text;
 }
 
-std::string item(const char* name, std::size_t i, const char* key = "") {
+std::string item(const char* name, std::size_t i, const char* key) {
   return std::string(name) + "[" + std::to_string(i) + "]" + (*key ? "." : "") + key;
 }
+
+namespace {
+
+// Plausible ranges. Each is far wider than any soft object, and narrower than a slip of a factor 1000.
+constexpr double smallest_object = 1e-3, largest_object = 10.0;      // [m]
+constexpr double least_density = 3.0, greatest_density = 25e3;       // [kg/m^3] foam to metal
+constexpr double least_gravity = 1.0, greatest_gravity = 30.0;       // [m/s^2] the Moon to Jupiter
+constexpr double shortest_interval = 1e-5, longest_interval = 10.0;  // [s] between frames
+constexpr double fastest = 100.0, fastest_spin = 1000.0;             // [m/s], [rad/s]
+constexpr double least_noise = 1e-6, greatest_noise = 0.25;          // [m]
+constexpr double greatest_force = 1e5;                               // [N]
+constexpr double greatest_load = 100.0;                              // times the object's own mass
+constexpr double surface_tolerance = 0.05;                           // of the object's size
 
 double size_of(const TriangleMesh& surface) { return bounding_box(surface).extent().maxCoeff(); }
 

@@ -22,16 +22,6 @@ constexpr int least_pixels = 10;                               // that show some
 constexpr double farthest_markers = 100.0;                     // sizes of the object from where they rest (median)
 constexpr double rate_tolerance = 5e-4;                        // tells 59.94 Hz from 60 Hz
 
-std::string item(const char* name, std::size_t i, const char* key = "") {
-  return std::string(name) + "[" + std::to_string(i) + "]" + (*key ? "." : "") + key;
-}
-
-std::string text_of(double value, const char* unit) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.4g %s", value, unit);
-  return text;
-}
-
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 // Frames whose file is not there.

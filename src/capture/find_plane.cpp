@@ -12,10 +12,10 @@ namespace pliant {
 
 namespace {
 
-constexpr int least_pixels = 300;
-constexpr double least_share = 0.1;  // of the readings in the region around the guess
-constexpr double farthest = 0.1;     // [m] of the guess's point from a plane that can be meant
-constexpr int most_frames = 3;       // looked at where there is no background image
+constexpr int least_plane_pixels = 300;
+constexpr double least_share = 0.1;     // of the readings in the region around the guess
+constexpr double farthest_guess = 0.1;  // [m] of the guess's point from a plane that can be meant
+constexpr int most_frames = 3;          // looked at where there is no background image
 
 // A guess may be wrong by a few centimetres, and by degrees that matter more the farther away.
 bool is_near(const Plane& guess, const Vector3& point) {
@@ -53,9 +53,9 @@ std::optional<FoundPlane> find_plane(const Capture& capture, const Plane& guess)
   PlaneFitOptions options;
   options.normal = guess.normal;
   const auto fit = fit_plane(readings.points, readings.noise, options);
-  if (!fit || fit->inliers < std::max<double>(least_pixels, least_share * double(readings.points.size())))
+  if (!fit || fit->inliers < std::max<double>(least_plane_pixels, least_share * double(readings.points.size())))
     return std::nullopt;
-  if (std::abs(fit->height(guess.point)) > farthest) return std::nullopt;
+  if (std::abs(fit->height(guess.point)) > farthest_guess) return std::nullopt;
   FoundPlane plane;
   plane.normal = fit->normal;
   plane.point = guess.point - fit->height(guess.point) * fit->normal;

@@ -13,7 +13,7 @@ using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
 using Tree = bg::index::rtree<TreePoint, bg::index::quadratic<8>>;
 
 constexpr unsigned neighbours = 6;
-constexpr double reach = 3.0;
+constexpr double isolated_reach = 3.0;
 
 /// Squared distance of each point to its sixth nearest neighbour.
 std::vector<double> neighbour_distances(std::span<const Vector3> points) {
@@ -41,7 +41,8 @@ std::vector<bool> isolated_points(std::span<const Vector3> points) {
   std::vector<double> sorted = distances;
   const auto middle = sorted.begin() + std::ptrdiff_t(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
-  for (std::size_t i = 0; i < points.size(); ++i) isolated[i] = distances[i] > reach * reach * *middle;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    isolated[i] = distances[i] > isolated_reach * isolated_reach * *middle;
   return isolated;
 }
 

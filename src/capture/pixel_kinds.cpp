@@ -12,7 +12,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double plane_reach = 3.0;       // standard deviations
 constexpr double background_reach = 4.0;  // of the difference of two readings: many pixels, few may slip through
 constexpr double fall = 2.0;              // [m] an object that nothing holds may fall out of its box
 

@@ -11,6 +11,9 @@
 
 namespace pliant {
 
+/// Standard deviations of a reading within which a pixel counts as one of a plane.
+inline constexpr double plane_reach = 3.0;
+
 /// What a pixel of a depth image shows.
 enum class PixelKind : std::uint8_t {
   NoReading,

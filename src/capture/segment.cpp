@@ -12,14 +12,14 @@ namespace pliant {
 namespace {
 
 constexpr int no_reading = -1, unlabelled = -50;
-constexpr double reach = 3.5;           // standard deviations between a plane and what stands on it
+constexpr double standing_reach = 3.5;  // standard deviations between a plane and what stands on it
 constexpr double touching = 0.02;       // [m] gap between an object's lowest point seen and the plane it stands on
 constexpr double least_height = 0.015;  // [m] what is flatter is a stain, a sheet or a bump of the plane
 
 int plane_label(std::size_t plane) { return -2 - int(plane); }
 
-// Pixels connected with `seed` among those labelled `from`, up to `reach` pixels apart and without a jump in depth;
-// they get the label `value`.
+// Pixels connected with `seed` among those labelled `from`, up to `standing_reach` pixels apart and without a jump in
+// depth; they get the label `value`.
 std::vector<int> grow(const DepthImage& depth, const DepthNoise& noise, int seed, Image<int>& label, int from,
                       int value, int pixel_reach, double gap) {
   std::vector<int> members{seed};
@@ -65,7 +65,7 @@ void find_planes(const DepthImage& depth, const PinholeCamera& camera, const Dep
     if (plane->height(camera.camera_to_world.translation) < 0) plane->normal = -plane->normal;
     const int own = plane_label(result.planes.size());
     for (std::size_t k = 0; k < left.points.size(); ++k)
-      if (std::abs(plane->height(left.points[k])) < reach * double(left.noise[k]))
+      if (std::abs(plane->height(left.points[k])) < standing_reach * double(left.noise[k]))
         label[std::size_t(left.pixel[k])] = own;
     keep_connected(depth, noise, own, result.label);
     const DepthPoints kept = points_of(depth, camera, noise, [&](int p) { return label[std::size_t(p)] == own; });

@@ -7,6 +7,7 @@
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
 #include "capture/markers.hpp"
+#include "capture/pixel_kinds.hpp"
 #include "capture/point_cloud.hpp"
 
 namespace pliant {
@@ -16,7 +17,6 @@ namespace {
 constexpr double moving = 4.0;          // standard deviations of a point; the centroid of hundreds is far steadier
 constexpr double moving_markers = 8.0;  // the same of markers: they are few
 constexpr double contact_gap = 0.02;    // of the object's size: how near a plane counts as touching it
-constexpr double plane_reach = 3.0;     // standard deviations within which observe() drops a plane's pixels
 
 template <class T>
 T median_of(std::vector<T> values) {

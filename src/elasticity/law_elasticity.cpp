@@ -21,9 +21,6 @@ Strain6 biot_strain(const Matrix3& F) {
 
 namespace {
 
-using Vector9 = Eigen::Matrix<double, 9, 1>;
-
-auto vec(const Matrix3& m) { return Eigen::Map<const Vector9>(m.data()); }
 Matrix3 matrix_of(const Vector9& v) { return Eigen::Map<const Matrix3>(v.data()); }
 
 /// A symmetric tangent and the same without its negative eigenvalues, the first of an ascending order.

@@ -11,9 +11,13 @@
 namespace pliant {
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
+using Vector9 = Eigen::Matrix<double, 9, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 /// Symmetric strains or stresses as xx, yy, zz, xy, xz, yz (Bickel 2009, section 3.2): tensor components, no factor 2.
 using Strain6 = Eigen::Matrix<double, 6, 1>;
+
+/// The entries of a matrix, column by column; a view of it.
+inline auto vec(const Matrix3& m) { return Eigen::Map<const Vector9>(m.data()); }
 
 /// What a deformed point of the material stores and how hard it pulls back.
 struct PointStress {

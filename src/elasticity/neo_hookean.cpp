@@ -7,12 +7,6 @@
 
 namespace pliant {
 
-namespace {
-
-auto vec(const Matrix3& m) { return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(m.data()); }
-
-}  // namespace
-
 void NeoHookeanLaw::check(const MatrixX& table) const {
   if (table.cols() != 2) throw std::invalid_argument("the neo-Hookean law has two parameters an element");
   for (Eigen::Index e = 0; e < table.rows(); ++e)

@@ -9,8 +9,6 @@ namespace pliant {
 
 namespace {
 
-auto vec(const Matrix3& m) { return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(m.data()); }
-
 /// Of (x - m)^order in the Taylor series of x^p about m.
 double taylor_coefficient(double p, int order, double m) {
   double product = std::pow(m, p - order);

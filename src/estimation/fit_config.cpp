@@ -36,7 +36,7 @@ const std::vector<std::pair<std::string, TrackingUse>> tracking_uses = {{"auto",
                                                                         {"both", TrackingUse::Both}};
 const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {{"monolithic", LoadFreeScheme::Together},
                                                                                {"staggered", LoadFreeScheme::InTurns}};
-const std::vector<std::pair<std::string, std::optional<ElementKind>>> elements = {
+const std::vector<std::pair<std::string, std::optional<ElementKind>>> element_names = {
     {"automatic", std::nullopt},
     {"hexahedra", ElementKind::Hexahedron},
     {"tetrahedra", ElementKind::Tetrahedron},
@@ -180,7 +180,7 @@ const std::vector<Entry>& entries() {
       choice_entry("element",
                    "finite elements; automatic: hexahedra, or quadratic_tetrahedra where the stress-free reference "
                    "shape is unknown",
-                   elements, &FitOptions::element),
+                   element_names, &FitOptions::element),
       choice_entry("tracking",
                    "alternate model-based tracking with the fit of the tracked motion (loop), fit the observed surface "
                    "points (off), "

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "estimation/notes.hpp"
@@ -11,8 +10,6 @@
 namespace pliant {
 
 namespace {
-
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
 bool is_pull(const Parameter& p) { return p.role == Role::Initial && p.is_auxiliary; }
 bool is_of_start(const Parameter& p) { return p.role == Role::Initial || p.role == Role::Load; }

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "base/error.hpp"
@@ -17,8 +16,6 @@
 namespace pliant {
 
 namespace {
-
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
 /// The overload that goes on from a state.
 OptimiserSummary minimise_from(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,

@@ -11,7 +11,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr double trust = 10.0;         // times the spread of neighbouring differences: what they cannot tell
 constexpr double least_digits = 0.05;  // of the derivative: differences less certain than this decide nothing
 
@@ -20,12 +19,12 @@ using Verdict = CheckedDerivative::Verdict;
 double difference(CostFunction& cost, const VectorX& p, Eigen::Index i, double h) {
   const VectorX step = h * VectorX::Unit(p.size(), i);
   const CostEvaluation up = cost.evaluate(p + step), down = cost.evaluate(p - step);
-  return up.succeeded && down.succeeded ? (up.cost - down.cost) / (2.0 * h) : none;
+  return up.succeeded && down.succeeded ? (up.cost - down.cost) / (2.0 * h) : not_a_number;
 }
 
 /// The middle of the three neighbouring steps whose differences spread least.
 void take_best_step(CheckedDerivative& d) {
-  d.by_difference = none;
+  d.by_difference = not_a_number;
   d.uncertainty = std::numeric_limits<double>::infinity();
   for (std::size_t k = 1; k + 1 < d.differences.size(); ++k) {
     const auto [low, high] = std::minmax({d.differences[k - 1], d.differences[k], d.differences[k + 1]});

@@ -9,7 +9,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double greatest_poissons_ratio = 0.4999;
 constexpr double least_exponent = 0.1, largest_exponent = 100.0;  // in size
 constexpr double small_ratio = 0.03;                              // stiffness of an added term against the first

@@ -5,7 +5,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <utility>
 
@@ -22,7 +21,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double outlier_scale = 6.0;  // deviations
 constexpr std::array field_sizes = {4, 8, 16, 32};
 constexpr double needed_evidence = 3.0;  // e^3 to 1

@@ -7,8 +7,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double none = std::numeric_limits<double>::infinity();
-
 /// Appends parameters that start from the middle of their priors.
 struct StartValues {
   const ParameterLayout& layout;
@@ -52,7 +50,7 @@ ParameterSet law_parameters(const LawLayout& layout, double youngs_modulus) {
   StartValues start{layout.layout(), theta, parameters};
   for (int k = 0; k < layout.form().controls; ++k)
     start.add(layout.modulus(k), Transform::Logarithm, youngs_modulus, 1e-4 * youngs_modulus, 1e4 * youngs_modulus,
-              none);
+              infinite);
   for (int law = 0; law < layout.form().laws; ++law) {
     start.add_ratio(layout.poissons_ratio(0, law));
     add_term_parameters(layout.layout(), layout, law, theta, parameters);

@@ -11,8 +11,6 @@ namespace pliant {
 
 namespace {
 
-bool is_fitted(const std::string& role) { return role == "fit"; }
-
 bool has_fitted_loads(const Capture& capture) {
   return std::ranges::any_of(capture.loads, [](const Load& load) { return is_fitted(load.role); });
 }

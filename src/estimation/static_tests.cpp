@@ -18,10 +18,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double none = std::numeric_limits<double>::quiet_NaN();
-
-bool is_fitted(const std::string& role) { return role == "fit"; }
-
 template <class Tests>
 bool any_fitted(const Tests& tests) {
   return std::ranges::any_of(tests, [](const auto& test) { return is_fitted(test.role); });
@@ -162,7 +158,7 @@ CurvePrediction predict(const PressScene& scene, const ObservedIndentation& test
   IndentedBody body(scene, test, law, modulus);
   for (std::size_t d = 0; d < test.curve.depths.size(); ++d) {
     const bool solved = body.solve(d);
-    result.predicted.push_back(solved ? body.force(d) : none);
+    result.predicted.push_back(solved ? body.force(d) : not_a_number);
     if (!solved && result.failure.empty()) result.failure = body.failure();
   }
   return result;
@@ -171,8 +167,8 @@ CurvePrediction predict(const PressScene& scene, const ObservedIndentation& test
 CurvePrediction predict(const PressScene& scene, const ObservedGrip& test,
                         const std::shared_ptr<const MaterialLaw>& law) {
   CurvePrediction result{
-      test.name,        "grip force", test.role, "displacement [m]", "N", {test.displacement.norm()}, {test.force},
-      {test.force_std}, {none},       {}};
+      test.name,        "grip force",   test.role, "displacement [m]", "N", {test.displacement.norm()}, {test.force},
+      {test.force_std}, {not_a_number}, {}};
   GrippedBody body(scene, test, law);
   if (body.solve())
     result.predicted = {body.force()};

@@ -11,7 +11,7 @@
 namespace pliant {
 
 /// Numbered boxes, found by the places that they hold or are near to: a packed R-tree (Guttman 1984). It is slow to
-/// compile: for source files only, whose room needs Boost's headers.
+/// compile: for source files only, whose module needs Boost's headers.
 using TreePoint = boost::geometry::model::point<double, 3, boost::geometry::cs::cartesian>;
 using TreeBox = boost::geometry::model::box<TreePoint>;
 using BoxTree = boost::geometry::index::rtree<std::pair<TreeBox, int>, boost::geometry::index::quadratic<8>>;

@@ -25,6 +25,13 @@ struct Box {
   Vector3 extent() const { return max - min; }
 };
 
+/// A box with `margin` [m] more on each side.
+inline Box grown(Box box, double margin) {
+  box.min.array() -= margin;
+  box.max.array() += margin;
+  return box;
+}
+
 Box bounding_box(const TriangleMesh& mesh);
 
 /// Enclosed volume [m^3] of a closed, outward oriented mesh (negative where it is oriented inwards).

@@ -2,10 +2,10 @@
 
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <boost/geometry.hpp>
-#include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <limits>
+
+#include "geometry/box_tree.hpp"
 
 namespace pliant {
 
@@ -34,11 +34,8 @@ DisplacementExtension::DisplacementExtension(DisplacementExtension&&) noexcept =
 namespace {
 
 namespace bg = boost::geometry;
-using TreePoint = bg::model::point<double, 3, bg::cs::cartesian>;
 using Tree = bg::index::rtree<std::pair<TreePoint, int>, bg::index::quadratic<8>>;
 using Triplets = std::vector<Eigen::Triplet<double>>;
-
-TreePoint tree_point(const Vector3& x) { return {x.x(), x.y(), x.z()}; }
 
 /// Known nodes that share a cell of the band with each, itself included.
 std::vector<std::vector<int>> neighbours(const std::vector<std::array<int, 8>>& cells, const std::vector<int>& known_of,

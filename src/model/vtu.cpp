@@ -118,9 +118,9 @@ pugi::xml_node load_root(const fs::path& path, pugi::xml_document& document, con
   return root;
 }
 
-class Reader {
+class GridReader {
  public:
-  Reader(fs::path path, pugi::xml_node root) : path_(std::move(path)) {
+  GridReader(fs::path path, pugi::xml_node root) : path_(std::move(path)) {
     if (root.attribute("compressor")) fail(path_, "compressed arrays", "arrays without compression");
     if (std::string(root.attribute("byte_order").value()) != "LittleEndian")
       fail(path_, "another byte order", "byte_order=\"LittleEndian\"");
@@ -294,7 +294,7 @@ VtuGrid read_vtu(const fs::path& path) {
   const pugi::xml_node root = load_root(path, document, "UnstructuredGrid");
   const pugi::xml_node piece = root.child("UnstructuredGrid").child("Piece");
   if (!piece || piece.next_sibling("Piece")) fail(path, "not exactly one piece", "one piece");
-  return Reader(path, root).grid(piece);
+  return GridReader(path, root).grid(piece);
 }
 
 void write_pvd(const fs::path& path, const std::vector<PvdEntry>& entries) {

@@ -13,7 +13,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr int neighbour_count = 12;
 constexpr int fewest_neighbours = 4;  // that say where a marker should be
 // All in spacings of the markers about the one in question.

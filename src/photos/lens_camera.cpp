@@ -17,7 +17,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double rotation_tolerance = 2e-3;  // files carry three decimals or more
 constexpr double lens_tolerance = 0.01;  // [pixels] that a pixel may be off after the lens was taken out and put back
 
@@ -203,7 +202,7 @@ std::vector<Vector2> project(const LensCamera& camera, std::span<const Vector3> 
                       pixels);
   std::vector<Vector2> out;
   for (std::size_t i = 0; i < pixels.size(); ++i)
-    out.push_back(local[i].z > 0 ? Vector2(pixels[i].x, pixels[i].y) : Vector2(nan, nan));
+    out.push_back(local[i].z > 0 ? Vector2(pixels[i].x, pixels[i].y) : Vector2(not_a_number, not_a_number));
   return out;
 }
 
@@ -225,7 +224,7 @@ std::vector<Vector2> without_lens(const LensCamera& camera, std::span<const Vect
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const bool came_back = std::hypot(again[i].x - seen[i].x, again[i].y - seen[i].y) < lens_tolerance;
     const Vector3 pixel = camera.camera_matrix * Vector3(straight[i].x, straight[i].y, 1.0);
-    out.push_back(came_back ? Vector2(pixel.head<2>()) : Vector2(nan, nan));
+    out.push_back(came_back ? Vector2(pixel.head<2>()) : Vector2(not_a_number, not_a_number));
   }
   return out;
 }

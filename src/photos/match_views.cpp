@@ -13,7 +13,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double least_limit = 0.1;     // [pixels] no set is dropped for less
 constexpr double clearly_worse = 2.5;   // times the rms of another
 constexpr double usual_multiple = 5.0;  // of the median rms

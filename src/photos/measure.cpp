@@ -20,12 +20,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double surface_tolerance = 0.05;  // of the object's size, as for contacts of a capture
-constexpr double loaded_margin = 0.5;       // of the object's size about its box, for markers under load
-constexpr double probe_slack = 3.0;         // times the tolerance: shafts are not thin
-constexpr double least_pixels = 4.0;        // diameter of a dot
-constexpr double usual_multiple = 5.0;      // of the rms at rest
+constexpr double surface_tolerance = 0.05;   // of the object's size, as for contacts of a capture
+constexpr double loaded_margin = 0.5;        // of the object's size about its box, for markers under load
+constexpr double probe_slack = 3.0;          // times the tolerance: shafts are not thin
+constexpr double least_pixels = 4.0;         // diameter of a dot
+constexpr double usual_rest_multiple = 5.0;  // of the rms at rest
 constexpr int fewest_markers = 4;
 constexpr int normal_neighbours = 8;
 
@@ -254,7 +253,7 @@ class Measurer {
   void fill(MeasuredMarkers& markers, PhotoFigures& figures, const std::vector<Sighting>& sightings,
             const std::vector<int>& candidate, const Snapshot& seen) const {
     const Eigen::Index count = rest_.rows();
-    markers.positions = markers.deviations = Points::Constant(count, 3, nan);
+    markers.positions = markers.deviations = Points::Constant(count, 3, not_a_number);
     std::vector<Sighting> used;
     for (const int c : candidate)
       if (c >= 0) used.push_back(sightings[std::size_t(c)]);
@@ -324,7 +323,7 @@ class Measurer {
 
   void follow(std::size_t index, const Snapshot& seen) {
     MeasuredPress& own = measurement_.presses[index];
-    const double tolerance = std::min(session_.tolerance, std::max(usual_multiple * rest_rms_, 0.2));
+    const double tolerance = std::min(session_.tolerance, std::max(usual_rest_multiple * rest_rms_, 0.2));
     const std::vector<ViewDots> views = without_lens(cameras(), seen.markers);
     const ResolvedSightings resolved = resolve(
         possible_sightings(cameras(), views, {tolerance, session_.least_views, near_box(loaded_margin * size_)}),

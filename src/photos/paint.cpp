@@ -337,7 +337,7 @@ TriangleMesh dome() {
 std::vector<LensCamera> example_cameras(int width, int height) {
   std::vector<LensCamera> cameras;
   const Vector3 along = view_axis.unitOrthogonal();
-  const char* const names[] = {"left", "right", "top"};
+  const char* const sides[] = {"left", "right", "top"};
   for (int k = 0; k < 3; ++k) {
     const Vector3 axis = Eigen::AngleAxisd((20.0 + 120.0 * k) * degree, view_axis) * along;
     const Vector3 eye = distance_of_cameras * (Eigen::AngleAxisd((22.0 + 2.0 * k) * degree, axis) * view_axis);
@@ -345,7 +345,7 @@ std::vector<LensCamera> example_cameras(int width, int height) {
     const PinholeCamera pinhole = look_at(eye, Vector3(0.002 * k, 0.03, 0.01), Vector3(0.1 * k, 1.0, 0.05), width,
                                           height, 2.0 * std::atan(0.5 * height / focal));
     LensCamera camera;
-    camera.name = names[k];
+    camera.name = sides[k];
     camera.width = width;
     camera.height = height;
     camera.camera_matrix << focal, 0.0, 0.5 * width + 11.3 * k, 0.0, 1.002 * focal, 0.5 * height - 7.7, 0.0, 0.0, 1.0;

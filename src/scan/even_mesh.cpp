@@ -14,12 +14,6 @@ namespace pliant {
 
 namespace {
 
-Box grown(Box box, double margin) {
-  box.min.array() -= margin;
-  box.max.array() += margin;
-  return box;
-}
-
 // A mean over the 27 lattice points around, weighted 1 2 1 each way: steps of the raw solid smaller than the lattice
 // go.
 double smoothed(const SignedDistance& distance, const Vector3& p, double spacing) {

@@ -15,8 +15,7 @@ namespace pliant {
 
 namespace {
 
-constexpr double plane_reach = 3.5;  // deviations above the plane within which readings do not show the object
-constexpr double steep = 0.2;        // of the view's level part: less is a look from above, which needs no mirror
+constexpr double steep = 0.2;  // of the view's level part: less is a look from above, which needs no mirror
 
 constexpr double shell = 4.0;  // lattice spacings that stay behind readings that contradict the mirror image
 
@@ -54,7 +53,7 @@ class Solid {
       sum += (view - view.dot(up_) * up_) / double(hulls_.size());
     }
     if (sum.norm() > steep) ahead_ = sum.normalized();
-    foot_ = plane_reach * deviation;
+    foot_ = scan_plane_reach * deviation;
     noise_ = deviation;
   }
 
@@ -168,12 +167,6 @@ Plane find_mirror(const Solid& solid, const Vector3& ahead, double spacing) {
   const auto chosen =
       std::ranges::find_if(misfits, [&](const auto& m) { return m.second <= (1.0 + slack) * least + tolerance; });
   return {chosen->first * ahead, -ahead, true};
-}
-
-Box grown(Box box, double margin) {
-  box.min.array() -= margin;
-  box.max.array() += margin;
-  return box;
 }
 
 double triangle_area(const TriangleMesh& mesh, const std::array<int, 3>& t) {

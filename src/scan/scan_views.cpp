@@ -13,9 +13,8 @@ namespace pliant {
 
 namespace {
 
-constexpr double trimmed = 3.0;      // deviations around the median that a mean takes
-constexpr double moving = 4.0;       // deviations of a mean's change that are motion
-constexpr double plane_reach = 3.5;  // deviations from the plane within which a reading does not tell the object
+constexpr double trimmed = 3.0;                                    // deviations around the median that a mean takes
+constexpr double moving = 4.0;                                     // deviations of a mean's change that are motion
 constexpr double greatest_tilt = 40.0 / 180.0 * std::numbers::pi;  // of the plane from `up`
 constexpr double least_share = 0.05;                               // of the object's readings, of a part that counts
 constexpr int least_readings = 100;                                // on an object
@@ -200,7 +199,7 @@ void remove_other_surfaces(const DepthImage& depth, const ScanView& view, const 
     if (!reads(p)) continue;
     const double z = depth.pixels[std::size_t(p)];
     const Vector3 point = view.camera.unproject(p % depth.width, p / depth.width, z);
-    if (plane->normal.dot(point - plane->point) < plane_reach * view.noise.axial(z))
+    if (plane->normal.dot(point - plane->point) < scan_plane_reach * view.noise.axial(z))
       silhouette.pixels[std::size_t(p)] = 0;
   }
   std::vector<char> visited(depth.pixels.size(), 0);

@@ -10,6 +10,9 @@
 
 namespace pliant {
 
+/// Standard deviations from the ground's plane within which a reading does not tell the object.
+inline constexpr double scan_plane_reach = 3.5;
+
 /// Which frames and which object a scan is made of.
 struct ScanChoice {
   std::optional<int> last_frame;            ///< nothing: the frame before `start_frame`, 0 at least; static: the last

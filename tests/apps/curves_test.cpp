@@ -10,7 +10,7 @@
 #include "support/curve_capture.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::curves_test {
 namespace {
 
 using nlohmann::json;
@@ -84,4 +84,4 @@ TEST(Curves, OfAMaterialAloneAreFittedWithoutShape) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::curves_test

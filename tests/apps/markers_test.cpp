@@ -10,7 +10,7 @@
 #include "base/files.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::markers_test {
 namespace {
 
 using testing::HasSubstr;
@@ -52,4 +52,4 @@ TEST(Markers, AsksForASession) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::markers_test

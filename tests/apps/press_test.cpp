@@ -9,7 +9,7 @@
 #include "support/press_capture.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::press_test {
 namespace {
 
 using nlohmann::json;
@@ -78,4 +78,4 @@ TEST(Presses, AreFittedEvaluatedAndPredicted) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::press_test

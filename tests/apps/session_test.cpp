@@ -15,7 +15,7 @@
 #include "apps/program.hpp"
 #include "base/files.hpp"
 
-namespace pliant::test {
+namespace pliant::test::session_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -393,4 +393,4 @@ TEST_F(Session, AStateOfAnotherFitIsRefused) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::session_test

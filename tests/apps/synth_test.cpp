@@ -10,7 +10,7 @@
 #include "geometry/mesh_io.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::synth_test {
 namespace {
 
 using testing::HasSubstr;
@@ -130,4 +130,4 @@ TEST(Synth, RefusesHalfARelease) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::synth_test

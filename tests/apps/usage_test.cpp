@@ -8,7 +8,7 @@
 #include "apps/program.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::usage_test {
 namespace {
 
 using testing::HasSubstr;
@@ -159,4 +159,4 @@ TEST(Mesh, RefusesWithThePlace) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::usage_test

@@ -3,7 +3,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::csv_test {
 namespace {
 
 using test::complaint_of;
@@ -71,4 +71,4 @@ TEST(Csv, ThrowsWhereThereIsNoFile) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::csv_test

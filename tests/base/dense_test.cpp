@@ -6,7 +6,7 @@
 
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::dense_test {
 namespace {
 
 using test::tolerance;
@@ -64,4 +64,4 @@ TEST(Dense, ComplementsAreOrthonormalAndOrthogonal) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::dense_test

@@ -1,6 +1,6 @@
 #include "base/error.hpp"
 
-namespace pliant {
+namespace pliant::error_test {
 namespace {
 
 TEST(Place, NamesWhatIsKnown) {
@@ -22,4 +22,4 @@ TEST(InputErrorTest, ListsEveryProblemOnItsLine) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::error_test

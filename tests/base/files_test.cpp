@@ -6,7 +6,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::files_test {
 namespace {
 
 using test::complaint_of;
@@ -95,4 +95,4 @@ TEST(Files, FoldersAreMadeOnceAndRemovedFilesAreGone) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::files_test

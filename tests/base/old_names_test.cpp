@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace pliant {
+namespace pliant::old_names_test {
 namespace {
 
 TEST(OldNames, FormerNamesBecomePresentOnes) {
@@ -28,4 +28,4 @@ TEST(OldNames, AreNotedOnceEach) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::old_names_test

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace pliant {
+namespace pliant::parallel_test {
 namespace {
 
 TEST(ParallelFor, TakesEachIndexOnce) {
@@ -103,4 +103,4 @@ TEST(ThreadLimit, OfOneLetsABodyWriteWhatAllShare) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::parallel_test

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace pliant {
+namespace pliant::sha256_test {
 namespace {
 
 /// The examples that NIST publishes for FIPS 180-4.
@@ -38,4 +38,4 @@ TEST(Sha256, OfBytes) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::sha256_test

@@ -4,7 +4,7 @@
 #include "support/c3d_writer.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::c3d_test {
 namespace {
 
 using test::C3dWriter;
@@ -185,4 +185,4 @@ TEST(C3d, SurvivesEveryBrokenByte) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::c3d_test

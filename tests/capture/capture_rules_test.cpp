@@ -6,7 +6,7 @@
 #include "input_errors.hpp"
 #include "support/c3d_writer.hpp"
 
-namespace pliant {
+namespace pliant::capture_rules_test {
 namespace {
 
 using test::complaint_of;
@@ -507,4 +507,4 @@ TEST(RangesText, JoinsRunsAndCountsTheRest) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::capture_rules_test

@@ -1,6 +1,6 @@
 #include "capture/depth_noise.hpp"
 
-namespace pliant {
+namespace pliant::depth_noise_test {
 namespace {
 
 DepthCamera camera(std::optional<double> noise) {
@@ -30,4 +30,4 @@ TEST(DepthNoiseTest, GrowsAtGrazingIncidence) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::depth_noise_test

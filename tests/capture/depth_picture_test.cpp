@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace pliant {
+namespace pliant::depth_picture_test {
 namespace {
 
 TEST(DepthPicture, GivesEachKindAColourOfItsOwn) {
@@ -31,4 +31,4 @@ TEST(DepthPicture, SurvivesNoPointsAndOnePoint) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::depth_picture_test

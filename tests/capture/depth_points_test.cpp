@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace pliant {
+namespace pliant::depth_points_test {
 namespace {
 
 PinholeCamera camera() {
@@ -61,4 +61,4 @@ TEST(SurfaceNormal, IsZeroWithoutNeighbours) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::depth_points_test

@@ -5,7 +5,7 @@
 
 #include "capture/small_capture.hpp"
 
-namespace pliant {
+namespace pliant::find_plane_test {
 namespace {
 
 using test::SmallCapture;
@@ -38,4 +38,4 @@ TEST(FindPlane, FindsNoneWhereNoneIs) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::find_plane_test

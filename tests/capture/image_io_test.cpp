@@ -6,7 +6,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::image_io_test {
 namespace {
 
 using test::complaint_of;
@@ -98,4 +98,4 @@ TEST(ReadImageHeader, TellsSizeAndKind) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::image_io_test

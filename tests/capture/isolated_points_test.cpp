@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace pliant {
+namespace pliant::isolated_points_test {
 namespace {
 
 std::vector<Vector3> sheet(int count, double spacing) {
@@ -39,4 +39,4 @@ TEST(IsolatedPoints, MayCoincide) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::isolated_points_test

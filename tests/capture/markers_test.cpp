@@ -4,7 +4,7 @@
 #include "support/c3d_writer.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::markers_test {
 namespace {
 
 using test::C3dWriter;
@@ -161,4 +161,4 @@ TEST_F(MarkerFiles, C3dSlipsAreTold) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::markers_test

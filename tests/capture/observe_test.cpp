@@ -5,7 +5,7 @@
 #include "base/parallel.hpp"
 #include "capture/small_capture.hpp"
 
-namespace pliant {
+namespace pliant::observe_test {
 namespace {
 
 using test::SmallCapture;
@@ -138,4 +138,4 @@ TEST(ObserveLoad, ReadsCloudAndImagesAndLeavesOutWhatStandsAlone) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::observe_test

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-namespace pliant {
+namespace pliant::plane_fit_test {
 namespace {
 
 struct Scene {
@@ -72,4 +72,4 @@ TEST(FitPlane, FindsNothingInALineOrInTwoPoints) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::plane_fit_test

@@ -7,7 +7,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::point_cloud_test {
 namespace {
 
 using test::complaint_of;
@@ -80,4 +80,4 @@ TEST(PointCloud, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::point_cloud_test

@@ -4,7 +4,7 @@
 #include "capture/small_capture.hpp"
 #include "input_errors.hpp"
 
-namespace pliant {
+namespace pliant::read_capture_test {
 namespace {
 
 using test::complaint_of;
@@ -129,4 +129,4 @@ TEST(FramePatternTest, FillsInTheNumber) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::read_capture_test

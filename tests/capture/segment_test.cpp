@@ -4,7 +4,7 @@
 
 #include "capture/small_capture.hpp"
 
-namespace pliant {
+namespace pliant::segment_test {
 namespace {
 
 using test::SmallCapture;
@@ -34,4 +34,4 @@ TEST(Segment, SurvivesAnImageWithoutReadings) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::segment_test

@@ -7,7 +7,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::shared_captures_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -52,4 +52,4 @@ TEST(SharedDepth, TableIsFoundWithinItsStatedScatter) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::shared_captures_test

@@ -9,7 +9,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::shared_markers_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -135,4 +135,4 @@ TEST(SharedPresses, MarkersAreMatched) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::shared_markers_test

@@ -4,7 +4,7 @@
 
 #include "capture/small_capture.hpp"
 
-namespace pliant {
+namespace pliant::survey_test {
 namespace {
 
 using test::SmallCapture;
@@ -150,4 +150,4 @@ TEST(IdentifiabilityTest, WithoutRestScanNothingCanBeFitted) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::survey_test

@@ -1,7 +1,7 @@
 #include "base/files.hpp"
 #include "capture/small_capture.hpp"
 
-namespace pliant {
+namespace pliant::write_capture_test {
 namespace {
 
 using test::SmallCapture;
@@ -237,4 +237,4 @@ TEST(WriteCapture, BeginsWithItsComment) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::write_capture_test

@@ -5,7 +5,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::corotated_test {
 namespace {
 
 using test::tolerance;
@@ -157,4 +157,4 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Elastic, ::testing::ValuesIn(test::body_kinds())
                          [](const auto& kind) { return kind.param.name; });
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::corotated_test

@@ -5,7 +5,7 @@
 #include "elasticity/modulus_field.hpp"
 #include "support/bodies.hpp"
 
-namespace pliant {
+namespace pliant::element_moduli_test {
 namespace {
 
 struct TwoControls {
@@ -68,4 +68,4 @@ TEST(ModulusStatistics, WithoutACovarianceNothingIsSaidOfDeviations) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::element_moduli_test

@@ -8,7 +8,7 @@
 #include "support/eigenvalues.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::hex_element_test {
 namespace {
 
 using test::tolerance;
@@ -172,4 +172,4 @@ TEST(Body, MassIsDensityTimesVolumeConsistentAndLumped) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::hex_element_test

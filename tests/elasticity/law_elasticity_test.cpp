@@ -5,7 +5,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::law_elasticity_test {
 namespace {
 
 using test::tolerance;
@@ -143,4 +143,4 @@ TEST(LawElasticity, RefusesOtherBodies) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_elasticity_test

@@ -4,7 +4,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::material_field_test {
 namespace {
 
 using test::tolerance;
@@ -142,4 +142,4 @@ TEST(LawLayouts, OfAMotionShareItsModuliAndPoissonsRatio) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::material_field_test

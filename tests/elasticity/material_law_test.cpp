@@ -7,7 +7,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::material_law_test {
 namespace {
 
 using test::tolerance;
@@ -348,4 +348,4 @@ TEST(SampledLaw, ErrorFallsAsTheBasisGrows) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::material_law_test

@@ -12,7 +12,7 @@
 #include "support/eigenvalues.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::modes_test {
 namespace {
 
 using test::tolerance;
@@ -314,4 +314,4 @@ TEST(ModesThatCannotBe, AreToldInWords) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::modes_test

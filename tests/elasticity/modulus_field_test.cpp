@@ -4,7 +4,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::modulus_field_test {
 namespace {
 
 using test::tolerance;
@@ -85,4 +85,4 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Field, ::testing::ValuesIn(test::body_kinds()),
                          [](const auto& kind) { return kind.param.name; });
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::modulus_field_test

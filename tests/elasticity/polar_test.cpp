@@ -6,7 +6,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::polar_test {
 namespace {
 
 using test::tolerance;
@@ -159,4 +159,4 @@ TEST(Polar, SymmetricChangesDoNotTurn) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::polar_test

@@ -10,7 +10,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::reference_forces_test {
 namespace {
 
 using test::tolerance;
@@ -170,4 +170,4 @@ TEST(BodyMaterial, NamesTheParametersThatItDependsOn) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::reference_forces_test

@@ -9,7 +9,7 @@
 #include "support/convergence.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::statics_test {
 namespace {
 
 using test::tolerance;
@@ -202,4 +202,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& kind) { return kind.param.name; });
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::statics_test

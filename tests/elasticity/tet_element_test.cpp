@@ -10,7 +10,7 @@
 #include "support/eigenvalues.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::tet_element_test {
 namespace {
 
 using test::tolerance;
@@ -290,4 +290,4 @@ TEST(QuadraticTet, BarsBendWithoutLockingUpToNearlyIncompressible) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::tet_element_test

@@ -9,7 +9,7 @@
 
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::third_derivatives_test {
 namespace {
 
 using test::tolerance;
@@ -63,4 +63,4 @@ TEST(OgdenLaw, TangentChangesSmoothlyWhereStretchesMeet) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::third_derivatives_test

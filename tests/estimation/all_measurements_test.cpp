@@ -19,7 +19,7 @@
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::all_measurements_test {
 namespace {
 
 using test::tolerance;
@@ -336,4 +336,4 @@ TEST_F(SeenInEveryWay, RecordingsOfOneObjectShareTheLaw) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::all_measurements_test

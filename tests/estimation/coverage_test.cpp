@@ -2,7 +2,7 @@
 #include "estimation/fit.hpp"
 #include "support/recordings.hpp"
 
-namespace pliant {
+namespace pliant::coverage_test {
 namespace {
 
 TEST(Coverage, NinetyPercentIntervalsOfTheModulusHoldTheTruth) {
@@ -41,4 +41,4 @@ TEST(Coverage, NinetyPercentIntervalsOfTheModulusHoldTheTruth) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::coverage_test

@@ -8,7 +8,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::cut_string_test {
 namespace {
 
 using test::tolerance;
@@ -136,4 +136,4 @@ TEST_F(ReleasedCapture, EstimatesTheDensityOnlyWhereNobodyKnowsIt) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::cut_string_test

@@ -7,7 +7,7 @@
 
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::damped_sinusoid_test {
 namespace {
 
 using test::tolerance;
@@ -101,4 +101,4 @@ TEST(DominantSinusoid, NeedsTimes) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::damped_sinusoid_test

@@ -17,7 +17,7 @@
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::field_choice_test {
 namespace {
 
 using test::tolerance;
@@ -316,4 +316,4 @@ TEST(FieldChoice, IsAKeyOfAFit) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::field_choice_test

@@ -5,7 +5,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::fit_config_test {
 namespace {
 
 TEST(FitConfig, FormerWordsAreRead) {
@@ -343,4 +343,4 @@ TEST(FitState, RefusesAnotherKeyAndDamage) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::fit_config_test

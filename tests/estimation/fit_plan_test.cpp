@@ -3,13 +3,11 @@
 
 #include <cmath>
 
-namespace pliant {
+namespace pliant::fit_plan_test {
 namespace {
 
 using testing::ElementsAre;
 using testing::UnorderedElementsAre;
-
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
 struct Plans : testing::Test {
   Plans() {
@@ -349,4 +347,4 @@ TEST(BestOfScan, LeavesOutWhatIsHopelessAndWhatCannotBeSimulated) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::fit_plan_test

@@ -8,7 +8,7 @@
 
 #include "estimation/objective.hpp"
 
-namespace pliant {
+namespace pliant::gradient_check_test {
 namespace {
 
 using Verdict = CheckedDerivative::Verdict;
@@ -116,4 +116,4 @@ TEST(GradientCheck, RefusesOptionsWithoutThreeSteps) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::gradient_check_test

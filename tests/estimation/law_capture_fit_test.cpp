@@ -9,7 +9,7 @@
 #include "simulation/model_simulation.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::law_capture_fit_test {
 namespace {
 
 using ::testing::Contains;
@@ -133,4 +133,4 @@ TEST(LawCaptureFit, FindsANeoHookeanLaw) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_capture_fit_test

@@ -7,7 +7,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::law_motion_fit_test {
 namespace {
 
 constexpr double modulus = 2e4, exponent = 9.0, nu = 0.3, noise = 1e-4;
@@ -107,4 +107,4 @@ TEST(LawMotionFit, FindsModulusAndExponentOfAFinerModel) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_motion_fit_test

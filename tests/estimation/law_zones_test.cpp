@@ -3,7 +3,7 @@
 #include "estimation/optimiser.hpp"
 #include "support/presses.hpp"
 
-namespace pliant {
+namespace pliant::law_zones_test {
 namespace {
 
 using By = ZoneCut::By;
@@ -103,4 +103,4 @@ TEST_F(TwoLayers, AreNotSeenInPressesOfOneMaterial) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_zones_test

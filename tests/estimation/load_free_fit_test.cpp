@@ -8,7 +8,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::load_free_fit_test {
 namespace {
 
 using test::tolerance;
@@ -204,4 +204,4 @@ TEST(CarryingModulus, HoldsTheScanUpFromAnyStart) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::load_free_fit_test

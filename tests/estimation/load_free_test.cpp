@@ -6,7 +6,7 @@
 #include "base/error.hpp"
 #include "geometry/primitives.hpp"
 
-namespace pliant {
+namespace pliant::load_free_test {
 namespace {
 
 constexpr double length = 0.3;
@@ -65,4 +65,4 @@ TEST(LoadFree, WhatCannotBeDoneIsRefused) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::load_free_test

@@ -10,7 +10,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::material_tests_test {
 namespace {
 
 using test::tolerance;
@@ -239,4 +239,4 @@ TEST(MaterialTests, RefuseWhatIsNoCurve) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::material_tests_test

@@ -10,7 +10,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::modal_start_test {
 namespace {
 
 using test::tolerance;
@@ -357,4 +357,4 @@ TEST(RotationStrainCoordinates, NeedPointsThatSpanThem) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::modal_start_test

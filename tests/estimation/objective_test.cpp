@@ -5,7 +5,7 @@
 #include "support/recordings.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::objective_test {
 namespace {
 
 using test::tolerance;
@@ -211,4 +211,4 @@ TEST(Objective, AFailedSimulationIsReportedNotThrown) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::objective_test

@@ -4,7 +4,7 @@
 #include "support/recordings.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::optimiser_test {
 namespace {
 
 using test::tolerance;
@@ -464,4 +464,4 @@ TEST(ParameterCovariance, StaysFiniteWithoutFrames) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::optimiser_test

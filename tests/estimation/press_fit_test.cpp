@@ -6,7 +6,7 @@
 #include "support/press_capture.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::press_fit_test {
 namespace {
 
 using test::complaint_of;
@@ -174,4 +174,4 @@ TEST_F(PressedLayers, AreRefusedBesideWhatTheyCannotBeFittedWith) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::press_fit_test

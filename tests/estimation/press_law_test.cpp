@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace pliant {
+namespace pliant::press_law_test {
 namespace {
 
 std::vector<std::string> names_of(const LawLayout& layout) {
@@ -88,4 +88,4 @@ TEST(CarriedLaw, GivesOneLawForAllToEachControl) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::press_law_test

@@ -5,7 +5,7 @@
 #include "support/presses.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::press_objective_test {
 namespace {
 
 using test::tolerance;
@@ -199,4 +199,4 @@ TEST(PressObjective, FailsInWordsWithThePress) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::press_objective_test

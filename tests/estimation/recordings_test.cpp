@@ -8,7 +8,7 @@
 #include "support/recordings.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::recordings_test {
 namespace {
 
 using test::tolerance;
@@ -314,4 +314,4 @@ TEST_F(TwoCaptures, KeepAllButTheModuliWhereThereAreOthers) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::recordings_test

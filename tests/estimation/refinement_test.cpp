@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace pliant {
+namespace pliant::refinement_test {
 namespace {
 
 /// Values of limit + c h^order at spacings h that shrink by the ratio.
@@ -86,4 +86,4 @@ TEST(Refinement, MeshAndStepAreTakenToTheirLimitsTogether) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::refinement_test

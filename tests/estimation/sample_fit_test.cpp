@@ -4,7 +4,7 @@
 #include "support/presses.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::sample_fit_test {
 namespace {
 
 using test::tolerance;
@@ -84,4 +84,4 @@ TEST(PressSample, FindsAStiffnessThatVariesAndStopsAtTheNoise) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::sample_fit_test

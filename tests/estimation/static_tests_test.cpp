@@ -10,7 +10,7 @@
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::static_tests_test {
 namespace {
 
 using test::CurveCapture;
@@ -142,4 +142,4 @@ TEST(StaticTests, ACaptureWithNothingToFitIsRefused) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::static_tests_test

@@ -10,7 +10,7 @@
 #include "geometry/primitives.hpp"
 #include "support/interruption.hpp"
 
-namespace pliant {
+namespace pliant::tracking_loop_test {
 namespace {
 
 using testing::HasSubstr;
@@ -279,4 +279,4 @@ TEST(SupportedPoints, AreThoseAboutWhichPointsWereSeen) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::tracking_loop_test

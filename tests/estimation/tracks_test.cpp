@@ -9,7 +9,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::tracks_test {
 namespace {
 
 using test::tolerance;
@@ -150,4 +150,4 @@ TEST(FollowedPointsWithNoise, LeadToTheModuliWithinTheirDeviations) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::tracks_test

@@ -8,7 +8,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::mesh_io_test {
 namespace {
 
 using test::complaint_of;
@@ -184,4 +184,4 @@ TEST(SharedMeshes, RestScansAreClosedSolids) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::mesh_io_test

@@ -3,7 +3,7 @@
 #include "geometry/mesh_io.hpp"
 #include "geometry/meshes.hpp"
 
-namespace pliant {
+namespace pliant::mesh_report_test {
 namespace {
 
 using ::testing::Contains;
@@ -86,4 +86,4 @@ TEST(Examine, SurvivesAnEmptyMesh) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::mesh_report_test

@@ -7,7 +7,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::ply_test {
 namespace {
 
 using test::complaint_of;
@@ -101,4 +101,4 @@ TEST(ReadPly, RefusesBrokenHeaders) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::ply_test

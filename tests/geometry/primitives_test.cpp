@@ -4,7 +4,7 @@
 #include <map>
 #include <numbers>
 
-namespace pliant {
+namespace pliant::primitives_test {
 namespace {
 
 // Every directed edge once, and its reverse once: closed, manifold and consistently oriented.
@@ -109,4 +109,4 @@ TEST(Primitives, RefuseSenselessSizes) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::primitives_test

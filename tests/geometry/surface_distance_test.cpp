@@ -8,7 +8,7 @@
 
 #include "geometry/meshes.hpp"
 
-namespace pliant {
+namespace pliant::surface_distance_test {
 namespace {
 
 TEST(SurfaceDistance, IsThatToFacesEdgesAndCorners) {
@@ -51,4 +51,4 @@ TEST(SurfaceDistance, NeedsATriangle) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::surface_distance_test

@@ -9,7 +9,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::volume_mesh_test {
 namespace {
 
 using test::complaint_of;
@@ -251,4 +251,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& fault) { return fault.param.name; });
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::volume_mesh_test

@@ -10,7 +10,7 @@
 #include "support/eigenvalues.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::hex_grid_test {
 namespace {
 
 using std::numbers::pi;
@@ -335,4 +335,4 @@ TEST(HexGrid, RefusesCellsThatMissTheObject) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::hex_grid_test

@@ -7,7 +7,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::tet_mesh_test {
 namespace {
 
 using test::tolerance;
@@ -352,4 +352,4 @@ TEST(TetQuality, KnowsRegularRightAndFlatElements) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::tet_mesh_test

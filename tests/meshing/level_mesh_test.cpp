@@ -6,7 +6,7 @@
 
 #include "geometry/mesh_io.hpp"
 
-namespace pliant {
+namespace pliant::level_mesh_test {
 namespace {
 
 constexpr double radius = 0.05;
@@ -48,4 +48,4 @@ TEST(LevelMesh, NothingInsideGivesNoTriangles) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::level_mesh_test

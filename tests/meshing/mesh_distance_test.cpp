@@ -8,7 +8,7 @@
 #include "support/convergence.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::mesh_distance_test {
 namespace {
 
 using test::tolerance;
@@ -106,4 +106,4 @@ TEST(SignedDistance, RefusesASurfaceThatEnclosesNothing) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::mesh_distance_test

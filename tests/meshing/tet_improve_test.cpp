@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace pliant {
+namespace pliant::tet_improve_test {
 namespace {
 
 struct Elements {
@@ -87,4 +87,4 @@ TEST(TetImprove, IsTheSameEveryTime) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::tet_improve_test

@@ -4,7 +4,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::point_tracks_test {
 namespace {
 
 using test::tolerance;
@@ -84,4 +84,4 @@ TEST(SurfaceLattice, NeedsACellSize) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::point_tracks_test

@@ -7,7 +7,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::sensor_correction_test {
 namespace {
 
 using test::tolerance;
@@ -87,4 +87,4 @@ TEST_F(TwoSensors, MoveWithTheirLayout) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::sensor_correction_test

@@ -8,7 +8,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::surface_constraints_test {
 namespace {
 
 using test::tolerance;
@@ -293,4 +293,4 @@ TEST(RobustLoss, DerivativeMatchesDifferencesAndIsContinuousAtTheEdge) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::surface_constraints_test

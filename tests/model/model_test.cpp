@@ -4,7 +4,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::model_test {
 namespace {
 
 using test::complaint_of;
@@ -220,4 +220,4 @@ TEST_F(ModelFile, DamagedFilesBesideItAreNamed) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::model_test

@@ -8,7 +8,7 @@
 #include "support/load_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::result_test {
 namespace {
 
 using test::complaint_of;
@@ -225,4 +225,4 @@ TEST(Evaluation, TellsHowFarLoadsAreOff) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::result_test

@@ -9,7 +9,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 
-namespace pliant {
+namespace pliant::vtu_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -220,4 +220,4 @@ TEST_F(Vtu, CollectionsComeBack) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::vtu_test

@@ -10,7 +10,7 @@
 #include "support/convergence.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::beam_test {
 namespace {
 
 constexpr double length = 1.0, edge = 0.1, modulus = 1e5, density = 100.0;
@@ -196,4 +196,4 @@ TEST(Clamps, HoldInADisplacedPose) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::beam_test

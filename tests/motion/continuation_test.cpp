@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-namespace pliant {
+namespace pliant::continuation_test {
 namespace {
 
 using Outcome = LoadContinuation::Outcome;
@@ -69,4 +69,4 @@ TEST(LoadContinuation, TriesTheLimitOnceMoreFromNearby) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::continuation_test

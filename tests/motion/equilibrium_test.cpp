@@ -5,7 +5,7 @@
 #include "support/hanging.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::equilibrium_test {
 namespace {
 
 using test::tolerance;
@@ -112,4 +112,4 @@ INSTANTIATE_TEST_SUITE_P(Parameters, EquilibriumDerivatives,
                                             ::testing::Bool()));
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::equilibrium_test

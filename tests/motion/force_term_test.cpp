@@ -10,7 +10,7 @@
 #include "motion/rigid_contact.hpp"
 #include "support/force_terms.hpp"
 
-namespace pliant {
+namespace pliant::force_term_test {
 namespace {
 
 using test::Family;
@@ -309,4 +309,4 @@ TEST(Gravity, PullsWithTheWeight) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::force_term_test

@@ -5,7 +5,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::friction_test {
 namespace {
 
 using test::tolerance;
@@ -57,7 +57,7 @@ End slide(double friction, bool of_tetrahedra, Integrator integrator, double sec
 
 struct Slope : ::testing::TestWithParam<std::tuple<bool, Integrator>> {
   End slide(double friction, double seconds, double speed = 0.0) const {
-    return pliant::slide(friction, std::get<0>(GetParam()), std::get<1>(GetParam()), seconds, speed);
+    return friction_test::slide(friction, std::get<0>(GetParam()), std::get<1>(GetParam()), seconds, speed);
   }
 };
 
@@ -92,4 +92,4 @@ INSTANTIATE_TEST_SUITE_P(Bodies, Slope,
                          });
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::friction_test

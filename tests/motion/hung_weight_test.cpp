@@ -6,7 +6,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::hung_weight_test {
 namespace {
 
 using test::tolerance;
@@ -135,4 +135,4 @@ TEST(Stepper, RefusesCarriedPointsWithoutMasses) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::hung_weight_test

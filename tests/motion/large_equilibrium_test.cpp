@@ -2,7 +2,7 @@
 #include "support/hanging.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::large_equilibrium_test {
 namespace {
 
 using namespace test::hanging;
@@ -55,4 +55,4 @@ TEST(Equilibrium, LargeDeflectionFollowsTheElastica) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::large_equilibrium_test

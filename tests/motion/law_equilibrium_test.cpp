@@ -5,7 +5,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::law_equilibrium_test {
 namespace {
 
 using test::tolerance;
@@ -234,4 +234,4 @@ TEST(LawEquilibrium, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_equilibrium_test

@@ -4,7 +4,7 @@
 #include "motion/simulation.hpp"
 #include "support/bodies.hpp"
 
-namespace pliant {
+namespace pliant::law_motion_test {
 namespace {
 
 constexpr double modulus = 2e4, nu = 0.3, density = 100.0;
@@ -102,4 +102,4 @@ TEST(LawMotionSmall, IsThatOfItsModuliAtRest) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_motion_test

@@ -4,7 +4,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::law_sensitivity_test {
 namespace {
 
 using test::tolerance;
@@ -198,4 +198,4 @@ TEST(LawSimulation, SaysSoWhereAStepWouldTurnElementsInsideOut) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_sensitivity_test

@@ -6,7 +6,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::penalty_test {
 namespace {
 
 using test::tolerance;
@@ -53,4 +53,4 @@ TEST(Softplus, HasTheDilogarithmAsEnergy) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::penalty_test

@@ -4,7 +4,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::press_session_test {
 namespace {
 
 using test::tolerance;
@@ -77,4 +77,4 @@ TEST(SurfaceFollower, FollowsAffineDeformationsExactlyAndOthersSmoothly) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::press_session_test

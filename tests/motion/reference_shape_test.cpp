@@ -6,7 +6,7 @@
 #include "support/hanging.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::reference_shape_test {
 namespace {
 
 using test::tolerance;
@@ -159,4 +159,4 @@ TEST(ReferenceShape, OtherSchemesAgree) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::reference_shape_test

@@ -6,7 +6,7 @@
 #include "support/released.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::release_test {
 namespace {
 
 using test::tolerance;
@@ -228,4 +228,4 @@ TEST(PullPoints, LieFarFromWhatIsHeldAndFromEachOther) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::release_test

@@ -5,7 +5,7 @@
 #include "support/released.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::rest_shape_test {
 namespace {
 
 using test::tolerance;
@@ -158,4 +158,4 @@ TEST(ShapeField, HasThePriorsWidthAndVanishesWhereHeld) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::rest_shape_test

@@ -4,7 +4,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::rigid_contact_test {
 namespace {
 
 using test::tolerance;
@@ -125,4 +125,4 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Contact, ::testing::Values(true, false),
                          [](const auto& c) { return c.param ? "Bonded" : "Sliding"; });
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::rigid_contact_test

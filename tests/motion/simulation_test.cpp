@@ -4,7 +4,7 @@
 #include "support/scenes.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::simulation_test {
 namespace {
 
 using test::tolerance;
@@ -149,4 +149,4 @@ TEST(Simulation, EverySolverGivesTheSameMotion) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::simulation_test

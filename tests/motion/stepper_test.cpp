@@ -13,7 +13,7 @@
 #include "support/scenes.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::stepper_test {
 namespace {
 
 using test::tolerance;
@@ -405,4 +405,4 @@ TEST(RigidContact, CarriesTheWeightOfABodyAtRest) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::stepper_test

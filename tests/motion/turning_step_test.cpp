@@ -8,7 +8,7 @@
 #include "motion/simulation.hpp"
 #include "support/bodies.hpp"
 
-namespace pliant {
+namespace pliant::turning_step_test {
 namespace {
 
 Box slender() {
@@ -84,4 +84,4 @@ TEST(TurningStep, NeedsNodesThatAreFixed) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::turning_step_test

@@ -10,7 +10,7 @@
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::prediction_test {
 namespace {
 
 using test::tolerance;
@@ -238,4 +238,4 @@ TEST_F(Predictions, RefuseMarkersThatAreMissingOrNamedTwice) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::prediction_test

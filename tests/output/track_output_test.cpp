@@ -7,7 +7,7 @@
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::track_output_test {
 namespace {
 
 using nlohmann::json;
@@ -82,4 +82,4 @@ TEST(TrackOutput, JsonHoldsEveryFrame) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::track_output_test

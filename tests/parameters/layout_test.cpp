@@ -5,7 +5,7 @@
 
 #include "parameters/motion_blocks.hpp"
 
-namespace pliant {
+namespace pliant::layout_test {
 namespace {
 
 /// A scalar, a vector and a plane.
@@ -200,4 +200,4 @@ TEST(MaterialBlocksOf, AMotionReadAndWriteAllModuli) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::layout_test

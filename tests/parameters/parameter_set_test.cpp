@@ -7,7 +7,7 @@
 #include "support/parameters.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::parameter_set_test {
 namespace {
 
 using test::tolerance;
@@ -244,4 +244,4 @@ TEST(ParameterSet, RefusesWhatIsNotOfItsLayout) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::parameter_set_test

@@ -10,7 +10,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::find_dots_test {
 namespace {
 
 /// An ellipse with its half axes and the turn of the first one.
@@ -144,4 +144,4 @@ TEST(ReadPhotograph, KeepsChannelsInOrderAndRefusesWhatIsNoImage) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::find_dots_test

@@ -10,7 +10,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace pliant::test {
+namespace pliant::test::follow_test {
 namespace {
 
 /// A sheet of markers about 10 mm apart, irregular as painted by hand.
@@ -148,4 +148,4 @@ TEST(Agreement, KeepsWhatNoAttemptContradicts) {
 TEST(Spacing, IsThatOfTheSheet) { EXPECT_NEAR(spacing_of(sheet(0.0)), 0.01, 1e-12); }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::follow_test

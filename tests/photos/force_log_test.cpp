@@ -6,7 +6,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::force_log_test {
 namespace {
 
 using testing::HasSubstr;
@@ -54,4 +54,4 @@ TEST(PhotographTimes, EachNumberOnce) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::force_log_test

@@ -9,7 +9,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::lens_camera_test {
 namespace {
 
 using testing::HasSubstr;
@@ -123,4 +123,4 @@ TEST(LensCamera, DerivativeAgreesWithDifferences) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::lens_camera_test

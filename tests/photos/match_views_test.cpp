@@ -10,7 +10,7 @@
 
 #include "rays/look_at.hpp"
 
-namespace pliant::test {
+namespace pliant::test::match_views_test {
 namespace {
 
 std::vector<LensCamera> some_cameras(int count) {
@@ -158,4 +158,4 @@ TEST(NoiseFactor, IsWhatPosesAddToTheDots) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::match_views_test

@@ -11,7 +11,7 @@
 #include "photos/follow.hpp"
 #include "support/marker_truth.hpp"
 
-namespace pliant::test {
+namespace pliant::test::measure_test {
 namespace {
 
 constexpr double greatest_mean_error = 0.1;  // [pixels]
@@ -95,4 +95,4 @@ TEST(MeasureMarkers, DeviationsGrowWithWhatCalibrationLeaves) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::measure_test

@@ -5,7 +5,7 @@
 
 #include "geometry/primitives.hpp"
 
-namespace pliant::test {
+namespace pliant::test::probe_test {
 namespace {
 
 using testing::HasSubstr;
@@ -53,4 +53,4 @@ TEST(ContactOf, IsWhereTheAxisEnters) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::probe_test

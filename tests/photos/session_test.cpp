@@ -14,7 +14,7 @@
 #include "photos/paint.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant::test {
+namespace pliant::test::session_test {
 namespace {
 
 using testing::HasSubstr;
@@ -131,4 +131,4 @@ TEST(PhotoSession, LeavesOutAPressWithoutProbe) {
 }
 
 }  // namespace
-}  // namespace pliant::test
+}  // namespace pliant::test::session_test

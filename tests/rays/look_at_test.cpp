@@ -4,7 +4,7 @@
 
 #include "capture/capture.hpp"
 
-namespace pliant {
+namespace pliant::look_at_test {
 namespace {
 
 const Vector3 eye(0.3, 0.8, 1.1), target(-0.1, 0.2, 0.05);
@@ -36,4 +36,4 @@ TEST(LookAt, RefusesViewsWithoutADirection) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::look_at_test

@@ -6,7 +6,7 @@
 #include "capture/capture.hpp"
 #include "geometry/primitives.hpp"
 
-namespace pliant {
+namespace pliant::ray_scene_test {
 namespace {
 
 constexpr double single_precision = 2e-6;  // relative; depths are kept as float
@@ -126,4 +126,4 @@ TEST(RayScene, RefusesTrianglesWithoutVerticesAndOtherNumbersOfVertices) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::ray_scene_test

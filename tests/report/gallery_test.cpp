@@ -3,7 +3,7 @@
 #include "geometry/primitives.hpp"
 #include "rays/ray_scene.hpp"
 
-namespace pliant {
+namespace pliant::gallery_test {
 namespace {
 
 using testing::ElementsAre;
@@ -51,4 +51,4 @@ TEST(Gallery, FramesShareOneViewThatHoldsTheWholeMotion) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::gallery_test

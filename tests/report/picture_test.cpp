@@ -9,7 +9,7 @@
 #include "rays/ray_scene.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::picture_test {
 namespace {
 
 Picture decode(const std::string& bytes) {
@@ -179,4 +179,4 @@ TEST(Picture, LargeWithPoints) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::picture_test

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <pugixml.hpp>
 
-namespace pliant {
+namespace pliant::plot_test {
 namespace {
 
 using testing::ElementsAre;
@@ -101,4 +101,4 @@ TEST(Plot, RefusesVectorsOfDifferentLength) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::plot_test

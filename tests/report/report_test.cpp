@@ -9,7 +9,7 @@
 #include "support/load_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::report_test {
 namespace {
 
 using testing::Contains;
@@ -209,4 +209,4 @@ TEST(Report, ExamplePage) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::report_test

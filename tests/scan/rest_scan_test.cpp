@@ -15,7 +15,7 @@
 #include "synthesis/synthesis.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::rest_scan_test {
 namespace {
 
 using test::complaint_of;
@@ -241,4 +241,4 @@ TEST(SheetScan, RefusesWhatIsNoSheet) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::rest_scan_test

@@ -2,7 +2,7 @@
 
 #include "geometry/meshes.hpp"
 
-namespace pliant {
+namespace pliant::region_test {
 namespace {
 
 const TriangleMesh box = test::box_mesh(Vector3::Zero(), Vector3::Ones());
@@ -29,4 +29,4 @@ TEST(RegionTest, TouchesTheInsideOfASolid) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::region_test

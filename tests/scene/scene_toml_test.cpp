@@ -7,7 +7,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::scene_toml_test {
 namespace {
 
 using test::complaint_of;
@@ -182,4 +182,4 @@ TEST(SceneToml, AFolderThatIsMovedStaysWhole) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::scene_toml_test

@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-namespace pliant {
+namespace pliant::toml_table_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -39,4 +39,4 @@ TEST(Rigid, RefusesScaleMirrorAndTransposition) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::toml_table_test

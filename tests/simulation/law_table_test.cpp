@@ -8,7 +8,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::law_table_test {
 namespace {
 
 using test::complaint_of;
@@ -114,4 +114,4 @@ TEST(KeptLaws, ThatAreDamagedAreToldWithWhatToDo) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::law_table_test

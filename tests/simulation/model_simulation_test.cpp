@@ -6,7 +6,7 @@
 #include "simulation/trajectory.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::model_simulation_test {
 namespace {
 
 using test::complaint_of;
@@ -81,4 +81,4 @@ TEST(Trajectory, HasAFileForEachFrame) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::model_simulation_test

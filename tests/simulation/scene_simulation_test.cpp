@@ -2,7 +2,7 @@
 
 #include "geometry/primitives.hpp"
 
-namespace pliant {
+namespace pliant::scene_simulation_test {
 namespace {
 
 Scene bar() {
@@ -83,4 +83,4 @@ TEST(SceneSimulation, FinerStepsAreShorter) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::scene_simulation_test

@@ -9,7 +9,7 @@
 #include "support/dense.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::general_solver_test {
 namespace {
 
 using test::tolerance;
@@ -109,4 +109,4 @@ TEST(LuSolver, ASingularMatrixIsRefused) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::general_solver_test

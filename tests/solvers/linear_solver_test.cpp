@@ -12,7 +12,7 @@
 #include "support/dense.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::linear_solver_test {
 namespace {
 
 using test::tolerance;
@@ -279,4 +279,4 @@ TEST(ConjugateGradients, NothingToSolve) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::linear_solver_test

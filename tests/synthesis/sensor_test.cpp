@@ -4,7 +4,7 @@
 
 #include "geometry/primitives.hpp"
 
-namespace pliant {
+namespace pliant::sensor_test {
 namespace {
 
 constexpr double metres_per_unit = 1e-4;
@@ -195,4 +195,4 @@ TEST(Sensor, RefusesSettingsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::sensor_test

@@ -8,7 +8,7 @@
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
 
-namespace pliant {
+namespace pliant::synthetic_scene_test {
 namespace {
 
 using test::complaint_of;
@@ -236,4 +236,4 @@ TEST(Synthesis, RefusesATrajectoryThatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::synthetic_scene_test

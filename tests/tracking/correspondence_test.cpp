@@ -9,7 +9,7 @@
 #include "base/parallel.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant {
+namespace pliant::correspondence_test {
 namespace {
 
 using test::tolerance;
@@ -205,4 +205,4 @@ TEST(Expectation, RefusesWrongNumbersAndSenselessOptions) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::correspondence_test

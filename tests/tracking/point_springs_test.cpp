@@ -2,7 +2,7 @@
 
 #include "support/force_terms.hpp"
 
-namespace pliant {
+namespace pliant::point_springs_test {
 namespace {
 
 using test::Family;
@@ -110,4 +110,4 @@ TEST(PointSprings, RefuseWrongNumbers) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::point_springs_test

@@ -10,7 +10,7 @@
 #include "support/tolerance.hpp"
 #include "tracking/neighbours.hpp"
 
-namespace pliant {
+namespace pliant::surface_samples_test {
 namespace {
 
 using test::tolerance;
@@ -127,4 +127,4 @@ TEST(Neighbours, AreThoseOfAllPairs) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::surface_samples_test

@@ -9,7 +9,7 @@
 #include "base/parallel.hpp"
 #include "support/swinging.hpp"
 
-namespace pliant {
+namespace pliant::tracker_test {
 namespace {
 
 using test::Sensors;
@@ -258,4 +258,4 @@ TEST(Tracker, NotesAScanThatSagsTooSoftly) {
 }
 
 }  // namespace
-}  // namespace pliant
+}  // namespace pliant::tracker_test
