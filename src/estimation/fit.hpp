@@ -173,20 +173,11 @@ struct FitState {
     bool keeps_loop = true;             ///< in the last phase
   };
   std::optional<Tracking> tracking;
-  /// Where the law of a pressed object is looked for.
-  struct LawSearch {
-    struct Done {
-      TriedLaw tried;
-      std::vector<ZoneCut> cuts;
-      VectorX theta;  ///< empty: it cannot be fitted
-      double noise = 0.0;
-    };
-    std::vector<Done> done;            ///< forms that were tried, in order
-    OptimiserState under_way;          ///< of the next; p is empty: not begun
-    std::vector<ZoneCut> cuts;         ///< of its zones
-    std::vector<PressSample> samples;  ///< of the sampled material: presses that are done, in order
+  /// Of a sampled material: the presses that are done, in order.
+  struct Sampled {
+    std::vector<PressSample> samples;
   };
-  std::optional<LawSearch> law;
+  std::optional<Sampled> sampled;
 };
 
 /// A recording, and what its sensors saw.

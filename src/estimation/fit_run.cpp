@@ -47,9 +47,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor,
                PassState state)
-    : options_(options),
-      monitor_(monitor),
-      state_(std::move(state)),
+    : StageLoop(options, monitor, std::move(state)),
       recordings_(std::move(recorded), options_, outcome_.notes),
       layout_(std::make_shared<ParameterLayout>(recordings_.parameters().layout())),
       plan_(facts()) {
@@ -117,67 +115,26 @@ PlanFacts FitRun::facts() {
 
 // The loop ------------------------------------------------------------------------------------------------------------
 
-void FitRun::execute() {
-  while (!interrupted_) {
-    const std::vector<StageChain> chains = plan_.next(state_);
-    if (chains.empty()) return;
-    for (const StageChain& chain : chains)
-      for (const Stage& stage : chain) (void)grid(stage.grid);  // made before threads ask for it
-    parallel_tasks(chains.size(), [&](std::size_t i) { run_chain(chains[i]); });
+std::vector<StageChain> FitRun::next() {
+  std::vector<StageChain> chains = plan_.next(state_);
+  for (const StageChain& chain : chains)
+    for (const Stage& stage : chain) (void)grid(stage.grid);  // made before threads ask for it
+  return chains;
+}
+
+StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
+  switch (stage.id.kind) {
+    case StageKind::Swing:
+      return find_swing(stage);
+    case StageKind::Scan:
+      return scan(stage, is_cut);
+    case StageKind::Pulls:
+      return find_pulls(stage, is_cut);
+    case StageKind::Test:
+      return test_corrections(stage);
+    default:
+      return minimise_stage(stage, is_cut);
   }
-}
-
-void FitRun::run_chain(const StageChain& chain) {
-  VectorX theta;
-  int counted = chain.front().iterations_before;
-  for (Stage stage : chain) {
-    if (is_interrupted()) {
-      interrupted_ = true;
-      return;
-    }
-    if (stage.from.empty()) stage.from = {theta};
-    stage.iterations_before = counted;
-    std::optional<StageRecord> record = run_stage(stage);
-    if (!record) return;
-    theta = record->theta, counted += counted_iterations(*record);
-    const bool ends = !record->succeeded && stage.id.kind != StageKind::Motion;
-    keep(std::move(*record));
-    if (ends) return;
-  }
-}
-
-std::optional<StageRecord> FitRun::run_stage(const Stage& stage) {
-  bool is_cut = false;
-  StageRecord record = [&] {
-    switch (stage.id.kind) {
-      case StageKind::Swing:
-        return find_swing(stage);
-      case StageKind::Scan:
-        return scan(stage, is_cut);
-      case StageKind::Pulls:
-        return find_pulls(stage, is_cut);
-      case StageKind::Test:
-        return test_corrections(stage);
-      default:
-        return minimise_stage(stage, is_cut);
-    }
-  }();
-  if (!is_cut) return record;
-  const std::lock_guard lock(mutex_);
-  interrupted_ = true;
-  partial_.push_back(std::move(record));
-  return std::nullopt;
-}
-
-void FitRun::keep(StageRecord record) {
-  const std::lock_guard lock(mutex_);
-  if (is_on_full_grid(record.id.kind)) state_.under_way.reset();
-  state_.done.push_back(std::move(record));
-  save();
-}
-
-void FitRun::save() {
-  if (monitor_.on_state) monitor_.on_state({state_, {}, {}, {}});
 }
 
 /// What a scan or a repetition has reached is nothing yet.
@@ -188,13 +145,11 @@ PassState FitRun::reached() const {
   return reached;
 }
 
-void FitRun::emit(FitEvent event) {
+void FitRun::tell(FitEvent event) {
   event.fraction_done /= all_work();
   event.youngs_modulus = event.theta[recordings_.material().youngs_moduli.front()];
   event.layout = layout_;
-  const std::lock_guard lock(mutex_);
-  if (monitor_.on_event) monitor_.on_event(event);
-  outcome_.history.push_back(std::move(event));
+  emit(std::move(event));
 }
 
 double FitRun::all_work() const {
@@ -227,15 +182,12 @@ OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, cons
   int iterations = from.iterations;
   OptimiserSummary s = (in_turns ? minimise_in_turns : minimise_from)(objective, from, o, [&](const Iteration& i) {
     ++iterations;
-    if (saves) {
-      state_.under_way = {stage.id, stage.from.front(), i.state()};
-      save();
-    }
+    if (saves) keep_under_way(stage, i.state());
     FitEvent event{stage.id.kind, stage.name, stage.id.start, stage.iterations_before + iterations,
                    i.cost,        i.damping,  i.surface_rms,  objective.parameters().to_theta(i.p)};
     const double part = std::min(1.0, double(iterations) / stage.iterations);
     event.fraction_done = stage.done_from + (stage.done_to - stage.done_from) * part;
-    emit(std::move(event));
+    tell(std::move(event));
     return !is_interrupted();
   });
   const std::lock_guard lock(mutex_);
@@ -244,14 +196,14 @@ OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, cons
 }
 
 StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
-  const bool goes_on = state_.under_way && state_.under_way->id == stage.id && !interrupted_;
-  const VectorX& from = goes_on ? state_.under_way->from : stage.from.front();
+  const StageUnderWay* left = under_way(stage.id);
+  const VectorX from = left ? left->from : stage.from.front();
   const ParameterSet parameters = parameters_of(stage, from);
   Objective objective = objective_of(stage, parameters, grid(stage.grid));
   Stage own = stage;
   own.from = {from};
-  const bool has_begun = goes_on && state_.under_way->optimiser.p.size() > 0;
-  OptimiserSummary s = optimise(objective, own, has_begun ? state_.under_way->optimiser : start_of(parameters));
+  const OptimiserState begin = left && left->optimiser.p.size() > 0 ? left->optimiser : start_of(parameters);
+  OptimiserSummary s = optimise(objective, own, begin);
   is_cut = s.interrupted;
   StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
@@ -341,18 +293,18 @@ StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
     record.trials.emplace_back(trials.back()[plan_.facts().moduli.front()], infinite);
   }
   std::atomic<int> done = 0;
-  const auto tell = [&](std::size_t i, const CostEvaluation& e) {
+  const auto on_evaluated = [&](std::size_t i, const CostEvaluation& e) {
     if (e.succeeded) record.trials[i].second = e.cost;
     FitEvent event{StageKind::Scan, stage.name, 0, int(i) + 1, e.cost, 0.0, e.surface_rms(), trials[i]};
     const double part = double(++done) / double(trials.size());
     event.fraction_done = stage.done_from + (stage.done_to - stage.done_from) * part;
-    emit(std::move(event));
+    tell(std::move(event));
     return !is_interrupted();
   };
   if (recordings_.all_static())
-    evaluate_downwards(objective, points, tell);
+    evaluate_downwards(objective, points, on_evaluated);
   else
-    (void)objective.evaluate(points, tell);
+    (void)objective.evaluate(points, on_evaluated);
   is_cut = is_interrupted();
   if (!is_cut && best_of_scan(record.trials, 1).empty())
     throw InputError({{recordings_.front().capture.file},

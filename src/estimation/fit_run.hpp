@@ -1,21 +1,18 @@
 #pragma once
 
-#include <atomic>
-#include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "estimation/fit_plan.hpp"
 #include "estimation/recordings.hpp"
+#include "estimation/stage_loop.hpp"
 
 namespace pliant {
 
-/// Carries out the plan of one pass: asks it for stages, runs them, keeps their records in the state, tells and saves
-/// what is done, and stops where it is interrupted. Internal to `fit`.
-class FitRun {
+/// Carries out a `FitPlan` on recordings of motions and equilibria. Internal to `fit`.
+class FitRun : StageLoop {
  public:
   /// Throws InputError where a recording cannot be fitted, with the reason.
   FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, PassState state);
@@ -25,15 +22,12 @@ class FitRun {
   FitOutcome run();
 
  private:
-  /// Until the plan has no more stages.
-  void execute();
-  void run_chain(const StageChain& chain);
-  /// Nothing where it was interrupted: `partial_` has what it reached.
-  std::optional<StageRecord> run_stage(const Stage& stage);
-  StageRecord minimise_stage(const Stage& stage, bool& is_interrupted);
-  StageRecord find_pulls(const Stage& stage, bool& is_interrupted);
+  std::vector<StageChain> next() override;
+  StageRecord run_stage(const Stage& stage, bool& is_cut) override;
+  StageRecord minimise_stage(const Stage& stage, bool& is_cut);
+  StageRecord find_pulls(const Stage& stage, bool& is_cut);
   StageRecord find_swing(const Stage& stage);
-  StageRecord scan(const Stage& stage, bool& is_interrupted);
+  StageRecord scan(const Stage& stage, bool& is_cut);
   StageRecord test_corrections(const Stage& stage);
 
   /// One minimisation, told as iterations of the stage; from any thread.
@@ -42,11 +36,7 @@ class FitRun {
   Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const;
   const Grid& grid(const Spacing& spacing);
 
-  bool is_interrupted() const { return monitor_.interrupted && monitor_.interrupted(); }
-  /// Tells and keeps it; from any thread.
-  void emit(FitEvent event);
-  void keep(StageRecord record);
-  void save();
+  void tell(FitEvent event);
 
   PlanFacts facts();
   /// The modulus that is enough for scans that sag [Pa]; 0: there are none.
@@ -70,18 +60,11 @@ class FitRun {
     CostEvaluation evaluation;
   };
 
-  FitOptions options_;
-  FitMonitor monitor_;
-  PassState state_;
-  FitOutcome outcome_;
   Recordings recordings_;
   std::shared_ptr<const ParameterLayout> layout_;
   std::vector<std::unique_ptr<Grid>> grids_;
   FitPlan plan_;
-  std::vector<StageRecord> partial_;  // of stages that were interrupted
-  std::vector<Ended> ended_;          // in this run
-  std::atomic<bool> interrupted_ = false;
-  std::mutex mutex_;  // of all above that stages write, and of the monitor
+  std::vector<Ended> ended_;  // in this run
 };
 
 }  // namespace pliant

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimation/law_stage.hpp"
 #include "estimation/optimiser.hpp"
 #include "estimation/refinement.hpp"
 
@@ -13,17 +14,21 @@ namespace pliant {
 
 /// What a stage of a fit is for.
 enum class StageKind {
-  Motion,     ///< the motion or pose at the start
-  Swing,      ///< the stiffness of the swing that was seen; no iterations
-  Scan,       ///< a trial of each of several Young's moduli: no iteration
-  Coarse,     ///< a start that is followed on the coarse grid
-  Pulls,      ///< what holds a released object, on another grid
-  Fine,       ///< the estimate on the full grid
-  Test,       ///< which corrections the residuals ask for; no iterations
-  Corrected,  ///< the estimate together with those
-  Finer,      ///< the estimate again with finer steps or on a finer grid
-  Law,        ///< a form of the law of a pressed object
-  Sample,     ///< the stiffness of each element that one press shows: all its iterations in one step
+  Motion,         ///< the motion or pose at the start
+  Swing,          ///< the stiffness of the swing that was seen; no iterations
+  Scan,           ///< a trial of each of several Young's moduli: no iteration
+  Coarse,         ///< a start that is followed on the coarse grid
+  Pulls,          ///< what holds a released object, on another grid
+  Fine,           ///< the estimate on the full grid
+  Test,           ///< which corrections the residuals ask for; no iterations
+  Corrected,      ///< the estimate together with those
+  Finer,          ///< the estimate again with finer steps or on a finer grid
+  Law,            ///< a form of the law of a pressed object
+  Scale,          ///< its moduli alone, where the other numbers begin
+  Cut,            ///< where a zone more is promised most; no iterations
+  Move,           ///< where one of the zones' cuts would fit better; no iterations
+  ControlPoints,  ///< a field of control points, and what a step promises of it; no iterations
+  Sample,         ///< the stiffness of each element that a few presses show, each by itself
 };
 
 /// Whether a stage makes the estimate, on the full grid or a finer one.
@@ -61,6 +66,7 @@ struct Stage {
   std::vector<VectorX> from = {};      ///< theta; of several the best end counts; empty: where the stage before ended
   std::vector<double> trials = {};     ///< of a scan: Young's moduli of the object's own material [Pa]
   double done_from = 0.0, done_to = 0.0;  ///< how much of the whole is done before and after it
+  std::optional<LawTask> law = {};        ///< of a search for the law of a pressed object
 };
 
 /// Stages one after the other, each from where the one before ended.
@@ -81,6 +87,7 @@ struct StageRecord {
   std::vector<std::pair<double, double>> trials = {};
   std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction
   std::string told = {};                    ///< for people: the swing that was found, what needs correction
+  std::optional<LawFinding> law = {};       ///< of a search for the law of a pressed object
 };
 
 /// A stage that is under way.
@@ -94,7 +101,7 @@ struct StageUnderWay {
 struct PassState {
   int controls = 1;                        ///< control moduli of the parameter vectors below
   std::vector<StageRecord> done;           ///< in the order in which they ended
-  std::optional<StageUnderWay> under_way;  ///< of those on the full grid
+  std::optional<StageUnderWay> under_way;  ///< of those that make an estimate
   /// Where the stages on the full grid begin, if not with the best start: what came before was taken over from another
   /// pass.
   struct Beginning {

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/9";
+constexpr const char* format = "fit-state/10";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -114,18 +114,6 @@ PressSample to_sample(const Json& json) {
   return s;
 }
 
-Json from_cuts(const std::vector<ZoneCut>& cuts) {
-  Json json = Json::array();
-  for (const ZoneCut& cut : cuts) json.push_back({cut.zone, int(cut.by), cut.at});
-  return json;
-}
-std::vector<ZoneCut> to_cuts(const Json& json) {
-  std::vector<ZoneCut> cuts;
-  for (const Json& c : json)
-    cuts.push_back({c.at(0).get<int>(), ZoneCut::By(c.at(1).get<int>()), c.at(2).get<double>()});
-  return cuts;
-}
-
 Json from_optimiser(const OptimiserState& o) {
   return {{"iterations", o.iterations}, {"p", from_vector(o.p)}, {"memory", from_vector(o.memory)}};
 }
@@ -133,41 +121,40 @@ OptimiserState to_optimiser(const Json& json) {
   return {json.at("iterations").get<int>(), to_vector(json.at("p")), to_vector(json.at("memory"))};
 }
 
-Json from_law(const FitState::LawSearch& law) {
-  Json json = {{"done", Json::array()}, {"samples", Json::array()}};
-  for (const FitState::LawSearch::Done& d : law.done)
-    json["done"].push_back({{"terms", d.tried.form.terms},
-                            {"controls", d.tried.form.controls},
-                            {"laws", d.tried.form.laws},
-                            {"own_ratios", d.tried.form.own_ratios},
-                            {"neo_hookean", d.tried.form.two_numbers == TwoNumberLaw::NeoHookean},
-                            {"cost", from_cost(d.tried.cost)},
-                            {"against", from_cost(-d.tried.evidence)},
-                            {"kept", d.tried.kept},
-                            {"cuts", from_cuts(d.cuts)},
-                            {"theta", from_vector(d.theta)},
-                            {"noise", d.noise}});
-  for (const PressSample& s : law.samples) json["samples"].push_back(from_sample(s));
-  json["under_way"] = from_optimiser(law.under_way);
-  json["cuts"] = from_cuts(law.cuts);
+Json from_sampled(const FitState::Sampled& sampled) {
+  Json json = Json::array();
+  for (const PressSample& s : sampled.samples) json.push_back(from_sample(s));
   return json;
 }
+FitState::Sampled to_sampled(const Json& json) {
+  FitState::Sampled sampled;
+  for (const Json& s : json) sampled.samples.push_back(to_sample(s));
+  return sampled;
+}
 
-FitState::LawSearch to_law(const Json& json) {
-  FitState::LawSearch law;
-  for (const Json& d : json.at("done"))
-    law.done.push_back({{{d.at("controls").get<int>(), d.at("terms").get<int>(), d.at("laws").get<int>(),
-                          d.at("own_ratios").get<bool>(),
-                          d.at("neo_hookean").get<bool>() ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear},
-                         to_cost(d.at("cost")),
-                         -to_cost(d.at("against")),
-                         d.at("kept").get<bool>()},
-                        to_cuts(d.at("cuts")),
-                        to_vector(d.at("theta")),
-                        d.at("noise").get<double>()});
-  for (const Json& s : json.at("samples")) law.samples.push_back(to_sample(s));
-  law.under_way = to_optimiser(json.at("under_way"));
-  law.cuts = to_cuts(json.at("cuts"));
+Json from_finding(const LawFinding& law) {
+  Json json = {{"noise", law.noise},           {"track_squares", law.track_squares},
+               {"curve_cost", law.curve_cost}, {"observations", law.observations},
+               {"dimension", law.dimension},   {"against", from_cost(-law.evidence)},
+               {"points", Json::array()}};
+  if (law.cut) json["cut"] = {law.cut->zone, int(law.cut->by), law.cut->at};
+  for (const Vector3& p : law.points) json["points"].push_back({p.x(), p.y(), p.z()});
+  return json;
+}
+LawFinding to_finding(const Json& json) {
+  LawFinding law;
+  law.noise = json.at("noise").get<double>();
+  law.track_squares = json.at("track_squares").get<double>();
+  law.curve_cost = json.at("curve_cost").get<double>();
+  law.observations = json.at("observations").get<double>();
+  law.dimension = json.at("dimension").get<int>();
+  law.evidence = -to_cost(json.at("against"));
+  if (json.contains("cut")) {
+    const Json& cut = json["cut"];
+    law.cut = {cut.at(0).get<int>(), ZoneCut::By(cut.at(1).get<int>()), cut.at(2).get<double>()};
+  }
+  for (const Json& p : json.at("points"))
+    law.points.emplace_back(p.at(0).get<double>(), p.at(1).get<double>(), p.at(2).get<double>());
   return law;
 }
 
@@ -194,6 +181,7 @@ Json from_record(const StageRecord& r) {
                {"told", r.told},
                {"trials", Json::array()}};
   for (const auto& [modulus, cost] : r.trials) json["trials"].push_back({modulus, from_cost(cost)});
+  if (r.law) json["law"] = from_finding(*r.law);
   return json;
 }
 
@@ -210,6 +198,7 @@ StageRecord to_record(const Json& json) {
   r.corrected = json.at("corrected").get<std::vector<std::string>>();
   r.told = json.at("told").get<std::string>();
   for (const Json& t : json.at("trials")) r.trials.emplace_back(t.at(0).get<double>(), to_cost(t.at(1)));
+  if (json.contains("law")) r.law = to_finding(json["law"]);
   return r;
 }
 
@@ -240,7 +229,7 @@ Json to_json(const FitState& state) {
   Json json = {{"pass", from_pass(state.pass)}};
   if (state.field) json["field"] = from_field(*state.field);
   if (state.tracking) json["tracking"] = from_tracking(*state.tracking);
-  if (state.law) json["law"] = from_law(*state.law);
+  if (state.sampled) json["sampled"] = from_sampled(*state.sampled);
   return json;
 }
 
@@ -249,7 +238,7 @@ FitState to_state(const Json& json) {
   state.pass = to_pass(json.at("pass"));
   if (json.contains("field")) state.field = to_field(json["field"]);
   if (json.contains("tracking")) state.tracking = to_tracking(json["tracking"]);
-  if (json.contains("law")) state.law = to_law(json["law"]);
+  if (json.contains("sampled")) state.sampled = to_sampled(json["sampled"]);
   return state;
 }
 

@@ -6,17 +6,10 @@
 #include <vector>
 
 #include "estimation/press_objective.hpp"
+#include "estimation/zone_cut.hpp"
 
 namespace pliant {
 
-/// A cut of one zone of an object in two, by where the elements' centres lie.
-struct ZoneCut {
-  enum class By : int { X, Y, Z, Depth };  ///< a coordinate in the scan, or how far below the nearest surface
-  int zone = 0;                            ///< of those that were there before; its upper part becomes the last zone
-  By by = By::X;
-  double at = 0.0;  ///< [m]
-  bool operator==(const ZoneCut&) const = default;
-};
 /// "zone 1 cut at y = 33 mm: above it zone 3", zones counted from 1.
 std::string describe(const ZoneCut& cut, int zones_before);
 

@@ -256,13 +256,17 @@ FitState some_state() {
                           VectorX::Constant(20, 2.0 / 7.0),
                           {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
   state.pass.begin = {VectorX::Constant(20, 5.0 / 7.0), 2};
-  FitState::LawSearch& law = state.law.emplace();
-  law.done = {{{{2, 1, 2, true}, 1.0 / 3.0, -std::numeric_limits<double>::infinity(), false},
-               {{0, ZoneCut::By::Depth, 1e-3 / 3.0}},
-               VectorX::Constant(6, 1.0 / 9.0),
-               1e-4 / 3.0}};
-  law.under_way = {3, VectorX::Constant(6, 1.0 / 11.0), VectorX::Constant(2, 1e-9 / 3.0)};
-  law.cuts = {{0, ZoneCut::By::X, 0.1}, {1, ZoneCut::By::Y, -1.0 / 3.0}};
+  StageRecord cut{{StageKind::Cut, 0, 3}, "2 zones", VectorX::Constant(6, 1.0 / 9.0), VectorX::Constant(6, 0.1)};
+  cut.law = LawFinding{1e-4 / 3.0,
+                       1e-9 / 3.0,
+                       1.0 / 3.0,
+                       77.0,
+                       5,
+                       -std::numeric_limits<double>::infinity(),
+                       ZoneCut{1, ZoneCut::By::Depth, 1e-3 / 3.0},
+                       {Vector3(0.1, -1.0 / 3.0, 0.0)}};
+  state.pass.done.push_back(cut);
+  FitState::Sampled& law = state.sampled.emplace();
   law.samples.emplace_back();
   law.samples[0].succeeded = true, law.samples[0].weight = 1.0 / 7.0, law.samples[0].iterations = 5;
   law.samples[0].sample.strains = MatrixX::Constant(2, 6, 1.0 / 3.0);
@@ -303,25 +307,25 @@ TEST(FitState, RoundTripsToTheLastBit) {
   ASSERT_TRUE(read.pass.begin.has_value());
   EXPECT_EQ(read.pass.begin->theta, written.pass.begin->theta);
   EXPECT_EQ(read.pass.begin->stage, 2);
-  ASSERT_TRUE(read.law.has_value());
-  ASSERT_EQ(read.law->done.size(), 1u);
-  const FitState::LawSearch::Done &done = read.law->done[0], &done_written = written.law->done[0];
-  EXPECT_EQ(done.tried.form, done_written.tried.form);
-  EXPECT_EQ(done.tried.cost, done_written.tried.cost);
-  EXPECT_EQ(done.tried.evidence, done_written.tried.evidence);
-  EXPECT_EQ(done.cuts, done_written.cuts);
-  EXPECT_EQ(done.theta, done_written.theta);
-  EXPECT_EQ(done.noise, done_written.noise);
-  EXPECT_EQ(read.law->under_way.p, written.law->under_way.p);
-  EXPECT_EQ(read.law->under_way.memory, written.law->under_way.memory);
-  EXPECT_EQ(read.law->cuts, written.law->cuts);
-  ASSERT_EQ(read.law->samples.size(), 1u);
-  EXPECT_EQ(read.law->samples[0].sample.strains, written.law->samples[0].sample.strains);
-  EXPECT_EQ(read.law->samples[0].sample.p[1].alpha, 0.4);
-  EXPECT_EQ(read.law->samples[0].weight, 1.0 / 7.0);
+  ASSERT_TRUE(read.sampled.has_value());
+  ASSERT_TRUE(read.pass.done.back().law.has_value());
+  const LawFinding &found = *read.pass.done.back().law, &found_written = *written.pass.done.back().law;
+  EXPECT_FALSE(read.pass.done.front().law.has_value());
+  EXPECT_EQ(found.noise, found_written.noise);
+  EXPECT_EQ(found.track_squares, found_written.track_squares);
+  EXPECT_EQ(found.curve_cost, found_written.curve_cost);
+  EXPECT_EQ(found.observations, found_written.observations);
+  EXPECT_EQ(found.dimension, found_written.dimension);
+  EXPECT_EQ(found.evidence, found_written.evidence);
+  EXPECT_EQ(found.cut, found_written.cut);
+  EXPECT_EQ(found.points, found_written.points);
+  ASSERT_EQ(read.sampled->samples.size(), 1u);
+  EXPECT_EQ(read.sampled->samples[0].sample.strains, written.sampled->samples[0].sample.strains);
+  EXPECT_EQ(read.sampled->samples[0].sample.p[1].alpha, 0.4);
+  EXPECT_EQ(read.sampled->samples[0].weight, 1.0 / 7.0);
   write_fit_state(folder / "empty.json", {}, "key");
   EXPECT_TRUE(read_fit_state(folder / "empty.json", "key").pass.done.empty());
-  EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").law.has_value());
+  EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").sampled.has_value());
 }
 
 TEST(FitState, RefusesAnotherKeyAndDamage) {
@@ -336,9 +340,9 @@ TEST(FitState, RefusesAnotherKeyAndDamage) {
         test::complaint_of([&] { (void)read_fit_state(folder.write("cut.json", whole.substr(0, length)), "key"); }), "")
         << length;
   for (const char* text :
-       {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})", R"({"format": "fit-state/9", "key": "key"})",
-        R"({"format": "fit-state/9", "key": "key", "pass": {"controls": 1, "done": [1]}})",
-        R"({"format": "fit-state/9", "key": "key", "pass": {"controls": 1, "done": [], "under_way": ["x"]}})"})
+       {"[]", "{}", "null", R"({"format": "fit-state/1", "key": "key"})", R"({"format": "fit-state/10", "key": "key"})",
+        R"({"format": "fit-state/10", "key": "key", "pass": {"controls": 1, "done": [1]}})",
+        R"({"format": "fit-state/10", "key": "key", "pass": {"controls": 1, "done": [], "under_way": ["x"]}})"})
     EXPECT_NE(test::complaint_of([&] { (void)read_fit_state(folder.write("bad.json", text), "key"); }), "") << text;
 }
 

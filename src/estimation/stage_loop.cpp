@@ -1,0 +1,63 @@
+#include "estimation/stage_loop.hpp"
+
+#include "base/parallel.hpp"
+#include "estimation/fit_plan.hpp"
+
+namespace pliant {
+
+void StageLoop::execute() {
+  while (!interrupted_) {
+    const std::vector<StageChain> chains = next();
+    if (chains.empty()) return;
+    parallel_tasks(chains.size(), [&](std::size_t i) { run_chain(chains[i]); });
+  }
+}
+
+void StageLoop::run_chain(const StageChain& chain) {
+  VectorX theta;
+  int counted = chain.front().iterations_before;
+  for (Stage stage : chain) {
+    if (is_interrupted()) {
+      interrupted_ = true;
+      return;
+    }
+    if (stage.from.empty()) stage.from = {theta};
+    stage.iterations_before = counted;
+    bool is_cut = false;
+    StageRecord record = run_stage(stage, is_cut);
+    if (is_cut) {
+      const std::lock_guard lock(mutex_);
+      interrupted_ = true;
+      partial_.push_back(std::move(record));
+      return;
+    }
+    theta = record.theta, counted += counted_iterations(record);
+    const bool ends = !record.succeeded && stage.id.kind != StageKind::Motion;
+    keep(std::move(record));
+    if (ends) return;
+  }
+}
+
+void StageLoop::keep(StageRecord record) {
+  const std::lock_guard lock(mutex_);
+  if (state_.under_way && state_.under_way->id == record.id) state_.under_way.reset();
+  state_.done.push_back(std::move(record));
+  save();
+}
+
+void StageLoop::keep_under_way(const Stage& stage, OptimiserState optimiser) {
+  state_.under_way = {stage.id, stage.from.front(), std::move(optimiser)};
+  save();
+}
+
+void StageLoop::save() {
+  if (monitor_.on_state) monitor_.on_state(whole_state());
+}
+
+void StageLoop::emit(FitEvent event) {
+  const std::lock_guard lock(mutex_);
+  if (monitor_.on_event) monitor_.on_event(event);
+  outcome_.history.push_back(std::move(event));
+}
+
+}  // namespace pliant
