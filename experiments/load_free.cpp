@@ -176,7 +176,7 @@ json compare(const Recorded& recorded) {
       for (const int last_frame : {frames / 4, frames / 2, frames - 1}) {  // swings out of step are all alike
         Objective objective = objective_of(recorded, parameters, scheme.front() != 's', last_frame);
         const OptimiserState start{0, s.p, {}};
-        s = scheme == "in turns" ? minimise_in_turns(objective, start, options) : minimise(objective, start, options);
+        s = scheme == "in turns" ? minimise_staggered(objective, start, options) : minimise(objective, start, options);
         iterations += s.iterations, evaluations += s.evaluations;
         if (!s.succeeded) break;
       }

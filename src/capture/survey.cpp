@@ -297,20 +297,19 @@ bool has_forces_to_fit(const Capture& capture) {
          std::ranges::any_of(capture.material_curves, is_fit);
 }
 
-void add_scale(const Capture& capture, Identifiability& result) {
-  if (has_forces_to_fit(capture))
-    result.possible.push_back("The absolute scale of stiffness follows from measured forces or stresses.");
-  else if (capture.scene.initial.release_of)
-    result.possible.push_back(
-        "The absolute scale of stiffness follows from the weight from which the object is released.");
-  else if (capture.scene.object.mass || capture.scene.object.density)
-    result.possible.push_back(std::string("The absolute scale of stiffness follows from the ") +
-                              (capture.scene.object.mass ? "mass." : "density."));
-  else
+/// What fixes the absolute scale of stiffness; empty: nothing.
+std::string source_of_scale(const Capture& capture) {
+  if (has_forces_to_fit(capture)) return "measured forces or stresses";
+  if (capture.scene.initial.release_of) return "the weight from which the object is released";
+  if (capture.scene.object.mass) return "the mass";
+  return capture.scene.object.density ? "the density" : "";
+}
+
+void add_missing_scale(const Capture& capture, Identifiability& result) {
+  if (source_of_scale(capture).empty())
     result.impossible.push_back(
         "The absolute scale of stiffness is not identifiable: neither mass, density nor a force is known. Only the "
-        "ratio "
-        "E/rho of stiffness to density can be estimated; weigh the object and write `mass`.");
+        "ratio E/rho of stiffness to density can be estimated; weigh the object and write `mass`.");
 }
 
 void add_stiffness(const Capture& capture, const Survey& seen, Identifiability& result) {
@@ -390,7 +389,9 @@ Identifiability identifiability(const Capture& capture, const Survey& seen) {
   const bool has_curves = std::ranges::any_of(capture.material_curves, [](const auto& c) { return c.role == "fit"; });
   if (has_curves && !capture.scene.object.surface) {
     result.possible.push_back("Stiffness: from stress-strain curves of the material.");
-    add_scale(capture, result);
+    if (const std::string source = source_of_scale(capture); !source.empty())
+      result.possible.push_back("The absolute scale of stiffness follows from " + source + ".");
+    add_missing_scale(capture, result);
     return result;
   }
   if (!capture.scene.object.surface) {
@@ -400,12 +401,13 @@ Identifiability identifiability(const Capture& capture, const Survey& seen) {
     if (!seen.scenes.empty())
       result.possible.push_back("The seen side of the scene can be split into planes and objects.");
     if (!seen.clouds.empty()) result.possible.push_back("The points can be looked at and measured.");
-    add_scale(capture, result);
-    std::erase_if(result.possible, [](const std::string& text) { return text.starts_with("The absolute scale"); });
+    add_missing_scale(capture, result);
     return result;
   }
   add_stiffness(capture, seen, result);
-  add_scale(capture, result);
+  if (const std::string source = source_of_scale(capture); !source.empty())
+    result.possible.push_back("The absolute scale of stiffness follows from " + source + ".");
+  add_missing_scale(capture, result);
   add_damping(capture, seen, result);
   add_surroundings(capture, seen, result);
   return result;

@@ -160,7 +160,7 @@ void follow_reference(Body& body) {
 
 Body with_reference(const Body& body, Points reference) {
   if (body.kind == ElementKind::Hexahedron)
-    throw std::invalid_argument("with_reference: hexahedra are regular where they are free of load");
+    throw std::invalid_argument("with_reference: hexahedra are regular where they are stress-free");
   if (reference.rows() != body.nodes.rows())
     throw std::invalid_argument("with_reference: one position a node is needed");
   Body moved = body;

@@ -36,8 +36,8 @@ struct ModulusField {
   std::vector<double> relative;  ///< r_e [-], one an element
 };
 
-/// The elastic object, free of load: nodes, elements and what does not change while it moves. Everything beyond this
-/// room works with any kind of element.
+/// The elastic object, stress-free: nodes, elements and what does not change while it moves. Everything beyond this
+/// module works with any kind of element.
 struct Body {
   ElementKind kind = ElementKind::Hexahedron;
   std::variant<HexGrid, TetMesh> mesh;
@@ -83,9 +83,9 @@ struct Body {
 Body make_body(HexGrid grid, const BodyOptions& options = {});
 Body make_body(TetMesh mesh, const BodyOptions& options = {});
 
-/// The same body, free of load where `reference` has its nodes [m]. Its mass, its surface, and where points of the scan
+/// The same body, stress-free where `reference` has its nodes [m]. Its mass, its surface, and where points of the scan
 /// lie in it stay as they are.
-/// Throws std::invalid_argument for hexahedra, whose grid is regular when it is free of load, and where an element has
+/// Throws std::invalid_argument for hexahedra, whose grid is regular when it is stress-free, and where an element has
 /// no positive volume.
 Body with_reference(const Body& body, Points reference);
 

@@ -13,7 +13,7 @@ class Elasticity : public ForceTerm {
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::Blended; }
 
-  /// From now on the nodes are free of load where this body has them, the same but for its reference
+  /// From now on the nodes are stress-free where this body has them, the same but for its reference
   /// (`with_reference`). Only then does the term have derivatives by the reference. Parameters are to be set anew.
   /// Throws std::invalid_argument for hexahedra.
   virtual void set_reference(std::shared_ptr<const Body> body) = 0;

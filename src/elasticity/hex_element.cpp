@@ -11,8 +11,8 @@ UnitLame unit_lame(double nu) {
 
 namespace {
 
-constexpr int modes = 3;              // bubbles 4 t (1 - t) along each axis
-constexpr int functions = 8 + modes;  // nodes, then bubbles
+constexpr int bubbles = 3;              // bubbles 4 t (1 - t) along each axis
+constexpr int functions = 8 + bubbles;  // nodes, then bubbles
 
 /// H[i][j](a, b) = integral of d_i N_a d_j N_b, for nodes and bubbles [m].
 using GradientProducts = std::array<std::array<Eigen::Matrix<double, functions, functions>, 3>, 3>;
@@ -21,7 +21,7 @@ Eigen::Matrix<double, functions, 3> gradients(const Vector3& local, const Vector
   Eigen::Matrix<double, functions, 3> g = Eigen::Matrix<double, functions, 3>::Zero();
   g.topRows<8>() = shape_gradients(local);
   // The mean is taken away so that constant strain does no work on the modes: then the patch test holds in cut cells.
-  for (int m = 0; m < modes; ++m) g(8 + m, m) = 8.0 * (mean_local[m] - local[m]);
+  for (int m = 0; m < bubbles; ++m) g(8 + m, m) = 8.0 * (mean_local[m] - local[m]);
   return g;
 }
 
@@ -68,8 +68,8 @@ HexStiffness hex_stiffness(const CellQuadrature& inside, double cell_size, doubl
   // modes being stationary, dK* = T^T dK T.
   Eigen::Matrix<double, 3 * functions, 24> T;
   T.topRows<24>().setIdentity();
-  T.bottomRows<3 * modes>() =
-      -K.bottomRightCorner<3 * modes, 3 * modes>().ldlt().solve(K.bottomLeftCorner<3 * modes, 24>());
+  T.bottomRows<3 * bubbles>() =
+      -K.bottomRightCorner<3 * bubbles, 3 * bubbles>().ldlt().solve(K.bottomLeftCorner<3 * bubbles, 24>());
   HexStiffness result;
   result.value = T.transpose() * K * T;
   result.d_poissons_ratio = T.transpose() * dK * T;

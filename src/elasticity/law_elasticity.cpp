@@ -117,7 +117,7 @@ class TetLawElasticity : public LawElasticity {
     for (int a = 0; a < N; ++a) own.row(a) = all.row(nodes_of(e)[a]);
     return own;
   }
-  /// Volumes of all points where the nodes are free of load here.
+  /// Volumes of all points where the nodes are stress-free here.
   std::vector<double> volumes(const Points& reference) const;
   void take_reference(const Points& reference);
   /// Change of a point's stress for G, that of its reference: dX = G of the reference as it is.

@@ -18,7 +18,7 @@ namespace pliant {
 /// moves z on and so acts by K+(p). All derivatives are exact, the lag matrix with them: by p they hold the law's third
 /// derivative along z - p (`MaterialLaw::tangent_derivative`) and how the projection K+ turns with it (Daleckii and
 /// Krein's formula; where an eigenvalue is zero the projection has a kink, and the derivative is one of both sides').
-/// By where the nodes are free of load all of volumes, gradients and both deformations follow.
+/// By where the nodes are stress-free all of volumes, gradients and both deformations follow.
 /// A law out of a parameter vector (`MaterialField`) also has derivatives by that; one given as it is has none.
 /// Where the law knows no such deformation the force is not a number, so that steps back off.
 class LawElasticity : public Elasticity {
@@ -55,12 +55,12 @@ class LawElasticity : public Elasticity {
   /// Mean over each element's points of S - I, F = R S, there; elements x 6.
   virtual MatrixX strains() const = 0;
 
-  /// From now on the nodes are free of load here, n x 3 [m]. False, and nothing changes, where an element would have no
+  /// From now on the nodes are stress-free here, n x 3 [m]. False, and nothing changes, where an element would have no
   /// positive volume at a quadrature point; `least_volume_ratio` is that of these positions all the same.
   [[nodiscard]] virtual bool set_reference_positions(const Points& reference) = 0;
   /// Smallest ratio of a quadrature point's volume to that in the body as it was given.
   virtual double least_volume_ratio() const = 0;
-  /// matrix += scale times the derivative of the force by where the nodes are free of load, p, z and theta staying as
+  /// matrix += scale times the derivative of the force by where the nodes are stress-free, p, z and theta staying as
   /// they are: what `add_reference_tangent` multiplies by. Not symmetric.
   virtual void add_reference_matrix(double scale, BlockMatrix& matrix) = 0;
 

@@ -6,7 +6,7 @@ namespace pliant {
 
 namespace {
 
-/// The forces of a law as a function of where the body is free of load.
+/// The forces of a law as a function of where the body is stress-free.
 class LawReferenceForces : public ReferenceForces {
  public:
   explicit LawReferenceForces(std::unique_ptr<LawElasticity> elasticity) : elasticity_(std::move(elasticity)) {}

@@ -10,7 +10,7 @@
 namespace pliant {
 
 /// What a body is made of: linearly elastic in one turning frame an element, the fast special case, or of any material
-/// law. It makes the body's forces, and the same as a function of where the body is free of load.
+/// law. It makes the body's forces, and the same as a function of where the body is stress-free.
 class BodyMaterial {
  public:
   /// Corotated linear elasticity, its moduli and Poisson's ratio in these blocks of a parameter vector.

@@ -21,7 +21,7 @@ inline auto vec(const Matrix3& m) { return Eigen::Map<const Vector9>(m.data()); 
 
 /// What a deformed point of the material stores and how hard it pulls back.
 struct PointStress {
-  double energy = 0.0;          ///< [J/m^3] of volume free of load; infinite where the law knows no such deformation
+  double energy = 0.0;  ///< [J/m^3] of the stress-free volume; infinite where the law admits no such deformation
   Matrix3 P = Matrix3::Zero();  ///< first Piola-Kirchhoff stress dW/dF [Pa]
   Matrix3 left, right;          ///< rotations of the frame below
   Matrix9 tangent;              ///< d(left^T P right) / d(left^T F right) [Pa], columns of F first; symmetric

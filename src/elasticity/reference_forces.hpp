@@ -5,12 +5,12 @@
 
 namespace pliant {
 
-/// Elastic forces of tetrahedra as a function of where their nodes are free of load, the deformed positions z and the
+/// Elastic forces of tetrahedra as a function of where their nodes are stress-free, the deformed positions z and the
 /// lag point p of those forces being known. Those of a material law are `LawElasticity`'s (`BodyMaterial`), corotated
 /// ones (Wang 2015, eq. 1 and appendix)
 ///   f_a = -E_e R integral of C : (R^T F - I) g_a,   F = sum_b z_b g_b^T,  R the rotation of sum_b p_b (mean g_b)^T,
 /// where volumes, gradients g and rotations all follow from X. Hexahedra do not take part: their grid is regular when
-/// it is free of load. Positions and forces are n x 3 [m], [N].
+/// it is stress-free. Positions and forces are n x 3 [m], [N].
 class ReferenceForces {
  public:
   /// Corotated ones. Throws std::invalid_argument for a body of hexahedra.

@@ -7,7 +7,7 @@
 
 namespace pliant {
 
-/// Something that spoils recordings and can be corrected: a sensor's range, its pose, the direction of gravity.
+/// A systematic error of a recording that can be estimated: a sensor's range, its pose, the direction of gravity.
 struct Correction {
   std::string what;                     ///< for people: "the pose of front"
   std::vector<std::string> parameters;  ///< that are estimated together
@@ -23,7 +23,7 @@ struct NeededCorrection {
   double least = 0.0;  ///< that is worth the correction's parameters
 };
 
-/// Rao's score test (1948) of each correction at an estimate that lacks it: one step of Gauss and Newton with it, all
+/// Rao's score test (1948) of each correction at an estimate that lacks it: one Gauss-Newton step with it, all
 /// that was estimated following along. A model that is a little wrong leaves residuals that any correction lowers
 /// somewhat; so one is needed only where the residuals' mean square is more than twice that of their noise, where it
 /// explains at least half of what the noise does not, and more than Schwarz's criterion (1978) asks, scaled by how much

@@ -75,7 +75,7 @@ bool FieldChoice::take(FitOutcome outcome, PassState reached) {
   histories_.emplace_back(count_, outcome.history);
   forward_steps_ += outcome.forward_steps;
   if (is_last_) {
-    outcome_ = told(std::move(outcome));
+    outcome_ = with_history(std::move(outcome));
     if (is_cut_) outcome_->interrupted = true, outcome_->converged = false, outcome_->reason = "interrupted";
     return false;
   }
@@ -175,7 +175,7 @@ Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double d
   return pass;
 }
 
-FitOutcome FieldChoice::told(FitOutcome outcome) {
+FitOutcome FieldChoice::with_history(FitOutcome outcome) {
   outcome.forward_steps = forward_steps_;
   outcome.fields = choice_.tried;
   outcome.history.clear();

@@ -33,7 +33,7 @@ class FieldChoice : public PassPlanner {
   Pass pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const;
   void judge(const FitOutcome& outcome, PassState reached);
   /// With all that was done on the way.
-  FitOutcome told(FitOutcome outcome);
+  FitOutcome with_history(FitOutcome outcome);
   std::string explained() const;
   JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }
   ModulusField field_of(const Body& body, int count) const;

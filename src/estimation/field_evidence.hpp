@@ -18,7 +18,7 @@ MatrixX field_precision(const std::vector<Vector3>& points, double length, doubl
 /// Logarithm of the Bayes factor of a field of moduli against another one that it can take the form of: of the evidence
 /// of the estimate d of what the finer field has beyond the coarser (contrasts of its ln E that vanish where it has the
 /// coarser one's form). Under the coarser field d is N(0, V), under the finer one N(0, V + P) with P of
-/// `field_precision`. d is where a step of Gauss and Newton leads from p, everything else following along: at the finer
+/// `field_precision`. d is where a Gauss-Newton step leads from p, everything else following along: at the finer
 /// field's estimate the estimate itself, before that what it promises (Rao's score test, 1948). V is the covariance
 /// that curvature and residuals claim and that of the scatter of the frames' gradients (a sandwich,
 /// `gradient_scatter`), added: neighbouring frames err together where the model is a little wrong, and such errors

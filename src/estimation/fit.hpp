@@ -16,10 +16,10 @@
 
 namespace pliant {
 
-/// How a fit minds that the load-free shape of an object scanned as it sags depends on its material.
+/// How the stress-free reference configuration of an object scanned as it sags is coupled with its material.
 enum class LoadFreeScheme {
-  Together,  ///< derivatives pass through the equilibrium: one minimisation sees the whole dependence
-  InTurns,   ///< shape and parameters in turns, each as the other is (Wang 2015, algorithm 1)
+  Monolithic,  ///< derivatives pass through the equilibrium: one minimisation sees the whole dependence
+  Staggered,   ///< shape and parameters in turns, each as the other is (Wang 2015, algorithm 1)
 };
 
 /// What a fit compares the simulated motion with, where only points on the surface were seen.
@@ -52,13 +52,13 @@ struct FitOptions {
   double wide_band = 0.12;      ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
   double fine_band = 0.05;      ///< of the last stage, (0, 0.5)
   double newmark_theta = 0.51;  ///< [0.5, 1)
-  /// Left out: hexahedra, or quadratic tetrahedra where it follows from the fit where the object is free of load.
+  /// Left out: hexahedra, or quadratic tetrahedra where it follows from the fit where the object is stress-free.
   std::optional<ElementKind> element;
   Integrator integrator = Integrator::Lagged;
   int pull_points = 4;  ///< that hold a released object until it is let go, 1..50
   TrackingUse tracking = TrackingUse::Automatic;
   int tracking_rounds = 3;  ///< of tracking and estimation in turns, at most, 1..10
-  LoadFreeScheme load_free = LoadFreeScheme::Together;
+  LoadFreeScheme load_free = LoadFreeScheme::Monolithic;
   int scan_points = 0;     ///< about which the scan may err, 0..50; 0: it is exact
   double scan_std = 0.01;  ///< by how much, times the object's size, (0, 0.2]
   /// Of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous; `automatic`: as many as the
@@ -126,7 +126,7 @@ struct FitStart {
 /// What a number of control points is worth: see `fit_with_chosen_field`.
 struct TriedField {
   int control_points = 1;
-  bool estimated = false;         ///< false: its evidence is what one step of Gauss and Newton promised
+  bool estimated = false;         ///< false: its evidence is what one Gauss-Newton step promised
   double cost = 0.0;              ///< of the estimate; infinite where there is none
   double log_bayes_factor = 0.0;  ///< against the best before; infinitely low where it cannot be simulated
 };
@@ -208,7 +208,7 @@ struct RecordingOutcome {
   Discretisation discretisation;
   VectorX theta;                          ///< of all recordings; its own blocks are `discretisation.simulation.blocks`
   CostEvaluation evaluation;              ///< its own frames
-  std::shared_ptr<const Body> rest_body;  ///< the body where it is free of load
+  std::shared_ptr<const Body> rest_body;  ///< the body where it is stress-free
 };
 
 /// The law that was fitted to an object's presses, and what it predicts of them.

@@ -34,8 +34,8 @@ const std::vector<std::pair<std::string, TrackingUse>> tracking_uses = {{"auto",
                                                                         {"off", TrackingUse::Off},
                                                                         {"loop", TrackingUse::Loop},
                                                                         {"both", TrackingUse::Both}};
-const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {{"monolithic", LoadFreeScheme::Together},
-                                                                               {"staggered", LoadFreeScheme::InTurns}};
+const std::vector<std::pair<std::string, LoadFreeScheme>> load_free_schemes = {
+    {"monolithic", LoadFreeScheme::Monolithic}, {"staggered", LoadFreeScheme::Staggered}};
 const std::vector<std::pair<std::string, std::optional<ElementKind>>> element_names = {
     {"automatic", std::nullopt},
     {"hexahedra", ElementKind::Hexahedron},
@@ -497,7 +497,7 @@ std::string FitOptions::validate() const {
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
   if (scan_points < 0 || scan_points > 50) return "scan_points must lie in 0..50";
   if (!(scan_std > 0.0 && scan_std <= 0.2)) return "scan_std must lie in (0, 0.2]";
-  if (scan_points > 0 && load_free == LoadFreeScheme::InTurns)
+  if (scan_points > 0 && load_free == LoadFreeScheme::Staggered)
     return "load_free=staggered keeps the shape while it minimises over parameters: it cannot correct the scan "
            "(scan_points)";
   if (tracking_rounds < 1 || tracking_rounds > 10) return "tracking_rounds must lie in 1..10";

@@ -178,9 +178,9 @@ OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, cons
   o.kind = options_.optimiser;
   o.max_iterations = stage.iterations;
   const bool saves = is_on_full_grid(stage.id.kind) && !interrupted_;  // a last look is no state to go on from
-  const bool in_turns = options_.load_free == LoadFreeScheme::InTurns && recordings_.any_sags();
+  const bool is_staggered = options_.load_free == LoadFreeScheme::Staggered && recordings_.any_sags();
   int iterations = from.iterations;
-  OptimiserSummary s = (in_turns ? minimise_in_turns : minimise_from)(objective, from, o, [&](const Iteration& i) {
+  OptimiserSummary s = (is_staggered ? minimise_staggered : minimise_from)(objective, from, o, [&](const Iteration& i) {
     ++iterations;
     if (saves) keep_under_way(stage, i.state());
     FitEvent event{stage.id.kind, stage.name, stage.id.start, stage.iterations_before + iterations,
@@ -315,7 +315,7 @@ StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
   return record;
 }
 
-/// What was not estimated and spoils the recordings, as their residuals at the estimate show.
+/// Systematic errors that were not estimated and show in the residuals at the estimate.
 StageRecord FitRun::test_corrections(const Stage& stage) {
   const VectorX& theta = stage.from.front();
   StageRecord record{stage.id, stage.name, theta, theta};

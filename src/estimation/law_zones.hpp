@@ -44,7 +44,7 @@ double zone_evidence(const CostEvaluation& evaluation, const ParameterSet& param
 double own_laws_evidence(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                          const LawLayout& layout, double modulus_variation);
 
-/// Where a zone is best cut, and ln of the Bayes factor that a step of Gauss and Newton promises for it.
+/// Where a zone is best cut, and ln of the Bayes factor that a Gauss-Newton step promises for it.
 struct PromisedCut {
   ZoneCut cut;
   double evidence = 0.0;
@@ -60,7 +60,7 @@ std::optional<PromisedCut> most_promising_cut(PressObjective& objective, const P
                                               const LawLayout& layout, const VectorX& theta,
                                               const std::vector<ZoneCut>& cuts, double modulus_variation);
 
-/// Another place for a cut, and by how much a step of Gauss and Newton promises to lower the cost there.
+/// Another place for a cut, and by how much a Gauss-Newton step promises to lower the cost there.
 struct PromisedMove {
   double at = 0.0;  ///< [m]
   double gain = 0.0;

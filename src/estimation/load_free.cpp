@@ -20,7 +20,7 @@ RolloutSummary sag_from_load_free(const Body& free, SimulationOptions options, c
   options.holds = {{[&free, held, close](const Vector3& p) {
     return std::ranges::any_of(held, [&](int n) { return (free.nodes.row(n).transpose() - p).norm() < close; });
   }}};
-  for (HungWeight& weight : options.weights) weight.at = Embedding(free, {weight.at}).position(0, free.nodes);
+  for (PointMass& weight : options.weights) weight.at = Embedding(free, {weight.at}).position(0, free.nodes);
   options.newton.tolerance = 1e-11;
   Simulation simulation(std::make_shared<Body>(std::move(body)), options);
   return simulation.run(theta, [&](int, const State& state, auto) { return sagged = state.x, true; });

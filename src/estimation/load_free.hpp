@@ -5,14 +5,14 @@
 
 namespace pliant {
 
-/// An object whose scan was taken as it sags, with the shape that it has free of load.
+/// An object whose scan was taken as it sags, with the shape that it has stress-free.
 struct LoadFree {
   Discretisation scene;       ///< at rest under its load; the body's reference is the shape that was found
   ReferenceShape shape;       ///< of the body's nodes
-  TriangleMesh surface;       ///< the scan free of load [m]
+  TriangleMesh surface;       ///< the scan stress-free [m]
   Points sagged_again;        ///< nodes of that body at rest under the load [m]; they should be the scan's
   double re_sag_error = 0.0;  ///< greatest distance of the two [m]
-  double sag = 0.0;           ///< greatest way of a node from free of load to the scan [m]
+  double sag = 0.0;           ///< greatest way of a node from stress-free to the scan [m]
 };
 
 /// Finds it for a material, and lets it sag again.

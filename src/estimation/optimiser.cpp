@@ -428,8 +428,8 @@ OptimiserSummary minimise(CostFunction& objective, const VectorX& p, const Optim
   return minimise(objective, OptimiserState{0, p, {}}, options, on_iteration);
 }
 
-OptimiserSummary minimise_in_turns(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
-                                   const std::function<bool(const Iteration&)>& on_iteration) {
+OptimiserSummary minimise_staggered(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+                                    const std::function<bool(const Iteration&)>& on_iteration) {
   constexpr int iterations_of_a_turn = 3;
   OptimiserSummary all;
   all.p = state.p;

@@ -73,7 +73,7 @@ OptimiserSummary minimise(CostFunction& objective, const OptimiserState& state, 
 /// shape for p, then a few iterations towards the p that is
 /// best for that shape, in turns until p stays. `max_iterations` are those of all turns together; their costs are
 /// those of the shape of the turn and need not fall from one to the next.
-OptimiserSummary minimise_in_turns(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
-                                   const std::function<bool(const Iteration&)>& on_iteration = {});
+OptimiserSummary minimise_staggered(Objective& objective, const OptimiserState& state, const OptimiserOptions& options,
+                                    const std::function<bool(const Iteration&)>& on_iteration = {});
 
 }  // namespace pliant

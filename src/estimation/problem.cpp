@@ -15,8 +15,8 @@ constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: 
 constexpr double gravity_guess = 9.81;
 constexpr double range_error_std = 0.02;  // [m], of light that enters a translucent material
 
-/// Whether forces are known that anchor pascals: a weight that is let go, or weights that hang while the object is
-/// seen.
+/// Whether forces are known, which fix the absolute scale of stiffness: a weight that is let go, or weights that hang
+/// while the object is seen.
 bool has_known_forces(const Capture& capture) {
   return capture.scene.initial.release_of.has_value() ||
          std::ranges::any_of(capture.loads, [](const Load& load) { return load.role == "fit"; });

@@ -85,7 +85,7 @@ class TrackingLoop : public PassPlanner {
     state.field.reset();
     if (inner_) inner_->write(state);
   }
-  FitOutcome outcome() override { return told(std::move(*final_)); }
+  FitOutcome outcome() override { return with_history(std::move(*final_)); }
 
  private:
   enum class Part { Round, RoundsAgain, Points, Last };
@@ -383,7 +383,7 @@ class TrackingLoop : public PassPlanner {
   }
 
   /// With all that was done on the way; the agreement is that with the points.
-  FitOutcome told(FitOutcome outcome) {
+  FitOutcome with_history(FitOutcome outcome) {
     outcome.history.clear();
     for (auto& [controls, event] : history_) {
       if (outcome.theta.size() > 0) event.theta = with_controls(event.theta, controls, controls_of(outcome));

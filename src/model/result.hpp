@@ -46,7 +46,7 @@ struct ControlPoint {
 /// What a number of control points was worth, where it was chosen.
 struct TriedFieldResult {
   int control_points = 1;
-  bool estimated = false;                  ///< false: one step of Gauss and Newton promised too little
+  bool estimated = false;                  ///< false: one Gauss-Newton step promised too little
   std::optional<double> cost;              ///< of the estimate
   std::optional<double> log_bayes_factor;  ///< against the best before; nothing: it cannot be simulated
 };

@@ -36,29 +36,29 @@ void Gravity::add_force_adjoint(const Points&, const Points& w, Points&, Points&
   theta_bar.segment<3>(gravity_block_) += density_ * sum;
 }
 
-HungWeights::HungWeights(const Body& body, const std::vector<HungWeight>& weights, const ParameterHandle& gravity)
+PointWeights::PointWeights(const Body& body, const std::vector<PointMass>& weights, const ParameterHandle& gravity)
     : DeadLoad(body.nodes), gravity_block_(gravity) {
   std::vector<Vector3> at;
-  for (const HungWeight& weight : weights) {
+  for (const PointMass& weight : weights) {
     at.push_back(weight.at);
     mass_.push_back(weight.mass);
   }
   points_ = Embedding(body, at);
 }
 
-void HungWeights::add_force(const Points&, Points& force) {
+void PointWeights::add_force(const Points&, Points& force) {
   if (!is_active_) return;
   for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * gravity_, force);
 }
 
-void HungWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta,
-                                    Points& force) {
+void PointWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta,
+                                     Points& force) {
   if (!is_active_) return;
   const Vector3 change = gravity_block_.vector(d_theta);
   for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * change, force);
 }
 
-void HungWeights::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
+void PointWeights::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
   if (!is_active_) return;
   for (int i = 0; i < points_.point_count(); ++i)
     theta_bar.segment<3>(gravity_block_) += mass_[std::size_t(i)] * points_.position(i, w);

@@ -54,17 +54,17 @@ class Gravity : public DeadLoad {
   Vector3 gravity_ = Vector3::Zero();
 };
 
-/// A small heavy thing that hangs at a point of the object.
-struct HungWeight {
+/// A point mass attached to the object.
+struct PointMass {
   Vector3 at;         ///< rest position [m]
   double mass = 0.0;  ///< [kg]
 };
 
 /// Weights hung from the object: f = sum_i m_i g at their points. Their inertia is the stepper's (`Stepper::carry`).
-class HungWeights : public DeadLoad {
+class PointWeights : public DeadLoad {
  public:
   /// @param gravity  3, [m/s^2]
-  HungWeights(const Body& body, const std::vector<HungWeight>& weights, const ParameterHandle& gravity);
+  PointWeights(const Body& body, const std::vector<PointMass>& weights, const ParameterHandle& gravity);
   const Embedding& points() const { return points_; }
   const std::vector<double>& masses() const { return mass_; }
   /// Nothing hangs while it is not active.

@@ -61,7 +61,7 @@ class Equilibrium {
   void set_dead_load(Points forces);
   void set_control(int contact, const ProbeControl& control);
 
-  /// Nodes free of load and rigid bodies where they are led to.
+  /// Nodes stress-free and rigid bodies where they are led to.
   Placement rest() const;
   /// From one placement to the equilibrium under the controls; a near placement takes fewer iterations. Not converged:
   /// the placement is the best that was reached.

@@ -9,7 +9,7 @@
 
 namespace pliant {
 
-/// Small displacements of a body from where it is free of load. One factorisation, any number of loads.
+/// Small displacements of a body from where it is stress-free. One factorisation, any number of loads.
 class LinearStatics {
  public:
   /// @param held   nodes that stay where they are

@@ -266,13 +266,13 @@ Points ReferenceShapeSolver::adjoint(const Points& X_bar) {
 }
 
 Points scan_load(const Body& body, const MotionBlocks& blocks, const VectorX& theta,
-                 const std::vector<HungWeight>& weights) {
+                 const std::vector<PointMass>& weights) {
   Points load = Points::Zero(body.node_count(), 3);
   Gravity gravity(body, blocks);
   gravity.set_parameters(theta);
   gravity.add_force(body.scanned_positions(), load);
   if (!weights.empty()) {
-    HungWeights hung(body, weights, blocks.gravity);
+    PointWeights hung(body, weights, blocks.gravity);
     hung.set_parameters(theta);
     hung.add_force(body.scanned_positions(), load);
   }

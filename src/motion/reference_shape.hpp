@@ -6,7 +6,7 @@
 
 #include "elasticity/material.hpp"
 #include "motion/body_forces.hpp"
-#include "motion/turning_step.hpp"
+#include "motion/rotation_strain_step.hpp"
 #include "solvers/general_solver.hpp"
 #include "solvers/lu_solver.hpp"
 
@@ -43,7 +43,7 @@ struct ReferenceShape {
   double carried = 0.0;
 };
 
-/// Where the nodes of a body have to be free of load so that its elasticity holds the scan in equilibrium (Wang 2015,
+/// Where the nodes of a body have to be stress-free so that its elasticity holds the scan in equilibrium (Wang 2015,
 /// eq. 7-8): f(X, x_scan) + load = 0 at all nodes that are not held. Held nodes are where they are in the scan. The
 /// mass is that of the scan.
 class ReferenceShapeSolver {
@@ -108,7 +108,7 @@ class ReferenceShapeSolver {
   ReferenceShapeOptions options_;
   std::unique_ptr<ReferenceForces> forces_;
   LuSolver solver_;
-  TurningStep turning_;
+  RotationStrainStep turning_;
   BlockMatrix jacobian_, metric_, matrix_;  // metric: what resists a step of pseudo-time
   std::vector<Matrix3> turn_;               // of each node
   Points residual_;
@@ -116,6 +116,6 @@ class ReferenceShapeSolver {
 
 /// Weight and hung weights at the nodes of the scan [N], n x 3.
 Points scan_load(const Body& body, const MotionBlocks& blocks, const VectorX& theta,
-                 const std::vector<HungWeight>& weights);
+                 const std::vector<PointMass>& weights);
 
 }  // namespace pliant

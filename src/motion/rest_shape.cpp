@@ -63,7 +63,7 @@ MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector
 }
 
 RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
-                     const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks,
+                     const std::vector<PointMass>& weights, MatrixX basis, const MotionBlocks& blocks,
                      const BodyMaterial& material)
     : body_(std::move(body)),
       free_(body_),
@@ -73,7 +73,7 @@ RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& h
       blocks_(blocks),
       scan_(body_->scanned_positions()) {
   if (body_->kind == ElementKind::Hexahedron)
-    throw std::invalid_argument("hexahedra are regular where they are free of load");
+    throw std::invalid_argument("hexahedra are regular where they are stress-free");
   if (basis_.cols() != Eigen::Index(blocks_.scan_corrections.size()))
     throw std::invalid_argument("one parameter block a correction of the scan is expected");
   if (!sags_) return;
@@ -83,7 +83,7 @@ RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& h
   solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, material, blocks_, options);
   elasticity_ = material.make_elasticity(body_);
   terms_.push_back(std::make_unique<Gravity>(*body_, blocks_));
-  if (!weights.empty()) terms_.push_back(std::make_unique<HungWeights>(*body_, weights, blocks_.gravity));
+  if (!weights.empty()) terms_.push_back(std::make_unique<PointWeights>(*body_, weights, blocks_.gravity));
 }
 
 Points RestShape::scan_tangent(const VectorX& d_theta) const {

@@ -23,7 +23,7 @@ struct ShapeField {
 /// Throws std::invalid_argument where lengths are not positive.
 MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector<int>& held);
 
-/// Where a body stands in its scan, and where its nodes are free of load, as functions of theta: both are the scan with
+/// Where a body stands in its scan, and where its nodes are stress-free, as functions of theta: both are the scan with
 /// its correction; or, for a scan of an object that sags, the latter is the shape whose elasticity holds the former in
 /// equilibrium (Wang 2015, eq. 7), and depends on all of its material and load too. With the derivatives of both.
 class RestShape {
@@ -35,18 +35,18 @@ class RestShape {
   /// @param blocks  of the correction, one a column of the basis, and of the load
   /// @param material  of the body
   RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
-            const std::vector<HungWeight>& weights, MatrixX basis, const MotionBlocks& blocks,
+            const std::vector<PointMass>& weights, MatrixX basis, const MotionBlocks& blocks,
             const BodyMaterial& material);
 
   /// Finds them for theta, from those found before. Empty, or why there are none.
   [[nodiscard]] std::string find(const VectorX& theta);
   const Points& scan() const { return scan_; }  ///< n x 3 [m]
-  /// The body, free of load where it was found to be.
+  /// The body, stress-free where it was found to be.
   const std::shared_ptr<const Body>& body() const { return free_; }
 
   /// Makes ready for the derivatives below, at what was found last. False where a matrix cannot be factorised.
   [[nodiscard]] bool prepare_derivatives();
-  /// Changes of where the nodes were in the scan and where they are free of load, for a change of theta.
+  /// Changes of where the nodes were in the scan and where they are stress-free, for a change of theta.
   Points scan_tangent(const VectorX& d_theta) const;
   Points reference_tangent(const VectorX& d_theta, const Points& d_scan);
   /// theta_bar += the cotangent for those of the two.

@@ -36,7 +36,7 @@ std::unique_ptr<ForceTerm> plane_contact(const Body& body, const PlaneBlock& pla
 
 std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const Body>& body,
                                                    const SimulationOptions& options, Elasticity*& elasticity,
-                                                   FixedRegions*& fixed, Pull*& pull, HungWeights*& let_go) {
+                                                   FixedRegions*& fixed, Pull*& pull, PointWeights*& let_go) {
   std::vector<std::unique_ptr<ForceTerm>> terms;
   auto elastic = scene_elasticity(body, options);
   elasticity = elastic.get();
@@ -44,9 +44,9 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   terms.push_back(std::make_unique<Gravity>(*body, options.blocks));
   for (const PlaneBlock& plane : options.blocks.planes) terms.push_back(plane_contact(*body, plane, options));
   if (!options.weights.empty())
-    terms.push_back(std::make_unique<HungWeights>(*body, options.weights, options.blocks.gravity));
+    terms.push_back(std::make_unique<PointWeights>(*body, options.weights, options.blocks.gravity));
   if (!options.released_weights.empty()) {
-    auto weights = std::make_unique<HungWeights>(*body, options.released_weights, options.blocks.gravity);
+    auto weights = std::make_unique<PointWeights>(*body, options.released_weights, options.blocks.gravity);
     let_go = weights.get();
     let_go->set_active(false);
     terms.push_back(std::move(weights));
@@ -94,7 +94,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     statics_.anchor(held_nodes(*body_, options_.holds));
   }
   if (!options_.weights.empty()) {
-    const HungWeights hung(*body_, options_.weights, options_.blocks.gravity);
+    const PointWeights hung(*body_, options_.weights, options_.blocks.gravity);
     stepper_.carry(hung.points(), hung.masses());
   }
   prepare_holds();
@@ -458,7 +458,7 @@ std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const
   Elasticity* elasticity = nullptr;
   FixedRegions* fixed = nullptr;
   Pull* pull = nullptr;
-  HungWeights* let_go = nullptr;
+  PointWeights* let_go = nullptr;
   std::vector<std::unique_ptr<ForceTerm>> terms = make_terms(body, without_pulls, elasticity, fixed, pull, let_go);
   if (fixed) fixed->move_to(options.holds);
   return terms;

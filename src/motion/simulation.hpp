@@ -33,12 +33,12 @@ struct SimulationOptions {
   /// pulls the motion starts at rest in the equilibrium under them (see `Pull`).
   MotionBlocks blocks = MotionLayout();
   PullPoints pull_points;  ///< where the pulls act, one a block; none: nodes of the body far from what is held
-  std::vector<HungWeight> released_weights;  ///< hung from the object at the start's equilibrium, and gone afterwards
+  std::vector<PointMass> released_weights;  ///< hung from the object at the start's equilibrium, and gone afterwards
   bool scan_sags = false;   ///< the body stands in its scan as gravity and weights hold it; its stress-free reference
                             ///< follows from the parameters. Tetrahedra only
   ShapeField shape;         ///< how the scan may err: one point a block of scan corrections. Tetrahedra only
   std::vector<Hold> holds;  ///< held regions
-  std::vector<HungWeight> weights;  ///< hung from the object: point masses that move along with their points
+  std::vector<PointMass> weights;  ///< hung from the object: point masses that move along with their points
   bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
   /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then.
@@ -66,7 +66,7 @@ class Simulation {
   const SimulationOptions& options() const { return options_; }
   int frame_count() const { return int(options_.times.size()); }
 
-  /// From now on the object is free of load where it is for this theta, whatever theta is: derivatives leave that out
+  /// From now on the object is stress-free where it is for this theta, whatever theta is: derivatives leave that out
   /// too. Returns why it cannot, or nothing.
   [[nodiscard]] std::string hold_shape(const VectorX& theta);
 
@@ -97,7 +97,7 @@ class Simulation {
     double time, dt;  ///< of its start, and its length [s]
     int frame_after;  ///< frame reached by this step, -1: none
   };
-  /// False where the object cannot be free of load anywhere: the summary says so.
+  /// False where the object cannot be stress-free anywhere: the summary says so.
   bool set_parameters(const VectorX& theta, RolloutSummary& summary);
   /// Whether the motion starts from an equilibrium, under forces that end there.
   bool starts_held() const { return pull_ || let_go_; }
@@ -105,7 +105,7 @@ class Simulation {
   /// Where and how fast the object is when it is let go; for a held one also the derivatives' matrix. False where
   /// there is no such equilibrium: the summary says so.
   bool start(const VectorX& theta, State& state, RolloutSummary& summary);
-  /// Changes of where the nodes are free of load along directions; empty where theta does not say that. `scan` is that
+  /// Changes of where the nodes are stress-free along directions; empty where theta does not say that. `scan` is that
   /// of where they were scanned.
   struct ShapeChange {
     std::vector<Points> reference, scan;
@@ -136,12 +136,12 @@ class Simulation {
   Elasticity* elasticity_ = nullptr;       // of the stepper's terms
   FixedRegions* fixed_regions_ = nullptr;  // likewise, if any
   Pull* pull_ = nullptr;                   // likewise
-  HungWeights* let_go_ = nullptr;          // likewise
+  PointWeights* let_go_ = nullptr;         // likewise
   std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;
   Statics statics_;                   // of the stepper's forces
-  std::unique_ptr<RestShape> shape_;  // where theta says where the body is free of load
+  std::unique_ptr<RestShape> shape_;  // where theta says where the body is stress-free
   bool shape_is_held_ = false;
   Points reference_bar_;     // likewise, of the reverse sweep
   Points last_equilibrium_;  // that was found, to begin with when the next is looked for; empty: none

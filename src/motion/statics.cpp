@@ -156,7 +156,7 @@ double Statics::prepare_move(const Points& x, const Points& step) {
   double share = 1.0;
   if (options_.longest_step > 0.0) share = std::min(share, options_.longest_step / step.rowwise().norm().maxCoeff());
   if (has_energy_) return share;
-  if (!turning_) turning_ = std::make_unique<TurningStep>(body_, options_.solver);
+  if (!turning_) turning_ = std::make_unique<RotationStrainStep>(body_, options_.solver);
   if (!turning_->fix(held_.empty() ? anchors_ : held_)) return share;
   const double angle = turning_->prepare(x, step);
   // A straight step is as good for small angles, and free of rounding.

@@ -7,7 +7,7 @@
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
 #include "motion/newton.hpp"
-#include "motion/turning_step.hpp"
+#include "motion/rotation_strain_step.hpp"
 #include "solvers/conjugate_gradients.hpp"
 #include "solvers/general_solver.hpp"
 
@@ -28,8 +28,8 @@ struct StaticsOptions {
 /// Equilibria of force terms, sum of f(x | x) = 0 at every row that is not held, and their derivatives. Where all
 /// forces have a potential the equilibrium is a minimum of their sum, and the stiffness is symmetric: Newton's method
 /// descends on the energy, with what makes the exact Hessian positive definite where it is not. Else (corotated forces
-/// have none) steps that turn parts of the body (`TurningStep`) are judged by natural monotonicity, with the exact,
-/// slightly unsymmetric stiffness. One instance for one thread.
+/// have none) steps that turn parts of the body (`RotationStrainStep`) are judged by natural monotonicity, with the
+/// exact, slightly unsymmetric stiffness. One instance for one thread.
 class Statics : private NewtonProblem {
  public:
   /// @param terms    stay alive as long as this
@@ -93,7 +93,7 @@ class Statics : private NewtonProblem {
   BlockMatrix matrix_, positive_;
   std::unique_ptr<LinearSolver> factor_;    // of symmetric stiffnesses
   std::unique_ptr<GeneralSolver> general_;  // of others
-  std::unique_ptr<TurningStep> turning_;
+  std::unique_ptr<RotationStrainStep> turning_;
   PreconditionedConjugateGradients conjugate_gradients_;
   bool has_energy_ = false, has_factor_ = false, is_exact_ = false, turns_ = false;
   double energy_scale_ = 0.0, rounding_ = 0.0;

@@ -81,7 +81,7 @@ class Stepper : private NewtonProblem {
 
   /// Makes ready for `tangent` or `adjoint` of a step whose Delta is known. False where a matrix cannot be factorised.
   [[nodiscard]] bool prepare_derivatives(const State& start, const Points& delta);
-  /// Change of the end for a change of start, theta and, where given, of where the nodes are free of load. `change`
+  /// Change of the end for a change of start, theta and, where given, of where the nodes are stress-free. `change`
   /// goes in as that of the start and comes out as that of the end.
   void tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change,
                const Points* d_reference = nullptr);

@@ -442,7 +442,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
 
 CaptureScene make_scene(const Model& model, const Capture& recorded) {
   Capture capture = recorded;
-  if (capture.scene.object.shape_is == ShapeIs::Static) {  // the model's surface and mesh are free of load already
+  if (capture.scene.object.shape_is == ShapeIs::Static) {  // the model's surface and mesh are stress-free already
     capture.scene.object.surface = model.scene.object.surface;
     capture.scene.object.shape_is = ShapeIs::Reference;
   }

@@ -25,7 +25,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
 /// The simulation-ready model of an estimate, in the scene of its first recording.
 Model make_model(const Capture& capture, const FitOutcome& outcome);
 
-/// The model of a material whose numbers are given, in a capture's scene; its surface and mesh are free of load.
+/// The model of a material whose numbers are given, in a capture's scene; its surface and mesh are stress-free.
 Model make_model(const Capture& capture, const Discretisation& discretisation, const VectorX& theta,
                  const ModulusStatistics& modulus, double cells);
 

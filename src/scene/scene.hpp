@@ -84,7 +84,7 @@ struct Initial {
   bool operator==(const Initial&) const = default;
 };
 
-/// State in which the object's shape was scanned: free of load, or sagging under gravity.
+/// State in which the object's shape was scanned: stress-free, or sagging under gravity.
 enum class ShapeIs { Reference, Static };
 
 /// The object itself.

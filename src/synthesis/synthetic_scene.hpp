@@ -14,7 +14,7 @@ namespace pliant {
 /// A situation to simulate and to record: the format "scene/1" of docs/scene.md. SI units.
 struct SyntheticScene {
   std::string name;
-  Scene scene;  ///< surface free of load, where the object is at the start; exactly one of mass and density
+  Scene scene;  ///< surface stress-free, where the object is at the start; exactly one of mass and density
   std::vector<double> plane_half_sizes;  ///< [m] of each plane: half the edge of the square that cameras see; 0: none
   double scan_noise = 0.0;               ///< [m] deviation of the vertices of rest.ply along their normals
 

@@ -480,7 +480,7 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
     } else {
       own.segment<3>(scene.blocks.gravity).setZero();
       result.note = "The material is too soft for its scan (" + failure +
-                    "): the object was tracked without gravity, as if it were free of load as scanned.";
+                    "): the object was tracked without gravity, as if it were stress-free as scanned.";
     }
     still.scan_sags = false;
   }

@@ -74,7 +74,7 @@ struct TrackTimes {
 
 /// The motion of an object.
 struct Track {
-  std::shared_ptr<const Body> body;  ///< free of load
+  std::shared_ptr<const Body> body;  ///< stress-free
   TriangleMesh surface;              ///< at rest, as sampled
   std::vector<Vector3> marks;        ///< [m] at rest, on the surface
   std::vector<TrackedFrame> frames;
@@ -89,7 +89,7 @@ struct Track {
 /// own implicit dynamics with them gives the motion, run to convergence, and new correspondences.
 class Tracker {
  public:
-  /// @param body        free of load
+  /// @param body        stress-free
   /// @param scene       held regions, planes, weights and solver count; `scan_sags` is passed over
   /// @param surface     in the scan [m]
   /// @param cameras     that saw the points: what they cannot see makes none; empty: unknown

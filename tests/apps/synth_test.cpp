@@ -76,7 +76,7 @@ TEST(Synth, SharesAScenesFactsWithCaptures) {
   const TemporaryFolder folder;
   const Recorded plain = recorded(folder, bar + held);
   ASSERT_EQ(plain.tip.size(), std::size_t(frames));
-  EXPECT_NEAR(plain.tip[start], 0.0, 1e-6) << "it begins free of load";
+  EXPECT_NEAR(plain.tip[start], 0.0, 1e-6) << "it begins stress-free";
   EXPECT_LT(plain.tip.back(), -1e-3) << "and sinks";
 
   const Recorded hung = recorded(folder, bar + held + "[[weight]]\nmass = 0.02\nat = [0.1, 0, 0]\n");

@@ -73,7 +73,7 @@ TEST_P(Reference, ForcesAreThoseOfABodyWithThatReference) {
     ASSERT_GT(expected.norm(), 1.0);
     EXPECT_LT((force(reference) - expected).norm(), tolerance(1e-11) * expected.norm());
   }
-  EXPECT_LT(force(x).norm(), tolerance(1e-9)) << "free of load where it is";
+  EXPECT_LT(force(x).norm(), tolerance(1e-9)) << "stress-free where it is";
 }
 
 TEST_P(Reference, TangentIsTheDerivativeAndMatrixAndAdjointAreIt) {

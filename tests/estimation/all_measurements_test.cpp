@@ -79,7 +79,7 @@ class SeenInEveryWay : public ::testing::Test {
     return discretise(capture_, capture_distance(capture_, 0.2), resolution, p.blocks, theta);
   }
 
-  void run(double youngs_modulus, bool at_rest, const std::vector<HungWeight>& weights,
+  void run(double youngs_modulus, bool at_rest, const std::vector<PointMass>& weights,
            const std::function<void(int, const Body&, const Points&)>& see) {
     const CaptureParameters p = parameters();
     VectorX theta = p.set.reference();
@@ -118,7 +118,7 @@ class SeenInEveryWay : public ::testing::Test {
       for (Eigen::Index m = 0; m < track.back().rows(); ++m) track.back().row(m) += error().transpose();
     });
     write_marker_track(folder_ / "track.csv", ids, track);
-    const HungWeight weight{Vector3(0.5 * length, -0.5 * edge, 0.0), 0.05};
+    const PointMass weight{Vector3(0.5 * length, -0.5 * edge, 0.0), 0.05};
     run(truths.loads, true, {weight}, [&](int, const Body& body, const Points& nodes) {
       const Points x = Embedding(body, markers_).positions(nodes);
       std::vector<Vector3> there;

@@ -108,7 +108,7 @@ TEST(Evidence, IsTheIntegralOfLikelihoodTimesPrior) {
       field += h * h * std::exp(-model.cost(Eigen::Vector2d(a, b)) - 0.5 * std::pow((b - a) / deviation, 2)) /
                (deviation * std::sqrt(2.0 * M_PI));
   }
-  // Far from the maximum: the step of Gauss and Newton that leads there is exact for a linear model.
+  // Far from the maximum: the Gauss-Newton step that leads there is exact for a linear model.
   for (const Eigen::Vector2d& p : {Eigen::Vector2d(-2.0, 1.0), Eigen::Vector2d(0.9, 0.9)})
     EXPECT_NEAR(model.log_factor(model.at(p), p), std::log(field / homogeneous), tolerance(1e-3));
 }

@@ -137,7 +137,7 @@ TEST(LoadFreeFit, FindsModuliAndShapeTogetherAndNearlyInTurns) {
   OptimiserOptions longer = patient();
   longer.max_iterations = 400;
   longer.step_tolerance = 1e-4;
-  const OptimiserSummary in_turns = minimise_in_turns(other, OptimiserState{0, start, {}}, longer);
+  const OptimiserSummary in_turns = minimise_staggered(other, OptimiserState{0, start, {}}, longer);
   const auto expect_near = [&](const OptimiserSummary& s, double modulus, double shape) {
     ASSERT_TRUE(s.succeeded && s.converged) << s.reason;
     const VectorX theta = parameters.to_theta(s.p);

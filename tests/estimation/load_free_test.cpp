@@ -1,4 +1,4 @@
-// From the scan of an object that sags to its shape free of load, the whole way of `pliant rest`.
+// From the scan of an object that sags to its shape stress-free, the whole way of `pliant rest`.
 #include "estimation/load_free.hpp"
 
 #include <gtest/gtest.h>

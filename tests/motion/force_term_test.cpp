@@ -212,11 +212,11 @@ std::vector<Family> families() {
        false,
        {},
        true},
-      {"HungWeights",
+      {"PointWeights",
        small_torus,
        [](auto body, const MotionBlocks& blocks) {
-         return std::make_unique<HungWeights>(
-             *body, std::vector<HungWeight>{{Vector3(0.1, 0.0, 0.01), 0.2}, {Vector3(-0.12, 0.01, 0.0), 0.05}},
+         return std::make_unique<PointWeights>(
+             *body, std::vector<PointMass>{{Vector3(0.1, 0.0, 0.01), 0.2}, {Vector3(-0.12, 0.01, 0.0), 0.05}},
              blocks.gravity);
        },
        false,

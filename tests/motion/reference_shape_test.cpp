@@ -1,4 +1,4 @@
-// Where bodies are free of load that sag as they were scanned.
+// Where bodies are stress-free that sag as they were scanned.
 #include "motion/reference_shape.hpp"
 
 #include "base/error.hpp"

@@ -40,7 +40,7 @@ struct Family {
   std::function<std::vector<ParameterHandle>(const SceneBlocks&)> parameters;  ///< that it depends on
   /// Whether its lag matrix is exact wherever z is; else it is where z is the lag point, and zero there.
   bool has_lag_matrix = false;
-  bool depends_on_reference = false;  ///< an `Elasticity` with derivatives by where the nodes are free of load
+  bool depends_on_reference = false;  ///< an `Elasticity` with derivatives by where the nodes are stress-free
   std::optional<LawForm> law = {};    ///< whose blocks the parameter vector has too
   bool has_potential = false;
   bool sees_start = false;  ///< depends on the step's start by itself
@@ -328,7 +328,7 @@ TEST_P(ForceTerms, TangentStiffnessIsMinusTheDerivativeAtRest) {
   EXPECT_GT(best_relative_error(along, 1.001 * y, 0.1), 1e-4) << "a wrong stiffness would pass";
 }
 
-/// The force with the nodes free of load elsewhere, the lag point, z and theta the same; then both products.
+/// The force with the nodes stress-free elsewhere, the lag point, z and theta the same; then both products.
 TEST_P(ForceTerms, DerivativesByTheReference) {
   Points reference_bar = none(), by_reference = none();
   const Points& X = body->reference_positions();

@@ -1,4 +1,4 @@
-#include "motion/turning_step.hpp"
+#include "motion/rotation_strain_step.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "motion/simulation.hpp"
 #include "support/bodies.hpp"
 
-namespace pliant::turning_step_test {
+namespace pliant::rotation_strain_step_test {
 namespace {
 
 Box slender() {
@@ -38,7 +38,7 @@ INSTANTIATE_TEST_SUITE_P(Elements, TurningStepOf,
 
 TEST_P(TurningStepOf, TurnsARigidBodyWithoutStretchingIt) {
   const auto body = bar(GetParam());
-  TurningStep step(body, SolverKind::Automatic);
+  RotationStrainStep step(body, SolverKind::Automatic);
   const double least = body->nodes.col(0).minCoeff(), height = body->nodes.col(2).minCoeff();
   const Vector3 about(least, 0.0, height), turn(0.0, 1.2, 0.0);
   ASSERT_TRUE(step.fix(
@@ -58,7 +58,7 @@ TEST_P(TurningStepOf, TurnsARigidBodyWithoutStretchingIt) {
 
 TEST_P(TurningStepOf, IsTheDisplacementItselfUpToItsSquare) {
   const auto body = bar(GetParam());
-  TurningStep step(body, SolverKind::Automatic);
+  RotationStrainStep step(body, SolverKind::Automatic);
   const double least = body->nodes.col(0).minCoeff();
   const std::vector<int> held = nodes_where(*body, [&](const Vector3& p) { return p.x() < least + 1e-9; });
   ASSERT_TRUE(step.fix(held));
@@ -77,11 +77,11 @@ TEST_P(TurningStepOf, IsTheDisplacementItselfUpToItsSquare) {
   EXPECT_NEAR(std::log10(far / near), 2.0, 0.1);
 }
 
-TEST(TurningStep, NeedsNodesThatAreFixed) {
-  TurningStep step(bar(ElementKind::Tetrahedron), SolverKind::Automatic);
+TEST(RotationStrainStep, NeedsNodesThatAreFixed) {
+  RotationStrainStep step(bar(ElementKind::Tetrahedron), SolverKind::Automatic);
   EXPECT_FALSE(step.fix({}));
   EXPECT_TRUE(step.fix({0, 1, 2}));
 }
 
 }  // namespace
-}  // namespace pliant::turning_step_test
+}  // namespace pliant::rotation_strain_step_test

@@ -6,7 +6,7 @@
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
 
-namespace pliant::hung_weight_test {
+namespace pliant::point_mass_test {
 namespace {
 
 using test::tolerance;
@@ -135,4 +135,4 @@ TEST(Stepper, RefusesCarriedPointsWithoutMasses) {
 }
 
 }  // namespace
-}  // namespace pliant::hung_weight_test
+}  // namespace pliant::point_mass_test

@@ -13,9 +13,9 @@ namespace pliant {
 /// positions fit those of all elements best, in least squares (rotation-strain coordinates, Huang 2011). Of small
 /// displacements d it is x + d up to their square, so that Newton's method keeps its order; slender bodies bend far in
 /// few steps.
-class TurningStep {
+class RotationStrainStep {
  public:
-  TurningStep(std::shared_ptr<const Body> body, SolverKind kind);
+  RotationStrainStep(std::shared_ptr<const Body> body, SolverKind kind);
 
   /// Nodes that go along straight lines, the held ones. False where there is none: nothing then says where to.
   [[nodiscard]] bool fix(const std::vector<int>& nodes);

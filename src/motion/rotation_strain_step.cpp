@@ -1,4 +1,4 @@
-#include "motion/turning_step.hpp"
+#include "motion/rotation_strain_step.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include "elasticity/tet_element.hpp"
 namespace pliant {
 
-TurningStep::TurningStep(std::shared_ptr<const Body> body, SolverKind kind)
+RotationStrainStep::RotationStrainStep(std::shared_ptr<const Body> body, SolverKind kind)
     : body_(std::move(body)), laplacian_(body_->pattern), excess_(Points::Zero(body_->node_count(), 3)) {
   SolverOptions options;
   options.kind = kind == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct_kind();
@@ -28,7 +28,7 @@ TurningStep::TurningStep(std::shared_ptr<const Body> body, SolverKind kind)
   }
 }
 
-void TurningStep::divide(int e) {
+void RotationStrainStep::divide(int e) {
   const auto add_part = [&](double part, const Points& gradients) {
     parts_.push_back({e, part, gradients, Matrix3::Zero(), Matrix3::Zero(), Vector3::Zero()});
   };
@@ -46,7 +46,7 @@ void TurningStep::divide(int e) {
     }
 }
 
-bool TurningStep::fix(const std::vector<int>& nodes) {
+bool RotationStrainStep::fix(const std::vector<int>& nodes) {
   if (is_ready_ && nodes == fixed_) return true;
   fixed_ = nodes;
   constrained_ = laplacian_;
@@ -54,7 +54,7 @@ bool TurningStep::fix(const std::vector<int>& nodes) {
   return is_ready_ = !fixed_.empty() && solver_->factorise(constrained_);
 }
 
-double TurningStep::prepare(const Points& x, const Points& d) {
+double RotationStrainStep::prepare(const Points& x, const Points& d) {
   x_ = x, d_ = d;
   double most = 0.0;
   for (Part& part : parts_) {
@@ -73,7 +73,7 @@ double TurningStep::prepare(const Points& x, const Points& d) {
   return most;
 }
 
-void TurningStep::move(double share, Points& out) {
+void RotationStrainStep::move(double share, Points& out) {
   excess_.setZero();
   for (const Part& part : parts_) {
     const auto nodes = body_->element(part.element);
