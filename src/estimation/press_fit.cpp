@@ -225,7 +225,7 @@ class LawRun : StageLoop {
     record.succeeded = true;
     record.cost = evaluation.cost;
     find_out(record, task, form, evaluation);
-    ended_[stage.id] = std::move(evaluation);
+    ended_[stage.id.number] = std::move(evaluation);
     return record;
   }
 
@@ -416,7 +416,7 @@ class LawRun : StageLoop {
     if (!interrupted_) law.predictions = predict_presses(*form.scene, law.law);
     outcome_.theta = best.theta;
     outcome_.parameters = form.parameters;
-    const auto ended = ended_.find(best.id);
+    const auto ended = ended_.find(best.id.number);
     outcome_.evaluation =
         ended != ended_.end()
             ? std::move(ended->second)
@@ -438,7 +438,7 @@ class LawRun : StageLoop {
   std::shared_ptr<const PressScene> scene_;
   std::vector<PressSample> samples_;  // of the sampled material, in order
   LawPlan plan_;
-  std::map<StageId, CostEvaluation> ended_;  // in this run
+  std::map<int, CostEvaluation> ended_;  // of this run, by the stage's number
 };
 
 /// What presses do not know is refused; what they merely do not use is told (`unused_choices`).
