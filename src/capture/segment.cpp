@@ -18,7 +18,7 @@ constexpr double least_height = 0.015;  // [m] what is flatter is a stain, a she
 
 int plane_label(std::size_t plane) { return -2 - int(plane); }
 
-// Pixels connected with `seed` among those labelled `from`, up to `standing_reach` pixels apart and without a jump in
+// Pixels connected with `seed` among those labelled `from`, up to `pixel_reach` pixels apart and without a jump in
 // depth; they get the label `value`.
 std::vector<int> grow(const DepthImage& depth, const DepthNoise& noise, int seed, Image<int>& label, int from,
                       int value, int pixel_reach, double gap) {

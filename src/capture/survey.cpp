@@ -312,6 +312,12 @@ void add_missing_scale(const Capture& capture, Identifiability& result) {
         "ratio E/rho of stiffness to density can be estimated; weigh the object and write `mass`.");
 }
 
+void add_scale(const Capture& capture, Identifiability& result) {
+  if (const std::string source = source_of_scale(capture); !source.empty())
+    result.possible.push_back("The absolute scale of stiffness follows from " + source + ".");
+  add_missing_scale(capture, result);
+}
+
 void add_stiffness(const Capture& capture, const Survey& seen, Identifiability& result) {
   const bool is_held = !capture.scene.fixed.empty(), touches = seen.first_contact.has_value();
   const bool has_forces = has_forces_to_fit(capture);
@@ -389,9 +395,7 @@ Identifiability identifiability(const Capture& capture, const Survey& seen) {
   const bool has_curves = std::ranges::any_of(capture.material_curves, [](const auto& c) { return c.role == "fit"; });
   if (has_curves && !capture.scene.object.surface) {
     result.possible.push_back("Stiffness: from stress-strain curves of the material.");
-    if (const std::string source = source_of_scale(capture); !source.empty())
-      result.possible.push_back("The absolute scale of stiffness follows from " + source + ".");
-    add_missing_scale(capture, result);
+    add_scale(capture, result);
     return result;
   }
   if (!capture.scene.object.surface) {
@@ -405,9 +409,7 @@ Identifiability identifiability(const Capture& capture, const Survey& seen) {
     return result;
   }
   add_stiffness(capture, seen, result);
-  if (const std::string source = source_of_scale(capture); !source.empty())
-    result.possible.push_back("The absolute scale of stiffness follows from " + source + ".");
-  add_missing_scale(capture, result);
+  add_scale(capture, result);
   add_damping(capture, seen, result);
   add_surroundings(capture, seen, result);
   return result;

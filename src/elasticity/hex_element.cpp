@@ -11,7 +11,7 @@ UnitLame unit_lame(double nu) {
 
 namespace {
 
-constexpr int bubbles = 3;              // bubbles 4 t (1 - t) along each axis
+constexpr int bubbles = 3;              // 4 t (1 - t) along each axis
 constexpr int functions = 8 + bubbles;  // nodes, then bubbles
 
 /// H[i][j](a, b) = integral of d_i N_a d_j N_b, for nodes and bubbles [m].
