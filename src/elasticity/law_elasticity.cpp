@@ -50,7 +50,7 @@ template <int N>
 class TetLawElasticity : public LawElasticity {
  public:
   TetLawElasticity(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
-                   std::shared_ptr<const BlockPattern> pattern);
+                   const std::shared_ptr<const BlockPattern>& pattern);
   TetLawElasticity(std::shared_ptr<const Body> body, const LawLayout& layout)
       : TetLawElasticity(body, nullptr, nullptr) {
     field_ = std::make_unique<MaterialField>(std::move(body), layout);
@@ -162,7 +162,7 @@ class TetLawElasticity : public LawElasticity {
 
 template <int N>
 TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
-                                      std::shared_ptr<const BlockPattern> pattern)
+                                      const std::shared_ptr<const BlockPattern>& pattern)
     : LawElasticity(std::move(law)), body_(std::move(body)) {
   const int count = body_->element_count();
   points_.resize(std::size_t(count) * points);
@@ -191,7 +191,7 @@ void TetLawElasticity<N>::take_reference(const Points& reference) {
   for (int e = 0; e < body_->element_count(); ++e) {
     const Nodes X = of_element(e, reference);
     for (int q = 0; q < points; ++q) {
-      const auto p = std::size_t(e * points + q);
+      const auto p = std::size_t(e) * points + std::size_t(q);
       points_[p].volume = all[p];
       points_[p].gradient = tet_gradients<N>(X, rule[std::size_t(q)].at);
     }
@@ -229,7 +229,7 @@ template <class Function>
 void TetLawElasticity<N>::for_all_points(Function&& function) const {
   parallel_ranges(0, std::size_t(body_->element_count()), 32, [&](std::size_t begin, std::size_t end) {
     for (int e = int(begin); e < int(end); ++e)
-      for (int q = 0; q < points; ++q) function(e, std::size_t(e * points + q));
+      for (int q = 0; q < points; ++q) function(e, std::size_t(e) * points + std::size_t(q));
   });
 }
 
@@ -259,7 +259,7 @@ template <int N>
 void TetLawElasticity<N>::add_gradient(Points& gradient) const {
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
+      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
       const Nodes force = point.volume * point.gradient * point.stress.P.transpose();
       for (int a = 0; a < N; ++a) gradient.row(nodes_of(e)[a]) += force.row(a);
     }
@@ -290,7 +290,7 @@ void TetLawElasticity<N>::add_stiffness(Stiffness which, double scale, BlockMatr
   if (which == Stiffness::Positive) projections();
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const PointStress& s = points_[p].stress;
       add_point_stiffness(e, points_[p], which == Stiffness::Exact ? s.tangent : projections_[p].positive, s.left,
                           s.right, scale, matrix);
@@ -305,7 +305,7 @@ void TetLawElasticity<N>::for_parameter_derivatives(const VisitDerivatives& visi
   for (int e = 0; e < body_->element_count(); ++e) {
     derivatives.setZero();
     for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
+      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
       law_->parameter_derivatives(e, point.F, by_parameter);
       for (int k = 0; k < count; ++k) {
         const Eigen::Matrix<double, 3, N> force =
@@ -322,7 +322,7 @@ Matrix3 TetLawElasticity<N>::cauchy_stress(int e) const {
   Matrix3 sum = Matrix3::Zero();
   double volume = 0.0;
   for (int q = 0; q < points; ++q) {
-    const Point& point = points_[std::size_t(e * points + q)];
+    const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
     sum += point.volume / point.F.determinant() * point.stress.P * point.F.transpose();
     volume += point.volume;
   }
@@ -335,7 +335,7 @@ MatrixX TetLawElasticity<N>::strains() const {
   for (int e = 0; e < body_->element_count(); ++e) {
     double volume = 0.0;
     for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
+      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
       strains.row(e) += point.volume * biot_strain(point.F).transpose();
       volume += point.volume;
     }
@@ -350,7 +350,7 @@ double TetLawElasticity<N>::energy(const Points& z) const {
   PointStress stress;
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
+      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
       law_->stress(e, deformation(e, point.gradient, z), false, stress);
       sum += point.volume * stress.energy;
     }
@@ -371,7 +371,7 @@ void TetLawElasticity<N>::find_rotations() {
     Matrix3 F = Matrix3::Zero();
     double volume = 0.0;
     for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
+      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
       F += point.volume * point.F;
       volume += point.volume;
     }
@@ -384,7 +384,7 @@ void TetLawElasticity<N>::add_product(const Points& d, double scale, Points& pro
   projections();
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       const PointStress& s = point.stress;
       const Matrix3 local = s.left.transpose() * deformation(e, point.gradient, d) * s.right;
@@ -403,7 +403,7 @@ void TetLawElasticity<N>::add_force(const Points& z, Points& force) {
   }
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e * points + q)];
+      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
       subtract(e, point, point.stress.P, force);
     }
   if (z == lag_) return;
@@ -485,7 +485,7 @@ void TetLawElasticity<N>::add_lag_matrix(const Points& z, double scale, BlockMat
   const Matrix3 world = Matrix3::Identity();
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       add_point_stiffness(e, points_[p], all[p].by_lag, world, world, scale, matrix);
     }
 }
@@ -498,7 +498,7 @@ void TetLawElasticity<N>::add_force_tangent(const Points& z, const Points& d_lag
   const std::vector<PointChange>& all = changes(z, has_change);
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       Vector9 change = all[p].by_lag * vec(deformation(e, point.gradient, d_lag));
       change += all[p].by_z * vec(deformation(e, point.gradient, d_z));
@@ -514,7 +514,7 @@ void TetLawElasticity<N>::add_force_adjoint(const Points& z, const Points& w, Po
   if (field_) field_->begin_adjoint();
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       const Matrix3 W = deformation(e, point.gradient, w);
       subtract(e, point, matrix_of(all[p].by_lag.transpose() * vec(W)), lag_bar);
@@ -530,7 +530,7 @@ void TetLawElasticity<N>::add_reference_tangent(const Points& d_reference, Point
   const std::vector<PointChange>& all = changes(reference_z_, false);
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       const Matrix3 F_z = deformation(e, point.gradient, reference_z_);
       subtract(e, point, reference_change(point, all[p], F_z, deformation(e, point.gradient, d_reference)), force);
@@ -544,7 +544,7 @@ void TetLawElasticity<N>::add_reference_matrix(double scale, BlockMatrix& matrix
   for (int e = 0; e < body_->element_count(); ++e) {
     const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       const Matrix3 F_z = deformation(e, point.gradient, reference_z_);
       for (int b = 0; b < N; ++b)
@@ -564,7 +564,7 @@ void TetLawElasticity<N>::add_reference_adjoint(const Points& w, Points& referen
   const std::vector<PointChange>& all = changes(reference_z_, false);
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e * points + q);
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       const Matrix3 W = deformation(e, point.gradient, w), F_z = deformation(e, point.gradient, reference_z_);
       const Matrix3 G_bar = all[p].stress.cwiseProduct(W).sum() * Matrix3::Identity() - W.transpose() * all[p].stress -
@@ -589,15 +589,15 @@ std::unique_ptr<LawElasticity> make_for(const std::shared_ptr<const Body>& body,
 
 }  // namespace
 
-std::unique_ptr<LawElasticity> LawElasticity::make(std::shared_ptr<const Body> body,
+std::unique_ptr<LawElasticity> LawElasticity::make(const std::shared_ptr<const Body>& body,
                                                    std::shared_ptr<const MaterialLaw> law,
-                                                   std::shared_ptr<const BlockPattern> pattern) {
+                                                   const std::shared_ptr<const BlockPattern>& pattern) {
   if (law->element_count() != body->element_count())
     throw std::invalid_argument("the material has another number of elements than the body");
-  return make_for(body, std::move(law), std::move(pattern));
+  return make_for(body, std::move(law), pattern);
 }
 
-std::unique_ptr<LawElasticity> LawElasticity::make(std::shared_ptr<const Body> body, const LawLayout& layout) {
+std::unique_ptr<LawElasticity> LawElasticity::make(const std::shared_ptr<const Body>& body, const LawLayout& layout) {
   return make_for(body, layout);
 }
 

@@ -25,11 +25,12 @@ class LawElasticity : public Elasticity {
  public:
   /// @param pattern  of the matrices to come; null: the body's own. It may have more rows than the body has nodes.
   /// Throws std::invalid_argument for hexahedra, and for a law of another number of elements.
-  static std::unique_ptr<LawElasticity> make(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
-                                             std::shared_ptr<const BlockPattern> pattern = nullptr);
+  static std::unique_ptr<LawElasticity> make(const std::shared_ptr<const Body>& body,
+                                             std::shared_ptr<const MaterialLaw> law,
+                                             const std::shared_ptr<const BlockPattern>& pattern = nullptr);
   /// The law follows from the parameter vector by this layout; `law` is null before the first `set_parameters`.
   /// Throws std::invalid_argument for hexahedra, and for a layout of another number of control moduli than the body's.
-  static std::unique_ptr<LawElasticity> make(std::shared_ptr<const Body> body, const LawLayout& layout);
+  static std::unique_ptr<LawElasticity> make(const std::shared_ptr<const Body>& body, const LawLayout& layout);
 
   const MaterialLaw& law() const { return *law_; }
   /// A law of the same elements in its place.

@@ -17,7 +17,7 @@ FitOptions for_following(const Capture& capture, FitOptions options) {
 
 }  // namespace
 
-FollowedRecording::FollowedRecording(RecordedCapture recorded, const FitOptions& options,
+FollowedRecording::FollowedRecording(const RecordedCapture& recorded, const FitOptions& options,
                                      std::vector<std::string>& notes)
     : observed_(recorded.observed),
       recordings_({recorded}, for_following(recorded.capture, options), notes),

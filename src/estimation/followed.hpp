@@ -16,7 +16,7 @@ class FollowedRecording {
  public:
   /// Throws InputError where the recording cannot be followed, with the reason.
   /// @param notes  what the user should know about how it was read is added
-  FollowedRecording(RecordedCapture recorded, const FitOptions& options, std::vector<std::string>& notes);
+  FollowedRecording(const RecordedCapture& recorded, const FitOptions& options, std::vector<std::string>& notes);
 
   /// Parameters at which nothing is known: the capture's facts, the options' choices, and middling guesses. Young's
   /// modulus is then at least so high that the object's weight hardly bends it: what is too soft hangs too low, while

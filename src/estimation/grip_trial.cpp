@@ -14,8 +14,8 @@ constexpr int most_parts = 64;  // of the displacement, where the body does not 
 std::vector<int> held_by_all(const PressScene& scene, const ObservedGrip& test) {
   std::vector<int> held = scene.held;
   held.insert(held.end(), test.nodes.begin(), test.nodes.end());
-  std::ranges::sort(held);
-  held.erase(std::ranges::unique(held).begin(), held.end());
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
   return held;
 }
 

@@ -54,7 +54,7 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
   return trials;
 }
 
-PressObjective::PressObjective(std::shared_ptr<const PressScene> scene, const std::vector<int>& presses,
+PressObjective::PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
                                const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options)
     : material_(std::make_shared<PressedMaterial>(scene->body, layout)),
       objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {

@@ -16,8 +16,8 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
 class PressObjective {
  public:
   /// @param presses  numbers of those that take part
-  PressObjective(std::shared_ptr<const PressScene> scene, const std::vector<int>& presses, const LawLayout& layout,
-                 ParameterSet parameters, const PressTrialOptions& options);
+  PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
+                 const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options);
 
   Objective& cost() { return objective_; }
   [[nodiscard]] CostEvaluation evaluate(const VectorX& p) { return objective_.evaluate(p); }

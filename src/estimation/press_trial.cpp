@@ -24,8 +24,9 @@ void PressedMaterial::set_form(std::shared_ptr<const Body> body, LawLayout layou
   law_.reset();
 }
 
-PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
-                       const VectorX& reference, const PressTrialOptions& options, int number)
+PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press,
+                       const std::shared_ptr<PressedMaterial>& material, const VectorX& reference,
+                       const PressTrialOptions& options, int number)
     : PressTrial(std::move(scene), press, material,
                  ContactMaterial{material->law(reference), mean_modulus(material->body(), *material->law(reference))},
                  options, number) {}

@@ -45,7 +45,7 @@ class PressTrial : public Trial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is
   /// @param number     what its frame calls it (`FrameFit::recording`)
-  PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
+  PressTrial(std::shared_ptr<const PressScene> scene, int press, const std::shared_ptr<PressedMaterial>& material,
              const VectorX& reference, const PressTrialOptions& options, int number = 0);
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;

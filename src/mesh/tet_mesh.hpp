@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -66,6 +67,7 @@ struct TetMeshOptions {
   bool quadratic = false;
   TetFit fit = TetFit::Conforming;
   double feature_angle_deg = 60.0;  ///< edges whose faces' normals differ by more are kept sharp, (0, 180]; 180: none
+  std::vector<std::function<bool(const Vector3&)>> parts = {};  ///< of space, whose boundaries the faces follow
 };
 
 /// Fills a closed surface with elements, by CGAL's Mesh_3 (Delaunay refinement, slivers removed).

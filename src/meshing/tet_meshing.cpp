@@ -24,6 +24,7 @@
 #include <map>
 #include <numeric>
 
+#include "meshing/part_boundary.hpp"
 #include "meshing/sharp_edges.hpp"
 #include "meshing/tet_improve.hpp"
 #endif
@@ -165,7 +166,8 @@ std::vector<Vector3> vertex_of_each_shell(const TriangleMesh& surface) {
 /// Refines, takes over the cells inside and makes the worst of them better. Slivers are perturbed, not exuded: CGAL's
 /// exudation depends on addresses.
 template <class Domain>
-TetMesh mesh_of(const Domain& domain, double h) {
+TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options) {
+  const double h = options.cell_size;
   const CGAL::Mesh_criteria_3<typename CGAL::Mesh_triangulation_3<Domain>::type> criteria(
       parameters::edge_size = h, parameters::facet_angle = 25.0, parameters::facet_size = 0.6 * h,
       parameters::facet_distance = facet_tolerance * h, parameters::cell_radius_edge_ratio = 2.0,
@@ -193,6 +195,7 @@ TetMesh mesh_of(const Domain& domain, double h) {
   }
   if (tets.empty()) refuse("no tetrahedron lies inside the object", "", "choose smaller cells");
   improve(points, tets, {.surface_tolerance = 0.2 * facet_tolerance * h});
+  for (const auto& part : options.parts) follow_part(points, tets, part, 0.2 * facet_tolerance * h);
   Points nodes(Eigen::Index(points.size()), 3);
   for (std::size_t n = 0; n < points.size(); ++n) nodes.row(Eigen::Index(n)) = points[n].transpose();
   return make_tet_mesh(std::move(nodes), std::move(tets));
@@ -212,7 +215,7 @@ TetMesh conforming(const TriangleMesh& surface, const Polyhedron& scan, const Te
   domain.add_features(lines.begin(), lines.end());
   if (shells.size() > 1)  // the mesher might find only one of them by itself
     for (const Vector3& vertex : shells) domain.add_corner(cgal(vertex));
-  TetMesh mesh = mesh_of(domain, options.cell_size);
+  TetMesh mesh = mesh_of(domain, options);
   for (const Vector3& vertex : shells) {
     double nearest = std::numeric_limits<double>::max();
     for (const SurfacePoint& p : mesh.surface) nearest = std::min(nearest, (p.position - vertex).norm());
@@ -246,7 +249,7 @@ TetMesh enclosing(const TriangleMesh& surface, const Polyhedron& scan, const Tet
     const double error = 0.01 * gap / radius;
     const GapDomain domain =
         GapDomain::create_implicit_mesh_domain(beyond_gap, bound, parameters::relative_error_bound = error);
-    TetMesh mesh = mesh_of(domain, options.cell_size);
+    TetMesh mesh = mesh_of(domain, options);
     if (encloses(mesh, tree, shells)) return mesh;
   }
   refuse("tetrahedra of " + text_of(options.cell_size) + " m do not enclose the surface", "", "choose smaller cells");

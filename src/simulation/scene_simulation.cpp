@@ -69,6 +69,7 @@ std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistanc
     TetMeshOptions options;
     options.cell_size = edge;
     options.quadratic = resolution.element == ElementKind::QuadraticTetrahedron;
+    for (const Hold& hold : held_regions(scene)) options.parts.push_back(hold.contains);
     body = make_body(make_tet_mesh(*scene.object.surface, options));
   }
   if (!scene.regions.empty()) {
