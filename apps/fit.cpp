@@ -164,10 +164,12 @@ void print_agreement(const Result& result, const FitOutcome& outcome, double sec
 }
 
 void print_result(const Result& result, const FitOutcome& outcome, const fs::path& out, double seconds) {
-  std::cout << result.capture.name << "\n";
+  std::cout << result.capture.name << (result.verdict.empty() ? "" : ": " + result.verdict) << "\n";
+  for (const std::string& reason : result.reasons) std::cout << "  " << reason << "\n";
   for (const ParameterResult& p : result.parameters)
     if (p.estimated) print_parameter(p);
   print_agreement(result, outcome, seconds);
+  if (const std::string most = largest_share_sentence(result); !most.empty()) std::cout << "  " << most << "\n";
   for (const std::string& note : result.notes) std::cout << "  note: " << note << "\n";
   const std::string model = (out / "model.toml").string();
   std::cout << "Look at " << (out / "report.html").string();

@@ -169,6 +169,7 @@ Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double d
   pass.recordings = recordings_;
   pass.options = with_controls(options_, count);
   pass.options.refine = refine;
+  pass.options.alternatives = options_.alternatives && is_last_;
   pass.begin = from;
   if (count > 1) pass.stage = points(count);
   pass.done_from = done_from, pass.done_to = done_to;

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 
-#include "base/dense.hpp"
 #include "base/error.hpp"
-#include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_pass.hpp"
 #include "estimation/press_fit.hpp"
@@ -13,19 +11,11 @@
 
 namespace pliant {
 
-MatrixX parameter_covariance(const CostEvaluation& evaluation) {
-  const MatrixX& H = evaluation.gauss_newton;
-  const Eigen::Index n = H.rows();
-  const MatrixX inverse = solve_symmetric(H, MatrixX(MatrixX::Identity(n, n)));
-  MatrixX sandwich = inverse * gradient_scatter(evaluation) * inverse;
-  // Fewer frames than parameters, or gradients that cancel by chance, must not make the estimate look sure.
-  for (Eigen::Index i = 0; i < n; ++i) sandwich(i, i) = std::max(sandwich(i, i), 0.0);
-  return sandwich + inverse;
-}
-
-void add_uncertainty(FitOutcome& outcome) {
-  outcome.covariance = parameter_covariance(outcome.evaluation);
-  outcome.std = outcome.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts, const VectorX& floor) {
+  outcome.uncertainty = uncertainty_of(outcome.evaluation, shifts, floor);
+  outcome.covariance = outcome.uncertainty.covariance;
+  outcome.std = outcome.uncertainty.std;
+  outcome.verdict = verdict_of(outcome.evaluation, outcome.uncertainty, outcome.parameters);
   const VectorX inverse = outcome.std.cwiseMax(1e-300).cwiseInverse();
   outcome.correlation = inverse.asDiagonal() * outcome.covariance * inverse.asDiagonal();
 }
@@ -37,7 +27,7 @@ namespace {
 OnePass pass_of_held_out(RecordedCapture held_out, const FitOutcome& fitted, const FitOptions& options) {
   FitOptions fixed = options;
   fixed.tracking = TrackingUse::Off;
-  fixed.cells = fitted.cells, fixed.refine = 1;
+  fixed.cells = fitted.cells, fixed.refine = 1, fixed.alternatives = false;
   fixed.control_points = fitted.recordings.front().discretisation.body->modulus.controls;
   for (const Parameter& p : fitted.parameters.parameters()) {
     if (!is_of_object(p)) continue;

@@ -12,6 +12,7 @@
 #include "estimation/law_zones.hpp"
 #include "estimation/problem.hpp"
 #include "estimation/sample_fit.hpp"
+#include "estimation/verdict.hpp"
 #include "tracking/tracker.hpp"
 
 namespace pliant {
@@ -24,7 +25,7 @@ enum class LoadFreeScheme {
 
 /// What a fit compares the simulated motion with, where only points on the surface were seen.
 enum class TrackingUse {
-  Automatic,  ///< both, where point clouds or several cameras saw the object move; else no tracking
+  Automatic,  ///< both, where point clouds or several cameras saw the object move; else none
   Off,        ///< the points, by surface constraints (Weiss 2020)
   Loop,       ///< the motion that the tracker found, in turns with it (Wang 2015, section 3)
   Both,       ///< each from a part of the frames; the one that predicts the others better is kept
@@ -56,7 +57,7 @@ struct FitOptions {
   std::optional<ElementKind> element;
   Integrator integrator = Integrator::Lagged;
   int pull_points = 4;  ///< that hold a released object until it is let go, 1..50
-  TrackingUse tracking = TrackingUse::Automatic;
+  TrackingUse tracking = TrackingUse::Off;
   int tracking_rounds = 3;  ///< of tracking and estimation in turns, at most, 1..10
   LoadFreeScheme load_free = LoadFreeScheme::Monolithic;
   int scan_points = 0;     ///< about which the scan may err, 0..50; 0: it is exact
@@ -75,6 +76,8 @@ struct FitOptions {
   double solver_tolerance = 1e-8;
   /// Whether a correction of sensors or of gravity's direction is estimated where the residuals ask for it.
   bool correct = true;
+  /// Whether the estimate is tried under other models, and their part added to its deviations.
+  bool alternatives = true;
   bool hold_strongly = false;  ///< eliminate nodes in held regions instead of Nitsche's method
   MaterialKind material = MaterialKind::Automatic;
   /// Of Ogden's law, 1..3; 0: one where the object moves, else as many as the presses support.
@@ -237,6 +240,8 @@ struct FitOutcome {
   VectorX start_theta;      ///< likewise; empty where the fit began with another form of the law
   VectorX std;              ///< of each unconstrained coordinate
   MatrixX covariance, correlation;
+  Uncertainty uncertainty;  ///< what these are made of; empty where nothing is estimated
+  Verdict verdict;          ///< whether the estimate can be quoted
   double start_cost = 0.0, final_cost = 0.0;
   CostEvaluation evaluation;  ///< at the solution, all points of the fit
   std::vector<RecordingOutcome> recordings;
@@ -278,12 +283,9 @@ struct FitMonitor {
 FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor = {},
                FitState resume = {}, std::optional<RecordedCapture> held_out = {});
 
-/// Standard deviations of the estimate from the curvature of the cost and the scatter of the frames' gradients
-/// (sandwich estimate; gradients of neighbouring frames may be correlated, Newey and West 1987), never below what the
-/// curvature alone gives.
-MatrixX parameter_covariance(const CostEvaluation& evaluation);
-
-/// Takes covariance, standard deviations and correlation from an outcome's evaluation, which has derivatives.
-void add_uncertainty(FitOutcome& outcome);
+/// Takes covariance, standard deviations and correlation from an outcome's evaluation, which has derivatives, and what
+/// is known about its models.
+/// @param shifts, floor  as in `uncertainty_of`
+void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts = {}, const VectorX& floor = {});
 
 }  // namespace pliant

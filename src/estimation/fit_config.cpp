@@ -184,7 +184,8 @@ const std::vector<Entry>& entries() {
       choice_entry("tracking",
                    "alternate model-based tracking with the fit of the tracked motion (loop), fit the observed surface "
                    "points (off), "
-                   "or both, keeping what predicts held-out frames better; auto: both for clouds and several cameras",
+                   "or both, keeping what predicts held-out frames better; auto: both for clouds and several cameras, "
+                   "else off",
                    tracking_uses, &FitOptions::tracking),
       integer_entry("tracking_rounds", "1..10", "greatest number of alternations of tracking and fit",
                     &FitOptions::tracking_rounds),
@@ -220,6 +221,10 @@ const std::vector<Entry>& entries() {
                  "score test on the "
                  "residuals requires it",
                  &FitOptions::correct),
+      flag_entry("alternatives",
+                 "try the estimate under other models (mesh, time step, contact, law, given quantities) and add what "
+                 "they differ by to its intervals",
+                 &FitOptions::alternatives),
       flag_entry("hold_strongly",
                  "impose Dirichlet conditions of held regions strongly, by elimination of nodes, instead of weakly by "
                  "Nitsche's method",

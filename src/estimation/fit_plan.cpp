@@ -123,6 +123,7 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
   if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Corrected)) return {};
   if (StageChain chain = finer(done); !chain.empty()) return {chain};
+  if (StageChain chain = alternative(done); !chain.empty()) return {chain};
   return {};
 }
 
@@ -305,6 +306,25 @@ StageChain FitPlan::finer(const Records& done) const {
   return {};
 }
 
+/// The next one, at the result.
+StageChain FitPlan::alternative(const Records& done) const {
+  const StageRecord* at = result(done);
+  if (!at) return {};
+  const Spacing own = spacing_of(*at);
+  for (std::size_t i = 0; i < facts_.alternatives.size(); ++i) {
+    const Alternative& a = facts_.alternatives[i];
+    Stage stage{{StageKind::Alternative, at->id.start, int(i)}, a.cause, {own.cells * a.cells, own.steps * a.steps}};
+    if (find_record(done, stage.id)) continue;
+    stage.band = facts_.options.fine_band;
+    stage.free = free_at_last(done);
+    stage.from = {at->theta};
+    stage.alternative = a;
+    stage.done_from = stage.done_to = 1.0;
+    return {stage};
+  }
+  return {};
+}
+
 // What the records say ----------------------------------------------------------------------------------------------
 
 VectorX FitPlan::before_starts(const Records& done) const {
@@ -408,6 +428,18 @@ std::vector<const StageRecord*> FitPlan::repetitions(const Records& done) const 
   for (const StageRecord& r : done)
     if (r.id.kind == StageKind::Finer && r.succeeded) all.push_back(&r);
   return all;
+}
+
+const StageRecord* FitPlan::result(const Records& done) const {
+  const StageRecord* finest = estimate(done);
+  for (const StageRecord* r : repetitions(done))
+    if (finest && spacing_of(*r).cells > spacing_of(*finest).cells) finest = r;
+  return finest;
+}
+
+Spacing FitPlan::spacing_of(const StageRecord& record) const {
+  if (record.id.kind == StageKind::Finer) return facts_.repetitions[std::size_t(record.id.number)];
+  return {facts_.options.cells, facts_.options.steps};
 }
 
 double FitPlan::work(const Spacing& s) const {

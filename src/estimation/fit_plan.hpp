@@ -7,22 +7,24 @@ namespace pliant {
 /// What the plan of a fit depends on, beside what was done: facts about the recordings, and the choices.
 struct PlanFacts {
   FitOptions options;
-  ParameterSet parameters;              ///< where the fit begins, with the choices
-  std::vector<ParameterHandle> moduli;  ///< of the object
-  ParameterHandle density, gravity;     ///< of the first recording
-  double size = 0.0;                    ///< of the object [m]
-  VectorX relative_moduli;              ///< of scan and starts, the first one's being one
-  bool is_scanned = true;               ///< Young's modulus is looked for
-  double carrying_modulus = 0.0;        ///< [Pa] that is enough for a scan that sags; 0: no scan does
-  bool swings = false;                  ///< some object is let go
-  bool coarse_is_as_fine = false;       ///< starts are followed on the full grid already
-  std::vector<Spacing> repetitions;     ///< on finer grids, after the first estimate
+  ParameterSet parameters;                ///< where the fit begins, with the choices
+  std::vector<ParameterHandle> moduli;    ///< of the object
+  ParameterHandle density, gravity;       ///< of the first recording
+  double size = 0.0;                      ///< of the object [m]
+  VectorX relative_moduli;                ///< of scan and starts, the first one's being one
+  bool is_scanned = true;                 ///< Young's modulus is looked for
+  double carrying_modulus = 0.0;          ///< [Pa] that is enough for a scan that sags; 0: no scan does
+  bool swings = false;                    ///< some object is let go
+  bool coarse_is_as_fine = false;         ///< starts are followed on the full grid already
+  std::vector<Spacing> repetitions;       ///< on finer grids, after the first estimate
+  std::vector<Alternative> alternatives;  ///< models that are tried at the last estimate
 };
 
 /// The stages of a fit of motions and equilibria: how the object moves at first; the swing that was seen, or a scan
 /// over decades of Young's modulus; the best values followed on the coarse grid, wide band, horizon growing as the
 /// early frames match; the best of them on the full grid, first in the wide band; a test of which corrections the
-/// residuals ask for, and the estimate with them; repetitions on finer grids.
+/// residuals ask for, and the estimate with them; repetitions on finer grids; one step under each of some alternative
+/// models.
 class FitPlan {
  public:
   explicit FitPlan(PlanFacts facts) : facts_(std::move(facts)) {}
@@ -42,6 +44,10 @@ class FitPlan {
   /// The first estimate, before any repetition, and the repetitions that succeeded; null where there is none.
   const StageRecord* estimate(const std::vector<StageRecord>& done) const;
   std::vector<const StageRecord*> repetitions(const std::vector<StageRecord>& done) const;
+  /// The one on the finest mesh, of the first estimate and its repetitions; null where there is none.
+  const StageRecord* result(const std::vector<StageRecord>& done) const;
+  /// How finely a record's stage was simulated.
+  Spacing spacing_of(const StageRecord& record) const;
   /// Of a repetition, in units of the first estimate's: a warm start needs few iterations.
   double work(const Spacing& spacing) const;
 
@@ -64,6 +70,7 @@ class FitPlan {
   Stage test(const StageRecord& estimate) const;
   StageChain corrected(const Records& done, const std::optional<PassState::Beginning>& begin) const;
   StageChain finer(const Records& done) const;
+  StageChain alternative(const Records& done) const;
 
   /// Where the fit is before any start is followed.
   VectorX before_starts(const Records& done) const;

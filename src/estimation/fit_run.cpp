@@ -10,6 +10,7 @@
 #include "base/parallel.hpp"
 #include "estimation/corrections.hpp"
 #include "estimation/fit_starts.hpp"
+#include "estimation/given_quantities.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/notes.hpp"
 
@@ -39,6 +40,12 @@ int last_frame(const Horizon& horizon, const Recording& r) {
   return horizon.part < 1.0 ? r.horizon(horizon.part) : r.last_frame;
 }
 
+constexpr double largest_shift = 1.0;    // of an unconstrained coordinate, by a few steps
+constexpr int steps_of_alternative = 3;  // enough to tell how far another model's estimate lies
+// From what one refinement changes to what is left without it, at second order.
+constexpr double size_of_mesh = 1.8, size_of_step = 4.0 / 3.0;
+constexpr double softer = 1.0 / 3.0;  // contact, as a fall on a carpet or a thin skin would be
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -56,11 +63,12 @@ FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options,
 
 // What the plan depends on --------------------------------------------------------------------------------------------
 
-const Grid& FitRun::grid(const Spacing& spacing) {
-  const auto it = std::ranges::find_if(
-      grids_, [&](const auto& g) { return g->cells == spacing.cells && g->steps == spacing.steps; });
+const Grid& FitRun::grid(const Spacing& spacing, const ModelChange& change) {
+  const auto it = std::ranges::find_if(grids_, [&](const auto& g) {
+    return g->cells == spacing.cells && g->steps == spacing.steps && g->change == change;
+  });
   if (it != grids_.end()) return **it;
-  grids_.push_back(std::make_unique<Grid>(recordings_.grid(spacing.cells, spacing.steps)));
+  grids_.push_back(std::make_unique<Grid>(recordings_.grid(spacing.cells, spacing.steps, change)));
   return *grids_.back();
 }
 
@@ -104,6 +112,7 @@ PlanFacts FitRun::facts() {
   f.parameters.set_reference(theta);
   f.repetitions = refined_spacings({options_.cells, options_.steps}, options_.refine, recordings_.any_meshed_here(),
                                    !recordings_.all_static());
+  if (options_.alternatives) f.alternatives = alternatives();
   constexpr double hardly = 0.8;  // of the elements
   const Grid &coarse = grid({options_.coarse_cells, options_.steps}), &fine = grid({options_.cells, options_.steps});
   f.coarse_is_as_fine = true;
@@ -113,12 +122,29 @@ PlanFacts FitRun::facts() {
   return f;
 }
 
+/// Each stands for what is known to differ between a model and what is recorded: its mesh and time step, the law at
+/// large strain, how hard a floor is, and what the capture gives.
+std::vector<Alternative> FitRun::alternatives() const {
+  const bool is_static = recordings_.all_static();
+  const bool meets =
+      std::ranges::any_of(recordings_.all(), [](const Recording& r) { return !r.capture.scene.planes.empty(); });
+  std::vector<Alternative> all;
+  if (recordings_.any_meshed_here()) all.push_back({"mesh", Refinement::mesh_ratio, 1.0, {}, false, size_of_mesh});
+  if (!is_static) all.push_back({"time step", 1.0, Refinement::step_ratio, {}, false, size_of_step});
+  if (meets) all.push_back({"stiffness of contact", 1.0, 1.0, {.contact = softer}, false, 1.0});
+  if (recordings_.are_tetrahedra() && !options_.law_of_motion())
+    all.push_back({"elastic law", 1.0, 1.0, {.neo_hookean = true}, false, 1.0});
+  all.push_back({"what is given", 1.0, 1.0, {}, true, 1.0});
+  return all;
+}
+
 // The loop ------------------------------------------------------------------------------------------------------------
 
 std::vector<StageChain> FitRun::next() {
   std::vector<StageChain> chains = plan_.next(state_);
   for (const StageChain& chain : chains)
-    for (const Stage& stage : chain) (void)grid(stage.grid);  // made before threads ask for it
+    for (const Stage& stage : chain)  // made before threads ask for it
+      if (!stage.alternative) (void)grid(stage.grid);
   return chains;
 }
 
@@ -132,6 +158,8 @@ StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
       return find_pulls(stage, is_cut);
     case StageKind::Test:
       return test_corrections(stage);
+    case StageKind::Alternative:
+      return try_alternative(stage, is_cut);
     default:
       return minimise_stage(stage, is_cut);
   }
@@ -141,7 +169,8 @@ StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
 PassState FitRun::reached() const {
   PassState reached = state_;
   for (const StageRecord& r : partial_)
-    if (r.id.kind != StageKind::Scan && r.id.kind != StageKind::Finer) reached.done.push_back(r);
+    if (r.id.kind != StageKind::Scan && r.id.kind != StageKind::Finer && r.id.kind != StageKind::Alternative)
+      reached.done.push_back(r);
   return reached;
 }
 
@@ -338,6 +367,44 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
   return record;
 }
 
+StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
+  const Alternative& alternative = *stage.alternative;
+  const VectorX& theta = stage.from.front();
+  StageRecord record{stage.id, stage.name, theta, theta};
+  record.succeeded = true;
+  const ParameterSet parameters = parameters_of(stage, theta);
+  if (alternative.given) {
+    record.shifts = shifts_of_given(stage, parameters);
+    return record;
+  }
+  try {
+    Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
+    OptimiserOptions o;
+    o.max_iterations = steps_of_alternative;
+    const VectorX p = parameters.to_unconstrained(theta);
+    const OptimiserSummary s =
+        minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
+    is_cut = s.interrupted;
+    record.cost = s.succeeded ? s.evaluation.cost : infinite;
+    record.iterations = s.iterations;
+    if (!s.succeeded) record.reason = s.reason;
+    if (s.succeeded) record.shifts = {{alternative.cause, (s.p - p).cwiseMax(-largest_shift).cwiseMin(largest_shift)}};
+    outcome_.forward_steps += s.steps;
+  } catch (const InputError& error) {  // no mesh as fine, or too small an object
+    record.reason = error.what();
+  }
+  grids_.pop_back();  // it is not used again
+  return record;
+}
+
+std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const ParameterSet& estimated) {
+  const std::vector<GivenQuantity> given = given_quantities(estimated);
+  const ParameterSet all = with_given(estimated, given);
+  Objective objective = objective_of(stage, all, grid(stage.grid));
+  const CostEvaluation e = objective.linearise(all.to_unconstrained(all.reference()));
+  return e.succeeded ? pliant::shifts_of_given(e, all, given) : std::vector<ModelShift>{};
+}
+
 // What came out -------------------------------------------------------------------------------------------------------
 
 FitOutcome FitRun::run() {
@@ -360,7 +427,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   const auto failed =
       std::ranges::find_if(done, [](const StageRecord& r) { return is_on_full_grid(r.id.kind) && !r.succeeded; });
   const StageRecord& last = first ? refined(done, *first) : *failed;
-  const Grid& at = grid(spacing_of(last));
+  const Grid& at = grid(plan_.spacing_of(last));
   ParameterSet parameters = plan_.estimated(done);
   parameters.set_reference(last.theta);
   outcome_.starts = plan_.starts(done);
@@ -372,7 +439,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   outcome_.theta = last.theta;
   outcome_.parameters = recordings_.with_field_prior(parameters, at);
   outcome_.final_cost = last.cost;
-  Stage narrow{last.id, last.name, spacing_of(last)};
+  Stage narrow{last.id, last.name, plan_.spacing_of(last)};
   narrow.band = options_.fine_band;
   outcome_.start_cost = objective_of(narrow, parameters_of(narrow, outcome_.start_theta), at).evaluate(VectorX(0)).cost;
   outcome_.evaluation = evaluation_of(last, narrow, parameters);
@@ -381,7 +448,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
     outcome_.recordings.push_back({d, outcome_.theta, outcome_.evaluation.of_recording(int(r)),
                                    Simulation(d.body, d.simulation).rest_body(outcome_.theta)});
   }
-  if (outcome_.evaluation.succeeded && parameters.dimension() > 0) add_uncertainty(outcome_);
+  if (outcome_.evaluation.succeeded && parameters.dimension() > 0) add_uncertainty(outcome_, shifts_in(done), floor());
   if (outcome_.evaluation.succeeded && !interrupted_) time_steps(narrow, parameters);
   if (const StageRecord* swing = find_record(done, {StageKind::Swing}); swing && !swing->told.empty())
     outcome_.notes.push_back(swing->told);
@@ -410,9 +477,29 @@ void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRe
       in_three_digits(test->theta[plan_.facts().moduli.front()]) + " Pa; correct = false leaves it so.");
 }
 
-Spacing FitRun::spacing_of(const StageRecord& record) const {
-  if (record.id.kind == StageKind::Finer) return plan_.facts().repetitions[std::size_t(record.id.number)];
-  return {options_.cells, options_.steps};
+/// Of the alternatives that could be tried, less that of the fit's own model, whose gradient is not quite zero.
+std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) {
+  const VectorX own = gauss_newton_shift(outcome_.evaluation, largest_shift);
+  std::vector<ModelShift> shifts;
+  for (const StageRecord& r : done) {
+    if (r.id.kind != StageKind::Alternative) continue;
+    const Alternative& a = plan_.facts().alternatives[std::size_t(r.id.number)];
+    if (!r.reason.empty())
+      outcome_.notes.push_back("How much the estimate depends on the " + r.name + " could not be seen: " + r.reason +
+                               ".");
+    for (const ModelShift& s : r.shifts) {
+      if (s.shift.size() != own.size()) continue;
+      shifts.push_back({s.cause, a.given ? s.shift : VectorX(a.size * (s.shift - own))});
+    }
+  }
+  return shifts;
+}
+
+VectorX FitRun::floor() const {
+  const bool meets = std::ranges::any_of(recordings_.all(), [](const Recording& r) {
+    return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static;
+  });
+  return options_.alternatives ? unmodelled_std(outcome_.parameters, meets) : VectorX();
 }
 
 /// The estimate on the finest mesh; that at all resolutions goes into the outcome.
@@ -428,7 +515,7 @@ const StageRecord& FitRun::refined(const std::vector<StageRecord>& done, const S
   if (options_.refine <= 1 || (all.size() == 1 && interrupted_)) return first;
   std::vector<RefinedEstimate> estimates;
   for (const StageRecord* r : all) {
-    const Spacing spacing = spacing_of(*r);
+    const Spacing spacing = plan_.spacing_of(*r);
     estimates.push_back({spacing.cells, spacing.steps, r->elements, r->theta, r->cost, r->converged, r->reason});
   }
   outcome_.refinement = extrapolate(std::move(estimates), plan_.estimated(done));

@@ -29,12 +29,14 @@ class FitRun : StageLoop {
   StageRecord find_swing(const Stage& stage);
   StageRecord scan(const Stage& stage, bool& is_cut);
   StageRecord test_corrections(const Stage& stage);
+  StageRecord try_alternative(const Stage& stage, bool& is_cut);
+  std::vector<ModelShift> shifts_of_given(const Stage& stage, const ParameterSet& estimated);
 
   /// One minimisation, told as iterations of the stage; from any thread.
   OptimiserSummary optimise(Objective& objective, const Stage& stage, const OptimiserState& from);
   ParameterSet parameters_of(const Stage& stage, const VectorX& theta) const;
   Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const;
-  const Grid& grid(const Spacing& spacing);
+  const Grid& grid(const Spacing& spacing, const ModelChange& change = {});
 
   void tell(FitEvent event);
 
@@ -51,7 +53,9 @@ class FitRun : StageLoop {
   CostEvaluation evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters);
   void say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate);
   const StageRecord& refined(const std::vector<StageRecord>& done, const StageRecord& first);
-  Spacing spacing_of(const StageRecord& record) const;
+  std::vector<Alternative> alternatives() const;
+  std::vector<ModelShift> shifts_in(const std::vector<StageRecord>& done);
+  VectorX floor() const;
   void time_steps(const Stage& narrow, const ParameterSet& parameters);
 
   /// What the optimiser found at the end of a stage on the full grid.

@@ -9,6 +9,7 @@
 #include "estimation/law_stage.hpp"
 #include "estimation/optimiser.hpp"
 #include "estimation/refinement.hpp"
+#include "estimation/uncertainty.hpp"
 
 namespace pliant {
 
@@ -23,6 +24,7 @@ enum class StageKind {
   Test,           ///< which corrections the residuals ask for; no iterations
   Corrected,      ///< the estimate together with those
   Finer,          ///< the estimate again with finer steps or on a finer grid
+  Alternative,    ///< one step from the estimate under another model; no iterations
   Law,            ///< a form of the law of a pressed object
   Scale,          ///< its moduli alone, where the other numbers begin
   Cut,            ///< where a zone more is promised most; no iterations
@@ -53,6 +55,22 @@ struct Horizon {
   bool operator==(const Horizon&) const = default;
 };
 
+/// In what a model differs from the one that is fitted.
+struct ModelChange {
+  double contact = 1.0;      ///< stiffness of contact, in that of the fit
+  bool neo_hookean = false;  ///< in the place of linear elasticity in turning frames
+  bool operator==(const ModelChange&) const = default;
+};
+
+/// A model beside the one that is fitted, to see how much the estimate depends on the difference.
+struct Alternative {
+  std::string cause;                ///< for people: what the difference stands for
+  double cells = 1.0, steps = 1.0;  ///< in those of the fit
+  ModelChange change = {};
+  bool given = false;  ///< the same model, and what is taken as given moves within its tolerance
+  double size = 1.0;   ///< deviation of the truth, in the shift of the estimate
+};
+
 /// A stage of a fit, as data: what is simulated and compared, what is estimated, and from where.
 struct Stage {
   StageId id;
@@ -66,7 +84,8 @@ struct Stage {
   std::vector<VectorX> from = {};      ///< theta; of several the best end counts; empty: where the stage before ended
   std::vector<double> trials = {};     ///< of a scan: Young's moduli of the object's own material [Pa]
   double done_from = 0.0, done_to = 0.0;  ///< how much of the whole is done before and after it
-  std::optional<LawTask> law = {};        ///< of a search for the law of a pressed object
+  std::optional<Alternative> alternative = {};
+  std::optional<LawTask> law = {};  ///< of a search for the law of a pressed object
 };
 
 /// Stages one after the other, each from where the one before ended.
@@ -87,6 +106,7 @@ struct StageRecord {
   std::vector<std::pair<double, double>> trials = {};
   std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction
   std::string told = {};                    ///< for people: the swing that was found, what needs correction
+  std::vector<ModelShift> shifts = {};      ///< of an alternative: of the estimate
   std::optional<LawFinding> law = {};       ///< of a search for the law of a pressed object
 };
 

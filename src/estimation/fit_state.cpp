@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/10";
+constexpr const char* format = "fit-state/11";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -181,6 +181,7 @@ Json from_record(const StageRecord& r) {
                {"told", r.told},
                {"trials", Json::array()}};
   for (const auto& [modulus, cost] : r.trials) json["trials"].push_back({modulus, from_cost(cost)});
+  for (const ModelShift& s : r.shifts) json["shifts"].push_back({s.cause, from_vector(s.shift)});
   if (r.law) json["law"] = from_finding(*r.law);
   return json;
 }
@@ -198,6 +199,8 @@ StageRecord to_record(const Json& json) {
   r.corrected = json.at("corrected").get<std::vector<std::string>>();
   r.told = json.at("told").get<std::string>();
   for (const Json& t : json.at("trials")) r.trials.emplace_back(t.at(0).get<double>(), to_cost(t.at(1)));
+  if (json.contains("shifts"))
+    for (const Json& s : json["shifts"]) r.shifts.push_back({s.at(0).get<std::string>(), to_vector(s.at(1))});
   if (json.contains("law")) r.law = to_finding(json["law"]);
   return r;
 }

@@ -14,7 +14,7 @@ namespace {
 constexpr double trust = 10.0;         // times the spread of neighbouring differences: what they cannot tell
 constexpr double least_digits = 0.05;  // of the derivative: differences less certain than this decide nothing
 
-using Verdict = CheckedDerivative::Verdict;
+using Judgement = CheckedDerivative::Verdict;
 
 double difference(CostFunction& cost, const VectorX& p, Eigen::Index i, double h) {
   const VectorX step = h * VectorX::Unit(p.size(), i);
@@ -36,23 +36,23 @@ void take_best_step(CheckedDerivative& d) {
   }
 }
 
-Verdict judge(const CheckedDerivative& d, double cost, double tolerance) {
+Judgement judge(const CheckedDerivative& d, double cost, double tolerance) {
   const double size = std::max({std::abs(d.by_tangents), std::abs(d.by_adjoint), d.scale});
-  if (!(std::abs(d.by_tangents - d.by_adjoint) <= tolerance * size)) return Verdict::Disagree;
-  if (!std::isfinite(d.by_difference)) return Verdict::Undecided;
+  if (!(std::abs(d.by_tangents - d.by_adjoint) <= tolerance * size)) return Judgement::Disagree;
+  if (!std::isfinite(d.by_difference)) return Judgement::Undecided;
   const double rounding = std::numeric_limits<double>::epsilon() * std::abs(cost) / d.step;
   const double unknown = trust * (d.uncertainty + rounding) + tolerance * size;
-  if (std::abs(d.by_tangents - d.by_difference) > unknown) return Verdict::Disagree;
-  return unknown > least_digits * size && unknown > 0.0 && size > 0.0 ? Verdict::Undecided : Verdict::Agree;
+  if (std::abs(d.by_tangents - d.by_difference) > unknown) return Judgement::Disagree;
+  return unknown > least_digits * size && unknown > 0.0 && size > 0.0 ? Judgement::Undecided : Judgement::Agree;
 }
 
-const char* word(Verdict verdict) {
+const char* word(Judgement verdict) {
   switch (verdict) {
-    case Verdict::Agree:
+    case Judgement::Agree:
       return "agree";
-    case Verdict::Disagree:
+    case Judgement::Disagree:
       return "DISAGREE";
-    case Verdict::Undecided:
+    case Judgement::Undecided:
       return "undecided";
   }
   return "";
@@ -61,7 +61,7 @@ const char* word(Verdict verdict) {
 }  // namespace
 
 bool GradientCheck::agrees() const {
-  return std::ranges::none_of(derivatives, [](const auto& d) { return d.verdict == Verdict::Disagree; });
+  return std::ranges::none_of(derivatives, [](const auto& d) { return d.verdict == Judgement::Disagree; });
 }
 
 GradientCheck check_gradient(CostFunction& cost, const VectorX& p, const GradientCheckOptions& options) {
@@ -100,15 +100,15 @@ std::string describe(const GradientCheck& check) {
   for (const CheckedDerivative& d : check.derivatives)
     text += fmt::format("{:{}}  {:14.7g}  {:14.7g}  {:14.7g}  {:9.2g}  {:8.1e}  {}\n", d.name, width, d.by_tangents,
                         d.by_adjoint, d.by_difference, d.uncertainty, d.step, word(d.verdict));
-  const auto count = [&](Verdict verdict) {
+  const auto count = [&](Judgement verdict) {
     return std::ranges::count(check.derivatives, verdict, &CheckedDerivative::verdict);
   };
-  if (const auto wrong = count(Verdict::Disagree); wrong > 0)
+  if (const auto wrong = count(Judgement::Disagree); wrong > 0)
     text += fmt::format("{} of {} derivatives disagree beyond what the differences can tell\n", wrong,
                         check.derivatives.size());
   else
     text += "tangents, adjoint and differences agree as far as the differences can tell\n";
-  if (const auto open = count(Verdict::Undecided); open > 0)
+  if (const auto open = count(Judgement::Undecided); open > 0)
     text += fmt::format("of {} derivatives no step size gives differences to compare with\n", open);
   return text;
 }

@@ -11,6 +11,8 @@ namespace pliant {
 
 namespace {
 
+LawForm neo_hookean_form() { return {1, 0, 1, false, TwoNumberLaw::NeoHookean}; }
+
 bool has_fitted_loads(const Capture& capture) {
   return std::ranges::any_of(capture.loads, [](const Load& load) { return is_fitted(load.role); });
 }
@@ -248,8 +250,9 @@ Resolution Recordings::resolution(double cells, double steps) const {
   Resolution r;
   const bool moves_reference = any_sags() || options_.scan_points > 0;
   const bool has_law = options_.law_of_motion().has_value();
-  r.element = options_.element.value_or(moves_reference || has_law ? ElementKind::QuadraticTetrahedron
-                                                                   : ElementKind::Hexahedron);
+  // At rest what bends shows alone, and an equilibrium of quadratic elements costs a second.
+  const bool wants_tetrahedra = moves_reference || has_law || all_static();
+  r.element = options_.element.value_or(wants_tetrahedra ? ElementKind::QuadraticTetrahedron : ElementKind::Hexahedron);
   if (has_law && r.element == ElementKind::Hexahedron)
     throw InputError({{front().capture.file},
                       "a material law, and element=hexahedra",
@@ -265,23 +268,30 @@ Resolution Recordings::resolution(double cells, double steps) const {
   r.shape_std = options_.scan_std;
   r.field = {options_.controls(), options_.control_weights};
   r.cells = cells;
+  r.follows_thickness = true;
   r.steps = steps;
   r.pulls = options_.pull_points;
   r.band = widest_band();
   return r;
 }
 
-Grid Recordings::grid(double cells, double steps) const {
+Grid Recordings::grid(double cells, double steps, const ModelChange& change) const {
   SimulationOptions settings;
   settings.newmark_theta = options_.newmark_theta;
   settings.solver.kind = options_.solver;
   settings.solver.tolerance = options_.solver_tolerance;
   settings.hold_strongly = options_.hold_strongly;
   settings.integrator = options_.integrator;
-  Grid grid{cells, steps, {}, {}};
+  Grid grid{cells, steps, change, {}, {}};
   for (const Recording& r : all_) {
     grid.recording.push_back(discretise(r.capture, r.distance, resolution(cells, steps), r.blocks,
                                         parameters_.reference(), settings, r.tracked.rest));
+    SimulationOptions& simulation = grid.recording.back().simulation;
+    simulation.contact.stiffness *= change.contact;
+    if (change.neo_hookean) {
+      ParameterLayout unchanged = parameters_.layout();  // the law has no numbers beside those of linear elasticity
+      simulation.law_layout = LawLayout::of_motion(unchanged, r.blocks.motion, neo_hookean_form());
+    }
     grid.presses.push_back(press_scene(r, grid.recording.back(), cells));
   }
   return grid;

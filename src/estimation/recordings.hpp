@@ -37,7 +37,8 @@ struct Recording {
 
 /// How finely all recordings of a fit are simulated.
 struct Grid {
-  double cells = 0.0, steps = 0.0;        ///< as in `Resolution`
+  double cells = 0.0, steps = 0.0;  ///< as in `Resolution`
+  ModelChange change = {};
   std::vector<Discretisation> recording;  ///< of each
   /// Presses of each recording around a body of tetrahedra; null where it has none that are fitted.
   std::vector<std::shared_ptr<const PressScene>> presses;
@@ -68,7 +69,11 @@ class Recordings {
     return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.scene.object.volume; });
   }
 
-  [[nodiscard]] Grid grid(double cells, double steps) const;
+  /// @param change  of the model; a neo-Hookean law asks for tetrahedra
+  /// Whether bodies are of tetrahedra, on whose laws of large strain work.
+  bool are_tetrahedra() const { return resolution(1.0, 1.0).element != ElementKind::Hexahedron; }
+
+  [[nodiscard]] Grid grid(double cells, double steps, const ModelChange& change = {}) const;
 
   /// The objective of the recordings' motions and, where parameters of the object are estimated or none are, of their
   /// loads and presses.

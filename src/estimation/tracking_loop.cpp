@@ -183,7 +183,9 @@ class TrackingLoop : public PassPlanner {
   void begin(Part part, const std::string& name, double done_from, double done_to,
              std::vector<RecordedCapture> recordings, const FitOptions& options, FitState from) {
     part_ = part, name_ = name, done_from_ = done_from, done_to_ = done_to;
-    inner_ = planner_of_points(std::move(recordings), options, std::move(from));
+    FitOptions own = options;
+    own.alternatives = options.alternatives && (part == Part::Last || !is_both_);
+    inner_ = planner_of_points(std::move(recordings), own, std::move(from));
   }
 
   /// A fit that looks again from an estimate, with other observations.

@@ -161,6 +161,8 @@ class CellCutter {
   Patches* patches_ = nullptr;
 };
 
+constexpr double hardly_any = 0.02;  // of a cell: it is merged even with what is held otherwise
+
 struct LatticeCell {
   CellQuadrature quadrature;
   double fraction = 0.0;
@@ -168,7 +170,8 @@ struct LatticeCell {
 
 /// The neighbour that takes over a barely cut cell: through a face before an edge before a corner, fullest first.
 std::optional<int> merge_target(const HexGrid& grid, const std::vector<LatticeCell>& lattice_cells,
-                                const Eigen::Vector3i& index, double threshold) {
+                                const Eigen::Vector3i& index, double threshold,
+                                const std::function<bool(const Eigen::Vector3i&)>& suits) {
   std::optional<int> best;
   double best_score = -1.0;
   for (int n = 0; n < 27; ++n) {
@@ -177,7 +180,7 @@ std::optional<int> merge_target(const HexGrid& grid, const std::vector<LatticeCe
     const Eigen::Vector3i at = index + step;
     if (manhattan == 0 || (at.array() < 0).any() || (at.array() >= grid.size.array()).any()) continue;
     const double fraction = lattice_cells[grid.lattice(at)].fraction;
-    if (fraction < threshold) continue;
+    if (fraction < threshold || !suits(at)) continue;
     const double score = 2.0 * (3 - manhattan) + fraction;
     if (score > best_score) best_score = score, best = grid.lattice(at);
   }
@@ -308,7 +311,14 @@ HexGrid make_hex_grid(const SignedDistance& distance, const Box& object, double 
   for (int l = 0; l < grid.lattice_count(); ++l) {
     if (stands_for[l] < 0 || cells[l].fraction >= options.merge_below) continue;
     const Eigen::Vector3i index = lattice_index(grid, l);
-    const auto target = merge_target(grid, cells, index, options.merge_below);
+    const auto is_held = [&](const Eigen::Vector3i& at) {
+      return options.is_held &&
+             options.is_held(grid.lattice_position(grid.lattice(at)) + Vector3::Constant(0.5 * cell_size));
+    };
+    auto target = merge_target(grid, cells, index, options.merge_below,
+                               [&](const auto& at) { return is_held(at) == is_held(index); });
+    if (!target && cells[l].fraction < hardly_any)
+      target = merge_target(grid, cells, index, options.merge_below, [](const auto&) { return true; });
     if (!target) continue;
     const Vector3 offset = (index - lattice_index(grid, *target)).cast<double>();
     for (int q = 0; q < CellQuadrature::count; ++q)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -66,6 +67,8 @@ struct HexGrid {
 struct HexGridOptions {
   double merge_below = 0.2;  ///< cells with a smaller inside fraction are merged with a neighbour; 0: none
   int subdivisions = 4;      ///< of a cut cell along each edge, for the integrals
+  /// Of a rest position: cells with their middle in what is held are merged with each other, and others with others.
+  std::function<bool(const Vector3&)> is_held = {};
 };
 
 /// @param cell_size  h [m]

@@ -34,6 +34,9 @@ Json parameter_json(const ParameterResult& parameter) {
   json["value"] = value_json(parameter.value);
   if (!parameter.unit.empty()) json["unit"] = parameter.unit;
   if (parameter.std) json["std"] = value_json(*parameter.std);
+  if (parameter.interval_90) json["interval_90"] = {parameter.interval_90->first, parameter.interval_90->second};
+  if (parameter.std_noise) json["std_noise"] = value_json(*parameter.std_noise);
+  if (parameter.std_model) json["std_model"] = value_json(*parameter.std_model);
   if (parameter.mesh_error) json["mesh_error"] = value_json(*parameter.mesh_error);
   if (parameter.step_error) json["step_error"] = value_json(*parameter.step_error);
   if (parameter.extrapolated) json["extrapolated"] = value_json(*parameter.extrapolated);
@@ -230,6 +233,14 @@ std::optional<ParameterValue> optional_value(const Member& parent, const char* k
   return parent[key].value();
 }
 
+std::optional<std::pair<double, double>> read_interval(const Member& member) {
+  if (!member.has("interval_90")) return std::nullopt;
+  std::vector<double> ends;
+  member["interval_90"].each_item([&](const Member& item) { ends.push_back(item.number()); });
+  if (ends.size() != 2) member["interval_90"].fail("two numbers");
+  return std::pair(ends[0], ends[1]);
+}
+
 ParameterResult read_parameter(const std::string& name, const Member& member) {
   return {name,
           member["value"].value(),
@@ -239,7 +250,10 @@ ParameterResult read_parameter(const std::string& name, const Member& member) {
           member["estimated"].boolean(),
           optional_value(member, "mesh_error"),
           optional_value(member, "step_error"),
-          optional_value(member, "extrapolated")};
+          optional_value(member, "extrapolated"),
+          optional_value(member, "std_noise"),
+          optional_value(member, "std_model"),
+          read_interval(member)};
 }
 
 ControlPoint read_control_point(const Member& member) {
@@ -381,6 +395,12 @@ Result read_all(const Member& top) {
   if (top.has("tracking")) result.tracking = read_tracking(top["tracking"]);
   if (top.has("curves")) top["curves"].each_item([&](const Member& m) { result.curves.push_back(read_curve(m)); });
   if (top.has("time")) result.time = read_time(top["time"]);
+  result.verdict = optional_string(top, "verdict");
+  if (top.has("reasons")) top["reasons"].each_item([&](const Member& m) { result.reasons.push_back(m.string()); });
+  if (top.has("uncertainty"))
+    top["uncertainty"].each_item([&](const Member& m) {
+      result.uncertainty.push_back({m["cause"].string(), read_values(m, "std")});
+    });
   if (top.has("notes")) top["notes"].each_item([&](const Member& m) { result.notes.push_back(m.string()); });
   return result;
 }
@@ -424,6 +444,10 @@ std::string to_json(const Result& result) {
   json["software"] = {
       {"name", result.software.name}, {"version", result.software.version}, {"commit", result.software.commit}};
   json["capture"] = {{"name", result.capture.name}, {"sha256", result.capture.sha256}};
+  if (!result.verdict.empty()) {
+    json["verdict"] = result.verdict;
+    json["reasons"] = result.reasons;
+  }
   json["parameters"] = Json::object();
   for (const ParameterResult& parameter : result.parameters)
     for (const std::string& name : {parameter.name, former_name(parameter.name)})
@@ -442,6 +466,10 @@ std::string to_json(const Result& result) {
   if (result.tracking) json["tracking"] = tracking_json(*result.tracking);
   if (!result.curves.empty()) json["curves"] = list(result.curves, curve_json);
   json["time"] = time_json(result.time);
+  if (!result.uncertainty.empty())
+    json["uncertainty"] = list(result.uncertainty, [](const UncertaintyResult& u) {
+      return Json{{"cause", u.cause}, {"std", values_json(u.std)}};
+    });
   if (!result.notes.empty()) json["notes"] = result.notes;
   return text(json);
 }

@@ -34,6 +34,9 @@ struct ParameterResult {
   /// Where the estimate was repeated at other resolutions: how far mesh and time steps may have put the value off, and
   /// where it goes as both become infinitely fine.
   std::optional<ParameterValue> mesh_error = {}, step_error = {}, extrapolated = {};
+  /// What `std` is made of, where models other than the fit's were tried, and the 90 % interval of a scalar.
+  std::optional<ParameterValue> std_noise = {}, std_model = {};
+  std::optional<std::pair<double, double>> interval_90 = {};
 };
 
 /// A control point of a field of values.
@@ -72,6 +75,12 @@ struct RecordingResult {
 
 struct CostResult {
   double start = 0.0, final = 0.0;
+};
+
+/// What one cause contributes to the deviations of the estimates.
+struct UncertaintyResult {
+  std::string cause;                  ///< "noise", "mesh", "mass", ...
+  std::map<std::string, double> std;  ///< by parameter name, of scalars, in their units
 };
 
 struct CorrelationResult {
@@ -154,6 +163,9 @@ struct Result {
   std::optional<RecordingResult> held_out;  ///< predicted, with its own start, planes and sensors alone estimated
   CostResult cost;
   std::vector<CorrelationResult> identifiability;
+  std::string verdict;               ///< "explained", "unexplained" or "undetermined"; empty: none was made
+  std::vector<std::string> reasons;  ///< of the verdict, plain sentences
+  std::vector<UncertaintyResult> uncertainty;
   std::vector<StartResult> starts;
   std::vector<ResolutionResult> resolutions;  ///< where there are several, in the order in which they were used
   std::optional<TrackingResult> tracking;

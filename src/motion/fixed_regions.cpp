@@ -1,6 +1,7 @@
 #include "motion/fixed_regions.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <map>
 
 #include "base/error.hpp"
@@ -58,14 +59,39 @@ Hold part_of_the_way(const Hold& hold, double share, const Vector3& middle) {
   return {hold.contains, R, middle + moved - R * middle};
 }
 
-std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds) {
+namespace {
+
+constexpr int fewest_nodes = 3;  // that can hold a body
+
+std::vector<int> nodes_inside(const Body& body, const Hold& hold) {
   std::vector<int> nodes;
   for (int n = 0; n < body.node_count(); ++n)
-    for (const Hold& hold : holds)
-      if (hold.contains(body.scanned_positions().row(n).transpose())) {
-        nodes.push_back(n);
-        break;
-      }
+    if (hold.contains(body.scanned_positions().row(n).transpose())) nodes.push_back(n);
+  return nodes;
+}
+
+/// Nodes of the elements whose surface lies inside in part.
+std::vector<int> nodes_around(const Body& body, const Hold& hold) {
+  std::vector<Vector3> inside;
+  for (const SurfacePoint& point : body.surface)
+    if (hold.contains(point.position)) inside.push_back(point.position);
+  const Embedding at(body, inside);
+  std::vector<int> nodes;
+  for (int p = 0; p < at.point_count(); ++p) nodes.insert(nodes.end(), at.nodes(p).begin(), at.nodes(p).end());
+  return nodes;
+}
+
+}  // namespace
+
+std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds) {
+  std::vector<int> nodes;
+  for (const Hold& hold : holds) {
+    std::vector<int> of_hold = nodes_inside(body, hold);
+    if (int(of_hold.size()) < fewest_nodes) of_hold = nodes_around(body, hold);
+    nodes.insert(nodes.end(), of_hold.begin(), of_hold.end());
+  }
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   return nodes;
 }
 

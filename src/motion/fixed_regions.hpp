@@ -18,7 +18,7 @@ struct Hold {
 /// and moved so that the region's middle goes straight.
 Hold part_of_the_way(const Hold& hold, double share, const Vector3& middle);
 
-/// Nodes inside any hold.
+/// Nodes inside any hold, in order; of a hold smaller than an element those of the elements whose surface it contains.
 std::vector<int> held_nodes(const Body& body, const std::vector<Hold>& holds);
 
 /// Held regions by Nitsche's method (Weiss 2020, appendix A.3) on the part of the surface inside them, symmetric form,

@@ -308,6 +308,41 @@ TrackingResult tracking_result(const TrackingOutcome& outcome, const MaterialBlo
 
 }  // namespace
 
+namespace {
+
+/// Deviations of an estimated parameter whose unconstrained numbers begin at `at`, and of a scalar the interval.
+void add_uncertainty_of(ParameterResult& r, const Parameter& p, const FitOutcome& outcome, const MatrixX& jacobian,
+                        int at) {
+  r.std = std_of(p, outcome.std, jacobian, at);
+  const Uncertainty& u = outcome.uncertainty;
+  if (u.std.size() != outcome.std.size()) return;
+  r.std_noise = std_of(p, u.std_noise, jacobian, at);
+  r.std_model = std_of(p, u.std_model, jacobian, at);
+  if (!p.is_scalar()) return;
+  const VectorX here = outcome.parameters.to_unconstrained(outcome.theta);
+  VectorX low = here, high = here;
+  low[at] += u.low[at], high[at] += u.high[at];
+  r.interval_90 = std::pair(outcome.parameters.to_theta(low)[p.at], outcome.parameters.to_theta(high)[p.at]);
+}
+
+void add_verdict(Result& result, const FitOutcome& outcome, const MatrixX& jacobian) {
+  if (outcome.uncertainty.std.size() == 0) return;
+  result.verdict = name_of(outcome.verdict.kind);
+  result.reasons = outcome.verdict.reasons;
+  for (const UncertaintyShare& share : outcome.uncertainty.budget) {
+    UncertaintyResult of_cause{share.cause, {}};
+    int at = 0;
+    for (const Parameter& p : outcome.parameters.parameters()) {
+      if (!p.estimated) continue;
+      if (p.is_scalar() && !p.is_auxiliary) of_cause.std[p.name] = std::get<double>(std_of(p, share.std, jacobian, at));
+      at += p.dimension();
+    }
+    result.uncertainty.push_back(std::move(of_cause));
+  }
+}
+
+}  // namespace
+
 Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome, const RunFacts& facts) {
   const Capture& capture = recordings.front().capture;
   Result result;
@@ -324,7 +359,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
     ParameterResult r{p.name, value_of(p, outcome.theta), p.unit, {}, {}, p.estimated};
     if (p.estimated) {
       if (outcome.start_theta.size() > 0) r.start = value_of(p, outcome.start_theta);
-      if (has_std) r.std = std_of(p, outcome.std, jacobian, at);
+      if (has_std) add_uncertainty_of(r, p, outcome, jacobian, at);
       if (refinement.mesh_error.size() > 0) r.mesh_error = std_of(p, refinement.mesh_error, jacobian, at);
       if (refinement.step_error.size() > 0) r.step_error = std_of(p, refinement.step_error, jacobian, at);
       if (repeated) r.extrapolated = value_of(p, outcome.parameters.to_theta(refinement.extrapolated));
@@ -333,6 +368,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
     result.parameters.push_back(std::move(r));
   }
   add_modulus_field(result, outcome);
+  add_verdict(result, outcome, jacobian);
   result.error = surface_errors(outcome.evaluation).error;
   for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
     result.recordings.push_back({recordings[r].capture.name, recordings[r].capture.sha256,

@@ -15,6 +15,8 @@ main{max-width:980px;margin:0 auto;padding:36px 20px 60px}
 h1{font-size:1.75rem;line-height:1.2;margin:0 0 .2rem;font-weight:650}
 h2{font-size:1.15rem;margin:2.4rem 0 .7rem;font-weight:650}
 .sub{color:var(--muted);margin:0 0 1.6rem}
+.verdict{border-left:4px solid var(--series-2);padding:.3rem 0 .3rem .8rem;margin:0 0 1.4rem}
+.verdict.unexplained{border-color:var(--series-5)}.verdict.undetermined{border-color:var(--series-4)}
 .cards{display:grid;grid-template-columns:repeat(auto-fill,minmax(215px,1fr));gap:14px}
 .card{background:var(--card);border:1px solid var(--grid);border-radius:10px;padding:14px 16px}
 .card .name{color:var(--muted);font-size:.85rem}

@@ -170,6 +170,34 @@ std::string discretisation_words(const ParameterResult& p) {
   return words + "limit " + in_unit(std::get<double>(*p.extrapolated), 4, p);
 }
 
+std::string largest_share_sentence(const Result& result) {
+  static const std::vector<std::pair<std::string, std::string>> remedies = {
+      {"noise", "a longer recording, or a better sensor"},
+      {"mesh", "a finer mesh (--set cells)"},
+      {"time step", "smaller time steps (--set steps)"},
+      {"stiffness of contact", "a hard floor, or less of it in the recording"},
+      {"elastic law", "smaller strains, or the law of the object's material (--set material)"},
+      {"mass", "weighing the object more exactly"},
+      {"direction of gravity", "a level: the direction of gravity in the capture"},
+      {"pose of", "a calibration of the sensor's pose"},
+      {"range of", "a calibration of the sensor's range"},
+      {"friction", "a coefficient of friction that is measured"},
+      {"law and damping", "a second recording of the object in another situation"}};
+  const UncertaintyResult* largest = nullptr;
+  for (const UncertaintyResult& u : result.uncertainty) {
+    const auto own = u.std.find("youngs_modulus");
+    if (own != u.std.end() && (!largest || own->second > largest->std.at("youngs_modulus"))) largest = &u;
+  }
+  const ParameterResult* modulus = result.find("youngs_modulus");
+  if (!largest || !modulus) return "";
+  const double percent = 100.0 * largest->std.at("youngs_modulus") / std::abs(std::get<double>(modulus->value));
+  std::string sentence = fmt::format("Most of the uncertainty of Young's modulus comes from {} ({} %)", largest->cause,
+                                     readable(percent, 2));
+  for (const auto& [cause, remedy] : remedies)
+    if (largest->cause.starts_with(cause)) return sentence + "; what would narrow it most is " + remedy + ".";
+  return sentence + ".";
+}
+
 std::vector<std::string> plain_sentences(const ReportData& data) {
   std::vector<std::string> sentences{agreement_sentence(data)};
   for (const ParameterResult& p : data.result.parameters) sentences.push_back(trust_sentence(p));

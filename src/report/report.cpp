@@ -80,6 +80,20 @@ std::string headline(const Result& result) {
   return cards.empty() ? "" : "<div class=\"cards\">\n" + cards + "</div>\n";
 }
 
+/// Whether the estimates can be quoted, and if not, why.
+std::string verdict(const Result& result) {
+  if (result.verdict.empty()) return "";
+  const std::string says = result.verdict == "explained"
+                               ? "The model explains the recording: its distances are those of the sensor's noise."
+                           : result.verdict == "unexplained"
+                               ? "The model does not explain the recording. The numbers below are its best attempt."
+                               : "The recording does not determine the material.";
+  std::string html =
+      "<p class=\"verdict " + escape_html(result.verdict) + "\"><b>" + escape_html(result.verdict) + ".</b> " + says;
+  for (const std::string& reason : result.reasons) html += " " + escape_html(reason);
+  return html + "</p>\n";
+}
+
 std::string words(const ReportData& data) {
   std::string items;
   for (const std::string& sentence : plain_sentences(data)) items += "<li>" + escape_html(sentence) + "</li>\n";
@@ -229,6 +243,37 @@ std::string parameter_table(const Result& result) {
         escape_html(spoken_name(p.name)), escape_html(value_text(p.value, p.std, p.unit)),
         p.start ? escape_html(value_text(*p.start, std::nullopt, p.unit)) : "", p.estimated ? "estimated" : "given");
   return body.empty() ? "" : table("<th>parameter</th><th>value</th><th>start</th><th></th>", body);
+}
+
+/// Deviations of the scalars by cause, in per cent of the values, and what would narrow the moduli's most.
+std::string uncertainty_table(const Result& result) {
+  if (result.uncertainty.size() < 2) return "";
+  std::vector<const ParameterResult*> shown;
+  for (const ParameterResult& p : result.parameters)
+    if (p.estimated && p.interval_90 && result.uncertainty.front().std.contains(p.name)) shown.push_back(&p);
+  if (shown.empty()) return "";
+  std::string head = "<th>cause</th>", body;
+  for (const ParameterResult* p : shown) head += "<th>" + escape_html(spoken_name(p->name)) + "</th>";
+  const auto percent = [](const ParameterResult& p, double std) {
+    const double value = std::abs(*scalar(p.value));
+    return value > 0.0 && std::isfinite(std) ? readable(100.0 * std / value, 2) + " %" : std::string();
+  };
+  for (const UncertaintyResult& u : result.uncertainty) {
+    body += "<tr><td>" + escape_html(u.cause) + "</td>";
+    for (const ParameterResult* p : shown) body += "<td>" + percent(*p, u.std.at(p->name)) + "</td>";
+    body += "</tr>\n";
+  }
+  body += "<tr><td>together</td>";
+  for (const ParameterResult* p : shown) body += "<td>" + percent(*p, scalar(p->std).value_or(0.0)) + "</td>";
+  body += "</tr>\n<tr><td>90 % interval</td>";
+  for (const ParameterResult* p : shown)
+    body += "<td>" + escape_html(value_text(p->interval_90->first, std::nullopt, p->unit)) + " to " +
+            escape_html(value_text(p->interval_90->second, std::nullopt, p->unit)) + "</td>";
+  return table(head, body + "</tr>\n") +
+         "<p class=\"given\">Standard deviations by cause, over the value. Each model was tried at the estimate, by "
+         "one "
+         "Gauss-Newton step; what the capture gives moves within its tolerance.</p>\n" +
+         "<p>" + escape_html(largest_share_sentence(result)) + "</p>\n";
 }
 
 // Readable on the diverging colours of both ends.
@@ -476,7 +521,7 @@ std::string report_html(const ReportData& data) {
       title + "</title><style>" + page_style + "</style></head><body><main>\n";
   const std::string recording = escape_html(data.result.capture.name);
   html += "<h1>" + title + "</h1>\n<p class=\"sub\">" + (recording == title ? "" : recording) + "</p>\n";
-  html += headline(data.result);
+  html += verdict(data.result) + headline(data.result);
   html += section("Summary", words(data));
   html += section("Observed and simulated", pictures(data));
   html += section("Agreement over time", data.residuals.size() > 1 ? residual_plot(data.residuals) : "");
@@ -487,6 +532,7 @@ std::string report_html(const ReportData& data) {
   html += section("All parameters", parameter_table(data.result));
   html += section("Alternating tracking and estimation", tracking_part(data.result));
   html += section("Convergence in mesh and time step", resolutions_table(data.result));
+  html += section("Uncertainty by cause", uncertainty_table(data.result));
   html += section("Parameter correlations", correlation_table(data.correlations));
   html += section("Starting points", starts_table(data.result));
   html += section("Using the model", usage(data));

@@ -66,6 +66,10 @@ std::string value_with_uncertainty(double value, std::optional<double> std, cons
 /// Empty where the estimate was not repeated.
 std::string discretisation_words(const ParameterResult& parameter);
 
+/// Which cause contributes most to the deviation of Young's modulus, and what would reduce it. Empty where no budget of
+/// causes is there.
+std::string largest_share_sentence(const Result& result);
+
 /// What the figures mean, one plain sentence each: agreement against noise, trust in each parameter, pairs that the
 /// recording can hardly tell apart, parameters that were given, starts that ended elsewhere.
 std::vector<std::string> plain_sentences(const ReportData& data);

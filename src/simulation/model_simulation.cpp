@@ -33,7 +33,7 @@ std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* di
   const ModelVolume& volume = model.volume;
   Body body;
   if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
-    body = make_body(make_hex_grid(*distance, bounding_box(*model.scene.object.surface), model.cell_size));
+    body = make_body(hex_grid_of(model.scene, *distance, model.cell_size));
   } else {
     const auto points = std::size_t(corner_count(volume.kind));
     std::vector<std::array<int, 4>> tets;

@@ -1,8 +1,10 @@
 #include "simulation/scene_simulation.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "meshing/mesh_distance.hpp"
 #include "scene/region.hpp"
@@ -44,8 +46,13 @@ ControlledField control_field(const Body& body, const Scene& scene, const FieldO
 double object_size(const Scene& scene) { return bounding_box(*scene.object.surface).extent().maxCoeff(); }
 
 std::shared_ptr<const SignedDistance> scene_distance(const Scene& scene, double band) {
-  const double size = object_size(scene);
-  return std::make_shared<SignedDistance>(signed_distance(*scene.object.surface, size / 80.0, (band + 0.1) * size));
+  constexpr double usual = 80.0, finest = 120.0;  // grid points along the object
+  constexpr double across = 24.0;                 // and through it: edges are rounded between grid points
+  const double size = object_size(scene), margin = (band + 0.1) * size;
+  auto distance = std::make_shared<SignedDistance>(signed_distance(*scene.object.surface, size / usual, margin));
+  const double spacing = std::max(thickness(scene, *distance) / across, size / finest);
+  if (spacing < 0.8 * distance->spacing()) *distance = signed_distance(*scene.object.surface, spacing, margin);
+  return distance;
 }
 
 std::vector<std::function<bool(const Vector3&)>> region_tests(const Scene& scene) {
@@ -53,6 +60,86 @@ std::vector<std::function<bool(const Vector3&)>> region_tests(const Scene& scene
   for (const MaterialRegion& region : scene.regions)
     regions.push_back(region_test(*scene.object.surface, region.region));
   return regions;
+}
+
+double thickness(const Scene& scene, const SignedDistance& distance) {
+  constexpr double share = 0.25;  // of the surface that may be thinner
+  const TriangleMesh& surface = *scene.object.surface;
+  const double size = object_size(scene), start = 1e-3 * size, least_step = 0.25 * distance.spacing();
+  std::vector<std::pair<double, double>> through;  // distance and area
+  double area = 0.0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vector3 &p = surface.vertices[std::size_t(a)], &q = surface.vertices[std::size_t(b)],
+                  &r = surface.vertices[std::size_t(c)];
+    const Vector3 cross = (q - p).cross(r - p), middle = (p + q + r) / 3.0, inwards = -cross.normalized();
+    if (!(cross.norm() > 0.0)) continue;
+    double t = start;
+    for (double depth = least_step; t < size; t += std::max(depth, least_step)) {
+      depth = -distance.value(middle + t * inwards);
+      if (depth <= 0.0 && t > 2.0 * distance.spacing()) break;
+    }
+    through.emplace_back(t, 0.5 * cross.norm());
+    area += through.back().second;
+  }
+  std::ranges::sort(through);
+  double before = 0.0;
+  for (const auto& [t, part] : through)
+    if ((before += part) >= share * area) return t;
+  return size;
+}
+
+double hex_cell_size(const Scene& scene, const SignedDistance& distance, double cells, int most) {
+  constexpr double slenderness = 5.0, usual_cells = 12.0;
+  const double size = object_size(scene);
+  const double by_count = usual_cells * std::cbrt(enclosed_volume(*scene.object.surface) / most);
+  return std::min(size, std::max(slenderness * thickness(scene, distance), by_count)) / cells;
+}
+
+namespace {
+
+/// Where a held region ends within the object along an axis, and on which side of it the region lies.
+struct HeldEnd {
+  double at;     // [m]
+  double inner;  // -1: below, 1: above
+};
+
+/// The first one along each axis.
+std::array<std::optional<HeldEnd>, 3> held_ends(const Scene& scene, const Box& object) {
+  std::array<std::optional<HeldEnd>, 3> ends;
+  const auto add = [&](int axis, double at, double inner) {
+    const double slack = 1e-6 * object.extent()[axis];
+    if (!ends[std::size_t(axis)] && at > object.min[axis] + slack && at < object.max[axis] - slack)
+      ends[std::size_t(axis)] = HeldEnd{at, inner};
+  };
+  for (const FixedRegion& fixed : scene.fixed) {
+    if (const auto* box = std::get_if<RegionBox>(&fixed.region))
+      for (int axis = 0; axis < 3; ++axis) add(axis, box->min[axis], 1.0), add(axis, box->max[axis], -1.0);
+    if (const auto* half = std::get_if<RegionHalfSpace>(&fixed.region))
+      for (int axis = 0; axis < 3; ++axis)
+        if (std::abs(half->normal[axis]) > 1.0 - 1e-9) add(axis, half->point[axis], half->normal[axis]);
+  }
+  return ends;
+}
+
+}  // namespace
+
+HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size) {
+  constexpr double inside = 1e-6;  // of a cell: nodes between the layers are held
+  const Box object = bounding_box(*scene.object.surface);
+  const auto ends = held_ends(scene, object);
+  Vector3 shift = Vector3::Zero();
+  for (int axis = 0; axis < 3; ++axis)
+    if (const auto& end = ends[std::size_t(axis)]) {
+      const double cells = std::ceil(object.extent()[axis] / cell_size);
+      const double origin = 0.5 * (object.min[axis] + object.max[axis] - cells * cell_size);
+      const double from_plane = (origin - end->at) / cell_size - inside * end->inner;
+      shift[axis] = from_plane - std::round(from_plane);
+    }
+  HexGridOptions options;
+  options.is_held = [holds = held_regions(scene)](const Vector3& p) {
+    return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); });
+  };
+  return make_hex_grid(distance, object, cell_size, options, shift);
 }
 
 std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
@@ -64,7 +151,8 @@ std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistanc
     const TetMesh mesh = make_tet_mesh(volume.nodes, volume.tets, volume.mid_nodes);
     body = make_body(resolution.element == ElementKind::QuadraticTetrahedron ? with_mid_nodes(mesh) : mesh);
   } else if (resolution.element == ElementKind::Hexahedron) {
-    body = make_body(make_hex_grid(distance, bounding_box(*scene.object.surface), edge));
+    const double cell_size = resolution.follows_thickness ? hex_cell_size(scene, distance, resolution.cells) : edge;
+    body = make_body(hex_grid_of(scene, distance, cell_size));
   } else {
     TetMeshOptions options;
     options.cell_size = edge;

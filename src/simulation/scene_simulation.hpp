@@ -25,12 +25,13 @@ struct FieldOptions {
 struct Resolution {
   ElementKind element = ElementKind::Hexahedron;
   FieldOptions field;
-  double cells = 12.0;      ///< elements along the object's longest axis
-  double steps = 1.0;       ///< time steps per default step: 2 halves the step
-  int pulls = 4;            ///< that hold a released object until it is let go
-  int shape_points = 0;     ///< about which the scan may err; 0: it is exact. Tetrahedra only
-  double shape_std = 0.01;  ///< by how much, times the object's longest axis
-  double band = 0.15;       ///< of the mismatch, times the object's longest axis
+  double cells = 12.0;             ///< elements along the object's longest axis
+  bool follows_thickness = false;  ///< hexahedra of thin objects are smaller: `hex_cell_size`
+  double steps = 1.0;              ///< time steps per default step: 2 halves the step
+  int pulls = 4;                   ///< that hold a released object until it is let go
+  int shape_points = 0;            ///< about which the scan may err; 0: it is exact. Tetrahedra only
+  double shape_std = 0.01;         ///< by how much, times the object's longest axis
+  double band = 0.15;              ///< of the mismatch, times the object's longest axis
 };
 
 /// The field of a body where the scene names no regions.
@@ -45,6 +46,20 @@ std::shared_ptr<const SignedDistance> scene_distance(const Scene& scene, double 
 
 /// Whether a point [m] at rest lies in each of the scene's regions of other materials.
 std::vector<std::function<bool(const Vector3&)>> region_tests(const Scene& scene);
+
+/// How thick the object is [m]: what three quarters of its surface exceed, by the distance through it along the normal.
+double thickness(const Scene& scene, const SignedDistance& distance);
+
+/// Edge of hexahedra [m]: so many along the object's longest axis or, where it is thinner than a fifth of that, along
+/// five times its thickness: what is thin bends, and its stiffness is wrong where an element reaches through it. No
+/// more than about `most` elements at 12 cells are spent on that.
+double hex_cell_size(const Scene& scene, const SignedDistance& distance, double cells, int most = 400);
+
+/// Hexahedra over the scene's object. The lattice lies so that the faces of held boxes, and held half-spaces with an
+/// axis as their normal, end between two layers of cells: held is then what the region contains, and no part of a cell
+/// more. One such face an axis can be met, the first in the scene's order.
+/// @param cell_size  [m]
+HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size);
 
 /// The object's elements at one resolution; `control_points` are those of its field of moduli, if any.
 /// @param distance  of the scene's surface; only hexahedra ask for it

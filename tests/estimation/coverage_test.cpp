@@ -24,7 +24,7 @@ TEST(Coverage, NinetyPercentIntervalsOfTheModulusHoldTheTruth) {
     const OptimiserSummary fitted = minimise(objective, set.to_unconstrained(start), {});
     ASSERT_TRUE(fitted.succeeded) << fitted.reason;
     const double error = fitted.p[0] - std::log(recording.truth[modulus]);
-    const double std = std::sqrt(parameter_covariance(fitted.evaluation)(0, 0));
+    const double std = std::sqrt(noise_covariance(fitted.evaluation)(0, 0));
     covered += std::abs(error) < quantile * std;
     z.push_back(error / std);
     claimed += std / seeds;

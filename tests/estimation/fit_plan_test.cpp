@@ -93,6 +93,34 @@ TEST_F(Plans, BeginWithTheMotionAtTheStart) {
   EXPECT_GT(chains[0][1].horizon.part, chains[0][0].horizon.part);
 }
 
+TEST_F(Plans, EndWithAlternativeModelsAtTheFinestEstimate) {
+  facts.options.correct = false;
+  facts.repetitions = {{18.0, 1.0}};
+  facts.alternatives = {{"mesh", 1.5, 1.0, {}, false, 1.8}, {"time step", 1.0, 2.0, {}, false, 1.0}};
+  has_done(record({StageKind::Motion, 0, 0}, 9.0, 7e3));
+  has_done(record({StageKind::Motion, 0, 1}, 9.0, 7e3));
+  for (int rounds = 0; rounds < 40; ++rounds) {
+    const auto chains = next();
+    if (chains.empty()) break;
+    for (const StageChain& chain : chains) {
+      for (const Stage& stage : chain) {
+        StageRecord r = record(stage.id, 5.0, stage.id.kind == StageKind::Finer ? 9e3 : 8e3);
+        if (stage.id.kind == StageKind::Scan)
+          for (const double E : stage.trials) r.trials.emplace_back(E, std::abs(std::log(E / 8e3)) + 1.0);
+        if (stage.id.kind == StageKind::Alternative) {
+          EXPECT_EQ(stage.from.front(), theta(9e3)) << "where the repetition ended";
+          EXPECT_EQ(stage.grid.cells, stage.id.number == 0 ? 27.0 : 18.0);
+          EXPECT_EQ(stage.grid.steps, stage.id.number == 0 ? 1.0 : 2.0);
+        }
+        has_done(std::move(r));
+      }
+    }
+  }
+  const auto count = std::ranges::count(state.done, StageKind::Alternative, [](const auto& r) { return r.id.kind; });
+  EXPECT_EQ(count, 2);
+  EXPECT_EQ(state.done.back().id.number, 1);
+}
+
 TEST_F(Plans, GoOnWhereAChainWasInterrupted) {
   has_done(record({StageKind::Motion, 0, 0}, 9.0, 7e3));
   const auto chains = next();

@@ -444,7 +444,7 @@ TEST(ParameterCovariance, OfALinearModel) {
     e.frames.push_back(fit);
   }
   e.gauss_newton = total;
-  const MatrixX least_squares = total.inverse(), covariance = parameter_covariance(e);
+  const MatrixX least_squares = total.inverse(), covariance = noise_covariance(e);
   EXPECT_LT((covariance - covariance.transpose()).norm(), tolerance(1e-12) * covariance.norm());
   for (int i = 0; i < 2; ++i) {
     const double ratio = covariance(i, i) / least_squares(i, i);
@@ -453,14 +453,14 @@ TEST(ParameterCovariance, OfALinearModel) {
   }
   // Errors that a frame's points share count as the few that they are.
   for (FrameFit& fit : e.frames) fit.gradient *= 3.0;
-  const MatrixX shared = parameter_covariance(e);
+  const MatrixX shared = noise_covariance(e);
   EXPECT_GT(shared(0, 0), 5.0 * least_squares(0, 0));
 }
 
 TEST(ParameterCovariance, StaysFiniteWithoutFrames) {
   CostEvaluation e;
   e.gauss_newton = 4.0 * MatrixX::Identity(3, 3);
-  EXPECT_LT((parameter_covariance(e) - 0.25 * MatrixX::Identity(3, 3)).norm(), tolerance(1e-14));
+  EXPECT_LT((noise_covariance(e) - 0.25 * MatrixX::Identity(3, 3)).norm(), tolerance(1e-14));
 }
 
 }  // namespace

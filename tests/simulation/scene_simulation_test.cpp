@@ -1,6 +1,9 @@
 #include "simulation/scene_simulation.hpp"
 
+#include <cmath>
+
 #include "geometry/primitives.hpp"
+#include "motion/linear_statics.hpp"
 
 namespace pliant::scene_simulation_test {
 namespace {
@@ -35,6 +38,67 @@ TEST(SceneSimulation, RegionsHaveAModulusEach) {
   EXPECT_EQ(body_of(scene).modulus.controls, 2);
   EXPECT_TRUE(region_tests(scene)[0](Vector3(0.01, 0, 0)));
   EXPECT_FALSE(region_tests(scene)[0](Vector3(-0.01, 0, 0)));
+}
+
+/// Sag of a bar held at one end as far as `held` [m], in that of an Euler-Bernoulli beam of what is free.
+double sag_of_beam(ElementKind element, double cells, double held) {
+  Scene scene;
+  const double length = 0.4, thickness = 0.04, density = 1000.0, modulus = 1e6;
+  scene.object.surface = make_box(Vector3(length, thickness, thickness), 0.02);
+  scene.timing = evenly_timed(50.0, 3);
+  scene.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + held, 1, 1)}, std::nullopt}};
+  Resolution resolution;
+  resolution.element = element, resolution.cells = cells;
+  std::vector<Vector3> controls;
+  const auto body = make_body_of(scene, *scene_distance(scene, 0.15), resolution, controls);
+  VectorX theta = blocks.zero();
+  blocks.set_moduli(theta, modulus);
+  theta[blocks.poissons_ratio] = 0.0;
+  const LinearStatics statics(body, held_nodes(*body, held_regions(scene)), blocks, theta);
+  Points ones = Points::Zero(body->node_count(), 3), force = ones;
+  ones.col(2).setOnes();
+  body->add_mass_product(9.81 * density, ones, force);
+  const double load = density * 9.81 * thickness * thickness, inertia = std::pow(thickness, 4) / 12.0;
+  // Hexahedra have nodes beyond the tip, which swing out further by the slope there.
+  const double beyond = body->nodes.col(0).maxCoeff() - 0.5 * length, slope = 4.0 / 3.0 / (length - held);
+  return statics.greatest_displacement(force) /
+         (load * std::pow(length - held, 4) / (8.0 * modulus * inertia) * (1.0 + slope * beyond));
+}
+
+class HeldEnds : public testing::TestWithParam<double> {};
+
+TEST_P(HeldEnds, HangABeamFromWhereTheyEndWhateverTheElements) {
+  // A cell is 33 mm long: held is less than one, one and a bit, and more.
+  EXPECT_NEAR(sag_of_beam(ElementKind::Hexahedron, 12.0, GetParam()), 1.0, 0.1);
+  EXPECT_NEAR(sag_of_beam(ElementKind::Hexahedron, 24.0, GetParam()), 1.0, 0.04);
+  EXPECT_NEAR(sag_of_beam(ElementKind::QuadraticTetrahedron, 12.0, GetParam()), 1.0, 0.03);
+  EXPECT_NEAR(sag_of_beam(ElementKind::QuadraticTetrahedron, 20.0, GetParam()), 1.0, 0.02);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lengths, HeldEnds, testing::Values(0.008, 0.02, 0.037, 0.05, 0.09));
+
+TEST(SceneSimulation, ThicknessIsThatOfMostOfTheSurface) {
+  const auto of = [](TriangleMesh mesh) {
+    Scene scene;
+    scene.object.surface = std::move(mesh);
+    return thickness(scene, *scene_distance(scene, 0.15));
+  };
+  EXPECT_NEAR(of(make_box(Vector3(0.4, 0.04, 0.04), 0.02)), 0.04, 0.004);
+  EXPECT_NEAR(of(make_box(Vector3(0.4, 0.2, 0.03), 0.02)), 0.03, 0.004);
+  EXPECT_NEAR(of(make_sphere(0.1, 3)), 0.2, 0.02);
+}
+
+TEST(SceneSimulation, HexahedraOfThinObjectsAreSmallerWithinABudget) {
+  Scene scene;
+  scene.object.surface = make_sphere(0.1, 3);
+  EXPECT_NEAR(hex_cell_size(scene, *scene_distance(scene, 0.15), 10.0), 0.02, 1e-3) << "not thin";
+  scene.object.surface = make_box(Vector3(0.4, 0.03, 0.03), 0.03);
+  const auto distance = scene_distance(scene, 0.15);
+  const double unlimited = hex_cell_size(scene, *distance, 12.0, 1000000);
+  EXPECT_NEAR(unlimited, 5.0 * 0.03 / 12.0, 0.002);
+  EXPECT_NEAR(hex_cell_size(scene, *distance, 24.0, 1000000), 0.5 * unlimited, 1e-12);
+  const double limited = hex_cell_size(scene, *distance, 12.0, 100);
+  EXPECT_NEAR(0.4 * 0.03 * 0.03 / std::pow(limited, 3), 100.0, 5.0);
 }
 
 TEST(SceneSimulation, ListedVerticesHoldWhatIsAroundThem) {

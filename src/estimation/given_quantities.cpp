@@ -1,0 +1,72 @@
+#include "estimation/given_quantities.hpp"
+
+#include <algorithm>
+
+namespace pliant {
+
+namespace {
+
+constexpr double turned = 0.002;      // [rad] of a sensor that was calibrated
+constexpr double moved = 0.001;       // times the object's size, of a sensor along each axis, and of its range
+constexpr double tilted = 0.003;      // [rad] of gravity, by a level
+constexpr double weighed = 0.01;      // of ln density: a kitchen scale, and the volume of a scan
+constexpr double coefficient = 0.05;  // of friction
+
+std::string sensor_of(const std::string& name) { return name.substr(name.find('@') + 1); }
+
+}  // namespace
+
+std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters) {
+  std::vector<GivenQuantity> given;
+  for (const Parameter& p : parameters.parameters()) {
+    if (p.estimated) continue;
+    if (p.role == Role::Sensor && p.is_scalar())
+      given.push_back({p.name, "range of " + sensor_of(p.name), moved});
+    else if (p.role == Role::Sensor)
+      given.push_back({p.name, "pose of " + sensor_of(p.name), p.unit == "rad" ? turned : moved});
+    else if (p.transform == Transform::Direction)
+      given.push_back({p.name, "direction of gravity", tilted});
+    else if (p.role == Role::Inertia && p.transform == Transform::Logarithm)
+      given.push_back({p.name, "mass", weighed});
+    else if (p.role == Role::Obstacle && p.transform == Transform::Shift)
+      given.push_back({p.name, "friction", coefficient});
+  }
+  return given;
+}
+
+ParameterSet with_given(const ParameterSet& parameters, const std::vector<GivenQuantity>& given) {
+  std::vector<Parameter> list = parameters.parameters();
+  const VectorX& theta = parameters.reference();
+  for (Parameter& p : list) {
+    const auto it = std::ranges::find(given, p.name, &GivenQuantity::parameter);
+    if (it == given.end()) continue;
+    p.estimated = true;
+    p.prior_std = it->deviation;
+    ParameterSet alone(parameters.layout(), {p}, theta);
+    p.prior_mean = alone.to_unconstrained(theta);
+  }
+  return {parameters.layout(), std::move(list), theta};
+}
+
+std::vector<ModelShift> shifts_of_given(const CostEvaluation& evaluation, const ParameterSet& all,
+                                        const std::vector<GivenQuantity>& given) {
+  std::vector<Eigen::Index> estimated, moving;
+  std::vector<std::string> causes;
+  const std::vector<const Parameter*> of = all.coordinate_parameters();
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    const auto it = std::ranges::find(given, of[i]->name, &GivenQuantity::parameter);
+    if (it == given.end()) {
+      estimated.push_back(Eigen::Index(i));
+      continue;
+    }
+    moving.push_back(Eigen::Index(i));
+    causes.push_back(it->cause);
+  }
+  std::vector<ModelShift> shifts;
+  if (moving.empty() || estimated.empty()) return shifts;
+  const MatrixX moved_by = shifts_of_given(evaluation.gauss_newton, estimated, moving);
+  for (std::size_t k = 0; k < causes.size(); ++k) shifts.push_back({causes[k], moved_by.col(Eigen::Index(k))});
+  return shifts;
+}
+
+}  // namespace pliant

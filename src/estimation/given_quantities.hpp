@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimation/cost.hpp"
+#include "estimation/uncertainty.hpp"
+
+namespace pliant {
+
+/// What a capture gives and a fit takes as exact, and how exactly such things are known.
+struct GivenQuantity {
+  std::string parameter, cause;  ///< its name; for people
+  double deviation = 0.0;        ///< of each of its unconstrained numbers
+};
+
+/// Of all parameters that are not estimated: poses and ranges of sensors, density, the direction of gravity, friction.
+std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters);
+
+/// The parameters with those estimated, under a prior about where they are.
+ParameterSet with_given(const ParameterSet& parameters, const std::vector<GivenQuantity>& given);
+
+/// How the estimate would follow each of them, as far as the recording does not tell it.
+/// @param evaluation  with derivatives by what is estimated and by what is given
+/// @param all         that set, both estimated
+std::vector<ModelShift> shifts_of_given(const CostEvaluation& evaluation, const ParameterSet& all,
+                                        const std::vector<GivenQuantity>& given);
+
+}  // namespace pliant

@@ -1,0 +1,113 @@
+#include "estimation/uncertainty.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/dense.hpp"
+#include "estimation/field_evidence.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double normal_90 = 1.6448536269514722;
+constexpr double freedom_of_alternative = 4.0;  // how well a declared alternative's size is known
+constexpr double freedom_of_floor = 20.0;
+
+/// Its deviations by name and whether the object meets obstacles: of ln E, logit of 2 nu, ln of the dampings.
+struct Unmodelled {
+  const char* name;
+  double in_flight_and_contact, at_rest_or_swinging;
+};
+constexpr Unmodelled unmodelled[] = {{"youngs_modulus", 0.05, 0.015},
+                                     {"poissons_ratio", 0.45, 0.15},
+                                     {"mass_damping", 0.06, 0.10},
+                                     {"stiffness_damping", 0.20, 0.08}};
+
+}  // namespace
+
+MatrixX noise_covariance(const CostEvaluation& evaluation) {
+  const MatrixX& H = evaluation.gauss_newton;
+  const Eigen::Index n = H.rows();
+  const MatrixX inverse = solve_symmetric(H, MatrixX(MatrixX::Identity(n, n)));
+  MatrixX sandwich = inverse * gradient_scatter(evaluation) * inverse;
+  // Fewer frames than parameters, or gradients that cancel by chance, must not make the estimate look sure.
+  for (Eigen::Index i = 0; i < n; ++i) sandwich(i, i) = std::max(sandwich(i, i), 0.0);
+  return sandwich + inverse;
+}
+
+double t_quantile_90(double v) {
+  const double z = normal_90, z3 = z * z * z, z5 = z3 * z * z;
+  return z + (z3 + z) / (4.0 * v) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * v * v) +
+         (3.0 * z5 * z * z + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * v * v * v);
+}
+
+Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<ModelShift>& shifts,
+                           const VectorX& floor) {
+  const Eigen::Index n = evaluation.gauss_newton.rows();
+  Uncertainty u;
+  u.covariance = noise_covariance(evaluation);
+  u.std_noise = u.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  u.budget.push_back({"noise", u.std_noise});
+  VectorX of_models = VectorX::Zero(n);  // variances
+  const double freedom_of_noise = std::max(3.0, double(evaluation.frames.size()) / 4.0);
+  VectorX weighed = u.std_noise.array().pow(4) / freedom_of_noise;  // Welch and Satterthwaite's denominators
+  const auto add = [&](const std::string& cause, const VectorX& variance, double freedom) {
+    of_models += variance;
+    weighed.array() += variance.array().square() / freedom;
+    auto share = std::ranges::find(u.budget, cause, &UncertaintyShare::cause);
+    if (share == u.budget.end()) share = u.budget.insert(u.budget.end(), {cause, VectorX::Zero(n)});
+    share->std = (share->std.array().square() + variance.array()).sqrt();
+  };
+  for (const ModelShift& s : shifts) {
+    u.covariance += s.shift * s.shift.transpose();
+    add(s.cause, s.shift.cwiseAbs2(), freedom_of_alternative);
+  }
+  if (floor.size() > 0) {
+    u.covariance.diagonal() += floor.cwiseAbs2();
+    add("law and damping", floor.cwiseAbs2(), freedom_of_floor);
+  }
+  u.std_model = of_models.cwiseSqrt();
+  u.std = u.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  u.low.resize(n), u.high.resize(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double freedom = weighed[i] > 0.0 ? std::pow(u.std[i], 4) / weighed[i] : 1e3;
+    u.high[i] = t_quantile_90(std::max(3.0, freedom)) * u.std[i];
+    u.low[i] = -u.high[i];
+  }
+  return u;
+}
+
+VectorX unmodelled_std(const ParameterSet& parameters, bool meets_obstacles) {
+  VectorX floor = VectorX::Zero(parameters.dimension());
+  const std::vector<const Parameter*> of = parameters.coordinate_parameters();
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    const std::string base = of[i]->name.substr(0, of[i]->name.find('@'));
+    for (const Unmodelled& u : unmodelled)
+      if (base == u.name) floor[Eigen::Index(i)] = meets_obstacles ? u.in_flight_and_contact : u.at_rest_or_swinging;
+  }
+  return floor;
+}
+
+VectorX gauss_newton_shift(const CostEvaluation& evaluation, double most) {
+  const VectorX scale = evaluation.gauss_newton.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const MatrixX H = scale.asDiagonal() * evaluation.gauss_newton * scale.asDiagonal();
+  const VectorX g = scale.cwiseProduct(evaluation.gradient);
+  return (-scale.cwiseProduct(solve_symmetric(H, g))).cwiseMax(-most).cwiseMin(most);
+}
+
+MatrixX shifts_of_given(const MatrixX& gauss_newton, const std::vector<Eigen::Index>& estimated,
+                        const std::vector<Eigen::Index>& given) {
+  const MatrixX H = gauss_newton(estimated, estimated), across = gauss_newton(estimated, given);
+  const VectorX scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const MatrixX scaled = scale.asDiagonal() * H * scale.asDiagonal();
+  MatrixX shifts = -(scale.asDiagonal() * solve_symmetric(scaled, MatrixX(scale.asDiagonal() * across)));
+  for (Eigen::Index k = 0; k < shifts.cols(); ++k) {
+    const Eigen::Index g = given[std::size_t(k)];
+    const double left = gauss_newton(g, g) + across.col(k).dot(shifts.col(k));
+    shifts.col(k) *= left > 0.0 ? 1.0 / std::sqrt(left) : 0.0;
+  }
+  return shifts;
+}
+
+}  // namespace pliant

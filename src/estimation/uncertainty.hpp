@@ -1,0 +1,66 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimation/cost.hpp"
+#include "parameters/parameter_set.hpp"
+
+namespace pliant {
+
+/// By how much an estimate would move under another model, or if something that is taken as given were off by its
+/// tolerance.
+struct ModelShift {
+  std::string cause;  ///< for people: "time step", "the pose of front"
+  VectorX shift;      ///< of the unconstrained estimate
+};
+
+/// What one cause contributes to the deviations of an estimate.
+struct UncertaintyShare {
+  std::string cause;
+  VectorX std;  ///< of each unconstrained coordinate
+};
+
+/// How sure an estimate is. Unconstrained coordinates throughout.
+struct Uncertainty {
+  MatrixX covariance;                    ///< noise and models together
+  VectorX std, std_noise, std_model;     ///< of each coordinate
+  VectorX low, high;                     ///< 90 % interval
+  std::vector<UncertaintyShare> budget;  ///< noise first, then the causes of the model's part
+};
+
+/// The part of the covariance that noise makes: the sandwich of curvature and scatter of the frames' gradients (Newey
+/// and West 1987), never below what the curvature alone gives.
+MatrixX noise_covariance(const CostEvaluation& evaluation);
+
+/// Puts together what noise and models leave open: covariances add, each alternative model as if the truth lay as
+/// likely as not beyond it (GUM, type B); the interval is Student's, with the degrees of freedom of Welch and
+/// Satterthwaite.
+/// @param evaluation  at the estimate, with derivatives
+/// @param shifts      of alternative models and of what is taken as given, one standard deviation each
+/// @param floor       deviation of each coordinate that no alternative here accounts for; empty: none
+Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<ModelShift>& shifts,
+                           const VectorX& floor);
+
+/// What remains of models whose law and damping are not those of the object, for each unconstrained coordinate:
+/// calibrated on recordings of an independent simulator with neo-Hookean elasticity and Kelvin-Voigt damping of the
+/// Green strain (half of `battery`).
+/// @param meets_obstacles  whether the object moves and meets planes; else it swings or hangs
+VectorX unmodelled_std(const ParameterSet& parameters, bool meets_obstacles);
+
+/// Two-sided 90 % quantile of Student's t, by its expansion about the normal one; within 1 % from three degrees of
+/// freedom on.
+double t_quantile_90(double degrees_of_freedom);
+
+/// The shift of one Gauss-Newton step of a cost [-], at most `most` long in each coordinate.
+VectorX gauss_newton_shift(const CostEvaluation& evaluation, double most);
+
+/// Shifts of an estimate, one for each quantity that is taken as given, moved by as much as prior and recording leave
+/// it open, what is estimated following: - H_ee^-1 H_eg s with s^-2 = H_gg - H_ge H_ee^-1 H_eg, one g at a time (the
+/// implicit function theorem, and Schur's complement).
+/// @param gauss_newton  H by all coordinates, the given ones' priors among it
+/// @return              estimated x given
+MatrixX shifts_of_given(const MatrixX& gauss_newton, const std::vector<Eigen::Index>& estimated,
+                        const std::vector<Eigen::Index>& given);
+
+}  // namespace pliant

@@ -1,0 +1,90 @@
+#include "estimation/verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace pliant {
+
+namespace {
+
+constexpr double far_above_noise = 1.6;   // root mean square residual over the noise, over the whole recording
+constexpr double far_for_a_while = 2.2;   // likewise, over a tenth of the frames and three at least
+constexpr double least_matched = 0.85;    // of the points
+constexpr double poorly_known = 0.25;     // deviation of ln E
+constexpr double beyond_tolerance = 0.3;  // of the model's part in ln E
+
+double median(std::vector<double> values) {
+  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
+  return values[values.size() / 2];
+}
+
+void look_at_residuals(const CostEvaluation& evaluation, Verdict& verdict) {
+  double squares = 0.0, noise = 0.0;
+  for (const FrameFit& f : evaluation.frames) squares += f.sum_squares, noise += f.sum_noise_squares;
+  if (!(noise > 0.0)) return;
+  const auto unexplained = [&](std::string reason) {
+    verdict.kind = Verdict::Kind::Unexplained;
+    verdict.reasons.push_back(std::move(reason));
+  };
+  const double ratio = std::sqrt(squares / noise);
+  if (ratio > far_above_noise)
+    unexplained(
+        fmt::format("The distances between what was seen and the simulated object are {:.1f} times the noise.", ratio));
+  if (const double matched = evaluation.matched_fraction(); matched < least_matched)
+    unexplained(fmt::format("{:.0f} % of the observed points lie too far from the simulated object to be matched.",
+                            100.0 * (1.0 - matched)));
+  const std::vector<double> over_time = residuals_over_noise(evaluation);
+  const auto worst = std::ranges::max_element(over_time);
+  if (verdict.kind == Verdict::Kind::Explained && worst != over_time.end() && *worst > far_for_a_while)
+    unexplained(fmt::format("About frame {} after the start the distances are {:.1f} times the noise.",
+                            evaluation.frames[std::size_t(worst - over_time.begin())].frame, *worst));
+}
+
+void look_at_moduli(const Uncertainty& uncertainty, const ParameterSet& parameters, Verdict& verdict) {
+  const std::vector<const Parameter*> of = parameters.coordinate_parameters();
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    if (!is_modulus(*of[i])) continue;
+    const double std = uncertainty.std[Eigen::Index(i)];
+    if (!(std > poorly_known)) continue;
+    if (verdict.kind == Verdict::Kind::Explained) verdict.kind = Verdict::Kind::Undetermined;
+    const bool is_model = uncertainty.std_model[Eigen::Index(i)] > beyond_tolerance;
+    verdict.reasons.push_back(fmt::format(
+        "{} is known to {:.0f} % only{}.", of[i]->name == "youngs_modulus" ? "Young's modulus" : of[i]->name,
+        100.0 * std, is_model ? ": other models of the same object differ by as much" : ""));
+  }
+}
+
+}  // namespace
+
+std::string name_of(Verdict::Kind kind) {
+  return kind == Verdict::Kind::Explained     ? "explained"
+         : kind == Verdict::Kind::Unexplained ? "unexplained"
+                                              : "undetermined";
+}
+
+std::vector<double> residuals_over_noise(const CostEvaluation& evaluation) {
+  std::vector<double> ratios;
+  for (const FrameFit& f : evaluation.frames) {
+    if (f.points == 0 || !(f.sum_noise_squares > 0.0)) return {};
+    ratios.push_back(std::sqrt(f.sum_squares / f.sum_noise_squares));
+  }
+  const int window = std::max(3, int(ratios.size()) / 10);
+  if (int(ratios.size()) < window) return ratios;
+  std::vector<double> smooth;
+  for (int i = 0; i < int(ratios.size()); ++i) {
+    const int first = std::clamp(i - window / 2, 0, int(ratios.size()) - window);
+    smooth.push_back(median({ratios.begin() + first, ratios.begin() + first + window}));
+  }
+  return smooth;
+}
+
+Verdict verdict_of(const CostEvaluation& evaluation, const Uncertainty& uncertainty, const ParameterSet& parameters) {
+  Verdict verdict;
+  look_at_residuals(evaluation, verdict);
+  if (uncertainty.std.size() == parameters.dimension()) look_at_moduli(uncertainty, parameters, verdict);
+  return verdict;
+}
+
+}  // namespace pliant

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimation/cost.hpp"
+#include "estimation/uncertainty.hpp"
+
+namespace pliant {
+
+/// Whether an estimate can be quoted.
+struct Verdict {
+  enum class Kind {
+    Explained,     ///< the model meets what was seen to within the noise, and the moduli are known
+    Unexplained,   ///< the residuals are far above the noise, or most of what was seen is not matched
+    Undetermined,  ///< the recording cannot tell a modulus
+  };
+  Kind kind = Kind::Explained;
+  std::vector<std::string> reasons;  ///< plain sentences; none where all is well
+};
+
+/// "explained", "unexplained" or "undetermined".
+std::string name_of(Verdict::Kind kind);
+
+/// Root mean square distance of a frame's points over that of the sensor's noise, the median of a window of frames
+/// about each; empty where no surface was seen.
+std::vector<double> residuals_over_noise(const CostEvaluation& evaluation);
+
+/// @param evaluation   at the estimate
+/// @param uncertainty  of the estimate; empty where nothing was estimated
+Verdict verdict_of(const CostEvaluation& evaluation, const Uncertainty& uncertainty, const ParameterSet& parameters);
+
+}  // namespace pliant

@@ -1,0 +1,161 @@
+#include "estimation/uncertainty.hpp"
+
+#include <cmath>
+
+#include "estimation/given_quantities.hpp"
+#include "estimation/verdict.hpp"
+
+namespace pliant::uncertainty_test {
+namespace {
+
+/// A cost of two coordinates whose frames' gradients cancel.
+CostEvaluation measured(const MatrixX& curvature, int frames = 40) {
+  CostEvaluation e;
+  e.succeeded = true;
+  e.gauss_newton = curvature;
+  e.gradient = VectorX::Zero(curvature.rows());
+  for (int f = 0; f < frames; ++f) {
+    FrameFit frame;
+    frame.frame = f;
+    frame.points = frame.matched = 100;
+    frame.sum_noise_squares = 100e-6, frame.sum_squares = 100e-6;
+    frame.gradient = VectorX::Zero(curvature.rows());
+    e.frames.push_back(std::move(frame));
+  }
+  return e;
+}
+
+MatrixX curvature() { return MatrixX{{400.0, 100.0}, {100.0, 250.0}}; }
+
+ParameterSet young_and_poisson() {
+  ParameterLayout layout;
+  std::vector<Parameter> list;
+  const auto add = [&](const char* name, const char* unit, Role role, Transform transform, bool estimated) {
+    Parameter p;
+    p.name = name, p.unit = unit, p.estimated = estimated, p.transform = transform;
+    p.at = layout.add({name, unit, transform == Transform::Vector ? 3 : 1, role});
+    list.push_back(p);
+  };
+  add("youngs_modulus", "Pa", Role::Material, Transform::Logarithm, true);
+  add("poissons_ratio", "1", Role::Material, Transform::LogitHalf, true);
+  add("density", "kg/m^3", Role::Inertia, Transform::Logarithm, false);
+  add("range_error@front", "m", Role::Sensor, Transform::Shift, false);
+  add("sensor_turn@front", "rad", Role::Sensor, Transform::Vector, false);
+  VectorX theta(7);
+  theta << 1e4, 0.3, 500.0, 0.0, 0.0, 0.0, 0.0;
+  return {layout, list, theta};
+}
+
+TEST(StudentsT, HasTheQuantilesOfItsTables) {
+  EXPECT_NEAR(t_quantile_90(3.0), 2.3534, 0.02);
+  EXPECT_NEAR(t_quantile_90(4.0), 2.1318, 0.01);
+  EXPECT_NEAR(t_quantile_90(8.0), 1.8595, 1e-3);
+  EXPECT_NEAR(t_quantile_90(20.0), 1.7247, 1e-4);
+  EXPECT_NEAR(t_quantile_90(1e6), 1.6449, 1e-4);
+}
+
+TEST(GaussNewtonShift, ReachesTheLeastOfAQuadraticCost) {
+  CostEvaluation e = measured(curvature());
+  const VectorX least = Eigen::Vector2d(0.03, -0.2);
+  e.gradient = -(curvature() * least);
+  EXPECT_LT((gauss_newton_shift(e, 1.0) - least).norm(), 1e-12);
+  EXPECT_NEAR(gauss_newton_shift(e, 0.1)[1], -0.1, 1e-12) << "no further than one step is believed";
+}
+
+TEST(GivenQuantities, WidenTheEstimateAsMarginalisationDoes) {
+  const MatrixX H{{4.0, 1.0, 0.5}, {1.0, 3.0, -0.7}, {0.5, -0.7, 5.0}};
+  const VectorX shift = shifts_of_given(H, {0, 1}, {2}).col(0);
+  const MatrixX alone = H.topLeftCorner(2, 2).inverse(), marginal = H.inverse().topLeftCorner(2, 2);
+  EXPECT_LT((alone + shift * shift.transpose() - marginal).norm(), 1e-14);
+}
+
+TEST(GivenQuantities, HaveAPriorAboutWhereTheyAre) {
+  const ParameterSet alone = young_and_poisson();
+  const ParameterSet all = with_given(alone, given_quantities(alone));
+  EXPECT_EQ(all.dimension(), 2 + 1 + 1 + 3);
+  VectorX gradient = VectorX::Zero(7);
+  EXPECT_NEAR(all.prior(all.to_unconstrained(all.reference()), &gradient), 0.0, 1e-20);
+  EXPECT_LT(gradient.norm(), 1e-10);
+}
+
+TEST(GivenQuantities, AreThoseThatAreNotEstimated) {
+  const std::vector<GivenQuantity> given = given_quantities(young_and_poisson());
+  ASSERT_EQ(given.size(), 3u);
+  EXPECT_EQ(given[0].cause, "mass");
+  EXPECT_EQ(given[1].cause, "range of front");
+  EXPECT_EQ(given[2].cause, "pose of front");
+}
+
+TEST(Uncertainties, OfNoiseAloneAreTheNoises) {
+  const CostEvaluation e = measured(curvature());
+  const Uncertainty u = uncertainty_of(e, {}, {});
+  EXPECT_LT((u.covariance - curvature().inverse()).norm(), 1e-14);
+  EXPECT_EQ(u.std, u.std_noise);
+  EXPECT_EQ(u.std_model.norm(), 0.0);
+  ASSERT_EQ(u.budget.size(), 1u);
+  const double freedom = double(e.frames.size()) / 4.0;
+  EXPECT_NEAR(u.high[0], t_quantile_90(freedom) * u.std[0], 1e-12);
+  EXPECT_EQ(u.low[0], -u.high[0]);
+}
+
+TEST(Uncertainties, OfModelsAddInSquares) {
+  const std::vector<ModelShift> shifts = {{"mesh", Eigen::Vector2d(0.1, 0.0)},
+                                          {"pose of front", Eigen::Vector2d(0.03, 0.0)},
+                                          {"pose of front", Eigen::Vector2d(0.04, -0.2)}};
+  const Uncertainty noise = uncertainty_of(measured(curvature(), 400), {}, {});
+  const Uncertainty u = uncertainty_of(measured(curvature(), 400), shifts, Eigen::Vector2d(0.05, 0.0));
+  EXPECT_NEAR(u.std_model[0], std::sqrt(0.01 + 0.0009 + 0.0016 + 0.0025), 1e-12);
+  EXPECT_NEAR(u.std[0], std::hypot(noise.std[0], u.std_model[0]), 1e-12);
+  EXPECT_NEAR(u.covariance(0, 1), noise.covariance(0, 1) - 0.008, 1e-12) << "a shift moves both together";
+  ASSERT_EQ(u.budget.size(), 4u);
+  EXPECT_EQ(u.budget[2].cause, "pose of front");
+  EXPECT_NEAR(u.budget[2].std[0], 0.05, 1e-12);
+  double squares = 0.0;
+  for (const UncertaintyShare& share : u.budget) squares += share.std[0] * share.std[0];
+  EXPECT_NEAR(std::sqrt(squares), u.std[0], 1e-12);
+  EXPECT_GT(u.high[0] / u.std[0], noise.high[0] / noise.std[0]) << "fewer degrees of freedom";
+}
+
+TEST(Verdicts, AreGoodWhereResidualsAreNoise) {
+  const CostEvaluation e = measured(curvature());
+  const Verdict v = verdict_of(e, uncertainty_of(e, {}, {}), young_and_poisson());
+  EXPECT_EQ(name_of(v.kind), "explained");
+  EXPECT_TRUE(v.reasons.empty());
+}
+
+TEST(Verdicts, DoubtAModelThatMissesTheRecording) {
+  CostEvaluation e = measured(curvature());
+  for (FrameFit& f : e.frames) f.sum_squares *= 9.0;
+  Verdict v = verdict_of(e, uncertainty_of(e, {}, {}), young_and_poisson());
+  EXPECT_EQ(name_of(v.kind), "unexplained");
+  ASSERT_EQ(v.reasons.size(), 1u);
+  EXPECT_NE(v.reasons[0].find("3.0 times the noise"), std::string::npos) << v.reasons[0];
+
+  e = measured(curvature());
+  for (int f = 20; f < 24; ++f) e.frames[std::size_t(f)].sum_squares *= 9.0;
+  v = verdict_of(e, uncertainty_of(e, {}, {}), young_and_poisson());
+  EXPECT_EQ(name_of(v.kind), "unexplained") << "for a tenth of the frames";
+  EXPECT_NE(v.reasons.at(0).find("frame 2"), std::string::npos) << v.reasons[0];
+
+  e = measured(curvature());
+  e.frames[20].sum_squares *= 9.0;
+  EXPECT_EQ(name_of(verdict_of(e, uncertainty_of(e, {}, {}), young_and_poisson()).kind), "explained") << "one frame";
+
+  e = measured(curvature());
+  for (FrameFit& f : e.frames) f.matched = 70;
+  EXPECT_EQ(name_of(verdict_of(e, uncertainty_of(e, {}, {}), young_and_poisson()).kind), "unexplained");
+}
+
+TEST(Verdicts, SayThatAModulusIsNotDetermined) {
+  const CostEvaluation e = measured(curvature());
+  const Uncertainty wide = uncertainty_of(e, {{"mesh", Eigen::Vector2d(0.4, 0.0)}}, {});
+  const Verdict v = verdict_of(e, wide, young_and_poisson());
+  EXPECT_EQ(name_of(v.kind), "undetermined");
+  ASSERT_EQ(v.reasons.size(), 1u);
+  EXPECT_NE(v.reasons[0].find("other models"), std::string::npos) << v.reasons[0];
+  const Uncertainty poisson = uncertainty_of(e, {{"mesh", Eigen::Vector2d(0.0, 0.9)}}, {});
+  EXPECT_EQ(name_of(verdict_of(e, poisson, young_and_poisson()).kind), "explained") << "Poisson's ratio is no modulus";
+}
+
+}  // namespace
+}  // namespace pliant::uncertainty_test
