@@ -42,8 +42,9 @@ int last_frame(const Horizon& horizon, const Recording& r) {
 
 constexpr double largest_shift = 1.0;    // of an unconstrained coordinate, by a few steps
 constexpr int steps_of_alternative = 3;  // enough to tell how far another model's estimate lies
-// From what one refinement changes to what is left without it, at second order.
-constexpr double size_of_mesh = 1.8, size_of_step = 4.0 / 3.0;
+// From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
+// less than that. A finer mesh is affordable at rest; of a motion the coarser one tells.
+constexpr double size_of_finer_mesh = 1.8, size_of_coarser_mesh = 0.8, size_of_longer_step = 0.6;
 constexpr double softer = 1.0 / 3.0;  // contact, as a fall on a carpet or a thin skin would be
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -129,8 +130,11 @@ std::vector<Alternative> FitRun::alternatives() const {
   const bool meets =
       std::ranges::any_of(recordings_.all(), [](const Recording& r) { return !r.capture.scene.planes.empty(); });
   std::vector<Alternative> all;
-  if (recordings_.any_meshed_here()) all.push_back({"mesh", Refinement::mesh_ratio, 1.0, {}, false, size_of_mesh});
-  if (!is_static) all.push_back({"time step", 1.0, Refinement::step_ratio, {}, false, size_of_step});
+  const double finer = Refinement::mesh_ratio;
+  if (recordings_.any_meshed_here() && is_static) all.push_back({"mesh", finer, 1.0, {}, false, size_of_finer_mesh});
+  if (recordings_.any_meshed_here() && !is_static)
+    all.push_back({"mesh", 1.0 / finer, 1.0, {}, false, size_of_coarser_mesh});
+  if (!is_static) all.push_back({"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step});
   if (meets) all.push_back({"stiffness of contact", 1.0, 1.0, {.contact = softer}, false, 1.0});
   if (recordings_.are_tetrahedra() && !options_.law_of_motion())
     all.push_back({"elastic law", 1.0, 1.0, {.neo_hookean = true}, false, 1.0});

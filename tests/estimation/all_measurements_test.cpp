@@ -75,7 +75,7 @@ class SeenInEveryWay : public ::testing::Test {
   }
   Discretisation discretised(const CaptureParameters& p, const VectorX& theta) const {
     Resolution resolution;
-    resolution.cells = 10.0;
+    resolution.cells = 10.0, resolution.follows_thickness = true;  // as fits are: an inverse crime
     return discretise(capture_, capture_distance(capture_, 0.2), resolution, p.blocks, theta);
   }
 

@@ -228,18 +228,20 @@ TEST(TrackingLoop, GoesOnUntilNoModulusChanges) {
 
 TEST(TrackingLoop, IsWhereItSuits) {
   RecordedCapture bar = swinging_bar();
-  EXPECT_TRUE(tracks({bar}, {}));
+  const FitOptions automatic = quick(TrackingUse::Automatic);
+  EXPECT_TRUE(tracks({bar}, automatic));
+  EXPECT_FALSE(tracks({bar}, {})) << "not unless it is asked for";
   EXPECT_FALSE(tracks({bar}, quick(TrackingUse::Off)));
   RecordedCapture still = bar;
   still.capture.scene.timing.is_static = true;
-  EXPECT_FALSE(tracks({still}, {}));
+  EXPECT_FALSE(tracks({still}, automatic));
   EXPECT_TRUE(tracks({still}, quick(TrackingUse::Loop))) << "on request";
   RecordedCapture one_camera = bar;
   one_camera.capture.clouds.clear();
   one_camera.capture.depth.resize(1);
-  EXPECT_FALSE(tracks({one_camera}, {}));
+  EXPECT_FALSE(tracks({one_camera}, automatic));
   one_camera.capture.depth.resize(2);
-  EXPECT_TRUE(tracks({one_camera}, {}));
+  EXPECT_TRUE(tracks({one_camera}, automatic));
 }
 
 TEST(TrackingLoop, IsAKeyOfAFit) {
