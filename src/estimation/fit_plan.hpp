@@ -23,8 +23,8 @@ struct PlanFacts {
 /// The stages of a fit of motions and equilibria: how the object moves at first; the swing that was seen, or a scan
 /// over decades of Young's modulus; the best values followed on the coarse grid, wide band, horizon growing as the
 /// early frames match; the best of them on the full grid, first in the wide band; a test of which corrections the
-/// residuals ask for, and the estimate with them; repetitions on finer grids; one step under each of some alternative
-/// models.
+/// residuals ask for, and the estimate with them; repetitions on finer grids; a few steps under each of some
+/// alternative models.
 class FitPlan {
  public:
   explicit FitPlan(PlanFacts facts) : facts_(std::move(facts)) {}

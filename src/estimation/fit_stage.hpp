@@ -24,7 +24,7 @@ enum class StageKind {
   Test,           ///< which corrections the residuals ask for; no iterations
   Corrected,      ///< the estimate together with those
   Finer,          ///< the estimate again with finer steps or on a finer grid
-  Alternative,    ///< one step from the estimate under another model; no iterations
+  Alternative,    ///< a few steps from the estimate under another model
   Law,            ///< a form of the law of a pressed object
   Scale,          ///< its moduli alone, where the other numbers begin
   Cut,            ///< where a zone more is promised most; no iterations

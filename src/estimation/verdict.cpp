@@ -23,6 +23,8 @@ double median(std::vector<double> values) {
 void look_at_residuals(const CostEvaluation& evaluation, Verdict& verdict) {
   double squares = 0.0, noise = 0.0;
   for (const FrameFit& f : evaluation.frames) squares += f.sum_squares, noise += f.sum_noise_squares;
+  // Followed points have a noise in the cost alone.
+  if (!(noise > 0.0)) squares = 2.0 * evaluation.cost, noise = evaluation.independent_observations();
   if (!(noise > 0.0)) return;
   const auto unexplained = [&](std::string reason) {
     verdict.kind = Verdict::Kind::Unexplained;

@@ -327,8 +327,10 @@ void add_uncertainty_of(ParameterResult& r, const Parameter& p, const FitOutcome
 
 void add_verdict(Result& result, const FitOutcome& outcome, const MatrixX& jacobian) {
   if (outcome.uncertainty.std.size() == 0) return;
-  result.verdict = name_of(outcome.verdict.kind);
-  result.reasons = outcome.verdict.reasons;
+  if (!outcome.law) {  // the noise of presses is what their residuals say
+    result.verdict = name_of(outcome.verdict.kind);
+    result.reasons = outcome.verdict.reasons;
+  }
   for (const UncertaintyShare& share : outcome.uncertainty.budget) {
     UncertaintyResult of_cause{share.cause, {}};
     int at = 0;

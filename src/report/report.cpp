@@ -270,9 +270,9 @@ std::string uncertainty_table(const Result& result) {
     body += "<td>" + escape_html(value_text(p->interval_90->first, std::nullopt, p->unit)) + " to " +
             escape_html(value_text(p->interval_90->second, std::nullopt, p->unit)) + "</td>";
   return table(head, body + "</tr>\n") +
-         "<p class=\"given\">Standard deviations by cause, over the value. Each model was tried at the estimate, by "
-         "one "
-         "Gauss-Newton step; what the capture gives moves within its tolerance.</p>\n" +
+         "<p class=\"given\">Standard deviations by cause, over the value. Each model was tried from the estimate, by "
+         "a "
+         "few steps; what the capture gives moves within its tolerance.</p>\n" +
          "<p>" + escape_html(largest_share_sentence(result)) + "</p>\n";
 }
 
