@@ -135,6 +135,29 @@ TEST(Result, NumbersThatAreNotFiniteBecomeNullAndAreReadAsNothing) {
   EXPECT_FALSE(read.starts[0].cost);
 }
 
+TEST(Result, IntervalsVerdictAndBudgetComeBack) {
+  const TemporaryFolder folder;
+  Result result = full_result();
+  result.parameters[0].interval_90 = std::pair(553.0, 629.0);
+  result.parameters[0].std_noise = 9.0, result.parameters[0].std_model = 19.0;
+  result.verdict = "unexplained", result.reasons = {"The distances are 3.0 times the noise."};
+  result.uncertainty = {{"noise", {{"youngs_modulus", 9.0}}}, {"mesh", {{"youngs_modulus", std::nan("")}}}};
+  write_result(folder / "result.json", result);
+  const Result read = read_result(folder / "result.json");
+  EXPECT_EQ(read.parameters[0].interval_90, result.parameters[0].interval_90);
+  EXPECT_EQ(read.parameters[0].std_noise, result.parameters[0].std_noise);
+  EXPECT_EQ(read.parameters[0].std_model, result.parameters[0].std_model);
+  EXPECT_EQ(read.verdict, result.verdict);
+  EXPECT_EQ(read.reasons, result.reasons);
+  ASSERT_EQ(read.uncertainty.size(), 2u);
+  EXPECT_EQ(read.uncertainty[0].cause, "noise");
+  EXPECT_EQ(read.uncertainty[0].std, result.uncertainty[0].std);
+  EXPECT_TRUE(std::isnan(read.uncertainty[1].std.at("youngs_modulus")));
+  const auto json = nlohmann::json::parse(to_json(result));
+  EXPECT_EQ(json["parameters"]["youngs_modulus"]["interval_90"], nlohmann::json({553.0, 629.0}));
+  EXPECT_EQ(json["verdict"], "unexplained");
+}
+
 TEST(Result, UnknownKeysArePassedOver) {
   const TemporaryFolder folder;
   auto json = nlohmann::json::parse(to_json(full_result()));

@@ -159,6 +159,20 @@ TEST(Report, IsOneSelfContainedPage) {
   EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
+TEST(Report, BeginsWithTheVerdictAndShowsWhatTheIntervalIsMadeOf) {
+  ReportData data = example(64, 40);
+  EXPECT_THAT(report_html(data), Not(HasSubstr("class=\"verdict")));
+  data.result.verdict = "unexplained", data.result.reasons = {"About frame 30 after the start it is < right."};
+  data.result.parameters[0].interval_90 = std::pair(553.0, 629.0);
+  data.result.uncertainty = {{"noise", {{"youngs_modulus", 5.9}}}, {"mass", {{"youngs_modulus", 11.8}}}};
+  const std::string html = report_html(data);
+  EXPECT_LT(html.find("does not explain"), html.find("class=\"cards\""));
+  EXPECT_THAT(html, HasSubstr("it is &lt; right"));
+  EXPECT_THAT(html, HasSubstr("<td>mass</td><td>2 %</td>"));
+  EXPECT_THAT(html, HasSubstr("553\u00a0Pa to 629\u00a0Pa"));
+  EXPECT_THAT(html, HasSubstr("comes from mass (2 %); what would narrow it most is weighing the object"));
+}
+
 TEST(Report, LinesAreBrokenBetweenStages) {
   ReportData data;
   data.convergence = falling_history();
