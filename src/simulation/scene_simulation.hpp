@@ -53,7 +53,7 @@ double thickness(const Scene& scene, const SignedDistance& distance);
 /// Edge of hexahedra [m]: so many along the object's longest axis or, where it is thinner than a fifth of that, along
 /// five times its thickness: what is thin bends, and its stiffness is wrong where an element reaches through it. No
 /// more than about `most` elements at 12 cells are spent on that.
-double hex_cell_size(const Scene& scene, const SignedDistance& distance, double cells, int most = 400);
+double hex_cell_size(const Scene& scene, const SignedDistance& distance, double cells, int most = 200);
 
 /// Hexahedra over the scene's object. The lattice lies so that the faces of held boxes, and held half-spaces with an
 /// axis as their normal, end between two layers of cells: held is then what the region contains, and no part of a cell
