@@ -43,8 +43,8 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
                            const VectorX& floor);
 
 /// What remains of models whose law and damping are not those of the object, for each unconstrained coordinate:
-/// calibrated on recordings of an independent simulator with neo-Hookean elasticity and Kelvin-Voigt damping of the
-/// Green strain (half of `battery`).
+/// set by the errors of fits to recordings of an independent simulator with neo-Hookean elasticity and Kelvin-Voigt
+/// damping of the Green strain; not judged on others yet.
 /// @param meets_obstacles  whether the object moves and meets planes; else it swings or hangs
 VectorX unmodelled_std(const ParameterSet& parameters, bool meets_obstacles);
 
