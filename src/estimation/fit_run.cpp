@@ -381,6 +381,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
     record.shifts = shifts_of_given(stage, parameters);
     return record;
   }
+  const std::size_t own_grids = grids_.size();
   try {
     Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
     OptimiserOptions o;
@@ -397,7 +398,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   } catch (const InputError& error) {  // no mesh as fine, or too small an object
     record.reason = error.what();
   }
-  grids_.pop_back();  // it is not used again
+  grids_.resize(own_grids);  // its grid, if it had one of its own, is not used again
   return record;
 }
 
