@@ -56,6 +56,8 @@ SimulationOptions options_of(const SyntheticScene& synthetic, const MotionBlocks
   for (int i = 0; i < timing.frame_count() - timing.start_frame; ++i) options.times.push_back(i / timing.frame_rate);
   options.max_dt = 1.0 / (timing.frame_rate * synthetic.substeps);
   options.newmark_theta = synthetic.newmark_theta;
+  if (synthetic.is_corotated) options.elastic_law = ElasticLaw::Corotated;
+  if (synthetic.is_rayleigh) options.stiffness_damping = StiffnessDamping::Rayleigh;
   options.contact = default_contact(body, synthetic.true_density() * body.volume(), scene.world.gravity->norm());
   options.friction_speed = default_friction_speed(body, scene.world.gravity->norm());
   if (synthetic.contact_stiffness > 0.0) options.contact.stiffness = synthetic.contact_stiffness;

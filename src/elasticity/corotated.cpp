@@ -11,19 +11,12 @@ namespace pliant {
 
 namespace {
 
-template <class Derived>
-auto node(Eigen::MatrixBase<Derived>& v, int a) {
-  return v.template segment<3>(3 * a);
-}
-template <class Derived>
-auto node(const Eigen::MatrixBase<Derived>& v, int a) {
-  return v.template segment<3>(3 * a);
-}
+using element_vector::node;
 
 template <int N>
 class CorotatedElasticity : public Elasticity {
  public:
-  CorotatedElasticity(std::shared_ptr<const Body> body, const MaterialBlocks& material);
+  CorotatedElasticity(std::shared_ptr<const Body> body, const MaterialBlocks& material, ElasticLaw law);
 
   void set_parameters(const VectorX& theta) override;
   void linearise(const Points& lag) override;
@@ -51,11 +44,33 @@ class CorotatedElasticity : public Elasticity {
   /// R^T z for the element's nodes, relative to the first.
   Vector unrotated(int element, const Points& z) const;
   void take_reference();
+  bool is_corrected() const { return law_ == ElasticLaw::NeoHookean; }
+  /// Change of an element's mean deformation from the lag point to z.
+  Matrix3 ahead(int element, const Points& z) const {
+    return mean_gradient(element, z) - gradients_[std::size_t(element)];
+  }
+  MeanStrainCorrection correction(int element) const {
+    return {gradients_[std::size_t(element)], polar_[std::size_t(element)], lame_};
+  }
+  double volume(int element) const { return body_->element_volume[std::size_t(element)]; }
+  /// force -= factor V P g
+  void subtract_stress(int element, double factor, const Matrix3& P, Points& force) const {
+    const Eigen::Matrix<double, N, 3> own = factor * volume(element) * gradients(element) * P.transpose();
+    for (int a = 0; a < N; ++a) force.row(nodes_of(element)[a]) -= own.row(a);
+  }
+  Matrix3 mean_gradient(int element, const Points& points) const {
+    const auto g = gradients(element);
+    Matrix3 F = Matrix3::Zero();
+    for (int a = 0; a < N; ++a) F.noalias() += points.row(nodes_of(element)[a]).transpose() * g.row(a);
+    return F;
+  }
 
   std::shared_ptr<const Body> body_;
   MaterialBlocks material_;
+  ElasticLaw law_;
   ElementModuli modulus_;
   double poissons_ratio_ = -2.0;
+  UnitLame lame_ = {};
   LocalStiffness<N> stiffness_;
   std::vector<Matrix3> gradients_;  // of the lag point
   std::vector<Vector> reference_;   // X of the element's nodes, relative to the first
@@ -65,9 +80,11 @@ class CorotatedElasticity : public Elasticity {
 };
 
 template <int N>
-CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body, const MaterialBlocks& material)
+CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body, const MaterialBlocks& material,
+                                            ElasticLaw law)
     : body_(std::move(body)),
       material_(material),
+      law_(law),
       modulus_(body_, material),
       stiffness_(body_),
       blocks_(element_blocks(*body_)) {
@@ -93,19 +110,24 @@ void CorotatedElasticity<N>::set_parameters(const VectorX& parameters) {
   const double nu = parameters[material_.poissons_ratio];
   if (nu == poissons_ratio_) return;
   poissons_ratio_ = nu;
+  lame_ = unit_lame(nu);
   stiffness_.set_poissons_ratio(nu);
 }
 
 template <int N>
 Matrix3 CorotatedElasticity<N>::cauchy_stress(int e) const {
-  const UnitLame c = unit_lame(poissons_ratio_);
   const Matrix3 in_body = polar_[e].S - Matrix3::Identity();
   const Matrix3 in_world = polar_[e].R * in_body * polar_[e].R.transpose();
-  return modulus_[e] * (c.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * c.mu * in_world);
+  const Matrix3 linear = lame_.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * lame_.mu * in_world;
+  if (!is_corrected()) return modulus_[e] * linear;
+  const Matrix3& F = gradients_[std::size_t(e)];
+  const Matrix3 first = linear * polar_[e].R + correction(e).stress();
+  return modulus_[e] / F.determinant() * first * F.transpose();
 }
 
 template <int N>
 void CorotatedElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
+  if (is_corrected()) throw std::invalid_argument("a corrected law has no derivatives by the reference");
   body_ = std::move(body);
   stiffness_ = LocalStiffness<N>(body_);
   poissons_ratio_ = -2.0;
@@ -131,13 +153,7 @@ void CorotatedElasticity<N>::add_reference_adjoint(const Points& w, Points& refe
 
 template <int N>
 void CorotatedElasticity<N>::linearise(const Points& lag) {
-  for (int e = 0; e < count(); ++e) {
-    const int* nodes = nodes_of(e);
-    const auto g = gradients(e);
-    Matrix3 F = Matrix3::Zero();
-    for (int a = 0; a < N; ++a) F.noalias() += lag.row(nodes[a]).transpose() * g.row(a);
-    gradients_[e] = F;
-  }
+  for (int e = 0; e < count(); ++e) gradients_[e] = mean_gradient(e, lag);
   if (by_reference_) lag_ = lag;
   polar_decompositions(gradients_, polar_);
 }
@@ -160,6 +176,7 @@ void CorotatedElasticity<N>::add_force(const Points& z, Points& force) {
     const Vector y = stiffness_.times(e, d);
     const Matrix3 R = modulus_[e] * polar_[e].R;
     for (int a = 0; a < N; ++a) force.row(nodes[a]).noalias() -= (R * node(y, a)).transpose();
+    if (is_corrected()) subtract_stress(e, modulus_[e], correction(e).stress(ahead(e, z)), force);
   }
 }
 
@@ -169,6 +186,7 @@ double CorotatedElasticity<N>::energy(const Points& z) const {
   for (int e = 0; e < count(); ++e) {
     const Vector d = unrotated(e, z) - reference_[e];
     sum += 0.5 * modulus_[e] * d.dot(stiffness_.times(e, d));
+    if (is_corrected()) sum += modulus_[e] * volume(e) * correction(e).energy();
   }
   return sum;
 }
@@ -176,6 +194,20 @@ double CorotatedElasticity<N>::energy(const Points& z) const {
 template <int N>
 void CorotatedElasticity<N>::add_matrix(double scale, BlockMatrix& matrix) {
   for (int e = 0; e < count(); ++e) stiffness_.add_rotated(e, polar_[e].R, scale * modulus_[e], blocks_of(e), matrix);
+  for (int e = 0; e < count() && is_corrected(); ++e) {
+    const MeanStrainCorrection mean = correction(e);
+    const auto g = gradients(e);
+    const Eigen::Matrix<double, N, 3> h = g * mean.cofactors().transpose();
+    const double factor = scale * modulus_[e] * volume(e);
+    const Eigen::Matrix<double, N, N> products = (factor * mean.diagonal()) * (g * g.transpose());
+    const int* blocks = blocks_of(e);
+    for (int a = 0; a < N; ++a)
+      for (int b = 0; b < N; ++b) {
+        Eigen::Map<Matrix3> block(matrix.block(blocks[N * a + b]));
+        block.noalias() += (factor * mean.factor()) * h.row(a).transpose() * h.row(b);
+        block.diagonal().array() += products(a, b);
+      }
+  }
 }
 
 /// A change dp turns the element by w = sum_b W_b dp_b, W_b = (tr(S) I - S)^-1 [g_b]x R^T, and the force changes by
@@ -199,6 +231,16 @@ void CorotatedElasticity<N>::add_lag_matrix(const Points& z, double scale, Block
       for (int a = 0; a < N; ++a)
         Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).noalias() += G.template middleRows<3>(3 * a) * W;
     }
+    if (!is_corrected()) continue;
+    const MeanStrainCorrection mean = correction(e);
+    const Matrix3 H = ahead(e, z);
+    for (int b = 0; b < N; ++b)
+      for (int d = 0; d < 3; ++d) {
+        const Matrix3 dF = Vector3::Unit(d) * g.row(b);
+        const Matrix3 dP = (scale * modulus_[e] * volume(e)) * mean.tangent(H, dF, -dF);
+        for (int a = 0; a < N; ++a)
+          Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).col(d).noalias() += dP * g.row(a).transpose();
+      }
   }
 }
 
@@ -209,9 +251,7 @@ void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_
   const double d_nu = d_theta[material_.poissons_ratio];
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
-    const auto g = gradients(e);
-    Matrix3 dF = Matrix3::Zero();
-    for (int a = 0; a < N; ++a) dF.noalias() += d_lag.row(nodes[a]).transpose() * g.row(a);
+    const Matrix3 dF = mean_gradient(e, d_lag);
     const Vector3 w = rotation_rate(polar_[e], dF);
     const Vector q = unrotated(e, z);
     const Vector d = q - reference_[e];
@@ -224,6 +264,12 @@ void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_
     const Matrix3 R = modulus_[e] * polar_[e].R;
     for (int a = 0; a < N; ++a)
       force.row(nodes[a]).noalias() -= (R * (w.cross(Vector3(node(y, a))) + node(dy, a))).transpose();
+    if (!is_corrected()) continue;
+    const MeanStrainCorrection mean = correction(e);
+    const Matrix3 H = ahead(e, z);
+    Matrix3 dP = mean.tangent(H, dF, mean_gradient(e, d_z) - dF) + modulus_.log_change(e) * mean.stress(H);
+    if (d_nu != 0.0) dP += d_nu * mean.by_poissons_ratio(H);
+    subtract_stress(e, modulus_[e], dP, force);
   }
 }
 
@@ -251,15 +297,24 @@ void CorotatedElasticity<N>::add_force_adjoint(const Points& z, const Points& w,
     }
     modulus_.add_log_adjoint(e, -E * products.work);
     theta_bar[material_.poissons_ratio] -= E * products.d_work;
+    if (!is_corrected()) continue;
+    const MeanStrainCorrection mean = correction(e);
+    const Matrix3 W = mean_gradient(e, w), H = ahead(e, z);
+    const MeanStrainCorrection::Cotangents bar = mean.adjoint(H, W);
+    subtract_stress(e, E, bar.F - bar.H, lag_bar);
+    subtract_stress(e, E, bar.H, z_bar);
+    modulus_.add_log_adjoint(e, -E * volume(e) * W.cwiseProduct(mean.stress(H)).sum());
+    theta_bar[material_.poissons_ratio] -= E * volume(e) * W.cwiseProduct(mean.by_poissons_ratio(H)).sum();
   }
   modulus_.end_adjoint(theta_bar);
 }
 
 }  // namespace
 
-std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks) {
+std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks,
+                                            ElasticLaw law) {
   return with_node_count(*body, [&]<int N>() -> std::unique_ptr<Elasticity> {
-    return std::make_unique<CorotatedElasticity<N>>(body, blocks);
+    return std::make_unique<CorotatedElasticity<N>>(body, blocks, law);
   });
 }
 

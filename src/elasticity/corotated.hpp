@@ -2,6 +2,7 @@
 
 #include "elasticity/element_moduli.hpp"
 #include "elasticity/force_term.hpp"
+#include "elasticity/mean_strain.hpp"
 #include "elasticity/polar.hpp"
 
 namespace pliant {
@@ -34,8 +35,14 @@ class Elasticity : public ForceTerm {
   std::vector<Polar> polar_;
 };
 
-/// The elasticity of any kind of body, its parameters in these blocks.
+/// The elasticity of any kind of body, its parameters in these blocks. With a neo-Hookean law the stress of each
+/// element's mean deformation at the lag point is that law's, and what its deformation departs from the mean stays
+/// linear in the turning frame,
+///   f(z | p) = - sum_e R_e(p) K_e (R_e(p)^T z - X) + V_e P_e(F_e(p), F_e(z) - F_e(p)) g_a,
+/// with P_e of `MeanStrainCorrection`; the term's matrix is symmetric and positive. There are no derivatives by the
+/// reference then.
 /// Throws std::invalid_argument where there is not one block for each control of the body's field of moduli.
-std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks);
+std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks,
+                                            ElasticLaw law = ElasticLaw::Corotated);
 
 }  // namespace pliant

@@ -8,6 +8,21 @@
 
 namespace pliant {
 
+/// Numbers of an element's nodes in one vector, three a node.
+namespace element_vector {
+
+/// Those of node a.
+template <class Derived>
+auto node(Eigen::MatrixBase<Derived>& v, int a) {
+  return v.template segment<3>(3 * a);
+}
+template <class Derived>
+auto node(const Eigen::MatrixBase<Derived>& v, int a) {
+  return v.template segment<3>(3 * a);
+}
+
+}  // namespace element_vector
+
 /// What the reverse sweep needs of an element's force y = K d and its cotangent c, with d = q - X.
 template <int N>
 struct ReverseProducts {
@@ -38,8 +53,12 @@ class LocalStiffness {
     for (int a = 0; a < N; ++a) products.turn += node(q, a).cross(node(products.k, a)) - node(y, a).cross(node(c, a));
     return products;
   }
-  /// Adds factor R K_ab R^T to the matrix's blocks.
+  /// Adds factor A K_ab A^T to the matrix's blocks.
   /// @param blocks  N x N numbers: where block (a, b) goes
+  void add_transformed(int element, const Matrix3& A, double factor, const int* blocks, BlockMatrix& matrix) const {
+    add_rotated(element, A, factor, blocks, matrix);
+  }
+  /// The same for a rotation.
   void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const;
 
  private:
@@ -127,6 +146,17 @@ class LocalStiffness<4> {
     return products;
   }
 
+  void add_transformed(int element, const Matrix3& A, double factor, const int* blocks, BlockMatrix& matrix) const {
+    const auto g = gradients(element);
+    const Matrix3x4 h = A * g;
+    const Matrix3 square = A * A.transpose();
+    const double volume = factor * body_->element_volume[std::size_t(element)];
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b)
+        Eigen::Map<Matrix3>(matrix.block(blocks[4 * a + b])).noalias() +=
+            volume * (lame_.lambda * h.col(a) * h.col(b).transpose() + lame_.mu * h.col(b) * h.col(a).transpose() +
+                      lame_.mu * g.col(a).dot(g.col(b)) * square);
+  }
   void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const {
     const Matrix3x4 h = R * gradients(element);
     const double volume = factor * body_->element_volume[std::size_t(element)];

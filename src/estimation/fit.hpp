@@ -49,6 +49,7 @@ struct FitOptions {
   int points_per_frame = 1000;  ///< >= 10: an even subset of the pixels; 0: all
   int scan_per_decade = 3;      ///< values of Young's modulus tried in each decade, >= 1
   int starts = 3;               ///< best ones of the scan that are followed, >= 1
+  int most_starts = 7;          ///< with those that are drawn as long as the best one is not good, >= 1
   int max_iterations = 25;      ///< of each stage of the optimiser, >= 1
   double wide_band = 0.12;      ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
   double fine_band = 0.05;      ///< of the last stage, (0, 0.5)
@@ -78,6 +79,7 @@ struct FitOptions {
   bool correct = true;
   /// Whether the estimate is tried under other models, and their part added to its deviations.
   bool alternatives = true;
+  StiffnessDamping damping = StiffnessDamping::KelvinVoigt;  ///< how stiffness damping acts at large strain
   bool hold_strongly = false;  ///< eliminate nodes in held regions instead of Nitsche's method
   MaterialKind material = MaterialKind::Automatic;
   /// Of Ogden's law, 1..3; 0: one where the object moves, else as many as the presses support.

@@ -25,6 +25,8 @@ const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", S
                                                                  {"iterative", SolverKind::Iterative},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
+const std::vector<std::pair<std::string, StiffnessDamping>> dampings = {{"kelvin_voigt", StiffnessDamping::KelvinVoigt},
+                                                                        {"rayleigh", StiffnessDamping::Rayleigh}};
 const std::vector<std::pair<std::string, MaterialKind>> materials = {{"automatic", MaterialKind::Automatic},
                                                                      {"linear", MaterialKind::Linear},
                                                                      {"neo_hookean", MaterialKind::NeoHookean},
@@ -47,12 +49,15 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"linear", FieldOptions::Weights::Linear},
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
-const std::set<std::string> parameter_names = {
-    "youngs_modulus",    "poissons_ratio",   "mass_damping",    "stiffness_damping", "density",    "gravity",
-    "linear_velocity",   "angular_velocity", "plane",           "plane_2",           "plane_3",    "plane_4",
-    "friction",          "friction_2",       "friction_3",      "friction_4",        "pull",       "range_error",
-    "sensor_turn",       "sensor_shift",     "scan_correction", "exponent_1",        "exponent_2", "exponent_3",
-    "stiffness_ratio_2", "stiffness_ratio_3"};
+const std::set<std::string> parameter_names = {"youngs_modulus",    "poissons_ratio",    "mass_damping",
+                                               "stiffness_damping", "density",           "gravity",
+                                               "linear_velocity",   "angular_velocity",  "plane",
+                                               "plane_2",           "plane_3",           "plane_4",
+                                               "friction",          "friction_2",        "friction_3",
+                                               "friction_4",        "contact_stiffness", "pull",
+                                               "range_error",       "sensor_turn",       "sensor_shift",
+                                               "scan_correction",   "exponent_1",        "exponent_2",
+                                               "exponent_3",        "stiffness_ratio_2", "stiffness_ratio_3"};
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -166,6 +171,11 @@ const std::vector<Entry>& entries() {
       integer_entry("starts", "1 and more",
                     "number of local minimisations, from the best values of the scan over Young's modulus",
                     &FitOptions::starts),
+      integer_entry(
+          "most_starts", "1 and more",
+          "greatest number of them, with those that are drawn at random (Young's modulus about the best values, "
+          "Poisson's ratio and dampings from their priors) as long as no start fits well",
+          &FitOptions::most_starts),
       integer_entry("max_iterations", "1 and more", "greatest number of iterations of each stage of the optimiser",
                     &FitOptions::max_iterations),
       real_entry("coarse_cells", "", "4..64",
@@ -222,18 +232,25 @@ const std::vector<Entry>& entries() {
                  "residuals requires it",
                  &FitOptions::correct),
       flag_entry("alternatives",
-                 "try the estimate under other models (mesh, time step, contact, law, given quantities) and add what "
+                 "try the estimate under other models (mesh, time step, law, given quantities) and add what "
                  "they differ by to its intervals",
                  &FitOptions::alternatives),
       flag_entry("hold_strongly",
                  "impose Dirichlet conditions of held regions strongly, by elimination of nodes, instead of weakly by "
                  "Nitsche's method",
                  &FitOptions::hold_strongly),
-      choice_entry("material",
-                   "material law; automatic: linear elasticity for motions and equilibria, Ogden's law where static "
-                   "tests are all "
-                   "there is; sampled: the stiffness of each press interpolated in strain space, for presses alone",
-                   materials, &FitOptions::material),
+      choice_entry(
+          "damping",
+          "law of stiffness damping at large strain: kelvin_voigt, on the rate of the Green strain, or rayleigh, "
+          "by the turned stiffness; rayleigh where the scan was taken sagging or may err",
+          dampings, &FitOptions::damping),
+      choice_entry(
+          "material",
+          "material law; automatic: neo-Hookean in the mean strain of each element for motions, linear elasticity for "
+          "equilibria, Ogden's law where static "
+          "tests are all "
+          "there is; sampled: the stiffness of each press interpolated in strain space, for presses alone",
+          materials, &FitOptions::material),
       integer_entry("law_terms", "0..3",
                     "number of terms of Ogden's law; 0: one for motions and equilibria, else as many as the static "
                     "tests support",
@@ -320,7 +337,8 @@ const std::vector<FitKey>& fit_keys() {
 std::string parameter_key_help() {
   return "Parameters (youngs_modulus, poissons_ratio, mass_damping, stiffness_damping, density, gravity, "
          "linear_velocity,\n"
-         "angular_velocity, plane, plane_2 .., youngs_modulus@REGION, exponent_1 .. of Ogden's law, and for what "
+         "angular_velocity, plane, plane_2 .., friction, contact_stiffness, youngs_modulus@REGION, exponent_1 .. of "
+         "Ogden's law, and for what "
          "sensors get wrong "
          "range_error@SENSOR,\n"
          "sensor_turn@SENSOR, sensor_shift@SENSOR; [2] after a name means the second recording's) have three keys "
@@ -518,6 +536,7 @@ std::string FitOptions::validate() const {
   if (const double finest = cells * std::pow(Refinement::mesh_ratio, refine - 1); finest > 64.0)
     return "refine takes " + text_of(cells) + " cells to " + text_of(finest) + ", more than 64: begin with fewer";
   if (starts < 1) return "starts must be at least 1";
+  if (most_starts < 1) return "most_starts must be at least 1";
   if (max_iterations < 1) return "max_iterations must be at least 1";
   if (!(wide_band > 0.0 && wide_band < 0.5) || !(fine_band > 0.0 && fine_band < 0.5))
     return "bands must lie in (0, 0.5)";

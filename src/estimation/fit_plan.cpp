@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
+#include <random>
 
 #include "estimation/notes.hpp"
 
@@ -111,9 +113,14 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
       return {{scan(before_starts(done))}};
     }
     std::vector<StageChain> starts;
-    const int count = int(start_moduli(done).size());
-    for (int i = 0; i < count; ++i)
-      if (StageChain chain = left_of(start(i, done), done); !chain.empty()) starts.push_back(std::move(chain));
+    const int count = start_count(done);
+    for (int i = 0; i < count; ++i) {
+      if (is_given_up(i, done)) continue;
+      StageChain chain = left_of(start(i, done), done);
+      if (chain.empty()) continue;
+      if (i >= int(start_moduli(done).size()) && !find_record(done, {StageKind::Coarse, i, 0})) chain.resize(1);
+      starts.push_back(std::move(chain));
+    }
     if (!starts.empty()) return starts;
   }
   if (StageChain chain = left_of(fine(done, state.begin), done); !chain.empty()) return {chain};
@@ -178,7 +185,7 @@ std::vector<double> fine_horizons(bool swings) {
 
 }  // namespace
 
-/// Over decades of the stress under the object's own weight.
+/// Over decades from the softest on that may hold itself up.
 Stage FitPlan::scan(const VectorX& from) const {
   const FitOptions& options = facts_.options;
   Stage stage{{StageKind::Scan}, "scan", {options.coarse_cells, options.steps}};
@@ -186,10 +193,9 @@ Stage FitPlan::scan(const VectorX& from) const {
   if (facts_.swings) stage.horizon.part = growing_horizon(true).front();
   stage.from = {from};
   const double g = std::max(facts_.gravity.vector(from).norm(), 0.1);
-  const double stress =
-      facts_.carrying_modulus > 0.0 ? 0.25 * facts_.carrying_modulus : from[facts_.density] * g * facts_.size;
+  const double softest = facts_.softest > 0.0 ? facts_.softest : from[facts_.density] * g * facts_.size;
   const int per_decade = options.scan_per_decade * (facts_.swings ? 2 : 1);
-  for (int i = 0; i <= 4 * per_decade; ++i) stage.trials.push_back(stress * std::pow(10.0, double(i) / per_decade));
+  for (int i = 0; i <= 4 * per_decade; ++i) stage.trials.push_back(softest * std::pow(10.0, double(i) / per_decade));
   stage.done_from = 0.05, stage.done_to = 0.15;
   return stage;
 }
@@ -208,8 +214,11 @@ StageChain FitPlan::start(int index, const Records& done) const {
     chain.push_back(std::move(stage));
   }
   const VectorX theta = before_starts(done);
-  const double modulus = start_moduli(done)[std::size_t(index)];
-  chain.front().from = {facts_.is_scanned ? with_modulus(theta, modulus, done) : theta};
+  const std::vector<double> moduli = start_moduli(done);
+  if (index >= int(moduli.size()))
+    chain.front().from = {drawn_start(index, done)};
+  else
+    chain.front().from = {facts_.is_scanned ? with_modulus(theta, moduli[std::size_t(index)], done) : theta};
   return chain;
 }
 
@@ -343,6 +352,69 @@ std::vector<double> FitPlan::start_moduli(const Records& done) const {
   return scan ? best_of_scan(scan->trials, facts_.options.starts) : std::vector<double>{};
 }
 
+const StageRecord* FitPlan::end_of_start(int index, const Records& done) const {
+  return find_record(done, {StageKind::Coarse, index, int(growing_horizon(facts_.swings).size()) - 1});
+}
+
+/// One that was drawn is followed over the first frames, and on if it leads about as far down as the best one.
+bool FitPlan::is_given_up(int index, const Records& done) const {
+  constexpr double hopeless = 2.0;  // times the least cost over the first frames
+  const auto has_failed = [&](const StageRecord& r) {
+    return r.id.kind == StageKind::Coarse && r.id.start == index && !r.succeeded;
+  };
+  if (std::ranges::any_of(done, has_failed)) return true;
+  const StageRecord* first = find_record(done, {StageKind::Coarse, index, 0});
+  const int given = int(start_moduli(done).size());
+  if (!first || index < given) return false;
+  double least = infinite;
+  for (int i = 0; i < given; ++i)
+    if (const StageRecord* r = find_record(done, {StageKind::Coarse, i, 0}); r && r->succeeded)
+      least = std::min(least, r->cost);
+  return first->cost > hopeless * least;
+}
+
+int FitPlan::start_count(const Records& done) const {
+  constexpr double good = 3.0;  // misfit on the coarse grid, in the wide band
+  constexpr int at_once = 2;
+  int count = int(start_moduli(done).size());
+  if (!facts_.is_scanned || count == 0) return count;
+  double least = infinite;
+  for (int i = 0; i < facts_.options.most_starts; ++i) {
+    if (i == count) {  // all before are done, and none is good
+      if (!(least > good)) return count;
+      count = std::min(count + at_once, facts_.options.most_starts);
+    }
+    const StageRecord* end = end_of_start(i, done);
+    if (!end && !is_given_up(i, done)) return count;
+    if (end && end->succeeded) least = std::min(least, end->misfit);
+  }
+  return count;
+}
+
+VectorX FitPlan::drawn_start(int index, const Records& done) const {
+  constexpr double decades = 0.7;  // to either side of what scan or swing showed
+  std::mt19937_64 bits{std::uint64_t(index)};
+  const auto uniform = [&] { return (double(bits() >> 11) + 0.5) * 0x1p-53; };
+  const auto normal = [&] {
+    return std::sqrt(-2.0 * std::log(uniform())) * std::cos(2.0 * std::numbers::pi * uniform());
+  };
+  const std::vector<double> moduli = start_moduli(done);
+  const auto [least, most] = std::ranges::minmax(moduli);
+  const double log_least = std::log10(least) - decades, log_most = std::log10(most) + decades;
+  const double modulus = std::pow(10.0, log_least + (log_most - log_least) * uniform());
+  VectorX theta = with_modulus(before_starts(done), modulus, done);
+  ParameterSet drawn = facts_.parameters;
+  const auto is_drawn = [](const Parameter& p) {
+    return p.is_scalar() && std::isfinite(p.prior_std) && (p.role == Role::Damping || shapes_law(p));
+  };
+  for (const Parameter& p : facts_.parameters.parameters()) drawn.set_estimated(p.name, p.estimated && is_drawn(p));
+  drawn.set_reference(theta);
+  VectorX p = drawn.to_unconstrained(theta);
+  const std::vector<const Parameter*> of = drawn.coordinate_parameters();
+  for (std::size_t i = 0; i < of.size(); ++i) p[Eigen::Index(i)] = of[i]->prior_mean[0] + of[i]->prior_std * normal();
+  return drawn.to_theta(drawn.clamp(p));
+}
+
 VectorX FitPlan::relative_moduli(const Records& done) const {
   const StageRecord* swung = find_record(done, {StageKind::Swing});
   if (!swung || !swung->converged) return facts_.relative_moduli;
@@ -372,7 +444,7 @@ VectorX FitPlan::start_theta(const Records& done) const {
 
 std::vector<FitStart> FitPlan::starts(const Records& done) const {
   std::vector<FitStart> all;
-  const int count = int(start_moduli(done).size());
+  const int count = start_count(done);
   for (int i = 0; i < count; ++i) {
     const StageChain chain = start(i, done);
     FitStart one;

@@ -13,7 +13,7 @@ struct PlanFacts {
   double size = 0.0;                      ///< of the object [m]
   VectorX relative_moduli;                ///< of scan and starts, the first one's being one
   bool is_scanned = true;                 ///< Young's modulus is looked for
-  double carrying_modulus = 0.0;          ///< [Pa] that is enough for a scan that sags; 0: no scan does
+  double softest = 0.0;                   ///< Young's modulus that is tried [Pa]; 0: the stress under its own weight
   bool swings = false;                    ///< some object is let go
   bool coarse_is_as_fine = false;         ///< starts are followed on the full grid already
   std::vector<Spacing> repetitions;       ///< on finer grids, after the first estimate
@@ -75,6 +75,15 @@ class FitPlan {
   /// Where the fit is before any start is followed.
   VectorX before_starts(const Records& done) const;
   std::vector<double> start_moduli(const Records& done) const;
+  /// How many starts are followed as far as is known: more than there are moduli where the best of them is not good.
+  int start_count(const Records& done) const;
+  /// Whether a start leads nowhere.
+  bool is_given_up(int index, const Records& done) const;
+  /// A start beyond those of the scan or the swing: the modulus log-uniform about those, what shapes the law and the
+  /// dampings drawn from their priors. The same for the same number.
+  VectorX drawn_start(int index, const Records& done) const;
+  /// The end of a start's chain; null where it is not reached.
+  const StageRecord* end_of_start(int index, const Records& done) const;
   /// The start that fits best.
   std::pair<VectorX, int> best_start(const Records& done) const;
   VectorX relative_moduli(const Records& done) const;

@@ -13,6 +13,7 @@
 #include "estimation/given_quantities.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/notes.hpp"
+#include "estimation/verdict.hpp"
 
 namespace pliant {
 
@@ -45,7 +46,8 @@ constexpr int steps_of_alternative = 3;  // enough to tell how far another model
 // From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
 // less than that. A finer mesh is affordable at rest; of a motion the coarser one tells.
 constexpr double size_of_finer_mesh = 1.8, size_of_coarser_mesh = 0.8, size_of_longer_step = 0.6;
-constexpr double softer = 1.0 / 3.0;  // contact, as a fall on a carpet or a thin skin would be
+// Of what a law that is linear in the strain changes, the share by which another law at large strain may differ.
+constexpr double size_of_small_strain = 0.5;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -79,14 +81,25 @@ std::optional<double> FitRun::given_start(const std::string& name) const {
   return (*change->second.start)[0];
 }
 
-double FitRun::carrying_modulus(const VectorX& theta) {
-  double modulus = 0.0;
+FitRun::Carrying FitRun::carrying(const VectorX& theta) {
+  constexpr double moderate = 0.2;  // sag of the object's size, under its weight as linear elasticity has it
+  // What is seen as it sags must bear that; others may hang as a rag does, where few simulations are lost in trying.
+  constexpr double part_of_scan = 0.25, part_at_rest = 0.02, part_in_motion = 0.1;
+  Carrying found;
   const Grid& coarse = grid({options_.coarse_cells, options_.steps});
-  for (const Discretisation& d : coarse.recording)
-    if (d.simulation.scan_sags)
-      modulus =
-          std::max(modulus, pliant::carrying_modulus(d.body, d.simulation, theta, [this] { return is_interrupted(); }));
-  return modulus;
+  for (std::size_t i = 0; i < coarse.recording.size(); ++i) {
+    const Discretisation& d = coarse.recording[i];
+    const Recording& r = recordings_.all()[i];
+    if (d.simulation.holds.empty()) continue;
+    const bool sags = d.simulation.scan_sags;
+    const double modulus =
+        sags ? pliant::carrying_modulus(d.body, d.simulation, theta, [this] { return is_interrupted(); })
+             : modulus_of_sag(d.body, d.simulation.holds, r.blocks.motion, theta, moderate);
+    const double part = sags ? part_of_scan : d.simulation.is_static ? part_at_rest : part_in_motion;
+    found.modulus = std::max(found.modulus, modulus);
+    found.softest = std::max(found.softest, part * modulus);
+  }
+  return found;
 }
 
 PlanFacts FitRun::facts() {
@@ -107,9 +120,12 @@ PlanFacts FitRun::facts() {
   for (int k = 0; k < recordings_.controls(); ++k)
     f.relative_moduli[k] = given_start(names[std::size_t(k)]).value_or(own) / own;
   recordings_.set_moduli(theta, own * f.relative_moduli);
-  // An object that was scanned as it sags has to be stiff enough for its scan before anything can be tried.
-  if (f.is_scanned) f.carrying_modulus = carrying_modulus(theta);
-  if (f.carrying_modulus > 0.0) recordings_.set_moduli(theta, f.carrying_modulus * f.relative_moduli);
+  // What is held has to be stiff enough for its weight before anything can be tried.
+  if (f.is_scanned) {
+    const Carrying enough = carrying(theta);
+    f.softest = enough.softest;
+    if (enough.modulus > 0.0) recordings_.set_moduli(theta, enough.modulus * f.relative_moduli);
+  }
   f.parameters.set_reference(theta);
   f.repetitions = refined_spacings({options_.cells, options_.steps}, options_.refine, recordings_.any_meshed_here(),
                                    !recordings_.all_static());
@@ -127,17 +143,20 @@ PlanFacts FitRun::facts() {
 /// large strain, how hard a floor is, and what the capture gives.
 std::vector<Alternative> FitRun::alternatives() const {
   const bool is_static = recordings_.all_static();
-  const bool meets =
-      std::ranges::any_of(recordings_.all(), [](const Recording& r) { return !r.capture.scene.planes.empty(); });
   std::vector<Alternative> all;
   const double finer = Refinement::mesh_ratio;
   if (recordings_.any_meshed_here() && is_static) all.push_back({"mesh", finer, 1.0, {}, false, size_of_finer_mesh});
   if (recordings_.any_meshed_here() && !is_static)
     all.push_back({"mesh", 1.0 / finer, 1.0, {}, false, size_of_coarser_mesh});
   if (!is_static) all.push_back({"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step});
-  if (meets) all.push_back({"stiffness of contact", 1.0, 1.0, {.contact = softer}, false, 1.0});
-  if (recordings_.are_tetrahedra() && !options_.law_of_motion())
-    all.push_back({"elastic law", 1.0, 1.0, {.neo_hookean = true}, false, 1.0});
+  if (!options_.law_of_motion()) {
+    const bool has_large_strain =
+        !is_static && !recordings_.moves_reference() && options_.material != MaterialKind::Linear;
+    if (has_large_strain)
+      all.push_back({"law at large strain", 1.0, 1.0, {.small_strain = true}, false, size_of_small_strain});
+    else if (recordings_.are_tetrahedra())
+      all.push_back({"law at large strain", 1.0, 1.0, {.neo_hookean = true}, false, 1.0});
+  }
   all.push_back({"what is given", 1.0, 1.0, {}, true, 1.0});
   return all;
 }
@@ -242,6 +261,7 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
   record.iterations = s.iterations;
   record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
+  if (s.succeeded) record.misfit = misfit_of(s.evaluation);
   record.elements = grid(stage.grid).recording.front().body->element_count();
   if (s.succeeded) record.theta = parameters.to_theta(s.p);
   if (is_on_full_grid(stage.id.kind)) ended_.push_back({stage.id, std::move(s.evaluation)});

@@ -41,8 +41,12 @@ class FitRun : StageLoop {
   void tell(FitEvent event);
 
   PlanFacts facts();
-  /// The modulus that is enough for scans that sag [Pa]; 0: there are none.
-  double carrying_modulus(const VectorX& theta);
+  /// A Young's modulus that holds up every object that is held, and the softest one that is worth a trial [Pa]; 0:
+  /// none is held.
+  struct Carrying {
+    double modulus = 0.0, softest = 0.0;
+  };
+  Carrying carrying(const VectorX& theta);
   std::optional<double> given_start(const std::string& name) const;
   double all_work() const;
 

@@ -57,8 +57,8 @@ struct Horizon {
 
 /// In what a model differs from the one that is fitted.
 struct ModelChange {
-  double contact = 1.0;      ///< stiffness of contact, in that of the fit
-  bool neo_hookean = false;  ///< in the place of linear elasticity in turning frames
+  bool neo_hookean = false;   ///< at every quadrature point, in the place of linear elasticity in turning frames
+  bool small_strain = false;  ///< linear elasticity in turning frames, and Rayleigh's damping
   bool operator==(const ModelChange&) const = default;
 };
 
@@ -97,6 +97,7 @@ struct StageRecord {
   std::string name;                     ///< for people
   VectorX from, theta;                  ///< where it began and ended
   double start_cost = 0.0, cost = 0.0;  ///< infinite where it could not be simulated
+  double misfit = infinite;             ///< of a minimisation, at its end: see `misfit_of`
   int iterations = 0;
   bool succeeded = false;
   bool converged = false;   ///< of a search for a swing: one was found

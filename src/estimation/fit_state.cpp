@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/11";
+constexpr const char* format = "fit-state/12";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -172,6 +172,7 @@ Json from_record(const StageRecord& r) {
                {"theta", from_vector(r.theta)},
                {"start_cost", from_cost(r.start_cost)},
                {"cost", from_cost(r.cost)},
+               {"misfit", from_cost(r.misfit)},
                {"iterations", r.iterations},
                {"succeeded", r.succeeded},
                {"converged", r.converged},
@@ -192,6 +193,7 @@ StageRecord to_record(const Json& json) {
   r.name = json.at("name").get<std::string>();
   r.from = to_vector(json.at("from")), r.theta = to_vector(json.at("theta"));
   r.start_cost = to_cost(json.at("start_cost")), r.cost = to_cost(json.at("cost"));
+  r.misfit = to_cost(json.at("misfit"));
   r.iterations = json.at("iterations").get<int>();
   r.succeeded = json.at("succeeded").get<bool>(), r.converged = json.at("converged").get<bool>();
   r.reason = json.at("reason").get<std::string>();

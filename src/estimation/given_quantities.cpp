@@ -11,6 +11,7 @@ constexpr double moved = 0.001;       // times the object's size, of a sensor al
 constexpr double tilted = 0.003;      // [rad] of gravity, by a level
 constexpr double weighed = 0.01;      // of ln density: a kitchen scale, and the volume of a scan
 constexpr double coefficient = 0.05;  // of friction
+constexpr double hardness = 0.3;      // of ln stiffness of contact, where it was chosen
 
 std::string sensor_of(const std::string& name) { return name.substr(name.find('@') + 1); }
 
@@ -30,6 +31,8 @@ std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters) {
       given.push_back({p.name, "mass", weighed});
     else if (p.role == Role::Obstacle && p.transform == Transform::Shift)
       given.push_back({p.name, "friction", coefficient});
+    else if (p.role == Role::Obstacle && p.transform == Transform::Logarithm)
+      given.push_back({p.name, "stiffness of contact", hardness});
   }
   return given;
 }

@@ -39,6 +39,20 @@ Capture at_rest(const Capture& capture) {
   return still;
 }
 
+double modulus_of_sag(const std::shared_ptr<const Body>& body, const std::vector<Hold>& holds,
+                      const MotionBlocks& blocks, VectorX theta, double sag) {
+  const std::vector<int> held = held_nodes(*body, holds);
+  const LinearStatics statics(body, held, blocks, theta);
+  if (!statics.is_held()) return 0.0;
+  const double gravity = blocks.gravity.vector(theta).norm();
+  double most = 0.0;
+  for (int d = 0; d < 3; ++d) {
+    theta.segment<3>(blocks.gravity) = gravity * Vector3::Unit(d);
+    most = std::max(most, statics.greatest_displacement(scan_load(*body, blocks, theta, {})));
+  }
+  return theta[blocks.youngs_moduli.front()] * most / (sag * body->size());
+}
+
 double carrying_modulus(const std::shared_ptr<const Body>& body, const SimulationOptions& scene, VectorX theta,
                         const std::function<bool()>& interrupted) {
   constexpr double sag_of_size = 0.5;

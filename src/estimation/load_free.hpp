@@ -24,6 +24,13 @@ struct LoadFree {
 LoadFree find_load_free(const Capture& capture, const Resolution& resolution, const CaptureBlocks& blocks,
                         const VectorX& theta, const ReferenceShapeOptions& options = {});
 
+/// The Young's modulus [Pa] by which linear elasticity lets a held object sag by a part of its size under its own
+/// weight, whichever way it lies: the largest of those for gravity along each axis. 0 where it has no weight.
+/// @param theta  with the density, Poisson's ratio and gravity; its moduli stay in proportion
+/// @param sag    [-] > 0, of the object's size
+double modulus_of_sag(const std::shared_ptr<const Body>& body, const std::vector<Hold>& holds,
+                      const MotionBlocks& blocks, VectorX theta, double sag);
+
 /// A Young's modulus [Pa] that holds the scan of a sagging object up: the one by which linear elasticity lets it sag by
 /// half its size, or, where that gives way, the first that does not as it is doubled again and again.
 /// @param theta  with the density, Poisson's ratio and gravity; its moduli are scaled together

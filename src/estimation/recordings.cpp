@@ -11,8 +11,6 @@ namespace pliant {
 
 namespace {
 
-LawForm neo_hookean_form() { return {1, 0, 1, false, TwoNumberLaw::NeoHookean}; }
-
 bool has_fitted_loads(const Capture& capture) {
   return std::ranges::any_of(capture.loads, [](const Load& load) { return is_fitted(load.role); });
 }
@@ -248,17 +246,16 @@ double Recordings::widest_band() const { return std::max(options_.wide_band, opt
 
 Resolution Recordings::resolution(double cells, double steps) const {
   Resolution r;
-  const bool moves_reference = any_sags() || options_.scan_points > 0;
   const bool has_law = options_.law_of_motion().has_value();
   // At rest what bends shows alone, and an equilibrium of quadratic elements costs a second.
-  const bool wants_tetrahedra = moves_reference || has_law || all_static();
+  const bool wants_tetrahedra = moves_reference() || has_law || all_static();
   r.element = options_.element.value_or(wants_tetrahedra ? ElementKind::QuadraticTetrahedron : ElementKind::Hexahedron);
   if (has_law && r.element == ElementKind::Hexahedron)
     throw InputError({{front().capture.file},
                       "a material law, and element=hexahedra",
                       "tetrahedra: hexahedra are linear in turning frames",
                       "leave out element, or choose quadratic_tetrahedra; or leave out material"});
-  if (moves_reference && r.element == ElementKind::Hexahedron)
+  if (moves_reference() && r.element == ElementKind::Hexahedron)
     throw InputError({{front().capture.file},
                       any_sags() ? "the scan was taken sagging (shape_is = \"static\"), and element=hexahedra"
                                  : "scan_points are given, and element=hexahedra",
@@ -282,15 +279,17 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
   settings.solver.tolerance = options_.solver_tolerance;
   settings.hold_strongly = options_.hold_strongly;
   settings.integrator = options_.integrator;
+  if (options_.material == MaterialKind::Linear || change.small_strain) settings.elastic_law = ElasticLaw::Corotated;
+  if (options_.damping == StiffnessDamping::Rayleigh || change.small_strain)
+    settings.stiffness_damping = StiffnessDamping::Rayleigh;
   Grid grid{cells, steps, change, {}, {}};
   for (const Recording& r : all_) {
     grid.recording.push_back(discretise(r.capture, r.distance, resolution(cells, steps), r.blocks,
                                         parameters_.reference(), settings, r.tracked.rest));
-    SimulationOptions& simulation = grid.recording.back().simulation;
-    simulation.contact.stiffness *= change.contact;
     if (change.neo_hookean) {
       ParameterLayout unchanged = parameters_.layout();  // the law has no numbers beside those of linear elasticity
-      simulation.law_layout = LawLayout::of_motion(unchanged, r.blocks.motion, neo_hookean_form());
+      const LawForm form{1, 0, 1, false, TwoNumberLaw::NeoHookean};
+      grid.recording.back().simulation.law_layout = LawLayout::of_motion(unchanged, r.blocks.motion, form);
     }
     grid.presses.push_back(press_scene(r, grid.recording.back(), cells));
   }

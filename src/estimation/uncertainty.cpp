@@ -22,7 +22,7 @@ struct Unmodelled {
 constexpr Unmodelled unmodelled[] = {{"youngs_modulus", 0.05, 0.015},
                                      {"poissons_ratio", 0.45, 0.15},
                                      {"mass_damping", 0.06, 0.10},
-                                     {"stiffness_damping", 0.20, 0.08}};
+                                     {"stiffness_damping", 0.16, 0.08}};
 
 }  // namespace
 

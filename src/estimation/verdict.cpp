@@ -20,17 +20,22 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-void look_at_residuals(const CostEvaluation& evaluation, Verdict& verdict) {
+/// Root mean square residual over the noise; 0 where there is neither.
+double residual_over_noise(const CostEvaluation& evaluation) {
   double squares = 0.0, noise = 0.0;
   for (const FrameFit& f : evaluation.frames) squares += f.sum_squares, noise += f.sum_noise_squares;
   // Followed points have a noise in the cost alone.
   if (!(noise > 0.0)) squares = 2.0 * evaluation.cost, noise = evaluation.independent_observations();
-  if (!(noise > 0.0)) return;
+  return noise > 0.0 ? std::sqrt(squares / noise) : 0.0;
+}
+
+void look_at_residuals(const CostEvaluation& evaluation, Verdict& verdict) {
+  const double ratio = residual_over_noise(evaluation);
+  if (ratio == 0.0) return;
   const auto unexplained = [&](std::string reason) {
     verdict.kind = Verdict::Kind::Unexplained;
     verdict.reasons.push_back(std::move(reason));
   };
-  const double ratio = std::sqrt(squares / noise);
   if (ratio > far_above_noise)
     unexplained(
         fmt::format("The distances between what was seen and the simulated object are {:.1f} times the noise.", ratio));
@@ -64,6 +69,12 @@ std::string name_of(Verdict::Kind kind) {
   return kind == Verdict::Kind::Explained     ? "explained"
          : kind == Verdict::Kind::Unexplained ? "unexplained"
                                               : "undetermined";
+}
+
+double misfit_of(const CostEvaluation& evaluation) {
+  const double ratio = residual_over_noise(evaluation);
+  const bool sees_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
+  return sees_surface ? ratio / std::min(1.0, evaluation.matched_fraction() / least_matched) : ratio;
 }
 
 std::vector<double> residuals_over_noise(const CostEvaluation& evaluation) {

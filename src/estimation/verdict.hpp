@@ -26,6 +26,11 @@ std::string name_of(Verdict::Kind kind);
 /// about each; empty where no surface was seen.
 std::vector<double> residuals_over_noise(const CostEvaluation& evaluation);
 
+/// One number for how far an evaluation is from what was seen: the root mean square distance over the noise, more
+/// where fewer points are matched than a verdict accepts. About 1 where the model is right; infinite where nothing is
+/// matched.
+double misfit_of(const CostEvaluation& evaluation);
+
 /// @param evaluation   at the estimate
 /// @param uncertainty  of the estimate; empty where nothing was estimated
 Verdict verdict_of(const CostEvaluation& evaluation, const Uncertainty& uncertainty, const ParameterSet& parameters);

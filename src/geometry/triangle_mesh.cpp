@@ -10,6 +10,16 @@ Box bounding_box(const TriangleMesh& mesh) {
   return box;
 }
 
+double surface_area(const TriangleMesh& mesh) {
+  double area = 0.0;
+  for (const auto& t : mesh.triangles) {
+    const Vector3 &a = mesh.vertices[std::size_t(t[0])], &b = mesh.vertices[std::size_t(t[1])],
+                  &c = mesh.vertices[std::size_t(t[2])];
+    area += 0.5 * (b - a).cross(c - a).norm();
+  }
+  return area;
+}
+
 double enclosed_volume(const TriangleMesh& mesh) {
   double six_volumes = 0.0;
   for (const auto& [a, b, c] : mesh.triangles)

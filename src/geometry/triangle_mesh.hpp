@@ -36,6 +36,8 @@ Box bounding_box(const TriangleMesh& mesh);
 
 /// Enclosed volume [m^3] of a closed, outward oriented mesh (negative where it is oriented inwards).
 double enclosed_volume(const TriangleMesh& mesh);
+/// [m^2]
+double surface_area(const TriangleMesh& mesh);
 
 /// Centre of the enclosed volume [m].
 Vector3 enclosed_centroid(const TriangleMesh& mesh);

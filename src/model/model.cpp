@@ -19,6 +19,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr const char *corotated = "corotated", *neo_hookean = "neo_hookean";  // mean_strain
+constexpr const char *rayleigh = "rayleigh", *kelvin_voigt = "kelvin_voigt";  // damping_law
+
 constexpr const char* modulus_field = "youngs_modulus [Pa]";
 constexpr const char* modulus_std_field = "youngs_modulus_std [Pa]";
 constexpr const char* ratio_field = "poissons_ratio";
@@ -46,7 +49,7 @@ std::string model_toml(const Model& m) {
   line(out, "mass", m.scene.object.mass.value(), "kg");
   line(out, "density", m.scene.object.density.value(), "kg/m^3");
   out << (m.law ? "\n[material]                          # moduli are those of small strains\n"
-                : "\n[material]                          # isotropic, linear in the rotated frame of each element\n");
+                : "\n[material]                          # isotropic\n");
   if (m.law) {
     out << fmt::format("law = \"{}\"\ntable = \"material.csv\"            # of the law, by element\n", m.law->name);
     if (m.law->metric_nu != 0.0) line(out, "metric_nu", m.law->metric_nu, "Poisson's ratio of the norm of strains");
@@ -54,7 +57,14 @@ std::string model_toml(const Model& m) {
   line(out, "youngs_modulus", m.youngs_modulus, "Pa; the mean where elements differ");
   line(out, "poissons_ratio", m.poissons_ratio, "-1 .. 0.5");
   line(out, "mass_damping", m.mass_damping, "Rayleigh, 1/s");
-  line(out, "stiffness_damping", m.stiffness_damping, "Rayleigh, s");
+  line(out, "stiffness_damping", m.stiffness_damping, "s");
+  out << fmt::format(
+             "mean_strain = \"{}\"        # of an element: neo_hookean, or corotated (linear in its turning frame)\n",
+             m.is_corotated ? corotated : neo_hookean)
+      << fmt::format(
+             "damping_law = \"{}\"       # of stiffness_damping: kelvin_voigt (on the rate of the Green strain), or "
+             "rayleigh\n",
+             m.is_rayleigh ? rayleigh : kelvin_voigt);
   out << "\n";
   write_toml(out, m.scene.world);
   if (!m.scene.timing.times.empty()) write_toml(out, m.scene.timing);
@@ -182,8 +192,10 @@ class Reader {
         material, "poissons_ratio",
         {.low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"});
     model_.mass_damping = read_number(material, "mass_damping", {.low = 0.0, .meaning = "Rayleigh's, in 1/s"}, 0.0);
-    model_.stiffness_damping =
-        read_number(material, "stiffness_damping", {.low = 0.0, .meaning = "Rayleigh's, in s"}, 0.0);
+    model_.stiffness_damping = read_number(material, "stiffness_damping", {.low = 0.0, .meaning = "in s"}, 0.0);
+    // Models of before there was a choice have neither key.
+    model_.is_corotated = read_choice(material, "mean_strain", {corotated, neo_hookean}) == corotated;
+    model_.is_rayleigh = read_choice(material, "damping_law", {rayleigh, kelvin_voigt}) == rayleigh;
   }
 
   void read_simulation(TomlTable& simulation) {

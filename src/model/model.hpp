@@ -47,6 +47,8 @@ struct Model {
   Vector3 grid_origin = Vector3::Zero();  ///< lattice point (0, 0, 0) [m]
   int substeps = 1;                       ///< time steps a frame, >= 1
   double theta = 0.5;                     ///< weight of a time step's end [0.5, 1]
+  bool is_corotated = false;              ///< the elements' mean strain is linear in the rotated frame, not neo-Hookean
+  bool is_rayleigh = false;               ///< stiffness damping is Rayleigh's, not Kelvin and Voigt's
   double contact_stiffness = 0.0;         ///< pressure by penetration [Pa/m] >= 0
   double contact_smoothing = 0.0;         ///< length over which contact sets in [m] >= 0
 

@@ -35,11 +35,15 @@ RigidContact bonded_disc(const Body& body, const ProbeOptions& probe, double you
 
 }  // namespace
 
+double default_contact_stiffness(double weight, double area, double size) {
+  const double projected = 0.25 * area;  // a convex body's mean over all directions
+  return weight / (projected * 1e-4 * size);
+}
+
 Penalty default_contact(const Body& body, double mass, double gravity) {
-  const double size = body.size();
-  double projected = 0.0;  // a convex body's mean projected area is a quarter of its surface
-  for (const SurfacePoint& point : body.surface) projected += 0.25 * point.area;
-  return {mass * gravity / (projected * 1e-4 * size), 1e-3 * size};
+  double area = 0.0;
+  for (const SurfacePoint& point : body.surface) area += point.area;
+  return {default_contact_stiffness(mass * gravity, area, body.size()), 1e-3 * body.size()};
 }
 
 double default_friction_speed(const Body& body, double gravity) { return std::sqrt(2e-4 * gravity * body.size()); }

@@ -15,6 +15,11 @@ namespace pliant {
 /// @param mass     of the object [kg]
 /// @param gravity  [m/s^2]
 Penalty default_contact(const Body& body, double mass, double gravity);
+/// Its stiffness alone [Pa/m].
+/// @param weight  of the object [N]
+/// @param area    of its surface [m^2]
+/// @param size    of the object [m]
+double default_contact_stiffness(double weight, double area, double size);
 
 /// Speed below which friction fades to nothing [m/s]: that of a fall by a ten-thousandth of the object's size.
 double default_friction_speed(const Body& body, double gravity);

@@ -63,6 +63,8 @@ void RigidContact::set_parameters(const VectorX& theta) {
   plane_point_ = plane_->point.vector(theta);
   plane_normal_ = plane_->normal.vector(theta);
   if (plane_->friction.exists()) friction_ = theta[plane_->friction];
+  follows_stiffness_ = plane_->stiffness.exists() && theta[plane_->stiffness] > 0.0;
+  if (follows_stiffness_) penalty_.stiffness = theta[plane_->stiffness];
 }
 
 void RigidContact::begin_step(const StepContext& step) {
@@ -238,6 +240,7 @@ void RigidContact::add_force_tangent(const Points& z, const Points& d_lag, const
   const Vector3 d_point = plane_ ? plane_->point.vector(d_theta) : Vector3::Zero();
   const Vector3 d_plane_normal = plane_ ? plane_->normal.vector(d_theta) : Vector3::Zero();
   const double d_friction = plane_ && plane_->friction.exists() ? d_theta[plane_->friction] : 0.0;
+  const double d_log_stiffness = follows_stiffness_ ? d_theta[plane_->stiffness] / penalty_.stiffness : 0.0;
   const bool has_details = shape_ || rubs() || (d_friction != 0.0 && may_rub());
   const Detail none;
   for (std::size_t i = 0; i < active_.size(); ++i) {
@@ -258,6 +261,7 @@ void RigidContact::add_force_tangent(const Points& z, const Points& d_lag, const
       f -= d_drag * o.slid + m.drag * (m.across(d_end) - o.normal * d_axis - d_axis.dot(w) * m.axis);
     }
     if (has_details && may_rub()) f -= d_friction * c.force / m.length * o.slid;
+    if (d_log_stiffness != 0.0) f += d_log_stiffness * ((c.force + c.slope * o.c) * c.normal - m.drag * o.slid);
     scatter(c.point, f, force);
   }
 }
@@ -266,7 +270,7 @@ void RigidContact::add_force_adjoint(const Points& z, const Points& w, Points& l
                                      VectorX& theta_bar) {
   if (is_bonded()) for_bonded([&](int i, double k) { scatter(i, -k * relative_change(i, w), z_bar); });
   Vector3 point_bar = Vector3::Zero(), plane_normal_bar = Vector3::Zero();
-  double friction_bar = 0.0;
+  double friction_bar = 0.0, log_stiffness_bar = 0.0;
   const bool rubbing = may_rub();
   const Detail none;
   for (std::size_t i = 0; i < active_.size(); ++i) {
@@ -275,12 +279,14 @@ void RigidContact::add_force_adjoint(const Points& z, const Points& w, Points& l
     const Offsets o = offsets(c, m, z);
     const Vector3 v = relative_change(c.point, w);
     const double along = v.dot(c.normal);
+    log_stiffness_bar += (c.force + c.slope * o.c) * along;
     double gap_bar = (c.curvature * o.c + c.slope) * along;
     Vector3 end_bar = c.slope * along * c.normal, y_bar = -end_bar;
     Vector3 normal_bar = (c.force + c.slope * o.c) * v + c.slope * along * o.q;
     if (rubbing) {
       const double drag_bar = -o.slid.dot(v);
       friction_bar += drag_bar * c.force / m.length;
+      log_stiffness_bar += m.drag * drag_bar;
       if (m.drag > 0.0) {
         const Vector3 w_z = o.slid + o.normal * m.axis;
         end_bar -= m.drag * m.across(v);
@@ -304,6 +310,7 @@ void RigidContact::add_force_adjoint(const Points& z, const Points& w, Points& l
   theta_bar.segment<3>(plane_->point) += point_bar;
   theta_bar.segment<3>(plane_->normal) += plane_normal_bar;
   if (plane_->friction.exists()) theta_bar[plane_->friction] += friction_bar;
+  if (follows_stiffness_) theta_bar[plane_->stiffness] += log_stiffness_bar / penalty_.stiffness;
 }
 
 void RigidContact::add_start_tangent(const Points& z, const Points& d_start, const Points&, Points& force) {

@@ -36,7 +36,7 @@ class RigidContact : public ForceTerm {
   /// Throws std::invalid_argument for a penalty without stiffness or smoothing.
   static RigidContact sliding(const Body& body, const ContactSamples& samples, std::shared_ptr<const RigidShape> shape,
                               const Penalty& penalty);
-  /// A plane whose place and coefficient of friction stand in the parameter vector.
+  /// A plane whose place, coefficient of friction and stiffness stand in the parameter vector.
   static RigidContact sliding(const Body& body, const ContactSamples& samples, const PlaneBlock& plane,
                               const Penalty& penalty);
 
@@ -135,6 +135,7 @@ class RigidContact : public ForceTerm {
   std::shared_ptr<const RigidShape> shape_;
   std::optional<PlaneBlock> plane_;
   Penalty penalty_;
+  bool follows_stiffness_ = false;                                  // whether the penalty's stiffness is that of theta
   double friction_ = 0.0, friction_speed_ = 0.0, threshold_ = 0.0;  // threshold: s [m]
   Vector3 translation_ = Vector3::Zero(), plane_point_ = Vector3::Zero(), plane_normal_ = Vector3::UnitY();
   int row_ = -1, row_diagonal_ = -1;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
+#include "elasticity/viscous_forces.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/continuation.hpp"
 
@@ -41,6 +42,8 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   auto elastic = scene_elasticity(body, options);
   elasticity = elastic.get();
   terms.push_back(std::move(elastic));
+  if (options.stiffness_damping == StiffnessDamping::KelvinVoigt && !options.is_static)
+    terms.push_back(make_viscous_forces(body, options.blocks, options.blocks.stiffness_damping));
   terms.push_back(std::make_unique<Gravity>(*body, options.blocks));
   for (const PlaneBlock& plane : options.blocks.planes) terms.push_back(plane_contact(*body, plane, options));
   if (!options.weights.empty())
@@ -70,6 +73,11 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
 
 /// With the integrator that the material needs.
 SimulationOptions completed(SimulationOptions options) {
+  if (options.scan_sags || !options.shape.points.empty()) {
+    options.elastic_law = ElasticLaw::Corotated;
+    options.stiffness_damping = StiffnessDamping::Rayleigh;
+  }
+  if (options.law || options.law_layout || options.is_static) options.elastic_law = ElasticLaw::Corotated;
   if (!options.law && !options.law_layout) return options;
   if (options.law && options.law_layout)
     throw std::invalid_argument("a material is given as it is or by the parameter vector, not both");
@@ -84,7 +92,8 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
       options_(completed(std::move(options))),
       stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_), options_.blocks,
                {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
-                options_.rotation_prediction, options_.solver, options_.integrator, options_.newton}),
+                options_.rotation_prediction, options_.stiffness_damping, options_.solver, options_.integrator,
+                options_.newton}),
       statics_(body_, stepper_.terms(), {.newton = options_.newton, .solver = options_.solver.kind}),
       rest_(body_->scanned_positions()) {
   if (holds_strongly(*body_, options_)) {
@@ -97,6 +106,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     const PointWeights hung(*body_, options_.weights, options_.blocks.gravity);
     stepper_.carry(hung.points(), hung.masses());
   }
+  element_edge_ = std::cbrt(body_->volume() / std::max(1, body_->element_count()));
   prepare_holds();
   if (options_.scan_sags || !options_.shape.points.empty()) {
     const std::vector<int> held = held_nodes(*body_, options_.holds);
@@ -112,6 +122,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     for (int s = 1; s <= steps; ++s)
       plan_.push_back(
           {options_.times[frame - 1] + (s - 1) * interval / steps, interval / steps, s == steps ? frame : -1});
+    longest_step_ = std::max(longest_step_, interval / steps);
   }
 }
 
@@ -306,6 +317,33 @@ bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary
   return true;
 }
 
+double Simulation::surprise(const StepPlan& plan, const State& state) const {
+  if (options_.integrator == Integrator::Newton) return 0.0;
+  return 0.5 * std::sqrt((delta_ - plan.dt * state.v).rowwise().squaredNorm().maxCoeff()) / element_edge_;
+}
+
+bool Simulation::take_step(std::size_t i, State& state, RolloutSummary& summary) {
+  constexpr double too_long = 0.3, explosion = 3.0;  // surprises
+  const double shortest = std::ldexp(longest_step_, -options_.most_halvings);
+  for (;;) {
+    const StepPlan plan = steps_[i];
+    const bool is_taken = forward_step(plan, state, summary);
+    const double surprised = is_taken ? surprise(plan, state) : 0.0;
+    if (is_taken && !(surprised > too_long)) return true;
+    const double half = 0.5 * plan.dt;
+    if (half < (1.0 - 1e-9) * shortest) {
+      if (surprised > explosion)
+        summary.failure = "nodes leap by several elements within the shortest step, number " +
+                          std::to_string(summary.steps) + ": the motion cannot be resolved";
+      return is_taken && !(surprised > explosion);
+    }
+    summary.failure.clear();
+    if (is_taken) --summary.steps;
+    steps_[i] = {plan.time, half, -1};
+    steps_.insert(steps_.begin() + std::ptrdiff_t(i) + 1, {plan.time + half, half, plan.frame_after});
+  }
+}
+
 RolloutSummary Simulation::run(const VectorX& parameters, const OnFrame& on_frame) {
   return run(parameters, MatrixX(parameters.size(), 0), frame_count() - 1, on_frame);
 }
@@ -332,18 +370,19 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   tangents = start_tangents(state, directions, shape);
   summary.frames = 1;
   if (!on_frame(0, state, tangents)) return summary.succeeded = true, summary;
-  for (const StepPlan& plan : plan_) {
-    if (summary.frames > last_frame) break;
-    if (!forward_step(plan, state, summary)) return summary;
+  steps_ = plan_;
+  for (std::size_t s = 0; s < steps_.size() && summary.frames <= last_frame; ++s) {
+    if (!take_step(s, state, summary)) return summary;
     if (!tangents.empty() && options_.integrator == Integrator::Newton && !stepper_.prepare_derivatives(state, delta_))
       return summary.failure = "a matrix of the tangents cannot be factorised", summary;
     if (!shape.reference.empty()) stepper_.prepare_reference_derivatives(state, delta_);
     for (std::size_t c = 0; c < tangents.size(); ++c)
       stepper_.tangent(state, delta_, directions.col(Eigen::Index(c)), tangents[c], shape.of(c));
     stepper_.advance(delta_, state);
-    if (plan.frame_after < 0) continue;
+    const int frame = steps_[s].frame_after;
+    if (frame < 0) continue;
     ++summary.frames;
-    if (!on_frame(plan.frame_after, state, tangents)) break;
+    if (!on_frame(frame, state, tangents)) break;
   }
   summary.succeeded = true;
   return summary;
@@ -383,6 +422,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   while (steps < plan_.size() && (steps == 0 || plan_[steps - 1].frame_after < last_frame)) ++steps;
   if (last_frame == 0) steps = 0;
   const std::size_t length = segment_length(steps);
+  steps_.assign(plan_.begin(), plan_.begin() + std::ptrdiff_t(steps));
 
   std::vector<State> checkpoints;
   State state;
@@ -392,17 +432,19 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   if (!cost(0, state)) return summary.failure = "the cost failed", summary;
   std::vector<State> segment;
   const bool all_kept = length > steps;
-  for (std::size_t s = 0; s < steps; ++s) {
+  for (std::size_t s = 0; s < steps_.size(); ++s) {
     if (all_kept)
       segment.push_back(state);
     else if (s % length == 0)
       checkpoints.push_back(state);
-    if (!forward_step(plan_[s], state, summary)) return summary;
+    if (!take_step(s, state, summary)) return summary;
     stepper_.advance(delta_, state);
-    if (plan_[s].frame_after < 0) continue;
+    const int frame = steps_[s].frame_after;
+    if (frame < 0) continue;
     ++summary.frames;
-    if (!cost(plan_[s].frame_after, state)) return summary.failure = "the cost failed", summary;
+    if (!cost(frame, state)) return summary.failure = "the cost failed", summary;
   }
+  steps = steps_.size();
   peak_state_bytes_ = (segment.size() + checkpoints.size() + (all_kept ? 1 : length + 1)) * state_bytes();
 
   State bar{Points::Zero(rest_.rows(), 3), Points::Zero(rest_.rows(), 3)};
@@ -415,15 +457,15 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       RolloutSummary ignored;
       for (std::size_t r = first; r <= s; ++r) {
         segment.push_back(replay);
-        if (!forward_step(plan_[r], replay, ignored)) return summary.failure = ignored.failure, summary;
+        if (!forward_step(steps_[r], replay, ignored)) return summary.failure = ignored.failure, summary;
         stepper_.advance(delta_, replay);
       }
       if (s + 1 == steps) state = replay;
     }
     const State& start = segment.back();
-    if (plan_[s].frame_after >= 0) cotangent(plan_[s].frame_after, state, bar.x);
-    stepper_.set_time(plan_[s].time);
-    stepper_.set_time_step(plan_[s].dt);
+    if (steps_[s].frame_after >= 0) cotangent(steps_[s].frame_after, state, bar.x);
+    stepper_.set_time(steps_[s].time);
+    stepper_.set_time_step(steps_[s].dt);
     delta_ = state.x - start.x;
     if (!stepper_.prepare_derivatives(start, delta_))
       return summary.failure = "a matrix of the reverse sweep is not positive definite", summary;
@@ -447,6 +489,7 @@ BodyMaterial scene_material(const SimulationOptions& options) {
 
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body,
                                              const SimulationOptions& options) {
+  if (options.elastic_law != ElasticLaw::Corotated) return make_elasticity(body, options.blocks, options.elastic_law);
   return scene_material(options).make_elasticity(body);
 }
 

@@ -23,6 +23,11 @@ struct SimulationOptions {
   double max_dt = 0.0;        ///< [s], > 0: each interval is cut into equal steps no longer than this
   double newmark_theta = 0.51;
   double contact_weight = 0.6, rotation_prediction = 0.5;  ///< see StepOptions
+  /// Of the elements' mean strain, and of stiffness damping, at large strain. The corotated law and Rayleigh's damping
+  /// take their place where the scan sags or errs, since they have no derivatives by the stress-free shape; the law
+  /// also at rest and where another is given below.
+  ElasticLaw elastic_law = ElasticLaw::NeoHookean;
+  StiffnessDamping stiffness_damping = StiffnessDamping::KelvinVoigt;
   SolverOptions solver;
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
@@ -46,6 +51,7 @@ struct SimulationOptions {
   std::optional<LawLayout> law_layout;  ///< with handles of the parameter vectors (`LawLayout::of_motion`)
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
                                ///< tetrahedra, which follow the shape
+  int most_halvings = 5;       ///< of a step that cannot be taken as a whole, >= 0
   std::size_t memory_budget = std::size_t(256) << 20;  ///< [bytes] for states kept for the adjoint
 };
 
@@ -128,6 +134,12 @@ class Simulation {
   void move_holds(double from, double to, Points& positions);
   void prepare_holds();
   bool forward_step(const StepPlan& plan, State& state, RolloutSummary& summary);
+  /// The step i of `steps_`, in halves where it cannot be taken as a whole: they stand in its place then. Sets the
+  /// step's way, not its end.
+  bool take_step(std::size_t i, State& state, RolloutSummary& summary);
+  /// How far the middle of a lagged step lies from where its rotations, strains and contact were predicted, the
+  /// farthest node, in edges of an element. A step is too long where that is no small part.
+  double surprise(const StepPlan& plan, const State& state) const;
   std::size_t state_bytes() const { return 2 * 3 * sizeof(double) * std::size_t(body_->node_count()); }
   std::size_t segment_length(std::size_t steps) const;
 
@@ -137,6 +149,9 @@ class Simulation {
   FixedRegions* fixed_regions_ = nullptr;  // likewise, if any
   Pull* pull_ = nullptr;                   // likewise
   PointWeights* let_go_ = nullptr;         // likewise
+  double longest_step_ = 0.0;              // of the plan [s]
+  double element_edge_ = 0.0;              // of a cube as large as a mean element [m]
+  std::vector<StepPlan> steps_;            // of the run: the plan's, some in halves
   std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
   MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
   Stepper stepper_;

@@ -50,7 +50,8 @@ constexpr std::array all_ats = {ForceTerm::At::Blended, ForceTerm::At::Contact, 
 Stepper::Scheme Stepper::scheme() const {
   Scheme s;
   s.dt = options_.dt;
-  s.at = {options_.newmark_theta + stiffness_damping_ / options_.dt, options_.contact_weight, 1.0};
+  s.at = {options_.newmark_theta + (is_rayleigh() ? stiffness_damping_ / options_.dt : 0.0), options_.contact_weight,
+          1.0};
   if (is_newton()) {
     s.lag = {options_.newmark_theta, options_.contact_weight};
     s.prediction = {0.0, 0.0};
@@ -262,7 +263,7 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
                       const Points* d_reference) {
   const Scheme s = scheme();
   const double dt = options_.dt, t = options_.newmark_theta;
-  const double d_beta = d_theta[stiffness_damping_block_];
+  const double d_beta = is_rayleigh() ? d_theta[stiffness_damping_block_] : 0.0;
   set_points_at(s, start.x, delta);
   d_blended_ = change.x + d_beta / dt * delta;
   for (const auto lag : all_lags) d_lag_[std::size_t(lag)] = change.x + s.prediction[std::size_t(lag)] * change.v;
@@ -335,7 +336,8 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
     if (reference_bar) term->add_reference_adjoint(w_, *reference_bar);
     if (term->sees_start()) term->add_start_adjoint(points_at_[at], w_, bar.x, bar.v);
   }
-  theta_bar[stiffness_damping_block_] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
+  if (is_rayleigh())
+    theta_bar[stiffness_damping_block_] += bar_at_[std::size_t(ForceTerm::At::Blended)].cwiseProduct(delta).sum() / dt;
   for (const Points& p : bar_at_) bar.x += p;
   for (const auto lag : all_lags) {
     bar.x += lag_bar_[std::size_t(lag)];

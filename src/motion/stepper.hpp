@@ -23,6 +23,12 @@ enum class Integrator {
   Newton,  ///< fully implicit with the exact corotational stiffness (Wang 2015)
 };
 
+/// How stiffness damping acts at large strain; at small strain both are Rayleigh's beta K v.
+enum class StiffnessDamping {
+  Rayleigh,     ///< beta times the turned stiffness times v
+  KelvinVoigt,  ///< on the rate of the Green strain, a force term of its own (`make_viscous_forces`)
+};
+
 struct StepOptions {
   double dt = 0.0;             ///< [s], > 0
   double newmark_theta = 0.5;  ///< [0.5, 1): weight of the step's end; above 0.5 adds numerical damping
@@ -32,6 +38,7 @@ struct StepOptions {
   /// Rotations are those of x + this dt v, [0, 1]: 0 takes the start's, as in the paper, an error of first order;
   /// 1/2 predicts the middle of the step, of second order.
   double rotation_prediction = 0.5;
+  StiffnessDamping stiffness_damping = StiffnessDamping::Rayleigh;
   SolverOptions solver;
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
@@ -41,7 +48,7 @@ struct StepOptions {
 /// corrected: it is subtracted). With Delta = x' - x and the terms' affine forces,
 ///   (1/(theta dt) + alpha) M Delta = M v / theta + dt sum of f(x + s Delta),
 ///   v' = Delta / (theta dt) - (1 - theta)/theta v,
-/// s = theta + beta/dt for blended terms (the stiffness damping's share with them), the contact's weight, or 1.
+/// s = theta + beta/dt for blended terms (Rayleigh's stiffness damping with them), the contact's weight, or 1.
 /// One linear system a step; its tangent and adjoint solve with the same (symmetric) matrix.
 ///
 /// The fully implicit scheme is the same equation with lag points that move along: rotations are those of x + theta
@@ -130,6 +137,7 @@ class Stepper : private NewtonProblem {
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
   void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
   bool is_newton() const { return options_.integrator == Integrator::Newton; }
+  bool is_rayleigh() const { return options_.stiffness_damping == StiffnessDamping::Rayleigh; }
   GeneralSolver& general();
 
   std::shared_ptr<const Body> body_;

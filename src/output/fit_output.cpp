@@ -464,6 +464,10 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   }
   model.theta = d.simulation.newmark_theta;
   model.contact_stiffness = d.simulation.contact.stiffness;
+  if (blocks.contact_stiffness.exists() && t[blocks.contact_stiffness] > 0.0)
+    model.contact_stiffness = t[blocks.contact_stiffness];
+  model.is_corotated = d.simulation.elastic_law == ElasticLaw::Corotated;
+  model.is_rayleigh = d.simulation.stiffness_damping == StiffnessDamping::Rayleigh;
   model.contact_smoothing = d.simulation.contact.smoothing;
   model.volume.nodes = d.body->reference_positions();
   model.volume.kind = vtu_cell(d.body->kind);

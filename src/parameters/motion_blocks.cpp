@@ -24,6 +24,7 @@ std::vector<ParameterHandle> MotionBlocks::all() const {
     handles.push_back(plane.whole());
     if (plane.friction.exists()) handles.push_back(plane.friction);
   }
+  if (contact_stiffness.exists()) handles.push_back(contact_stiffness);
   handles.insert(handles.end(), pulls.begin(), pulls.end());
   handles.insert(handles.end(), scan_corrections.begin(), scan_corrections.end());
   return handles;
@@ -35,9 +36,12 @@ MotionBlocks MotionBlocks::moved(const std::function<ParameterHandle(const Param
   for (ParameterHandle* handle : {&other.poissons_ratio, &other.mass_damping, &other.stiffness_damping, &other.density,
                                   &other.gravity, &other.linear_velocity, &other.angular_velocity})
     *handle = there(*handle);
+  const auto there_if = [&](const ParameterHandle& handle) {
+    return handle.exists() ? there(handle) : ParameterHandle{};
+  };
   for (PlaneBlock& plane : other.planes)
-    plane = {there(plane.point), there(plane.normal),
-             plane.friction.exists() ? there(plane.friction) : ParameterHandle{}};
+    plane = {there(plane.point), there(plane.normal), there_if(plane.friction), there_if(plane.stiffness)};
+  other.contact_stiffness = there_if(contact_stiffness);
   for (ParameterHandle& pull : other.pulls) pull = there(pull);
   for (ParameterHandle& correction : other.scan_corrections) correction = there(correction);
   return other;
@@ -67,8 +71,10 @@ MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& coun
         layout.add({i == 0 ? "plane" : "plane_" + std::to_string(i + 1), "", 6, Role::Obstacle});
     const ParameterHandle friction =
         layout.add({i == 0 ? "friction" : "friction_" + std::to_string(i + 1), "1", 1, Role::Obstacle});
-    blocks.planes.push_back({{plane.first, 3}, {plane.first + 3, 3}, friction});
+    blocks.planes.push_back({{plane.first, 3}, {plane.first + 3, 3}, friction, {}});
   }
+  if (counts.planes > 0) blocks.contact_stiffness = layout.add({"contact_stiffness", "Pa/m", 1, Role::Obstacle});
+  for (PlaneBlock& plane : blocks.planes) plane.stiffness = blocks.contact_stiffness;
   for (int k = 0; k < counts.pulls; ++k)
     blocks.pulls.push_back(layout.add({"pull@" + std::to_string(k + 1), "1", 3, Role::Initial}));
   for (int k = 0; k < counts.scan_corrections; ++k)

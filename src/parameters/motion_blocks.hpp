@@ -21,11 +21,12 @@ struct MaterialBlocks {
   VectorX moduli(const VectorX& theta) const;
 };
 
-/// A plane's blocks: six numbers of its place, and one of its friction.
+/// A plane's blocks: six numbers of its place, one of its friction and one of how hard it is.
 struct PlaneBlock {
-  ParameterHandle point;     ///< 3, [m]
-  ParameterHandle normal;    ///< 3, unit length
-  ParameterHandle friction;  ///< Coulomb's coefficient [-]; may not exist: none
+  ParameterHandle point;      ///< 3, [m]
+  ParameterHandle normal;     ///< 3, unit length
+  ParameterHandle friction;   ///< Coulomb's coefficient [-]; may not exist: none
+  ParameterHandle stiffness;  ///< of the penalty [Pa/m]; may not exist or be 0: that which the contact was made with
 
   /// The six numbers of its place.
   ParameterHandle whole() const { return {point.first, point.size + normal.size}; }
@@ -39,7 +40,8 @@ struct MotionBlocks : MaterialBlocks {
   ParameterHandle gravity;                        ///< 3, [m/s^2]
   ParameterHandle linear_velocity;                ///< 3, of the centre of mass at the start [m/s]
   ParameterHandle angular_velocity;               ///< 3, about the centre of mass at the start [rad/s]
-  std::vector<PlaneBlock> planes;                 ///< obstacles
+  std::vector<PlaneBlock> planes;                 ///< obstacles; all have one block of stiffness
+  ParameterHandle contact_stiffness;              ///< that block [Pa/m]; does not exist where there is no plane
   std::vector<ParameterHandle> pulls;             ///< 3 each [-], see `Pull`
   std::vector<ParameterHandle> scan_corrections;  ///< 3 each [-], see `ShapeField`
 

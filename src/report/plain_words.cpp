@@ -22,6 +22,8 @@ Scaled scaled_unit(double value, const std::string& unit) {
   if (unit == "Pa" && size >= 1e9) return {1e-9, "GPa"};
   if (unit == "Pa" && size >= 1e6) return {1e-6, "MPa"};
   if (unit == "Pa" && size >= 1e4) return {1e-3, "kPa"};
+  if (unit == "Pa/m" && size >= 1e6) return {1e-6, "MPa/m"};
+  if (unit == "Pa/m" && size >= 1e4) return {1e-3, "kPa/m"};
   if (unit == "m" && size < 0.1 && size > 0.0) return {1e3, "mm"};
   if (unit == "s" && size < 0.1 && size > 0.0) return {1e3, "ms"};
   static const std::map<std::string, std::string> spoken{

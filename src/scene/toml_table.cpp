@@ -322,6 +322,19 @@ void check_format(TomlTable& root, const std::string& expected) {
                             "use a program that knows this format");
 }
 
+std::string read_choice(TomlTable& table, const std::string& name, std::initializer_list<const char*> words) {
+  const auto word = table.optional<std::string>(name);
+  if (!word) return *words.begin();
+  std::string list;
+  for (const char* possible : words) {
+    if (*word == possible) return *word;
+    list += (list.empty() ? "\"" : ", \"") + std::string(possible) + "\"";
+  }
+  table.context().reject(table.key_of(name), "`" + name + "` is \"" + *word + "\"", "one of " + list,
+                         "write one of these, or leave it out");
+  return *words.begin();
+}
+
 double read_number(TomlTable& table, const std::string& name, const NumberRule& rule) {
   return checked(table, name, rule, table.required<double>(name, rule.meaning), 1.0);
 }

@@ -125,6 +125,9 @@ void TomlTable::each_block(const std::string& name, const Read& read) {
 /// Complains where the key `format` is missing or names another format than `expected`, like "capture/1".
 void check_format(TomlTable& root, const std::string& expected);
 
+/// Which of several words a key has; the first where it is missing, or where it is another: that is complained about.
+std::string read_choice(TomlTable& table, const std::string& name, std::initializer_list<const char*> words);
+
 /// A number with a range. Complains, and answers `fallback`, where it is missing (unless optional) or outside.
 struct NumberRule {
   double low = -1e300, high = 1e300;

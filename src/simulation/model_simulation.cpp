@@ -79,6 +79,8 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
   made.theta = model_theta(model, scene, gravity, blocks);
   SimulationOptions settings;
   settings.newmark_theta = model.theta;
+  if (model.is_corotated) settings.elastic_law = ElasticLaw::Corotated;
+  if (model.is_rayleigh) settings.stiffness_damping = StiffnessDamping::Rayleigh;
   Resolution resolution;
   resolution.cells = object_size(scene) / model.cell_size;
   resolution.pulls = int(scene.initial.pulls.size());

@@ -150,7 +150,9 @@ class Reader {
         t, "poissons_ratio",
         {.low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"});
     scene_.mass_damping = read_number(t, "mass_damping", at_least_zero("Rayleigh's, in 1/s"), 0.0);
-    scene_.stiffness_damping = read_number(t, "stiffness_damping", at_least_zero("Rayleigh's, in s"), 0.0);
+    scene_.stiffness_damping = read_number(t, "stiffness_damping", at_least_zero("in s"), 0.0);
+    scene_.is_corotated = read_choice(t, "mean_strain", {"neo_hookean", "corotated"}) == "corotated";
+    scene_.is_rayleigh = read_choice(t, "damping_law", {"kelvin_voigt", "rayleigh"}) == "rayleigh";
   }
 
   void read_gravity(TomlTable& t) { scene_.scene.world = read_world(t, true); }

@@ -22,7 +22,9 @@ struct SyntheticScene {
   std::vector<double> region_moduli;  ///< [Pa] of each region
   double poissons_ratio = 0.0;
   double mass_damping = 0.0;       ///< Rayleigh [1/s]
-  double stiffness_damping = 0.0;  ///< Rayleigh [s]
+  double stiffness_damping = 0.0;  ///< [s]
+  bool is_corotated = false;       ///< the elements' mean strain is linear in the rotated frame, not neo-Hookean
+  bool is_rayleigh = false;        ///< stiffness damping is Rayleigh's, not Kelvin and Voigt's
 
   double cell_size = 0.0;  ///< [m]
   int substeps = 4;        ///< time steps a frame

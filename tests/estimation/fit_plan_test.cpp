@@ -49,6 +49,7 @@ struct Plans : testing::Test {
   StageRecord record(const StageId& id, double cost, double modulus = 1e4) const {
     StageRecord r{id, "", theta(modulus), theta(modulus)};
     r.cost = cost, r.succeeded = std::isfinite(cost), r.iterations = 3;
+    r.misfit = 1.0;
     return r;
   }
   void has_done(StageRecord r) { state.done.push_back(std::move(r)); }
@@ -141,6 +142,54 @@ TEST_F(Plans, ScanWhereNoSwingWasSeen) {
   ASSERT_EQ(scan.trials.size(), 9u) << "four decades, two values each";
   EXPECT_DOUBLE_EQ(scan.trials.front(), 200.0 * 10.0 * 0.1) << "the stress under its own weight";
   EXPECT_NEAR(scan.trials.back() / scan.trials.front(), 1e4, 1e-8);
+}
+
+TEST_F(Plans, ScanFromTheSoftestThatMayHoldItselfUp) {
+  facts.softest = 7e3;
+  has_moved();
+  has_done(record({StageKind::Swing}, 0.0));
+  const auto chains = next();
+  EXPECT_DOUBLE_EQ(only(chains).trials.front(), 7e3);
+}
+
+TEST_F(Plans, DrawStartsWhileTheBestDoesNotFit) {
+  facts.options.most_starts = 5;
+  has_followed();
+  for (StageRecord& r : state.done) r.misfit = 9.0;
+  const std::vector<StageChain> drawn = next();
+  ASSERT_EQ(drawn.size(), 2u) << "two more";
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    ASSERT_EQ(drawn[i].size(), 1u) << "over the first frames alone";
+    EXPECT_EQ(drawn[i][0].id, (StageId{StageKind::Coarse, 2 + int(i), 0}));
+    const double modulus = drawn[i][0].from.front()[facts.moduli[0]];
+    EXPECT_GT(modulus, 400.0 / 6.0);
+    EXPECT_LT(modulus, 4e4 * 6.0);
+  }
+  EXPECT_NE(drawn[0][0].from.front(), drawn[1][0].from.front());
+  EXPECT_EQ(next()[0][0].from.front(), drawn[0][0].from.front()) << "the same again";
+  // One leads nowhere in the first frames, one is as good as the best.
+  has_done(record({StageKind::Coarse, 2, 0}, 50.0));
+  has_done(record({StageKind::Coarse, 3, 0}, 2.0, 9e3));
+  const std::vector<StageChain> on = next();
+  ASSERT_EQ(on.size(), 1u);
+  EXPECT_EQ(on[0][0].id, (StageId{StageKind::Coarse, 3, 1}));
+  EXPECT_EQ(on[0][0].from.front(), theta(9e3));
+  StageRecord good = record({StageKind::Coarse, 3, 1}, 1.0, 9.1e3);
+  good.misfit = 1.2;
+  has_done(good);
+  const std::vector<StageChain> fine = next();
+  EXPECT_EQ(only(fine).id.kind, StageKind::Fine) << "no more are needed";
+  EXPECT_EQ(only(fine).from.front(), theta(9.1e3));
+  EXPECT_EQ(FitPlan(facts).starts(state.done).size(), 4u);
+}
+
+TEST_F(Plans, DrawNoMoreStartsThanAreAllowed) {
+  facts.options.most_starts = 3;
+  has_followed();
+  for (StageRecord& r : state.done) r.misfit = 9.0;
+  ASSERT_EQ(next().size(), 1u);
+  has_done(record({StageKind::Coarse, 2, 0}, infinite));
+  EXPECT_EQ(only(next()).id.kind, StageKind::Fine);
 }
 
 TEST_F(Plans, BeginAtTheSwingThatWasSeen) {

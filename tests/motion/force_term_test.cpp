@@ -4,6 +4,7 @@
 #include "elasticity/corotated.hpp"
 #include "elasticity/law_elasticity.hpp"
 #include "elasticity/sampled_law.hpp"
+#include "elasticity/viscous_forces.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/fixed_regions.hpp"
 #include "motion/pull.hpp"
@@ -23,8 +24,14 @@ Handles of_material(const MotionBlocks& blocks) {
   Handles all = blocks.youngs_moduli;
   return all.push_back(blocks.poissons_ratio), all;
 }
-Handles of_plane(const MotionBlocks& blocks) { return {blocks.planes[1].whole()}; }
-Handles of_rough_plane(const MotionBlocks& blocks) { return {blocks.planes[1].whole(), blocks.planes[1].friction}; }
+Handles of_damped_material(const MotionBlocks& blocks) {
+  Handles all = of_material(blocks);
+  return all.push_back(blocks.stiffness_damping), all;
+}
+Handles of_plane(const MotionBlocks& blocks) { return {blocks.planes[1].whole(), blocks.contact_stiffness}; }
+Handles of_rough_plane(const MotionBlocks& blocks) {
+  return {blocks.planes[1].whole(), blocks.planes[1].friction, blocks.contact_stiffness};
+}
 Handles of_nothing(const MotionBlocks&) { return {}; }
 Handles of_pulls(const MotionBlocks& blocks) {
   Handles all = blocks.pulls;
@@ -182,6 +189,21 @@ std::vector<Family> families() {
     list.push_back(elastic(
         "ThreeModuliOf" + kind.name, [kind] { return with_three_moduli(*kind.make()); },
         kind.name.ends_with("Tetrahedra")));
+  for (const test::BodyKind& kind : test::body_kinds()) {
+    list.push_back(
+        {"NeoHookeanMeanOf" + kind.name, kind.make,
+         [](auto of, const MotionBlocks& blocks) { return make_elasticity(of, blocks, ElasticLaw::NeoHookean); }, true,
+         true, of_material, true});
+    const auto viscous = [](auto of, const MotionBlocks& blocks) {
+      return make_viscous_forces(of, blocks, blocks.stiffness_damping);
+    };
+    Family family{"ViscosityOf" + kind.name, kind.make, viscous, true, true, of_damped_material, true};
+    family.sees_start = family.rests = true;
+    list.push_back(family);
+    family.name = "ViscosityOfThreeModuliOf" + kind.name;
+    family.body = [kind] { return with_three_moduli(*kind.make()); };
+    list.push_back(family);
+  }
   add_laws(list);
   add_contacts(list);
   const auto box = [](bool quadratic) {

@@ -53,6 +53,7 @@ class Sensitivity : public ::testing::TestWithParam<std::tuple<int, Integrator>>
   Sensitivity() : scene(scene_for(last + 1, std::get<1>(GetParam()))) {
     scene.options.friction_speed = 0.2;  // the plane is rough
     scene.theta[scene.layout.planes[0].friction] = 0.3;
+    scene.theta[scene.layout.contact_stiffness] = scene.options.contact.stiffness;
   }
   int index() const { return std::get<0>(GetParam()); }
   test::TorusScene scene;
@@ -97,6 +98,41 @@ TEST_P(Sensitivity, AdjointMatchesTangent) {
 INSTANTIATE_TEST_SUITE_P(EveryParameter, Sensitivity,
                          ::testing::Combine(::testing::Range(0, MotionLayout({.planes = 1}).size()),
                                             ::testing::Values(Integrator::Lagged, Integrator::Newton)));
+
+/// One step a frame is too long for an impact: the steps in which nodes leap are taken in halves, and both derivatives
+/// follow them.
+TEST(Simulation, StepsThatAreTooLongAreHalved) {
+  test::TorusScene scene = scene_for();
+  const int as_planned = [&] {
+    Simulation simulation(scene.body, scene.options);
+    return simulation.run(scene.theta, [](int, const State&, auto) { return true; }).steps;
+  }();
+  EXPECT_GE(as_planned, last);
+  scene.options.max_dt = 1.0;
+  scene.theta.segment<3>(scene.layout.linear_velocity) *= 3.0;
+  Simulation simulation(scene.body, scene.options);
+  const VectorX direction = relative_scale(scene.theta, scene.layout.youngs_moduli[0].first);
+  const Points weight = test::deformed(scene.body->reference_positions(), 0.3);
+  double by_tangent = 0.0;
+  const RolloutSummary run =
+      simulation.run(scene.theta, direction, last, [&](int f, const State& state, std::span<const State> tangents) {
+        EXPECT_LT(state.x.cwiseAbs().maxCoeff(), 2.0) << "it does not explode";
+        if (f == last) by_tangent = weight.cwiseProduct(tangents[0].x).sum();
+        return true;
+      });
+  ASSERT_TRUE(run.succeeded) << run.failure;
+  EXPECT_GT(run.steps, last) << "some were halved";
+  VectorX gradient;
+  const RolloutSummary reverse = simulation.run_adjoint(
+      scene.theta, last, [](int, const State&) { return true; },
+      [&](int f, const State&, Points& bar) {
+        if (f == last) bar += weight;
+      },
+      gradient);
+  ASSERT_TRUE(reverse.succeeded) << reverse.failure;
+  EXPECT_EQ(reverse.steps, run.steps);
+  EXPECT_NEAR(gradient.dot(direction), by_tangent, tolerance(1e-9) * std::abs(by_tangent));
+}
 
 /// Two schemes of one equation: their difference vanishes with the step, the fully implicit one's own error too.
 TEST(Simulation, BothIntegratorsAgreeAsStepsShrink) {

@@ -127,7 +127,7 @@ TEST(MotionLayouts, HaveAsManyBlocksAsWereAskedFor) {
   EXPECT_EQ(layout.planes.size(), 2u);
   EXPECT_EQ(layout.pulls.size(), 4u);
   EXPECT_EQ(layout.scan_corrections.size(), 2u);
-  EXPECT_EQ(layout.size(), MotionLayout().size() + 2 + 2 * (6 + 1) + 4 * 3 + 2 * 3);
+  EXPECT_EQ(layout.size(), MotionLayout().size() + 2 + 2 * (6 + 1) + 1 + 4 * 3 + 2 * 3);
   EXPECT_EQ(layout.zero(), VectorX::Zero(layout.size()));
   EXPECT_EQ(layout.layout().at("youngs_modulus@3"), layout.youngs_moduli[2]);
   EXPECT_EQ(layout.layout().at("plane_2"), layout.planes[1].whole());

@@ -114,6 +114,7 @@ TEST(ValueWithUncertainty, RoundsBothToTheSamePlace) {
   EXPECT_EQ(value_with_uncertainty(590.3, 21.4, "Pa"), "590 ± 21\u00a0Pa");
   EXPECT_EQ(value_with_uncertainty(0.2437, 0.052, "1/s"), "0.244 ± 0.052\u00a01/s");
   EXPECT_EQ(value_with_uncertainty(12345.0, 432.0, "Pa"), "12.35 ± 0.43\u00a0kPa");
+  EXPECT_EQ(value_with_uncertainty(4.21e6, 6.5e5, "Pa/m"), "4.21 ± 0.65\u00a0MPa/m");
   EXPECT_EQ(value_with_uncertainty(0.0271, 0.004, "s"), "27.1 ± 4\u00a0ms");
   EXPECT_EQ(value_with_uncertainty(0.35, std::nullopt, "1"), "0.35");
   EXPECT_EQ(value_with_uncertainty(95.0, std::nullopt, "kg/m^3"), "95\u00a0kg/m³");

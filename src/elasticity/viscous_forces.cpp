@@ -1,0 +1,238 @@
+#include "elasticity/viscous_forces.hpp"
+
+#include "elasticity/local_stiffness.hpp"
+
+namespace pliant {
+
+namespace {
+
+using element_vector::node;
+
+template <int N>
+class ViscousForces : public ForceTerm {
+ public:
+  ViscousForces(std::shared_ptr<const Body> body, const MaterialBlocks& material, ParameterHandle stiffness_damping)
+      : body_(std::move(body)),
+        material_(material),
+        damping_block_(stiffness_damping),
+        modulus_(body_, material),
+        stiffness_(body_),
+        blocks_(element_blocks(*body_)),
+        gradients_(std::size_t(body_->element_count()), Matrix3::Identity()) {}
+
+  Lag lag() const override { return Lag::Rotation; }
+  At at() const override { return At::End; }
+  bool sees_start() const override { return true; }
+
+  void set_parameters(const VectorX& theta) override;
+  void begin_step(const StepContext& step) override { step_ = step, has_strained_ = false; }
+  void linearise(const Points& lag) override;
+  void add_force(const Points& z, Points& force) override;
+  void add_matrix(double scale, BlockMatrix& matrix) override;
+  void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
+  void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
+                         Points& force) override;
+  void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
+  void add_start_tangent(const Points& z, const Points& d_start, const Points& d_start_velocity,
+                         Points& force) override;
+  void add_start_adjoint(const Points& z, const Points& w, Points& start_bar, Points& start_velocity_bar) override;
+
+ private:
+  using Vector = Eigen::Matrix<double, 3 * N, 1>;
+  const int* nodes_of(int element) const { return body_->connectivity.data() + std::size_t(element) * N; }
+  auto shape_gradients(int element) const { return body_->mean_gradient.middleRows<N>(Eigen::Index(element) * N); }
+  int count() const { return int(gradients_.size()); }
+  bool is_active() const { return step_.start && damping_ > 0.0; }
+  double rate() const { return damping_ / step_.dt; }
+  Matrix3 gradient(int element, const Points& x) const {
+    const auto g = shape_gradients(element);
+    Matrix3 F = Matrix3::Zero();
+    for (int a = 0; a < N; ++a) F.noalias() += x.row(nodes_of(element)[a]).transpose() * g.row(a);
+    return F;
+  }
+  /// The element's nodes' numbers of some points.
+  Vector gathered(int element, const Points& points) const {
+    Vector local;
+    for (int a = 0; a < N; ++a) node(local, a) = points.row(nodes_of(element)[a]).transpose();
+    return local;
+  }
+  /// A^T v node by node.
+  static Vector turned(const Matrix3& A, const Vector& v) {
+    Vector local;
+    for (int a = 0; a < N; ++a) node(local, a).noalias() = A.transpose() * node(v, a);
+    return local;
+  }
+  void scatter(int element, double factor, const Matrix3& A, const Vector& v, Points& out) const {
+    for (int a = 0; a < N; ++a) out.row(nodes_of(element)[a]).noalias() += factor * (A * node(v, a)).transpose();
+  }
+  /// The way of the element's nodes in the step so far.
+  Vector way(int element, const Points& z) const { return gathered(element, z) - gathered(element, *step_.start); }
+
+  std::shared_ptr<const Body> body_;
+  MaterialBlocks material_;
+  ParameterHandle damping_block_;
+  ElementModuli modulus_;
+  double poissons_ratio_ = -2.0, damping_ = 0.0;
+  LocalStiffness<N> stiffness_;
+  std::vector<int> blocks_;
+  /// What both products need of each element, once for all directions of a step.
+  struct Strained {
+    Vector way, turned, stress;  // s = z - x0, u = F^T s, K u
+  };
+  const std::vector<Strained>& strained(const Points& z) {
+    if (has_strained_ && strained_at_ == z) return strained_;
+    strained_.resize(gradients_.size());
+    for (int e = 0; e < count(); ++e) {
+      Strained& own = strained_[std::size_t(e)];
+      own.way = way(e, z);
+      own.turned = turned(gradients_[std::size_t(e)], own.way);
+      own.stress = stiffness_.times(e, own.turned);
+    }
+    strained_at_ = z;
+    has_strained_ = true;
+    return strained_;
+  }
+  std::vector<Matrix3> gradients_;  // of the lag point
+  std::vector<Strained> strained_;
+  Points strained_at_;
+  bool has_strained_ = false;
+  StepContext step_;
+};
+
+template <int N>
+void ViscousForces<N>::set_parameters(const VectorX& theta) {
+  step_ = {};
+  has_strained_ = false;
+  modulus_.set_parameters(theta);
+  damping_ = theta[damping_block_];
+  const double nu = theta[material_.poissons_ratio];
+  if (nu == poissons_ratio_) return;
+  poissons_ratio_ = nu;
+  stiffness_.set_poissons_ratio(nu);
+}
+
+template <int N>
+void ViscousForces<N>::linearise(const Points& lag) {
+  has_strained_ = false;
+  if (!is_active()) return;
+  for (int e = 0; e < count(); ++e) gradients_[std::size_t(e)] = gradient(e, lag);
+}
+
+template <int N>
+void ViscousForces<N>::add_force(const Points& z, Points& force) {
+  if (!is_active()) return;
+  for (int e = 0; e < count(); ++e) {
+    const Matrix3& F = gradients_[std::size_t(e)];
+    scatter(e, -rate() * modulus_[e], F, stiffness_.times(e, turned(F, way(e, z))), force);
+  }
+}
+
+template <int N>
+void ViscousForces<N>::add_matrix(double scale, BlockMatrix& matrix) {
+  if (!is_active()) return;
+  for (int e = 0; e < count(); ++e)
+    stiffness_.add_transformed(e, gradients_[std::size_t(e)], scale * rate() * modulus_[e],
+                               blocks_.data() + std::size_t(e) * (N * N), matrix);
+}
+
+/// A change dp changes F by dp_b g_b^T, and with s = z - x0, y = K F^T s the force by
+///   - beta/dt ((g_b . y_a) dp_b + F sum_c K_ac g_b (s_c . dp_b)).
+template <int N>
+void ViscousForces<N>::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
+  if (!is_active()) return;
+  for (int e = 0; e < count(); ++e) {
+    const Matrix3& F = gradients_[std::size_t(e)];
+    const Vector s = way(e, z);
+    const Vector y = stiffness_.times(e, turned(F, s));
+    const double factor = scale * rate() * modulus_[e];
+    const auto g = shape_gradients(e);
+    const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+    for (int b = 0; b < N; ++b) {
+      const Vector3 g_b = g.row(b);
+      for (int d = 0; d < 3; ++d) {
+        Vector by;
+        for (int c = 0; c < N; ++c) node(by, c) = g_b * node(s, c)[d];
+        const Vector change = stiffness_.times(e, by);
+        for (int a = 0; a < N; ++a) {
+          Eigen::Map<Matrix3> block(matrix.block(blocks[N * a + b]));
+          block.col(d).noalias() += factor * (F * node(change, a));
+          block(d, d) += factor * g_b.dot(node(y, a));
+        }
+      }
+    }
+  }
+}
+
+template <int N>
+void ViscousForces<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
+                                         const VectorX& d_theta, Points& force) {
+  if (!step_.start) return;
+  modulus_.set_change(d_theta);
+  const double d_nu = d_theta[material_.poissons_ratio], d_damping = d_theta[damping_block_];
+  const std::vector<Strained>& all = strained(z);
+  for (int e = 0; e < count(); ++e) {
+    const Matrix3& F = gradients_[std::size_t(e)];
+    const Matrix3 dF = gradient(e, d_lag);
+    const auto& [s, u, y] = all[std::size_t(e)];
+    Vector dy = stiffness_.times(e, turned(dF, s) + turned(F, gathered(e, d_z)));
+    if (d_nu != 0.0) dy += d_nu * stiffness_.derivative_times(e, u);
+    dy += modulus_.log_change(e) * y;
+    const double factor = modulus_[e] / step_.dt;
+    scatter(e, -factor * damping_, dF, y, force);
+    scatter(e, -factor, F, damping_ * dy + d_damping * y, force);
+  }
+}
+
+template <int N>
+void ViscousForces<N>::add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
+                                         VectorX& theta_bar) {
+  if (!step_.start) return;
+  modulus_.begin_adjoint();
+  const std::vector<Strained>& all = strained(z);
+  for (int e = 0; e < count(); ++e) {
+    const Matrix3& F = gradients_[std::size_t(e)];
+    const auto& [s, u, y] = all[std::size_t(e)];
+    const Vector w_e = gathered(e, w), c = turned(F, w_e), k = stiffness_.times(e, c);
+    const double factor = rate() * modulus_[e], work = c.dot(y);
+    scatter(e, -factor, F, k, z_bar);
+    Matrix3 F_bar = Matrix3::Zero();
+    for (int a = 0; a < N; ++a)
+      F_bar.noalias() += node(w_e, a) * node(y, a).transpose() + node(s, a) * node(k, a).transpose();
+    const auto g = shape_gradients(e);
+    for (int a = 0; a < N; ++a)
+      lag_bar.row(nodes_of(e)[a]).noalias() -= factor * (F_bar * g.row(a).transpose()).transpose();
+    modulus_.add_log_adjoint(e, -factor * work);
+    theta_bar[damping_block_] -= modulus_[e] / step_.dt * work;
+    theta_bar[material_.poissons_ratio] -= factor * c.dot(stiffness_.derivative_times(e, u));
+  }
+  modulus_.end_adjoint(theta_bar);
+}
+
+template <int N>
+void ViscousForces<N>::add_start_tangent(const Points&, const Points& d_start, const Points&, Points& force) {
+  if (!is_active()) return;
+  for (int e = 0; e < count(); ++e) {
+    const Matrix3& F = gradients_[std::size_t(e)];
+    scatter(e, rate() * modulus_[e], F, stiffness_.times(e, turned(F, gathered(e, d_start))), force);
+  }
+}
+
+template <int N>
+void ViscousForces<N>::add_start_adjoint(const Points&, const Points& w, Points& start_bar, Points&) {
+  if (!is_active()) return;
+  for (int e = 0; e < count(); ++e) {
+    const Matrix3& F = gradients_[std::size_t(e)];
+    scatter(e, rate() * modulus_[e], F, stiffness_.times(e, turned(F, gathered(e, w))), start_bar);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<ForceTerm> make_viscous_forces(std::shared_ptr<const Body> body, const MaterialBlocks& blocks,
+                                               ParameterHandle stiffness_damping) {
+  return with_node_count(*body, [&]<int N>() -> std::unique_ptr<ForceTerm> {
+    return std::make_unique<ViscousForces<N>>(body, blocks, stiffness_damping);
+  });
+}
+
+}  // namespace pliant

@@ -1,0 +1,124 @@
+// Derivatives of both are in the battery of force terms (motion/force_term_test.cpp).
+#include "elasticity/viscous_forces.hpp"
+
+#include <gtest/gtest.h>
+
+#include "elasticity/corotated.hpp"
+#include "support/bodies.hpp"
+
+namespace pliant {
+namespace {
+
+struct Damped {
+  explicit Damped(const test::BodyKind& kind) : body(kind.make()), theta(layout.zero()) {
+    layout.set_moduli(theta, 3000.0);
+    theta[layout.poissons_ratio] = 0.3;
+    theta[layout.stiffness_damping] = beta;
+    term = make_viscous_forces(body, layout, layout.stiffness_damping);
+    term->set_parameters(theta);
+  }
+  Points moved(const Matrix3& F) const { return body->reference_positions() * F.transpose(); }
+  Points force(const Points& start, const Points& lag, const Points& end) {
+    const Points velocity = Points::Zero(start.rows(), 3);
+    term->begin_step({&start, &velocity, 0.0, dt});
+    term->linearise(lag);
+    Points f = Points::Zero(start.rows(), 3);
+    term->add_force(end, f);
+    return f;
+  }
+  double volume() const { return body->volume(); }
+
+  static constexpr double beta = 0.004, dt = 0.01;
+  std::shared_ptr<const Body> body;
+  MotionLayout layout;
+  VectorX theta;
+  std::unique_ptr<ForceTerm> term;
+};
+
+/// Under a homogeneous F and rate dF/dt the power is that of S = beta C : dE/dt over the volume, dE/dt = sym(F^T
+/// dF/dt).
+TEST(ViscousForces, TakeThePowerOfTheGreenStrainRate) {
+  Matrix3 F, rate;
+  F << 0.7, 0.1, 0.0, -0.2, 1.1, 0.05, 0.1, 0.0, 1.3;
+  rate << -2.0, 0.5, 0.3, 0.1, 1.0, -0.4, 0.2, 0.6, 0.8;
+  for (const test::BodyKind& kind : test::body_kinds()) {
+    Damped damped(kind);
+    const Points x = damped.moved(F), velocity = damped.moved(rate);
+    const Points f = damped.force(x, x, x + Damped::dt * velocity);
+    const Matrix3 strain_rate = 0.5 * (F.transpose() * rate + rate.transpose() * F);
+    const UnitLame lame = unit_lame(0.3);
+    const double density =
+        lame.lambda * strain_rate.trace() * strain_rate.trace() + 2.0 * lame.mu * strain_rate.squaredNorm();
+    const double power = -Damped::beta * 3000.0 * damped.volume() * density;
+    EXPECT_NEAR(f.cwiseProduct(velocity).sum() / power, 1.0, 1e-10) << kind.name;
+    EXPECT_LT(f.colwise().sum().norm(), 1e-10 * f.norm()) << kind.name;
+  }
+}
+
+TEST(ViscousForces, LeaveARigidMotionAlone) {
+  Matrix3 F;
+  F << 0.7, 0.1, 0.0, -0.2, 1.1, 0.05, 0.1, 0.0, 1.3;
+  Matrix3 spin;
+  spin << 0.0, -3.0, 1.0, 3.0, 0.0, 2.0, -1.0, -2.0, 0.0;
+  for (const test::BodyKind& kind : test::body_kinds()) {
+    Damped damped(kind);
+    const Points x = damped.moved(F);
+    const Points turning = damped.force(x, x, x + Damped::dt * x * spin.transpose());
+    const Points stretching = damped.force(x, x, x + Damped::dt * 3.0 * x);
+    EXPECT_LT(turning.norm(), 1e-12 * stretching.norm()) << kind.name;
+  }
+}
+
+TEST(ViscousForces, AreThoseOfRayleighAtSmallStrain) {
+  for (const test::BodyKind& kind : test::body_kinds()) {
+    Damped damped(kind);
+    const Points x = damped.body->reference_positions();
+    const Points way = 1e-3 * Points::Random(x.rows(), 3);
+    const auto elasticity = make_elasticity(damped.body, damped.layout);
+    elasticity->set_parameters(damped.theta);
+    elasticity->linearise(x);
+    Points elastic = Points::Zero(x.rows(), 3);
+    elasticity->add_force(x + way, elastic);
+    const Points viscous = damped.force(x, x, x + way);
+    EXPECT_LT((viscous - Damped::beta / Damped::dt * elastic).norm(), 1e-10 * viscous.norm()) << kind.name;
+  }
+}
+
+TEST(ViscousForces, AreNothingAtRest) {
+  Damped damped(test::body_kinds().front());
+  damped.term->begin_step({});
+  const Points x = damped.body->reference_positions();
+  damped.term->linearise(x);
+  Points f = Points::Zero(x.rows(), 3);
+  damped.term->add_force(2.0 * x, f);
+  EXPECT_EQ(f.norm(), 0.0);
+}
+
+/// Homogeneous uniaxial strain: sigma = F P^T / J, with what lateral constraint asks for.
+TEST(NeoHookeanMean, HasTheStressOfItsEnergy) {
+  const UnitLame lame = unit_lame(0.35);
+  for (const double stretch : {0.5, 0.8, 1.0, 1.4}) {
+    const Matrix3 F = Vector3(stretch, 1.0, 1.0).asDiagonal();
+    for (const test::BodyKind& kind : test::body_kinds()) {
+      const auto body = kind.make();
+      MotionLayout layout;
+      VectorX theta = layout.zero();
+      layout.set_moduli(theta, 3000.0);
+      theta[layout.poissons_ratio] = 0.35;
+      const auto term = make_elasticity(body, layout, ElasticLaw::NeoHookean);
+      term->set_parameters(theta);
+      const Points x = body->reference_positions() * F;
+      term->linearise(x);
+      const double s = stretch;
+      // dW/ds of W = mu/2 (s^2 - 1) - mu (s - 1) + (lambda + mu)/2 (s - 1)^2; lateral faces have unit area s.
+      const double along = 3000.0 * (lame.mu * s - lame.mu + (lame.lambda + lame.mu) * (s - 1.0));
+      EXPECT_NEAR(term->cauchy_stress(0)(0, 0), along, 1e-9 * 3000.0) << kind.name << " " << s;
+      const double W = 3000.0 * (0.5 * lame.mu * (s * s - 1.0) - lame.mu * (s - 1.0) +
+                                 0.5 * (lame.lambda + lame.mu) * (s - 1.0) * (s - 1.0));
+      EXPECT_NEAR(term->energy(x), W * body->volume(), 1e-9 * 3000.0 * body->volume()) << kind.name << " " << s;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace pliant
