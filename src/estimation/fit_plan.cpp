@@ -404,14 +404,21 @@ VectorX FitPlan::drawn_start(int index, const Records& done) const {
   const double modulus = std::pow(10.0, log_least + (log_most - log_least) * uniform());
   VectorX theta = with_modulus(before_starts(done), modulus, done);
   ParameterSet drawn = facts_.parameters;
+  // The throw is told by the first frames, better than by its prior.
   const auto is_drawn = [](const Parameter& p) {
-    return p.is_scalar() && std::isfinite(p.prior_std) && (p.role == Role::Damping || shapes_law(p));
+    return std::isfinite(p.prior_std) && !p.is_auxiliary &&
+           (p.role == Role::Damping || p.role == Role::Load || p.role == Role::Obstacle || shapes_law(p));
   };
   for (const Parameter& p : facts_.parameters.parameters()) drawn.set_estimated(p.name, p.estimated && is_drawn(p));
   drawn.set_reference(theta);
   VectorX p = drawn.to_unconstrained(theta);
   const std::vector<const Parameter*> of = drawn.coordinate_parameters();
-  for (std::size_t i = 0; i < of.size(); ++i) p[Eigen::Index(i)] = of[i]->prior_mean[0] + of[i]->prior_std * normal();
+  Eigen::Index first = 0;  // coordinate of the parameter
+  for (Eigen::Index i = 0; i < p.size(); ++i) {
+    const Parameter& parameter = *of[std::size_t(i)];
+    if (i > 0 && of[std::size_t(i) - 1] != &parameter) first = i;
+    p[i] = parameter.prior_mean[i - first] + parameter.prior_std * normal();
+  }
   return drawn.to_theta(drawn.clamp(p));
 }
 

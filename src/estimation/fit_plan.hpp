@@ -79,8 +79,9 @@ class FitPlan {
   int start_count(const Records& done) const;
   /// Whether a start leads nowhere.
   bool is_given_up(int index, const Records& done) const;
-  /// A start beyond those of the scan or the swing: the modulus log-uniform about those, what shapes the law and the
-  /// dampings drawn from their priors. The same for the same number.
+  /// A start beyond those of the scan or the swing: the modulus log-uniform about those; what shapes the law, dampings,
+  /// gravity, and how obstacles stand, are hard and rub, drawn from their priors where they are estimated. The same for
+  /// the same number.
   VectorX drawn_start(int index, const Records& done) const;
   /// The end of a start's chain; null where it is not reached.
   const StageRecord* end_of_start(int index, const Records& done) const;

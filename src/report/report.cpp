@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <stdexcept>
 
 #include "base/base64.hpp"
@@ -309,23 +310,34 @@ const ParameterResult* parameter_of(const Result& result, const std::string& nam
   return p ? p : result.find(name.substr(0, name.find('.')));
 }
 
+// Estimated scalars of a start, in words.
+std::string spoken_values(const Result& result, const std::map<std::string, double>& values) {
+  std::string text;
+  for (const auto& [name, value] : values) {
+    const ParameterResult* p = parameter_of(result, name);
+    if (p && !p->estimated) continue;  // the same for all starts
+    text += (text.empty() ? "" : "; ") + spoken_name(name) + " " +
+            value_with_uncertainty(value, std::nullopt, p ? p->unit : "1");
+  }
+  return text;
+}
+
+// Best first.
 std::string starts_table(const Result& result) {
   if (result.starts.empty()) return "";
+  std::vector<std::size_t> order(result.starts.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return result.starts[i].cost.value_or(HUGE_VAL); });
   std::string body;
-  for (size_t i = 0; i < result.starts.size(); ++i) {
+  for (const std::size_t i : order) {
     const StartResult& s = result.starts[i];
-    std::string ends;
-    for (const auto& [name, value] : s.final) {
-      const ParameterResult* p = parameter_of(result, name);
-      if (p && !p->estimated) continue;  // the same for all starts
-      ends += (ends.empty() ? "" : "; ") + spoken_name(name) + " " +
-              value_with_uncertainty(value, std::nullopt, p ? p->unit : "1");
-    }
-    body += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}{}</td><td>{}</td></tr>\n", i + 1,
+    body += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}{}</td><td>{}</td><td>{}</td></tr>\n", i + 1,
                         s.cost ? readable(*s.cost, 4) : "not finite", s.iterations,
-                        s.converged ? "" : "not converged: ", escape_html(s.reason), escape_html(ends));
+                        s.converged ? "" : "not converged: ", escape_html(s.reason),
+                        escape_html(spoken_values(result, s.start)), escape_html(spoken_values(result, s.final)));
   }
-  return table("<th>start</th><th>cost</th><th>iterations</th><th>why it stopped</th><th>ended at</th>", body);
+  return table("<th>start</th><th>cost</th><th>iterations</th><th>why it stopped</th><th>began at</th><th>ended at</th>",
+               body);
 }
 
 // Scalars, a row for each resolution and one for their limit.

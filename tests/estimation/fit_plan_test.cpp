@@ -24,7 +24,9 @@ struct Plans : testing::Test {
     facts.moduli = {add("youngs_modulus", "Pa", 1, Role::Material, true).at};
     add("poissons_ratio", "1", 1, Role::Material, true);
     facts.density = add("density", "kg/m^3", 1, Role::Inertia, false).at;
-    facts.gravity = add("gravity", "m/s^2", 3, Role::Load, false).at;
+    Parameter& gravity = add("gravity", "m/s^2", 3, Role::Load, false);
+    gravity.prior_mean = Vector3(0.0, -10.0, 0.0), gravity.prior_std = 10.0;
+    facts.gravity = gravity.at;
     add("linear_velocity", "m/s", 3, Role::Initial, true);
     add("range_error@front", "m", 1, Role::Sensor, false);
     VectorX theta = VectorX::Zero(layout.size());
@@ -150,6 +152,23 @@ TEST_F(Plans, ScanFromTheSoftestThatMayHoldItselfUp) {
   has_done(record({StageKind::Swing}, 0.0));
   const auto chains = next();
   EXPECT_DOUBLE_EQ(only(chains).trials.front(), 7e3);
+}
+
+TEST_F(Plans, DrawGravityWhereItIsNotKnown) {
+  facts.options.most_starts = 4;
+  facts.parameters.set_estimated("gravity", true);
+  has_followed();
+  for (StageRecord& r : state.done) r.misfit = 9.0;
+  const std::vector<StageChain> drawn = next();
+  ASSERT_EQ(drawn.size(), 2u);
+  const VectorX &first = drawn[0][0].from.front(), &second = drawn[1][0].from.front();
+  const Vector3 change = facts.gravity.vector(first) - facts.gravity.vector(facts.parameters.reference());
+  for (int d = 0; d < 3; ++d) {
+    EXPECT_NE(change[d], 0.0);
+    EXPECT_LT(std::abs(change[d]), 40.0) << "four deviations of the prior";
+    EXPECT_NE(facts.gravity.vector(first)[d], facts.gravity.vector(second)[d]);
+  }
+  EXPECT_EQ(first[facts.density], facts.parameters.reference()[facts.density]) << "given";
 }
 
 TEST_F(Plans, DrawStartsWhileTheBestDoesNotFit) {
