@@ -9,6 +9,7 @@ import sys
 
 import plots
 from bar_page import bar, dinosaur
+from battery_page import battery, coverage
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_zones
 from material_curves_page import material_curves
 from oracle_tracking_page import clouds
@@ -385,6 +386,13 @@ def arm():
 
 
 SECTIONS = [
+    ("A battery of random recordings", "battery",
+     "Twenty recordings by another simulator, drawn at random: shape, size, stiffness, density, dampings, camera, and how the object is dropped, thrown on a tilted board, pulled and let go, or hung. "
+     "Fitted with no choice of ours; the truth is read for judging only.", battery),
+    ("How often intervals hold the truth", "coverage",
+     "Recordings by `pliant synth` on smaller elements and steps than a fit's. Each differs in one more way from what a fit assumes: `law`, linear elasticity in turning frames and Rayleigh's damping; "
+     "`damping`, Rayleigh's alone; `contact`, a floor up to ten times softer and five times smoother; `friction`, a coefficient that the capture has wrong by 0.05; `varying`, parts a tenth stiffer and softer; `mesh`, nothing more. "
+     "`odd` are those of odd number, of every family.", coverage),
     ("Another simulator's recordings", "oracle-bounce",
      "A ring dropped on the floor (twice), and a pebble dropped on a tilted board whose place is to be found too, recorded by another simulator with another material law, other elements "
      "and a model of a depth sensor's faults. Fitted with no choice of ours; the truth is read for judging only.", oracle),

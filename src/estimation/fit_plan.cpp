@@ -130,8 +130,7 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
   if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Corrected)) return {};
   if (StageChain chain = finer(done); !chain.empty()) return {chain};
-  if (StageChain chain = alternative(done); !chain.empty()) return {chain};
-  return {};
+  return alternatives(done);
 }
 
 Stage FitPlan::last_look(const PassState& state) const {
@@ -315,11 +314,12 @@ StageChain FitPlan::finer(const Records& done) const {
   return {};
 }
 
-/// The next one, at the result.
-StageChain FitPlan::alternative(const Records& done) const {
+/// Those that are left, at the result.
+std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
   const StageRecord* at = result(done);
   if (!at) return {};
   const Spacing own = spacing_of(*at);
+  std::vector<StageChain> left;
   for (std::size_t i = 0; i < facts_.alternatives.size(); ++i) {
     const Alternative& a = facts_.alternatives[i];
     Stage stage{{StageKind::Alternative, at->id.start, int(i)}, a.cause, {own.cells * a.cells, own.steps * a.steps}};
@@ -329,9 +329,9 @@ StageChain FitPlan::alternative(const Records& done) const {
     stage.from = {at->theta};
     stage.alternative = a;
     stage.done_from = stage.done_to = 1.0;
-    return {stage};
+    left.push_back({std::move(stage)});
   }
-  return {};
+  return left;
 }
 
 // What the records say ----------------------------------------------------------------------------------------------

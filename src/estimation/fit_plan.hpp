@@ -70,7 +70,7 @@ class FitPlan {
   Stage test(const StageRecord& estimate) const;
   StageChain corrected(const Records& done, const std::optional<PassState::Beginning>& begin) const;
   StageChain finer(const Records& done) const;
-  StageChain alternative(const Records& done) const;
+  std::vector<StageChain> alternatives(const Records& done) const;
 
   /// Where the fit is before any start is followed.
   VectorX before_starts(const Records& done) const;

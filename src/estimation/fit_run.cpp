@@ -43,6 +43,7 @@ int last_frame(const Horizon& horizon, const Recording& r) {
 
 constexpr double largest_shift = 1.0;    // of an unconstrained coordinate, by a few steps
 constexpr int steps_of_alternative = 3;  // enough to tell how far another model's estimate lies
+constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 // From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
 // less than that. A finer mesh is affordable at rest; of a motion the coarser one tells.
 constexpr double size_of_finer_mesh = 1.8, size_of_coarser_mesh = 0.8, size_of_longer_step = 0.6;
@@ -165,10 +166,24 @@ std::vector<Alternative> FitRun::alternatives() const {
 
 std::vector<StageChain> FitRun::next() {
   std::vector<StageChain> chains = plan_.next(state_);
+  const bool at_alternatives = !chains.empty() && chains.front().front().alternative;
+  if (at_alternatives && !grids_of_fit_) grids_of_fit_ = grids_.size();
+  if (!at_alternatives && grids_of_fit_) grids_.resize(*grids_of_fit_);  // those of alternatives are not used again
   for (const StageChain& chain : chains)
-    for (const Stage& stage : chain)  // made before threads ask for it
-      if (!stage.alternative) (void)grid(stage.grid);
+    for (const Stage& stage : chain) make_grid(stage);  // before threads ask for it
   return chains;
+}
+
+void FitRun::make_grid(const Stage& stage) {
+  if (!stage.alternative) {
+    (void)grid(stage.grid);
+    return;
+  }
+  try {
+    (void)grid(stage.grid, stage.alternative->change);
+  } catch (const InputError& error) {  // no mesh as fine, or too small an object
+    not_made_[stage.id.number] = error.what();
+  }
 }
 
 StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
@@ -229,6 +244,7 @@ OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, cons
   OptimiserOptions o;
   o.kind = options_.optimiser;
   o.max_iterations = stage.iterations;
+  if (!recordings_.all_static()) o.trials_after_rejection = trials_after_rejection;
   const bool saves = is_on_full_grid(stage.id.kind) && !interrupted_;  // a last look is no state to go on from
   const bool is_staggered = options_.load_free == LoadFreeScheme::Staggered && recordings_.any_sags();
   int iterations = from.iterations;
@@ -401,24 +417,23 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
     record.shifts = shifts_of_given(stage, parameters);
     return record;
   }
-  const std::size_t own_grids = grids_.size();
-  try {
-    Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
-    OptimiserOptions o;
-    o.max_iterations = steps_of_alternative;
-    const VectorX p = parameters.to_unconstrained(theta);
-    const OptimiserSummary s =
-        minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
-    is_cut = s.interrupted;
-    record.cost = s.succeeded ? s.evaluation.cost : infinite;
-    record.iterations = s.iterations;
-    if (!s.succeeded) record.reason = s.reason;
-    if (s.succeeded) record.shifts = {{alternative.cause, (s.p - p).cwiseMax(-largest_shift).cwiseMin(largest_shift)}};
-    outcome_.forward_steps += s.steps;
-  } catch (const InputError& error) {  // no mesh as fine, or too small an object
-    record.reason = error.what();
+  if (const auto failure = not_made_.find(stage.id.number); failure != not_made_.end()) {
+    record.reason = failure->second;
+    return record;
   }
-  grids_.resize(own_grids);  // its grid, if it had one of its own, is not used again
+  Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
+  OptimiserOptions o;
+  o.max_iterations = steps_of_alternative;
+  const VectorX p = parameters.to_unconstrained(theta);
+  const OptimiserSummary s =
+      minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
+  is_cut = s.interrupted;
+  record.cost = s.succeeded ? s.evaluation.cost : infinite;
+  record.iterations = s.iterations;
+  if (!s.succeeded) record.reason = s.reason;
+  if (s.succeeded) record.shifts = {{alternative.cause, (s.p - p).cwiseMax(-largest_shift).cwiseMin(largest_shift)}};
+  const std::lock_guard lock(mutex_);
+  outcome_.forward_steps += s.steps;
   return record;
 }
 
@@ -506,8 +521,11 @@ void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRe
 std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) {
   const VectorX own = gauss_newton_shift(outcome_.evaluation, largest_shift);
   std::vector<ModelShift> shifts;
-  for (const StageRecord& r : done) {
-    if (r.id.kind != StageKind::Alternative) continue;
+  std::vector<StageRecord> tried;  // side by side: told in an order that does not depend on who was faster
+  std::ranges::copy_if(done, std::back_inserter(tried),
+                       [](const StageRecord& r) { return r.id.kind == StageKind::Alternative; });
+  std::ranges::sort(tried, {}, &StageRecord::id);
+  for (const StageRecord& r : tried) {
     const Alternative& a = plan_.facts().alternatives[std::size_t(r.id.number)];
     if (!r.reason.empty())
       outcome_.notes.push_back("How much the estimate depends on the " + r.name + " could not be seen: " + r.reason +

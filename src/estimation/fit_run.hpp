@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,6 +38,8 @@ class FitRun : StageLoop {
   ParameterSet parameters_of(const Stage& stage, const VectorX& theta) const;
   Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const;
   const Grid& grid(const Spacing& spacing, const ModelChange& change = {});
+  /// Makes a stage's grid; an alternative's that cannot be made is told by the stage.
+  void make_grid(const Stage& stage);
 
   void tell(FitEvent event);
 
@@ -71,6 +74,8 @@ class FitRun : StageLoop {
   Recordings recordings_;
   std::shared_ptr<const ParameterLayout> layout_;
   std::vector<std::unique_ptr<Grid>> grids_;
+  std::optional<std::size_t> grids_of_fit_;  // how many there were before the alternatives'
+  std::map<int, std::string> not_made_;      // why, by the alternative's number
   FitPlan plan_;
   std::vector<Ended> ended_;  // in this run
 };

@@ -46,6 +46,12 @@ class Run {
     summary.steps += e.steps;
     return e;
   }
+  /// Costs alone, side by side where that can be.
+  std::vector<CostEvaluation> evaluate(const std::vector<VectorX>& points) {
+    std::vector<CostEvaluation> all = objective_.evaluate(points);
+    for (const CostEvaluation& e : all) ++summary.evaluations, summary.steps += e.steps;
+    return all;
+  }
   bool begin(const OptimiserState& state, Derivatives by) {
     summary.p = objective_.parameters().clamp(state.p);
     summary.iterations = state.iterations;
@@ -105,48 +111,89 @@ VectorX step_within_bounds(const Run& run, const MatrixX& H) {
   return VectorX::Zero(p.size());
 }
 
+/// A step of Levenberg and Marquardt, and what it promises.
+struct DampedStep {
+  double damping = 0.0;
+  VectorX to;
+  double moved = 0.0;      // by the number that moves most
+  double predicted = 0.0;  // fall of the cost
+  bool may_lower = true;   // false: known not to lower it
+};
+
+DampedStep damped_step(const Run& run, const OptimiserOptions& options, double damping) {
+  const VectorX &p = run.summary.p, &g = run.summary.evaluation.gradient;
+  const MatrixX& H = run.summary.evaluation.gauss_newton;
+  const double floor = 1e-9 * std::max(H.trace() / double(H.rows()), 1e-300);
+  const auto step_with = [&](double by) {
+    MatrixX damped = H;
+    damped.diagonal() += by * H.diagonal().cwiseMax(floor);
+    return step_within_bounds(run, damped);
+  };
+  VectorX step = step_with(damping);
+  if (options.damps_long_steps)
+    for (double more = std::max(damping, 1e-8); step.cwiseAbs().maxCoeff() > options.max_step && more < 1e4;)
+      step = step_with(more *= 2.0);
+  const double longest = step.cwiseAbs().maxCoeff();
+  if (longest > options.max_step) step *= options.max_step / longest;
+  DampedStep made{damping, run.clamp(p + step)};
+  const VectorX way = made.to - p;
+  made.moved = way.cwiseAbs().maxCoeff();
+  made.predicted = -(g.dot(way) + 0.5 * way.dot(H * way));
+  return made;
+}
+
+/// Rejections come in series. The step among several dampings whose cost is least; the last and shortest where none is
+/// lower than at hand.
+DampedStep best_of_several(Run& run, const OptimiserOptions& options, double damping, double raise) {
+  std::vector<DampedStep> steps;
+  std::vector<VectorX> ends;
+  for (int i = 0; i < options.trials_after_rejection; ++i, damping = std::min(damping * raise, 1e8)) {
+    steps.push_back(damped_step(run, options, damping));
+    ends.push_back(steps.back().to);
+  }
+  const std::vector<CostEvaluation> costs = run.evaluate(ends);
+  double least = run.summary.evaluation.cost;
+  std::size_t best = steps.size() - 1;
+  steps[best].may_lower = false;
+  for (std::size_t i = 0; i < costs.size(); ++i)
+    if (costs[i].succeeded && costs[i].cost < least) least = costs[i].cost, best = i, steps[i].may_lower = true;
+  return steps[best];
+}
+
+/// Memory: the damping, and whether the last step was rejected.
 void levenberg_marquardt(Run& run, const OptimiserOptions& options, const VectorX& memory) {
+  constexpr double raise = 5.0, most = 1e8;  // damping
   OptimiserSummary& s = run.summary;
   double lambda = memory.size() > 0 ? memory[0] : 1e-2;
+  bool was_rejected = memory.size() > 1 && memory[1] > 0.0;
   for (bool done = false; !done;) {
-    const MatrixX& H = s.evaluation.gauss_newton;
-    const VectorX& g = s.evaluation.gradient;
-    const double floor = 1e-9 * std::max(H.trace() / double(H.rows()), 1e-300);
-    const auto step_with = [&](double damping) {
-      MatrixX damped = H;
-      damped.diagonal() += damping * H.diagonal().cwiseMax(floor);
-      return step_within_bounds(run, damped);
-    };
-    VectorX step = step_with(lambda);
-    if (options.damps_long_steps)
-      for (double more = std::max(lambda, 1e-8); step.cwiseAbs().maxCoeff() > options.max_step && more < 1e4;)
-        step = step_with(more *= 2.0);
-    const double longest = step.cwiseAbs().maxCoeff();
-    if (longest > options.max_step) step *= options.max_step / longest;
-    const VectorX trial = run.clamp(s.p + step);
-    const double moved = (trial - s.p).cwiseAbs().maxCoeff();
-    if (moved == 0.0) {
+    const bool looks_ahead = was_rejected && options.trials_after_rejection > 1;
+    const DampedStep step =
+        looks_ahead ? best_of_several(run, options, lambda, raise) : damped_step(run, options, lambda);
+    lambda = step.damping;
+    if (step.moved == 0.0) {
       run.end(true, "the step is zero");
       return;
     }
-    const double predicted = -(g.dot(trial - s.p) + 0.5 * (trial - s.p).dot(H * (trial - s.p)));
-    CostEvaluation e = run.evaluate(trial, Derivatives::Tangents);
+    CostEvaluation e;
+    if (step.may_lower) e = run.evaluate(step.to, Derivatives::Tangents);
     const double gain = s.evaluation.cost - e.cost;
     const bool accepted = e.succeeded && gain > 0.0;
     if (accepted) {
-      const double quality = predicted > 0.0 ? gain / predicted : 0.0;
-      lambda = std::clamp(quality > 0.75 ? lambda / 5.0 : quality < 0.25 ? lambda * 3.0 : lambda, 1e-8, 1e8);
-      const bool small = moved < options.step_tolerance || gain < options.cost_tolerance * s.evaluation.cost;
-      s.p = trial;
+      const double quality = step.predicted > 0.0 ? gain / step.predicted : 0.0;
+      lambda = std::clamp(quality > 0.75 ? lambda / raise : quality < 0.25 ? lambda * 3.0 : lambda, 1e-8, most);
+      const bool small = step.moved < options.step_tolerance || gain < options.cost_tolerance * s.evaluation.cost;
+      s.p = step.to;
       s.evaluation = std::move(e);
       if (small) done = run.end(true, "the cost no longer falls");
     } else {
       // Where a step promises or moves next to nothing, the point is as good as the cost's smoothness allows.
-      if (moved < options.step_tolerance || predicted < options.cost_tolerance * s.evaluation.cost)
+      if (step.moved < options.step_tolerance || step.predicted < options.cost_tolerance * s.evaluation.cost)
         done = run.end(true, "no step lowers the cost");
-      lambda = std::min(std::max(lambda, 1e-3) * 5.0, 1e8);
+      lambda = std::min(std::max(lambda, 1e-3) * raise, most);
     }
-    done = run.report(lambda, accepted, VectorX::Constant(1, lambda), done);
+    was_rejected = !accepted;
+    done = run.report(lambda, accepted, Eigen::Vector2d(lambda, was_rejected ? 1.0 : 0.0), done);
   }
 }
 

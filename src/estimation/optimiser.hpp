@@ -26,6 +26,9 @@ struct OptimiserOptions {
   /// How Levenberg-Marquardt keeps to that: by more damping in that step, so that combinations of numbers that the data
   /// hardly tell do not hold up what they do, or by a shorter step in the same direction.
   bool damps_long_steps = false;
+  /// After a rejected step: how many dampings Levenberg-Marquardt tries side by side by their costs alone, each five
+  /// times the one before, before it linearises at the best, >= 1. One: it linearises at each trial.
+  int trials_after_rejection = 1;
 };
 
 /// Where a run stands between two iterations: going on from here takes the path that an undisturbed run takes.

@@ -323,7 +323,7 @@ double Simulation::surprise(const StepPlan& plan, const State& state) const {
 }
 
 bool Simulation::take_step(std::size_t i, State& state, RolloutSummary& summary) {
-  constexpr double too_long = 0.3, explosion = 3.0;  // surprises
+  constexpr double too_long = 0.1, explosion = 3.0;  // surprises
   const double shortest = std::ldexp(longest_step_, -options_.most_halvings);
   for (;;) {
     const StepPlan plan = steps_[i];

@@ -275,6 +275,51 @@ TEST(LevenbergMarquardt, DampingOfLongStepsLetsWhatIsKnownArrive) {
   EXPECT_NEAR(sum_after(true), 0.4, 0.02);
 }
 
+OptimiserOptions precise(OptimiserKind kind) {
+  OptimiserOptions options;
+  options.kind = kind;
+  options.max_iterations = 200;
+  options.step_tolerance = 1e-7, options.cost_tolerance = 1e-12;
+  return options;
+}
+
+/// Its curvature is fifty times what its Gauss-Newton matrix says: steps are far too long until they are damped.
+class Overshooting : public BoundedQuadratic {
+ public:
+  Overshooting() : BoundedQuadratic(MatrixX::Identity(2, 2), Eigen::Vector2d(0.3, -0.2)) {}
+  CostEvaluation linearise(const VectorX& x) override {
+    ++linearisations;
+    CostEvaluation e = evaluate(x);
+    e.gauss_newton /= 50.0;
+    return e;
+  }
+  int linearisations = 0;
+};
+
+TEST(LevenbergMarquardt, TriesSeveralDampingsAfterARejection) {
+  OptimiserOptions options = precise(OptimiserKind::LevenbergMarquardt);
+  Overshooting one, several;
+  const OptimiserSummary by_one = minimise(one, Eigen::Vector2d(0.0, 0.0), options);
+  options.trials_after_rejection = 3;
+  std::vector<OptimiserState> states;
+  const OptimiserSummary by_several = minimise(several, Eigen::Vector2d(0.0, 0.0), options, [&](const Iteration& i) {
+    states.push_back(i.state());
+    return true;
+  });
+  for (const OptimiserSummary* s : {&by_one, &by_several}) {
+    EXPECT_NEAR(s->p[0], 0.3, 1e-4);
+    EXPECT_NEAR(s->p[1], -0.2, 1e-4);
+  }
+  EXPECT_LT(several.linearisations, one.linearisations);
+  EXPECT_LT(by_several.iterations, by_one.iterations);
+  EXPECT_GT(by_several.evaluations, several.linearisations) << "the costs alone count as well";
+  states.pop_back();  // its end
+  for (const OptimiserState& state : states) {
+    Overshooting anew;
+    EXPECT_EQ(minimise(anew, state, options).p, by_several.p) << "from " << state.iterations;
+  }
+}
+
 /// Eigenvalues over three decades, in directions that mix all numbers.
 BoundedQuadratic long_valley(const VectorX& minimum) {
   const Eigen::Index n = minimum.size();
@@ -285,14 +330,6 @@ BoundedQuadratic long_valley(const VectorX& minimum) {
   const VectorX eigenvalues = VectorX::LinSpaced(n, 0.0, 3.0).unaryExpr([](double e) { return std::pow(10.0, e); });
   const MatrixX H = Q * eigenvalues.asDiagonal() * Q.transpose();
   return {H, H * minimum};
-}
-
-OptimiserOptions precise(OptimiserKind kind) {
-  OptimiserOptions options;
-  options.kind = kind;
-  options.max_iterations = 200;
-  options.step_tolerance = 1e-7, options.cost_tolerance = 1e-12;
-  return options;
 }
 
 TEST(Lbfgs, FollowsALongValleyWhereGradientDescentDoesNotArrive) {
