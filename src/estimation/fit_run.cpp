@@ -41,8 +41,8 @@ int last_frame(const Horizon& horizon, const Recording& r) {
   return horizon.part < 1.0 ? r.horizon(horizon.part) : r.last_frame;
 }
 
-constexpr double largest_shift = 1.0;    // of an unconstrained coordinate, by a few steps
-constexpr int steps_of_alternative = 3;  // enough to tell how far another model's estimate lies
+constexpr double largest_shift = 1.0;      // of an unconstrained coordinate, by a few steps
+constexpr int steps_of_alternative = 3;    // enough to tell how far another model's estimate lies
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 // From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
 // less than that. A finer mesh is affordable at rest; of a motion the coarser one tells.

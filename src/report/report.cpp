@@ -336,8 +336,8 @@ std::string starts_table(const Result& result) {
                         s.converged ? "" : "not converged: ", escape_html(s.reason),
                         escape_html(spoken_values(result, s.start)), escape_html(spoken_values(result, s.final)));
   }
-  return table("<th>start</th><th>cost</th><th>iterations</th><th>why it stopped</th><th>began at</th><th>ended at</th>",
-               body);
+  return table(
+      "<th>start</th><th>cost</th><th>iterations</th><th>why it stopped</th><th>began at</th><th>ended at</th>", body);
 }
 
 // Scalars, a row for each resolution and one for their limit.

@@ -255,7 +255,9 @@ TEST_F(Session, TwoRecordingsAreFittedTogetherAndAThirdIsPredicted) {
       << "each has its own noise";
   EXPECT_TRUE(two["parameters"].contains("linear_velocity[2]"));
   EXPECT_FALSE(two["parameters"].contains("youngs_modulus[2]")) << "one material";
-  const auto spread = [](const json& found) { return found["parameters"]["youngs_modulus"]["std_noise"].get<double>(); };
+  const auto spread = [](const json& found) {
+    return found["parameters"]["youngs_modulus"]["std_noise"].get<double>();
+  };
   EXPECT_LT(spread(two), spread(one)) << "twice the data";
   const double fitted = two["error"]["surface_rms"], predicted = two["held_out"]["error"]["surface_rms"];
   EXPECT_NEAR(predicted / fitted, 1.0, 0.2) << "the same object, scene and noise";
