@@ -42,11 +42,11 @@ def oracle():
     text += table(["model of", "recording", "surface rms [mm]", "fitted there [mm]"],
                   [[p["model"], p["recording"], f"{1e3 * p['surface_rms']:.2f}",
                     f"{1e3 * figures['recordings'][p['recording']]['surface_rms']:.2f}"] for p in figures["predictions"]])
-    outside = [f"{name}: {key.replace('_', ' ')} {abs(p['value'] - p['truth']) / p['std']:.1f} deviations off"
-               for name, r in figures["recordings"].items() for key, p in r["parameters"].items()
-               if p.get("std") and p.get("truth") is not None and abs(p["value"] - p["truth"]) > 2 * p["std"]]
-    text += "\nOutside twice the stated deviation: " + ("; ".join(outside) if outside else "none") + \
-        ". The deviations come from the sensor's noise alone; another material law and other elements are not in them.\n"
+    stated = [(name, key, p) for name, r in figures["recordings"].items() for key, p in r["parameters"].items()
+              if p.get("interval_90") and p.get("truth") is not None]
+    outside = [f"{name}, {key.replace('_', ' ')}" for name, key, p in stated if not p["interval_90"][0] <= p["truth"] <= p["interval_90"][1]]
+    text += f"\n{len(stated) - len(outside)} of {len(stated)} stated 90 % intervals hold the truth" + \
+        (f"; not those of {'; '.join(outside)}" if outside else "") + ".\n"
     return text + f"\nMeasured on {machine(figures)}.\n"
 
 

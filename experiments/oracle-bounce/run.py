@@ -45,7 +45,7 @@ def main():
         for key in NAMES:
             p = result["parameters"][key]
             parameters[key] = {"value": common.number(p["value"]), "std": common.number(p.get("std"), 2), "unit": p["unit"],
-                               "truth": truth.get(key)}
+                               "truth": truth.get(key), "interval_90": common.rounded(p["interval_90"], 5) if p.get("interval_90") else None}
         recordings[name] = {"parameters": parameters, "surface_rms": common.number(result["error"]["surface_rms"], 4),
                             "points": result["error"]["points"], "cost": common.number(result["cost"]["final"]),
                             "converged": figures["exit_code"] == 0, "starts": len(result["starts"]), **figures}

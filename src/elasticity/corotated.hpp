@@ -19,7 +19,8 @@ class Elasticity : public ForceTerm {
   /// Throws std::invalid_argument for hexahedra.
   virtual void set_reference(std::shared_ptr<const Body> body) = 0;
 
-  /// Elastic energy [J] of the positions with the rotations of the lag point.
+  /// Elastic energy [J] of the positions with the rotations of the lag point; of the neo-Hookean law, whose mean strain
+  /// is the lag point's, only where the positions are that point.
   virtual double energy(const Points& z) const = 0;
   /// Mean Cauchy stress of an element at the lag point [Pa].
   virtual Matrix3 cauchy_stress(int element) const = 0;

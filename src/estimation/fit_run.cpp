@@ -524,7 +524,7 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) 
   std::vector<StageRecord> tried;  // side by side: told in an order that does not depend on who was faster
   std::ranges::copy_if(done, std::back_inserter(tried),
                        [](const StageRecord& r) { return r.id.kind == StageKind::Alternative; });
-  std::ranges::sort(tried, {}, &StageRecord::id);
+  std::ranges::sort(tried, {}, [](const StageRecord& r) { return r.id.number; });
   for (const StageRecord& r : tried) {
     const Alternative& a = plan_.facts().alternatives[std::size_t(r.id.number)];
     if (!r.reason.empty())
