@@ -14,6 +14,7 @@ namespace {
 constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: only ratios follow then
 constexpr double gravity_guess = 9.81;
 constexpr double contact_std = 1.2;       // of the logarithm of its stiffness: a board, a carpet, a furry skin
+constexpr double hardest_contact = 2.0;   // times that which is as good as rigid: beyond, motions are erratic
 constexpr double range_error_std = 0.02;  // [m], of light that enters a translucent material
 
 /// Whether forces are known, which fix the absolute scale of stiffness: a weight that is let go, or weights that hang
@@ -187,7 +188,7 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     theta[m.contact_stiffness] = default_contact_stiffness(density * volume * std::max(gravity, 0.1),
                                                            surface_area(*capture.scene.object.surface), size);
     p.push_back(scalar(layout, m.contact_stiffness, Transform::Logarithm, 1e-3 * theta[m.contact_stiffness],
-                       1e2 * theta[m.contact_stiffness], std::log(theta[m.contact_stiffness]), contact_std,
+                       hardest_contact * theta[m.contact_stiffness], std::log(theta[m.contact_stiffness]), contact_std,
                        !capture.scene.timing.is_static));
   }
   for (std::size_t k = 0; k < m.pulls.size(); ++k) {
