@@ -484,15 +484,13 @@ def accuracy():
         digits = max(0, 1 - math.floor(math.log10(p["std"] * scale)))
         return [words, f"{p['value'] * scale:.{digits}f} ± {p['std'] * scale:.{digits}f}{unit}", f"{p['truth'] * scale:g}{unit}"]
 
-    off = {name: f["parameters"]["youngs_modulus"]["value"] / f["parameters"]["youngs_modulus"]["truth"] - 1 for name, f in figures["recordings"].items()}
-    pebble = off["oracle-ramp"]
-    assert max(map(abs, off.values())) == abs(pebble), "another recording than the pebble is the worst: README.md says otherwise"
+    off = max(abs(f["parameters"]["youngs_modulus"]["value"] / f["parameters"]["youngs_modulus"]["truth"] - 1) for f in figures["recordings"].values())
     predicted, = [p["surface_rms"] for p in figures["predictions"] if p["model"] == "oracle-bounce-a"]
     return (table(["", "estimated", "truth"], [row("Young's modulus", "youngs_modulus", 1, " Pa"), row("Poisson's ratio", "poisson_ratio", 1, ""),
                                                row("mass damping", "mass_damping", 1, " 1/s"), row("stiffness damping", "stiffness_damping", 1e3, " ms")]) +
             f"\n{r['points']} points, {1e3 * r['surface_rms']:.2f} mm rms under a sensor noise of about {1e3 * r['sensor_noise']:.2f} mm; {r['wall_seconds']:.0f} s on {figures['machine']['cores']} cores shared with\n"
-            f"other work. The model predicts another recording of the same ring to {1e3 * predicted:.2f} mm. Worst of its kind: a stiffer pebble on a\ntilted board of unknown place "
-            f"is found {100 * abs(pebble):.0f} % too {'stiff' if pebble > 0 else 'soft'}.\n")
+            f"other work. The model predicts another recording of the same ring to {1e3 * predicted:.2f} mm. Of that, and of a pebble on a\ntilted board "
+            f"of unknown place, Young's modulus is found within {100 * off:.1f} %. What follows a ± is a deviation that holds other models\nthan the fit's, too.\n")
 
 
 def readme():
