@@ -27,13 +27,13 @@ VectorX model_theta(const Model& model, const Scene& scene, const Vector3& gravi
   return theta;
 }
 
-/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the surface; with each element's
-/// modulus where the volume mesh has as many elements.
-std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* distance) {
+/// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the situation's surface; with each
+/// element's modulus where the volume mesh has as many elements.
+std::shared_ptr<const Body> body_of(const Model& model, const Scene& scene, const SignedDistance* distance) {
   const ModelVolume& volume = model.volume;
   Body body;
   if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
-    body = make_body(hex_grid_of(model.scene, *distance, model.cell_size));
+    body = make_body(hex_grid_of(scene, *distance, model.cell_size));
   } else {
     const auto points = std::size_t(corner_count(volume.kind));
     std::vector<std::array<int, 4>> tets;
@@ -53,7 +53,7 @@ std::shared_ptr<const Body> body_of(const Model& model, const SignedDistance* di
 
 }  // namespace
 
-std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, nullptr); }
+std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, model.scene, nullptr); }
 
 ModelScene make_scene(const Model& model) {
   Scene situation = model.scene;
@@ -84,7 +84,7 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
   Resolution resolution;
   resolution.cells = object_size(scene) / model.cell_size;
   resolution.pulls = int(scene.initial.pulls.size());
-  made.body = body_of(model, distance.get());
+  made.body = body_of(model, scene, distance.get());
   made.distance = std::move(distance);
   if (model.law) settings.law = make_law(*model.law, made.body->element_count());
   resolution.element = made.body->kind;

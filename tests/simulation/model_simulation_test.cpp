@@ -50,6 +50,19 @@ TEST(ModelSimulation, IsTheModelsOwnSituation) {
   EXPECT_EQ(made.simulation.blocks.planes[0].point.vector(made.theta), Vector3(0, 0, -0.3));
 }
 
+/// The same bar somewhere else, as another recording has it: its elements are laid there.
+TEST(ModelSimulation, ElementsFillTheObjectWhereAnotherSituationHasIt) {
+  const Model model = bar();
+  Scene elsewhere = model.scene;
+  elsewhere.fixed.clear(), elsewhere.weights.clear();
+  TriangleMesh moved = *model.scene.object.surface;
+  for (Vector3& vertex : moved.vertices) vertex += Vector3(0.31, -0.17, 0.43);
+  elsewhere.object.surface = moved;
+  const ModelScene made = make_scene(model, elsewhere, scene_distance(elsewhere, Resolution{}.band), {});
+  EXPECT_NEAR(made.body->volume(), length * edge * edge, 0.02 * length * edge * edge);
+  EXPECT_NEAR(made.body->reference_positions().colwise().mean().x(), 0.31, 0.02 * length);
+}
+
 TEST(ModelSimulation, WithoutFramesIsOneEquilibrium) {
   Model model = bar();
   model.scene.timing = {};
