@@ -43,6 +43,8 @@ def battery():
     aims += [["time, median", f"{score['median_seconds']:.0f} s", "120 s", score["median_seconds"] <= 120],
              ["time, worst", f"{score['worst_seconds']:.0f} s", "600 s", score["worst_seconds"] <= 600]]
     text += "\n" + table(["", "reached", "aim", ""], [[*row[:3], judged(row[3])] for row in aims])
+    if len(rows) < figures["captures"]:
+        text += f"\nOf {figures['captures']} recordings these {len(rows)} were fitted.\n"
     return text + ("\nWhat stands for unmodelled law and damping in the intervals was set by looking at errors of this battery: they are no "
                    f"independent check of it. Measured on {machine(figures)}.\n")
 

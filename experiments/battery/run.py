@@ -82,7 +82,7 @@ def main():
               f"median, {100 * p['worst_error']:.1f} % at worst, {100 * p['rms_error']:.1f} % rms; stated {100 * p['median_deviation']:.1f} %")
     print(f"{total['recordings']} recordings, {total['refused']} refused, {total['trusted']} explained; "
           f"{total['median_seconds']:.0f} s in the median, {total['worst_seconds']:.0f} s at worst")
-    common.write_results(__file__, {"recordings": rows, "score": total})
+    common.write_results(__file__, {"captures": len(list(battery.glob("*/truth.json"))), "recordings": rows, "score": total})
 
 
 if __name__ == "__main__":
