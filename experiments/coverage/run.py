@@ -82,9 +82,10 @@ def draw(number):
         "camera": [{"name": "front", "width": 160, "height": 120, "eye": eye, "target": [0.0, 0.5 * size, 0.0], "vertical_fov_deg": 50.0,
                     "depth_scale": 10000.0, "sensor": {"preset": "structured-light", "noise_base": 0.006 * size, "noise_growth": 0.0,
                                                        "step": 2e-4}}]}
-    if family == "varying":  # two halves, and the thirds beyond them: 10 % rms about the mean
-        scene["region"] = [{"name": f"part {i}", "half_space": {"point": [0.0, height, 0.0], "normal": unit(rng)},
-                            "youngs_modulus": modulus * factor} for i, factor in enumerate((1.1, 0.9))]
+    if family == "varying":  # two halves, of shapes that are alike about their middle: the mean stays
+        normal = unit(rng)
+        scene["region"] = [{"name": f"half {i}", "half_space": {"point": [0.0, height, 0.0], "normal": [sign * x for x in normal]},
+                            "youngs_modulus": modulus * (1 + 0.1 * sign)} for i, sign in enumerate((1, -1))]
     return family, scene, {"friction": max(0.0, friction + rng.gauss(0, 0.05)) if family == "friction" else None}
 
 
@@ -113,9 +114,8 @@ def forget(capture, changes):
 
 
 def true_values(capture):
-    """Of truth.json; a stiffness that varies has its mean over the volume, the model's `youngs_modulus`."""
-    truth = common.read(capture / "truth.json")
-    parameters = truth["parameters"]
+    """Of truth.json, with the names that results have; a stiffness that varies by its mean."""
+    parameters = common.read(capture / "truth.json")["parameters"]
     parameters["poisson_ratio"] = parameters["poissons_ratio"]
     return parameters
 
