@@ -59,10 +59,7 @@ class CorotatedElasticity : public Elasticity {
     for (int a = 0; a < N; ++a) force.row(nodes_of(element)[a]) -= own.row(a);
   }
   Matrix3 mean_gradient(int element, const Points& points) const {
-    const auto g = gradients(element);
-    Matrix3 F = Matrix3::Zero();
-    for (int a = 0; a < N; ++a) F.noalias() += points.row(nodes_of(element)[a]).transpose() * g.row(a);
-    return F;
+    return pliant::mean_gradient<N>(*body_, element, points);
   }
 
   std::shared_ptr<const Body> body_;

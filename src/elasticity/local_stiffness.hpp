@@ -23,6 +23,16 @@ auto node(const Eigen::MatrixBase<Derived>& v, int a) {
 
 }  // namespace element_vector
 
+/// Mean over an element of N nodes of the gradient of a field that its nodes carry.
+template <int N>
+Matrix3 mean_gradient(const Body& body, int element, const Points& field) {
+  const auto g = body.mean_gradient.middleRows<N>(Eigen::Index(element) * N);
+  const int* nodes = body.connectivity.data() + std::size_t(element) * N;
+  Matrix3 gradient = Matrix3::Zero();
+  for (int a = 0; a < N; ++a) gradient.noalias() += field.row(nodes[a]).transpose() * g.row(a);
+  return gradient;
+}
+
 /// What the reverse sweep needs of an element's force y = K d and its cotangent c, with d = q - X.
 template <int N>
 struct ReverseProducts {

@@ -44,12 +44,7 @@ class ViscousForces : public ForceTerm {
   int count() const { return int(gradients_.size()); }
   bool is_active() const { return step_.start && damping_ > 0.0; }
   double rate() const { return damping_ / step_.dt; }
-  Matrix3 gradient(int element, const Points& x) const {
-    const auto g = shape_gradients(element);
-    Matrix3 F = Matrix3::Zero();
-    for (int a = 0; a < N; ++a) F.noalias() += x.row(nodes_of(element)[a]).transpose() * g.row(a);
-    return F;
-  }
+  Matrix3 gradient(int element, const Points& x) const { return mean_gradient<N>(*body_, element, x); }
   /// The element's nodes' numbers of some points.
   Vector gathered(int element, const Points& points) const {
     Vector local;
