@@ -392,7 +392,7 @@ SECTIONS = [
     ("How often intervals hold the truth", "coverage",
      "Recordings by `pliant synth` on smaller elements and steps than a fit's. Each differs in one more way from what a fit assumes: `law`, linear elasticity in turning frames and Rayleigh's damping; "
      "`damping`, Rayleigh's alone; `contact`, a floor up to ten times softer and five times smoother; `friction`, a coefficient that the capture has wrong by 0.05; `varying`, one half a tenth stiffer, the other as much softer; `mesh`, nothing more. "
-     "`odd` are those of odd number, of every family.", coverage),
+     "`held back` is every other round of the families.", coverage),
     ("Another simulator's recordings", "oracle-bounce",
      "A ring dropped on the floor (twice), and a pebble dropped on a tilted board whose place is to be found too, recorded by another simulator with another material law, other elements "
      "and a model of a depth sensor's faults. Fitted with no choice of ours; the truth is read for judging only.", oracle),

@@ -7,7 +7,7 @@ Each recording is of a drawn shape, material, throw and camera, by smaller eleme
 fit assumes in one more way, its family: the law at large strain, the damping, how hard and smooth the floor is, a coefficient of
 friction that the capture has wrong, a stiffness that varies by a tenth within the body, or nothing more. Fits get no choices. The
 intervals are counted by family, over results that do not doubt themselves; what stands for unmodelled physics (docs/uncertainty.md) may
-be set by recordings of even number, so those of odd number are counted alone as well. A recording that is fitted in the work folder is
+be set by every other round of the families, so the rounds between (`held back`) are counted alone as well. A recording that is fitted in the work folder is
 not fitted again; after M minutes no further one is begun."""
 import math
 import pathlib
@@ -153,7 +153,7 @@ def main():
             print(f"{name}: refused\n{refusal}", flush=True)
             continue
         print(rows[name]["family"], told(name, rows[name]), flush=True)
-    parts = {"all": rows, "odd": {n: r for n, r in rows.items() if int(n) % 2}}
+    parts = {"all": rows, "held back": {n: r for n, r in rows.items() if int(n) // len(FAMILIES) % 2}}
     parts |= {family: {n: r for n, r in rows.items() if r["family"] == family} for family in FAMILIES}
     scores = {part: score(of) for part, of in parts.items() if of}
     for part, s in scores.items():
