@@ -62,6 +62,12 @@ class CorotatedElasticity : public Elasticity {
     return pliant::mean_gradient<N>(*body_, element, points);
   }
 
+  /// What tangents need of each element, once for all directions at z.
+  struct Strained {
+    Vector unrotated, displacement, stress;  // q = R^T z, d = q - X, K d
+  };
+  const std::vector<Strained>& strained(const Points& z);
+
   std::shared_ptr<const Body> body_;
   MaterialBlocks material_;
   ElasticLaw law_;
@@ -74,6 +80,9 @@ class CorotatedElasticity : public Elasticity {
   std::vector<int> blocks_;
   std::unique_ptr<ReferenceForces> by_reference_;  // where the reference was set
   Points lag_;                                     // likewise
+  std::vector<Strained> strained_;
+  Points strained_at_;
+  bool has_strained_ = false;
 };
 
 template <int N>
@@ -100,6 +109,7 @@ void CorotatedElasticity<N>::take_reference() {
 
 template <int N>
 void CorotatedElasticity<N>::set_parameters(const VectorX& parameters) {
+  has_strained_ = false;
   // Rotations start from those of the step before; a run must not start from those of the run before.
   std::ranges::fill(polar_, Polar{});
   modulus_.set_parameters(parameters);
@@ -125,6 +135,7 @@ Matrix3 CorotatedElasticity<N>::cauchy_stress(int e) const {
 template <int N>
 void CorotatedElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
   if (is_corrected()) throw std::invalid_argument("a corrected law has no derivatives by the reference");
+  has_strained_ = false;
   body_ = std::move(body);
   stiffness_ = LocalStiffness<N>(body_);
   poissons_ratio_ = -2.0;
@@ -149,7 +160,23 @@ void CorotatedElasticity<N>::add_reference_adjoint(const Points& w, Points& refe
 }
 
 template <int N>
+auto CorotatedElasticity<N>::strained(const Points& z) -> const std::vector<Strained>& {
+  if (has_strained_ && strained_at_ == z) return strained_;
+  strained_.resize(polar_.size());
+  for (int e = 0; e < count(); ++e) {
+    Strained& own = strained_[std::size_t(e)];
+    own.unrotated = unrotated(e, z);
+    own.displacement = own.unrotated - reference_[std::size_t(e)];
+    own.stress = stiffness_.times(e, own.displacement);
+  }
+  strained_at_ = z;
+  has_strained_ = true;
+  return strained_;
+}
+
+template <int N>
 void CorotatedElasticity<N>::linearise(const Points& lag) {
+  has_strained_ = false;
   for (int e = 0; e < count(); ++e) gradients_[e] = mean_gradient(e, lag);
   if (by_reference_) lag_ = lag;
   polar_decompositions(gradients_, polar_);
@@ -246,15 +273,14 @@ void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_
                                                const VectorX& d_theta, Points& force) {
   modulus_.set_change(d_theta);
   const double d_nu = d_theta[material_.poissons_ratio];
+  const std::vector<Strained>& all = strained(z);
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
     const Matrix3 dF = mean_gradient(e, d_lag);
     const Vector3 w = rotation_rate(polar_[e], dF);
-    const Vector q = unrotated(e, z);
-    const Vector d = q - reference_[e];
+    const auto& [q, d, y] = all[std::size_t(e)];
     Vector dd = unrotated(e, d_z);
     for (int a = 0; a < N; ++a) node(dd, a) -= w.cross(Vector3(node(q, a)));
-    const Vector y = stiffness_.times(e, d);
     Vector dy = stiffness_.times(e, dd);
     dy += modulus_.log_change(e) * y;
     if (d_nu != 0.0) dy += d_nu * stiffness_.derivative_times(e, d);

@@ -70,6 +70,9 @@ class ForceTerm {
   /// Whether the force depends on the step's start other than through p and z; only then are the two products below
   /// called.
   virtual bool sees_start() const { return false; }
+  /// Whether z and the step's start enter only as their difference (p aside), the way since the start: a change of the
+  /// start that moves both changes nothing.
+  virtual bool sees_way_alone() const { return false; }
   /// force += df for a change of the step's start, p, z and theta staying as they are.
   virtual void add_start_tangent(const Points& z, const Points& d_start, const Points& d_start_velocity,
                                  Points& force) {

@@ -23,6 +23,7 @@ class ViscousForces : public ForceTerm {
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
   bool sees_start() const override { return true; }
+  bool sees_way_alone() const override { return true; }
 
   void set_parameters(const VectorX& theta) override;
   void begin_step(const StepContext& step) override { step_ = step, has_strained_ = false; }

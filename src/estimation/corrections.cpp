@@ -10,8 +10,7 @@ namespace pliant {
 
 namespace {
 
-/// An elastic model errs about as much as the sensor that sees it, in mean square; that is no sensor's fault.
-constexpr double tolerated = 1.0;
+constexpr double tolerated = 1.0;  // of what noise explains
 
 /// Rows of the unconstrained vector that belong to parameters of these names.
 std::vector<Eigen::Index> rows_of(const ParameterSet& parameters, const std::vector<std::string>& names) {
@@ -60,6 +59,8 @@ std::vector<Correction> possible_corrections(const ParameterSet& parameters, con
   }
   return corrections;
 }
+
+bool may_need_correction(double cost, double observations) { return cost > (1.0 + tolerated) * 0.5 * observations; }
 
 std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluation, const ParameterSet& parameters,
                                                  const std::vector<Correction>& corrections, double observations) {

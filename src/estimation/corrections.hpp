@@ -23,6 +23,11 @@ struct NeededCorrection {
   double least = 0.0;  ///< that is worth the correction's parameters
 };
 
+/// Whether residuals leave so much that a correction may be needed: their mean square is more than twice that of their
+/// noise. An elastic model errs about as much as the sensor that sees it; that is no sensor's fault.
+/// @param observations  independent ones behind the cost
+bool may_need_correction(double cost, double observations);
+
 /// Rao's score test (1948) of each correction at an estimate that lacks it: one Gauss-Newton step with it, all
 /// that was estimated following along. A model that is a little wrong leaves residuals that any correction lowers
 /// somewhat; so one is needed only where the residuals' mean square is more than twice that of their noise, where it

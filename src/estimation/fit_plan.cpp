@@ -18,6 +18,11 @@ bool is_of_start(const Parameter& p) { return p.role == Role::Initial || p.role 
 /// Poisson's ratios and exponents: what shapes a law, where moduli scale it.
 bool shapes_law(const Parameter& p) { return p.role == Role::Material && p.unit != "Pa"; }
 
+/// A stage that another one follows ends a standard deviation from its minimum, or where that gains little.
+void is_intermediate(Stage& stage) { stage.promise_tolerance = 0.5, stage.cost_tolerance = 2e-3; }
+
+constexpr double good_misfit = 2.0;  // on the coarse grid, in the wide band: what is left is noise and the mesh
+
 /// Whether what comes after a stage can be tried where it fails: the motion at the start is a help only.
 bool ends_at_failure(const StageRecord& record) { return !record.succeeded && record.id.kind != StageKind::Motion; }
 
@@ -112,16 +117,7 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
     } else if (swung && !find_record(done, {StageKind::Scan})) {
       return {{scan(before_starts(done))}};
     }
-    std::vector<StageChain> starts;
-    const int count = start_count(done);
-    for (int i = 0; i < count; ++i) {
-      if (is_given_up(i, done)) continue;
-      StageChain chain = left_of(start(i, done), done);
-      if (chain.empty()) continue;
-      if (i >= int(start_moduli(done).size()) && !find_record(done, {StageKind::Coarse, i, 0})) chain.resize(1);
-      starts.push_back(std::move(chain));
-    }
-    if (!starts.empty()) return starts;
+    if (std::vector<StageChain> starts = starts_left(done); !starts.empty()) return starts;
   }
   if (StageChain chain = left_of(fine(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Fine)) return {};
@@ -155,6 +151,7 @@ StageChain FitPlan::motion(int first, const VectorX& from) const {
     Stage stage{{StageKind::Motion, 0, first + i}, "motion", {facts_.options.coarse_cells, facts_.options.steps}};
     stage.horizon = {Horizon::Until::Beginning, i == 0 ? 1.0 / 8 : 1.0 / 4};
     stage.band = facts_.options.wide_band, stage.iterations = 12;
+    is_intermediate(stage);
     stage.free = free;
     stage.done_to = 0.05;
     chain.push_back(std::move(stage));
@@ -207,6 +204,7 @@ StageChain FitPlan::start(int index, const Records& done) const {
     Stage stage{{StageKind::Coarse, index, int(i)}, "coarse", {facts_.options.coarse_cells, facts_.options.steps}};
     stage.horizon.part = horizons[i];
     stage.band = facts_.options.wide_band, stage.iterations = last ? 10 : 5;
+    is_intermediate(stage);
     // Poisson's ratio is told from the rest only once the fit is close.
     stage.free = names([](const Parameter& p) { return !shapes_law(p); });
     stage.done_from = 0.15 + 0.3 * (last ? 0.4 : 0.0), stage.done_to = stage.done_from + 0.15;
@@ -233,7 +231,7 @@ Stage FitPlan::pulls(const VectorX& from, const Spacing& grid, int number) const
 }
 
 /// Thin objects are meshed by their thickness, however few cells are asked for: starts were then followed on the full
-/// grid already, and the last stage is enough.
+/// grid already, and the last stage is enough. So it is where the best start explains what was seen.
 StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beginning>& begin) const {
   const FitOptions& options = facts_.options;
   const Spacing grid{options.cells, options.steps};
@@ -242,15 +240,19 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
   const bool is_last_one_corrected = begin && !needed_corrections(done).empty();
   const auto [start, index] = best_start(done);
   const VectorX from = begin ? begin->theta : start;
+  const StageRecord* best = end_of_start(index, done);
+  const bool is_explained = best && best->misfit < good_misfit && !facts_.swings;
+  const bool is_close = facts_.coarse_is_as_fine || (!begin && is_explained);
   StageChain chain;
   if (!begin && !names(is_pull).empty()) chain.push_back(pulls(from, grid, 0));
   for (std::size_t i = 0; i < horizons.size(); ++i) {
     const bool is_narrow = i + 1 == horizons.size(), is_last = is_narrow && !is_last_one_corrected;
-    if ((!is_last && facts_.coarse_is_as_fine) || (begin && int(i) < begin->stage)) continue;
+    if ((!is_last && is_close) || (begin && int(i) < begin->stage)) continue;
     Stage stage{{StageKind::Fine, index, int(i)}, is_narrow ? "fine" : "fine, wide band", grid};
     stage.horizon.part = horizons[i];
     stage.band = is_narrow ? options.fine_band : options.wide_band;
     stage.iterations = is_narrow ? options.max_iterations : std::max(1, options.max_iterations / 4);
+    if (!is_narrow) is_intermediate(stage);
     stage.free = free_at_last(done);
     // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
     if (facts_.swings && !is_last)
@@ -352,25 +354,67 @@ std::vector<double> FitPlan::start_moduli(const Records& done) const {
   return scan ? best_of_scan(scan->trials, facts_.options.starts) : std::vector<double>{};
 }
 
+const StageRecord* FitPlan::first_of_start(int index, const Records& done) const {
+  return find_record(done, {StageKind::Coarse, index, 0});
+}
+
 const StageRecord* FitPlan::end_of_start(int index, const Records& done) const {
   return find_record(done, {StageKind::Coarse, index, int(growing_horizon(facts_.swings).size()) - 1});
 }
 
-/// One that was drawn is followed over the first frames, and on if it leads about as far down as the best one.
-bool FitPlan::is_given_up(int index, const Records& done) const {
-  constexpr double hopeless = 2.0;  // times the least cost over the first frames
-  const auto has_failed = [&](const StageRecord& r) {
-    return r.id.kind == StageKind::Coarse && r.id.start == index && !r.succeeded;
-  };
-  if (std::ranges::any_of(done, has_failed)) return true;
-  const StageRecord* first = find_record(done, {StageKind::Coarse, index, 0});
+/// Starts are followed over the first frames, and on if one leads about as far down as the best one, elsewhere.
+std::string FitPlan::why_given_up(int index, const Records& done) const {
+  constexpr double hopeless = 4.0, hopeless_if_drawn = 2.0;  // times the least cost over the first frames
+  for (const StageRecord& r : done)
+    if (r.id.kind == StageKind::Coarse && r.id.start == index && !r.succeeded) return r.reason;
+  const StageRecord* first = first_of_start(index, done);
+  if (!first) return {};
   const int given = int(start_moduli(done).size());
-  if (!first || index < given) return false;
   double least = infinite;
   for (int i = 0; i < given; ++i)
-    if (const StageRecord* r = find_record(done, {StageKind::Coarse, i, 0}); r && r->succeeded)
-      least = std::min(least, r->cost);
-  return first->cost > hopeless * least;
+    if (const StageRecord* r = first_of_start(i, done); r && r->succeeded) least = std::min(least, r->cost);
+  if (first->cost > (index < given ? hopeless : hopeless_if_drawn) * least)
+    return "given up: over the first frames its cost was " + in_three_digits(first->cost / least) +
+           " times that of the best start";
+  if (const auto same = joined(index, done))
+    return "given up: over the first frames it led to where start " + std::to_string(*same + 1) + " led";
+  return {};
+}
+
+/// Of two in one place, that with the lower cost is followed, or that which was followed already.
+std::optional<int> FitPlan::joined(int index, const Records& done) const {
+  // Of unconstrained numbers, logarithms of moduli and dampings among them, and of costs: two that have not converged
+  // quite are in one valley all the same.
+  constexpr double same_place = 0.4, same_cost = 0.02;
+  const StageRecord* first = first_of_start(index, done);
+  if (!first || !first->succeeded || end_of_start(index, done)) return std::nullopt;
+  const VectorX p = facts_.parameters.to_unconstrained(first->theta);
+  for (int i = 0; i < facts_.options.most_starts; ++i) {
+    const StageRecord* r = first_of_start(i, done);
+    if (i == index || !r || !r->succeeded) continue;
+    const bool is_better = r->cost < first->cost || (r->cost == first->cost && i < index);
+    const bool is_there = (facts_.parameters.to_unconstrained(r->theta) - p).cwiseAbs().maxCoeff() <= same_place &&
+                          std::abs(r->cost - first->cost) <= same_cost * std::min(r->cost, first->cost);
+    if (is_there && (is_better || end_of_start(i, done))) return i;
+  }
+  return std::nullopt;
+}
+
+/// All over the first frames; then those that are not given up. A single one is followed at once.
+std::vector<StageChain> FitPlan::starts_left(const Records& done) const {
+  std::vector<StageChain> first, rest;
+  const int count = start_count(done);
+  for (int i = 0; i < count; ++i) {
+    StageChain chain = left_of(start(i, done), done);
+    if (chain.empty()) continue;
+    if (count > 1 && !first_of_start(i, done)) {
+      chain.resize(1);
+      first.push_back(std::move(chain));
+    } else if (why_given_up(i, done).empty()) {
+      rest.push_back(std::move(chain));
+    }
+  }
+  return first.empty() ? rest : first;
 }
 
 int FitPlan::start_count(const Records& done) const {
@@ -385,7 +429,7 @@ int FitPlan::start_count(const Records& done) const {
       count = std::min(count + at_once, facts_.options.most_starts);
     }
     const StageRecord* end = end_of_start(i, done);
-    if (!end && !is_given_up(i, done)) return count;
+    if (!end && why_given_up(i, done).empty()) return count;
     if (end && end->succeeded) least = std::min(least, end->misfit);
   }
   return count;
@@ -466,16 +510,24 @@ std::vector<FitStart> FitPlan::starts(const Records& done) const {
       one.cost = r->succeeded ? r->cost : infinite;
       one.final = r->theta;
     }
+    if (!end_of_start(i, done)) {  // costs over the first frames are not those over all
+      one.cost = infinite;
+      if (const std::string why = why_given_up(i, done); !why.empty()) one.reason = why;
+      if (const auto same = joined(i, done))
+        if (const StageRecord* r = end_of_start(*same, done); r && r->succeeded) one.cost = r->cost;
+    }
     all.push_back(std::move(one));
   }
   return all;
 }
 
 std::pair<VectorX, int> FitPlan::best_start(const Records& done) const {
-  const std::vector<FitStart> all = starts(done);
-  const auto best = std::ranges::min_element(all, {}, &FitStart::cost);
-  if (best == all.end()) return {before_starts(done), 0};
-  return {std::isfinite(best->cost) ? best->final : before_starts(done), int(best - all.begin())};
+  const StageRecord* best = nullptr;
+  for (int i = 0; i < start_count(done); ++i) {
+    const StageRecord* r = end_of_start(i, done);
+    if (r && r->succeeded && (!best || r->cost < best->cost)) best = r;
+  }
+  return best ? std::pair{best->theta, best->id.start} : std::pair{before_starts(done), 0};
 }
 
 std::vector<std::string> FitPlan::needed_corrections(const Records& done) const {

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "estimation/fit.hpp"
 
 namespace pliant {
@@ -77,12 +80,17 @@ class FitPlan {
   std::vector<double> start_moduli(const Records& done) const;
   /// How many starts are followed as far as is known: more than there are moduli where the best of them is not good.
   int start_count(const Records& done) const;
-  /// Whether a start leads nowhere.
-  bool is_given_up(int index, const Records& done) const;
+  /// Why a start is not followed any further: it leads nowhere, or where another leads. Empty: it is followed.
+  std::string why_given_up(int index, const Records& done) const;
+  /// Another start that leads to the same place over the first frames and is followed in its stead.
+  std::optional<int> joined(int index, const Records& done) const;
+  std::vector<StageChain> starts_left(const Records& done) const;
   /// A start beyond those of the scan or the swing: the modulus log-uniform about those; what shapes the law, dampings,
   /// gravity, and how obstacles stand, are hard and rub, drawn from their priors where they are estimated. The same for
   /// the same number.
   VectorX drawn_start(int index, const Records& done) const;
+  /// A start over the first frames; null where it is not there yet.
+  const StageRecord* first_of_start(int index, const Records& done) const;
   /// The end of a start's chain; null where it is not reached.
   const StageRecord* end_of_start(int index, const Records& done) const;
   /// The start that fits best.

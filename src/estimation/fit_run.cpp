@@ -42,7 +42,10 @@ int last_frame(const Horizon& horizon, const Recording& r) {
 }
 
 constexpr double largest_shift = 1.0;      // of an unconstrained coordinate, by a few steps
-constexpr int steps_of_alternative = 3;    // enough to tell how far another model's estimate lies
+// Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
+// where they cost little.
+constexpr int few_iterations = 2, many_iterations = 5;
+constexpr double promise_of_alternative = 0.1, promise_to_trust = 0.5;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 // From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
 // less than that. A finer mesh is affordable at rest; of a motion the coarser one tells.
@@ -145,20 +148,24 @@ PlanFacts FitRun::facts() {
 std::vector<Alternative> FitRun::alternatives() const {
   const bool is_static = recordings_.all_static();
   std::vector<Alternative> all;
-  const double finer = Refinement::mesh_ratio;
-  if (recordings_.any_meshed_here() && is_static) all.push_back({"mesh", finer, 1.0, {}, false, size_of_finer_mesh});
-  if (recordings_.any_meshed_here() && !is_static)
-    all.push_back({"mesh", 1.0 / finer, 1.0, {}, false, size_of_coarser_mesh});
-  if (!is_static) all.push_back({"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step});
+  const double ratio = Refinement::mesh_ratio;
+  // Of motions, what another law changes is seen on the coarser mesh as well, for a third of the work.
+  const bool has_coarser = recordings_.any_meshed_here() && !is_static;
+  const double cells = has_coarser ? 1.0 / ratio : 1.0;
+  if (has_coarser) all.push_back({"mesh", cells, 1.0, {}, false, size_of_coarser_mesh, false, many_iterations});
+  if (recordings_.any_meshed_here() && is_static) all.push_back({"mesh", ratio, 1.0, {}, false, size_of_finer_mesh});
+  if (!is_static)
+    all.push_back({"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step, false, few_iterations});
   if (!options_.law_of_motion()) {
     const bool has_large_strain =
         !is_static && !recordings_.moves_reference() && options_.material != MaterialKind::Linear;
     if (has_large_strain)
-      all.push_back({"law at large strain", 1.0, 1.0, {.small_strain = true}, false, size_of_small_strain});
+      all.push_back({"law at large strain", cells, 1.0, {.small_strain = true}, false, size_of_small_strain,
+                     has_coarser, has_coarser ? many_iterations : few_iterations});
     else if (recordings_.are_tetrahedra())
-      all.push_back({"law at large strain", 1.0, 1.0, {.neo_hookean = true}, false, 1.0});
+      all.push_back({"law at large strain", cells, 1.0, {.neo_hookean = true}, false, 1.0, has_coarser});
   }
-  all.push_back({"what is given", 1.0, 1.0, {}, true, 1.0});
+  all.push_back({"what is given", cells, 1.0, {}, true, 1.0});
   return all;
 }
 
@@ -244,6 +251,7 @@ OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, cons
   OptimiserOptions o;
   o.kind = options_.optimiser;
   o.max_iterations = stage.iterations;
+  o.promise_tolerance = stage.promise_tolerance, o.cost_tolerance = stage.cost_tolerance;
   if (!recordings_.all_static()) o.trials_after_rejection = trials_after_rejection;
   const bool saves = is_on_full_grid(stage.id.kind) && !interrupted_;  // a last look is no state to go on from
   const bool is_staggered = options_.load_free == LoadFreeScheme::Staggered && recordings_.any_sags();
@@ -389,7 +397,12 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
   const VectorX& theta = stage.from.front();
   StageRecord record{stage.id, stage.name, theta, theta};
   record.succeeded = true;
-  if (const StageRecord* estimate = plan_.estimate(state_.done)) record.cost = estimate->cost;
+  if (const StageRecord* estimate = plan_.estimate(state_.done)) {
+    record.cost = estimate->cost;
+    const auto ended = std::ranges::find(ended_, estimate->id, &Ended::id);
+    const bool has_ended = ended != ended_.end();
+    if (has_ended && !may_need_correction(record.cost, ended->evaluation.independent_observations())) return record;
+  }
   std::vector<std::string> chosen;
   for (const auto& [name, change] : options_.parameters) chosen.push_back(name);
   const std::vector<Correction> possible = possible_corrections(plan_.facts().parameters, chosen);
@@ -413,17 +426,18 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   StageRecord record{stage.id, stage.name, theta, theta};
   record.succeeded = true;
   const ParameterSet parameters = parameters_of(stage, theta);
-  if (alternative.given) {
-    record.shifts = shifts_of_given(stage, parameters);
-    return record;
-  }
   if (const auto failure = not_made_.find(stage.id.number); failure != not_made_.end()) {
     record.reason = failure->second;
     return record;
   }
+  if (alternative.given) {
+    record.shifts = shifts_of_given(stage, parameters);
+    return record;
+  }
   Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
   OptimiserOptions o;
-  o.max_iterations = steps_of_alternative;
+  o.max_iterations = alternative.iterations;
+  o.promise_tolerance = promise_of_alternative;
   const VectorX p = parameters.to_unconstrained(theta);
   const OptimiserSummary s =
       minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
@@ -431,7 +445,13 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   record.cost = s.succeeded ? s.evaluation.cost : infinite;
   record.iterations = s.iterations;
   if (!s.succeeded) record.reason = s.reason;
-  if (s.succeeded) record.shifts = {{alternative.cause, (s.p - p).cwiseMax(-largest_shift).cwiseMin(largest_shift)}};
+  if (s.succeeded) {
+    VectorX shift = s.p - p;
+    const VectorX rest = gauss_newton_shift(s.evaluation, largest_shift);
+    const double promised = -(s.evaluation.gradient + 0.5 * s.evaluation.gauss_newton * rest).dot(rest);
+    if (promised < promise_to_trust) shift += rest;
+    record.shifts = {{alternative.cause, shift.cwiseMax(-largest_shift).cwiseMin(largest_shift)}};
+  }
   const std::lock_guard lock(mutex_);
   outcome_.forward_steps += s.steps;
   return record;
@@ -517,7 +537,8 @@ void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRe
       in_three_digits(test->theta[plan_.facts().moduli.front()]) + " Pa; correct = false leaves it so.");
 }
 
-/// Of the alternatives that could be tried, less that of the fit's own model, whose gradient is not quite zero.
+/// Of the alternatives that could be tried, less that of the model that each stands beside: the fit's own, whose
+/// gradient is not quite zero, or the first of them.
 std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) {
   const VectorX own = gauss_newton_shift(outcome_.evaluation, largest_shift);
   std::vector<ModelShift> shifts;
@@ -525,14 +546,18 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) 
   std::ranges::copy_if(done, std::back_inserter(tried),
                        [](const StageRecord& r) { return r.id.kind == StageKind::Alternative; });
   std::ranges::sort(tried, {}, [](const StageRecord& r) { return r.id.number; });
+  const auto first = std::ranges::find(tried, 0, [](const StageRecord& r) { return r.id.number; });
   for (const StageRecord& r : tried) {
     const Alternative& a = plan_.facts().alternatives[std::size_t(r.id.number)];
+    const bool has_first = first != tried.end() && !first->shifts.empty();
+    if (a.beside_the_first && !has_first) continue;
+    const VectorX& reference = a.beside_the_first ? first->shifts.front().shift : own;
     if (!r.reason.empty())
       outcome_.notes.push_back("How much the estimate depends on the " + r.name + " could not be seen: " + r.reason +
                                ".");
     for (const ModelShift& s : r.shifts) {
-      if (s.shift.size() != own.size()) continue;
-      shifts.push_back({s.cause, a.given ? s.shift : VectorX(a.size * (s.shift - own))});
+      if (s.shift.size() != own.size() || reference.size() != own.size()) continue;
+      shifts.push_back({s.cause, a.given ? s.shift : VectorX(a.size * (s.shift - reference))});
     }
   }
   return shifts;

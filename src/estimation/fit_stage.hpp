@@ -69,6 +69,9 @@ struct Alternative {
   ModelChange change = {};
   bool given = false;  ///< the same model, and what is taken as given moves within its tolerance
   double size = 1.0;   ///< deviation of the truth, in the shift of the estimate
+  /// What its estimate is compared with: the fit's own model, or the first alternative, whose mesh it shares.
+  bool beside_the_first = false;
+  int iterations = 3;  ///< before a last, short Gauss-Newton step, which is not evaluated
 };
 
 /// A stage of a fit, as data: what is simulated and compared, what is estimated, and from where.
@@ -79,6 +82,8 @@ struct Stage {
   Horizon horizon = {};
   double band = 0.0;  ///< outlier scale, times the object's size
   int iterations = 0;
+  /// Of the optimiser: a tenth of a standard deviation, and a part of the cost.
+  double promise_tolerance = 0.005, cost_tolerance = 2e-4;
   int iterations_before = 0;           ///< of its start, that are counted on
   std::vector<std::string> free = {};  ///< parameters that are estimated
   std::vector<VectorX> from = {};      ///< theta; of several the best end counts; empty: where the stage before ended

@@ -13,14 +13,14 @@ class MotionTrial::Comparison {
  public:
   Comparison(ObservedMotion motion, int number)
       : motion_(std::move(motion)), number_(number), simulation_(motion_.body, motion_.simulation) {
-    const auto add = [this](const std::vector<ParameterHandle>& all) {
-      blocks_.insert(blocks_.end(), all.begin(), all.end());
+    const auto add = [this](std::vector<ParameterHandle>& blocks, const std::vector<ParameterHandle>& all) {
+      blocks.insert(blocks.end(), all.begin(), all.end());
+      for (const ParameterHandle& block : all)
+        least_size_ = std::max(least_size_, Eigen::Index(block.first + block.size));
     };
-    add(motion_.simulation.blocks.all());
-    if (motion_.simulation.law_layout) add(motion_.simulation.law_layout->all());
-    for (const SensorBlocks& sensor : motion_.mismatch.sensors) add(sensor.all());
-    for (const ParameterHandle& block : blocks_)
-      least_size_ = std::max(least_size_, Eigen::Index(block.first + block.size));
+    add(blocks_of_motion_, motion_.simulation.blocks.all());
+    if (motion_.simulation.law_layout) add(blocks_of_motion_, motion_.simulation.law_layout->all());
+    for (const SensorBlocks& sensor : motion_.mismatch.sensors) add(blocks_of_sensors_, sensor.all());
   }
 
   const ObservedMotion& motion() const { return motion_; }
@@ -47,13 +47,18 @@ class MotionTrial::Comparison {
   std::vector<TrackObservation> corrected(const std::vector<TrackObservation>& tracks) const;
   bool is_corrected(int sensor) const { return sensor < int(sensors_.corrections.size()); }
   const SensorBlocks& sensor_blocks(int sensor) const { return motion_.mismatch.sensors[std::size_t(sensor)]; }
-  /// Whether a change of theta changes anything about this recording.
-  bool depends_on(const Eigen::Ref<const VectorX>& direction) const;
+  static bool changes_any(const std::vector<ParameterHandle>& blocks, const Eigen::Ref<const VectorX>& direction);
 
-  FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents) const;
-  void fit_surface(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+  /// How positions change along those of all directions that move the body; sensors alone change along the others.
+  struct Tangents {
+    Eigen::Index directions = 0;
+    std::vector<Eigen::Index> along;  // which of them move it
+    std::vector<Points> positions;    // one each
+  };
+  FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const Tangents& tangents) const;
+  void fit_surface(const FrameObservations& seen, const Points& positions, const Tangents& tangents,
                    FrameFit& fit) const;
-  void fit_tracks(const FrameObservations& seen, const Points& positions, const std::vector<Points>& tangents,
+  void fit_tracks(const FrameObservations& seen, const Points& positions, const Tangents& tangents,
                   FrameFit& fit) const;
   /// Cotangents of positions and of the sensors' corrections for the cost of a frame.
   void add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar, VectorX& theta_bar) const;
@@ -64,7 +69,7 @@ class MotionTrial::Comparison {
   }
 
   ObservedMotion motion_;
-  std::vector<ParameterHandle> blocks_;  // all that the comparison depends on
+  std::vector<ParameterHandle> blocks_of_motion_, blocks_of_sensors_;
   Eigen::Index least_size_ = 0;          // of a parameter vector that has them
   int number_;
   Simulation simulation_;
@@ -103,7 +108,7 @@ std::vector<TrackObservation> MotionTrial::Comparison::corrected(const std::vect
 }
 
 void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const Points& positions,
-                                          const std::vector<Points>& tangents, FrameFit& fit) const {
+                                          const Tangents& tangents, FrameFit& fit) const {
   const SurfaceConstraints& surface = *motion_.mismatch.surface;
   const double outlier_scale = motion_.options.outlier_scale;
   fit.points = int(seen.points.size());
@@ -111,8 +116,9 @@ void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const P
   const auto matches = surface.match(corrected(seen.points), positions);
   const RobustLoss loss{outlier_scale};
   const double share = frame_weight(seen);
-  MatrixX J(fit.points, Eigen::Index(tangents.size()));
-  for (std::size_t c = 0; c < tangents.size(); ++c) J.col(Eigen::Index(c)) = surface.tangent(matches, tangents[c]);
+  MatrixX J = MatrixX::Zero(fit.points, tangents.directions);
+  for (std::size_t c = 0; c < tangents.along.size(); ++c)
+    J.col(tangents.along[c]) = surface.tangent(matches, tangents.positions[c]);
   VectorX weight(fit.points), weighted(fit.points);
   fit.distances.assign(std::size_t(fit.points), float(outlier_scale));
   for (int i = 0; i < fit.points; ++i) {
@@ -139,14 +145,14 @@ void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const P
       J.row(i) -= m.direction.transpose() * sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, o.view) *
                   sensors_.changes[std::size_t(o.sensor)];
   }
-  if (!tangents.empty()) {
+  if (tangents.directions > 0) {
     fit.gradient += J.transpose() * weighted;
     fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
   }
 }
 
 void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Points& positions,
-                                         const std::vector<Points>& tangents, FrameFit& fit) const {
+                                         const Tangents& tangents, FrameFit& fit) const {
   const PointTracks& tracks = *motion_.mismatch.tracks;
   const double outlier_scale = motion_.options.outlier_scale;
   fit.tracks = int(seen.tracks.size());
@@ -160,10 +166,10 @@ void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Po
     fit.track_sum_squares += std::pow(std::min(distance, outlier_scale), 2);
     weight.segment<3>(3 * i).setConstant(w * loss.weight(distance));
   }
-  if (tangents.empty()) return;
-  MatrixX J(weight.size(), Eigen::Index(tangents.size()));
-  for (std::size_t c = 0; c < tangents.size(); ++c)
-    J.col(Eigen::Index(c)) = flat(tracks.tangent(seen.tracks, tangents[c]));
+  if (tangents.directions == 0) return;
+  MatrixX J = MatrixX::Zero(weight.size(), tangents.directions);
+  for (std::size_t c = 0; c < tangents.along.size(); ++c)
+    J.col(tangents.along[c]) = flat(tracks.tangent(seen.tracks, tangents.positions[c]));
   for (int i = 0; i < fit.tracks && sensors_.change; ++i) {
     const TrackObservation& o = seen.tracks[std::size_t(i)];
     if (is_corrected(o.sensor))
@@ -175,11 +181,11 @@ void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Po
 }
 
 FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const Points& positions,
-                                            const std::vector<Points>& tangents) const {
+                                            const Tangents& tangents) const {
   FrameFit fit;
   fit.recording = number_;
   fit.frame = seen.frame;
-  const auto n = Eigen::Index(tangents.size());
+  const Eigen::Index n = tangents.directions;
   if (n > 0) {
     fit.gradient.setZero(n);
     fit.gauss_newton.setZero(n, n);
@@ -189,19 +195,23 @@ FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const
   return fit;
 }
 
-bool MotionTrial::Comparison::depends_on(const Eigen::Ref<const VectorX>& direction) const {
+bool MotionTrial::Comparison::changes_any(const std::vector<ParameterHandle>& blocks,
+                                          const Eigen::Ref<const VectorX>& direction) {
   const auto changes = [&](const ParameterHandle& block) {
     return !direction.segment(block.first, block.size).isZero(0.0);
   };
-  return std::ranges::any_of(blocks_, changes);
+  return std::ranges::any_of(blocks, changes);
 }
 
 CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX& all_directions) {
   require_all_blocks(theta);
   // Directions along which only other recordings change cost nothing.
-  std::vector<Eigen::Index> columns;
-  for (Eigen::Index c = 0; c < all_directions.cols(); ++c)
-    if (depends_on(all_directions.col(c))) columns.push_back(c);
+  std::vector<Eigen::Index> columns, along;
+  for (Eigen::Index c = 0; c < all_directions.cols(); ++c) {
+    const bool moves = changes_any(blocks_of_motion_, all_directions.col(c));
+    if (moves) along.push_back(Eigen::Index(columns.size()));
+    if (moves || changes_any(blocks_of_sensors_, all_directions.col(c))) columns.push_back(c);
+  }
   const MatrixX directions = all_directions(Eigen::all, columns);
   sensors_ = sensors_at(theta, directions);
   const auto& observations = *motion_.observations;
@@ -211,10 +221,10 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
   TaskGroup beside;
   const int last_frame = motion_.options.last_frame;
   const RolloutSummary summary = simulation_.run(
-      theta, directions, last_frame, [&](int frame, const State& state, std::span<const State> tangents) {
+      theta, directions(Eigen::all, along), last_frame, [&](int frame, const State& state, std::span<const State> tangents) {
         if (next < observations.size() && observations[next].frame == frame) {
-          std::vector<Points> changes;
-          for (const State& t : tangents) changes.push_back(t.x);
+          Tangents changes{directions.cols(), along, {}};
+          for (const State& t : tangents) changes.positions.push_back(t.x);
           const std::size_t slot = next++;
           beside.run([this, &observations, &fits, slot, x = state.x, changes = std::move(changes)] {
             fits[slot] = fit_frame(observations[slot], x, changes);

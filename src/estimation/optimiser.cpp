@@ -162,11 +162,15 @@ DampedStep best_of_several(Run& run, const OptimiserOptions& options, double dam
 
 /// Memory: the damping, and whether the last step was rejected.
 void levenberg_marquardt(Run& run, const OptimiserOptions& options, const VectorX& memory) {
-  constexpr double raise = 5.0, most = 1e8;  // damping
+  constexpr double raise = 5.0, most = 1e8, undamped = 1e-10;  // damping
   OptimiserSummary& s = run.summary;
   double lambda = memory.size() > 0 ? memory[0] : 1e-2;
   bool was_rejected = memory.size() > 1 && memory[1] > 0.0;
   for (bool done = false; !done;) {
+    if (damped_step(run, options, undamped).predicted < options.promise_tolerance) {
+      run.end(true, "the minimum is within a fraction of its standard deviation");
+      return;
+    }
     const bool looks_ahead = was_rejected && options.trials_after_rejection > 1;
     const DampedStep step =
         looks_ahead ? best_of_several(run, options, lambda, raise) : damped_step(run, options, lambda);

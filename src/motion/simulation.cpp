@@ -376,8 +376,7 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
     if (!tangents.empty() && options_.integrator == Integrator::Newton && !stepper_.prepare_derivatives(state, delta_))
       return summary.failure = "a matrix of the tangents cannot be factorised", summary;
     if (!shape.reference.empty()) stepper_.prepare_reference_derivatives(state, delta_);
-    for (std::size_t c = 0; c < tangents.size(); ++c)
-      stepper_.tangent(state, delta_, directions.col(Eigen::Index(c)), tangents[c], shape.of(c));
+    if (!tangents.empty()) stepper_.tangents(state, delta_, directions, tangents, shape.reference);
     stepper_.advance(delta_, state);
     const int frame = steps_[s].frame_after;
     if (frame < 0) continue;

@@ -25,7 +25,7 @@ Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<F
     throw std::invalid_argument("the contact's weight must lie in (0.5, 1]");
   if (!(options_.rotation_prediction >= 0.0 && options_.rotation_prediction <= 1.0))
     throw std::invalid_argument("the prediction of rotations must lie in [0, 1]");
-  for (Points* p : {&force_, &d_blended_, &d_force_, &w_, &mass_part_, &residual_, &inertia_})
+  for (Points* p : {&force_, &d_blended_, &d_force_, &w_, &mass_part_, &residual_, &inertia_, &no_change_})
     p->setZero(body_->node_count(), 3);
   for (auto* points : {&lag_, &d_lag_, &lag_bar_})
     for (Points& p : *points) p.setZero(body_->node_count(), 3);
@@ -259,22 +259,23 @@ void Stepper::prepare_reference_derivatives(const State& start, const Points& de
   for (auto& term : terms_) term->linearise_reference(points_at_[std::size_t(term->at())]);
 }
 
-void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change,
-                      const Points* d_reference) {
+void Stepper::find_change_of_force(const State& start, const Points& delta, const VectorX& d_theta, const State& change,
+                                   const Points* d_reference) {
   const Scheme s = scheme();
   const double dt = options_.dt, t = options_.newmark_theta;
   const double d_beta = is_rayleigh() ? d_theta[stiffness_damping_block_] : 0.0;
-  set_points_at(s, start.x, delta);
   d_blended_ = change.x + d_beta / dt * delta;
   for (const auto lag : all_lags) d_lag_[std::size_t(lag)] = change.x + s.prediction[std::size_t(lag)] * change.v;
   d_force_.setZero();
   if (d_reference && d_reference->isZero(0.0)) d_reference = nullptr;  // pulls and dampings leave it where it is
   for (auto& term : terms_) {
     const bool blended = term->at() == ForceTerm::At::Blended;
-    term->add_force_tangent(points_at_[std::size_t(term->at())], d_lag_[std::size_t(term->lag())],
-                            blended ? d_blended_ : change.x, d_theta, d_force_);
+    const Points& d_z = term->sees_way_alone() ? no_change_ : blended ? d_blended_ : change.x;
+    term->add_force_tangent(points_at_[std::size_t(term->at())], d_lag_[std::size_t(term->lag())], d_z, d_theta,
+                            d_force_);
     if (d_reference) term->add_reference_tangent(*d_reference, d_force_);
-    if (term->sees_start()) term->add_start_tangent(points_at_[std::size_t(term->at())], change.x, change.v, d_force_);
+    if (term->sees_start() && !term->sees_way_alone())
+      term->add_start_tangent(points_at_[std::size_t(term->at())], change.x, change.v, d_force_);
   }
   d_force_ *= dt;
   mass_part_ = density_ / t * change.v;
@@ -284,15 +285,34 @@ void Stepper::tangent(const State& start, const Points& delta, const VectorX& d_
   body_->add_mass_product(1.0, mass_part_, d_force_);
   add_carried(1.0 / t, change.v, d_force_);
   clear_held(d_force_);
-  if (is_newton()) {
-    solve_derivative(d_force_, w_, GeneralSolver::Side::Plain);
-  } else {
-    solution_ = flat(change.v) * dt;
-    solver_->solve(flat(d_force_), solution_);
-    w_ = as_points(std::as_const(solution_));
+}
+
+void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d_theta, std::span<State> changes,
+                       std::span<const Points> d_reference) {
+  const double dt = options_.dt, t = options_.newmark_theta;
+  set_points_at(scheme(), start.x, delta);
+  tangent_forces_.resize(delta.size(), d_theta.cols());
+  tangent_solutions_.resize(delta.size(), d_theta.cols());
+  for (Eigen::Index c = 0; c < d_theta.cols(); ++c) {
+    const State& change = changes[std::size_t(c)];
+    direction_ = d_theta.col(c);
+    find_change_of_force(start, delta, direction_, change, d_reference.empty() ? nullptr : &d_reference[std::size_t(c)]);
+    if (is_newton()) {
+      solve_derivative(d_force_, w_, GeneralSolver::Side::Plain);
+      tangent_solutions_.col(c) = flat(w_);
+    } else {
+      tangent_forces_.col(c) = flat(d_force_);
+      tangent_solutions_.col(c) = flat(change.v) * dt;
+    }
   }
-  change.x += w_;
-  change.v = w_ / (t * dt) - (1.0 - t) / t * change.v;
+  if (!is_newton()) solver_->solve_columns(tangent_forces_, tangent_solutions_);
+  for (Eigen::Index c = 0; c < d_theta.cols(); ++c) {
+    State& change = changes[std::size_t(c)];
+    solution_ = tangent_solutions_.col(c);
+    w_ = as_points(std::as_const(solution_));
+    change.x += w_;
+    change.v = w_ / (t * dt) - (1.0 - t) / t * change.v;
+  }
 }
 
 void Stepper::adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar, Points* reference_bar) {

@@ -88,10 +88,12 @@ class Stepper : private NewtonProblem {
 
   /// Makes ready for `tangent` or `adjoint` of a step whose Delta is known. False where a matrix cannot be factorised.
   [[nodiscard]] bool prepare_derivatives(const State& start, const Points& delta);
-  /// Change of the end for a change of start, theta and, where given, of where the nodes are stress-free. `change`
-  /// goes in as that of the start and comes out as that of the end.
-  void tangent(const State& start, const Points& delta, const VectorX& d_theta, State& change,
-               const Points* d_reference = nullptr);
+  /// Changes of the end for changes of start, theta and, where given, of where the nodes are stress-free.
+  /// @param d_theta      one direction a column
+  /// @param changes      one a direction; in: of the start, out: of the end
+  /// @param d_reference  one a direction, or none
+  void tangents(const State& start, const Points& delta, const MatrixX& d_theta, std::span<State> changes,
+                std::span<const Points> d_reference = {});
   /// Cotangent of the start for one of the end, in place; theta_bar and, where given, reference_bar accumulate.
   void adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar,
                Points* reference_bar = nullptr);
@@ -136,6 +138,9 @@ class Stepper : private NewtonProblem {
 
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
   void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
+  /// `d_force_`: change of the step's right-hand side, Delta staying as it is.
+  void find_change_of_force(const State& start, const Points& delta, const VectorX& d_theta, const State& change,
+                            const Points* d_reference);
   bool is_newton() const { return options_.integrator == Integrator::Newton; }
   bool is_rayleigh() const { return options_.stiffness_damping == StiffnessDamping::Rayleigh; }
   GeneralSolver& general();
@@ -158,8 +163,9 @@ class Stepper : private NewtonProblem {
   std::unique_ptr<GeneralSolver> general_;
   std::array<Points, 3> points_at_, bar_at_;     // by ForceTerm::At
   std::array<Points, 2> lag_, d_lag_, lag_bar_;  // by ForceTerm::Lag
-  Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, delta_;
-  VectorX solution_, right_;
+  Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, delta_, no_change_;
+  VectorX solution_, right_, direction_;
+  MatrixX tangent_forces_, tangent_solutions_;  // one direction a column
   std::array<VectorX, 2> adjoint_solution_;  // of the last adjoint steps with these parameters: guesses of the next
   int adjoint_solutions_ = 0;
 };

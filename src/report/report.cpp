@@ -332,7 +332,7 @@ std::string starts_table(const Result& result) {
   for (const std::size_t i : order) {
     const StartResult& s = result.starts[i];
     body += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}{}</td><td>{}</td><td>{}</td></tr>\n", i + 1,
-                        s.cost ? readable(*s.cost, 4) : "not finite", s.iterations,
+                        s.cost ? readable(*s.cost, 4) : "-", s.iterations,
                         s.converged ? "" : "not converged: ", escape_html(s.reason),
                         escape_html(spoken_values(result, s.start)), escape_html(spoken_values(result, s.final)));
   }

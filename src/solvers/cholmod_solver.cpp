@@ -6,6 +6,7 @@
 #include <cholmod.h>
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <mutex>
 #endif
 
@@ -60,24 +61,35 @@ class CholmodSolver : public LinearSolver {
   }
 
   SolveSummary solve(const VectorX& b, VectorX& x) override {
-    keep_cholmod_serial();
-    cholmod_dense rhs{};
-    rhs.nrow = rhs.d = rhs.nzmax = std::size_t(b.size());
-    rhs.ncol = 1;
-    rhs.x = const_cast<double*>(b.data());
-    rhs.xtype = CHOLMOD_REAL;
-    rhs.dtype = CHOLMOD_DOUBLE;
-    const std::lock_guard lock(blas());
-    const bool done =
-        cholmod_solve2(CHOLMOD_A, factor_, &rhs, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_);
-    if (done) x = Eigen::Map<const VectorX>(static_cast<const double*>(solution_->x), b.size());
-    return {done, 0, 0.0};
+    x.resize(b.size());
+    return solve_dense(b, x.data());
+  }
+  SolveSummary solve_columns(const MatrixX& B, MatrixX& X) override {
+    return B.cols() == 0 ? SolveSummary{true, 0, 0.0} : solve_dense(B, X.data());
   }
 
   std::string name() const override { return "CHOLMOD supernodal Cholesky"; }
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<CholmodSolver>(pattern_); }
 
  private:
+  /// @param x  out: as large as B, columns one after the other
+  template <class Dense>
+  SolveSummary solve_dense(const Dense& B, double* x) {
+    keep_cholmod_serial();
+    cholmod_dense rhs{};
+    rhs.nrow = rhs.d = std::size_t(B.rows());
+    rhs.ncol = std::size_t(B.cols());
+    rhs.nzmax = std::size_t(B.size());
+    rhs.x = const_cast<double*>(B.data());
+    rhs.xtype = CHOLMOD_REAL;
+    rhs.dtype = CHOLMOD_DOUBLE;
+    const std::lock_guard lock(blas());
+    const bool done =
+        cholmod_solve2(CHOLMOD_A, factor_, &rhs, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_);
+    if (done) std::copy_n(static_cast<const double*>(solution_->x), B.size(), x);
+    return {done, 0, 0.0};
+  }
+
   /// The lower triangle by columns; by symmetry a block row's blocks on and right of the diagonal, transposed.
   void build_structure() {
     const BlockPattern& pattern = *pattern_;

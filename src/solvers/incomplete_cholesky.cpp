@@ -1,6 +1,7 @@
 #include "solvers/incomplete_cholesky.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "solvers/wide.hpp"
@@ -108,6 +109,68 @@ void IncompleteCholesky::apply(const std::vector<double>& r, std::vector<double>
   }
 }
 
+namespace {
+
+/// Sum over j of column j of a block (3 x 3, column by column) times a wide number each: entry d of the product in
+/// sum[d][0] + sum[d][1] + sum[d][2], which do not wait for each other.
+template <class Real>
+using LaneSums = Wide<Real>[3][3];
+
+template <class Real>
+inline void add_block_times(const Real* block, const Wide<Real>* v, LaneSums<Real>& sum) {
+  for (int d = 0; d < 3; ++d)
+    for (int j = 0; j < 3; ++j) sum[d][j] += block[3 * j + d] * v[j];
+}
+
+template <class Real>
+inline Wide<Real> total(const LaneSums<Real>& sum, int d) {
+  return sum[d][0] + sum[d][1] + sum[d][2];
+}
+
+template <class Real>
+inline void load_lanes(const Real* p, Wide<Real>* v) {
+  for (int d = 0; d < 3; ++d) v[d] = load_wide(p + 4 * d);
+}
+
+inline Wide<float> narrow(Wide<double> w) { return __builtin_convertvector(w, Wide<float>); }
+inline Wide<double> widen(Wide<float> w) { return __builtin_convertvector(w, Wide<double>); }
+
+}  // namespace
+
+void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vector<double>& z) const {
+  lane_work_.resize(12 * std::size_t(rows_));
+  float* w = lane_work_.data();
+  for (int i = 0; i < rows_; ++i) {
+    LaneSums<float> sum{};
+    for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
+      Wide<float> v[3];
+      load_lanes(&w[12 * std::size_t(column_[l])], v);
+      add_block_times(&forward_[9 * std::size_t(l)], v, sum);
+    }
+    const double* inv = &inverse_diagonal_[9 * std::size_t(i)];
+    Wide<float> left[3];
+    for (int d = 0; d < 3; ++d) left[d] = narrow(load_wide(&r[12 * std::size_t(i) + 4 * d])) - total<float>(sum, d);
+    float* wi = &w[12 * std::size_t(i)];
+    store_wide(wi, float(inv[0]) * left[0]);
+    store_wide(wi + 4, float(inv[1]) * left[0] + float(inv[4]) * left[1]);
+    store_wide(wi + 8, float(inv[2]) * left[0] + float(inv[5]) * left[1] + float(inv[8]) * left[2]);
+  }
+  for (int i = rows_ - 1; i >= 0; --i) {
+    const double* inv = &inverse_diagonal_[9 * std::size_t(i)];
+    Wide<float> own[3];
+    load_lanes(&w[12 * std::size_t(i)], own);
+    const Wide<float> x[3] = {float(inv[0]) * own[0] + float(inv[1]) * own[1] + float(inv[2]) * own[2],
+                              float(inv[4]) * own[1] + float(inv[5]) * own[2], float(inv[8]) * own[2]};
+    for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
+      float* v = &w[12 * std::size_t(column_[l])];
+      const float* block = &backward_[9 * std::size_t(l)];
+      for (int d = 0; d < 3; ++d)
+        store_wide(v + 4 * d, load_wide(v + 4 * d) - (block[d] * x[0] + block[3 + d] * x[1] + block[6 + d] * x[2]));
+    }
+    for (int d = 0; d < 3; ++d) store_wide(&z[12 * std::size_t(i) + 4 * d], widen(x[d]));
+  }
+}
+
 ConjugateGradients::ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
     : pattern_(std::move(pattern)), options_(options), preconditioner_(*pattern_) {
   const std::size_t size = 4 * std::size_t(pattern_->rows);
@@ -182,6 +245,103 @@ SolveSummary ConjugateGradients::solve(const VectorX& b, VectorX& x) {
   for (int i = 0; i < n; ++i)
     for (int d = 0; d < 3; ++d) x[3 * Eigen::Index(i) + d] = x_[4 * std::size_t(i) + d];
   return summary;
+}
+
+auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vector<double>& ap) const
+    -> std::array<double, lanes> {
+  const BlockPattern& pattern = *pattern_;
+  const int* column = pattern.column.data();
+  Wide<double> dot{};
+  for (int row = 0; row < pattern.rows; ++row) {
+    LaneSums<double> sum{};
+    for (int b = pattern.row_start[row]; b < pattern.row_start[row + 1]; ++b) {
+      Wide<double> v[3];
+      load_lanes(&p[12 * std::size_t(column[b])], v);
+      add_block_times(matrix_->block(b), v, sum);
+    }
+    for (int d = 0; d < 3; ++d) {
+      const Wide<double> product = total<double>(sum, d);
+      store_wide(&ap[12 * std::size_t(row) + 4 * d], product);
+      dot += load_wide(&p[12 * std::size_t(row) + 4 * d]) * product;
+    }
+  }
+  return {dot[0], dot[1], dot[2], dot[3]};
+}
+
+SolveSummary ConjugateGradients::solve_lanes() {
+  auto& [b, x, r, z, p, ap] = lanes_;
+  const std::size_t size = b.size();
+  multiply_lanes(x, ap);
+  Wide<double> b_norm{}, r_norm{};
+  for (std::size_t i = 0; i < size; i += lanes) {
+    const Wide<double> bi = load_wide(&b[i]), ri = bi - load_wide(&ap[i]);
+    store_wide(&r[i], ri);
+    b_norm += bi * bi, r_norm += ri * ri;
+  }
+  SolveSummary summary;
+  const double squared = options_.tolerance * options_.tolerance;
+  std::array<bool, lanes> goes_on{};
+  Wide<double> rz{};
+  for (;; ++summary.iterations) {
+    bool any = false;
+    for (int l = 0; l < lanes; ++l) {  // those that are done stay where they are
+      const bool is_left = r_norm[l] > squared * b_norm[l] && std::isfinite(r_norm[l]);
+      goes_on[std::size_t(l)] = is_left && (summary.iterations == 0 || goes_on[std::size_t(l)]);
+      any = any || goes_on[std::size_t(l)];
+    }
+    if (!any || summary.iterations >= options_.max_iterations) break;
+    preconditioner_.apply_to_lanes(r, z);
+    Wide<double> rz_new{}, alpha{}, beta{};
+    for (std::size_t i = 0; i < size; i += lanes) rz_new += load_wide(&r[i]) * load_wide(&z[i]);
+    for (int l = 0; l < lanes && summary.iterations > 0; ++l) beta[l] = goes_on[std::size_t(l)] ? rz_new[l] / rz[l] : 0.0;
+    rz = rz_new;
+    for (std::size_t i = 0; i < size; i += lanes) store_wide(&p[i], load_wide(&z[i]) + beta * load_wide(&p[i]));
+    const std::array<double, lanes> curvature = multiply_lanes(p, ap);
+    for (std::size_t l = 0; l < lanes; ++l) {
+      goes_on[l] = goes_on[l] && curvature[l] > 0.0;
+      alpha[l] = goes_on[l] ? rz[l] / curvature[l] : 0.0;
+    }
+    r_norm = Wide<double>{};
+    for (std::size_t i = 0; i < size; i += lanes) {
+      store_wide(&x[i], load_wide(&x[i]) + alpha * load_wide(&p[i]));
+      const Wide<double> ri = load_wide(&r[i]) - alpha * load_wide(&ap[i]);
+      store_wide(&r[i], ri);
+      r_norm += ri * ri;
+    }
+  }
+  summary.converged = true;
+  for (int l = 0; l < lanes; ++l) {
+    summary.converged = summary.converged && r_norm[l] <= squared * b_norm[l];
+    if (b_norm[l] > 0.0) summary.residual = std::max(summary.residual, std::sqrt(r_norm[l] / b_norm[l]));
+  }
+  return summary;
+}
+
+SolveSummary ConjugateGradients::solve_columns(const MatrixX& B, MatrixX& X) {
+  const std::size_t size = 4 * std::size_t(B.rows());
+  for (auto* v : {&lanes_.b, &lanes_.x, &lanes_.r, &lanes_.z, &lanes_.p, &lanes_.ap}) v->resize(size);
+  SolveSummary all{true, 0, 0.0};
+  for (Eigen::Index first = 0; first < B.cols(); first += lanes) {
+    const Eigen::Index count = std::min<Eigen::Index>(lanes, B.cols() - first);
+    SolveSummary one;
+    if (count == 1) {
+      right_ = B.col(first), solution_ = X.col(first);
+      one = solve(right_, solution_);
+      X.col(first) = solution_;
+    } else {
+      std::ranges::fill(lanes_.p, 0.0);
+      for (Eigen::Index i = 0; i < B.rows(); ++i)
+        for (Eigen::Index l = 0; l < lanes; ++l) {  // those that are not needed have nothing to solve
+          lanes_.b[std::size_t(lanes * i + l)] = l < count ? B(i, first + l) : 0.0;
+          lanes_.x[std::size_t(lanes * i + l)] = l < count ? X(i, first + l) : 0.0;
+        }
+      one = solve_lanes();
+      for (Eigen::Index i = 0; i < B.rows(); ++i)
+        for (Eigen::Index l = 0; l < count; ++l) X(i, first + l) = lanes_.x[std::size_t(lanes * i + l)];
+    }
+    all = {all.converged && one.converged, all.iterations + one.iterations, std::max(all.residual, one.residual)};
+  }
+  return all;
 }
 
 }  // namespace pliant

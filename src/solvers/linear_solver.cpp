@@ -1,6 +1,7 @@
 #include "solvers/linear_solver.hpp"
 
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -70,6 +71,13 @@ class AutomaticSolver : public LinearSolver {
     if (summary.converged || !turn_direct()) return summary;
     return direct_->solve(b, x);
   }
+  SolveSummary solve_columns(const MatrixX& B, MatrixX& X) override {
+    if (direct_) return direct_->solve_columns(B, X);
+    const SolveSummary summary = iterative_.solve_columns(B, X);
+    iterations_ += summary.iterations;
+    if (summary.converged || !turn_direct()) return summary;
+    return direct_->solve_columns(B, X);
+  }
   std::string name() const override { return direct_ ? direct_->name() : iterative_.name(); }
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<AutomaticSolver>(pattern_, options_); }
 
@@ -90,6 +98,18 @@ class AutomaticSolver : public LinearSolver {
 };
 
 }  // namespace
+
+SolveSummary LinearSolver::solve_columns(const MatrixX& B, MatrixX& X) {
+  SolveSummary all{true, 0, 0.0};
+  VectorX b, x;
+  for (Eigen::Index c = 0; c < B.cols(); ++c) {
+    b = B.col(c), x = X.col(c);
+    const SolveSummary one = solve(b, x);
+    X.col(c) = x;
+    all = {all.converged && one.converged, all.iterations + one.iterations, std::max(all.residual, one.residual)};
+  }
+  return all;
+}
 
 SolverKind best_direct_kind() {
 #ifdef PLIANT_WITH_CHOLMOD

@@ -23,6 +23,10 @@ class LinearSolver {
   [[nodiscard]] virtual bool factorise(const BlockMatrix& matrix) = 0;
   /// @param x  in: a first guess; out: the solution, 3 n
   virtual SolveSummary solve(const VectorX& b, VectorX& x) = 0;
+  /// A X = B, column by column; all 3 n x p. Solvers may take columns together, which costs less than one by one.
+  /// @param X  in: first guesses; out: the solutions
+  /// `converged` is true where all columns are; the residual is the largest.
+  virtual SolveSummary solve_columns(const MatrixX& B, MatrixX& X);
   virtual std::string name() const = 0;
   /// A solver of the same kind and pattern, for another thread.
   virtual std::unique_ptr<LinearSolver> clone() const = 0;

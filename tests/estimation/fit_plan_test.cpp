@@ -51,7 +51,7 @@ struct Plans : testing::Test {
   StageRecord record(const StageId& id, double cost, double modulus = 1e4) const {
     StageRecord r{id, "", theta(modulus), theta(modulus)};
     r.cost = cost, r.succeeded = std::isfinite(cost), r.iterations = 3;
-    r.misfit = 1.0;
+    r.misfit = 2.5;  // neither so good that a stage can be left out, nor so bad that more starts are needed
     return r;
   }
   void has_done(StageRecord r) { state.done.push_back(std::move(r)); }
@@ -244,18 +244,73 @@ TEST_F(Plans, FollowTheValleysOfAScanSideBySide) {
   EXPECT_EQ(chains[0].front().from.front(), theta(4e2));
   EXPECT_EQ(chains[1].front().from.front(), theta(4e4));
   for (const StageChain& chain : chains) {
-    EXPECT_EQ(chain.size(), 2u);
-    for (const Stage& stage : chain) EXPECT_THAT(stage.free, UnorderedElementsAre("youngs_modulus", "linear_velocity"));
-    EXPECT_EQ(chain.back().horizon.part, 1.0);
+    ASSERT_EQ(chain.size(), 1u) << "over the first frames";
+    EXPECT_THAT(chain[0].free, UnorderedElementsAre("youngs_modulus", "linear_velocity"));
+    EXPECT_LT(chain[0].horizon.part, 1.0);
   }
+  has_done(record({StageKind::Coarse, 0, 0}, 2.5, 410.0));
+  ASSERT_EQ(next().size(), 1u) << "the others before any goes on";
+  EXPECT_EQ(next()[0][0].id, (StageId{StageKind::Coarse, 1, 0}));
+  has_done(record({StageKind::Coarse, 1, 0}, 3.5, 4.1e4));
+  const auto on = next();
+  ASSERT_EQ(on.size(), 2u);
+  for (const StageChain& chain : on) {
+    ASSERT_EQ(chain.size(), 1u);
+    EXPECT_THAT(chain[0].free, UnorderedElementsAre("youngs_modulus", "linear_velocity"));
+    EXPECT_EQ(chain[0].horizon.part, 1.0);
+  }
+  EXPECT_EQ(on[1].front().from.front(), theta(4.1e4));
   EXPECT_EQ(FitPlan(facts).start_theta(state.done), theta(4e2));
+}
+
+TEST_F(Plans, GiveUpAStartThatLeadsNowhere) {
+  has_scanned();
+  has_done(record({StageKind::Coarse, 0, 0}, 20.0, 410.0));
+  has_done(record({StageKind::Coarse, 1, 0}, 2.0, 4.1e4));
+  EXPECT_EQ(only(next()).id, (StageId{StageKind::Coarse, 1, 1}));
+  has_done(record({StageKind::Coarse, 1, 1}, 30.0, 4e4));
+  EXPECT_EQ(only(next()).id.start, 1) << "costs over fewer frames are not compared with those over all";
+  const std::vector<FitStart> starts = FitPlan(facts).starts(state.done);
+  EXPECT_EQ(starts[0].cost, infinite);
+  EXPECT_THAT(starts[0].reason, testing::HasSubstr("10"));
+  EXPECT_EQ(starts[1].cost, 30.0);
+}
+
+TEST_F(Plans, FollowOneOfTwoStartsThatLeadToTheSamePlace) {
+  has_scanned();
+  has_done(record({StageKind::Coarse, 0, 0}, 2.02, 9e3));
+  has_done(record({StageKind::Coarse, 1, 0}, 2.0, 1.1e4));
+  EXPECT_EQ(only(next()).id, (StageId{StageKind::Coarse, 1, 1}));
+  has_done(record({StageKind::Coarse, 1, 1}, 4.0, 1e4));
+  EXPECT_EQ(only(next()).id.kind, StageKind::Fine);
+  const std::vector<FitStart> starts = FitPlan(facts).starts(state.done);
+  EXPECT_EQ(starts[0].cost, 4.0) << "that of the one it joined";
+  EXPECT_THAT(starts[0].reason, testing::HasSubstr("start 2"));
+  // Two that cost the same in other places are both followed.
+  state.done.clear();
+  has_scanned();
+  has_done(record({StageKind::Coarse, 0, 0}, 2.02, 5e3));
+  has_done(record({StageKind::Coarse, 1, 0}, 2.0, 1.1e4));
+  EXPECT_EQ(next().size(), 2u);
+}
+
+TEST_F(Plans, LeaveOutTheWideBandWhereTheBestStartExplainsWhatWasSeen) {
+  has_followed();
+  EXPECT_EQ(next()[0].size(), 2u);
+  state.done.back().misfit = state.done[state.done.size() - 2].misfit = 1.2;
+  ASSERT_EQ(next()[0].size(), 1u);
+  EXPECT_EQ(only(next()).band, facts.options.fine_band);
+  facts.swings = true;
+  EXPECT_GT(next()[0].size(), 1u) << "swings may be out of step";
 }
 
 TEST_F(Plans, OfObjectsThatSwingLookAtThemLongerAndLonger) {
   facts.swings = true;
   has_scanned();
+  has_done(record({StageKind::Coarse, 0, 0}, 2.5, 410.0));
+  has_done(record({StageKind::Coarse, 1, 0}, 3.5, 4.1e4));
   for (const StageChain& chain : next()) {
-    ASSERT_EQ(chain.size(), 4u);
+    ASSERT_EQ(chain.size(), 3u);
     for (std::size_t i = 1; i < chain.size(); ++i) EXPECT_GT(chain[i].horizon.part, chain[i - 1].horizon.part);
   }
 }

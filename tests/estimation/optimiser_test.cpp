@@ -241,6 +241,23 @@ TEST(CostFunction, EvaluatesSeveralVectorsOneAfterTheOther) {
   EXPECT_EQ(all[2].failure, "left out");
 }
 
+TEST(LevenbergMarquardt, EndsWithinAFractionOfAStandardDeviationWhereThatIsEnough) {
+  const MatrixX H = Eigen::Vector2d(4.0, 1.0).asDiagonal();
+  const Eigen::Vector2d minimum(0.5, 0.1), far(-0.4, 0.9);
+  BoundedQuadratic cost(H, H * minimum);
+  const double least = cost.evaluate(minimum).cost;
+  OptimiserOptions options = {.step_tolerance = 1e-12, .cost_tolerance = 1e-15, .promise_tolerance = 0.005};
+  const OptimiserSummary near = minimise(cost, far, options);
+  EXPECT_TRUE(near.converged);
+  EXPECT_GT(near.iterations, 0);
+  EXPECT_LT(near.evaluation.cost - least, options.promise_tolerance);
+  options.promise_tolerance = 3.0;  // more than there is to gain
+  const OptimiserSummary at_once = minimise(cost, far, options);
+  EXPECT_TRUE(at_once.converged);
+  EXPECT_EQ(at_once.iterations, 0);
+  EXPECT_EQ(at_once.p, VectorX(far));
+}
+
 TEST(LevenbergMarquardt, ANumberAtItsBoundDoesNotHoldUpTheOthers) {
   // The first wants to go to 1000; the second's minimum with the first at 1 is 0.5.
   const MatrixX H = (MatrixX(2, 2) << 1e-3, 0.0, 0.0, 1.0).finished();

@@ -167,6 +167,8 @@ TEST(Corrections, TheScoreTestPredictsTheFallOfAQuadraticCost) {
   const Eigen::Vector2d g(0.0, 50.0);
   EXPECT_NEAR(needed[0].gain, 0.5 * g.dot(A.topLeftCorner<2, 2>().ldlt().solve(g)), 1e-12);
   EXPECT_NEAR(needed[0].least, 0.5 * (650.0 - 50.0), 1e-12) << "half of what noise does not explain";
+  EXPECT_TRUE(may_need_correction(650.0, 100.0));
+  EXPECT_FALSE(may_need_correction(99.0, 100.0));
   e.cost = 99.0;  // an error of the model as large as the noise
   EXPECT_TRUE(needed_corrections(e, parameters, both, 100.0).empty());
   e.cost = 1000.0;  // it explains less than half of what is wrong

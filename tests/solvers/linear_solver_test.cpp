@@ -120,6 +120,31 @@ TEST_P(EverySolver, AgreesWithTheDenseSolution) {
   }
 }
 
+TEST_P(EverySolver, SolvesColumnsAsItSolvesEachAlone) {
+  const BlockMatrix A = step_matrix();
+  const MatrixX dense = test::dense(A);
+  for (const Eigen::Index columns : {0, 1, 2, 4, 5, 7}) {
+    const auto solver = make(A, 1e-11);
+    ASSERT_TRUE(solver->factorise(A));
+    MatrixX B(A.rows(), columns), X(A.rows(), columns);
+    for (Eigen::Index c = 0; c < columns; ++c) {
+      B.col(c) = std::pow(10.0, double(c)) * random_vector(A.rows(), 20 + unsigned(c));
+      X.col(c) = random_vector(A.rows(), 40 + unsigned(c));
+    }
+    if (columns > 2) B.col(2).setZero(), X.col(2).setZero();
+    if (columns > 3) X.col(3) = solve_symmetric(dense, VectorX(B.col(3)));  // nothing left to do
+    const MatrixX guesses = X;
+    const SolveSummary summary = solver->solve_columns(B, X);
+    EXPECT_TRUE(summary.converged) << columns << ' ' << summary.residual << ' ' << summary.iterations;
+    for (Eigen::Index c = 0; c < columns; ++c) {
+      VectorX alone = guesses.col(c);
+      ASSERT_TRUE(solver->solve(B.col(c), alone).converged) << c << " of " << columns;
+      EXPECT_LT((X.col(c) - alone).norm(), tolerance(1e-10) * alone.norm() + 1e-12) << c << " of " << columns;
+      EXPECT_LE((dense * X.col(c) - B.col(c)).norm(), tolerance(1e-10) * B.col(c).norm()) << c << " of " << columns;
+    }
+  }
+}
+
 TEST_P(EverySolver, TakesAnotherMatrixOfThePattern) {
   BlockMatrix A = chain(9);
   const auto solver = make(A);
@@ -266,6 +291,19 @@ TEST(ConjugateGradients, TakesFewIterationsAndReportsItsResidual) {
   const SolveSummary unfinished = hasty.solve(b, x);
   EXPECT_FALSE(unfinished.converged);
   EXPECT_EQ(unfinished.iterations, 3);
+}
+
+TEST(ConjugateGradients, ColumnsThatDoNotConvergeAreToldOf) {
+  const BlockMatrix A = step_matrix();
+  ConjugateGradients hasty(A.shared_pattern(), {SolverKind::Iterative, 1e-8, 3});
+  ASSERT_TRUE(hasty.factorise(A));
+  MatrixX B = MatrixX::Zero(A.rows(), 3), X = B;
+  B.col(1) = random_vector(A.rows(), 9);
+  const SolveSummary summary = hasty.solve_columns(B, X);
+  EXPECT_FALSE(summary.converged);
+  EXPECT_EQ(summary.iterations, 3);
+  EXPECT_NEAR(summary.residual, (test::dense(A) * X.col(1) - B.col(1)).norm() / B.col(1).norm(), 1e-9);
+  EXPECT_EQ(X.col(0).norm() + X.col(2).norm(), 0.0);
 }
 
 TEST(ConjugateGradients, NothingToSolve) {
