@@ -169,6 +169,7 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
   for (bool done = false; !done;) {
     if (damped_step(run, options, undamped).predicted < options.promise_tolerance) {
       run.end(true, "the minimum is within a fraction of its standard deviation");
+      if (s.iterations == 0) run.report(lambda, true, Eigen::Vector2d(lambda, 0.0), true);  // a run is seen to be one
       return;
     }
     const bool looks_ahead = was_rejected && options.trials_after_rejection > 1;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "elasticity/corotated.hpp"
 #include "support/bodies.hpp"
 
@@ -81,6 +83,28 @@ TEST(ViscousForces, AreThoseOfRayleighAtSmallStrain) {
     elasticity->add_force(x + way, elastic);
     const Points viscous = damped.force(x, x, x + way);
     EXPECT_LT((viscous - Damped::beta / Damped::dt * elastic).norm(), 1e-10 * viscous.norm()) << kind.name;
+  }
+}
+
+/// The force of every node, of a way that no two elements share, on bodies of many elements.
+TEST(ViscousForces, AreThoseOfTheirMatrix) {
+  for (const test::BodyKind& kind : test::body_kinds()) {
+    Damped damped(kind);
+    const Points& X = damped.body->reference_positions();
+    Points lag = X, way(X.rows(), 3);
+    for (Eigen::Index n = 0; n < X.rows(); ++n)
+      for (int d = 0; d < 3; ++d) {
+        lag(n, d) += 2e-3 * std::sin(double(7 * n + d));
+        way(n, d) = 1e-3 * std::cos(double(5 * n + 3 * d));
+      }
+    const Points force = damped.force(X, lag, X + way);
+    BlockMatrix matrix(damped.body->pattern);
+    damped.term->add_matrix(1.0, matrix);
+    VectorX expected;
+    matrix.multiply(flat(way), expected);
+    for (Eigen::Index n = 0; n < X.rows(); ++n)
+      ASSERT_LT((force.row(n).transpose() + expected.segment<3>(3 * n)).norm(), 1e-10 * expected.norm())
+          << kind.name << ", node " << n;
   }
 }
 

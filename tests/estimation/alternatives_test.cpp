@@ -1,0 +1,70 @@
+// Models beside the estimate: what they add to its uncertainty, and that they are resumed.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "estimation/fit.hpp"
+#include "support/interruption.hpp"
+#include "support/sagging_bar.hpp"
+
+namespace pliant::alternatives_test {
+namespace {
+
+FitOptions quick() {
+  FitOptions options;
+  options.cells = options.coarse_cells = 8.0;
+  options.parameters["poissons_ratio"].estimated = false;
+  options.starts = 1;
+  return options;
+}
+
+const UncertaintyShare* share(const FitOutcome& outcome, const std::string& cause) {
+  const auto it = std::ranges::find(outcome.uncertainty.budget, cause, &UncertaintyShare::cause);
+  return it == outcome.uncertainty.budget.end() ? nullptr : &*it;
+}
+
+TEST(Alternatives, WidenWhatTheNoiseLeavesOpen) {
+  const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  FitOptions options = quick();
+  const FitOutcome with = fit({bar}, options);
+  options.alternatives = false;
+  const FitOutcome without = fit({bar}, options);
+  EXPECT_EQ(with.theta, without.theta) << "they leave the estimate alone";
+  ASSERT_EQ(without.uncertainty.budget.size(), 1u) << "noise";
+  EXPECT_EQ(without.uncertainty.std, without.uncertainty.std_noise);
+  EXPECT_EQ(with.uncertainty.std_noise, without.uncertainty.std_noise);
+  double squares = 0.0;
+  for (const UncertaintyShare& s : with.uncertainty.budget) squares += s.std[0] * s.std[0];
+  EXPECT_NEAR(squares, with.uncertainty.std[0] * with.uncertainty.std[0], 1e-9 * squares);
+  for (const char* cause : {"mesh", "mass"}) {
+    ASSERT_NE(share(with, cause), nullptr) << cause;
+    EXPECT_GT(share(with, cause)->std[0], 0.0) << cause;
+  }
+  // A bar sags by its weight over its modulus: a hundredth of the mass is a hundredth of the modulus.
+  EXPECT_NEAR(share(with, "mass")->std[0], 0.01, 0.002);
+}
+
+TEST(Alternatives, GoOnAfterAnInterruption) {
+  const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  const FitOutcome undisturbed = fit({bar}, quick());
+  const auto has_tried_one = [](const FitState& state) {
+    return std::ranges::any_of(state.pass.done,
+                               [](const StageRecord& r) { return r.id.kind == StageKind::Alternative; });
+  };
+  test::Interruption interruption(has_tried_one);
+  const FitOutcome interrupted = fit({bar}, quick(), interruption.monitor());
+  ASSERT_TRUE(interruption.came());
+  EXPECT_TRUE(interrupted.interrupted);
+  const FitOutcome resumed = fit({bar}, quick(), {}, interruption.left());
+  EXPECT_EQ(resumed.theta, undisturbed.theta);
+  ASSERT_EQ(resumed.uncertainty.budget.size(), undisturbed.uncertainty.budget.size());
+  for (std::size_t i = 0; i < resumed.uncertainty.budget.size(); ++i) {
+    EXPECT_EQ(resumed.uncertainty.budget[i].cause, undisturbed.uncertainty.budget[i].cause);
+    EXPECT_NEAR(resumed.uncertainty.budget[i].std[0], undisturbed.uncertainty.budget[i].std[0],
+                1e-6 * undisturbed.uncertainty.std[0])
+        << resumed.uncertainty.budget[i].cause;
+  }
+}
+
+}  // namespace
+}  // namespace pliant::alternatives_test
