@@ -174,6 +174,24 @@ void adjoint(benchmark::State& state, MakeMotion make, Integrator integrator) {
 void adjoint_step(benchmark::State& state, MakeMotion make) { adjoint(state, make, Integrator::Lagged); }
 void newton_adjoint_step(benchmark::State& state, MakeMotion make) { adjoint(state, make, Integrator::Newton); }
 
+/// Tangents along so many directions, as fits carry them along: of the material, the dampings and the start's velocity.
+void tangents(benchmark::State& state, MakeMotion make, int directions) {
+  Motion motion = make(Integrator::Lagged);
+  MatrixX along = MatrixX::Zero(motion.theta.size(), directions);
+  for (int c = 0; c < directions; ++c) along(c % motion.theta.size(), c) = 1.0;
+  const Eigen::Index nodes = motion.body->node_count();
+  while (state.KeepRunningBatch(Motion::steps)) {
+    motion.stepper->set_parameters(motion.theta);
+    std::vector<State> changes(std::size_t(directions), {Points::Zero(nodes, 3), Points::Zero(nodes, 3)});
+    for (std::size_t s = 0; s < Motion::steps; ++s) {
+      benchmark::DoNotOptimize(motion.stepper->prepare_derivatives(motion.states[s], motion.deltas[s]));
+      motion.stepper->tangents(motion.states[s], motion.deltas[s], along, changes);
+    }
+    benchmark::DoNotOptimize(changes.back().x.data());
+  }
+  motion.label(state);
+}
+
 /// Factorisation (or preconditioner) of a step's matrix and one solve for its right-hand side, from zero.
 void linear_solve(benchmark::State& state, MakeMotion make, SolverOptions options) {
   Motion motion = make(Integrator::Lagged);
@@ -216,6 +234,8 @@ void assembly(benchmark::State& state, MakeMotion make) {
 #define PLIANT_STEP_BENCHMARKS(motion)                                                                             \
   BENCHMARK_CAPTURE(forward_step, motion, motion)->Unit(benchmark::kMillisecond);                                  \
   BENCHMARK_CAPTURE(adjoint_step, motion, motion)->Unit(benchmark::kMillisecond);                                  \
+  BENCHMARK_CAPTURE(tangents, motion##_1_direction, motion, 1)->Unit(benchmark::kMillisecond);                     \
+  BENCHMARK_CAPTURE(tangents, motion##_5_directions, motion, 5)->Unit(benchmark::kMillisecond);                    \
   BENCHMARK_CAPTURE(linear_solve, motion##_iterative_1e6, motion, iterative(1e-6))->Unit(benchmark::kMillisecond); \
   BENCHMARK_CAPTURE(linear_solve, motion##_iterative_1e8, motion, iterative(1e-8))->Unit(benchmark::kMillisecond); \
   BENCHMARK_CAPTURE(linear_solve, motion##_cholmod, motion, SolverOptions{SolverKind::Cholmod})                    \
