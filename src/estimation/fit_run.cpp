@@ -41,7 +41,7 @@ int last_frame(const Horizon& horizon, const Recording& r) {
   return horizon.part < 1.0 ? r.horizon(horizon.part) : r.last_frame;
 }
 
-constexpr double largest_shift = 1.0;      // of an unconstrained coordinate, by a few steps
+constexpr double largest_shift = 1.0;  // of an unconstrained coordinate, by a few steps
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
 constexpr int few_iterations = 2, many_iterations = 5;
@@ -155,13 +155,20 @@ std::vector<Alternative> FitRun::alternatives() const {
   if (has_coarser) all.push_back({"mesh", cells, 1.0, {}, false, size_of_coarser_mesh, false, many_iterations});
   if (recordings_.any_meshed_here() && is_static) all.push_back({"mesh", ratio, 1.0, {}, false, size_of_finer_mesh});
   if (!is_static)
-    all.push_back({"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step, false, few_iterations});
+    all.push_back(
+        {"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step, false, few_iterations});
   if (!options_.law_of_motion()) {
     const bool has_large_strain =
         !is_static && !recordings_.moves_reference() && options_.material != MaterialKind::Linear;
     if (has_large_strain)
-      all.push_back({"law at large strain", cells, 1.0, {.small_strain = true}, false, size_of_small_strain,
-                     has_coarser, has_coarser ? many_iterations : few_iterations});
+      all.push_back({"law at large strain",
+                     cells,
+                     1.0,
+                     {.small_strain = true},
+                     false,
+                     size_of_small_strain,
+                     has_coarser,
+                     has_coarser ? many_iterations : few_iterations});
     else if (recordings_.are_tetrahedra())
       all.push_back({"law at large strain", cells, 1.0, {.neo_hookean = true}, false, 1.0, has_coarser});
   }

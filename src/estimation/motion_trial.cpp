@@ -70,7 +70,7 @@ class MotionTrial::Comparison {
 
   ObservedMotion motion_;
   std::vector<ParameterHandle> blocks_of_motion_, blocks_of_sensors_;
-  Eigen::Index least_size_ = 0;          // of a parameter vector that has them
+  Eigen::Index least_size_ = 0;  // of a parameter vector that has them
   int number_;
   Simulation simulation_;
   Sensors sensors_;
@@ -220,18 +220,19 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
   std::size_t next = 0;
   TaskGroup beside;
   const int last_frame = motion_.options.last_frame;
-  const RolloutSummary summary = simulation_.run(
-      theta, directions(Eigen::all, along), last_frame, [&](int frame, const State& state, std::span<const State> tangents) {
-        if (next < observations.size() && observations[next].frame == frame) {
-          Tangents changes{directions.cols(), along, {}};
-          for (const State& t : tangents) changes.positions.push_back(t.x);
-          const std::size_t slot = next++;
-          beside.run([this, &observations, &fits, slot, x = state.x, changes = std::move(changes)] {
-            fits[slot] = fit_frame(observations[slot], x, changes);
-          });
-        }
-        return frame < last_frame;
-      });
+  const RolloutSummary summary =
+      simulation_.run(theta, directions(Eigen::all, along), last_frame,
+                      [&](int frame, const State& state, std::span<const State> tangents) {
+                        if (next < observations.size() && observations[next].frame == frame) {
+                          Tangents changes{directions.cols(), along, {}};
+                          for (const State& t : tangents) changes.positions.push_back(t.x);
+                          const std::size_t slot = next++;
+                          beside.run([this, &observations, &fits, slot, x = state.x, changes = std::move(changes)] {
+                            fits[slot] = fit_frame(observations[slot], x, changes);
+                          });
+                        }
+                        return frame < last_frame;
+                      });
   beside.wait();
   evaluation.steps = summary.steps;
   if (!summary.succeeded) return evaluation.failure = summary.failure, evaluation;

@@ -296,7 +296,8 @@ void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d
   for (Eigen::Index c = 0; c < d_theta.cols(); ++c) {
     const State& change = changes[std::size_t(c)];
     direction_ = d_theta.col(c);
-    find_change_of_force(start, delta, direction_, change, d_reference.empty() ? nullptr : &d_reference[std::size_t(c)]);
+    find_change_of_force(start, delta, direction_, change,
+                         d_reference.empty() ? nullptr : &d_reference[std::size_t(c)]);
     if (is_newton()) {
       solve_derivative(d_force_, w_, GeneralSolver::Side::Plain);
       tangent_solutions_.col(c) = flat(w_);

@@ -166,7 +166,7 @@ class Stepper : private NewtonProblem {
   Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, delta_, no_change_;
   VectorX solution_, right_, direction_;
   MatrixX tangent_forces_, tangent_solutions_;  // one direction a column
-  std::array<VectorX, 2> adjoint_solution_;  // of the last adjoint steps with these parameters: guesses of the next
+  std::array<VectorX, 2> adjoint_solution_;     // of the last adjoint steps with these parameters: guesses of the next
   int adjoint_solutions_ = 0;
 };
 

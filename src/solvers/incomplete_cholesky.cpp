@@ -293,7 +293,8 @@ SolveSummary ConjugateGradients::solve_lanes() {
     preconditioner_.apply_to_lanes(r, z);
     Wide<double> rz_new{}, alpha{}, beta{};
     for (std::size_t i = 0; i < size; i += lanes) rz_new += load_wide(&r[i]) * load_wide(&z[i]);
-    for (int l = 0; l < lanes && summary.iterations > 0; ++l) beta[l] = goes_on[std::size_t(l)] ? rz_new[l] / rz[l] : 0.0;
+    for (int l = 0; l < lanes && summary.iterations > 0; ++l)
+      beta[l] = goes_on[std::size_t(l)] ? rz_new[l] / rz[l] : 0.0;
     rz = rz_new;
     for (std::size_t i = 0; i < size; i += lanes) store_wide(&p[i], load_wide(&z[i]) + beta * load_wide(&p[i]));
     const std::array<double, lanes> curvature = multiply_lanes(p, ap);
