@@ -11,6 +11,7 @@
 #include "capture/depth_points.hpp"
 #include "capture/isolated_points.hpp"
 #include "capture/pixel_kinds.hpp"
+#include "capture/pixel_scatter.hpp"
 #include "capture/point_cloud.hpp"
 
 namespace pliant {
@@ -36,6 +37,8 @@ void append_pixels(ObservedFrame& frame, const PixelSorter& sorter, const DepthC
       frame.camera.push_back(index);
       frame.pixel.push_back(v * depth.width + u);
     }
+  frame.scatter.resize(std::size_t(index) + 1, 0.0);
+  frame.scatter[std::size_t(index)] = pixel_scatter(depth, kinds, lens, sorter.noise());
 }
 
 void append_camera(ObservedFrame& frame, const Capture& capture, const PixelSorter& sorter, int index) {

@@ -15,6 +15,8 @@ struct ObservedFrame {
   std::vector<Vector3> view;    ///< unit direction from the sensor to the point; zero for clouds
   std::vector<int> camera;      ///< index into Capture::depth; -1 for clouds
   std::vector<int> pixel;       ///< row * width + column; -1 for clouds
+  /// Of each depth camera, how far neighbouring pixels scatter over the noise (`pixel_scatter`); 0 where nothing tells.
+  std::vector<double> scatter;
 };
 
 struct ObserveOptions {

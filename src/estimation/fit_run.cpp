@@ -465,7 +465,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
 }
 
 std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const ParameterSet& estimated) {
-  const std::vector<GivenQuantity> given = given_quantities(estimated);
+  const std::vector<GivenQuantity> given = given_quantities(estimated, recordings_.common_errors());
   const ParameterSet all = with_given(estimated, given);
   Objective objective = objective_of(stage, all, grid(stage.grid));
   const CostEvaluation e = objective.linearise(all.to_unconstrained(all.reference()));

@@ -17,16 +17,25 @@ std::string sensor_of(const std::string& name) { return name.substr(name.find('@
 
 }  // namespace
 
-std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters) {
+std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters,
+                                            const std::vector<CommonError>& common_errors) {
   std::vector<GivenQuantity> given;
+  const auto error_of = [&](const Parameter& p) {
+    for (const CommonError& e : common_errors)
+      if (p.at == e.sensor.turn || p.at == e.sensor.shift) return e.relative;
+    return 0.0;
+  };
+  double worst_error = 0.0;
+  for (const CommonError& e : common_errors) worst_error = std::max(worst_error, e.relative);
   for (const Parameter& p : parameters.parameters()) {
     if (p.estimated) continue;
     if (p.role == Role::Sensor && p.is_scalar())
       given.push_back({p.name, "range of " + sensor_of(p.name), moved});
     else if (p.role == Role::Sensor)
-      given.push_back({p.name, "pose of " + sensor_of(p.name), p.unit == "rad" ? turned : moved});
+      given.push_back({p.name, "pose of " + sensor_of(p.name),
+                       p.unit == "rad" ? std::max(turned, 2.0 * error_of(p)) : std::max(moved, error_of(p))});
     else if (p.transform == Transform::Direction)
-      given.push_back({p.name, "direction of gravity", tilted});
+      given.push_back({p.name, "direction of gravity", std::max(tilted, 2.0 * worst_error)});
     else if (p.role == Role::Inertia && p.transform == Transform::Logarithm)
       given.push_back({p.name, "mass", weighed});
     else if (p.role == Role::Obstacle && p.transform == Transform::Shift)

@@ -1,8 +1,13 @@
 #include "estimation/recordings.hpp"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
 #include "base/error.hpp"
 #include "capture/find_plane.hpp"
 #include "capture/markers.hpp"
+#include "capture/pixel_scatter.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/press_objective.hpp"
@@ -65,6 +70,44 @@ LoadCase load_case(const Capture& capture, const Load& load, int points) {
   }
   one.observations = std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, seen, one.tracked));
   return one;
+}
+
+/// Weighs depth readings by how far neighbours are seen to scatter where that is more than the noise that is stated or
+/// that such sensors have. Returns of each depth camera the error that neighbours have in common [m]: nearly all of the
+/// noise where they scatter far less than it says.
+std::vector<double> weigh_by_scatter(const Capture& capture, std::vector<ObservedFrame>& observed,
+                                     std::vector<std::string>& notes) {
+  constexpr double clearly_more = 1.25, far_less = 1.0 / 3.0;
+  std::vector<double> common(capture.depth.size(), 0.0);
+  const std::vector<double> scatter = median_scatter(observed, capture.depth.size());
+  for (std::size_t c = 0; c < scatter.size(); ++c) {
+    if (scatter[c] == 0.0) continue;
+    double squares = 0.0;
+    int count = 0;
+    for (ObservedFrame& frame : observed)
+      for (std::size_t i = 0; i < frame.points.size(); ++i) {
+        if (frame.camera[i] != int(c)) continue;
+        squares += frame.noise[i] * frame.noise[i], ++count;
+        if (scatter[c] > clearly_more) frame.noise[i] *= float(scatter[c]);
+      }
+    const double noise = std::sqrt(squares / count);
+    const std::string& name = capture.depth[c].name;
+    if (scatter[c] > clearly_more)
+      notes.push_back(
+          fmt::format("Neighbouring pixels of {} scatter by {:.2g} mm, {:.1f} times the noise {}; they are "
+                      "weighed by what is seen.",
+                      name, 1e3 * noise * scatter[c], scatter[c],
+                      capture.depth[c].noise ? "that the capture states" : "of such cameras"));
+    if (scatter[c] < far_less) {
+      common[c] = noise * std::sqrt(1.0 - scatter[c] * scatter[c]);
+      notes.push_back(
+          fmt::format("Neighbouring pixels of {} scatter by {:.2g} mm only, where its noise is {:.2g} mm: "
+                      "they err together, so its pose and the direction of gravity are taken to be known no "
+                      "better than that.",
+                      name, 1e3 * noise * scatter[c], 1e3 * noise));
+    }
+  }
+  return common;
 }
 
 /// Puts planes that are only roughly known where the depth images show them. Returns the numbers of those found.
@@ -216,6 +259,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
     notes.push_back("Plane " + std::to_string(plane + 1) +
                     " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
   recording.tracked = recorded.followed ? std::move(*recorded.followed) : tracked_points(capture);
+  recording.common_error = weigh_by_scatter(capture, recorded.observed, notes);
   recording.observations = std::make_shared<std::vector<FrameObservations>>(
       frame_observations(capture, recorded.observed, recording.tracked));
   if (recording.observations->empty() && recording.loads.empty())
@@ -270,6 +314,14 @@ Resolution Recordings::resolution(double cells, double steps) const {
   r.pulls = options_.pull_points;
   r.band = widest_band();
   return r;
+}
+
+std::vector<CommonError> Recordings::common_errors() const {
+  std::vector<CommonError> errors;
+  for (const Recording& r : all_)
+    for (std::size_t c = 0; c < r.common_error.size(); ++c)
+      if (r.common_error[c] > 0.0) errors.push_back({r.blocks.sensors[c], r.common_error[c] / r.size});
+  return errors;
 }
 
 Grid Recordings::grid(double cells, double steps, const ModelChange& change) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimation/fit.hpp"
+#include "estimation/given_quantities.hpp"
 #include "estimation/press_scene.hpp"
 
 namespace pliant {
@@ -26,6 +27,7 @@ struct Recording {
   std::shared_ptr<const SignedDistance> distance;
   double size = 0.0;  ///< of the object [m]
   int last_frame = 0;
+  std::vector<double> common_error;  ///< of each depth camera, what all its readings err by together [m]
   CaptureBlocks blocks;
   std::vector<LoadCase> loads;  ///< those that are fitted
 
@@ -73,6 +75,9 @@ class Recordings {
   bool are_tetrahedra() const { return resolution(1.0, 1.0).element != ElementKind::Hexahedron; }
   /// Whether where the body is stress-free follows from the parameters.
   bool moves_reference() const { return any_sags() || options_.scan_points > 0; }
+
+  /// Errors that all readings of a sensor have in common, where the images show that they do.
+  std::vector<CommonError> common_errors() const;
 
   [[nodiscard]] Grid grid(double cells, double steps, const ModelChange& change = {}) const;
 

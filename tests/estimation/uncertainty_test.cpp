@@ -86,6 +86,18 @@ TEST(GivenQuantities, AreThoseThatAreNotEstimated) {
   EXPECT_EQ(given[2].cause, "pose of front");
 }
 
+TEST(GivenQuantities, OfASensorAreKnownNoBetterThanItReads) {
+  const ParameterSet set = young_and_poisson();
+  CommonError error;
+  error.sensor.turn = set.find("sensor_turn@front")->at;
+  error.relative = 0.03;
+  EXPECT_EQ(given_quantities(set, {error})[2].deviation, 0.06) << "at the object's ends, half its size away";
+  error.relative = 1e-5;
+  EXPECT_EQ(given_quantities(set, {error})[2].deviation, given_quantities(set)[2].deviation);
+  error.sensor.turn = {}, error.relative = 0.03;
+  EXPECT_EQ(given_quantities(set, {error})[2].deviation, given_quantities(set)[2].deviation) << "of another sensor";
+}
+
 TEST(Uncertainties, OfNoiseAloneAreTheNoises) {
   const CostEvaluation e = measured(curvature());
   const Uncertainty u = uncertainty_of(e, {}, {});
