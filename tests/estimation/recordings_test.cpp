@@ -6,6 +6,7 @@
 #include "geometry/primitives.hpp"
 #include "support/derivatives.hpp"
 #include "support/recordings.hpp"
+#include "support/sagging_bar.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant::recordings_test {
@@ -313,6 +314,54 @@ TEST_F(TwoCaptures, KeepAllButTheModuliWhereThereAreOthers) {
     EXPECT_TRUE(same(from.blocks[r].motion.density, to.blocks[r].motion.density));
     EXPECT_TRUE(same(from.blocks[r].sensors[0].shift, to.blocks[r].sensors[0].shift));
   }
+}
+
+/// A bar that a camera sees whose neighbouring pixels scatter by so many times its noise of 1 mm.
+struct ScatteringBar {
+  explicit ScatteringBar(double scatter) {
+    RecordedCapture bar = test::sagging_bar(2e5);
+    bar.capture.clouds.clear();
+    DepthCamera camera;
+    camera.name = "front";
+    camera.camera.width = camera.camera.height = 100;
+    camera.noise = 1e-3;
+    bar.capture.depth = {camera};
+    std::ranges::fill(bar.observed.front().camera, 0);
+    bar.observed.front().scatter = {scatter};
+    recordings = std::make_unique<Recordings>(std::vector{bar}, FitOptions{}, notes);
+  }
+  double noise() const { return recordings->front().observations->front().points.front().noise; }
+
+  std::vector<std::string> notes;
+  std::unique_ptr<Recordings> recordings;
+};
+
+TEST(ScatterOfPixels, WithinWhatTheCaptureStatesChangesNothing) {
+  const ScatteringBar bar(0.8);
+  EXPECT_NEAR(bar.noise(), 1e-3, 1e-9);
+  EXPECT_THAT(bar.recordings->common_errors(), ::testing::IsEmpty());
+  EXPECT_THAT(bar.notes, ::testing::IsEmpty());
+}
+
+TEST(ScatterOfPixels, BeyondTheNoiseWeighsThem) {
+  const ScatteringBar bar(2.0);
+  EXPECT_NEAR(bar.noise(), 2e-3, 1e-9);
+  EXPECT_THAT(bar.recordings->common_errors(), ::testing::IsEmpty());
+  EXPECT_THAT(bar.notes, ::testing::ElementsAre(::testing::HasSubstr("2.0 times the noise that the capture states")));
+}
+
+TEST(ScatterOfPixels, FarBelowTheNoiseIsAnErrorThatAllHaveInCommon) {
+  const ScatteringBar bar(0.1);
+  EXPECT_NEAR(bar.noise(), 1e-3, 1e-9);
+  const std::vector<CommonError> errors = bar.recordings->common_errors();
+  ASSERT_EQ(errors.size(), 1u);
+  EXPECT_NEAR(errors[0].relative, 1e-3 * std::sqrt(0.99) / 0.4, 1e-8);
+  EXPECT_EQ(errors[0].sensor.turn, bar.recordings->parameters().layout().at("sensor_turn@front"));
+  EXPECT_THAT(bar.notes, ::testing::ElementsAre(::testing::HasSubstr("they err together")));
+  const auto given = given_quantities(bar.recordings->parameters(), errors);
+  const auto gravity = std::ranges::find(given, std::string("direction of gravity"), &GivenQuantity::cause);
+  ASSERT_NE(gravity, given.end());
+  EXPECT_EQ(gravity->deviation, 2.0 * errors[0].relative);
 }
 
 }  // namespace
