@@ -33,6 +33,7 @@ struct Arguments {
   std::string out, config, held_out;
   std::vector<std::string> settings;
   int threads = 0, refine = 0;
+  std::string budget;
   bool resume = false, check_gradient = false;
 };
 
@@ -118,6 +119,7 @@ FitOptions read_options(const Arguments& arguments) {
   if (!arguments.config.empty()) read_fit_options(arguments.config, options);
   for (const std::string& assignment : arguments.settings) set_fit_option(options, assignment);
   if (arguments.refine > 0) options.refine = arguments.refine;
+  if (!arguments.budget.empty()) set_fit_option(options, "budget=" + arguments.budget);
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{arguments.config}, wrong, "", "see `pliant fit --help`"});
   return options;
@@ -310,6 +312,11 @@ void add_fit(CommandLine& line, int& exit_code) {
               "take it to the limit, and state what error is left")
       .range(1, 3)
       .type_name("N");
+  command
+      .option("--budget", arguments->budget,
+              "time that the fit may take with repetitions on finer meshes, which are made as long as the mesh "
+              "contributes to the uncertainty of a modulus more than half of what the noise does; 0: none")
+      .type_name("MINUTES");
   command.option("--threads", arguments->threads, "most threads to use; all processors where left out").positive();
   command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
   command.flag("--check-gradient", arguments->check_gradient,

@@ -1,17 +1,23 @@
 #!/usr/bin/env python3
 """How often the stated intervals hold the truth, on recordings by `pliant synth` under physics that the fit does not use.
 
-    run.py [PROGRAM] [--count N] [--minutes M] [--work FOLDER]
+    run.py [PROGRAM] [--count N] [--minutes M] [--jobs J] [--again 1] [--work FOLDER]
 
 Each recording is of a drawn shape, material, throw and camera, by smaller elements and steps than a fit takes, and differs from what a
 fit assumes in one more way, its family: the law at large strain, the damping, how hard and smooth the floor is, a coefficient of
 friction that the capture has wrong, a stiffness that varies by a tenth within the body, or nothing more. Fits get no choices. The
 intervals are counted by family, over results that do not doubt themselves; what stands for unmodelled physics (docs/uncertainty.md) may
-be set by every other round of the families, so the rounds between (`held back`) are counted alone as well. A recording that is fitted in the work folder is
-not fitted again; after M minutes no further one is begun."""
+be set by every other round of the families, so the rounds between (`held back`) are counted alone as well.
+
+Hours on two cores, so results add up: a recording that stands in results.json, with the commit of the program that fitted it, or that is
+fitted in the work folder is not fitted again unless with --again 1, and after M minutes no further one is begun. J fits run side by side,
+each on its share of the processors."""
+import concurrent.futures
 import math
+import os
 import pathlib
 import random
+import subprocess
 import sys
 import time
 
@@ -65,7 +71,7 @@ def draw(number):
     soft = common.log_uniform(rng, 0.1, 1) if family == "contact" else 1.0
     distance, around, above = size * rng.uniform(2.4, 3.2), rng.uniform(0, 2 * math.pi), rng.uniform(0.4, 0.9)
     eye = [distance * math.cos(around) * math.cos(above), distance * math.sin(above), distance * math.sin(around) * math.cos(above)]
-    frames = 36
+    frames = 24
     scene = {
         "object": {**body, "translation": [0.0, height, 0.0], "axis": unit(rng), "angle_deg": rng.uniform(0, 180), "density": density},
         "material": {"youngs_modulus": modulus, "poissons_ratio": rng.uniform(0.2, 0.47),
@@ -74,7 +80,7 @@ def draw(number):
                      "mean_strain": "corotated" if family == "law" else "neo_hookean",
                      "damping_law": "rayleigh" if family == "damping" else "kelvin_voigt"},
         "world": {"gravity": [0.0, -GRAVITY, 0.0]},
-        "timing": {"frame_rate": round(frames / (7 * time_scale)), "frame_count": frames, "start_frame": 1},
+        "timing": {"frame_rate": round(frames / (4.7 * time_scale)), "frame_count": frames, "start_frame": 1},
         "simulation": {"cell_size": size / 18, "substeps": 16, "newmark_theta": 0.5, "contact_stiffness": hardness * soft,
                        "contact_smoothing": 1e-3 * size * (common.log_uniform(rng, 1, 5) if family == "contact" else 1)},
         "initial": {"linear_velocity": velocity, "angular_velocity": spin, "known": True},
@@ -130,29 +136,50 @@ def one(arguments, number):
         common.run(arguments.program, "synth", folder / "scene.toml", "--out", capture, "--seed", number)
         forget(capture, changes)
         (capture / "ready").touch()
-    figures = common.fit(arguments.program, capture, folder / "fit")
+    threads = max(1, (os.cpu_count() or 1) // arguments.jobs) if arguments.jobs > 1 else None
+    figures = common.fit(arguments.program, capture, folder / "fit", threads=threads)
     result = figures.pop("result")
-    return {"family": family, "verdict": result["verdict"], "wall_seconds": figures["wall_seconds"],
+    return {"family": family, "commit": arguments.commit, "verdict": result["verdict"], "wall_seconds": figures["wall_seconds"],
             "surface_rms": common.number(result["error"].get("surface_rms") or 0.0, 4),
             "parameters": judged(result, true_values(capture))}
 
 
+def commit():
+    said = subprocess.run(["git", "-C", HERE, "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
+    return said.stdout.strip() or "unknown"
+
+
+def known_rows():
+    """Those of results.json."""
+    path = HERE / "results.json"
+    return common.read(path)["recordings"] if path.exists() else {}
+
+
 def main():
     arguments = common.arguments(__doc__, count={"type": int, "default": 200, "help": "number of recordings"},
-                                 minutes={"type": float, "default": math.inf, "help": "after which no further fit is begun"})
-    begin, rows = time.monotonic(), {}
-    for number in range(arguments.count):
-        if time.monotonic() - begin > 60 * arguments.minutes and not (arguments.work / f"{number:03}/fit/figures.json").exists():
-            continue
+                                 minutes={"type": float, "default": math.inf, "help": "after which no further fit is begun"},
+                                 jobs={"type": int, "default": 1, "help": "fits side by side"},
+                                 again={"type": int, "default": 0, "help": "1: fit those of results.json again"})
+    arguments.commit = commit()
+    begin, rows = time.monotonic(), {} if arguments.again else known_rows()
+
+    def fitted(number):
         name = f"{number:03}"
+        is_late = time.monotonic() - begin > 60 * arguments.minutes
+        if name in rows or is_late and not (arguments.work / name / "fit/figures.json").exists():
+            return
         try:
             rows[name] = one(arguments, number)
         except SystemExit as refusal:
-            rows[name] = {"family": FAMILIES[number % len(FAMILIES)], "verdict": "refused", "reason": str(refusal)[-500:], "parameters": {},
-                          "wall_seconds": 0.0}
+            rows[name] = {"family": FAMILIES[number % len(FAMILIES)], "commit": arguments.commit, "verdict": "refused",
+                          "reason": str(refusal)[-500:], "parameters": {}, "wall_seconds": 0.0}
             print(f"{name}: refused\n{refusal}", flush=True)
-            continue
+            return
         print(rows[name]["family"], told(name, rows[name]), flush=True)
+
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        list(pool.map(fitted, range(arguments.count)))
+    rows = dict(sorted(rows.items()))
     parts = {"all": rows, "held back": {n: r for n, r in rows.items() if int(n) // len(FAMILIES) % 2}}
     parts |= {family: {n: r for n, r in rows.items() if r["family"] == family} for family in FAMILIES}
     scores = {part: score(of) for part, of in parts.items() if of}

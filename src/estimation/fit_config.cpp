@@ -165,6 +165,10 @@ const std::vector<Entry>& entries() {
       integer_entry("refine", "1..3",
                     "number of resolutions of mesh and time step for Richardson extrapolation; 1: no extrapolation",
                     &FitOptions::refine),
+      real_entry("budget", "minutes", "0 and more",
+                 "time within which the estimate is repeated on finer meshes, as long as the mesh's part in the "
+                 "uncertainty of a modulus is more than half of the noise's; 0: never",
+                 &FitOptions::budget),
       integer_entry("points_per_frame", "0, or 10 and more",
                     "greatest number of observed points used of each frame, evenly spread; 0: all",
                     &FitOptions::points_per_frame),
@@ -535,6 +539,7 @@ std::string FitOptions::validate() const {
   if (refine < 1 || refine > 3) return "refine must lie in 1..3";
   if (const double finest = cells * std::pow(Refinement::mesh_ratio, refine - 1); finest > 64.0)
     return "refine takes " + text_of(cells) + " cells to " + text_of(finest) + ", more than 64: begin with fewer";
+  if (!(budget >= 0.0 && std::isfinite(budget))) return "budget must be a time in minutes, not negative";
   if (starts < 1) return "starts must be at least 1";
   if (most_starts < 1) return "most_starts must be at least 1";
   if (max_iterations < 1) return "max_iterations must be at least 1";

@@ -126,7 +126,8 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
   if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Corrected)) return {};
   if (StageChain chain = finer(done); !chain.empty()) return {chain};
-  return alternatives(done);
+  if (std::vector<StageChain> left = alternatives(done); !left.empty()) return left;
+  return resolution(done);
 }
 
 Stage FitPlan::last_look(const PassState& state) const {
@@ -294,6 +295,8 @@ StageChain FitPlan::finer(const Records& done) const {
   double from = 1.0;
   for (std::size_t i = 0; i < facts_.repetitions.size() && before; ++i) {
     const Spacing& grid = facts_.repetitions[i];
+    const StageRecord* asked = find_record(done, {StageKind::Resolution, before->id.start, int(i)});
+    if (facts_.repeats_by_need && !(asked && asked->converged)) return {};
     Stage stage{{StageKind::Finer, before->id.start, int(i)},
                 grid.cells == facts_.options.cells ? in_three_digits(grid.steps) + " x steps"
                                                    : in_three_digits(grid.cells) + " cells",
@@ -334,6 +337,20 @@ std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
     left.push_back({std::move(stage)});
   }
   return left;
+}
+
+std::vector<StageChain> FitPlan::resolution(const Records& done) const {
+  const StageRecord* at = result(done);
+  if (!at || !facts_.repeats_by_need) return {};
+  const std::size_t next = repetitions(done).size();
+  Stage stage{{StageKind::Resolution, at->id.start, int(next)}, "resolution", spacing_of(*at)};
+  const bool has_failed = find_record(done, {StageKind::Finer, at->id.start, int(next)});
+  if (next >= facts_.repetitions.size() || has_failed || find_record(done, stage.id)) return {};
+  stage.band = facts_.options.fine_band;
+  stage.free = free_at_last(done);
+  stage.from = {at->theta};
+  stage.done_from = stage.done_to = 1.0;
+  return {{std::move(stage)}};
 }
 
 // What the records say ----------------------------------------------------------------------------------------------

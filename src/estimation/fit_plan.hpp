@@ -20,6 +20,7 @@ struct PlanFacts {
   bool swings = false;                    ///< some object is let go
   bool coarse_is_as_fine = false;         ///< starts are followed on the full grid already
   std::vector<Spacing> repetitions;       ///< on finer grids, after the first estimate
+  bool repeats_by_need = false;           ///< each only where a look at the resolution asks for it
   std::vector<Alternative> alternatives;  ///< models that are tried at the last estimate
 };
 
@@ -27,7 +28,7 @@ struct PlanFacts {
 /// over decades of Young's modulus; the best values followed on the coarse grid, wide band, horizon growing as the
 /// early frames match; the best of them on the full grid, first in the wide band; a test of which corrections the
 /// residuals ask for, and the estimate with them; repetitions on finer grids; a few steps under each of some
-/// alternative models.
+/// alternative models; where these show that the mesh matters, repetitions on finer ones within the budget.
 class FitPlan {
  public:
   explicit FitPlan(PlanFacts facts) : facts_(std::move(facts)) {}
@@ -74,6 +75,8 @@ class FitPlan {
   StageChain corrected(const Records& done, const std::optional<PassState::Beginning>& begin) const;
   StageChain finer(const Records& done) const;
   std::vector<StageChain> alternatives(const Records& done) const;
+  /// A look at whether the next repetition is needed; none where they are not by need, or one has failed.
+  std::vector<StageChain> resolution(const Records& done) const;
 
   /// Where the fit is before any start is followed.
   VectorX before_starts(const Records& done) const;

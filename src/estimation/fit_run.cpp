@@ -1,5 +1,7 @@
 #include "estimation/fit_run.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -41,6 +43,8 @@ int last_frame(const Horizon& horizon, const Recording& r) {
   return horizon.part < 1.0 ? r.horizon(horizon.part) : r.last_frame;
 }
 
+constexpr const char* cause_mesh = "mesh";
+constexpr double most_cells = 64.0;    // along the object's longest axis
 constexpr double largest_shift = 1.0;  // of an unconstrained coordinate, by a few steps
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
@@ -134,6 +138,11 @@ PlanFacts FitRun::facts() {
   f.repetitions = refined_spacings({options_.cells, options_.steps}, options_.refine, recordings_.any_meshed_here(),
                                    !recordings_.all_static());
   if (options_.alternatives) f.alternatives = alternatives();
+  f.repeats_by_need =
+      options_.refine == 1 && options_.alternatives && options_.budget > 0.0 && recordings_.any_meshed_here();
+  for (double cells = options_.cells * Refinement::mesh_ratio; f.repeats_by_need && cells <= most_cells;
+       cells *= Refinement::mesh_ratio)
+    f.repetitions.push_back({cells, options_.steps});
   constexpr double hardly = 0.8;  // of the elements
   const Grid &coarse = grid({options_.coarse_cells, options_.steps}), &fine = grid({options_.cells, options_.steps});
   f.coarse_is_as_fine = true;
@@ -152,8 +161,9 @@ std::vector<Alternative> FitRun::alternatives() const {
   // Of motions, what another law changes is seen on the coarser mesh as well, for a third of the work.
   const bool has_coarser = recordings_.any_meshed_here() && !is_static;
   const double cells = has_coarser ? 1.0 / ratio : 1.0;
-  if (has_coarser) all.push_back({"mesh", cells, 1.0, {}, false, size_of_coarser_mesh, false, many_iterations});
-  if (recordings_.any_meshed_here() && is_static) all.push_back({"mesh", ratio, 1.0, {}, false, size_of_finer_mesh});
+  if (has_coarser) all.push_back({cause_mesh, cells, 1.0, {}, false, size_of_coarser_mesh, false, many_iterations});
+  if (recordings_.any_meshed_here() && is_static)
+    all.push_back({cause_mesh, ratio, 1.0, {}, false, size_of_finer_mesh});
   if (!is_static)
     all.push_back(
         {"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step, false, few_iterations});
@@ -182,7 +192,10 @@ std::vector<StageChain> FitRun::next() {
   std::vector<StageChain> chains = plan_.next(state_);
   const bool at_alternatives = !chains.empty() && chains.front().front().alternative;
   if (at_alternatives && !grids_of_fit_) grids_of_fit_ = grids_.size();
-  if (!at_alternatives && grids_of_fit_) grids_.resize(*grids_of_fit_);  // those of alternatives are not used again
+  if (!at_alternatives && grids_of_fit_) {  // those of alternatives are not used again
+    grids_.resize(*grids_of_fit_);
+    grids_of_fit_.reset();
+  }
   for (const StageChain& chain : chains)
     for (const Stage& stage : chain) make_grid(stage);  // before threads ask for it
   return chains;
@@ -212,6 +225,8 @@ StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
       return test_corrections(stage);
     case StageKind::Alternative:
       return try_alternative(stage, is_cut);
+    case StageKind::Resolution:
+      return look_at_resolution(stage);
     default:
       return minimise_stage(stage, is_cut);
   }
@@ -221,7 +236,8 @@ StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
 PassState FitRun::reached() const {
   PassState reached = state_;
   for (const StageRecord& r : partial_)
-    if (r.id.kind != StageKind::Scan && r.id.kind != StageKind::Finer && r.id.kind != StageKind::Alternative)
+    if (r.id.kind != StageKind::Scan && r.id.kind != StageKind::Finer && r.id.kind != StageKind::Alternative &&
+        r.id.kind != StageKind::Resolution)
       reached.done.push_back(r);
   return reached;
 }
@@ -235,6 +251,7 @@ void FitRun::tell(FitEvent event) {
 
 double FitRun::all_work() const {
   double all = 1.0;
+  if (plan_.facts().repeats_by_need) return all;
   for (const Spacing& s : plan_.facts().repetitions) all += plan_.work(s);
   return all;
 }
@@ -472,6 +489,64 @@ std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const Parame
   return e.succeeded ? pliant::shifts_of_given(e, all, given) : std::vector<ModelShift>{};
 }
 
+/// Whether the mesh's part in the uncertainty of a modulus is more than half of the noise's, and the next finer mesh
+/// can be had within the budget: what was spent is in the records, what it takes follows from the last estimate's
+/// iterations.
+StageRecord FitRun::look_at_resolution(const Stage& stage) {
+  constexpr double tolerated = 0.5, growth = 3.5;  // of the noise's; power of the ratio of edges, of time
+  constexpr int iterations = 4;                    // from an estimate that is near, with the first linearisation
+  const VectorX& theta = stage.from.front();
+  StageRecord record{stage.id, stage.name, theta, theta};
+  record.succeeded = true;
+  const StageRecord& at = *plan_.result(state_.done);
+  const ParameterSet parameters = parameters_of(stage, theta);
+  const auto ended = std::ranges::find(ended_, at.id, &Ended::id);
+  const bool has_ended = ended != ended_.end() && ended->evaluation.gauss_newton.rows() == parameters.dimension();
+  const CostEvaluation e =
+      has_ended ? ended->evaluation
+                : objective_of(stage, parameters, grid(stage.grid)).linearise(parameters.to_unconstrained(theta));
+  const std::optional<VectorX> mesh = mesh_shift(state_.done, gauss_newton_shift(e, largest_shift));
+  if (!e.succeeded || !mesh) return record;
+  const VectorX noise = uncertainty_of(e, {}, {}).std;
+  const std::vector<const Parameter*> of = parameters.coordinate_parameters();
+  double share = 0.0, statistical = 0.0;
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    if (!is_modulus(*of[i]) || std::abs((*mesh)[Eigen::Index(i)]) <= share) continue;
+    share = std::abs((*mesh)[Eigen::Index(i)]), statistical = noise[Eigen::Index(i)];
+  }
+  if (share <= tolerated * statistical) return record;
+  double spent = 0.0;
+  for (const StageRecord& r : state_.done) spent += r.seconds;
+  const double predicted = at.seconds / (at.iterations + 1) * iterations * std::pow(Refinement::mesh_ratio, growth);
+  record.converged = spent + predicted <= 60.0 * options_.budget;
+  if (!record.converged)
+    record.told = fmt::format(
+        "The mesh contributes {:.1f} % to the uncertainty of Young's modulus, noise {:.1f} %: a finer one would narrow "
+        "it and takes about {:.0f} minutes in all, --budget {:.0f}.",
+        100.0 * share, 100.0 * statistical, std::ceil((spent + predicted) / 60.0),
+        std::ceil(1.2 * (spent + predicted) / 60.0));
+  return record;
+}
+
+/// By how far the estimate errs for its mesh, as the last finer one or the alternative shows.
+/// @param own  what is left of the way to the estimate's own minimum
+std::optional<VectorX> FitRun::mesh_shift(const std::vector<StageRecord>& done, const VectorX& own) const {
+  const std::vector<const StageRecord*> finer = plan_.repetitions(done);
+  if (!finer.empty()) {
+    const ParameterSet parameters = plan_.estimated(done);
+    const StageRecord& before = finer.size() > 1 ? *finer[finer.size() - 2] : *plan_.estimate(done);
+    return size_of_coarser_mesh *
+           (parameters.to_unconstrained(before.theta) - parameters.to_unconstrained(finer.back()->theta));
+  }
+  for (const StageRecord& r : done) {
+    if (r.id.kind != StageKind::Alternative || r.shifts.empty()) continue;
+    const Alternative& a = plan_.facts().alternatives[std::size_t(r.id.number)];
+    if (a.cause == cause_mesh && r.shifts.front().shift.size() == own.size())
+      return a.size * (r.shifts.front().shift - own);
+  }
+  return std::nullopt;
+}
+
 // What came out -------------------------------------------------------------------------------------------------------
 
 FitOutcome FitRun::run() {
@@ -491,6 +566,8 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
                            [](const FitEvent& e) { return std::tuple(e.kind, e.start, e.iteration); });
   const StageRecord* first = plan_.estimate(done);
   if (first) say_corrections(done, *first);
+  for (const StageRecord& r : done)
+    if (r.id.kind == StageKind::Resolution && !r.told.empty()) outcome_.notes.push_back(r.told);
   const auto failed =
       std::ranges::find_if(done, [](const StageRecord& r) { return is_on_full_grid(r.id.kind) && !r.succeeded; });
   const StageRecord& last = first ? refined(done, *first) : *failed;
@@ -564,6 +641,10 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) 
                                ".");
     for (const ModelShift& s : r.shifts) {
       if (s.shift.size() != own.size() || reference.size() != own.size()) continue;
+      if (s.cause == cause_mesh && plan_.facts().repeats_by_need && !plan_.repetitions(done).empty()) {
+        shifts.push_back({s.cause, *mesh_shift(done, own)});
+        continue;
+      }
       shifts.push_back({s.cause, a.given ? s.shift : VectorX(a.size * (s.shift - reference))});
     }
   }
@@ -587,7 +668,7 @@ const StageRecord& FitRun::refined(const std::vector<StageRecord>& done, const S
     else
       outcome_.notes.push_back("The estimate could not be repeated at " + r.name + ": " + r.reason + ".");
   }
-  if (options_.refine <= 1 || (all.size() == 1 && interrupted_)) return first;
+  if (all.size() == 1 && (options_.refine <= 1 || interrupted_)) return first;
   std::vector<RefinedEstimate> estimates;
   for (const StageRecord* r : all) {
     const Spacing spacing = plan_.spacing_of(*r);

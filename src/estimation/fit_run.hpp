@@ -30,6 +30,8 @@ class FitRun : StageLoop {
   StageRecord find_swing(const Stage& stage);
   StageRecord scan(const Stage& stage, bool& is_cut);
   StageRecord test_corrections(const Stage& stage);
+  StageRecord look_at_resolution(const Stage& stage);
+  std::optional<VectorX> mesh_shift(const std::vector<StageRecord>& done, const VectorX& own) const;
   StageRecord try_alternative(const Stage& stage, bool& is_cut);
   std::vector<ModelShift> shifts_of_given(const Stage& stage, const ParameterSet& estimated);
 

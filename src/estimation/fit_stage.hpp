@@ -25,6 +25,7 @@ enum class StageKind {
   Corrected,      ///< the estimate together with those
   Finer,          ///< the estimate again with finer steps or on a finer grid
   Alternative,    ///< a few steps from the estimate under another model
+  Resolution,     ///< whether the next finer mesh is needed, and there is time for it; no iterations
   Law,            ///< a form of the law of a pressed object
   Scale,          ///< its moduli alone, where the other numbers begin
   Cut,            ///< where a zone more is promised most; no iterations
@@ -105,9 +106,11 @@ struct StageRecord {
   double misfit = infinite;             ///< of a minimisation, at its end: see `misfit_of`
   int iterations = 0;
   bool succeeded = false;
-  bool converged = false;   ///< of a search for a swing: one was found
+  /// Of a search for a swing: one was found; of a look at the resolution: the next finer mesh is made.
+  bool converged = false;
   std::string reason = {};  ///< why it ended
   int elements = 0;         ///< of the first recording's body
+  double seconds = 0.0;     ///< that it took, of those since the fit was last resumed
   /// Of a scan: Young's moduli and costs; infinite where it cannot be simulated.
   std::vector<std::pair<double, double>> trials = {};
   std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction

@@ -24,11 +24,13 @@ struct Limits {
   VectorX values, errors;  // errors are of the last
 };
 
+/// Of the last three, where there are as many.
 Limits limits_of(const std::vector<VectorX>& p, double ratio) {
+  constexpr std::size_t most = 3;
   Limits limits{p.back(), VectorX::Zero(p.back().size())};
   for (Eigen::Index i = 0; i < p.back().size(); ++i) {
     std::vector<double> values;
-    for (const VectorX& q : p) values.push_back(q[i]);
+    for (std::size_t k = p.size() - std::min(p.size(), most); k < p.size(); ++k) values.push_back(p[k][i]);
     const Limit limit = limit_of(values, ratio, Refinement::order);
     limits.values[i] = limit.value, limits.errors[i] = limit.error;
   }

@@ -1,5 +1,7 @@
 #include "estimation/stage_loop.hpp"
 
+#include <chrono>
+
 #include "base/parallel.hpp"
 #include "estimation/fit_plan.hpp"
 
@@ -24,7 +26,9 @@ void StageLoop::run_chain(const StageChain& chain) {
     if (stage.from.empty()) stage.from = {theta};
     stage.iterations_before = counted;
     bool is_cut = false;
+    const auto begin = std::chrono::steady_clock::now();
     StageRecord record = run_stage(stage, is_cut);
+    record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (is_cut) {
       const std::lock_guard lock(mutex_);
       interrupted_ = true;

@@ -1,4 +1,5 @@
 // Models beside the estimate: what they add to its uncertainty, and that they are resumed.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@ namespace {
 
 FitOptions quick() {
   FitOptions options;
+  options.budget = 0.0;
   options.cells = options.coarse_cells = 8.0;
   options.parameters["poissons_ratio"].estimated = false;
   options.starts = 1;
@@ -42,6 +44,50 @@ TEST(Alternatives, WidenWhatTheNoiseLeavesOpen) {
   }
   // A bar sags by its weight over its modulus: a hundredth of the mass is a hundredth of the modulus.
   EXPECT_NEAR(share(with, "mass")->std[0], 0.01, 0.002);
+}
+
+/// A hexahedron high: the bar is far too stiff for its mesh, and the noise is small beside that.
+FitOptions one_hexahedron() {
+  FitOptions options = quick();
+  options.element = ElementKind::Hexahedron;
+  return options;
+}
+
+TEST(Budget, IsSpentOnFinerMeshesWhereTheyMatter) {
+  RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  for (float& noise : bar.observed.front().noise) noise = 0.01F;
+  FitOptions options = one_hexahedron();
+  const FitOutcome once = fit({bar}, options);
+  ASSERT_NE(share(once, "mesh"), nullptr);
+  ASSERT_GT(share(once, "mesh")->std[0], once.uncertainty.std_noise[0]);
+  EXPECT_EQ(once.refinement.estimates.size(), 0u);
+  options.budget = 10.0;
+  const FitOutcome repeated = fit({bar}, options);
+  ASSERT_GE(repeated.refinement.estimates.size(), 2u);
+  EXPECT_DOUBLE_EQ(repeated.refinement.estimates[1].cells, 12.0);
+  EXPECT_EQ(repeated.theta, repeated.refinement.estimates.back().theta);
+  ASSERT_NE(share(repeated, "mesh"), nullptr);
+  EXPECT_LT(share(repeated, "mesh")->std[0], 0.5 * repeated.uncertainty.std_noise[0]);
+  EXPECT_LT(repeated.uncertainty.std[0], once.uncertainty.std[0]);
+}
+
+TEST(Budget, ThatIsTooSmallIsSaid) {
+  const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  FitOptions options = one_hexahedron();
+  options.budget = 1e-6;
+  const FitOutcome outcome = fit({bar}, options);
+  EXPECT_EQ(outcome.refinement.estimates.size(), 0u);
+  EXPECT_THAT(outcome.notes, ::testing::Contains(::testing::HasSubstr("--budget")));
+}
+
+TEST(Budget, IsNotNeededWhereTheMeshHardlyMatters) {
+  RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  for (float& noise : bar.observed.front().noise) noise = 0.05F;
+  FitOptions options = one_hexahedron();
+  options.budget = 10.0;
+  const FitOutcome outcome = fit({bar}, options);
+  EXPECT_EQ(outcome.refinement.estimates.size(), 0u);
+  EXPECT_THAT(outcome.notes, ::testing::Not(::testing::Contains(::testing::HasSubstr("--budget"))));
 }
 
 TEST(Alternatives, GoOnAfterAnInterruption) {

@@ -405,6 +405,43 @@ TEST_F(Plans, RepeatTheEstimateFinerOneAfterTheOther) {
   EXPECT_TRUE(next().empty());
 }
 
+TEST_F(Plans, RepeatTheEstimateByNeed) {
+  facts.options.correct = false;
+  facts.repetitions = {{18.0, 1.0}, {27.0, 1.0}};
+  facts.repeats_by_need = true;
+  facts.alternatives = {{"mesh", 1.0 / 1.5, 1.0, {}, false, 0.8}};
+  has_estimated();
+  EXPECT_EQ(only(next()).id.kind, StageKind::Alternative);
+  has_done(record({StageKind::Alternative, 0, 0}, 1.5));
+  const auto asked = next();
+  EXPECT_EQ(only(asked).id.kind, StageKind::Resolution);
+  EXPECT_EQ(only(asked).grid.cells, facts.options.cells);
+  StageRecord answer = record(only(asked).id, 0.0);
+  answer.converged = true;
+  has_done(answer);
+  const auto finer = next();
+  EXPECT_EQ(only(finer).name, "18 cells");
+  EXPECT_EQ(only(finer).from.front(), theta(430.0));
+  has_done(record(only(finer).id, 1.3, 433.0));
+  const auto again = next();
+  EXPECT_EQ(only(again).id.number, 1) << "the alternatives are not tried anew";
+  EXPECT_EQ(only(again).grid.cells, 18.0);
+  answer.id = only(again).id;
+  has_done(answer);
+  EXPECT_EQ(only(next()).name, "27 cells");
+  has_done(record({StageKind::Finer, 0, 1}, infinite));
+  EXPECT_TRUE(next().empty());
+}
+
+TEST_F(Plans, DoNotRepeatWhatIsNotNeeded) {
+  facts.options.correct = false;
+  facts.repetitions = {{18.0, 1.0}};
+  facts.repeats_by_need = true;
+  has_estimated();
+  has_done(record(only(next()).id, 0.0));
+  EXPECT_TRUE(next().empty());
+}
+
 TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
   ParameterLayout layout = facts.parameters.layout();
   std::vector<Parameter> list = facts.parameters.parameters();
