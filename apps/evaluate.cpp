@@ -34,7 +34,7 @@ bool evaluate_frames(const Capture& capture, const CaptureScene& scene, const Ob
     std::cerr << "pliant: the simulation stopped: " << evaluation.failure << "\n";
     return false;
   }
-  result.error = surface_errors(evaluation).error;
+  result.error = surface_errors(evaluation);
   return true;
 }
 

@@ -47,8 +47,9 @@ struct FitOptions {
   double steps = 1.0;         ///< time steps per default step, (0, 16]
   int refine = 1;             ///< resolutions at which the estimate is made, 1..3
   /// Minutes that the fit may take with repetitions on finer meshes, made as long as the mesh's part in the uncertainty
-  /// of a modulus is more than half of the noise's; 0: none. Where `refine` is 1 and alternatives are tried.
-  double budget = 2.0;
+  /// of a modulus is more than half of the noise's; 0: none. Where `refine` is 1, alternatives are
+  /// tried, and no tracking takes turns with the fit.
+  double budget = 1.0;
   int points_per_frame = 1000;  ///< >= 10: an even subset of the pixels; 0: all
   int scan_per_decade = 3;      ///< values of Young's modulus tried in each decade, >= 1
   int starts = 3;               ///< best ones of the scan that are followed, >= 1

@@ -244,6 +244,7 @@ PassState FitRun::reached() const {
 
 void FitRun::tell(FitEvent event) {
   event.fraction_done /= all_work();
+  if (event.fraction_done > 1.0) event.fraction_done = 0.0;  // beyond what was planned: how much is left is not known
   event.youngs_modulus = event.theta[recordings_.material().youngs_moduli.front()];
   event.layout = layout_;
   emit(std::move(event));

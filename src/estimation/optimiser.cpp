@@ -186,7 +186,9 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
     const bool accepted = e.succeeded && gain > 0.0;
     if (accepted) {
       const double quality = step.predicted > 0.0 ? gain / step.predicted : 0.0;
-      lambda = std::clamp(quality > 0.75 ? lambda / raise : quality < 0.25 ? lambda * 3.0 : lambda, 1e-8, most);
+      // The longer step that was just refused would be refused again.
+      const bool may_lengthen = quality > 0.75 && !was_rejected;
+      lambda = std::clamp(may_lengthen ? lambda / raise : quality < 0.25 ? lambda * 3.0 : lambda, 1e-8, most);
       const bool small = step.moved < options.step_tolerance || gain < options.cost_tolerance * s.evaluation.cost;
       s.p = step.to;
       s.evaluation = std::move(e);

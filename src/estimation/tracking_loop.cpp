@@ -185,6 +185,7 @@ class TrackingLoop : public PassPlanner {
     part_ = part, name_ = name, done_from_ = done_from, done_to_ = done_to;
     FitOptions own = options;
     own.alternatives = options.alternatives && (part == Part::Last || !is_both_);
+    own.budget = 0.0;  // every round would spend it
     inner_ = planner_of_points(std::move(recordings), own, std::move(from));
   }
 

@@ -61,12 +61,15 @@ Json field_json(const FieldResult& field) {
 }
 
 Json error_json(const ErrorResult& error) {
-  return {{"surface_rms", number(error.surface_rms)},
-          {"surface_median", number(error.surface_median)},
-          {"surface_max", number(error.surface_max)},
-          {"marker_rms", number(error.marker_rms)},
-          {"unit", "m"},
-          {"points", error.points}};
+  Json json = {{"surface_rms", number(error.surface_rms)},
+               {"surface_median", number(error.surface_median)},
+               {"surface_max", number(error.surface_max)},
+               {"marker_rms", number(error.marker_rms)},
+               {"unit", "m"},
+               {"points", error.points}};
+  for (const ErrorResult::Frame& f : error.frames)
+    json["frames"].push_back({{"frame", f.frame}, {"rms", f.rms}, {"noise", f.noise}, {"points", f.points}});
+  return json;
 }
 
 Json values_json(const std::map<std::string, double>& values) {
@@ -281,9 +284,15 @@ FieldResult read_field(const std::string& name, const Member& member) {
 }
 
 ErrorResult read_error(const Member& member) {
-  return {optional_number(member, "surface_rms"), optional_number(member, "surface_median"),
-          optional_number(member, "surface_max"), optional_number(member, "marker_rms"),
-          member.has("points") ? member["points"].count() : 0};
+  ErrorResult error{optional_number(member, "surface_rms"), optional_number(member, "surface_median"),
+                    optional_number(member, "surface_max"), optional_number(member, "marker_rms"),
+                    member.has("points") ? member["points"].count() : 0};
+  if (member.has("frames"))
+    member["frames"].each_item([&](const Member& f) {
+      error.frames.push_back(
+          {int(f["frame"].count()), f["rms"].number(), f["noise"].number(), int(f["points"].count())});
+    });
+  return error;
 }
 
 RecordingResult read_recording(const Member& member) {

@@ -65,6 +65,12 @@ struct FieldResult {
 struct ErrorResult {
   std::optional<double> surface_rms, surface_median, surface_max, marker_rms;
   long long points = 0;
+  struct Frame {
+    int frame = 0;                  ///< of the simulation: 0 is its start
+    double rms = 0.0, noise = 0.0;  ///< [m], of the distances to the surface, and of the sensor
+    int points = 0;
+  };
+  std::vector<Frame> frames = {};  ///< of one recording; empty for several, and where no surface was seen
 };
 
 /// One of several recordings of a fit, or one that was kept out of it.

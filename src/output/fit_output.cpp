@@ -268,24 +268,26 @@ void add_modulus_field(Result& result, const FitOutcome& outcome) {
 
 }  // namespace
 
-SurfaceErrors surface_errors(const CostEvaluation& evaluation) {
-  SurfaceErrors errors;
+ErrorResult surface_errors(const CostEvaluation& evaluation) {
+  ErrorResult errors;
   double max = 0.0;
+  const bool is_one = std::ranges::all_of(
+      evaluation.frames, [&](const FrameFit& f) { return f.recording == evaluation.frames.front().recording; });
   for (const FrameFit& f : evaluation.frames) {
-    errors.error.points += f.points + f.tracks;
+    errors.points += f.points + f.tracks;
     max = std::max(max, f.max_distance);
-    if (f.points > 0)
+    if (is_one && f.points > 0)
       errors.frames.push_back(
           {f.frame, std::sqrt(f.sum_squares / f.points), std::sqrt(f.sum_noise_squares / f.points), f.points});
   }
   const bool has_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
   const bool has_tracks = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.tracks > 0; });
   if (has_surface) {
-    errors.error.surface_rms = evaluation.surface_rms();
-    errors.error.surface_median = evaluation.surface_median();
-    errors.error.surface_max = max;
+    errors.surface_rms = evaluation.surface_rms();
+    errors.surface_median = evaluation.surface_median();
+    errors.surface_max = max;
   }
-  if (has_tracks) errors.error.marker_rms = evaluation.track_rms();
+  if (has_tracks) errors.marker_rms = evaluation.track_rms();
   return errors;
 }
 
@@ -371,10 +373,10 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   }
   add_modulus_field(result, outcome);
   add_verdict(result, outcome, jacobian);
-  result.error = surface_errors(outcome.evaluation).error;
+  result.error = surface_errors(outcome.evaluation);
   for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
-    result.recordings.push_back({recordings[r].capture.name, recordings[r].capture.sha256,
-                                 surface_errors(outcome.recordings[r].evaluation).error});
+    result.recordings.push_back(
+        {recordings[r].capture.name, recordings[r].capture.sha256, surface_errors(outcome.recordings[r].evaluation)});
   result.cost = {outcome.start_cost, outcome.final_cost};
   add_correlations(result, outcome);
   for (const FitStart& s : outcome.starts) {
@@ -390,7 +392,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   add_resolutions(result, outcome);
   if (const auto& held_out = outcome.held_out) {
     result.held_out = {held_out->name, held_out->sha256, {}};
-    if (held_out->evaluation.succeeded) result.held_out->error = surface_errors(held_out->evaluation).error;
+    if (held_out->evaluation.succeeded) result.held_out->error = surface_errors(held_out->evaluation);
   }
   result.time.wall_seconds = facts.wall_seconds;
   result.time.forward_steps = outcome.forward_steps;

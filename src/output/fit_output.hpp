@@ -42,16 +42,7 @@ CaptureScene make_scene(const Model& model, const Capture& capture);
 std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks, const VectorX& theta);
 
 /// Distances of observed points to a simulated surface, frame by frame.
-struct SurfaceErrors {
-  ErrorResult error;
-  struct Frame {
-    int frame = 0;
-    double rms = 0.0, noise = 0.0;  ///< [m]
-    int points = 0;
-  };
-  std::vector<Frame> frames;
-};
-SurfaceErrors surface_errors(const CostEvaluation& evaluation);
+ErrorResult surface_errors(const CostEvaluation& evaluation);
 
 /// Writes the whole output folder of a fit (docs/formats.md, section 2) but for its log.
 /// @param result  of `make_result`, with what else is known

@@ -60,7 +60,7 @@ class Session : public testing::Test {
                             const std::string& interrupt_at = "") {
     std::vector<std::string> arguments = {"fit", capture(), "--out", at(name)};
     for (const char* choice : {"cells=8", "coarse_cells=6", "points_per_frame=100", "scan_per_decade=1", "starts=1",
-                               "steps=0.4", "max_iterations=40"})
+                               "steps=0.4", "max_iterations=40", "budget=0"})
       arguments.insert(arguments.end(), {"--set", choice});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_pliant(arguments, interrupt_at);

@@ -170,6 +170,7 @@ using test::sagging_bar;
 
 FitOptions quick() {
   FitOptions options;
+  options.budget = 0.0;
   options.cells = options.coarse_cells = 8.0;
   options.control_points = FitOptions::automatic;
   options.parameters["poissons_ratio"].estimated = false;

@@ -35,6 +35,7 @@ Capture thrown_bar() {
 
 FitOptions quick(MaterialKind material) {
   FitOptions options;
+  options.budget = 0.0;
   options.material = material;
   options.cells = options.coarse_cells = 5.0;
   options.steps = 0.45;

@@ -339,6 +339,23 @@ TEST(LevenbergMarquardt, TriesSeveralDampingsAfterARejection) {
   }
 }
 
+TEST(LevenbergMarquardt, DoesNotTryAStepAgainThatWasJustRefused) {
+  OptimiserOptions options = precise(OptimiserKind::LevenbergMarquardt);
+  Overshooting cost;
+  std::vector<Iteration> iterations;
+  (void)minimise(cost, Eigen::Vector2d(0.0, 0.0), options, [&](const Iteration& i) {
+    iterations.push_back(i);
+    return true;
+  });
+  int pairs = 0;
+  for (std::size_t i = 1; i < iterations.size(); ++i) {
+    if (iterations[i - 1].accepted || !iterations[i].accepted) continue;
+    ++pairs;
+    EXPECT_GE(iterations[i].damping, iterations[i - 1].damping) << "of the step after next";
+  }
+  EXPECT_GT(pairs, 0);
+}
+
 /// Eigenvalues over three decades, in directions that mix all numbers.
 BoundedQuadratic long_valley(const VectorX& minimum) {
   const Eigen::Index n = minimum.size();

@@ -62,6 +62,7 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
 
 FitOptions quick(TrackingUse tracking) {
   FitOptions options;
+  options.budget = 0.0;
   options.cells = options.coarse_cells = 8.0;
   options.parameters["poissons_ratio"].estimated = false;
   options.starts = 1;
