@@ -22,9 +22,16 @@ def battery():
     if not figures:
         return "Not run yet.\n"
     rows, score = figures["recordings"], figures["score"]
-    text = table(["recording", *(f"{s} off (± stated)" for s in SHORT.values()), "verdict", "surface rms [mm]", "time [s]"],
+    text = table(["recording", *(f"{s} off (± stated)" for s in SHORT.values()), "verdict", "surface rms [mm]", "over the noise, by thirds of the time", "time [s]"],
                  [[name, *(told(r["parameters"].get(n)) for n in SHORT), r["verdict"], f"{1e3 * r.get('surface_rms', 0):.2f}",
+                   ", ".join(f"{x:.2f}" for x in r.get("over_noise", [])),
                    f"{r['wall_seconds']:.0f}"] for name, r in rows.items()])
+    late = [(name, r["over_noise"]) for name, r in rows.items() if r.get("over_noise") and name.startswith(("drop", "tilted"))]
+    if late:
+        worst = max(late, key=lambda item: item[1][2])
+        text += ("\nOf what meets a plane, distances are " + percent(min(x[2] for _, x in late) - 1) + f" to {percent(worst[1][2] - 1)} of the noise beyond it in the last "
+                 "third of the recording, after the impacts, and "
+                 f"{percent(min(x[0] for _, x in late) - 1)} to {percent(max(x[0] for _, x in late) - 1)} in the first.\n")
     text += "\n" + counts(score)
     moduli = {name: r["parameters"].get("youngs_modulus") for name, r in rows.items()}
     within = sum(p is not None and abs(p["error"]) <= 0.1 for p in moduli.values())

@@ -32,6 +32,16 @@ def judged(result, truth):
     return rows
 
 
+def over_noise(result):
+    """Root mean square distance over the sensor's noise in each third of a recording; nothing of fewer frames."""
+    frames = result["error"].get("frames", [])
+    if len(frames) < 6:
+        return []
+    parts = [frames[i * len(frames) // 3:(i + 1) * len(frames) // 3] for i in range(3)]
+    squares = lambda part, key: sum(f["points"] * f[key] ** 2 for f in part)
+    return [common.number(math.sqrt(squares(part, "rms") / squares(part, "noise")), 3) for part in parts]
+
+
 def told(name, row):
     cells = [f"{NAMES[key]} {100 * p['error']:+.1f} % (± {100 * p['deviation']:.1f}{'' if p['held'] else ', missed'})"
              for key, p in row["parameters"].items()]
@@ -74,6 +84,7 @@ def main():
         result = figures.pop("result")
         rows[capture.name] = {"verdict": result.get("verdict", "explained"), "wall_seconds": figures["wall_seconds"],
                               "surface_rms": common.number(result["error"].get("surface_rms") or 0.0, 4),
+                              "over_noise": over_noise(result),
                               "parameters": judged(result, common.read(capture / "truth.json")["parameters"])}
         print(told(capture.name, rows[capture.name]), flush=True)
     total = score(rows)

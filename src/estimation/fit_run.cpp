@@ -395,8 +395,10 @@ StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
     record.trials.emplace_back(trials.back()[plan_.facts().moduli.front()], infinite);
   }
   std::atomic<int> done = 0;
+  std::string why_not;  // of the stiffest
   const auto on_evaluated = [&](std::size_t i, const CostEvaluation& e) {
     if (e.succeeded) record.trials[i].second = e.cost;
+    if (!e.succeeded && i + 1 == trials.size()) why_not = e.failure;
     FitEvent event{StageKind::Scan, stage.name, 0, int(i) + 1, e.cost, 0.0, e.surface_rms(), trials[i]};
     const double part = double(++done) / double(trials.size());
     event.fraction_done = stage.done_from + (stage.done_to - stage.done_from) * part;
@@ -411,7 +413,7 @@ StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
   if (!is_cut && best_of_scan(record.trials, 1).empty())
     throw InputError({{recordings_.front().capture.file},
                       "no stiffness between " + in_three_digits(stage.trials.front()) +
-                          " Pa and ten thousand times that can be simulated",
+                          " Pa and ten thousand times that can be simulated; of the stiffest: " + why_not,
                       "",
                       "check mass, gravity and the size of the scan"});
   return record;
@@ -656,7 +658,7 @@ VectorX FitRun::floor() const {
   const bool meets = std::ranges::any_of(recordings_.all(), [](const Recording& r) {
     return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static;
   });
-  return options_.alternatives ? unmodelled_std(outcome_.parameters, meets) : VectorX();
+  return options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, meets) : VectorX();
 }
 
 /// The estimate on the finest mesh; that at all resolutions goes into the outcome.

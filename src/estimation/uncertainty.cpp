@@ -14,13 +14,13 @@ constexpr double normal_90 = 1.6448536269514722;
 constexpr double freedom_of_alternative = 4.0;  // how well a declared alternative's size is known
 constexpr double freedom_of_floor = 20.0;
 
-/// Its deviations by name and whether the object meets obstacles: of ln E, logit of 2 nu, ln of the dampings.
+/// Its deviations by name and whether the object meets obstacles: of ln E, nu, ln of the dampings.
 struct Unmodelled {
   const char* name;
   double in_flight_and_contact, at_rest_or_swinging;
 };
 constexpr Unmodelled unmodelled[] = {{"youngs_modulus", 0.05, 0.015},
-                                     {"poissons_ratio", 0.45, 0.15},
+                                     {"poissons_ratio", 0.047, 0.016},
                                      {"mass_damping", 0.06, 0.10},
                                      {"stiffness_damping", 0.16, 0.08}};
 
@@ -78,13 +78,16 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
   return u;
 }
 
-VectorX unmodelled_std(const ParameterSet& parameters, bool meets_obstacles) {
+VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, bool meets_obstacles) {
   VectorX floor = VectorX::Zero(parameters.dimension());
   const std::vector<const Parameter*> of = parameters.coordinate_parameters();
   for (std::size_t i = 0; i < of.size(); ++i) {
     const std::string base = of[i]->name.substr(0, of[i]->name.find('@'));
     for (const Unmodelled& u : unmodelled)
       if (base == u.name) floor[Eigen::Index(i)] = meets_obstacles ? u.in_flight_and_contact : u.at_rest_or_swinging;
+    if (of[i]->transform != Transform::LogitHalf) continue;
+    const double nu = theta[of[i]->at];  // whose logit ln(2 nu / (1 - 2 nu)) has the derivative 1 / (nu (1 - 2 nu))
+    floor[Eigen::Index(i)] /= std::max(1e-3, nu * (1.0 - 2.0 * nu));
   }
   return floor;
 }

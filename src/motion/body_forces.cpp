@@ -1,5 +1,7 @@
 #include "motion/body_forces.hpp"
 
+#include <utility>
+
 namespace pliant {
 
 std::optional<double> DeadLoad::potential(const Points& x) {
@@ -9,8 +11,12 @@ std::optional<double> DeadLoad::potential(const Points& x) {
   return -force_.topRows(n).cwiseProduct(x.topRows(n) - rest_).sum();
 }
 
-Gravity::Gravity(const Body& body, const MotionBlocks& blocks)
-    : DeadLoad(body.nodes), density_block_(blocks.density), gravity_block_(blocks.gravity) {
+Gravity::Gravity(const Body& body, const MotionBlocks& blocks, KeyFrames<3> change)
+    : DeadLoad(body.nodes),
+      density_block_(blocks.density),
+      gravity_block_(blocks.gravity),
+      change_(std::move(change)),
+      change_now_(change_.at(0.0)) {
   Points ones = Points::Ones(body.node_count(), 3), sum = Points::Zero(body.node_count(), 3);
   body.add_mass_product(1.0, ones, sum);
   nodal_volume_ = sum.col(0);
@@ -22,22 +28,23 @@ void Gravity::set_parameters(const VectorX& parameters) {
 }
 
 void Gravity::add_force(const Points&, Points& force) {
-  force.noalias() += nodal_volume_ * (density_ * gravity_).transpose();
+  force.noalias() += nodal_volume_ * (density_ * (gravity_ + change_now_)).transpose();
 }
 
 void Gravity::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
-  const Vector3 change = d_theta[density_block_] * gravity_ + density_ * gravity_block_.vector(d_theta);
+  const Vector3 change = d_theta[density_block_] * (gravity_ + change_now_) + density_ * gravity_block_.vector(d_theta);
   force.noalias() += nodal_volume_ * change.transpose();
 }
 
 void Gravity::add_force_adjoint(const Points&, const Points& w, Points&, Points&, VectorX& theta_bar) {
   const Vector3 sum = w.transpose() * nodal_volume_;
-  theta_bar[density_block_] += gravity_.dot(sum);
+  theta_bar[density_block_] += (gravity_ + change_now_).dot(sum);
   theta_bar.segment<3>(gravity_block_) += density_ * sum;
 }
 
-PointWeights::PointWeights(const Body& body, const std::vector<PointMass>& weights, const ParameterHandle& gravity)
-    : DeadLoad(body.nodes), gravity_block_(gravity) {
+PointWeights::PointWeights(const Body& body, const std::vector<PointMass>& weights, const ParameterHandle& gravity,
+                           KeyFrames<3> change)
+    : DeadLoad(body.nodes), gravity_block_(gravity), change_(std::move(change)), change_now_(change_.at(0.0)) {
   std::vector<Vector3> at;
   for (const PointMass& weight : weights) {
     at.push_back(weight.at);
@@ -48,7 +55,8 @@ PointWeights::PointWeights(const Body& body, const std::vector<PointMass>& weigh
 
 void PointWeights::add_force(const Points&, Points& force) {
   if (!is_active_) return;
-  for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * gravity_, force);
+  const Vector3 gravity = gravity_ + change_now_;
+  for (int i = 0; i < points_.point_count(); ++i) points_.add_transpose(i, mass_[std::size_t(i)] * gravity, force);
 }
 
 void PointWeights::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta,

@@ -2,6 +2,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "motion/key_frames.hpp"
 #include "parameters/motion_blocks.hpp"
 
 namespace pliant {
@@ -37,11 +38,13 @@ class NodalLoad : public DeadLoad {
   Points forces_;
 };
 
-/// Weight: f = rho M1 g.
+/// Weight: f = rho M1 g(t).
 class Gravity : public DeadLoad {
  public:
-  Gravity(const Body& body, const MotionBlocks& blocks);
+  /// @param change  of gravity over time, added to that of the parameter vector [m/s^2]
+  Gravity(const Body& body, const MotionBlocks& blocks, KeyFrames<3> change = {});
   void set_parameters(const VectorX& theta) override;
+  void begin_step(const StepContext& step) override { change_now_ = change_.at(step.time + 0.5 * step.dt); }
   void add_force(const Points& z, Points& force) override;
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
@@ -52,6 +55,8 @@ class Gravity : public DeadLoad {
   VectorX nodal_volume_;  // M1 summed over columns [m^3]
   double density_ = 0.0;
   Vector3 gravity_ = Vector3::Zero();
+  KeyFrames<3> change_;
+  Vector3 change_now_ = Vector3::Zero();
 };
 
 /// A point mass attached to the object.
@@ -64,12 +69,15 @@ struct PointMass {
 class PointWeights : public DeadLoad {
  public:
   /// @param gravity  3, [m/s^2]
-  PointWeights(const Body& body, const std::vector<PointMass>& weights, const ParameterHandle& gravity);
+  /// @param change   see `Gravity`
+  PointWeights(const Body& body, const std::vector<PointMass>& weights, const ParameterHandle& gravity,
+               KeyFrames<3> change = {});
   const Embedding& points() const { return points_; }
   const std::vector<double>& masses() const { return mass_; }
   /// Nothing hangs while it is not active.
   void set_active(bool active) { is_active_ = active; }
   void set_parameters(const VectorX& theta) override { gravity_ = gravity_block_.vector(theta); }
+  void begin_step(const StepContext& step) override { change_now_ = change_.at(step.time + 0.5 * step.dt); }
   void add_force(const Points& z, Points& force) override;
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
@@ -80,6 +88,8 @@ class PointWeights : public DeadLoad {
   Embedding points_;
   std::vector<double> mass_;
   Vector3 gravity_ = Vector3::Zero();
+  KeyFrames<3> change_;
+  Vector3 change_now_ = Vector3::Zero();
   bool is_active_ = true;
 };
 

@@ -67,9 +67,20 @@ void RigidContact::set_parameters(const VectorX& theta) {
   if (follows_stiffness_) penalty_.stiffness = theta[plane_->stiffness];
 }
 
+void RigidContact::lead(KeyedMotion motion) {
+  if (!shape_) throw std::invalid_argument("a shape can be led, not a bond or a plane of the parameter vector");
+  led_shape_ = shape_;
+  motion_ = std::move(motion);
+  begin_step({});
+}
+
 void RigidContact::begin_step(const StepContext& step) {
   start_ = step.start;
   threshold_ = friction_speed_ * step.dt;
+  if (!led_shape_) return;
+  const RigidMotion end = motion_.at(step.time + step.dt), before = motion_.at(step.time).inverse();
+  shape_ = rigid_moved(led_shape_, end);
+  carried_ = {end.rotation * before.rotation, end(before.translation)};
 }
 
 bool RigidContact::may_rub() const {
@@ -148,7 +159,7 @@ void RigidContact::touch(int point, const Vector3& y, double gap, const Vector3&
 }
 
 void RigidContact::add_friction(const Active& c, Detail& m) const {
-  m.start = relative(c.point, *start_);
+  m.start = carried_(relative(c.point, *start_));
   m.per_normal = 1.0 / c.normal.norm();
   m.axis = m.per_normal * c.normal;
   m.axis_way = m.axis.dot(c.y - m.start);
@@ -318,7 +329,7 @@ void RigidContact::add_start_tangent(const Points& z, const Points& d_start, con
     const Active& c = active_[i];
     const Detail& m = details_[i];
     const Offsets o = offsets(c, m, z);
-    const Vector3 change = relative_change(c.point, d_start);
+    const Vector3 change = carried_.rotation * relative_change(c.point, d_start);
     const double d_drag = m.drag * m.way.dot(change) / (m.length * m.length);
     scatter(c.point, m.drag * m.across(change) - d_drag * o.slid, force);
   }
@@ -331,7 +342,8 @@ void RigidContact::add_start_adjoint(const Points& z, const Points& w, Points& s
     const Offsets o = offsets(c, m, z);
     const Vector3 v = relative_change(c.point, w);
     const double drag_bar = -o.slid.dot(v);
-    scatter(c.point, m.drag * m.across(v) + drag_bar * m.drag / (m.length * m.length) * m.way, start_bar);
+    const Vector3 bar = m.drag * m.across(v) + drag_bar * m.drag / (m.length * m.length) * m.way;
+    scatter(c.point, carried_.rotation.transpose() * bar, start_bar);
   }
 }
 

@@ -7,14 +7,15 @@
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
 #include "motion/contact_samples.hpp"
+#include "motion/key_frames.hpp"
 #include "motion/penalty.hpp"
 #include "motion/rigid_shape.hpp"
 #include "parameters/motion_blocks.hpp"
 
 namespace pliant {
 
-/// Contact of an object's surface with a rigid body that does not turn: forces at samples of the surface, by where each
-/// is relative to the rigid body, y = x - u, u the body's translation [m]:
+/// Contact of an object's surface with a rigid body: forces at samples of the surface, by where each is relative to the
+/// rigid body, y = x - u, u the body's translation [m]:
 ///   bonded:   -k a (y - X): samples neither slide nor lift off (stiff springs), so that a disc stays flat
 ///   sliding:  a p(d(y)) n(y): the penalty's pressure p (`Penalty`; Weiss 2020, eq. 18, of one plane) along the
 ///   gradient
@@ -51,6 +52,10 @@ class RigidContact : public ForceTerm {
   /// @param coefficient  mu [-], >= 0; a plane of the parameter vector has its own
   /// @param speed        below which friction fades to nothing [m/s], > 0
   void set_friction(double coefficient, double speed);
+  /// The shape moves, and may turn, over time: in a step it is where it is at the end, and friction is with the way
+  /// relative to it. Its translation stays zero. Throws std::invalid_argument for a bond or a plane of the parameter
+  /// vector.
+  void lead(KeyedMotion motion);
   /// Where the rigid body is [m], unless its translation is unknown.
   void set_translation(const Vector3& translation) { translation_ = translation; }
   /// From now on the translation is unknown: this row of positions, forces and matrices.
@@ -142,6 +147,9 @@ class RigidContact : public ForceTerm {
   std::vector<int>
       links_;  // of each sample's nodes: blocks (node, row), then (row, node); -1 for those that weigh nothing
   const Points* start_ = nullptr;
+  std::shared_ptr<const RigidShape> led_shape_;  // before its motion; null: it is not led
+  KeyedMotion motion_;
+  RigidMotion carried_;  // by the motion within the step; friction is with the way beyond that
   std::vector<Active> active_;
   std::vector<Detail> details_;  // of the active samples; empty for a smooth plane
 };

@@ -68,6 +68,47 @@ class Punch : public RigidShape {
   double radius_, edge_;
 };
 
+class RoundedBox : public RigidShape {
+ public:
+  RoundedBox(const Vector3& centre, const Vector3& half, double edge)
+      : centre_(centre), inner_((half.array() - edge).matrix()), edge_(edge) {}
+  /// Distance to the box that is smaller by the edges' radius, less that.
+  Sample sample(const Vector3& p) const override {
+    const Vector3 q = p - centre_;
+    const Vector3 beyond = q.cwiseAbs() - inner_;
+    const Vector3 sign = q.unaryExpr([](double v) { return v < 0.0 ? -1.0 : 1.0; });
+    const Vector3 outside = beyond.cwiseMax(0.0);
+    const double distance = outside.norm();
+    if (distance == 0.0) {  // by the nearest face
+      Eigen::Index axis = 0;
+      const double depth = beyond.maxCoeff(&axis);
+      return {depth - edge_, sign[axis] * Vector3::Unit(axis), Matrix3::Zero()};
+    }
+    const Vector3 n = outside.cwiseProduct(sign) / distance;
+    Matrix3 free = Matrix3::Zero();
+    for (int i = 0; i < 3; ++i) free(i, i) = beyond[i] > 0.0 ? 1.0 : 0.0;
+    return {distance - edge_, n, (free - n * n.transpose()) / distance};
+  }
+
+ private:
+  Vector3 centre_, inner_;
+  double edge_;
+};
+
+class Moved : public RigidShape {
+ public:
+  Moved(std::shared_ptr<const RigidShape> shape, const RigidMotion& motion)
+      : shape_(std::move(shape)), motion_(motion), back_(motion.inverse()) {}
+  Sample sample(const Vector3& p) const override {
+    const Sample s = shape_->sample(back_(p));
+    return {s.distance, motion_.rotation * s.gradient, motion_.rotation * s.hessian * back_.rotation};
+  }
+
+ private:
+  std::shared_ptr<const RigidShape> shape_;
+  RigidMotion motion_, back_;
+};
+
 class Grid : public RigidShape {
  public:
   Grid(SignedDistance distance, bool hollow) : distance_(std::move(distance)), sign_(hollow ? -1.0 : 1.0) {}
@@ -94,6 +135,12 @@ std::shared_ptr<const RigidShape> rigid_capsule(const Vector3& from, const Vecto
 }
 std::shared_ptr<const RigidShape> rigid_punch(const Vector3& tip, const Vector3& axis, double radius, double edge) {
   return std::make_shared<Punch>(tip, axis, radius, edge);
+}
+std::shared_ptr<const RigidShape> rigid_box(const Vector3& centre, const Vector3& half, double edge) {
+  return std::make_shared<RoundedBox>(centre, half, edge);
+}
+std::shared_ptr<const RigidShape> rigid_moved(std::shared_ptr<const RigidShape> shape, const RigidMotion& motion) {
+  return std::make_shared<Moved>(std::move(shape), motion);
 }
 std::shared_ptr<const RigidShape> rigid_grid(SignedDistance distance, bool hollow) {
   return std::make_shared<Grid>(std::move(distance), hollow);

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "geometry/camera.hpp"
 #include "geometry/signed_distance.hpp"
 
 namespace pliant {
@@ -31,5 +32,11 @@ std::shared_ptr<const RigidShape> rigid_punch(const Vector3& tip, const Vector3&
 /// Any closed mesh as its signed distance on a grid, or its outside (`hollow`: an object that lies in a mould).
 /// Gradient and curvature are those of the interpolated distance: the gradient jumps a little from cell to cell.
 std::shared_ptr<const RigidShape> rigid_grid(SignedDistance distance, bool hollow = false);
+/// A box about a point, with edges rounded.
+/// @param half    of its edges [m], > 0
+/// @param edge    radius by which edges and corners are rounded [m], in (0, least half edge]
+std::shared_ptr<const RigidShape> rigid_box(const Vector3& centre, const Vector3& half, double edge);
+/// A shape after a rigid motion.
+std::shared_ptr<const RigidShape> rigid_moved(std::shared_ptr<const RigidShape> shape, const RigidMotion& motion);
 
 }  // namespace pliant

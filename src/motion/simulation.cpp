@@ -44,10 +44,11 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   terms.push_back(std::move(elastic));
   if (options.stiffness_damping == StiffnessDamping::KelvinVoigt && !options.is_static)
     terms.push_back(make_viscous_forces(body, options.blocks, options.blocks.stiffness_damping));
-  terms.push_back(std::make_unique<Gravity>(*body, options.blocks));
+  terms.push_back(std::make_unique<Gravity>(*body, options.blocks, options.gravity_change));
   for (const PlaneBlock& plane : options.blocks.planes) terms.push_back(plane_contact(*body, plane, options));
   if (!options.weights.empty())
-    terms.push_back(std::make_unique<PointWeights>(*body, options.weights, options.blocks.gravity));
+    terms.push_back(
+        std::make_unique<PointWeights>(*body, options.weights, options.blocks.gravity, options.gravity_change));
   if (!options.released_weights.empty()) {
     auto weights = std::make_unique<PointWeights>(*body, options.released_weights, options.blocks.gravity);
     let_go = weights.get();
@@ -68,6 +69,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
     pull->set_active(false);
     terms.push_back(std::move(pulling));
   }
+  for (const auto& make : options.further_forces) terms.push_back(make(body));
   return terms;
 }
 
@@ -116,6 +118,10 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   }
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->scanned_positions().rowwise() - body_->centre_of_mass().transpose();
+  if (options_.holds.empty() && !(options_.start_pose == RigidMotion())) {
+    rest_ = (rest_ * options_.start_pose.rotation.transpose()).rowwise() + options_.start_pose.translation.transpose();
+    lever_ = lever_ * options_.start_pose.rotation.transpose();
+  }
   for (int frame = 1; frame < frame_count() && !options_.is_static; ++frame) {
     const double interval = options_.times[frame] - options_.times[frame - 1];
     const int steps = std::max(1, int(std::ceil(interval / options_.max_dt - 1e-9)));

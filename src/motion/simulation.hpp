@@ -44,7 +44,12 @@ struct SimulationOptions {
   ShapeField shape;         ///< how the scan may err: one point a block of scan corrections. Tetrahedra only
   std::vector<Hold> holds;  ///< held regions
   std::vector<PointMass> weights;  ///< hung from the object: point masses that move along with their points
-  bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
+  KeyFrames<3> gravity_change;     ///< of gravity over time, added to that of the parameter vector [m/s^2]
+  /// Makers of forces beyond those above, such as wind, hands and led shapes; each is called once a simulation.
+  std::vector<std::function<std::unique_ptr<ForceTerm>(const std::shared_ptr<const Body>& body)>> further_forces;
+  RigidMotion start_pose;       ///< from rest to where the object is at the start, where nothing is held
+  bool starts_settled = false;  ///< the motion starts from the equilibrium under the forces of its first instant
+  bool is_static = false;       ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
   /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then.
   std::shared_ptr<const MaterialLaw> law;
@@ -106,7 +111,7 @@ class Simulation {
   /// False where the object cannot be stress-free anywhere: the summary says so.
   bool set_parameters(const VectorX& theta, RolloutSummary& summary);
   /// Whether the motion starts from an equilibrium, under forces that end there.
-  bool starts_held() const { return pull_ || let_go_; }
+  bool starts_held() const { return pull_ || let_go_ || options_.starts_settled; }
   void hold_start(bool held);
   /// Where and how fast the object is when it is let go; for a held one also the derivatives' matrix. False where
   /// there is no such equilibrium: the summary says so.

@@ -27,6 +27,8 @@ std::vector<ParameterHandle> MotionBlocks::all() const {
   if (contact_stiffness.exists()) handles.push_back(contact_stiffness);
   handles.insert(handles.end(), pulls.begin(), pulls.end());
   handles.insert(handles.end(), scan_corrections.begin(), scan_corrections.end());
+  if (wind.exists()) handles.push_back(wind);
+  handles.insert(handles.end(), strengths.begin(), strengths.end());
   return handles;
 }
 
@@ -44,6 +46,8 @@ MotionBlocks MotionBlocks::moved(const std::function<ParameterHandle(const Param
   other.contact_stiffness = there_if(contact_stiffness);
   for (ParameterHandle& pull : other.pulls) pull = there(pull);
   for (ParameterHandle& correction : other.scan_corrections) correction = there(correction);
+  other.wind = there_if(wind);
+  for (ParameterHandle& strength : other.strengths) strength = there(strength);
   return other;
 }
 
@@ -79,6 +83,9 @@ MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& coun
     blocks.pulls.push_back(layout.add({"pull@" + std::to_string(k + 1), "1", 3, Role::Initial}));
   for (int k = 0; k < counts.scan_corrections; ++k)
     blocks.scan_corrections.push_back(layout.add({"scan_correction@" + std::to_string(k + 1), "1", 3, Role::Shape}));
+  if (counts.wind) blocks.wind = layout.add({"wind", "m/s", 3, Role::Load});
+  for (int k = 0; k < counts.strengths; ++k)
+    blocks.strengths.push_back(layout.add({"strength@" + std::to_string(k + 1), "1", 1, Role::Load}));
   for (int k = 1; k < counts.moduli; ++k) blocks.youngs_moduli.push_back(modulus(k));
   return blocks;
 }

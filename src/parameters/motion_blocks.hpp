@@ -44,6 +44,8 @@ struct MotionBlocks : MaterialBlocks {
   ParameterHandle contact_stiffness;              ///< that block [Pa/m]; does not exist where there is no plane
   std::vector<ParameterHandle> pulls;             ///< 3 each [-], see `Pull`
   std::vector<ParameterHandle> scan_corrections;  ///< 3 each [-], see `ShapeField`
+  ParameterHandle wind;                           ///< 3, mean velocity of the air [m/s]; may not exist
+  std::vector<ParameterHandle> strengths;         ///< 1 each [-], factors of forces that are applied
 
   /// All of them.
   std::vector<ParameterHandle> all() const;
@@ -55,11 +57,13 @@ struct MotionBlocks : MaterialBlocks {
 /// How many blocks of each kind a motion has.
 struct MotionCounts {
   int moduli = 1, planes = 0, pulls = 0, scan_corrections = 0;
+  bool wind = false;
+  int strengths = 0;
 };
 
 /// Appends the blocks of a motion: Young's modulus, Poisson's ratio, dampings, density, gravity and first velocities,
-/// then planes, pulls, corrections of the scan, and further control moduli. So blocks that every motion has stand in
-/// the same places whatever follows.
+/// then planes, pulls, corrections of the scan, wind, strengths, and further control moduli. So blocks that every
+/// motion has stand in the same places whatever follows.
 /// @param moduli_names  of the control moduli; empty: "youngs_modulus", "youngs_modulus@2", ...
 /// Throws std::invalid_argument where a name is taken.
 MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& counts,

@@ -54,6 +54,22 @@ bool contains_vertex(const Region& region, const TriangleMesh& surface, int vert
   return contains(region, surface.vertices[std::size_t(vertex)]);
 }
 
+std::function<bool(const Vector3&)> is_in_region(const TriangleMesh& mesh, const Region& region) {
+  const auto* vertices = std::get_if<RegionVertices>(&region);
+  if (!vertices) return [region](const Vector3& p) { return contains(region, p); };
+  // Named vertices hold the object around them, as far as the next vertices.
+  std::vector<Vector3> centres;
+  double radius = 0.0;
+  for (const int v : vertices->indices) centres.push_back(mesh.vertices[std::size_t(v)]);
+  for (const auto& triangle : mesh.triangles)
+    for (int side = 0; side < 3; ++side)
+      radius += (mesh.vertices[triangle[side]] - mesh.vertices[triangle[(side + 1) % 3]]).norm();
+  radius /= 3.0 * double(mesh.triangles.size());
+  return [centres = std::move(centres), radius](const Vector3& p) {
+    return std::any_of(centres.begin(), centres.end(), [&](const Vector3& c) { return (p - c).norm() <= radius; });
+  };
+}
+
 bool touches_solid(const Region& region, const TriangleMesh& surface) {
   if (const auto* list = std::get_if<RegionVertices>(&region)) return !list->indices.empty();
   if (std::ranges::any_of(surface.vertices, [&](const Vector3& v) { return contains(region, v); })) return true;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include "scene/scene.hpp"
 
 namespace pliant {
@@ -12,5 +14,8 @@ bool contains_vertex(const Region& region, const TriangleMesh& surface, int vert
 
 /// Whether any point of the solid lies in the region: a vertex of the surface, or a point inside it.
 bool touches_solid(const Region& region, const TriangleMesh& surface);
+
+/// Whether a point [m] at rest lies in a region; named vertices hold the object around them, as far as the next ones.
+std::function<bool(const Vector3&)> is_in_region(const TriangleMesh& surface, const Region& region);
 
 }  // namespace pliant

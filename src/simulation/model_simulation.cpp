@@ -62,7 +62,7 @@ ModelScene make_scene(const Model& model) {
 }
 
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
-                      const std::filesystem::path& file) {
+                      const std::filesystem::path& file, const MotionCounts& further) {
   Scene scene = situation;
   if (scene.initial.released && !scene.initial.release_of && scene.initial.pulls.empty()) {
     if (model.scene.initial.pulls.empty())
@@ -74,7 +74,10 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
   }
   const Vector3 gravity = scene.world.gravity.value_or(model.scene.world.gravity.value_or(-9.81 * scene.world.up));
   ModelScene made;
-  const MotionLayout blocks({.planes = int(scene.planes.size()), .pulls = int(scene.initial.pulls.size())});
+  MotionCounts counts = further;
+  counts.planes = int(scene.planes.size());
+  counts.pulls = int(scene.initial.pulls.size());
+  const MotionLayout blocks(counts);
   made.layout = blocks.layout();
   made.theta = model_theta(model, scene, gravity, blocks);
   SimulationOptions settings;

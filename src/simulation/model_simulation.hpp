@@ -23,9 +23,10 @@ ModelScene make_scene(const Model& model);
 /// A model's material in another situation, on a grid as fine as the model's.
 /// @param distance  of the situation's surface, as `scene_distance` makes it
 /// @param file      that the situation was read from, for complaints
+/// @param further   whether the parameters have a wind, and how many strengths; both zero
 /// Throws InputError where the object is released from a pose that neither knows.
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
-                      const std::filesystem::path& file);
+                      const std::filesystem::path& file, const MotionCounts& further = {});
 
 /// The body of a model of tetrahedra, with each element's modulus.
 std::shared_ptr<const Body> model_body(const Model& model);

@@ -11,26 +11,6 @@
 
 namespace pliant {
 
-namespace {
-
-std::function<bool(const Vector3&)> region_test(const TriangleMesh& mesh, const Region& region) {
-  const auto* vertices = std::get_if<RegionVertices>(&region);
-  if (!vertices) return [region](const Vector3& p) { return contains(region, p); };
-  // Named vertices hold the object around them, as far as the next vertices.
-  std::vector<Vector3> centres;
-  double radius = 0.0;
-  for (const int v : vertices->indices) centres.push_back(mesh.vertices[std::size_t(v)]);
-  for (const auto& triangle : mesh.triangles)
-    for (int side = 0; side < 3; ++side)
-      radius += (mesh.vertices[triangle[side]] - mesh.vertices[triangle[(side + 1) % 3]]).norm();
-  radius /= 3.0 * double(mesh.triangles.size());
-  return [centres = std::move(centres), radius](const Vector3& p) {
-    return std::any_of(centres.begin(), centres.end(), [&](const Vector3& c) { return (p - c).norm() <= radius; });
-  };
-}
-
-}  // namespace
-
 ControlledField control_field(const Body& body, const Scene& scene, const FieldOptions& options) {
   const int count = options.control_points;
   if (options.weights == FieldOptions::Weights::Linear) {
@@ -58,7 +38,7 @@ std::shared_ptr<const SignedDistance> scene_distance(const Scene& scene, double 
 std::vector<std::function<bool(const Vector3&)>> region_tests(const Scene& scene) {
   std::vector<std::function<bool(const Vector3&)>> regions;
   for (const MaterialRegion& region : scene.regions)
-    regions.push_back(region_test(*scene.object.surface, region.region));
+    regions.push_back(is_in_region(*scene.object.surface, region.region));
   return regions;
 }
 
@@ -174,7 +154,7 @@ std::vector<Hold> held_regions(const std::vector<FixedRegion>& regions, const Tr
   std::vector<Hold> holds;
   for (const FixedRegion& fixed : regions) {
     const RigidMotion motion = fixed.displaced_to.value_or(RigidMotion{});
-    holds.push_back({region_test(surface, fixed.region), motion.rotation, motion.translation});
+    holds.push_back({is_in_region(surface, fixed.region), motion.rotation, motion.translation});
   }
   return holds;
 }
@@ -192,7 +172,7 @@ namespace {
 PullPoints pull_points(const Scene& scene, int count) {
   std::vector<Vector3> held;
   for (const FixedRegion& fixed : scene.fixed) {
-    const auto contains = region_test(*scene.object.surface, fixed.region);
+    const auto contains = is_in_region(*scene.object.surface, fixed.region);
     std::ranges::copy_if(scene.object.surface->vertices, std::back_inserter(held), contains);
   }
   if (count == 0 || held.empty()) return {};

@@ -51,7 +51,8 @@ VtuGrid frame_grid(const Body& body, const State& state, Elasticity& elasticity)
 
 RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Body> body,
                                 const SimulationOptions& options, const VectorX& parameters,
-                                const std::function<bool(int, int)>& progress) {
+                                const std::function<bool(int, int)>& progress,
+                                const std::function<void(int, const State&)>& on_frame) {
   std::vector<PvdEntry> entries;
   const auto elasticity = scene_elasticity(body, options);
   elasticity->set_parameters(parameters);
@@ -61,6 +62,7 @@ RolloutSummary write_trajectory(const fs::path& folder, std::shared_ptr<const Bo
     std::snprintf(name, sizeof name, "frames/%06d.vtu", frame);
     write_vtu(folder / name, frame_grid(*body, state, *elasticity), VtuPrecision::Single);
     entries.push_back({options.times[std::size_t(frame)] - options.times.front(), name});
+    if (on_frame) on_frame(frame, state);
     return !progress || progress(frame + 1, simulation.frame_count());
   });
   write_pvd(folder / "trajectory.pvd", entries);

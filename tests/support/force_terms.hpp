@@ -103,6 +103,8 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
     theta[layout.contact_stiffness] = 2e5;
     theta.segment<3>(layout.pulls[0]) = Vector3(0.1, -0.2, 0.05);
     theta.segment<3>(layout.pulls[1]) = Vector3(0.02, 0.15, -0.1);
+    theta.segment<3>(layout.wind) = Vector3(4.0, -1.0, 2.0);
+    theta[layout.strengths[0]] = 0.7;
     lag = deformed(body->reference_positions(), 0.3);
     z = deformed(body->reference_positions(), 0.28, 1.93);
     d_lag = deformed(body->reference_positions(), 0.6, -0.7);
@@ -122,7 +124,8 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
 
   SceneBlocks add_blocks() {
     SceneBlocks blocks;
-    const MotionCounts counts{.moduli = body->modulus.controls, .planes = 2, .pulls = pulls};
+    const MotionCounts counts{
+        .moduli = body->modulus.controls, .planes = 2, .pulls = pulls, .wind = true, .strengths = 1};
     static_cast<MotionBlocks&>(blocks) = add_motion_blocks(all, counts);
     if (GetParam().law) blocks.law = LawLayout::of_motion(all, blocks, *GetParam().law);
     return blocks;

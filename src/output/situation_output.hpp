@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "model/model.hpp"
+#include "motion/simulation.hpp"
+#include "situation/situation.hpp"
+
+namespace pliant {
+
+/// What a simulated situation leaves behind.
+struct SituationFiles {
+  std::filesystem::path folder;
+  bool ply = false;                                 ///< `surface/*.ply`: the surface in every frame
+  bool pictures = false;                            ///< `pictures/*.png`: every frame drawn
+  std::filesystem::path video;                      ///< the pictures as a video, made by ffmpeg; empty: none
+  int width = 1280, height = 720;                   ///< of a picture [pixels], even
+  double azimuth_deg = 34.0, elevation_deg = 20.0;  ///< from where it is seen [degrees]
+};
+
+/// Simulates a model in a situation and writes `trajectory.pvd` with `frames/*.vtu`, the surfaces of all frames in
+/// `surface.trajectory` (docs/formats.md), and what else is asked for; copies of the object in folders `copy_1`, ...
+/// @param progress  what is done, how much of it and the whole; false stops
+/// Returns why it ended early, empty where it did not. Throws InputError where files cannot be written, or where there
+/// shall be a video and no ffmpeg is installed: before anything is simulated.
+RolloutSummary write_situation(const Model& model, const Situation& situation, const SituationFiles& files,
+                               const std::function<bool(const char* what, int done, int total)>& progress = {});
+
+}  // namespace pliant

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "geometry/triangle_mesh.hpp"
+#include "motion/key_frames.hpp"
+#include "motion/rain.hpp"
+#include "motion/wind.hpp"
+#include "scene/scene.hpp"
+
+// What happens to a model: a situation other than that of its recording (docs/formats.md, `situation/1`). SI units, the
+// model's world.
+
+namespace pliant {
+
+/// A wind with its turbulence.
+struct WindFacts {
+  Vector3 velocity = Vector3::Zero();              ///< mean [m/s]
+  std::vector<KeyFrames<3>::Key> over_time;        ///< in the place of the mean; empty: it stays
+  double gust_intensity = 0.0, gust_length = 5.0;  ///< [-], [m]
+  std::uint64_t seed = 1;
+  double air_density = 1.2, normal = 1.2, tangential = 0.02;  ///< see `WindOptions`
+};
+
+/// A force on a patch of the object.
+struct AppliedForce {
+  Vector3 at = Vector3::Zero();          ///< on the surface at rest [m]
+  double radius = 0.0;                   ///< of the patch [m]
+  std::vector<KeyFrames<3>::Key> force;  ///< [N] over time
+};
+
+/// A hand that takes the object at a point and leads it there on a spring.
+struct Hand {
+  Vector3 at = Vector3::Zero();               ///< on the surface at rest [m]
+  double radius = 0.0;                        ///< of the patch [m]
+  double stiffness = 0.0;                     ///< [N/m]; 0: ten times the weight over the size of the object
+  double from = -infinite, until = infinite;  ///< [s]
+  std::vector<KeyFrames<6>::Key> motion;      ///< shift [m] and rotation vector [rad] since it took hold
+  std::vector<KeyFrames<3>::Key> path;        ///< where it is [m], in the place of a motion
+};
+
+/// A region of the object that is led.
+struct LedRegion {
+  Region region;
+  double from = -infinite, until = infinite;  ///< [s]
+  std::vector<KeyFrames<6>::Key> motion;      ///< shift [m] and rotation vector [rad] about the region's middle
+};
+
+/// A rigid shape that the object meets.
+struct ShapeBall {
+  Vector3 centre;
+  double radius;
+};
+struct ShapeCapsule {
+  Vector3 from, to;
+  double radius;
+};
+struct ShapeBox {
+  Vector3 min, max;
+};
+struct ShapePlane {
+  Vector3 point, normal;
+};
+struct ShapeMesh {
+  std::filesystem::path file;
+  TriangleMesh mesh;
+};
+struct RigidObstacle {
+  std::variant<ShapeBall, ShapeCapsule, ShapeBox, ShapePlane, ShapeMesh> shape;
+  double friction = 0.0;                  ///< Coulomb's coefficient [-]
+  std::vector<KeyFrames<6>::Key> motion;  ///< shift [m] and rotation vector [rad] about its middle
+};
+
+/// Copies of the object beside it, each on its own.
+struct ObjectCopy {
+  Vector3 shift = Vector3::Zero();  ///< of everything that is seen [m]
+  double delay = 0.0;               ///< [s] by which its wind and rain are others
+};
+
+struct Situation {
+  std::filesystem::path file;                ///< that it was read from, for complaints
+  double duration = 5.0;                     ///< [s]
+  double frame_rate = 30.0;                  ///< [Hz]
+  bool keeps_held = true;                    ///< what the recording held is held
+  std::optional<bool> settles;               ///< starts from equilibrium; nothing: where something is held
+  std::optional<std::vector<Plane>> planes;  ///< in the place of the model's
+  std::vector<KeyFrames<3>::Key> gravity;    ///< [m/s^2] over time; empty: the model's
+  RigidMotion pose;                          ///< of the object at the start, about its middle
+  Vector3 linear_velocity = Vector3::Zero(), angular_velocity = Vector3::Zero();  ///< there [m/s], [rad/s]
+  std::optional<WindFacts> wind;
+  std::vector<RainOptions> rains;
+  std::vector<AppliedForce> forces;
+  std::vector<Hand> hands;
+  std::vector<LedRegion> led;
+  std::vector<RigidObstacle> obstacles;
+  std::vector<ObjectCopy> copies;
+};
+
+/// Reads a situation, strictly. Throws InputError with every problem found, with file, line and column.
+Situation read_situation(const std::filesystem::path& path);
+
+}  // namespace pliant

@@ -1,0 +1,224 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "base/files.hpp"
+#include "geometry/mesh_io.hpp"
+#include "scene/scene_toml.hpp"
+#include "situation/situation.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+const NumberRule positive_metres{.low = 0.0, .low_allowed = false, .meaning = "a length in metres"};
+const NumberRule any_time{.meaning = "a time in seconds"};
+
+template <class Key>
+void check_times(TomlTable& owner, const std::string& name, const std::vector<Key>& keys) {
+  for (std::size_t k = 1; k < keys.size(); ++k)
+    if (!(keys[k].time > keys[k - 1].time)) {
+      owner.context().complain(owner.key_of(name) + fmt::format("[{}].time", k),
+                               fmt::format("{} s after {} s", keys[k].time, keys[k - 1].time),
+                               "times that increase from key to key", "put the keys in order");
+      return;
+    }
+}
+
+/// Keys of one vector, such as { time = 0, force = [0, 1, 0] }.
+std::vector<KeyFrames<3>::Key> read_keys(TomlTable& owner, const std::string& name, const std::string& value) {
+  std::vector<KeyFrames<3>::Key> keys;
+  owner.each_block(name, [&](TomlTable& block) {
+    const double time = read_number(block, "time", any_time);
+    keys.push_back({time, block.required<Vector3>(value).value_or(Vector3::Zero())});
+  });
+  check_times(owner, name, keys);
+  return keys;
+}
+
+/// Keys of a rigid motion: { time = 0, shift = [0, 0.1, 0], turn_deg = [0, 90, 0] }.
+std::vector<KeyFrames<6>::Key> read_motion(TomlTable& owner) {
+  std::vector<KeyFrames<6>::Key> keys;
+  owner.each_block("motion", [&](TomlTable& block) {
+    KeyFrames<6>::Key key{read_number(block, "time", any_time), {}};
+    key.value.head<3>() = block.optional<Vector3>("shift").value_or(Vector3::Zero());
+    key.value.tail<3>() = degree * block.optional<Vector3>("turn_deg").value_or(Vector3::Zero());
+    keys.push_back(key);
+  });
+  check_times(owner, "motion", keys);
+  return keys;
+}
+
+void read_span(TomlTable& table, double& from, double& until) {
+  from = read_number(table, "from", any_time, -infinite);
+  until = read_number(table, "until", any_time, infinite);
+  if (!(from < until))
+    table.context().complain(table.key_of("until"), fmt::format("`until` is {} s, and `from` is {} s", until, from),
+                             "an end after the beginning");
+}
+
+std::uint64_t read_seed(TomlTable& table) { return std::uint64_t(read_count(table, "seed", 0, 2'000'000'000, 1)); }
+
+WindFacts read_wind(TomlTable& table) {
+  WindFacts wind;
+  wind.over_time = read_keys(table, "over_time", "velocity");
+  if (wind.over_time.empty())
+    wind.velocity = table.required<Vector3>("velocity", "of the air, in metres a second").value_or(Vector3::Zero());
+  else
+    for (const auto& key : wind.over_time) wind.velocity += key.value / double(wind.over_time.size());
+  wind.air_density =
+      read_number(table, "air_density", {.low = 0.0, .high = 2000.0, .low_allowed = false, .meaning = "in kg/m^3"},
+                  wind.air_density);
+  wind.normal = read_number(table, "normal", {.low = 0.0, .high = 10.0, .meaning = "a drag coefficient"}, wind.normal);
+  wind.tangential = read_number(table, "tangential", {.low = 0.0, .high = 10.0, .meaning = "a friction coefficient"},
+                                wind.tangential);
+  table.with_table("gusts", [&](TomlTable& gusts) {
+    wind.gust_intensity = read_number(
+        gusts, "intensity", {.low = 0.0, .high = 1.0, .meaning = "standard deviation of the speed over its mean"}, 0.2);
+    wind.gust_length = read_number(gusts, "length", positive_metres, wind.gust_length);
+    wind.seed = read_seed(gusts);
+  });
+  return wind;
+}
+
+RainOptions read_rain(TomlTable& table, double duration) {
+  RainOptions rain;
+  rain.rate = read_number(
+      table, "rate", {.low = 0.0, .high = 1e7, .low_allowed = false, .meaning = "drops a square metre and second"});
+  rain.diameter = read_number(
+      table, "diameter", {.low = 0.0, .high = 0.02, .low_allowed = false, .meaning = "of a drop in metres"}, 0.003);
+  rain.velocity = table.optional<Vector3>("velocity").value_or(rain.velocity);
+  if (!(rain.velocity.norm() > 0.0))
+    table.context().complain(table.key_of("velocity"), "no velocity",
+                             "how fast and where drops fall, in metres a second");
+  rain.from = read_number(table, "from", any_time, 0.0);
+  rain.until = read_number(table, "until", any_time, duration);
+  rain.stays = read_number(table, "stays", {.low = 0.0, .high = 1.0, .meaning = "part of the water that stays"}, 0.0);
+  rain.runs_off =
+      read_number(table, "runs_off", {.low = 0.0, .low_allowed = false, .meaning = "a time in seconds"}, 1.0);
+  rain.seed = read_seed(table);
+  return rain;
+}
+
+void read_patch(TomlTable& table, Vector3& at, double& radius) {
+  at = table.required<Vector3>("at", "a point of the surface at rest").value_or(Vector3::Zero());
+  radius = read_number(table, "radius", {.low = 0.0, .meaning = "a length in metres"}, 0.0);
+}
+
+Hand read_hand(TomlTable& table) {
+  Hand hand;
+  read_patch(table, hand.at, hand.radius);
+  hand.stiffness = read_number(table, "stiffness", {.low = 0.0, .meaning = "in newtons a metre"}, 0.0);
+  read_span(table, hand.from, hand.until);
+  hand.motion = read_motion(table);
+  hand.path = read_keys(table, "path", "at");
+  if (hand.motion.empty() == hand.path.empty())
+    table.context().complain(
+        table.key(), hand.path.empty() ? "a hand without `motion` and `path`" : "a hand with `motion` and `path`",
+        "one of them: how it moves since it took hold, or where it is");
+  return hand;
+}
+
+LedRegion read_led(TomlTable& table, const NamedFiles& files) {
+  LedRegion led{RegionBox{}, -infinite, infinite, {}};
+  if (const auto region = read_region(table, files)) led.region = *region;
+  read_span(table, led.from, led.until);
+  led.motion = read_motion(table);
+  return led;
+}
+
+RigidObstacle read_obstacle(TomlTable& table, const NamedFiles& files) {
+  RigidObstacle obstacle{ShapeBall{Vector3::Zero(), 1.0}, 0.0, {}};
+  int count = 0;
+  table.with_table("ball", [&](TomlTable& t) {
+    const Vector3 centre = t.required<Vector3>("centre").value_or(Vector3::Zero());
+    obstacle.shape = ShapeBall{centre, read_number(t, "radius", positive_metres)}, ++count;
+  });
+  table.with_table("capsule", [&](TomlTable& t) {
+    const Vector3 from = t.required<Vector3>("from").value_or(Vector3::Zero()),
+                  to = t.required<Vector3>("to").value_or(Vector3::Zero());
+    obstacle.shape = ShapeCapsule{from, to, read_number(t, "radius", positive_metres)}, ++count;
+  });
+  table.with_table("box", [&](TomlTable& t) {
+    const Vector3 min = t.required<Vector3>("min").value_or(Vector3::Zero()),
+                  max = t.required<Vector3>("max").value_or(Vector3::Ones());
+    if (!(max.array() > min.array()).all())
+      t.context().complain(t.key(), "a box whose `min` does not lie below its `max`", "min < max on each axis",
+                           "swap them");
+    obstacle.shape = ShapeBox{min, max}, ++count;
+  });
+  table.with_table("plane", [&](TomlTable& t) {
+    const Vector3 point = t.required<Vector3>("point").value_or(Vector3::Zero());
+    obstacle.shape = ShapePlane{point, read_direction(t, "normal").value_or(Vector3::UnitY())}, ++count;
+  });
+  if (const auto file = read_optional_path(table, "mesh", files)) {
+    ShapeMesh shape{*file, {}};
+    read_file_of(table, "mesh", *file, [&](const auto& path) { shape.mesh = read_mesh(path); });
+    obstacle.shape = std::move(shape), ++count;
+  } else if (table.has("mesh")) {
+    ++count;
+  }
+  if (count != 1)
+    table.context().complain(table.key(), fmt::format("an obstacle of {} shapes", count),
+                             "one of `ball`, `capsule`, `box`, `plane`, `mesh`");
+  obstacle.friction =
+      read_number(table, "friction", {.low = 0.0, .high = 5.0, .meaning = "Coulomb's coefficient"}, 0.0);
+  obstacle.motion = read_motion(table);
+  return obstacle;
+}
+
+}  // namespace
+
+Situation read_situation(const std::filesystem::path& path) {
+  const toml::table parsed = parse_toml(read_file(path), path);
+  TomlContext context{TomlPlaces(path), {}, {}};
+  TomlTable root(parsed, "", context);
+  check_format(root, "situation/1");
+  const NamedFiles files{path.parent_path()};
+  Situation s;
+  s.file = path;
+  s.duration = read_number(
+      root, "duration", {.low = 0.0, .high = 3600.0, .low_allowed = false, .meaning = "a time in seconds"}, s.duration);
+  s.frame_rate = read_number(
+      root, "frame_rate", {.low = 0.0, .high = 1e5, .low_allowed = false, .meaning = "frames a second"}, s.frame_rate);
+  s.keeps_held = root.optional<bool>("held").value_or(true);
+  s.settles = root.optional<bool>("settle");
+  s.gravity = read_keys(root, "gravity", "value");
+  if (root.has("plane")) s.planes.emplace();
+  root.each_block("plane", [&](TomlTable& block) { s.planes->push_back(read_plane(block)); });
+  root.with_table("initial", [&](TomlTable& table) {
+    s.pose.translation = table.optional<Vector3>("shift").value_or(Vector3::Zero());
+    const Vector3 turn = degree * table.optional<Vector3>("turn_deg").value_or(Vector3::Zero());
+    if (turn.norm() > 0.0) s.pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    s.linear_velocity = table.optional<Vector3>("linear_velocity").value_or(Vector3::Zero());
+    s.angular_velocity = table.optional<Vector3>("angular_velocity").value_or(Vector3::Zero());
+  });
+  root.with_table("wind", [&](TomlTable& table) { s.wind = read_wind(table); });
+  root.each_block("rain", [&](TomlTable& table) { s.rains.push_back(read_rain(table, s.duration)); });
+  root.each_block("force", [&](TomlTable& table) {
+    AppliedForce force;
+    read_patch(table, force.at, force.radius);
+    force.force = read_keys(table, "over_time", "force");
+    if (force.force.empty())
+      force.force = {
+          {0.0, table.required<Vector3>("force", "in newtons, or blocks `over_time`").value_or(Vector3::Zero())}};
+    s.forces.push_back(std::move(force));
+  });
+  root.each_block("hand", [&](TomlTable& table) { s.hands.push_back(read_hand(table)); });
+  root.each_block("led", [&](TomlTable& table) { s.led.push_back(read_led(table, files)); });
+  root.each_block("obstacle", [&](TomlTable& table) { s.obstacles.push_back(read_obstacle(table, files)); });
+  root.each_block("copy", [&](TomlTable& table) {
+    ObjectCopy copy;
+    copy.shift = table.required<Vector3>("shift").value_or(Vector3::Zero());
+    copy.delay = read_number(table, "delay", any_time, 0.0);
+    s.copies.push_back(copy);
+  });
+  root.finish();
+  context.throw_problems();
+  return s;
+}
+
+}  // namespace pliant
