@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "base/error.hpp"
 
@@ -327,6 +328,33 @@ HexGrid make_hex_grid(const SignedDistance& distance, const Box& object, double 
   }
   number_cells_and_nodes(grid, cells, stands_for);
   return grid;
+}
+
+int face_connected_parts(const HexGrid& grid) {
+  // Nodes with bit d of their number clear, then set: the two faces of a cell across axis d.
+  std::map<std::array<int, 4>, int> first_cell;
+  std::vector<int> parent(grid.cells.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int cell) {
+    while (parent[std::size_t(cell)] != cell)
+      cell = parent[std::size_t(cell)] = parent[std::size_t(parent[std::size_t(cell)])];
+    return cell;
+  };
+  int parts = grid.cell_count();
+  for (int cell = 0; cell < grid.cell_count(); ++cell)
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int side : {0, 1}) {
+        std::array<int, 4> face{};
+        int k = 0;
+        for (int a = 0; a < 8; ++a)
+          if ((a >> axis & 1) == side) face[std::size_t(k++)] = grid.cells[std::size_t(cell)][std::size_t(a)];
+        std::ranges::sort(face);
+        const auto [at, is_new] = first_cell.emplace(face, cell);
+        if (is_new || root(at->second) == root(cell)) continue;
+        parent[std::size_t(root(cell))] = root(at->second);
+        --parts;
+      }
+  return parts;
 }
 
 }  // namespace pliant

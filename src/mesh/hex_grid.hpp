@@ -64,6 +64,10 @@ struct HexGrid {
   [[nodiscard]] CellPoint locate(const Vector3& point) const;
 };
 
+/// Parts of a grid that are joined by whole faces of cells: one where nothing hangs by an edge or a corner alone, about
+/// which it would turn freely.
+int face_connected_parts(const HexGrid& grid);
+
 struct HexGridOptions {
   double merge_below = 0.2;  ///< cells with a smaller inside fraction are merged with a neighbour; 0: none
   int subdivisions = 4;      ///< of a cut cell along each edge, for the integrals

@@ -131,8 +131,12 @@ std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistanc
     const TetMesh mesh = make_tet_mesh(volume.nodes, volume.tets, volume.mid_nodes);
     body = make_body(resolution.element == ElementKind::QuadraticTetrahedron ? with_mid_nodes(mesh) : mesh);
   } else if (resolution.element == ElementKind::Hexahedron) {
-    const double cell_size = resolution.follows_thickness ? hex_cell_size(scene, distance, resolution.cells) : edge;
-    body = make_body(hex_grid_of(scene, distance, cell_size));
+    double cell_size = resolution.follows_thickness ? hex_cell_size(scene, distance, resolution.cells) : edge;
+    HexGrid grid = hex_grid_of(scene, distance, cell_size);
+    // Where a neck falls between cells, a part of the object would hang by an edge, or not at all.
+    for (int smaller = 0; smaller < 6 && face_connected_parts(grid) > 1; ++smaller)
+      grid = hex_grid_of(scene, distance, cell_size *= 0.85);
+    body = make_body(std::move(grid));
   } else {
     TetMeshOptions options;
     options.cell_size = edge;

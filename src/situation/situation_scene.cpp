@@ -10,7 +10,7 @@
 #include "geometry/surface_distance.hpp"
 #include "meshing/mesh_distance.hpp"
 #include "motion/fixed_regions.hpp"
-#include "motion/grip.hpp"
+#include "motion/patch_forces.hpp"
 #include "motion/rain.hpp"
 #include "motion/rigid_contact.hpp"
 #include "motion/wind.hpp"
@@ -169,7 +169,7 @@ SituationScene make_scene(const Model& model, const Situation& situation, int co
         });
   const double weight = made.theta[blocks.density] * made.body->volume() * std::max(gravity.norm(), 1.0);
   for (const Hand& hand : situation.hands) {
-    GripOptions options;
+    LedSpringsOptions options;
     options.stiffness = hand.stiffness > 0.0 ? hand.stiffness : 10.0 * weight / made.body->size();
     options.from = hand.from, options.until = hand.until;
     options.reaches = !hand.path.empty();
@@ -184,7 +184,7 @@ SituationScene make_scene(const Model& model, const Situation& situation, int co
       options.motion = keyed_motion(hand.at, hand.motion);
     }
     further.push_back([hand, options](const auto& body) -> std::unique_ptr<ForceTerm> {
-      return std::make_unique<Grip>(*body, surface_patch(*body, hand.at, hand.radius), options);
+      return std::make_unique<LedSprings>(*body, surface_patch(*body, hand.at, hand.radius), options);
     });
   }
   const double modulus = model.youngs_modulus * (1.0 - model.poissons_ratio) /
@@ -206,13 +206,13 @@ SituationScene make_scene(const Model& model, const Situation& situation, int co
       volume += std::max(0.0, nodal(node, 0));
     }
     // As stiff as the penalty that holds regions of a grid.
-    GripOptions options;
+    LedSpringsOptions options;
     options.stiffness = 40.0 * modulus * volume / (edge * edge);
     options.from = led.from, options.until = led.until;
     options.from_rest = !(led.from > 0.0);
     options.motion = keyed_motion(middle, led.motion);
     further.push_back([nodes, options](const auto& body) -> std::unique_ptr<ForceTerm> {
-      return std::make_unique<Grip>(*body, node_patch(*body, nodes), options);
+      return std::make_unique<LedSprings>(*body, node_patch(*body, nodes), options);
     });
   }
   for (const RigidObstacle& obstacle : situation.obstacles) {

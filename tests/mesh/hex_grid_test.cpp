@@ -329,6 +329,19 @@ TEST(HexGrid, LocateReproducesLinearFunctionsInsideAndOutside) {
   EXPECT_GT(outside, 50);
 }
 
+/// Two balls that overlap are one part; where their neck lies about an edge of the lattice, coarse cells meet in no
+/// face.
+TEST(HexGrid, PartsAreJoinedByWholeFaces) {
+  EXPECT_EQ(face_connected_parts(test::sphere_grid(0.1, 0.05)), 1);
+  const auto two = [](const Vector3& away, double cell_size) {
+    const auto distance = [&](const Vector3& p) { return std::min((p - away).norm(), (p + away).norm()) - 0.1; };
+    const Box box = grown({-away, away}, 0.1);
+    return make_hex_grid(SignedDistance(grown(box, 0.1), 0.01, distance), box, cell_size, {.merge_below = 0.0});
+  };
+  EXPECT_EQ(face_connected_parts(two({0.09, 0.0, 0.0}, 0.03)), 1);
+  EXPECT_EQ(face_connected_parts(two({0.2, 0.0, 0.0}, 0.03)), 2);
+}
+
 TEST(HexGrid, RefusesCellsThatMissTheObject) {
   const SignedDistance distance(test::centred_box(Vector3::Constant(0.1)), 0.02, [](const Vector3&) { return 1.0; });
   EXPECT_ANY_THROW(make_hex_grid(distance, test::centred_box(Vector3::Constant(0.05)), 0.05));

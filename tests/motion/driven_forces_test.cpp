@@ -1,5 +1,5 @@
 #include "geometry/primitives.hpp"
-#include "motion/grip.hpp"
+#include "motion/patch_forces.hpp"
 #include "motion/rigid_contact.hpp"
 #include "motion/wind.hpp"
 #include "support/force_terms.hpp"
@@ -40,13 +40,13 @@ std::vector<Family> families() {
                 [](const MotionBlocks& blocks) { return Handles{blocks.wind}; }};
     wind.sees_start = wind.rests = true;
     list.push_back(wind);
-    Family grip{"GripOf" + kind,
+    Family grip{"LedSpringsOf" + kind,
                 body,
                 [](auto of, const MotionBlocks&) {
-                  GripOptions options;
+                  LedSpringsOptions options;
                   options.stiffness = 300.0, options.from_rest = true;
                   options.motion = KeyedMotion({0.1, 0.0, 0.0}, turning());
-                  return std::make_unique<Grip>(*of, surface_patch(*of, {0.1, 0.05, 0.05}, 0.09), options);
+                  return std::make_unique<LedSprings>(*of, surface_patch(*of, {0.1, 0.05, 0.05}, 0.09), options);
                 },
                 false,
                 true,

@@ -1,4 +1,4 @@
-#include "motion/grip.hpp"
+#include "motion/patch_forces.hpp"
 
 #include <cmath>
 #include <stdexcept>
@@ -38,7 +38,7 @@ Patch node_patch(const Body& body, const std::vector<int>& nodes) {
   return patch;
 }
 
-Grip::Grip(const Body& body, const Patch& patch, GripOptions options)
+LedSprings::LedSprings(const Body& body, const Patch& patch, LedSpringsOptions options)
     : options_(std::move(options)),
       points_(body, patch.rest),
       share_(patch.share),
@@ -51,12 +51,12 @@ Grip::Grip(const Body& body, const Patch& patch, GripOptions options)
   if (!(options_.stiffness > 0.0)) throw std::invalid_argument("a grip's stiffness must be positive");
 }
 
-void Grip::take_hold(const Points& positions, double time) {
+void LedSprings::take_hold(const Points& positions, double time) {
   for (std::size_t i = 0; i < anchor_.size(); ++i) anchor_[i] = points_.position(int(i), positions);
   took_hold_ = time;
 }
 
-void Grip::begin_step(const StepContext& step) {
+void LedSprings::begin_step(const StepContext& step) {
   const double end = step.time + step.dt;
   holds_ = step.time >= options_.from - 1e-12 && end <= options_.until + 1e-12;
   if (step.time < options_.from) took_hold_ = infinite;
@@ -85,37 +85,37 @@ void Grip::begin_step(const StepContext& step) {
   for (std::size_t i = 0; i < target_.size(); ++i) target_[i] = turn * (anchor_[i] - centre) + to;
 }
 
-Vector3 Grip::force(const Points& z) const {
+Vector3 LedSprings::force(const Points& z) const {
   Vector3 sum = Vector3::Zero();
   for (int i = 0; i < points_.point_count() && holds_; ++i)
     sum -= stiffness(i) * (points_.position(i, z) - target_[std::size_t(i)]);
   return sum;
 }
 
-void Grip::move_to(const Vector3& place) {
+void LedSprings::move_to(const Vector3& place) {
   KeyFrames<6>::Value shift = KeyFrames<6>::Value::Zero();
   shift.head<3>() = place;
   options_.motion = KeyedMotion(Vector3::Zero(), KeyFrames<6>(shift));
 }
 
-Vector3 Grip::place() const {
+Vector3 LedSprings::place() const {
   Vector3 sum = Vector3::Zero();
   for (std::size_t i = 0; i < target_.size(); ++i) sum += share_[i] * target_[i];
   return sum;
 }
 
-Vector3 Grip::middle(const Points& z) const {
+Vector3 LedSprings::middle(const Points& z) const {
   Vector3 sum = Vector3::Zero();
   for (int i = 0; i < points_.point_count(); ++i) sum += share_[std::size_t(i)] * points_.position(i, z);
   return sum;
 }
 
-void Grip::add_force(const Points& z, Points& force) {
+void LedSprings::add_force(const Points& z, Points& force) {
   for (int i = 0; i < points_.point_count() && holds_; ++i)
     points_.add_transpose(i, -stiffness(i) * (points_.position(i, z) - target_[std::size_t(i)]), force);
 }
 
-void Grip::add_matrix(double scale, BlockMatrix& matrix) {
+void LedSprings::add_matrix(double scale, BlockMatrix& matrix) {
   const int n = points_.nodes_per_point();
   for (int i = 0; i < points_.point_count() && holds_; ++i) {
     const auto w = points_.weights(i);
@@ -128,19 +128,19 @@ void Grip::add_matrix(double scale, BlockMatrix& matrix) {
   }
 }
 
-std::optional<double> Grip::potential(const Points& x) {
+std::optional<double> LedSprings::potential(const Points& x) {
   double sum = 0.0;
   for (int i = 0; i < points_.point_count() && holds_; ++i)
     sum += 0.5 * stiffness(i) * (points_.position(i, x) - target_[std::size_t(i)]).squaredNorm();
   return sum;
 }
 
-void Grip::add_force_tangent(const Points&, const Points&, const Points& d_z, const VectorX&, Points& force) {
+void LedSprings::add_force_tangent(const Points&, const Points&, const Points& d_z, const VectorX&, Points& force) {
   for (int i = 0; i < points_.point_count() && holds_; ++i)
     points_.add_transpose(i, -stiffness(i) * points_.position(i, d_z), force);
 }
 
-void Grip::add_force_adjoint(const Points&, const Points& w, Points&, Points& z_bar, VectorX&) {
+void LedSprings::add_force_adjoint(const Points&, const Points& w, Points&, Points& z_bar, VectorX&) {
   for (int i = 0; i < points_.point_count() && holds_; ++i)
     points_.add_transpose(i, -stiffness(i) * points_.position(i, w), z_bar);
 }

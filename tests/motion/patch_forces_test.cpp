@@ -1,4 +1,4 @@
-#include "motion/grip.hpp"
+#include "motion/patch_forces.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "motion/simulation.hpp"
 #include "support/bodies.hpp"
 
-namespace pliant::grip_test {
+namespace pliant::patch_forces_test {
 namespace {
 
 struct Floating {
@@ -41,9 +41,9 @@ struct Floating {
     EXPECT_TRUE(summary.succeeded) << summary.failure;
     return states;
   }
-  void add(const GripOptions& grip, const Patch& patch) {
+  void add(const LedSpringsOptions& grip, const Patch& patch) {
     options.further_forces.push_back([grip, patch](const auto& of) -> std::unique_ptr<ForceTerm> {
-      return std::make_unique<Grip>(*of, patch, grip);
+      return std::make_unique<LedSprings>(*of, patch, grip);
     });
   }
 };
@@ -76,9 +76,9 @@ TEST(AppliedForce, GivesTheObjectItsImpulse) {
 }
 
 /// A stiff grip leads what it holds along its motion.
-TEST(Grip, LeadsWhereItsMotionGoes) {
+TEST(LedSprings, LeadsWhereItsMotionGoes) {
   Floating scene;
-  GripOptions grip;
+  LedSpringsOptions grip;
   grip.stiffness = 1e5, grip.from_rest = true, grip.motion = shift_of({0.0, 0.15, 0.0}, 0.2);
   std::vector<int> nodes;
   for (int n = 0; n < scene.body->node_count(); ++n)
@@ -89,10 +89,10 @@ TEST(Grip, LeadsWhereItsMotionGoes) {
 }
 
 /// It takes hold of what flies by where that is, and lets go with the momentum that it has then.
-TEST(Grip, TakesHoldAndLetsGo) {
+TEST(LedSprings, TakesHoldAndLetsGo) {
   Floating scene;
   scene.theta.segment<3>(scene.options.blocks.linear_velocity) = Vector3(1.0, 0.0, 0.0);
-  GripOptions grip;
+  LedSpringsOptions grip;
   grip.stiffness = 40.0, grip.from = 0.1, grip.until = 0.2;
   scene.add(grip, surface_patch(*scene.body, {0.1, 0.0, 0.0}, 0.06));
   const std::vector<State> states = scene.run();
@@ -103,11 +103,11 @@ TEST(Grip, TakesHoldAndLetsGo) {
   EXPECT_LT((scene.momentum(states[40]) - scene.momentum(states[20])).norm(), 1e-9 * scene.mass());
 }
 
-TEST(Grip, ReachesForAPlace) {
+TEST(LedSprings, ReachesForAPlace) {
   Floating scene;
   scene.theta[scene.options.blocks.mass_damping] = 40.0;
   for (double& time : scene.options.times) time *= 5.0;
-  GripOptions grip;
+  LedSpringsOptions grip;
   grip.stiffness = 200.0, grip.reaches = true, grip.motion = shift_of({0.3, 0.1, 0.0}, 0.01);
   const Patch patch = surface_patch(*scene.body, {0.1, 0.0, 0.0}, 0.06);
   scene.add(grip, patch);
@@ -118,13 +118,13 @@ TEST(Grip, ReachesForAPlace) {
   EXPECT_LT((middle - Vector3(0.3, 0.1, 0.0)).norm(), 0.003);
 }
 
-TEST(Grip, RefusesWhatCannotHold) {
+TEST(LedSprings, RefusesWhatCannotHold) {
   const auto body = test::box_body({0.2, 0.1, 0.1}, 0.05);
-  EXPECT_THROW(Grip(*body, {{Vector3::Zero()}, {1.0}}, {}), std::invalid_argument);
-  GripOptions stiff;
+  EXPECT_THROW(LedSprings(*body, {{Vector3::Zero()}, {1.0}}, {}), std::invalid_argument);
+  LedSpringsOptions stiff;
   stiff.stiffness = 1.0;
-  EXPECT_THROW(Grip(*body, {}, stiff), std::invalid_argument);
+  EXPECT_THROW(LedSprings(*body, {}, stiff), std::invalid_argument);
 }
 
 }  // namespace
-}  // namespace pliant::grip_test
+}  // namespace pliant::patch_forces_test

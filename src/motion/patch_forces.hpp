@@ -21,7 +21,7 @@ Patch surface_patch(const Body& body, const Vector3& centre, double radius);
 /// Nodes by the volume about each. Throws std::invalid_argument for none.
 Patch node_patch(const Body& body, const std::vector<int>& nodes);
 
-struct GripOptions {
+struct LedSpringsOptions {
   double stiffness = 0.0;                     ///< of all springs together [N/m], > 0
   KeyedMotion motion;                         ///< of what grips
   double from = -infinite, until = infinite;  ///< when it takes hold and lets go [s]
@@ -35,10 +35,10 @@ struct GripOptions {
 /// A hand, a finger or a led clamp: springs from points of the object to where a rigid motion over time leads them,
 ///   f(z) = -k sum_i s_i (z_i - target_i).
 /// Stiff springs lead a region of the object; soft ones are a hand that gives.
-class Grip : public ForceTerm {
+class LedSprings : public ForceTerm {
  public:
   /// Throws std::invalid_argument for no points, or a stiffness that is not positive.
-  Grip(const Body& body, const Patch& patch, GripOptions options);
+  LedSprings(const Body& body, const Patch& patch, LedSpringsOptions options);
 
   const Embedding& points() const { return points_; }
   bool holds() const { return holds_; }
@@ -66,7 +66,7 @@ class Grip : public ForceTerm {
   void take_hold(const Points& positions, double time);
   double stiffness(int point) const { return options_.stiffness * share_[std::size_t(point)]; }
 
-  GripOptions options_;
+  LedSpringsOptions options_;
   Embedding points_;
   std::vector<double> share_;
   std::vector<int> blocks_;
