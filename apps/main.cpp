@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   add_markers(line, exit_code);
   add_fit(line, exit_code);
   add_simulate(line, exit_code);
+  add_live(line, exit_code);
   add_track(line, exit_code);
   add_evaluate(line, exit_code);
   add_press(line, exit_code);

@@ -96,6 +96,8 @@ void LedSprings::move_to(const Vector3& place) {
   KeyFrames<6>::Value shift = KeyFrames<6>::Value::Zero();
   shift.head<3>() = place;
   options_.motion = KeyedMotion(Vector3::Zero(), KeyFrames<6>(shift));
+  const Vector3 way = place - this->place();
+  for (Vector3& target : target_) target += way;
 }
 
 Vector3 LedSprings::place() const {

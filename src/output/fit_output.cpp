@@ -1,13 +1,16 @@
 #include "output/fit_output.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 #include <tuple>
 
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "elasticity/element_moduli.hpp"
+#include "live/live_page.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
 #include "output/track_output.hpp"
@@ -522,6 +525,56 @@ void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& re
   tell("pictures", 1, 1);
 }
 
+/// Parameters of the object drawn from the estimate's uncertainty, as a page takes them; none where nothing is known.
+std::vector<VectorX> posterior_samples(const FitOutcome& outcome, const LiveData& live) {
+  constexpr int count = 5;
+  const ParameterSet& parameters = outcome.parameters;
+  const Parameter* const modulus = parameters.find("youngs_modulus");
+  if (outcome.covariance.size() == 0 || !modulus || !modulus->estimated) return {};
+  const MotionLayout blocks = live_blocks(live.planes);
+  const VectorX p = parameters.to_unconstrained(outcome.theta);
+  const Eigen::LLT<MatrixX> factor(outcome.covariance);
+  if (factor.info() != Eigen::Success) return {};
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<VectorX> samples;
+  for (int k = 0; k < count; ++k) {
+    const VectorX z = VectorX::NullaryExpr(p.size(), [&](Eigen::Index) { return normal(random); });
+    const VectorX drawn = parameters.to_theta(parameters.clamp(p + factor.matrixL() * z));
+    VectorX& sample = samples.emplace_back(live.theta);
+    blocks.scale_moduli(sample, drawn[modulus->at] / outcome.theta[modulus->at]);
+    for (const auto& [name, at] :
+         {std::pair{"poissons_ratio", blocks.poissons_ratio}, std::pair{"mass_damping", blocks.mass_damping},
+          std::pair{"stiffness_damping", blocks.stiffness_damping}})
+      if (const Parameter* const own = parameters.find(name); own && own->estimated) sample[at] = drawn[own->at];
+  }
+  return samples;
+}
+
+/// The page in which the object can be touched. Its name; empty where its law is one that no page knows.
+std::string write_live_page(const fs::path& folder, const RecordedCapture& recorded, const FitOutcome& outcome,
+                            const Model& model) {
+  if (model.law || outcome.law) return {};
+  constexpr std::size_t most_points = 300;  // a frame
+  LiveRecording recording;
+  const Timing& timing = recorded.capture.scene.timing;
+  // A page knows no pose from which an object was let go.
+  if (!timing.is_static && !model.scene.initial.released)
+    for (int frame = timing.start_frame; frame < timing.frame_count(); ++frame) {
+      recording.times.push_back(timing.times[std::size_t(frame)]);
+      std::vector<Vector3>& points = recording.points.emplace_back();
+      const auto seen = std::ranges::find(recorded.observed, frame, &ObservedFrame::frame);
+      if (seen == recorded.observed.end()) continue;
+      const std::vector<Vector3> all = corrected_points(
+          *seen, recorded.capture, outcome.recordings.front().discretisation, outcome.recordings.front().theta);
+      const std::size_t every = std::max<std::size_t>(1, all.size() / most_points);
+      for (std::size_t i = 0; i < all.size(); i += every) points.push_back(all[i]);
+    }
+  const char* const name = "live.html";
+  write_file(folder / name, live_page(model, recording, posterior_samples(outcome, live_data(model))));
+  return name;
+}
+
 void write_law(const fs::path& folder, const LawOutcome& law, ReportData& report, const Progress& tell) {
   write_presses(folder, law, tell);
   report.presses = press_errors(*law.scene, law.predictions);
@@ -556,7 +609,11 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   write_result(folder / "result.json", report.result);
   write_convergence(folder / "convergence.csv", history_of(outcome, true));
-  if (capture.scene.object.surface) save_model(folder, make_model(capture, outcome));
+  if (capture.scene.object.surface) {
+    const Model model = make_model(capture, outcome);
+    save_model(folder, model);
+    report.live_page = write_live_page(folder, recordings.front(), outcome, model);
+  }
   if (outcome.law)
     write_law(folder, *outcome.law, report, tell);
   else

@@ -108,8 +108,10 @@ void draw_pictures(const SituationFiles& files, const Scene& scene, const Situat
       box.extend(surface.colwise().maxCoeff().cast<double>().transpose() + copy.shift);
     }
   const double degree = std::numbers::pi / 180.0;
-  const PinholeCamera camera = view_of(grown(box, 0.04 * box.extent().maxCoeff()), scene.world.up, files.width,
-                                       files.height, files.azimuth_deg * degree, files.elevation_deg * degree);
+  const Box whole = grown(box, 0.04 * box.extent().maxCoeff());
+  const PinholeCamera camera = framed(view_of(whole, scene.world.up, files.width, files.height,
+                                              files.azimuth_deg * degree, files.elevation_deg * degree),
+                                      whole, files.width, files.height);
   const std::size_t frames = copies.front().surfaces.size();
   for (std::size_t frame = 0; frame < frames; ++frame) {
     PictureScene seen;

@@ -503,7 +503,11 @@ std::string loads_table(const std::vector<LoadError>& loads) {
 std::string usage(const ReportData& data) {
   const std::string capture = data.capture_path.empty() ? "CAPTURE" : data.capture_path;
   const std::string model = escape_html(data.model_file);
-  return "<p>The model stands beside this page: <code>" + model +
+  const std::string live = data.live_page.empty()
+                               ? ""
+                               : "<p><a href=\"" + escape_html(data.live_page) +
+                                     "\">Touch it</a>: pull, poke and throw the fitted object in the browser.</p>\n";
+  return live + "<p>The model stands beside this page: <code>" + model +
          "</code> with its volume mesh and surface. All numbers are SI.</p>\n<pre>"
          "# predict another recording with this model and compare\npliant evaluate " +
          model + " OTHER_CAPTURE\n\n# repeat this fit\npliant fit " + escape_html(capture) + " --out OUT</pre>\n<p>" +

@@ -45,11 +45,12 @@ struct ReportData {
   std::vector<double> press_forces;       ///< ... and their forces [N]
   std::vector<double> basis_errors;       ///< of a sampled material: error of stress with 1, 2, ... samples an element
   std::string model_file = "model.toml";  ///< beside the page
+  std::string live_page = {};             ///< beside the page; empty: none
   std::string capture_path;               ///< as the user named it; empty: "CAPTURE" in the commands shown
 };
 
-/// One self-contained page: no script, no link to another file or place; light and dark by the reader's setting.
-/// Throws std::invalid_argument where correlations or convergence rows do not fit their names.
+/// One self-contained page: no script, no link to another file or place but the live page beside it; light and dark by
+/// the reader's setting. Throws std::invalid_argument where correlations or convergence rows do not fit their names.
 std::string report_html(const ReportData& data);
 
 /// Writes the page, whole or not at all. Throws InputError where it cannot be written.

@@ -2,9 +2,9 @@
 
 #include <fstream>
 
-#include "geometry/primitives.hpp"
 #include "input_errors.hpp"
 #include "situation/situation_scene.hpp"
+#include "support/models.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant::situation_test {
@@ -14,22 +14,8 @@ using test::complaint_of;
 using test::TemporaryFolder;
 using testing::HasSubstr;
 
-constexpr double edge = 0.05;
-
-/// A block, free or held at its low end, above a floor.
-Model block(bool held) {
-  Model model;
-  model.name = "block";
-  model.scene.object.surface = make_box(Vector3(0.2, edge, edge), 0.025);
-  model.scene.object.density = 500.0, model.scene.object.mass = 0.25;
-  model.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
-  model.scene.timing = evenly_timed(50.0, 3);
-  if (held) model.scene.fixed = {{RegionHalfSpace{{-0.07, 0, 0}, {-1, 0, 0}}, std::nullopt}};
-  model.scene.planes = {{{0, -0.1, 0}, Vector3::UnitY(), true, 0.5}};
-  model.youngs_modulus = 2e5, model.poissons_ratio = 0.3, model.stiffness_damping = 2e-3, model.mass_damping = 0.5;
-  model.cell_size = edge, model.substeps = 8, model.theta = 0.51;
-  return model;
-}
+using test::block;
+constexpr double edge = test::block_edge;
 
 struct Folder : TemporaryFolder {
   Situation read(const std::string& text) const {

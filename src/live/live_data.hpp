@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "elasticity/body.hpp"
+#include "elasticity/material.hpp"
+#include "geometry/triangle_mesh.hpp"
+#include "motion/simulation.hpp"
+#include "scene/scene.hpp"
+
+namespace pliant {
+
+/// Everything that moves a fitted object, as one block of bytes: what a page needs that runs the simulation itself.
+struct LiveData {
+  std::variant<HexGrid, TetMesh> mesh;
+  std::vector<double> relative_moduli;  ///< one an element [-]
+  TriangleMesh surface;                 ///< at rest [m]
+  std::vector<FixedRegion> fixed;
+  std::vector<Weight> weights;
+  int planes = 0;
+  VectorX theta;  ///< of `live_blocks`
+  /// Of the simulation: what is not listed here has its default.
+  double max_dt = 0.0, newmark_theta = 0.51, contact_weight = 0.6, rotation_prediction = 0.5;
+  ElasticLaw elastic_law = ElasticLaw::NeoHookean;
+  StiffnessDamping stiffness_damping = StiffnessDamping::KelvinVoigt;
+  Penalty contact;
+  double friction_speed = 0.0;
+  Vector3 up = Vector3::UnitY();
+  std::vector<VectorX> samples;  ///< of the posterior, like `theta`
+};
+
+/// Blocks of the parameters of an object that a page moves: those of its motion, and a wind.
+MotionLayout live_blocks(int planes);
+
+/// The bytes, little-endian, and back. Throws std::runtime_error where the bytes are none, are cut short or are of
+/// another version.
+std::string encode(const LiveData& data);
+LiveData decode(std::string_view bytes);
+
+}  // namespace pliant

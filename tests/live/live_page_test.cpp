@@ -1,0 +1,33 @@
+#include "live/live_page.hpp"
+
+#include "input_errors.hpp"
+#include "support/models.hpp"
+
+namespace pliant::live_page_test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(LivePage, IsOneFileThatNeedsNoOther) {
+  Model model = test::block(false);
+  model.name = "a <block> & more";
+  LiveRecording recording{{1.0, 1.1}, {{Vector3(0, 0, 0)}, {Vector3(1, 0, 0), Vector3(2, 0, 0)}}};
+  const std::string page = live_page(model, recording);
+  EXPECT_THAT(page, HasSubstr("<title>a &lt;block> &amp; more"));
+  EXPECT_THAT(page, HasSubstr("\"times\":[0,0.1]"));
+  EXPECT_THAT(page, HasSubstr("\"counts\":[1,2]"));
+  EXPECT_THAT(page, Not(HasSubstr("@MODULE@")));
+  EXPECT_THAT(page, Not(HasSubstr("@FACTS@")));
+  for (const char* outside : {"http://", "https://", "src=\"", "import("}) EXPECT_THAT(page, Not(HasSubstr(outside)));
+  EXPECT_LT(page.size(), std::size_t(3) << 20);
+}
+
+TEST(LivePage, ModelsOfOtherLawsAreNamed) {
+  Model model = test::block(false);
+  model.law = ModelLaw{"ogden", {"element"}, {}, 0.0};
+  EXPECT_THAT(test::complaint_of([&] { (void)live_page(model); }), HasSubstr("ogden"));
+}
+
+}  // namespace
+}  // namespace pliant::live_page_test

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "geometry/primitives.hpp"
+#include "model/model.hpp"
+
+namespace pliant::test {
+
+inline constexpr double block_edge = 0.05;  // [m]
+
+/// A block of four cells, free or held at its low end, above a rough floor.
+inline Model block(bool held) {
+  Model model;
+  model.name = "block";
+  model.scene.object.surface = make_box(Vector3(0.2, block_edge, block_edge), 0.025);
+  model.scene.object.density = 500.0, model.scene.object.mass = 0.25;
+  model.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
+  model.scene.timing = evenly_timed(50.0, 3);
+  if (held) model.scene.fixed = {{RegionHalfSpace{{-0.07, 0, 0}, {-1, 0, 0}}, std::nullopt}};
+  model.scene.planes = {{{0, -0.1, 0}, Vector3::UnitY(), true, 0.5}};
+  model.youngs_modulus = 2e5, model.poissons_ratio = 0.3, model.stiffness_damping = 2e-3, model.mass_damping = 0.5;
+  model.cell_size = block_edge, model.substeps = 8, model.theta = 0.51;
+  return model;
+}
+
+}  // namespace pliant::test
