@@ -17,8 +17,6 @@
 #include "simulation/trajectory.hpp"
 #include "situation/situation_scene.hpp"
 
-extern char** environ;
-
 namespace pliant {
 
 namespace fs = std::filesystem;
