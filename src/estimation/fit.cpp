@@ -12,7 +12,7 @@
 namespace pliant {
 
 void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts, const VectorX& floor) {
-  outcome.uncertainty = uncertainty_of(outcome.evaluation, shifts, floor);
+  outcome.uncertainty = uncertainty_of(outcome.evaluation, shifts, floor, int(outcome.recordings.size()));
   outcome.covariance = outcome.uncertainty.covariance;
   outcome.std = outcome.uncertainty.std;
   outcome.verdict = verdict_of(outcome.evaluation, outcome.uncertainty, outcome.parameters);

@@ -36,18 +36,55 @@ MatrixX noise_covariance(const CostEvaluation& evaluation) {
   return sandwich + inverse;
 }
 
+std::optional<MatrixX> covariance_between_recordings(const CostEvaluation& evaluation, int recordings) {
+  constexpr double shared = 1e-6;  // of a coordinate's curvature, in the other recordings: else it is one's own
+  if (recordings < 3) return std::nullopt;
+  const MatrixX& H = evaluation.gauss_newton;
+  const Eigen::Index n = H.rows();
+  MatrixX without = MatrixX::Zero(n, recordings);  // the estimates of all but one, from that of all
+  for (int r = 0; r < recordings; ++r) {
+    MatrixX others = H;
+    VectorX pull = VectorX::Zero(n);
+    for (const FrameFit& frame : evaluation.frames)
+      if (frame.recording == r) others -= frame.gauss_newton, pull += frame.gradient;
+    std::vector<Eigen::Index> kept;
+    for (Eigen::Index i = 0; i < n; ++i)
+      if (others(i, i) > shared * H(i, i)) kept.push_back(i);
+    if (kept.empty()) continue;
+    const VectorX scale = others.diagonal()(kept).cwiseSqrt().cwiseInverse();
+    const MatrixX scaled = scale.asDiagonal() * others(kept, kept) * scale.asDiagonal();
+    without.col(r)(kept) = scale.cwiseProduct(solve_symmetric(scaled, VectorX(scale.cwiseProduct(pull(kept)))));
+  }
+  const MatrixX about_mean = without.colwise() - without.rowwise().mean();
+  return MatrixX((recordings - 1.0) / recordings * about_mean * about_mean.transpose());
+}
+
 double t_quantile_90(double v) {
+  constexpr double two = 2.9199856, three = 2.3533634;  // degrees of freedom, below which the expansion is not used
+  if (v < 3.0) return three + (two - three) * (1.0 / v - 1.0 / 3.0) / (1.0 / 2.0 - 1.0 / 3.0);
   const double z = normal_90, z3 = z * z * z, z5 = z3 * z * z;
   return z + (z3 + z) / (4.0 * v) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * v * v) +
          (3.0 * z5 * z * z + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * v * v * v);
 }
 
 Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<ModelShift>& shifts,
-                           const VectorX& floor) {
+                           const VectorX& floor, int recordings) {
   const Eigen::Index n = evaluation.gauss_newton.rows();
   Uncertainty u;
   u.covariance = noise_covariance(evaluation);
-  u.std_noise = u.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  VectorX of_noise = u.covariance.diagonal().cwiseMax(0.0), of_recordings = VectorX::Zero(n);  // variances
+  if (const std::optional<MatrixX> between = covariance_between_recordings(evaluation, recordings)) {
+    const VectorX of_curvature =
+        solve_symmetric(evaluation.gauss_newton, MatrixX(MatrixX::Identity(n, n))).diagonal().cwiseMax(0.0);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      // Frames of one recording err together: what noise they seemed to have beyond their sensor's is counted here.
+      if ((*between)(i, i) <= of_noise[i]) continue;
+      u.covariance(i, i) = (*between)(i, i);
+      of_noise[i] = of_curvature[i];
+      of_recordings[i] = (*between)(i, i) - of_curvature[i];
+    }
+  }
+  u.std_noise = of_noise.cwiseSqrt();
   u.budget.push_back({"noise", u.std_noise});
   VectorX of_models = VectorX::Zero(n);  // variances
   const double freedom_of_noise = std::max(3.0, double(evaluation.frames.size()) / 4.0);
@@ -67,12 +104,13 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
     u.covariance.diagonal() += floor.cwiseAbs2();
     add("law and damping", floor.cwiseAbs2(), freedom_of_floor);
   }
+  if (of_recordings.maxCoeff() > 0.0) add("what the recordings differ by", of_recordings, recordings - 1.0);
   u.std_model = of_models.cwiseSqrt();
   u.std = u.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   u.low.resize(n), u.high.resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double freedom = weighed[i] > 0.0 ? std::pow(u.std[i], 4) / weighed[i] : 1e3;
-    u.high[i] = t_quantile_90(std::max(3.0, freedom)) * u.std[i];
+    u.high[i] = t_quantile_90(std::max(2.0, freedom)) * u.std[i];
     u.low[i] = -u.high[i];
   }
   return u;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,14 +34,23 @@ struct Uncertainty {
 /// and West 1987), never below what the curvature alone gives.
 MatrixX noise_covariance(const CostEvaluation& evaluation);
 
+/// Covariance of the estimate as the recordings of one object tell it by where each pulls: the jackknife over
+/// recordings (Quenouille; Efron 1982), each left out by one Gauss-Newton step of the others. What only the one left
+/// out tells, as its throw, stays where it is.
+/// @param recordings  how many: the trials before that number are one each, those after it (loads, presses) are taken
+///                    along in all
+/// @return            none for fewer than three
+std::optional<MatrixX> covariance_between_recordings(const CostEvaluation& evaluation, int recordings);
+
 /// Puts together what noise and models leave open: covariances add, each alternative model as if the truth lay as
 /// likely as not beyond it (GUM, type B); the interval is Student's, with the degrees of freedom of Welch and
 /// Satterthwaite.
 /// @param evaluation  at the estimate, with derivatives
 /// @param shifts      of alternative models and of what is taken as given, one standard deviation each
 /// @param floor       deviation of each coordinate that no alternative here accounts for; empty: none
+/// @param recordings  of the object; from three on, what they differ by beyond their noise is a cause of its own
 Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<ModelShift>& shifts,
-                           const VectorX& floor);
+                           const VectorX& floor, int recordings = 1);
 
 /// What remains of models whose law and damping are not those of the object, for each unconstrained coordinate:
 /// set by the errors of fits to recordings of an independent simulator with neo-Hookean elasticity and Kelvin-Voigt
@@ -50,7 +60,7 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
 /// @param meets_obstacles  whether the object moves and meets planes; else it swings or hangs
 VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, bool meets_obstacles);
 
-/// Two-sided 90 % quantile of Student's t, by its expansion about the normal one; within 1 % from three degrees of
+/// Two-sided 90 % quantile of Student's t, by its expansion about the normal one; within 1 % from two degrees of
 /// freedom on.
 double t_quantile_90(double degrees_of_freedom);
 

@@ -1,6 +1,7 @@
 #include "estimation/uncertainty.hpp"
 
 #include <cmath>
+#include <random>
 
 #include "estimation/given_quantities.hpp"
 #include "estimation/verdict.hpp"
@@ -47,6 +48,8 @@ ParameterSet young_and_poisson() {
 }
 
 TEST(StudentsT, HasTheQuantilesOfItsTables) {
+  EXPECT_NEAR(t_quantile_90(2.0), 2.9200, 1e-4);
+  EXPECT_NEAR(t_quantile_90(2.5), 2.5582, 0.025);
   EXPECT_NEAR(t_quantile_90(3.0), 2.3534, 0.02);
   EXPECT_NEAR(t_quantile_90(4.0), 2.1318, 0.01);
   EXPECT_NEAR(t_quantile_90(8.0), 1.8595, 1e-3);
@@ -126,6 +129,76 @@ TEST(Uncertainties, OfModelsAddInSquares) {
   for (const UncertaintyShare& share : u.budget) squares += share.std[0] * share.std[0];
   EXPECT_NEAR(std::sqrt(squares), u.std[0], 1e-12);
   EXPECT_GT(u.high[0] / u.std[0], noise.high[0] / noise.std[0]) << "fewer degrees of freedom";
+}
+
+/// Recordings that each pull at the estimate of their sum, alike in 40 frames apiece: the cost of the coordinates that
+/// all share is quadratic about each recording's own least, and coordinate `2 + r` belongs to recording r alone.
+CostEvaluation recordings_about(const std::vector<Eigen::Vector2d>& least, const MatrixX& of_one) {
+  constexpr int frames = 40;
+  const int count = int(least.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& l : least) mean += l / count;
+  CostEvaluation e = measured(MatrixX::Zero(2 + count, 2 + count), 0);
+  for (int r = 0; r < count; ++r) {
+    FrameFit frame;
+    frame.recording = r;
+    frame.gauss_newton = MatrixX::Zero(2 + count, 2 + count);
+    frame.gauss_newton.topLeftCorner(2, 2) = of_one / frames;
+    frame.gauss_newton(2 + r, 2 + r) = 30.0 / frames;
+    frame.gradient = VectorX::Zero(2 + count);
+    frame.gradient.head(2) = of_one * (mean - least[r]) / frames;
+    for (frame.frame = 0; frame.frame < frames; ++frame.frame) {
+      e.gauss_newton += frame.gauss_newton;
+      e.gradient += frame.gradient;
+      e.frames.push_back(frame);
+    }
+  }
+  return e;
+}
+
+TEST(CovarianceBetweenRecordings, TakesThreeRecordings) {
+  const std::vector<Eigen::Vector2d> two = {{0.1, 0.0}, {-0.1, 0.0}};
+  EXPECT_FALSE(covariance_between_recordings(recordings_about(two, curvature()), 2));
+  EXPECT_FALSE(covariance_between_recordings(measured(curvature()), 1));
+}
+
+TEST(CovarianceBetweenRecordings, IsTheScatterOfTheirMeanWhereTheyAreAlike) {
+  const std::vector<Eigen::Vector2d> least = {{0.1, 0.02}, {-0.05, 0.3}, {0.0, -0.1}, {0.2, 0.04}};
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& l : least) mean += l / 4.0;
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& l : least) scatter += (l - mean) * (l - mean).transpose() / (3.0 * 4.0);
+  const MatrixX between = *covariance_between_recordings(recordings_about(least, curvature()), 4);
+  EXPECT_LT((between.topLeftCorner(2, 2) - scatter).norm(), 1e-12);
+  EXPECT_LT(between.bottomRightCorner(4, 4).norm(), 1e-20) << "what each has of its own does not move";
+}
+
+TEST(CovarianceBetweenRecordings, WidensNothingThatNoiseAccountsFor) {
+  const std::vector<Eigen::Vector2d> alike(3, Eigen::Vector2d(0.2, 0.1));
+  const Uncertainty u = uncertainty_of(recordings_about(alike, curvature()), {}, {}, 3);
+  EXPECT_EQ(u.std, u.std_noise);
+}
+
+TEST(CovarianceBetweenRecordings, MakesTheIntervalHoldWhatRecordingsScatterAbout) {
+  constexpr int count = 5, draws = 2000;
+  constexpr double scatter = 0.3;  // of one recording, six times what its noise makes
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, scatter);
+  int held = 0, held_by_noise = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    std::vector<Eigen::Vector2d> least;
+    double mean = 0.0;
+    for (int r = 0; r < count; ++r) {
+      least.push_back({normal(random), normal(random)});
+      mean += least.back()[0] / count;
+    }
+    const CostEvaluation e = recordings_about(least, curvature());
+    const auto holds_zero = [&](const Uncertainty& u) { return mean + u.low[0] < 0.0 && 0.0 < mean + u.high[0]; };
+    held += holds_zero(uncertainty_of(e, {}, {}, count));
+    held_by_noise += holds_zero(uncertainty_of(e, {}, {}));
+  }
+  EXPECT_NEAR(held / double(draws), 0.9, 0.03);
+  EXPECT_LT(held_by_noise / double(draws), 0.7) << "recordings that do not differ would show nothing";
 }
 
 TEST(Verdicts, AreGoodWhereResidualsAreNoise) {
