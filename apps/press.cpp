@@ -1,5 +1,8 @@
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <chrono>
-#include <cstdio>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -7,22 +10,20 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "base/files.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "elasticity/law_elasticity.hpp"
 #include "geometry/mesh_io.hpp"
-#include "motion/press_session.hpp"
-#include "simulation/law_table.hpp"
-#include "simulation/model_simulation.hpp"
-#include "simulation/scene_simulation.hpp"
 #include "simulation/trajectory.hpp"
+#include "situation/probing.hpp"
 
 namespace pliant::apps {
 
 namespace {
 
 struct Arguments {
-  std::string model, out, surface;
+  std::string model, out, surface, path;
   std::vector<double> contact, force, to, axis;
   double radius = 0.01;
   std::string probe = "disc";
@@ -31,76 +32,132 @@ struct Arguments {
 
 Vector3 vector_of(const std::vector<double>& numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
-int run(const Arguments& arguments) {
-  const Model model = load_model(arguments.model);
-  const auto body = model_body(model);
-  const auto law = law_of(model, *body);
+/// The situation of one probe that goes straight where the command line says, in equal steps of a second.
+Situation straight_press(const Arguments& arguments) {
+  if (arguments.contact.empty())
+    throw InputError({{}, "neither --contact nor --path", "one of them", "say where the probe touches the object"});
   if (arguments.force.empty() == arguments.to.empty())
     throw InputError({{}, "neither or both of --force and --move", "one of them", "say what leads the probe"});
-  PressSessionOptions options;
-  options.held = held_nodes(*body, held_regions(model.scene));
-  if (const auto& gravity = model.scene.world.gravity)
-    options.dead_load = weight_of(*body, model.scene.object.density.value(), *gravity);
-  ProbeOptions probe;
-  probe.centre = vector_of(arguments.contact);
-  probe.radius = arguments.radius;
+  ProbeFacts probe;
   probe.kind = arguments.probe == "disc"    ? ProbeKind::BondedDisc
                : arguments.probe == "punch" ? ProbeKind::Punch
                                             : ProbeKind::Ball;
+  probe.at = vector_of(arguments.contact);
+  probe.radius = arguments.radius;
   if (!arguments.axis.empty()) probe.axis = vector_of(arguments.axis).normalized();
-  PressSession session(body, law, probe, options);
-  const std::string file = arguments.surface.empty() ? "" : arguments.surface;
-  const TriangleMesh fine = file.empty() ? model.scene.object.surface.value() : read_mesh(file);
-  const SurfaceFollower follower(*body, fine.vertices);
-  std::vector<PvdEntry> entries;
-  std::cout << "step  force [N]                        displacement [mm]              iterations\n";
-  const auto elasticity = LawElasticity::make(body, law);
-  for (int step = 1; step <= arguments.steps; ++step) {
-    stop_if_interrupted();
-    const double share = double(step) / arguments.steps;
-    const SolveSummary summary = arguments.to.empty() ? session.push(share * vector_of(arguments.force))
-                                                      : session.move_to(share * vector_of(arguments.to));
-    if (!summary.converged) {
-      std::cerr << "pliant: step " << step << ": " << session.failure() << "\n";
-      return NotConverged;
+  probe.led = arguments.to.empty() ? ProbeFacts::Led::Force : ProbeFacts::Led::Displacement;
+  const Vector3 end = vector_of(arguments.to.empty() ? arguments.force : arguments.to);
+  for (int step = 0; step <= arguments.steps; ++step) {
+    KeyFrames<6>::Key key{double(step), KeyFrames<6>::Value::Zero()};
+    key.value.head<3>() = double(step) / arguments.steps * end;
+    probe.path.push_back(key);
+  }
+  Situation situation;
+  situation.duration = arguments.steps, situation.frame_rate = 1.0;
+  situation.probes = {probe};
+  return situation;
+}
+
+/// Equilibria as they are found: a table of what each probe does and, in a folder, deformed meshes and surfaces.
+class Record {
+ public:
+  Record(const Probing& probing, const TriangleMesh& fine, std::filesystem::path folder)
+      : probing_(probing), fine_(fine), folder_(std::move(folder)) {
+    if (folder_.empty()) return;
+    follower_.emplace(*probing.body(), fine.vertices);
+    elasticity_ = LawElasticity::make(probing.body(), probing.law());
+    table_ << "time,probe,x,y,z,depth,fx,fy,fz,iterations\n";
+  }
+
+  void add(int frame, int iterations) {
+    const PressSession& session = probing_.session();
+    for (int i = 0; i < probing_.probe_count(); ++i) {
+      const Vector3 force = session.force(i), moved = session.displacement(i);
+      std::cout << fmt::format("{:8.3f} {:5d}  {:10.4g} {:10.4g} {:10.4g}  {:10.4g} {:10.4g} {:10.4g}  {:6d}\n",
+                               probing_.time(), i + 1, force.x(), force.y(), force.z(), 1e3 * moved.x(),
+                               1e3 * moved.y(), 1e3 * moved.z(), iterations);
+      table_ << fmt::format("{:.9g},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{}\n", probing_.time(), i + 1,
+                            moved.x(), moved.y(), moved.z(), probing_.depth(i), force.x(), force.y(), force.z(),
+                            iterations);
     }
-    const Vector3 force = session.force(), moved = 1e3 * session.displacement();
-    char line[160];
-    std::snprintf(line, sizeof line, "%4d  %8.4g %8.4g %8.4g      %8.4g %8.4g %8.4g      %d\n", step, force.x(),
-                  force.y(), force.z(), moved.x(), moved.y(), moved.z(), summary.iterations);
-    std::cout << line;
-    if (arguments.out.empty()) continue;
-    char name[40];
-    std::snprintf(name, sizeof name, "frames/%06d", step);
+    if (folder_.empty()) return;
+    const std::string name = fmt::format("frames/{:06}", frame);
     const State state{session.nodes(), Points::Zero(session.nodes().rows(), 3)};
-    const std::filesystem::path folder = arguments.out;
-    write_vtu(folder / (std::string(name) + ".vtu"), frame_grid(*body, state, *elasticity), VtuPrecision::Single);
-    TriangleMesh deformed = fine;
-    const Points positions = follower.positions(session.nodes());
+    write_vtu(folder_ / (name + ".vtu"), frame_grid(*probing_.body(), state, *elasticity_), VtuPrecision::Single);
+    TriangleMesh deformed = fine_;
+    const Points positions = follower_->positions(session.nodes());
     for (std::size_t v = 0; v < deformed.vertices.size(); ++v)
       deformed.vertices[v] = positions.row(Eigen::Index(v)).transpose();
-    write_mesh(folder / (std::string(name) + ".ply"), deformed);
-    entries.push_back({double(step), std::string(name) + ".vtu"});
+    write_mesh(folder_ / (name + ".ply"), deformed);
+    entries_.push_back({probing_.time(), name + ".vtu"});
   }
-  if (arguments.out.empty()) return Fine;
-  write_pvd(std::filesystem::path(arguments.out) / "press.pvd", entries);
-  std::cout << arguments.steps << " equilibria in " << arguments.out << "/press.pvd, surfaces beside them\n";
+
+  /// Also where a path ends early: what was found stays.
+  void finish() {
+    if (folder_.empty()) return;
+    write_pvd(folder_ / "press.pvd", entries_);
+    write_file(folder_ / "probes.csv", [&](std::ostream& out) { out << table_.str(); });
+  }
+
+ private:
+  const Probing& probing_;
+  const TriangleMesh& fine_;
+  std::filesystem::path folder_;
+  std::optional<SurfaceFollower> follower_;
+  std::unique_ptr<LawElasticity> elasticity_;
+  std::ostringstream table_;
+  std::vector<PvdEntry> entries_;
+};
+
+int run(const Arguments& arguments) {
+  if (!arguments.path.empty() && !(arguments.contact.empty() && arguments.force.empty() && arguments.to.empty()))
+    throw InputError({{}, "--path beside --contact, --force or --move", "one of them", "the file says it all"});
+  const Situation situation = arguments.path.empty() ? straight_press(arguments) : read_situation(arguments.path);
+  const Model model = load_model(arguments.model);
+  Probing probing(model, situation);
+  const TriangleMesh fine =
+      arguments.surface.empty() ? model.scene.object.surface.value() : read_mesh(arguments.surface);
+  Record record(probing, fine, arguments.out);
+  std::cout << "time [s] probe  force [N]                         displacement [mm]                 iterations\n";
+  const int frames = std::max(1, int(std::lround(situation.duration * situation.frame_rate)));
+  std::vector<double> milliseconds;
+  for (int frame = arguments.path.empty() ? 1 : 0; frame <= frames; ++frame) {
+    if (is_interrupted()) record.finish();
+    stop_if_interrupted();
+    const auto start = std::chrono::steady_clock::now();
+    const SolveSummary summary = probing.advance(frame / situation.frame_rate);
+    milliseconds.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+    if (!summary.converged) {
+      record.finish();
+      std::cerr << fmt::format("pliant: {:.4g} s: {}\n", probing.time(), probing.failure());
+      return NotConverged;
+    }
+    record.add(frame, summary.iterations);
+  }
+  record.finish();
+  std::ranges::nth_element(milliseconds, milliseconds.begin() + std::ptrdiff_t(milliseconds.size() / 2));
+  std::cout << fmt::format("{} equilibria of {} elements, {:.3g} ms each (median)", milliseconds.size(),
+                           probing.body()->element_count(), milliseconds[milliseconds.size() / 2]);
+  if (!arguments.out.empty())
+    std::cout << fmt::format("; {}/press.pvd, surfaces beside them, probes.csv", arguments.out);
+  std::cout << "\n";
   return Fine;
 }
 
 constexpr const char* footer = R"(Examples:
   pliant press out/foam/model.toml --contact 0,0.1,0 --force 0,-20,0 --radius 0.03 --out out/pressed
   pliant press out/foam/model.toml --contact 0,0.1,0 --move 0,-0.02,0 --probe ball --steps 20 --out out/pressed
-The probe begins where it touches the surface at rest; each step is an equilibrium.)";
+  pliant press out/foam/model.toml --path probing.toml --out out/pressed
+The probe begins where it touches the surface at rest; each step is an equilibrium. A file leads several probes of any shape
+along paths, by displacement, depth or force, and turns them; it is a situation with [[probe]] (docs/formats.md).)";
 
 }  // namespace
 
 void add_press(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   Command command = line.add_command("press", "Press a fitted model with a probe, by force or by moving it");
-  command.option("model", arguments->model, "model.toml of a fit, of tetrahedra").required().type_name("MODEL");
+  command.option("model", arguments->model, "model.toml of a fit").required().type_name("MODEL");
   command.option("--contact", arguments->contact, "where the probe touches the surface at rest, metres")
-      .required()
       .delimiter(',')
       .expected(3)
       .type_name("X,Y,Z");
@@ -112,6 +169,7 @@ void add_press(CommandLine& line, int& exit_code) {
       .delimiter(',')
       .expected(3)
       .type_name("X,Y,Z");
+  command.option("--path", arguments->path, "probes and how they are led, in the place of --contact").type_name("FILE");
   command.option("--probe", arguments->probe, "a disc that is glued on, a flat punch or a ball that slides")
       .one_of({"disc", "punch", "ball"});
   command.option("--radius", arguments->radius, "of the probe, metres").positive();

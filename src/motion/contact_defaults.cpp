@@ -60,8 +60,13 @@ RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double y
   const Vector3 axis = probe_axis(body, probe);
   const double edge = mean_edge(body), radius = probe.radius;
   const ContactSamples samples = boundary_samples(body, std::clamp(int(2.0 * edge / radius), fewest_cuts, most_cuts));
-  if (probe.kind == ProbeKind::Ball)
-    return RigidContact::sliding(body, samples, rigid_ball(probe.centre - radius * axis, radius),
+  std::shared_ptr<const RigidShape> round = probe.shape;
+  const Vector3 middle = probe.centre - radius * axis;
+  if (probe.kind == ProbeKind::Ball) round = rigid_ball(middle, radius);
+  if (probe.kind == ProbeKind::Capsule)
+    round = rigid_capsule(middle - 0.5 * probe.rod, middle + 0.5 * probe.rod, radius);
+  if (probe.kind != ProbeKind::Punch)
+    return RigidContact::sliding(body, samples, round,
                                  Penalty{ball_stiffness * youngs_modulus / edge, ball_smoothing * radius, quadratic});
   return RigidContact::sliding(body, samples, rigid_punch(probe.centre, axis, radius, punch_rim * radius),
                                Penalty{bond_stiffness(youngs_modulus, edge), punch_smoothing * radius, quadratic});

@@ -28,6 +28,8 @@ enum class ProbeKind {
   BondedDisc,  ///< sticks to the surface that it covers; neither slides nor tilts
   Punch,       ///< a flat end that slides
   Ball,        ///< slides
+  Capsule,     ///< a rod with round ends that lies on the surface; slides
+  Shape,       ///< any rigid body, where it is; slides
 };
 
 /// A probe that touches the object at rest.
@@ -37,6 +39,10 @@ struct ProbeOptions {
   double radius = 0.0;               ///< [m], > 0
   /// Unit, into the object; nothing: against the surface's normal there.
   std::optional<Vector3> axis;
+  /// Of a capsule, from the centre of one end to that of the other [m].
+  Vector3 rod = Vector3::Zero();
+  /// Of a shape; `centre` then is the point about which it turns, `radius` that of its finest parts.
+  std::shared_ptr<const RigidShape> shape = nullptr;
 };
 
 /// The probe's axis [-], unit, into the object.

@@ -266,6 +266,10 @@ void Equilibrium::set_control(int contact, const ProbeControl& control) {
   solver_->controls_[std::size_t(contact)] = control;
 }
 
+void Equilibrium::turn(int contact, const Matrix3& rotation, const Vector3& centre) {
+  solver_->contacts_[std::size_t(contact)].turn(rotation, centre);
+}
+
 Placement Equilibrium::rest() const {
   Placement placement{solver_->body_->nodes, Points::Zero(contact_count(), 3)};
   for (int c = 0; c < contact_count(); ++c)

@@ -60,6 +60,8 @@ class Equilibrium {
   /// Forces on nodes [N], n x 3: the weight, for one. None at the beginning.
   void set_dead_load(Points forces);
   void set_control(int contact, const ProbeControl& control);
+  /// Turns a rigid body, see `RigidContact::turn`.
+  void turn(int contact, const Matrix3& rotation, const Vector3& centre);
 
   /// Nodes stress-free and rigid bodies where they are led to.
   Placement rest() const;

@@ -62,6 +62,12 @@ class KeyFrames {
   std::vector<Value> slopes_;  // [1/s]
 };
 
+/// The rotation about a vector by its length [rad].
+inline Matrix3 rotation_of(const Vector3& turn) {
+  const double angle = turn.norm();
+  return angle > 0.0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Matrix3(Matrix3::Identity());
+}
+
 /// A rigid motion over time: a shift [m] and a turn about a centre that moves along.
 class KeyedMotion {
  public:
@@ -75,10 +81,8 @@ class KeyedMotion {
   /// From where points are for a zero shift and turn to where they are at a time [s].
   RigidMotion at(double time) const {
     const Eigen::Matrix<double, 6, 1> value = keys_.at(time);
-    const Vector3 turn = value.tail<3>();
-    const double angle = turn.norm();
     RigidMotion motion;
-    if (angle > 0.0) motion.rotation = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+    motion.rotation = rotation_of(value.tail<3>());
     motion.translation = centre_ + value.head<3>() - motion.rotation * centre_;
     return motion;
   }

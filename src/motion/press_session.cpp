@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 
 #include "motion/body_forces.hpp"
 
@@ -11,9 +12,11 @@ namespace pliant {
 
 namespace {
 
-std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, const ProbeOptions& probe,
+std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, const std::vector<ProbeOptions>& probes,
                                       const std::vector<RigidContact>& inner) {
-  std::vector<RigidContact> contacts = {probe_contact(body, probe, mean_modulus(body, law))};
+  if (probes.empty()) throw std::invalid_argument("a session of presses needs a probe");
+  std::vector<RigidContact> contacts;
+  for (const ProbeOptions& probe : probes) contacts.push_back(probe_contact(body, probe, mean_modulus(body, law)));
   contacts.insert(contacts.end(), inner.begin(), inner.end());
   return contacts;
 }
@@ -21,35 +24,59 @@ std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, 
 }  // namespace
 
 PressSession::PressSession(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
-                           const ProbeOptions& probe, const PressSessionOptions& options)
-    : probe_(probe),
-      equilibrium_(body, law, options.held, contacts_of(*body, *law, probe, options.inner), options.equilibrium) {
-  probe_.axis = probe_axis(*body, probe);
+                           const std::vector<ProbeOptions>& probes, const PressSessionOptions& options)
+    : probes_(probes),
+      moves_(probes.size()),
+      equilibrium_(body, law, options.held, contacts_of(*body, *law, probes, options.inner), options.equilibrium) {
+  for (ProbeOptions& probe : probes_) probe.axis = probe_axis(*body, probe);
   if (options.dead_load.rows() > 0) equilibrium_.set_dead_load(options.dead_load);
   for (int i = 0; i < equilibrium_.contact_count(); ++i)
     equilibrium_.set_control(i, {ProbeControl::Kind::Position, {}, Vector3::Zero(), {}});
   placement_ = equilibrium_.rest();
 }
 
-SolveSummary PressSession::solve(const ProbeControl& control) {
-  equilibrium_.set_control(0, control);
+void PressSession::apply(const std::vector<ProbeMove>& moves) {
+  for (int i = 0; i < probe_count(); ++i) {
+    const ProbeMove& move = moves[std::size_t(i)];
+    const ProbeOptions& probe = probes_[std::size_t(i)];
+    const Matrix3 turned = rotation_of(move.turn);
+    if (move.turn != moves_[std::size_t(i)].turn) equilibrium_.turn(i, turned, probe.centre);
+    ProbeControl control{ProbeControl::Kind::Position, {}, move.vector, {}};
+    if (move.by == ProbeMove::By::Force) {
+      control = {ProbeControl::Kind::Force, move.vector, Vector3::Zero(), {}};
+      if (probe.kind != ProbeKind::BondedDisc) {
+        control.axis = turned * *probe.axis;
+        control.force = *control.axis * control.axis->dot(move.vector);
+      }
+    }
+    equilibrium_.set_control(i, control);
+  }
+  moves_ = moves;
+}
+
+SolveSummary PressSession::lead(const std::vector<ProbeMove>& moves) {
+  if (moves.size() != probes_.size()) throw std::invalid_argument("a session of presses needs a move for each probe");
+  const std::vector<ProbeMove> before = moves_;
+  apply(moves);
   Placement next = placement_;
   const SolveSummary summary = equilibrium_.solve(next);
-  if (summary.converged) placement_ = std::move(next);
+  if (summary.converged)
+    placement_ = std::move(next);
+  else
+    apply(before);
   return summary;
 }
 
 SolveSummary PressSession::move_to(const Vector3& displacement) {
-  return solve({ProbeControl::Kind::Position, {}, displacement, {}});
+  std::vector<ProbeMove> moves = moves_;
+  moves.front() = {ProbeMove::By::Displacement, displacement, moves.front().turn};
+  return lead(moves);
 }
 
 SolveSummary PressSession::push(const Vector3& force) {
-  ProbeControl control{ProbeControl::Kind::Force, force, Vector3::Zero(), {}};
-  if (probe_.kind != ProbeKind::BondedDisc) {
-    control.axis = *probe_.axis;
-    control.force = *probe_.axis * probe_.axis->dot(force);
-  }
-  return solve(control);
+  std::vector<ProbeMove> moves = moves_;
+  moves.front() = {ProbeMove::By::Force, force, moves.front().turn};
+  return lead(moves);
 }
 
 SurfaceFollower::SurfaceFollower(const Body& body, const std::vector<Vector3>& rest) : start_{0} {

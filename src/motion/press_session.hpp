@@ -13,28 +13,47 @@ struct PressSessionOptions {
   EquilibriumOptions equilibrium = {.tolerance = 1e-6, .reuse_factor = true};
 };
 
-/// An object and a probe, led interactively: each call goes on from the last equilibrium with the factorisation at
+/// What leads a probe to an equilibrium.
+struct ProbeMove {
+  enum class By { Displacement, Force };
+  By by = By::Displacement;
+  Vector3 vector = Vector3::Zero();  ///< from where it touches [m]; or of the probe on the object [N]
+  Vector3 turn = Vector3::Zero();    ///< rotation vector [rad] about where it touches
+};
+
+/// An object and its probes, led interactively: each call goes on from the last equilibrium with the factorisation at
 /// hand, so that small moves take two or three cheap iterations. For one thread.
 class PressSession {
  public:
-  /// Throws InputError where the probe touches nothing.
+  /// Throws InputError where a bonded probe touches nothing, std::invalid_argument without a probe.
+  PressSession(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
+               const std::vector<ProbeOptions>& probes, const PressSessionOptions& options);
+  /// With one probe.
   PressSession(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law, const ProbeOptions& probe,
-               const PressSessionOptions& options);
+               const PressSessionOptions& options)
+      : PressSession(std::move(body), std::move(law), std::vector<ProbeOptions>{probe}, options) {}
 
-  /// To the equilibrium with the probe that far from where it touches [m], or where it exerts that force [N] (a
-  /// sliding one along its axis alone). Not converged: the last equilibrium stays, and `failure` says why.
+  /// To the equilibrium with each probe where its move has it (of a sliding one a force acts along its axis alone,
+  /// which turns along). Not converged: the last equilibrium stays, and `failure` says why.
+  /// @param moves  one a probe; others throw std::invalid_argument
+  SolveSummary lead(const std::vector<ProbeMove>& moves);
+  /// The same of the first probe, the others as they were led last.
   SolveSummary move_to(const Vector3& displacement);
   SolveSummary push(const Vector3& force);
 
-  const Points& nodes() const { return placement_.nodes; }  ///< n x 3 [m]
-  Vector3 displacement() const { return placement_.translations.row(0).transpose(); }
-  Vector3 force() const { return equilibrium_.contact_force(0, placement_); }  ///< of the probe on the object [N]
+  int probe_count() const { return int(probes_.size()); }
+  const ProbeOptions& probe(int i = 0) const { return probes_[std::size_t(i)]; }  ///< with its axis at rest
+  const Points& nodes() const { return placement_.nodes; }                        ///< n x 3 [m]
+  Vector3 displacement(int probe = 0) const { return placement_.translations.row(probe).transpose(); }
+  /// Of a probe on the object [N].
+  Vector3 force(int probe = 0) const { return equilibrium_.contact_force(probe, placement_); }
   const std::string& failure() const { return equilibrium_.failure(); }
   Equilibrium& equilibrium() { return equilibrium_; }
 
  private:
-  SolveSummary solve(const ProbeControl& control);
-  ProbeOptions probe_;
+  void apply(const std::vector<ProbeMove>& moves);
+  std::vector<ProbeOptions> probes_;
+  std::vector<ProbeMove> moves_;  // that led to the placement
   Equilibrium equilibrium_;
   Placement placement_;
 };

@@ -7,7 +7,11 @@
 namespace pliant {
 
 RigidContact::RigidContact(const Body& body, const ContactSamples& samples)
-    : points_(body, samples.rest), rest_(samples.rest), area_(samples.area), blocks_(element_blocks(body)) {
+    : points_(body, samples.rest),
+      rest_(samples.rest),
+      bond_(samples.rest),
+      area_(samples.area),
+      blocks_(element_blocks(body)) {
   active_.reserve(rest_.size());
 }
 
@@ -72,6 +76,18 @@ void RigidContact::lead(KeyedMotion motion) {
   led_shape_ = shape_;
   motion_ = std::move(motion);
   begin_step({});
+}
+
+void RigidContact::turn(const Matrix3& rotation, const Vector3& centre) {
+  if (plane_ || led_shape_)
+    throw std::invalid_argument("a plane of the parameter vector or a shape that is led is not turned");
+  const RigidMotion motion{rotation, centre - rotation * centre};
+  if (is_bonded()) {
+    for (std::size_t i = 0; i < rest_.size(); ++i) bond_[i] = motion(rest_[i]);
+    return;
+  }
+  if (!first_shape_) first_shape_ = shape_;
+  shape_ = rigid_moved(first_shape_, motion);
 }
 
 void RigidContact::begin_step(const StepContext& step) {
@@ -187,7 +203,7 @@ RigidContact::Offsets RigidContact::offsets(const Active& c, const Detail& m, co
 
 void RigidContact::add_force(const Points& z, Points& force) {
   if (is_bonded())
-    for_bonded([&](int i, double k) { scatter(i, -k * (relative(i, z) - rest_[std::size_t(i)]), force); });
+    for_bonded([&](int i, double k) { scatter(i, -k * (relative(i, z) - bond_[std::size_t(i)]), force); });
   const bool rubbing = rubs();
   for (std::size_t i = 0; i < active_.size(); ++i) {
     const Active& c = active_[i];
@@ -240,7 +256,7 @@ std::optional<double> RigidContact::potential(const Points& x) {
   if (rubs()) return std::nullopt;
   double sum = 0.0;
   if (is_bonded())
-    for_bonded([&](int i, double k) { sum += 0.5 * k * (relative(i, x) - rest_[std::size_t(i)]).squaredNorm(); });
+    for_bonded([&](int i, double k) { sum += 0.5 * k * (relative(i, x) - bond_[std::size_t(i)]).squaredNorm(); });
   for (const Active& c : active_) sum += area_[std::size_t(c.point)] * penalty_.at(c.gap).energy;
   return sum;
 }
@@ -352,7 +368,7 @@ RigidContact::Potential RigidContact::potential(int i, const Vector3& y, bool po
   const double area = area_[std::size_t(i)];
   if (is_bonded()) {
     const double k = penalty_.stiffness * area;
-    const Vector3 offset = y - rest_[std::size_t(i)];
+    const Vector3 offset = y - bond_[std::size_t(i)];
     p.energy = 0.5 * k * offset.squaredNorm();
     p.gradient = k * offset;
     p.hessian = k * Matrix3::Identity();

@@ -56,6 +56,9 @@ class RigidContact : public ForceTerm {
   /// relative to it. Its translation stays zero. Throws std::invalid_argument for a bond or a plane of the parameter
   /// vector.
   void lead(KeyedMotion motion);
+  /// The rigid body is turned about a point, which its translation then moves; bonded samples turn along. Throws
+  /// std::invalid_argument for a plane of the parameter vector and for a shape that is led.
+  void turn(const Matrix3& rotation, const Vector3& centre);
   /// Where the rigid body is [m], unless its translation is unknown.
   void set_translation(const Vector3& translation) { translation_ = translation; }
   /// From now on the translation is unknown: this row of positions, forces and matrices.
@@ -134,7 +137,7 @@ class RigidContact : public ForceTerm {
   void for_bonded(Visit&& visit) const;
 
   Embedding points_;
-  std::vector<Vector3> rest_;
+  std::vector<Vector3> rest_, bond_;  // of samples [m]: at rest; where a turned bond would have them
   std::vector<double> area_;
   std::vector<int> blocks_;  // where each element's blocks go in the matrix
   std::shared_ptr<const RigidShape> shape_;
@@ -147,7 +150,8 @@ class RigidContact : public ForceTerm {
   std::vector<int>
       links_;  // of each sample's nodes: blocks (node, row), then (row, node); -1 for those that weigh nothing
   const Points* start_ = nullptr;
-  std::shared_ptr<const RigidShape> led_shape_;  // before its motion; null: it is not led
+  std::shared_ptr<const RigidShape> led_shape_;    // before its motion; null: it is not led
+  std::shared_ptr<const RigidShape> first_shape_;  // before it was turned; null: it was not
   KeyedMotion motion_;
   RigidMotion carried_;  // by the motion within the step; friction is with the way beyond that
   std::vector<Active> active_;

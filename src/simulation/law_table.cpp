@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
+#include "elasticity/lame.hpp"
 #include "elasticity/sampled_law.hpp"
 
 namespace pliant {
@@ -101,13 +102,21 @@ std::shared_ptr<const MaterialLaw> make_law(const ModelLaw& law, int elements) t
 std::shared_ptr<const MaterialLaw> law_of(const Model& model, const Body& body) {
   if (model.law) return make_law(*model.law, body.element_count());
   MatrixX table(body.element_count(), 2);
+  const bool is_neo_hookean = model.volume.kind == VtuCell::Hexahedron && !model.is_corotated;
   for (int e = 0; e < body.element_count(); ++e) {
     const auto i = std::size_t(e);
-    const bool has_field = model.volume.youngs_modulus.size() == std::size_t(body.element_count());
-    const LambdaAlpha p = lambda_alpha({has_field ? model.volume.youngs_modulus[i] : model.youngs_modulus,
-                                        has_field ? model.volume.poissons_ratio[i] : model.poissons_ratio});
-    table.row(e) << p.lambda, p.alpha;
+    const bool has_field = model.volume.poissons_ratio.size() == std::size_t(body.element_count());
+    const double E = model.youngs_modulus * body.modulus.relative[i];
+    const double nu = has_field ? model.volume.poissons_ratio[i] : model.poissons_ratio;
+    if (is_neo_hookean) {
+      const UnitLame unit = unit_lame(nu);
+      table.row(e) << E * unit.mu, E * unit.lambda;
+    } else {
+      const LambdaAlpha p = lambda_alpha({E, nu});
+      table.row(e) << p.lambda, p.alpha;
+    }
   }
+  if (is_neo_hookean) return std::make_shared<NeoHookeanLaw>(std::move(table));
   return std::make_shared<LinearLaw>(std::move(table));
 }
 

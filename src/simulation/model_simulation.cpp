@@ -27,12 +27,16 @@ VectorX model_theta(const Model& model, const Scene& scene, const Vector3& gravi
   return theta;
 }
 
+bool has_tetrahedra(const Model& model) {
+  return model.volume.kind != VtuCell::Hexahedron && !model.volume.connectivity.empty();
+}
+
 /// The body of a model: tetrahedra from its volume mesh, hexahedra laid anew over the situation's surface; with each
 /// element's modulus where the volume mesh has as many elements.
 std::shared_ptr<const Body> body_of(const Model& model, const Scene& scene, const SignedDistance* distance) {
   const ModelVolume& volume = model.volume;
   Body body;
-  if (volume.kind == VtuCell::Hexahedron || volume.connectivity.empty()) {
+  if (!has_tetrahedra(model)) {
     body = make_body(hex_grid_of(scene, *distance, model.cell_size));
   } else {
     const auto points = std::size_t(corner_count(volume.kind));
@@ -53,7 +57,32 @@ std::shared_ptr<const Body> body_of(const Model& model, const Scene& scene, cons
 
 }  // namespace
 
-std::shared_ptr<const Body> model_body(const Model& model) { return body_of(model, model.scene, nullptr); }
+std::shared_ptr<const Body> model_body(const Model& model) {
+  if (has_tetrahedra(model)) return body_of(model, model.scene, nullptr);
+  const Scene& scene = model.scene;
+  const auto distance = scene_distance(scene, Resolution{}.band);
+  std::vector<Vector3> no_points;
+  Resolution resolution;
+  resolution.element = ElementKind::QuadraticTetrahedron;
+  resolution.cells = 0.6 * object_size(scene) / model.cell_size;  // whose nodes lie about as close
+  Body body = *make_body_of(scene, *distance, resolution, no_points);
+  const ModelVolume& volume = model.volume;
+  const std::size_t hexahedra = volume.connectivity.size() / 8;
+  body.modulus = {};
+  body.modulus.relative.assign(std::size_t(body.element_count()), 1.0);
+  if (hexahedra == 0 || volume.youngs_modulus.size() != hexahedra) return std::make_shared<Body>(std::move(body));
+  Points middles = Points::Zero(Eigen::Index(hexahedra), 3);
+  for (std::size_t i = 0; i < volume.connectivity.size(); ++i)
+    middles.row(Eigen::Index(i / 8)) += 0.125 * volume.nodes.row(volume.connectivity[i]);
+  for (int e = 0; e < body.element_count(); ++e) {
+    Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+    for (const int node : body.element(e)) middle += body.nodes.row(node) / double(body.element(e).size());
+    Eigen::Index nearest = 0;
+    (middles.rowwise() - middle).rowwise().squaredNorm().minCoeff(&nearest);
+    body.modulus.relative[std::size_t(e)] = volume.youngs_modulus[std::size_t(nearest)] / model.youngs_modulus;
+  }
+  return std::make_shared<Body>(std::move(body));
+}
 
 ModelScene make_scene(const Model& model) {
   Scene situation = model.scene;

@@ -28,7 +28,8 @@ ModelScene make_scene(const Model& model);
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
                       const std::filesystem::path& file, const MotionCounts& further = {});
 
-/// The body of a model of tetrahedra, with each element's modulus.
+/// The body of a model as tetrahedra, with each element's modulus: its own, or, where the model is of hexahedra,
+/// quadratic ones with about as many nodes along its longest axis, each with the modulus of the hexahedron about it.
 std::shared_ptr<const Body> model_body(const Model& model);
 
 }  // namespace pliant

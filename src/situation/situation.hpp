@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "geometry/triangle_mesh.hpp"
+#include "motion/contact_defaults.hpp"
 #include "motion/key_frames.hpp"
 #include "motion/rain.hpp"
 #include "motion/wind.hpp"
@@ -75,6 +76,20 @@ struct RigidObstacle {
   std::vector<KeyFrames<6>::Key> motion;  ///< shift [m] and rotation vector [rad] about its middle
 };
 
+/// A probe that is led from equilibrium to equilibrium.
+struct ProbeFacts {
+  ProbeKind kind = ProbeKind::BondedDisc;
+  Vector3 at = Vector3::Zero();   ///< where it touches the surface at rest [m]
+  double radius = 0.0;            ///< [m]
+  std::optional<Vector3> axis;    ///< unit, into the object; nothing: against the surface's normal there
+  Vector3 rod = Vector3::Zero();  ///< of a capsule, from the centre of one end to that of the other [m]
+  TriangleMesh mesh;              ///< of a shape, where it is at rest
+  enum class Led { Displacement, Depth, Force, Push } led = Led::Displacement;
+  /// Displacement [m], depth along the axis [m], force [N], force along the axis [N], each with a rotation vector [rad]
+  /// behind it; of depth and push the first number counts.
+  std::vector<KeyFrames<6>::Key> path;
+};
+
 /// Copies of the object beside it, each on its own.
 struct ObjectCopy {
   Vector3 shift = Vector3::Zero();  ///< of everything that is seen [m]
@@ -97,6 +112,7 @@ struct Situation {
   std::vector<Hand> hands;
   std::vector<LedRegion> led;
   std::vector<RigidObstacle> obstacles;
+  std::vector<ProbeFacts> probes;  ///< of presses alone: what moves has obstacles and hands
   std::vector<ObjectCopy> copies;
 };
 

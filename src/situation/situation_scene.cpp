@@ -20,10 +20,6 @@ namespace pliant {
 
 namespace {
 
-KeyedMotion keyed_motion(const Vector3& centre, const std::vector<KeyFrames<6>::Key>& keys) {
-  return keys.empty() ? KeyedMotion() : KeyedMotion(centre, KeyFrames<6>(keys));
-}
-
 /// Changes from the first key on.
 KeyFrames<3> changes(std::vector<KeyFrames<3>::Key> keys, const Vector3& from) {
   if (keys.empty()) return {};
@@ -31,16 +27,34 @@ KeyFrames<3> changes(std::vector<KeyFrames<3>::Key> keys, const Vector3& from) {
   return KeyFrames<3>(std::move(keys));
 }
 
-/// A shape with the point about which it turns, and a box around it.
-struct Shape {
-  std::shared_ptr<const RigidShape> rigid;
-  Vector3 middle;
-  Box box;  // of no extent for planes
-};
+WindOptions wind_options(const WindFacts& wind, const Vector3& up, double delay) {
+  WindOptions options;
+  options.air_density = wind.air_density, options.normal = wind.normal, options.tangential = wind.tangential;
+  options.change = changes(wind.over_time, wind.velocity);
+  options.gusts = Gusts(wind.velocity, up, wind.gust_intensity, wind.gust_length, wind.seed);
+  options.delay = delay;
+  return options;
+}
 
-Shape make_shape(const RigidObstacle& obstacle) {
+}  // namespace
+
+void check_place(const Situation& situation, const Scene& scene, const char* what, const Vector3& at, double radius) {
+  const double distance = distances_to_surface(*scene.object.surface, std::span(&at, 1)).front();
+  if (distance <= std::max(radius, 0.05 * object_size(scene))) return;
+  throw InputError({{situation.file},
+                    fmt::format("a {} at [{:.4g}, {:.4g}, {:.4g}], {:.3g} m from the object", what, at.x(), at.y(),
+                                at.z(), distance),
+                    "`at`: a point of the object's surface at rest, in metres",
+                    "look at the model's surface.ply for its coordinates"});
+}
+
+KeyedMotion keyed_motion(const Vector3& centre, const std::vector<KeyFrames<6>::Key>& keys) {
+  return keys.empty() ? KeyedMotion() : KeyedMotion(centre, KeyFrames<6>(keys));
+}
+
+ObstacleShape obstacle_shape(const RigidObstacle& obstacle) {
   const auto in_box = [](std::shared_ptr<const RigidShape> rigid, const Box& box) {
-    return Shape{std::move(rigid), 0.5 * (box.min + box.max), box};
+    return ObstacleShape{std::move(rigid), 0.5 * (box.min + box.max), box};
   };
   if (const auto* ball = std::get_if<ShapeBall>(&obstacle.shape))
     return in_box(rigid_ball(ball->centre, ball->radius), grown({ball->centre, ball->centre}, ball->radius));
@@ -59,32 +73,10 @@ Shape make_shape(const RigidObstacle& obstacle) {
   return in_box(rigid_grid(signed_distance(mesh, size / 64.0, 0.5 * size)), box);
 }
 
-WindOptions wind_options(const WindFacts& wind, const Vector3& up, double delay) {
-  WindOptions options;
-  options.air_density = wind.air_density, options.normal = wind.normal, options.tangential = wind.tangential;
-  options.change = changes(wind.over_time, wind.velocity);
-  options.gusts = Gusts(wind.velocity, up, wind.gust_intensity, wind.gust_length, wind.seed);
-  options.delay = delay;
-  return options;
-}
-
-/// Complains about a point that is far from the object's surface.
-void check_place(const Situation& situation, const Scene& scene, const char* what, const Vector3& at, double radius) {
-  const double distance = distances_to_surface(*scene.object.surface, std::span(&at, 1)).front();
-  if (distance <= std::max(radius, 0.05 * object_size(scene))) return;
-  throw InputError({{situation.file},
-                    fmt::format("a {} at [{:.4g}, {:.4g}, {:.4g}], {:.3g} m from the object", what, at.x(), at.y(),
-                                at.z(), distance),
-                    "`at`: a point of the object's surface at rest, in metres",
-                    "look at the model's surface.ply for its coordinates"});
-}
-
-}  // namespace
-
 std::vector<SeenObstacle> seen_obstacles(const Situation& situation) {
   std::vector<SeenObstacle> seen;
   for (const RigidObstacle& obstacle : situation.obstacles) {
-    const Shape shape = make_shape(obstacle);
+    const ObstacleShape shape = obstacle_shape(obstacle);
     SeenObstacle& one = seen.emplace_back();
     one.motion = keyed_motion(shape.middle, obstacle.motion);
     if (const auto* mesh = std::get_if<ShapeMesh>(&obstacle.shape)) {
@@ -99,6 +91,11 @@ std::vector<SeenObstacle> seen_obstacles(const Situation& situation) {
 }
 
 SituationScene make_scene(const Model& model, const Situation& situation, int copy) {
+  if (!situation.probes.empty())
+    throw InputError({{situation.file},
+                      "[[probe]] in a situation that is simulated in time",
+                      "[[obstacle]] or [[hand]]: they have inertia to meet",
+                      "`pliant press MODEL --path FILE` leads probes from equilibrium to equilibrium"});
   Scene scene = model.scene;
   const int frames = std::max(1, int(std::lround(situation.duration * situation.frame_rate)));
   scene.timing = evenly_timed(situation.frame_rate, frames + 1);
@@ -216,7 +213,7 @@ SituationScene make_scene(const Model& model, const Situation& situation, int co
     });
   }
   for (const RigidObstacle& obstacle : situation.obstacles) {
-    const Shape shape = make_shape(obstacle);
+    const ObstacleShape shape = obstacle_shape(obstacle);
     further.push_back([shape, obstacle, penalty = simulation.contact,
                        speed = simulation.friction_speed](const auto& body) -> std::unique_ptr<ForceTerm> {
       auto contact =

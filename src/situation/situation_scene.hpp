@@ -17,6 +17,21 @@ struct SeenObstacle {
 };
 std::vector<SeenObstacle> seen_obstacles(const Situation& situation);
 
+/// A rigid shape with the point about which it turns [m], and a box around it.
+struct ObstacleShape {
+  std::shared_ptr<const RigidShape> rigid;
+  Vector3 middle;
+  Box box;  ///< of no extent for planes
+};
+ObstacleShape obstacle_shape(const RigidObstacle& obstacle);
+/// A rigid motion by its keys; none: it stands still.
+KeyedMotion keyed_motion(const Vector3& centre, const std::vector<KeyFrames<6>::Key>& keys);
+
+/// Throws InputError about a place that is further from the object's surface at rest than a radius and a twentieth of
+/// its size.
+/// @param what  that is to be there: "hand"
+void check_place(const Situation& situation, const Scene& scene, const char* what, const Vector3& at, double radius);
+
 /// A model in a situation, and what of it is to be seen.
 struct SituationScene : ModelScene {
   /// The rains of the simulation that was made of this last, and lives.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "base/csv.hpp"
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
 #include "scene/scene_toml.hpp"
@@ -122,6 +123,105 @@ Hand read_hand(TomlTable& table) {
   return hand;
 }
 
+using Led = ProbeFacts::Led;
+
+/// What of a probe's path a key of the file or the header of a table names.
+struct PathForm {
+  Led led;
+  const char* key;     // of `path`
+  const char* header;  // of a table
+  int numbers;         // of a line, beside its time
+};
+constexpr PathForm path_forms[] = {{Led::Displacement, "shift", "time,x,y,z", 3},
+                                   {Led::Displacement, "shift", "time,x,y,z,turn_x,turn_y,turn_z", 6},
+                                   {Led::Depth, "depth", "time,depth", 1},
+                                   {Led::Force, "force", "time,fx,fy,fz", 3},
+                                   {Led::Push, "push", "time,push", 1}};
+
+/// Keys such as { time = 1, depth = 0.01, turn_deg = [0, 0, 10] }, all of one form.
+void read_path_keys(TomlTable& table, ProbeFacts& probe) {
+  const PathForm* form = nullptr;
+  table.each_block("path", [&](TomlTable& block) {
+    KeyFrames<6>::Key key{read_number(block, "time", any_time), KeyFrames<6>::Value::Zero()};
+    key.value.tail<3>() = degree * block.optional<Vector3>("turn_deg").value_or(Vector3::Zero());
+    int count = 0;
+    for (const PathForm& f : path_forms) {
+      if (f.numbers == 6 || !block.has(f.key)) continue;
+      if (f.numbers == 1)
+        key.value[0] = read_number(block, f.key, {});
+      else
+        key.value.head<3>() = block.required<Vector3>(f.key).value_or(Vector3::Zero());
+      if (form && form != &f)
+        block.context().complain(block.key_of(f.key), std::string("a path by `") + form->key + "` and `" + f.key + "`",
+                                 "one of them throughout", "lead another probe by the other");
+      form = &f, ++count;
+    }
+    if (count != 1)
+      block.context().complain(block.key(), fmt::format("a key of a path with {} of them", count),
+                               "one of `shift`, `depth` [m], `force`, `push` [N]");
+    probe.path.push_back(key);
+  });
+  if (form) probe.led = form->led;
+  check_times(table, "path", probe.path);
+}
+
+/// A path as a table: see `path_forms`.
+void read_path_file(const std::filesystem::path& file, ProbeFacts& probe) {
+  const std::string text = read_file(file);
+  std::string header = text.substr(0, text.find_first_of("\r\n"));
+  std::erase(header, ' ');
+  const auto form = std::ranges::find(path_forms, header, &PathForm::header);
+  std::vector<Problem> problems;
+  if (form == std::end(path_forms)) {
+    std::string known;
+    for (const PathForm& f : path_forms) known += fmt::format("{}`{}`", known.empty() ? "" : ", ", f.header);
+    throw InputError({{file, 1, 1}, "the header `" + header + "`", "one of " + known, "metres, newtons and degrees"});
+  }
+  probe.led = form->led;
+  read_csv(file, form->header, problems, [&](CsvRow& row) {
+    KeyFrames<6>::Key key{row.number(0).value_or(0.0), KeyFrames<6>::Value::Zero()};
+    for (int k = 0; k < form->numbers; ++k) key.value[k] = row.number(std::size_t(k) + 1).value_or(0.0);
+    key.value.tail<3>() *= degree;
+    if (!probe.path.empty() && !(key.time > probe.path.back().time))
+      row.complain(0, fmt::format("{} s after {} s", key.time, probe.path.back().time),
+                   "times that increase from line to line", "put the lines in order");
+    probe.path.push_back(key);
+  });
+  if (!problems.empty()) throw InputError(problems);
+}
+
+ProbeFacts read_probe(TomlTable& table, const NamedFiles& files) {
+  ProbeFacts probe;
+  const std::string kind = read_choice(table, "kind", {"disc", "punch", "ball", "capsule", "mesh"});
+  probe.kind = kind == "disc"      ? ProbeKind::BondedDisc
+               : kind == "punch"   ? ProbeKind::Punch
+               : kind == "ball"    ? ProbeKind::Ball
+               : kind == "capsule" ? ProbeKind::Capsule
+                                   : ProbeKind::Shape;
+  probe.at = table.required<Vector3>("at", "where it touches the surface at rest, in metres").value_or(Vector3::Zero());
+  if (table.has("axis")) probe.axis = read_direction(table, "axis");
+  if (probe.kind != ProbeKind::Shape) probe.radius = read_number(table, "radius", positive_metres);
+  if (probe.kind == ProbeKind::Capsule) {
+    probe.rod =
+        table.required<Vector3>("rod", "from the centre of one end to that of the other").value_or(Vector3::UnitX());
+    if (!(probe.rod.norm() > 0.0))
+      table.context().complain(table.key_of("rod"), "a capsule without length", "its two ends apart", "or use a ball");
+  }
+  if (probe.kind == ProbeKind::Shape)
+    if (const auto file = read_path(table, "mesh", files))
+      read_file_of(table, "mesh", *file, [&](const auto& path) { probe.mesh = read_mesh(path); });
+  if (const auto file = read_optional_path(table, "path_file", files)) {
+    read_file_of(table, "path_file", *file, [&](const auto& path) { read_path_file(path, probe); });
+    if (table.has("path"))
+      table.context().complain(table.key_of("path"), "`path` and `path_file`", "one of them: how the probe is led");
+  } else if (!table.has("path_file")) {
+    read_path_keys(table, probe);
+    if (probe.path.empty() && !table.has("path"))
+      table.context().complain(table.key(), "a probe without `path` and `path_file`", "one of them: how it is led");
+  }
+  return probe;
+}
+
 LedRegion read_led(TomlTable& table, const NamedFiles& files) {
   LedRegion led{RegionBox{}, -infinite, infinite, {}};
   if (const auto region = read_region(table, files)) led.region = *region;
@@ -191,8 +291,7 @@ Situation read_situation(const std::filesystem::path& path) {
   root.each_block("plane", [&](TomlTable& block) { s.planes->push_back(read_plane(block)); });
   root.with_table("initial", [&](TomlTable& table) {
     s.pose.translation = table.optional<Vector3>("shift").value_or(Vector3::Zero());
-    const Vector3 turn = degree * table.optional<Vector3>("turn_deg").value_or(Vector3::Zero());
-    if (turn.norm() > 0.0) s.pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    s.pose.rotation = rotation_of(degree * table.optional<Vector3>("turn_deg").value_or(Vector3::Zero()));
     s.linear_velocity = table.optional<Vector3>("linear_velocity").value_or(Vector3::Zero());
     s.angular_velocity = table.optional<Vector3>("angular_velocity").value_or(Vector3::Zero());
   });
@@ -210,6 +309,7 @@ Situation read_situation(const std::filesystem::path& path) {
   root.each_block("hand", [&](TomlTable& table) { s.hands.push_back(read_hand(table)); });
   root.each_block("led", [&](TomlTable& table) { s.led.push_back(read_led(table, files)); });
   root.each_block("obstacle", [&](TomlTable& table) { s.obstacles.push_back(read_obstacle(table, files)); });
+  root.each_block("probe", [&](TomlTable& table) { s.probes.push_back(read_probe(table, files)); });
   root.each_block("copy", [&](TomlTable& table) {
     ObjectCopy copy;
     copy.shift = table.required<Vector3>("shift").value_or(Vector3::Zero());

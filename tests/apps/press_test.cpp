@@ -64,6 +64,27 @@ TEST(Presses, AreFittedEvaluatedAndPredicted) {
   EXPECT_TRUE(std::filesystem::exists(folder / "pressed/frames/000003.ply"));
   const ProgramRun by_ball = pressed({"--move", "0,-0.01,0", "--probe", "ball"});
   EXPECT_EQ(by_ball.exit_code, 0) << by_ball.err;
+  folder.write("probing.toml", R"(format = "situation/1"
+duration = 1
+frame_rate = 4
+[[probe]]
+kind = "capsule"
+at = [0, 0.05, 0]
+axis = [0, -1, 0]
+radius = 0.01
+rod = [0.04, 0, 0]
+path = [ { time = 0, depth = 0 }, { time = 1, depth = 0.006, turn_deg = [0, 30, 0] } ]
+)");
+  const ProgramRun along =
+      run_pliant({"press", out + "/model.toml", "--path", folder / "probing.toml", "--out", folder / "probed"});
+  EXPECT_EQ(along.exit_code, 0) << along.err;
+  EXPECT_THAT(along.out, HasSubstr("5 equilibria of"));
+  EXPECT_THAT(read_file(folder / "probed/probes.csv"), HasSubstr("\n1,1,0,-0.006,0,0.006,"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "probed/frames/000004.vtu"));
+  const ProgramRun both = pressed({"--path", folder / "probing.toml"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("--path beside --contact"));
+
   const ProgramRun neither = pressed({});
   EXPECT_EQ(neither.exit_code, 2);
   EXPECT_THAT(neither.err, HasSubstr("say what leads the probe"));

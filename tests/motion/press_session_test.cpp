@@ -1,5 +1,7 @@
 #include "motion/press_session.hpp"
 
+#include <numbers>
+
 #include "base/error.hpp"
 #include "support/bodies.hpp"
 #include "support/tolerance.hpp"
@@ -52,6 +54,73 @@ TEST_F(Session, AFailedPushLeavesTheLastEquilibrium) {
   EXPECT_FALSE(session.push({0.0, std::nan(""), 0.0}).converged);
   EXPECT_FALSE(session.failure().empty());
   EXPECT_EQ(session.nodes(), before);
+}
+
+TEST_F(Session, ASecondProbeIsFeltByTheFirst) {
+  const ProbeOptions left{ProbeKind::BondedDisc, {-0.05, 0.05, 0.0}, 0.03, {}};
+  ProbeOptions right = left;
+  right.centre.x() = 0.05;
+  PressSession both(body, law, std::vector<ProbeOptions>{left, right}, options), alone(body, law, left, options);
+  const ProbeMove in{ProbeMove::By::Displacement, {0.0, -0.01, 0.0}, Vector3::Zero()};
+  ASSERT_TRUE(alone.lead({in}).converged);
+  ASSERT_TRUE(both.lead({in, in}).converged) << both.failure();
+  EXPECT_NEAR(both.force(0).y() / both.force(1).y(), 1.0, 0.02) << "the mesh is not quite symmetric";
+  EXPECT_LT(both.force(0).y() + both.force(1).y(), 1.2 * alone.force().y()) << "more than one probe presses";
+  EXPECT_GT(both.force(0).x(), 0.01 * std::abs(both.force(0).y())) << "each holds what the other pushes away";
+  EXPECT_THROW((void)both.lead({in}), std::invalid_argument);
+}
+
+TEST_F(Session, ProbesPullAsTheyPush) {
+  PressSession session = make(ProbeKind::BondedDisc);
+  ASSERT_TRUE(session.move_to({0.0, 1e-5, 0.0}).converged);
+  const double pull = session.force().y();
+  ASSERT_TRUE(session.move_to({0.0, -1e-5, 0.0}).converged);
+  EXPECT_NEAR(session.force().y() / pull, -1.0, 1e-2) << "small strains have one stiffness";
+  ASSERT_TRUE(session.push({0.0, 6.0, 0.0}).converged);
+  EXPECT_GT(session.displacement().y(), 0.002);
+  PressSession sliding = make(ProbeKind::Punch);
+  ASSERT_TRUE(sliding.move_to({0.0, 0.002, 0.0}).converged);
+  EXPECT_LT(sliding.force().norm(), tolerance(1e-9)) << "what slides lifts off";
+}
+
+TEST_F(Session, ATurnedDiscTwistsTheObject) {
+  PressSession session = make(ProbeKind::BondedDisc);
+  constexpr double angle = 0.1;
+  for (int k = 1; k <= 4; ++k)
+    ASSERT_TRUE(session.lead({{ProbeMove::By::Displacement, Vector3::Zero(), {0.0, 0.25 * k * angle, 0.0}}}).converged);
+  const Vector3 about(0.01, 0.05, 0.0);
+  double turned = 0.0, spread = 0.0;
+  for (int n = 0; n < body->node_count(); ++n) {
+    const Vector3 arm = body->nodes.row(n).transpose() - about,
+                  way = (session.nodes() - body->nodes).row(n).transpose();
+    if (std::abs(arm.y()) > 1e-3 || arm.norm() > 0.026) continue;
+    turned += arm.cross(way).y(), spread += arm.squaredNorm();
+  }
+  EXPECT_NEAR(turned / spread, angle, 0.3 * angle) << "the patch under it turns along, its bond gives a little";
+  EXPECT_LT(session.force().norm(), 0.3) << "a turn pushes nowhere";
+  ASSERT_TRUE(session.lead({ProbeMove{}}).converged);
+  EXPECT_LT((session.nodes() - body->nodes).rowwise().norm().maxCoeff(), 1e-6) << "turned back, all is as it was";
+}
+
+TEST_F(Session, ACapsuleAndItsMeshAgree) {
+  const Vector3 down(0.0, -1.0, 0.0), rod(0.06, 0.0, 0.0);
+  constexpr double radius = 0.02;
+  const ProbeOptions capsule{ProbeKind::Capsule, {0.0, 0.05, 0.0}, radius, down, rod};
+  ProbeOptions shape = capsule;
+  shape.kind = ProbeKind::Shape;
+  const Vector3 middle = shape.centre - radius * down;
+  shape.shape = rigid_capsule(middle - 0.5 * rod, middle + 0.5 * rod, radius);
+  PressSession one(body, law, capsule, options), other(body, law, shape, options);
+  const ProbeMove move{ProbeMove::By::Displacement, 0.01 * down, {0.0, 0.5, 0.0}};
+  ASSERT_TRUE(one.lead({move}).converged) << one.failure();
+  ASSERT_TRUE(other.lead({move}).converged) << other.failure();
+  EXPECT_LT((one.force() - other.force()).norm(), tolerance(1e-6) * one.force().norm());
+  EXPECT_LT(one.force().y(), -1.0);
+  // The block is square, so a quarter turn of the rod about the middle presses as hard.
+  PressSession across(body, law, capsule, options), along(body, law, capsule, options);
+  ASSERT_TRUE(along.move_to(0.008 * down).converged);
+  ASSERT_TRUE(across.lead({{ProbeMove::By::Displacement, 0.008 * down, {0.0, 0.5 * std::numbers::pi, 0.0}}}).converged);
+  EXPECT_NEAR(across.force().y() / along.force().y(), 1.0, 0.03);
 }
 
 TEST_F(Session, AProbeInTheAirIsRefused) {
