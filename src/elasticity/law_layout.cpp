@@ -119,6 +119,12 @@ LawLayout LawLayout::moved(const std::function<ParameterHandle(const ParameterHa
   return law;
 }
 
+double LawLayout::mean_modulus(const VectorX& theta) const {
+  double log = 0.0;
+  for (const ParameterHandle& modulus : moduli_) log += std::log(theta[modulus]) / double(moduli_.size());
+  return std::exp(log);
+}
+
 std::vector<ParameterHandle> LawLayout::numbers(int law) const {
   std::vector<ParameterHandle> all = {modulus(law), poissons_ratio(0, law)};
   for (int i = 0; i < form_.terms; ++i) {

@@ -52,6 +52,8 @@ class LawLayout {
   const std::vector<std::string>& modulus_names() const { return names_; }
 
   ParameterHandle modulus(int control) const { return moduli_[std::size_t(control)]; }
+  /// Geometric mean of the control moduli [Pa].
+  double mean_modulus(const VectorX& theta) const;
   ParameterHandle exponent(int term, int law = 0) const { return laws_[std::size_t(law)].exponents[std::size_t(term)]; }
   /// Of a term but the first.
   ParameterHandle stiffness_ratio(int term, int law = 0) const {

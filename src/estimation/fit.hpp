@@ -159,6 +159,7 @@ struct TriedLaw {
   double evidence = 0.0;  ///< for it against the best before: fall of half the BIC for terms, ln of the Bayes factor
                           ///< for zones and control points
   bool kept = false;
+  double youngs_modulus = 0.0;  ///< [Pa] at no strain, geometric mean of its moduli; 0 where it cannot be fitted
 };
 
 /// Where a fit stands, to go on after an interruption.

@@ -135,6 +135,7 @@ class LawPlan::Replay {
   void conclude(std::optional<Estimate> next, const TriedLaw& tried, double noise_before) {
     if (is_pending()) return;
     now_.tried.push_back(tried);
+    if (next) now_.tried.back().youngs_modulus = next->layout.mean_modulus(next->theta);
     if (tried.kept)
       now_.best = std::move(next);
     else

@@ -265,10 +265,7 @@ class LawRun : StageLoop {
     double sum = 0.0;
     for (const double r : residuals) sum += r * r;
     event.marker_rms = std::sqrt(3.0 * sum / double(std::max<std::size_t>(residuals.size(), 1)));
-    double log = 0.0;
-    const int controls = form.layout.form().controls;
-    for (int k = 0; k < controls; ++k) log += std::log(event.theta[form.layout.modulus(k)]) / controls;
-    event.youngs_modulus = std::exp(log);
+    event.youngs_modulus = form.layout.mean_modulus(event.theta);
     emit(std::move(event));
   }
 
@@ -424,7 +421,8 @@ class LawRun : StageLoop {
     outcome_.start_cost = best.start_cost, outcome_.final_cost = best.cost;
     outcome_.converged = best.converged && !interrupted_;
     if (!interrupted_) outcome_.reason = best.reason;
-    add_uncertainty(outcome_);
+    add_uncertainty(outcome_,
+                    shifts_of_forms(outcome_.parameters, best.layout.mean_modulus(best.theta), standing.tried));
     outcome_.recordings.push_back(as_recording(form.scene->body, form.layout, outcome_));
     outcome_.recordings.back().discretisation.control_points = best.shape.points;
     for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
@@ -457,6 +455,22 @@ void require_known(const Capture& capture, const FitOptions& options) {
 }
 
 }  // namespace
+
+std::vector<ModelShift> shifts_of_forms(const ParameterSet& parameters, double youngs_modulus,
+                                        const std::vector<TriedLaw>& tried) {
+  constexpr double ruled_out = -3.0;
+  double farthest = 0.0;
+  for (const TriedLaw& t : tried)
+    if (!t.kept && t.evidence > ruled_out && t.youngs_modulus > 0.0)
+      if (const double shift = std::log(t.youngs_modulus / youngs_modulus); std::abs(shift) > std::abs(farthest))
+        farthest = shift;
+  if (farthest == 0.0) return {};
+  VectorX shift = VectorX::Zero(parameters.dimension());
+  const std::vector<const Parameter*> of = parameters.coordinate_parameters();
+  for (std::size_t i = 0; i < of.size(); ++i)
+    if (of[i]->unit == "Pa" && of[i]->transform == Transform::Logarithm) shift[Eigen::Index(i)] = farthest;
+  return {{"form of the law", shift}};
+}
 
 std::optional<double> known_poissons_ratio(const FitOptions& options) {
   const auto known = options.parameters.find("poissons_ratio");

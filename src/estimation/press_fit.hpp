@@ -26,4 +26,10 @@ std::optional<double> known_poissons_ratio(const FitOptions& options);
 FitOutcome fit_presses(const Capture& capture, const FitOptions& options, const FitMonitor& monitor = {},
                        FitState resume = {});
 
+/// By how much Young's moduli would differ in a form of the law that was tried and left although the evidence does not
+/// rule it out (ln of the Bayes factor above -3): of those forms the one that is farthest. None where there is none.
+/// @param youngs_modulus  of the form that was kept [Pa]
+std::vector<ModelShift> shifts_of_forms(const ParameterSet& parameters, double youngs_modulus,
+                                        const std::vector<TriedLaw>& tried);
+
 }  // namespace pliant

@@ -178,6 +178,7 @@ std::string largest_share_sentence(const Result& result) {
       {"mesh", "a finer mesh (--set cells)"},
       {"time step", "smaller time steps (--set steps)"},
       {"stiffness of contact", "a hard floor, or less of it in the recording"},
+      {"form of the law", "presses of other sizes and at other places"},
       {"elastic law", "smaller strains, or the law of the object's material (--set material)"},
       {"mass", "weighing the object more exactly"},
       {"direction of gravity", "a level: the direction of gravity in the capture"},

@@ -150,6 +150,9 @@ TEST_F(TwoZones, AreNotKeptWhereTheyFitHardlyBetter) {
   (void)names();
   EXPECT_EQ(end.best->shape.form.controls, 1);
   EXPECT_EQ(end.noise, noise) << "as before them";
+  const auto zones = std::ranges::find(end.tried, 2, [](const TriedLaw& t) { return t.form.controls; });
+  ASSERT_NE(zones, end.tried.end());
+  EXPECT_GT(zones->youngs_modulus, 0.0);
 }
 
 TEST_F(TwoZones, AreNoMoreThanWereAskedFor) {

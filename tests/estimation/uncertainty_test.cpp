@@ -4,6 +4,7 @@
 #include <random>
 
 #include "estimation/given_quantities.hpp"
+#include "estimation/press_fit.hpp"
 #include "estimation/verdict.hpp"
 
 namespace pliant::uncertainty_test {
@@ -154,6 +155,20 @@ CostEvaluation recordings_about(const std::vector<Eigen::Vector2d>& least, const
     }
   }
   return e;
+}
+
+TEST(FormsOfTheLaw, ThatAreNotRuledOutWidenTheModulus) {
+  const LawForm form;
+  const auto tried = [&](double evidence, bool kept, double modulus) {
+    return TriedLaw{form, 1.0, evidence, kept, modulus};
+  };
+  const ParameterSet set = young_and_poisson();
+  EXPECT_TRUE(shifts_of_forms(set, 1e4, {tried(infinite, true, 1e4), tried(-8.0, false, 5e3)}).empty());
+  const std::vector<ModelShift> shifts = shifts_of_forms(
+      set, 1e4, {tried(-8.0, false, 5e3), tried(2.0, false, 9e3), tried(-2.0, false, 1.05e4), tried(0.0, false, 0.0)});
+  ASSERT_EQ(shifts.size(), 1u);
+  EXPECT_NEAR(shifts[0].shift[0], std::log(0.9), 1e-12) << "the farthest of those that may be true";
+  EXPECT_EQ(shifts[0].shift[1], 0.0);
 }
 
 TEST(CovarianceBetweenRecordings, TakesThreeRecordings) {
