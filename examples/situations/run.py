@@ -64,7 +64,7 @@ OBJECTS = {
     "plant": (plant, 0.006, 0.008, 1.2e6, 200.0, "released"),
     "dinosaur": (dinosaur, 0.006, 0.011, 3.0e4, 120.0, "dropped"),
     "pot_holder": (pot_holder, 0.004, 0.007, 2.0e4, 150.0, "dropped"),
-    "hanger": (hanger, 0.005, 0.008, 1.0e5, 200.0, "dropped"),
+    "hanger": (hanger, 0.005, 0.008, 1.0e5, 200.0, "hung"),
 }
 
 SCENE = """format = "scene/1"
@@ -107,6 +107,12 @@ vertical_fov_deg = 40.0
 sensor = {{ preset = "structured-light" }}
 """
 GROUND = "[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nfriction = 0.4\nhalf_size = 0.5\n"
+HUNG = """[initial]
+released = true
+release_of = {{ mass = {mass}, at = [{at}] }}
+[[fixed]]
+half_space = {{ point = [0, 0.185, 0], normal = [0, 1, 0] }}
+"""
 RELEASED = """[initial]
 released = true
 release_of = {{ mass = {mass}, at = [{at}] }}
@@ -126,12 +132,12 @@ def make(program, work, name):
     folder.mkdir(parents=True, exist_ok=True)
     mesh = shapes.surface(*shape(), spacing)
     shapes.write_obj(folder / f"{name}.obj", mesh)
-    released = kind == "released"
-    top = max(mesh[0], key=lambda v: v[1] + 0.3 * v[0])
-    held = RELEASED.format(mass=0.03 if name == "plant" else 0.05, at=", ".join(f"{x:.5f}" for x in top)) if released else GROUND
+    pulled = {"released": (RELEASED, 0.03 if name == "plant" else 0.05, max(mesh[0], key=lambda v: v[1] + 0.3 * v[0])),
+              "hung": (HUNG, 0.02, max(mesh[0], key=lambda v: v[0] - v[1]))}.get(kind)
+    held = pulled[0].format(mass=pulled[1], at=", ".join(f"{x:.5f}" for x in pulled[2])) if pulled else GROUND
     scene = folder / "scene.toml"
     scene.write_text(SCENE.format(name=name, density=density, modulus=modulus, cell=cell, held=held, damping=0.003,
-                                  height=0.0 if released else 0.25))
+                                  height=0.0 if pulled else 0.25))
     if not (folder / "recording/capture.toml").exists():
         run(program, "synth", scene, "--out", folder / "recording")
     if not (folder / "fit/model.toml").exists():

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "elasticity/point_averages.hpp"
 #include "motion/contact_samples.hpp"
 #include "scene/region.hpp"
 
@@ -249,41 +250,23 @@ const std::vector<float>& LiveObject::field(Field which) {
     return field_;
   }
   if (which == Field::None) return field_;
-  std::vector<double> of_node(std::size_t(body_->node_count()), 0.0), volume(of_node.size(), 0.0);
+  std::vector<double> of_elements(std::size_t(body_->element_count()));
   if (which != Field::Modulus) elasticity_->linearise(state_.x);
   for (int e = 0; e < body_->element_count(); ++e) {
-    double value = 0.0;
-    if (which == Field::Modulus) {
+    double& value = of_elements[std::size_t(e)];
+    if (which == Field::Modulus)
       value = theta_[blocks_.youngs_moduli.front()] * body_->modulus.relative[std::size_t(e)];
-    } else if (which == Field::VonMises) {
-      const Matrix3 stress = elasticity_->cauchy_stress(e);
-      const Matrix3 deviator = stress - stress.trace() / 3.0 * Matrix3::Identity();
-      value = std::sqrt(1.5) * deviator.norm();
-    } else {
+    else if (which == Field::VonMises)
+      value = von_mises(elasticity_->cauchy_stress(e));
+    else
       value = Eigen::SelfAdjointEigenSolver<Matrix3>(Matrix3(elasticity_->rotation(e).S - Matrix3::Identity()),
                                                      Eigen::EigenvaluesOnly)
                   .eigenvalues()
                   .cwiseAbs()
                   .maxCoeff();
-    }
-    const double size = body_->element_volume[std::size_t(e)];
-    for (const int node : body_->element(e)) {
-      of_node[std::size_t(node)] += size * value;
-      volume[std::size_t(node)] += size;
-    }
   }
-  for (std::size_t v = 0; v < field_.size(); ++v) {
-    const auto nodes = vertices_.nodes(int(v));
-    const auto weights = vertices_.weights(int(v));
-    double sum = 0.0, total = 0.0;
-    for (std::size_t a = 0; a < nodes.size(); ++a) {
-      const auto n = std::size_t(nodes[a]);
-      const double share = std::abs(weights[a]);
-      sum += share * (volume[n] > 0.0 ? of_node[n] / volume[n] : 0.0);
-      total += share;
-    }
-    field_[v] = float(total > 0.0 ? sum / total : 0.0);
-  }
+  const std::vector<double> averages = averages_at(*body_, vertices_, of_elements);
+  std::ranges::transform(averages, field_.begin(), [](double v) { return float(v); });
   return field_;
 }
 

@@ -34,6 +34,8 @@ class Rain : public DeadLoad {
   /// @param gravity  3, in the parameter vector [m/s^2]
   Rain(const Body& body, const TriangleMesh& surface, const RainOptions& options, const ParameterHandle& gravity);
 
+  const RainOptions& options() const { return options_; }
+
   struct Hit {
     double time;              ///< start of the step in which it hits [s]
     int triangle;             ///< of the surface

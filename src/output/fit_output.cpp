@@ -1,5 +1,7 @@
 #include "output/fit_output.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +12,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "elasticity/element_moduli.hpp"
+#include "elasticity/point_averages.hpp"
 #include "live/live_page.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
@@ -506,12 +509,67 @@ namespace {
 
 using Progress = std::function<void(const char*, int, int)>;
 
+/// Fields of a motion, for the page: the stress where it is greatest, and a modulus that varies, with its deviation.
+class FieldPictures {
+ public:
+  FieldPictures(const Capture& capture, const RecordingOutcome& outcome)
+      : capture_(capture),
+        outcome_(outcome),
+        elasticity_(scene_elasticity(outcome.discretisation.body, outcome.discretisation.simulation)) {
+    elasticity_->set_parameters(outcome.theta);
+  }
+
+  /// Takes the stress of a frame.
+  void add(int frame, const State& state) {
+    const Body& body = *outcome_.discretisation.body;
+    elasticity_->linearise(state.x);
+    std::vector<double> stress(std::size_t(body.element_count()));
+    for (std::size_t e = 0; e < stress.size(); ++e) stress[e] = von_mises(elasticity_->cauchy_stress(int(e)));
+    const double greatest = *std::ranges::max_element(stress);
+    if (!greatest_.empty() && greatest <= *std::ranges::max_element(greatest_)) return;
+    greatest_ = std::move(stress), frame_ = frame, nodes_ = state.x;
+  }
+
+  void draw(const Gallery& gallery, const ModulusStatistics& modulus, std::vector<ReportField>& fields) const {
+    const Body& body = *outcome_.discretisation.body;
+    const Embedding vertices(body, capture_.scene.object.surface->vertices);
+    if (!greatest_.empty()) {
+      const Timing& timing = capture_.scene.timing;
+      const int recorded = frame_ + timing.start_frame;
+      const double time = timing.times[std::size_t(recorded)] - timing.times[std::size_t(timing.start_frame)];
+      fields.push_back(draw_field(gallery, vertices.positions(nodes_), averages_at(body, vertices, greatest_),
+                                  "von Mises stress", "Pa",
+                                  fmt::format("Where stress is greatest: frame {}, {:.3g} s", recorded, time)));
+    }
+    if (body.modulus.controls == 1) return;
+    const Points at_rest = vertices.positions(body.nodes);
+    const auto draw_modulus = [&](const VectorX& values, const char* name, const char* unit, const char* caption) {
+      const std::vector<double> of_elements(values.data(), values.data() + values.size());
+      fields.push_back(draw_field(gallery, at_rest, averages_at(body, vertices, of_elements), name, unit, caption));
+    };
+    draw_modulus(modulus.value, "Young's modulus", "Pa", "Young's modulus over the object");
+    if (modulus.mean_std > 0.0)
+      draw_modulus(modulus.std, "standard deviation", "Pa", "How sure Young's modulus is over the object");
+  }
+
+ private:
+  const Capture& capture_;
+  const RecordingOutcome& outcome_;
+  std::unique_ptr<Elasticity> elasticity_;
+  std::vector<double> greatest_;  // of each element [Pa]
+  int frame_ = 0;
+  Points nodes_;
+};
+
 void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
                   ReportData& report, const Progress& tell) {
   const Capture& capture = recordings.front().capture;
   const RecordingOutcome& first = outcome.recordings.front();
-  write_trajectory(folder, first.discretisation.body, first.discretisation.simulation, first.theta,
-                   [&](int done, int total) { return tell("trajectory", done, total), true; });
+  FieldPictures fields(capture, first);
+  write_trajectory(
+      folder, first.discretisation.body, first.discretisation.simulation, first.theta,
+      [&](int done, int total) { return tell("trajectory", done, total), true; },
+      [&](int frame, const State& state) { fields.add(frame, state); });
   for (const auto& f : surface_errors(first.evaluation).frames) {
     const int frame = f.frame + capture.scene.timing.start_frame;
     report.residuals.push_back({frame, capture.scene.timing.times[std::size_t(frame)], f.rms, f.points, f.noise});
@@ -521,7 +579,9 @@ void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& re
   std::erase_if(report.loads, [](const LoadError& load) { return load.role != "test"; });
   tell("loads", 1, 1);
   tell("pictures", 0, 1);
-  add_pictures(report, gallery_of(recordings.front(), first));
+  const Gallery gallery = gallery_of(recordings.front(), first);
+  add_pictures(report, gallery);
+  fields.draw(gallery, modulus_statistics(outcome), report.fields);
   tell("pictures", 1, 1);
 }
 

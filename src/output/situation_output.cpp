@@ -30,6 +30,7 @@ struct SeenCopy {
   Vector3 shift = Vector3::Zero();
   std::vector<FloatPoints> surfaces;        // one a frame [m]
   std::vector<std::vector<Vector3>> drops;  // of rain, one list a frame [m]
+  std::vector<std::vector<Vector3>> falls;  // of each of them, its velocity [m/s]
 };
 
 /// Runs a program that writes what it complains about to a file. Its exit code; 127 where it is not installed.
@@ -95,50 +96,89 @@ void write_surfaces(const fs::path& path, const std::vector<double>& times, cons
   });
 }
 
+/// What is drawn of one frame: meshes, each in its colour.
+class FrameDrawing {
+ public:
+  void add(const std::vector<Vector3>& points, const std::vector<std::array<int, 3>>& faces, const Rgb& colour) {
+    const int first = int(vertices_.size());
+    vertices_.insert(vertices_.end(), points.begin(), points.end());
+    seen_.colours.insert(seen_.colours.end(), points.size(), colour);
+    for (const auto& face : faces) seen_.triangles.push_back({face[0] + first, face[1] + first, face[2] + first});
+  }
+  /// An octahedron, drawn out along a direction.
+  void add_mark(const Vector3& at, const Vector3& along, double width, double length, const Rgb& colour) {
+    const Vector3 z = along.normalized(), x = z.unitOrthogonal(), y = z.cross(x);
+    add({at + width * x, at + width * y, at - width * x, at - width * y, at + length * z, at - length * z},
+        {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}, colour);
+  }
+  PictureScene scene(const std::vector<Plane>& planes, const Box& about) {
+    seen_.surface.resize(Eigen::Index(vertices_.size()), 3);
+    for (std::size_t i = 0; i < vertices_.size(); ++i) seen_.surface.row(Eigen::Index(i)) = vertices_[i].transpose();
+    seen_.planes = planes, seen_.about = about;
+    return std::move(seen_);
+  }
+
+ private:
+  PictureScene seen_;
+  std::vector<Vector3> vertices_;
+};
+
+/// Where a hand is while it holds [m]; nothing: it does not.
+std::optional<Vector3> place_of(const Hand& hand, double time) {
+  if (time < hand.from || time > hand.until) return std::nullopt;
+  if (!hand.path.empty()) return KeyFrames<3>(hand.path).at(time);
+  return hand.at + KeyFrames<6>(hand.motion).at(time).head<3>();
+}
+
 void draw_pictures(const SituationFiles& files, const Scene& scene, const Situation& situation,
                    const std::vector<std::array<int, 3>>& triangles, const std::vector<SeenCopy>& copies,
                    const std::vector<double>& times, const std::function<bool(int, int)>& progress) {
+  constexpr Rgb object{176, 182, 190}, obstacle_colour{214, 170, 110}, drop_colour{70, 130, 200}, hand{190, 60, 110};
+  constexpr int some = 7;  // of the vertices frame the picture
   const std::vector<SeenObstacle> obstacles = seen_obstacles(situation);
   Box box;
+  std::vector<Vector3> framing;
   for (const SeenCopy& copy : copies)
-    for (const FloatPoints& surface : copy.surfaces) {
-      box.extend(surface.colwise().minCoeff().cast<double>().transpose() + copy.shift);
-      box.extend(surface.colwise().maxCoeff().cast<double>().transpose() + copy.shift);
-    }
+    for (const FloatPoints& surface : copy.surfaces)
+      for (Eigen::Index i = 0; i < surface.rows(); i += some) {
+        framing.push_back(surface.row(i).cast<double>().transpose() + copy.shift);
+        box.extend(framing.back());
+      }
   const double degree = std::numbers::pi / 180.0;
-  const Box whole = grown(box, 0.04 * box.extent().maxCoeff());
-  const PinholeCamera camera = framed(view_of(whole, scene.world.up, files.width, files.height,
-                                              files.azimuth_deg * degree, files.elevation_deg * degree),
-                                      whole, files.width, files.height);
+  const PinholeCamera camera = framed(
+      view_of(box, scene.world.up, files.width, files.height, files.azimuth_deg * degree, files.elevation_deg * degree),
+      framing, files.width, files.height);
+  const double mark = 0.006 * box.extent().maxCoeff();
   const std::size_t frames = copies.front().surfaces.size();
   for (std::size_t frame = 0; frame < frames; ++frame) {
-    PictureScene seen;
-    std::vector<Vector3> vertices;
-    const auto add = [&](const auto& points, const std::vector<std::array<int, 3>>& faces) {
-      const int first = int(vertices.size());
-      for (const Vector3& p : points) vertices.push_back(p);
-      for (const auto& face : faces) seen.triangles.push_back({face[0] + first, face[1] + first, face[2] + first});
-    };
+    FrameDrawing drawing;
     for (const SeenCopy& copy : copies) {
       if (frame >= copy.surfaces.size()) continue;
       std::vector<Vector3> points;
       for (Eigen::Index i = 0; i < copy.surfaces[frame].rows(); ++i)
         points.push_back(copy.surfaces[frame].row(i).cast<double>().transpose() + copy.shift);
-      add(points, triangles);
-      for (const Vector3& drop : copy.drops[frame]) seen.points.push_back(drop + copy.shift);
+      drawing.add(points, triangles, object);
+      for (std::size_t d = 0; d < copy.drops[frame].size(); ++d)
+        drawing.add_mark(copy.drops[frame][d] + copy.shift, copy.falls[frame][d], 0.5 * mark, 3.0 * mark, drop_colour);
+      for (const Hand& h : situation.hands)
+        if (const auto place = place_of(h, times[frame]))
+          drawing.add_mark(*place + copy.shift, scene.world.up, 2.0 * mark, 2.0 * mark, hand);
     }
     for (const SeenObstacle& obstacle : obstacles) {
       std::vector<Vector3> points = obstacle.mesh.vertices;
       const RigidMotion motion = obstacle.motion.at(times[frame]);
       for (Vector3& p : points) p = motion(p);
-      add(points, obstacle.mesh.triangles);
+      drawing.add(points, obstacle.mesh.triangles, obstacle_colour);
     }
-    seen.surface.resize(Eigen::Index(vertices.size()), 3);
-    for (std::size_t i = 0; i < vertices.size(); ++i) seen.surface.row(Eigen::Index(i)) = vertices[i].transpose();
-    seen.planes = situation.planes.value_or(scene.planes);
-    PictureOptions options;
-    options.disc_radius = 1.5;
-    write_file(files.folder / "pictures" / fmt::format("{:06}.png", frame), encode_png(draw(seen, camera, options)));
+    std::vector<Plane> planes = situation.planes.value_or(scene.planes);
+    for (std::size_t o = 0; o < obstacles.size(); ++o)
+      if (const auto* plane = std::get_if<ShapePlane>(&situation.obstacles[o].shape)) {
+        const RigidMotion motion = obstacles[o].motion.at(times[frame]);
+        Plane& ground = planes.emplace_back();
+        ground.point = motion(plane->point), ground.normal = motion.rotation * plane->normal;
+      }
+    const PictureScene seen = drawing.scene(planes, box);
+    write_file(files.folder / "pictures" / fmt::format("{:06}.png", frame), encode_png(draw(seen, camera)));
     if (progress && !progress(int(frame) + 1, int(frames))) return;
   }
 }
@@ -166,13 +206,13 @@ RolloutSummary write_situation(const Model& model, const Situation& situation, c
         [&](int frame, const State& state) {
           const Points now = vertices.positions(state.x);
           copy.surfaces.push_back(now.cast<float>());
-          std::vector<Vector3>& drops = copy.drops.emplace_back();
+          std::vector<Vector3>&drops = copy.drops.emplace_back(), &falls = copy.falls.emplace_back();
           Box box;
           for (Eigen::Index i = 0; i < now.rows(); ++i) box.extend(now.row(i));
           const double margin = 0.5 * box.extent().maxCoeff();
           for (const Rain* rain : *scene.rains)
             for (const Vector3& drop : rain->drops_at(times[std::size_t(frame)], grown(box, margin)))
-              drops.push_back(drop);
+              drops.push_back(drop), falls.push_back(rain->options().velocity);
           if (!files.ply) return;
           TriangleMesh mesh = surface;
           for (Eigen::Index i = 0; i < now.rows(); ++i)

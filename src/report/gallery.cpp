@@ -72,4 +72,20 @@ std::vector<ReportPicture> draw_gallery(const Gallery& gallery, double range) {
   return pictures;
 }
 
+ReportField draw_field(const Gallery& gallery, const Points& surface, const std::vector<double>& values,
+                       const std::string& name, const std::string& unit, const std::string& caption) {
+  ReportField field{name, unit, 0.0, 1.0, {}};
+  const auto [least, most] = std::ranges::minmax(values);
+  field.low = least, field.high = most > least ? most : least + std::max(1e-12, 1e-6 * std::abs(least));
+  PictureScene scene{surface, gallery.triangles, gallery.planes, {}, {}};
+  for (const double v : values) scene.colours.push_back(sequential_colour((v - field.low) / (field.high - field.low)));
+  const Box box = box_of(surface);
+  const PinholeCamera view = gallery.camera ? framed(*gallery.camera, box, gallery.width, gallery.height)
+                                            : view_of(box, gallery.up, gallery.width, gallery.height);
+  PictureOptions options;
+  options.samples = gallery.samples;
+  field.picture = {encode_png(draw(scene, view, options)), caption};
+  return field;
+}
+
 }  // namespace pliant

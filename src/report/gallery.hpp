@@ -38,6 +38,12 @@ std::vector<int> spread_frames(int first, int last, int count);
 ///               ReportData::residual_range
 std::vector<ReportPicture> draw_gallery(const Gallery& gallery, double range = 0.0);
 
+/// A number at each vertex of a surface, drawn in colours from the same place as a gallery.
+/// @param surface  the vertices [m]; as many as `values`
+/// @param caption  plain text
+ReportField draw_field(const Gallery& gallery, const Points& surface, const std::vector<double>& values,
+                       const std::string& name, const std::string& unit, const std::string& caption);
+
 /// All residuals of a gallery, for residual_range.
 std::vector<double> all_residuals(const Gallery& gallery);
 

@@ -51,6 +51,22 @@ Rgb diverging_colour(double value) {
   return colour;
 }
 
+Rgb sequential_colour(double value) {
+  // A polynomial of sixth degree in each channel, near Matplotlib's viridis.
+  constexpr double k[7][3] = {{0.2777, 0.0054, 0.3340},     {0.1051, 1.4046, 1.3846},   {-0.3309, 0.2148, 0.0951},
+                              {-4.6342, -5.7991, -19.3324}, {6.2283, 14.1799, 56.6906}, {4.7764, -13.7451, -65.3530},
+                              {-5.4355, 4.6459, 26.3124}};
+  if (std::isnan(value)) return {128, 128, 128};
+  const double t = std::clamp(value, 0.0, 1.0);
+  Rgb colour;
+  for (std::size_t c = 0; c < 3; ++c) {
+    double sum = 0.0;
+    for (int i = 6; i >= 0; --i) sum = sum * t + k[i][c];
+    colour[c] = std::uint8_t(std::lround(255.0 * std::clamp(sum, 0.0, 1.0)));
+  }
+  return colour;
+}
+
 std::string css(const Rgb& colour) {
   constexpr char digits[] = "0123456789abcdef";
   std::string text = "#";

@@ -17,6 +17,10 @@ std::string encode_png(const Picture& picture);
 /// red above, of like lightness on both sides and told apart by colour-blind people.
 Rgb diverging_colour(double value);
 
+/// Colour of a number in [0, 1] (clamped; grey where it is not a number): from dark violet to yellow, its lightness
+/// rising evenly, told apart by colour-blind people.
+Rgb sequential_colour(double value);
+
 /// "#rrggbb".
 std::string css(const Rgb& colour);
 

@@ -73,8 +73,10 @@ class Painter {
     mesh.triangles = scene.triangles;
     normals_ = vertex_normals(mesh);
     rays_.add(mesh);
-    size_ = mesh.vertices.empty() ? 1.0 : box_.extent().norm();
-    centre_ = mesh.vertices.empty() ? Vector3::Zero().eval() : (0.5 * (box_.min + box_.max)).eval();
+    if (scene.about) box_ = *scene.about;
+    const bool is_empty = mesh.vertices.empty() && !scene.about;
+    size_ = is_empty ? 1.0 : box_.extent().norm();
+    centre_ = is_empty ? Vector3::Zero().eval() : (0.5 * (box_.min + box_.max)).eval();
     grid_ = grid_spacing(box_);
     // the key light comes over the viewer's left shoulder
     const Matrix3& r = camera.camera_to_world.rotation;
@@ -190,6 +192,17 @@ class Painter {
     return n.norm() > 1e-9 ? n.normalized() : hit.normal;
   }
 
+  Colour albedo(const RayHit& hit) const {
+    if (scene_.colours.empty()) return from_srgb(176, 182, 190);
+    Colour sum = Colour::Zero();
+    const double share[] = {1.0 - hit.u - hit.v, hit.u, hit.v};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Rgb& c = scene_.colours[std::size_t(scene_.triangles[hit.triangle][k])];
+      sum += share[k] * from_srgb(c[0], c[1], c[2]);
+    }
+    return sum;
+  }
+
   Colour object_colour(const Vector3& point, const RayHit& hit, const Vector3& direction, uint32_t pixel,
                        uint32_t index) const {
     Vector3 normal = smooth_normal(hit), face = hit.normal;
@@ -201,8 +214,7 @@ class Painter {
     const double facing = std::max(0.0, normal.dot(key_));
     const Vector3 half = (key_ - direction).normalized();
     const double shine = 0.05 * std::pow(std::max(0.0, normal.dot(half)), 24.0) * light_here.key;
-    const Colour albedo = from_srgb(176, 182, 190);
-    return albedo * (0.62 * ambient + 0.75 * light_here.key * facing * key) + shine;
+    return albedo(hit) * (0.62 * ambient + 0.75 * light_here.key * facing * key) + shine;
   }
 
   Colour floor_colour(const Vector3& point, const Plane& plane, const Colour& sky, uint32_t pixel,
@@ -242,6 +254,8 @@ class Painter {
 void check(const PictureScene& scene, const PictureOptions& options) {
   if (!scene.residuals.empty() && scene.residuals.size() != scene.points.size())
     throw std::invalid_argument("draw: as many residuals as points are needed, or none");
+  if (!scene.colours.empty() && scene.colours.size() != std::size_t(scene.surface.rows()))
+    throw std::invalid_argument("draw: as many colours as vertices are needed, or none");
   if (options.samples < 1 || options.samples > 8) throw std::invalid_argument("draw: samples must be 1..8");
   if (options.light_rays < 1 || options.light_rays > 64) throw std::invalid_argument("draw: light_rays must be 1..64");
   if (options.max_points < 1) throw std::invalid_argument("draw: max_points must be at least 1");
@@ -314,12 +328,16 @@ Picture draw(const PictureScene& scene, const PinholeCamera& camera, const Pictu
 }
 
 PinholeCamera framed(const PinholeCamera& camera, const Box& box, int width, int height) {
+  return framed(camera, corners(box), width, height);
+}
+
+PinholeCamera framed(const PinholeCamera& camera, std::span<const Vector3> points, int width, int height) {
   PinholeCamera result = camera;
   result.width = width, result.height = height;
   Eigen::Array2d low = Eigen::Array2d::Constant(1e300), high = -low;
   bool in_front = true;
-  for (const Vector3& corner : corners(box)) {
-    const Vector3 seen = camera.project(corner);
+  for (const Vector3& point : points) {
+    const Vector3 seen = camera.project(point);
     in_front = in_front && seen.z() > 0.0;
     low = low.min(seen.head<2>().array()), high = high.max(seen.head<2>().array());
   }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/types.hpp"
@@ -18,6 +19,9 @@ struct PictureScene {
   std::vector<Plane> planes;      ///< obstacles, drawn as light floors with grid lines and soft shadows
   std::vector<Vector3> points;    ///< observed points [m], drawn as small discs over the surface; may be empty
   std::vector<double> residuals;  ///< signed distance of each point to the surface [m]; empty: one colour for all
+  std::vector<Rgb> colours = {};  ///< of the surface's vertices; empty: grey
+  /// What floor, grid and shadows are scaled by, the same for all frames of a motion; left out: the surface's own box.
+  std::optional<Box> about = {};
 };
 
 struct PictureOptions {
@@ -30,7 +34,8 @@ struct PictureOptions {
 
 /// Draws a scene as a camera sees it; no display is needed. The picture has the camera's size. Deterministic, and the
 /// same for every number of threads.
-/// Throws std::invalid_argument where residuals do not match the points or an option is out of its range.
+/// Throws std::invalid_argument where residuals do not match the points, or colours the vertices, or an option is out
+/// of its range.
 Picture draw(const PictureScene& scene, const PinholeCamera& camera, const PictureOptions& options = {});
 
 /// Residual [m] at which the colours end: the 95th percentile of the absolute residuals, rounded up to 1, 2 or 5 times
@@ -43,6 +48,9 @@ double grid_spacing(const Box& object);
 /// The camera's place and direction, with focal length and centre changed so that the box fills a picture of
 /// width x height pixels with a margin. The camera itself, scaled to the width, where the box is not all in front.
 PinholeCamera framed(const PinholeCamera& camera, const Box& box, int width, int height);
+
+/// The same for points.
+PinholeCamera framed(const PinholeCamera& camera, std::span<const Vector3> points, int width, int height);
 
 /// A view from above and aside that shows the whole box. `azimuth` [rad] around `up`, `elevation` [rad] above the
 /// horizontal.

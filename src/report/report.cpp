@@ -134,6 +134,31 @@ std::string pictures(const ReportData& data) {
   return html + "</div>\n";
 }
 
+std::string fields_section(const std::vector<ReportField>& fields) {
+  if (fields.empty()) return "";
+  std::string html = "<div class=\"pictures\">\n";
+  int number = 0;
+  for (const ReportField& field : fields) {
+    const std::string caption = escape_html(field.picture.caption), id = fmt::format("field-{}", ++number);
+    html +=
+        "<figure><img alt=\"" + caption + "\" src=\"data:image/png;base64," + encode_base64(field.picture.png) + "\">" +
+        fmt::format(R"svg(<svg viewBox="0 0 480 44" role="img" aria-label="colours of {0}" )svg"
+                    R"svg(style="font:13px system-ui,sans-serif;fill:var(--muted)"><defs><linearGradient id="{1}">)svg",
+                    escape_html(field.name), id);
+    for (int k = 0; k <= 16; ++k)
+      html +=
+          fmt::format(R"svg(<stop offset="{:.4f}" stop-color="{}"/>)svg", k / 16.0, css(sequential_colour(k / 16.0)));
+    html +=
+        fmt::format(R"svg(</linearGradient></defs><rect x="1" y="4" width="478" height="14" rx="3" fill="url(#{})" )svg"
+                    R"svg(style="stroke:var(--grid)"/><text x="1" y="36">{}</text><text x="240" y="36" )svg"
+                    R"svg(text-anchor="middle">{}</text><text x="479" y="36" text-anchor="end">{}</text></svg>)svg",
+                    id, value_with_uncertainty(field.low, {}, field.unit), escape_html(field.name),
+                    value_with_uncertainty(field.high, {}, field.unit));
+    html += "<figcaption>" + caption + "</figcaption></figure>\n";
+  }
+  return html + "</div>\n";
+}
+
 // ---- plots
 
 std::string panel(const std::string& content) { return "<div class=\"panel\">" + content + "</div>\n"; }
@@ -540,6 +565,7 @@ std::string report_html(const ReportData& data) {
   html += verdict(data.result) + headline(data.result);
   html += section("Summary", words(data));
   html += section("Observed and simulated", pictures(data));
+  html += section("Fields over the object", fields_section(data.fields));
   html += section("Agreement over time", data.residuals.size() > 1 ? residual_plot(data.residuals) : "");
   html += section("Presses", presses_section(data));
   html += section("Force-depth and stress-strain curves", curves_section(data.result.curves));

@@ -25,6 +25,13 @@ struct ReportPicture {
   std::string caption;  ///< plain text
 };
 
+/// A number over the object's surface, drawn in colours.
+struct ReportField {
+  std::string name, unit;        ///< "von Mises stress", "Pa"
+  double low = 0.0, high = 1.0;  ///< where the colours end
+  ReportPicture picture;
+};
+
 /// Correlation of every pair of estimated parameters at the solution.
 struct CorrelationTable {
   std::vector<std::string> names;  ///< of parameters
@@ -39,6 +46,7 @@ struct ReportData {
   std::vector<FrameResidual> residuals;
   double residual_range = 0.0;  ///< [m], where the colours of the discs in the pictures end; 0: no colour scale
   std::vector<ReportPicture> pictures;
+  std::vector<ReportField> fields;
   CorrelationTable correlations;
   std::vector<LoadError> loads;           ///< that took no part in the fit, as the model predicts them
   std::vector<StaticError> presses;       ///< all of them, as the model predicts them ...

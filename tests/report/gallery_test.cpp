@@ -50,5 +50,22 @@ TEST(Gallery, FramesShareOneViewThatHoldsTheWholeMotion) {
   EXPECT_TRUE(draw_gallery(Gallery{}).empty());
 }
 
+TEST(Gallery, DrawsANumberInColoursWithItsRange) {
+  const TriangleMesh ring = make_torus(0.15, 0.06, 32, 16);
+  Gallery gallery;
+  gallery.triangles = ring.triangles;
+  gallery.width = 120, gallery.height = 90;
+  std::vector<double> values;
+  for (const Vector3& v : ring.vertices) values.push_back(1e3 + 1e4 * v.x());
+  const ReportField field = draw_field(gallery, vertex_points(ring), values, "stress", "Pa", "where it is greatest");
+  EXPECT_NEAR(field.low, 1e3 - 2100.0, 1e-9);
+  EXPECT_NEAR(field.high, 1e3 + 2100.0, 1e-9);
+  ReportData data;
+  data.fields = {field};
+  const std::string page = report_html(data);
+  EXPECT_NE(page.find("Fields over the object"), std::string::npos);
+  EXPECT_NE(page.find("3100 Pa"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace pliant::gallery_test

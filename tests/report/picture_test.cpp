@@ -107,6 +107,38 @@ TEST(Picture, DiscsHaveTheColourOfTheirResidual) {
   }
 }
 
+TEST(Picture, SurfacesHaveTheColoursOfTheirVertices) {
+  PictureScene scene = ring_on_floor();
+  scene.planes.clear();
+  const PinholeCamera camera = view_of(box_of(scene), Vector3::UnitY(), 120, 90);
+  scene.colours.assign(std::size_t(scene.surface.rows()), Rgb{200, 40, 40});
+  const Picture red = draw(scene, camera);
+  scene.colours.assign(std::size_t(scene.surface.rows()), Rgb{40, 40, 200});
+  const Picture blue = draw(scene, camera);
+  int redder = 0, bluer = 0;
+  for (std::size_t i = 0; i < red.pixels.size(); ++i) {
+    redder += red.pixels[i][0] > red.pixels[i][2] + 40;
+    bluer += blue.pixels[i][2] > blue.pixels[i][0] + 40;
+  }
+  EXPECT_GT(redder, 800);
+  EXPECT_NEAR(redder, bluer, 0.1 * redder);
+  scene.colours.pop_back();
+  EXPECT_THROW((void)draw(scene, camera), std::invalid_argument);
+}
+
+TEST(Image, SequentialColoursGrowLighterAndAreClamped) {
+  double before = 0.0;
+  for (int k = 0; k <= 10; ++k) {
+    const Rgb c = sequential_colour(0.1 * k);
+    const double lightness = 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+    EXPECT_GT(lightness, before);
+    before = lightness;
+  }
+  EXPECT_EQ(sequential_colour(-3.0), sequential_colour(0.0));
+  EXPECT_EQ(sequential_colour(7.0), sequential_colour(1.0));
+  EXPECT_EQ(sequential_colour(std::nan("")), (Rgb{128, 128, 128}));
+}
+
 TEST(Picture, PointsBehindTheObjectAreNotDrawn) {
   PictureScene scene = ring_on_floor();
   const PinholeCamera camera = view_of(box_of(scene), Vector3::UnitY(), 160, 120, 0.3, 1.2);
