@@ -22,7 +22,7 @@ flags=(-target wasm32-wasi -std=c++20 -O3 -msimd128 -DNDEBUG -DBOOST_NO_CXX98_FU
 compile() {
   local source=$1 object
   object=$work/objects/${source//\//_}.o
-  [[ $object -nt $source && -z ${PLIANT_LIVE_CLEAN:-} ]] || "$work/python/bin/python" -m ziglang c++ "${flags[@]}" -c "$source" -o "$object"
+  [[ $object -nt $source && -z ${PLIANT_LIVE_CLEAN:-}$(find src -name '*.hpp' -newer "$object" -print -quit 2> /dev/null) ]] || "$work/python/bin/python" -m ziglang c++ "${flags[@]}" -c "$source" -o "$object"
   echo "$object"
 }
 objects=()
