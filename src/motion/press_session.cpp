@@ -23,7 +23,7 @@ std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, 
 
 }  // namespace
 
-PressSession::PressSession(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
+PressSession::PressSession(const std::shared_ptr<const Body>& body, const std::shared_ptr<const MaterialLaw>& law,
                            const std::vector<ProbeOptions>& probes, const PressSessionOptions& options)
     : probes_(probes),
       moves_(probes.size()),

@@ -26,12 +26,12 @@ struct ProbeMove {
 class PressSession {
  public:
   /// Throws InputError where a bonded probe touches nothing, std::invalid_argument without a probe.
-  PressSession(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law,
+  PressSession(const std::shared_ptr<const Body>& body, const std::shared_ptr<const MaterialLaw>& law,
                const std::vector<ProbeOptions>& probes, const PressSessionOptions& options);
   /// With one probe.
-  PressSession(std::shared_ptr<const Body> body, std::shared_ptr<const MaterialLaw> law, const ProbeOptions& probe,
-               const PressSessionOptions& options)
-      : PressSession(std::move(body), std::move(law), std::vector<ProbeOptions>{probe}, options) {}
+  PressSession(const std::shared_ptr<const Body>& body, const std::shared_ptr<const MaterialLaw>& law,
+               const ProbeOptions& probe, const PressSessionOptions& options)
+      : PressSession(body, law, std::vector<ProbeOptions>{probe}, options) {}
 
   /// To the equilibrium with each probe where its move has it (of a sliding one a force acts along its axis alone,
   /// which turns along). Not converged: the last equilibrium stays, and `failure` says why.
