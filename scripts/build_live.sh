@@ -16,13 +16,22 @@ for name in eigen3/Eigen eigen3/unsupported boost; do ln -sfn "/usr/include/$nam
 
 sources=(src/base/{error,dense,parallel}.cpp src/geometry/{signed_distance,triangle_mesh,surface_distance}.cpp
   src/mesh/{hex_grid,tet_mesh,tet_shape}.cpp src/parameters/*.cpp src/solvers/*.cpp src/elasticity/*.cpp src/motion/*.cpp
-  src/scene/region.cpp src/live/{live_data,live_object}.cpp src/live/wasm/*.cpp)
+  src/scene/region.cpp src/live/{live_data,live_motion,live_object,live_press}.cpp src/live/wasm/*.cpp)
 flags=(-target wasm32-wasi -std=c++20 -O3 -msimd128 -DNDEBUG -DBOOST_NO_CXX98_FUNCTION_BASE
   -ffile-prefix-map="$PWD=." -Isrc -isystem "$work/include")
+# An object is current where nothing that it was made of is newer.
+is_current() {
+  local object=$1 needed
+  [[ -f $object && -f ${object%.o}.d && -z ${PLIANT_LIVE_CLEAN:-} ]] || return 1
+  for needed in $(sed -e 's/^[^:]*://' -e 's/\\$//' "${object%.o}.d"); do
+    [[ $needed -nt $object || ! -e $needed ]] && return 1
+  done
+  return 0
+}
 compile() {
   local source=$1 object
   object=$work/objects/${source//\//_}.o
-  [[ $object -nt $source && -z ${PLIANT_LIVE_CLEAN:-}$(find src -name '*.hpp' -newer "$object" -print -quit 2> /dev/null) ]] || "$work/python/bin/python" -m ziglang c++ "${flags[@]}" -c "$source" -o "$object"
+  is_current "$object" || "$work/python/bin/python" -m ziglang c++ "${flags[@]}" -MD -MF "${object%.o}.d" -c "$source" -o "$object"
   echo "$object"
 }
 objects=()

@@ -55,6 +55,70 @@ Matrix9 world_tangent(const PointStress& s) {
   return turn * s.tangent * turn.transpose();
 }
 
+double tangent_modulus(const MaterialLaw& law, int element, const Matrix3& F) {
+  PointStress at;
+  law.stress(element, F, true, at);
+  if (!std::isfinite(at.energy)) return std::numeric_limits<double>::quiet_NaN();
+  const Polar polar = polar_decomposition(F);
+  const Eigen::SelfAdjointEigenSolver<Matrix3> strain(Matrix3(polar.S - Matrix3::Identity()));
+  Eigen::Index greatest = 0;
+  strain.eigenvalues().cwiseAbs().maxCoeff(&greatest);
+  // Symmetric matrices in Mandel's components; with R fixed, dP = R d(dW/dU) but for its antisymmetric part.
+  constexpr std::array<std::pair<int, int>, 6> pairs = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+  const auto component = [&](const Matrix3& m, std::size_t k) {
+    const auto [i, j] = pairs[k];
+    return i == j ? m(i, i) : std::sqrt(0.5) * (m(i, j) + m(j, i));
+  };
+  const Matrix9 tangent = world_tangent(at);
+  Matrix6 stiffness;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const auto [i, j] = pairs[k];
+    Matrix3 dU = Matrix3::Zero();
+    dU(i, j) = dU(j, i) = i == j ? 1.0 : std::sqrt(0.5);
+    const Vector9 change = tangent * vec(Matrix3(polar.R * dU));
+    const Matrix3 dP = Eigen::Map<const Matrix3>(change.data());
+    for (std::size_t l = 0; l < pairs.size(); ++l)
+      stiffness(Eigen::Index(l), Eigen::Index(k)) = component(polar.R.transpose() * dP, l);
+  }
+  const Vector3 n = strain.eigenvectors().col(greatest);
+  Strain6 along;
+  for (std::size_t k = 0; k < pairs.size(); ++k) along[Eigen::Index(k)] = component(n * n.transpose(), k);
+  return 1.0 / along.dot(stiffness.partialPivLu().solve(along));
+}
+
+namespace {
+
+class ScaledLaw : public MaterialLaw {
+ public:
+  ScaledLaw(std::shared_ptr<const MaterialLaw> law, double factor) : law_(std::move(law)), factor_(factor) {}
+  std::string name() const override { return law_->name(); }
+  int element_count() const override { return law_->element_count(); }
+  void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override {
+    law_->stress(element, F, with_tangent, out);
+    out.energy *= factor_;
+    out.P *= factor_;
+    if (with_tangent) out.tangent *= factor_;
+  }
+  SmallStrainModuli small_strain(int element) const override {
+    const SmallStrainModuli m = law_->small_strain(element);
+    return {factor_ * m.youngs_modulus, m.poissons_ratio};
+  }
+  Matrix9 tangent_derivative(int element, const Matrix3& F, const Matrix3& dF) const override {
+    return factor_ * law_->tangent_derivative(element, F, dF);
+  }
+
+ private:
+  std::shared_ptr<const MaterialLaw> law_;
+  double factor_;
+};
+
+}  // namespace
+
+std::shared_ptr<const MaterialLaw> scaled_law(std::shared_ptr<const MaterialLaw> law, double factor) {
+  if (!(factor > 0.0)) throw std::invalid_argument("a material's factor must be positive");
+  return factor == 1.0 ? law : std::make_shared<ScaledLaw>(std::move(law), factor);
+}
+
 void TabulatedLaw::set_table(MatrixX table) {
   if (!table.allFinite()) throw std::invalid_argument("a material's parameters must be finite");
   check(table);

@@ -63,6 +63,14 @@ class MaterialLaw {
 /// Turns a tangent given in the frame of `left` and `right` into that of the world.
 Matrix9 world_tangent(const PointStress& stress);
 
+/// Young's modulus at a deformation F = R U [Pa]: the slope of the Biot stress dW/dU by a further strain along the
+/// principal direction of the greatest strain |U - I|, the stress in all other directions staying as it is. Of a linear
+/// law it is Young's modulus whatever the strain. Not a number where the law knows no such deformation.
+double tangent_modulus(const MaterialLaw& law, int element, const Matrix3& F);
+
+/// A law whose energy is another's times a factor > 0: everything is as much stiffer. It has no parameters of its own.
+std::shared_ptr<const MaterialLaw> scaled_law(std::shared_ptr<const MaterialLaw> law, double factor);
+
 /// Laws whose parameters stand in a table: elements x parameters.
 class TabulatedLaw : public MaterialLaw {
  public:

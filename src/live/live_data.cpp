@@ -4,11 +4,13 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "elasticity/sampled_law.hpp"
+
 namespace pliant {
 
 namespace {
 
-constexpr std::string_view magic = "pliant live/1\n";
+constexpr std::string_view magic = "pliant live/2\n";
 
 class Writer {
  public:
@@ -133,6 +135,55 @@ void visit(Archive& archive, TetMesh& mesh) {
   if constexpr (Archive::reads)
     mesh = make_tet_mesh(std::move(mesh.nodes), std::move(mesh.tets), std::move(mesh.mid_nodes));
 }
+template <class Archive>
+void visit(Archive& archive, StrainSamples& s) {
+  visit(archive, s.strains), visit(archive, s.weights);
+  visit(archive, s.constant), visit(archive, s.least), visit(archive, s.most);
+}
+template <class Archive>
+void visit(Archive& archive, std::shared_ptr<const MaterialLaw>& law) {
+  std::string name = law ? law->name() : "";
+  visit(archive, name);
+  if (name.empty()) return;
+  if (name == "sampled") {
+    std::vector<StrainSamples> elements;
+    double metric_nu = 0.0;
+    if constexpr (!Archive::reads) {
+      const auto& sampled = dynamic_cast<const SampledLaw&>(*law);
+      for (int e = 0; e < sampled.element_count(); ++e) elements.push_back(sampled.samples(e));
+      metric_nu = sampled.metric_nu();
+    }
+    visit(archive, elements), visit(archive, metric_nu);
+    if constexpr (Archive::reads) law = std::make_shared<SampledLaw>(std::move(elements), metric_nu);
+    return;
+  }
+  MatrixX table;
+  if constexpr (!Archive::reads) table = dynamic_cast<const TabulatedLaw&>(*law).table();
+  int columns = int(table.cols());
+  VectorX numbers = table.reshaped();
+  visit(archive, columns), visit(archive, numbers);
+  if constexpr (Archive::reads) {
+    if (columns < 1 || numbers.size() % columns != 0) throw std::runtime_error("the bytes of the object make no sense");
+    table = numbers.reshaped(numbers.size() / columns, columns);
+    if (name == "linear")
+      law = std::make_shared<LinearLaw>(std::move(table));
+    else if (name == "neo_hookean")
+      law = std::make_shared<NeoHookeanLaw>(std::move(table));
+    else if (name == "ogden")
+      law = std::make_shared<OgdenLaw>(std::move(table));
+    else
+      throw std::runtime_error("the bytes of the object make no sense");
+  }
+}
+template <class Archive>
+void visit(Archive& archive, LiveSample& sample) {
+  visit(archive, sample.theta), visit(archive, sample.law);
+}
+template <class Archive>
+void visit(Archive& archive, LiveTest& test) {
+  visit(archive, test.at), visit(archive, test.radius), visit(archive, test.force);
+}
+
 template <class Archive, class T>
 void visit(Archive& archive, std::vector<T>& values) {
   const std::size_t count = visit_count(archive, values.size(), 1);
@@ -142,7 +193,8 @@ void visit(Archive& archive, std::vector<T>& values) {
 
 template <class Archive>
 void visit(Archive& archive, LiveData& d) {
-  visit(archive, d.mesh), visit(archive, d.relative_moduli);
+  visit(archive, d.mesh), visit(archive, d.relative_moduli), visit(archive, d.relative_deviations);
+  visit(archive, d.law), visit(archive, d.is_pressed), visit(archive, d.held), visit(archive, d.tests);
   visit(archive, d.surface.vertices), visit(archive, d.surface.triangles);
   visit(archive, d.fixed), visit(archive, d.weights), visit(archive, d.planes), visit(archive, d.theta);
   visit(archive, d.max_dt), visit(archive, d.newmark_theta), visit(archive, d.contact_weight);

@@ -2,100 +2,96 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "live/live_data.hpp"
-#include "motion/patch_forces.hpp"
-#include "motion/rain.hpp"
-#include "motion/rigid_contact.hpp"
-#include "motion/wind.hpp"
 
 namespace pliant {
 
-/// An object that is stepped, pulled, poked, blown at and rained upon while somebody looks.
+/// The bodies that a user pokes with.
+enum class LiveProbe { Ball, Disc, Capsule, BondedDisc };
+
+/// A number over the object that is shown in colours.
+enum class LiveField {
+  None,
+  Displacement,     ///< from where it was scanned [m]
+  VonMises,         ///< stress [Pa]
+  Strain,           ///< principal strain of the greatest magnitude [-]
+  Modulus,          ///< Young's modulus at rest [Pa]
+  Deviation,        ///< standard deviation of that [Pa]; zero where it is not known
+  ModulusAtStrain,  ///< Young's modulus at the strain at hand [Pa], see `tangent_modulus`
+};
+
+/// An object that is pulled and poked while somebody looks.
 class LiveObject {
  public:
-  /// Throws std::runtime_error for bytes that are no object.
-  explicit LiveObject(LiveData data);
+  /// What the data ask for: an object that moves, or one that a press brings from equilibrium to equilibrium.
+  /// Throws std::runtime_error for data that make no object.
+  static std::unique_ptr<LiveObject> make(LiveData data);
+  virtual ~LiveObject() = default;
 
   const LiveData& data() const { return data_; }
   const Body& body() const { return *body_; }
-  const State& state() const { return state_; }
-  double time() const { return time_; }
-  double step_length() const { return options_.max_dt; }
   /// Of the surface's vertices [m].
   const Points& surface() const { return surface_; }
+  virtual const Points& nodes() const = 0;  ///< n x 3 [m]
 
-  /// Back to the start: at rest where it was scanned, or, where something is held, in equilibrium.
-  void reset();
-  /// Takes the object as it is, and its velocities, as those of the recording at its start.
-  void start_as_recorded();
-  /// One step, in halves where it cannot be taken as a whole. False where it cannot be taken at all: the object stays
-  /// as it was.
-  bool step();
+  /// Back to the start, with nothing that holds or pokes.
+  virtual void reset() = 0;
+  /// One step in time, or towards an equilibrium. False where it cannot be taken: the object stays as it was.
+  virtual bool step() = 0;
 
   /// @name What a user does
   /// @{
-  /// Takes the surface within a radius [m] of a triangle's point.
-  /// @param stiffness  of the springs together [N/m]; 0: what lifts the object by a tenth of its size
-  void grab(int triangle, const Vector3& corners, double radius, double stiffness = 0.0);
-  /// Where the hand is now [m].
-  void move_hand(const Vector3& place);
-  void let_go() { grip_.reset(); }
+  /// Takes the surface about a point.
+  /// @param corners  barycentric coordinates in the triangle [-]
+  /// @param radius   of what is taken [m]
+  virtual void grab(int triangle, const Vector3& corners, double radius) = 0;
+  virtual void move_hand(const Vector3& place) = 0;
+  virtual void let_go() = 0;
   /// Of the hand on the object [N].
-  Vector3 hand_force() const;
-  /// Where the hand holds the object, and where it would have it [m].
-  std::optional<std::pair<Vector3, Vector3>> hand() const;
-  void set_gravity(const Vector3& gravity);
-  void set_wind(const Vector3& velocity, double gust_intensity);
-  /// @param rate  drops by square metre and second; 0: none
-  void set_rain(double rate, double diameter);
-  /// A rigid ball or rod that pushes; a radius of 0 takes it away.
-  void set_probe(const Vector3& from, const Vector3& to, double radius);
-  Vector3 probe_force() const { return probe_force_; }
+  virtual Vector3 hand_force() const = 0;
+  /// Where the hand holds the object, and where it would have it [m]; nothing where it holds nothing.
+  virtual std::optional<std::pair<Vector3, Vector3>> hand() const = 0;
+  /// A probe at the surface, against its normal.
+  /// @param rod  of a capsule, from the centre of one end to that of the other [m]
+  virtual void touch(LiveProbe kind, int triangle, const Vector3& corners, double radius, const Vector3& rod) = 0;
+  /// To this far from where it touched [m].
+  virtual void move_probe(const Vector3& way) = 0;
+  virtual void lift() = 0;
+  /// Of the probe on the object [N].
+  virtual Vector3 probe_force() const = 0;
+  /// How far the probe is from where it touched [m].
+  virtual Vector3 probe_way() const = 0;
+  virtual void set_gravity(const Vector3& gravity) = 0;
   /// Factors of Young's modulus and of both dampings.
-  void set_material(double stiffness, double damping);
-  /// Adds a velocity to every node [m/s].
-  void push(const Vector3& velocity);
+  virtual void set_material(double stiffness, double damping) = 0;
   /// The parameters of a sample of the posterior; -1: the estimate.
-  void set_sample(int sample);
+  virtual void set_sample(int sample) = 0;
   /// @}
 
-  enum class Field { None, Displacement, VonMises, Strain, Modulus };
-  /// A number for each vertex of the surface, of the elements around it: displacement [m], von Mises stress [Pa],
-  /// largest principal strain [1], Young's modulus [Pa].
-  const std::vector<float>& field(Field which);
-  /// Kinetic energy [J].
-  double kinetic_energy() const;
-  const std::vector<Vector3>& drops();
+  /// The same elements' material at points, with the factors and the sample at hand.
+  virtual std::shared_ptr<const MaterialLaw> law() const = 0;
+  /// A field at each vertex of the surface, of the elements around it.
+  const std::vector<float>& field(LiveField which);
 
- private:
-  /// A force that comes and goes.
-  class Slot;
-  void build();
-  void apply_parameters();
-  bool take(double dt);
+ protected:
+  /// Throws std::runtime_error for data that make no object.
+  explicit LiveObject(LiveData data);
+  /// Where a point of the surface was scanned, and the inward normal there, from the vertices' positions, m x 3 [m].
+  struct Touched {
+    Vector3 at, inward;
+  };
+  Touched touched(int triangle, const Vector3& corners, const Points& vertices) const;
 
   LiveData data_;
-  MotionLayout blocks_;
   std::shared_ptr<const Body> body_;
-  SimulationOptions options_;
-  std::unique_ptr<Stepper> stepper_;
-  Elasticity* elasticity_ = nullptr;
-  Slot *hand_slot_ = nullptr, *wind_slot_ = nullptr, *rain_slot_ = nullptr, *probe_slot_ = nullptr;
   Embedding vertices_;
-  State state_, first_;
-  Points delta_, surface_;
-  double time_ = 0.0, element_edge_ = 0.0;
-  VectorX theta_;
-  int sample_ = -1;
-  double stiffness_ = 1.0, damping_ = 1.0;
-  Vector3 gravity_ = Vector3::Zero(), wind_ = Vector3::Zero(), probe_force_ = Vector3::Zero();
-  std::shared_ptr<LedSprings> grip_;
-  std::shared_ptr<Rain> rain_;
-  std::shared_ptr<RigidContact> probe_;
+  Points surface_;
+
+ private:
   std::vector<float> field_;
-  std::vector<Vector3> drops_;
 };
 
 }  // namespace pliant

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "base/base64.hpp"
-#include "base/error.hpp"
+#include "motion/fixed_regions.hpp"
 #include "simulation/scene_simulation.hpp"
 
 // The files beside this one, as they are: what users get needs no other file.
@@ -71,10 +71,12 @@ std::string facts(const Model& model, const LiveData& data, const LiveRecording&
   const Scene& scene = model.scene;
   const Box box = bounding_box(data.surface);
   const double size = box.extent().maxCoeff();
-  const Vector3 gravity = scene.world.gravity.value_or(-9.81 * scene.world.up);
+  const Vector3 gravity = live_blocks(data.planes).gravity.vector(data.theta);
   const double magnitude = std::pow(10.0, std::floor(std::log10(size / 2.0)));
   const double mass = scene.object.total_mass().value_or(0.1);
-  std::string planes, times, counts, bytes;
+  std::string planes, times, presses, counts, bytes;
+  for (const LiveTest& press : data.tests)
+    presses += fmt::format("{}{:.4g}", presses.empty() ? "" : ",", press.force.norm());
   for (const Plane& plane : scene.planes)
     planes += fmt::format("{}{{\"point\":{},\"normal\":{}}}", planes.empty() ? "" : ",", list(plane.point),
                           list(plane.normal));
@@ -90,11 +92,11 @@ std::string facts(const Model& model, const LiveData& data, const LiveRecording&
   // The heaviest rain of the slider brings half the object's weight of water each second.
   const double drop = 1000.0 * 3.14159 / 6.0 * std::pow(0.004, 3), area = std::max(1e-4, size * size);
   return fmt::format(
-      "{{\"up\":{},\"gravity\":{},\"size\":{},\"middle\":{},\"grid\":{},\"rain\":{:.4g},\"samples\":{},\"planes\":[{}],"
-      "\"times\":[{}]{}}}",
+      "{{\"up\":{},\"gravity\":{},\"size\":{},\"middle\":{},\"grid\":{},\"rain\":{:.4g},\"samples\":{},\"pressed\":{},"
+      "\"deviations\":{},\"planes\":[{}],\"times\":[{}],\"presses\":[{}]{}}}",
       list(gravity.norm() > 0.0 ? Vector3(-gravity.normalized()) : scene.world.up), gravity.norm(), size,
       list(0.5 * (box.min + box.max)), magnitude, std::min(2e4, 0.5 * mass / (drop * area)), data.samples.size(),
-      planes, times,
+      data.is_pressed, data.relative_deviations.size() > 0, data.is_pressed ? "" : planes, times, presses,
       recording.points.empty()
           ? ""
           : fmt::format(",\"observed\":{{\"counts\":[{}],\"points\":\"{}\"}}", counts, encode_base64(bytes)));
@@ -103,11 +105,6 @@ std::string facts(const Model& model, const LiveData& data, const LiveRecording&
 }  // namespace
 
 LiveData live_data(const Model& model) {
-  if (model.law)
-    throw InputError({{},
-                      "a model with the law `" + model.law->name + "`",
-                      "a model of Young's modulus and Poisson's ratio",
-                      "`pliant press` and `pliant simulate` know this law; live pages do not yet"});
   Model free = model;
   free.scene.initial.released = false;
   free.scene.initial.release_of.reset();
@@ -125,15 +122,30 @@ LiveData live_data(const Model& model) {
   data.theta = made.theta;
   const SimulationOptions& s = made.simulation;
   data.max_dt = s.max_dt, data.newmark_theta = s.newmark_theta, data.contact_weight = s.contact_weight;
-  data.rotation_prediction = s.rotation_prediction, data.elastic_law = s.elastic_law;
+  data.rotation_prediction = s.rotation_prediction;
+  data.elastic_law = s.law ? ElasticLaw::Corotated : s.elastic_law;  // as `Simulation` has it
   data.stiffness_damping = s.stiffness_damping, data.contact = s.contact, data.friction_speed = s.friction_speed;
   data.up = model.scene.world.up;
+  data.law = s.law;
+  const ModelVolume& volume = model.volume;
+  if (!volume.youngs_modulus_std.empty() && volume.youngs_modulus_std.size() == data.relative_moduli.size()) {
+    data.relative_deviations.resize(Eigen::Index(volume.youngs_modulus_std.size()));
+    for (std::size_t e = 0; e < volume.youngs_modulus_std.size(); ++e)
+      data.relative_deviations[Eigen::Index(e)] = volume.youngs_modulus_std[e] / volume.youngs_modulus[e];
+  }
+  const Timing& timing = model.scene.timing;
+  if (data.law && (timing.is_static || timing.times.empty()) && made.body->kind != ElementKind::Hexahedron)
+    data.held = held_nodes(*made.body, held_regions(model.scene));
+  data.is_pressed = !data.held.empty();
+  // A model of presses that says nothing of gravity has none: it is stress-free as it was scanned.
+  if (data.is_pressed && !model.scene.world.gravity) data.theta.segment<3>(live_blocks(data.planes).gravity).setZero();
   return data;
 }
 
-std::string live_page(const Model& model, const LiveRecording& recording, const std::vector<VectorX>& samples) {
+std::string live_page(const Model& model, const LiveRecording& recording, const std::vector<LiveSample>& samples) {
   LiveData data = live_data(model);
   data.samples = samples;
+  if (data.is_pressed) data.tests = recording.presses;
   std::string page(pliant_live_html());
   replace(page, "@NAME@", escaped(model.name));
   replace(page, "@NAME@", escaped(model.name));

@@ -10,20 +10,21 @@
 
 namespace pliant {
 
-/// What was recorded, for a page: times of its frames [s], the first being the start, and the points seen in each [m].
+/// What was recorded, for a page: frames of a motion, or presses.
 struct LiveRecording {
-  std::vector<double> times;
-  std::vector<std::vector<Vector3>> points;
+  std::vector<double> times;                 ///< of frames [s], the first being the start
+  std::vector<LiveTest> presses;             ///< of an object that is pressed, in the place of `times`
+  std::vector<std::vector<Vector3>> points;  ///< seen in each frame, or under each press [m]
 };
 
-/// Everything that a page needs to move a model.
-/// Throws InputError for a model whose law no page knows yet.
+/// Everything that a page needs to move or press a model. What is held, at rest and of a material law is pressed:
+/// nothing is known of its damping. All else moves.
 LiveData live_data(const Model& model);
 
 /// A page in which the object can be pulled, poked and blown at: one file that needs neither server nor network. It
 /// holds the simulation as WebAssembly, the object, and what was recorded of it.
-/// @param samples  of the posterior, parameters of `live_blocks`
+/// @param samples  of the posterior
 std::string live_page(const Model& model, const LiveRecording& recording = {},
-                      const std::vector<VectorX>& samples = {});
+                      const std::vector<LiveSample>& samples = {});
 
 }  // namespace pliant

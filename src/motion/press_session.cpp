@@ -14,7 +14,6 @@ namespace {
 
 std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, const std::vector<ProbeOptions>& probes,
                                       const std::vector<RigidContact>& inner) {
-  if (probes.empty()) throw std::invalid_argument("a session of presses needs a probe");
   std::vector<RigidContact> contacts;
   for (const ProbeOptions& probe : probes) contacts.push_back(probe_contact(body, probe, mean_modulus(body, law)));
   contacts.insert(contacts.end(), inner.begin(), inner.end());

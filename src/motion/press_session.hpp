@@ -25,7 +25,7 @@ struct ProbeMove {
 /// hand, so that small moves take two or three cheap iterations. For one thread.
 class PressSession {
  public:
-  /// Throws InputError where a bonded probe touches nothing, std::invalid_argument without a probe.
+  /// Without a probe: the object under its dead load alone. Throws InputError where a bonded probe touches nothing.
   PressSession(const std::shared_ptr<const Body>& body, const std::shared_ptr<const MaterialLaw>& law,
                const std::vector<ProbeOptions>& probes, const PressSessionOptions& options);
   /// With one probe.
@@ -48,6 +48,8 @@ class PressSession {
   /// Of a probe on the object [N].
   Vector3 force(int probe = 0) const { return equilibrium_.contact_force(probe, placement_); }
   const std::string& failure() const { return equilibrium_.failure(); }
+  /// The next equilibrium is sought from these nodes, n x 3 [m].
+  void start_from(Points nodes) { placement_.nodes = std::move(nodes); }
   Equilibrium& equilibrium() { return equilibrium_; }
 
  private:

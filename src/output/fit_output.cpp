@@ -423,7 +423,16 @@ World world_of(const Vector3& gravity) {
 }  // namespace
 
 Model make_model(const Capture& capture, const FitOutcome& outcome) {
-  if (outcome.law) return make_model(capture, *outcome.law);
+  if (outcome.law) {
+    Model model = make_model(capture, *outcome.law);
+    if (outcome.law->sampled) return model;
+    const ModulusStatistics modulus = modulus_statistics(outcome);
+    if (modulus.mean_std > 0.0)
+      for (std::size_t e = 0; e < model.volume.youngs_modulus.size(); ++e)
+        model.volume.youngs_modulus_std.push_back(model.volume.youngs_modulus[e] * modulus.std[Eigen::Index(e)] /
+                                                  modulus.value[Eigen::Index(e)]);
+    return model;
+  }
   const RecordingOutcome& first = outcome.recordings.front();
   Discretisation free = first.discretisation;
   free.body = first.rest_body;
@@ -585,50 +594,80 @@ void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& re
   tell("pictures", 1, 1);
 }
 
-/// Parameters of the object drawn from the estimate's uncertainty, as a page takes them; none where nothing is known.
-std::vector<VectorX> posterior_samples(const FitOutcome& outcome, const LiveData& live) {
+/// Vectors of all parameters drawn from the estimate's uncertainty; none where nothing of the material is known.
+std::vector<VectorX> posterior_draws(const FitOutcome& outcome) {
   constexpr int count = 5;
-  const ParameterSet& parameters = outcome.parameters;
-  const Parameter* const modulus = parameters.find("youngs_modulus");
-  if (outcome.covariance.size() == 0 || !modulus || !modulus->estimated) return {};
-  const MotionLayout blocks = live_blocks(live.planes);
-  const VectorX p = parameters.to_unconstrained(outcome.theta);
+  if (outcome.covariance.size() == 0) return {};
   const Eigen::LLT<MatrixX> factor(outcome.covariance);
   if (factor.info() != Eigen::Success) return {};
+  const ParameterSet& parameters = outcome.parameters;
+  const VectorX p = parameters.to_unconstrained(outcome.theta);
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
-  std::vector<VectorX> samples;
+  std::vector<VectorX> draws;
   for (int k = 0; k < count; ++k) {
     const VectorX z = VectorX::NullaryExpr(p.size(), [&](Eigen::Index) { return normal(random); });
-    const VectorX drawn = parameters.to_theta(parameters.clamp(p + factor.matrixL() * z));
-    VectorX& sample = samples.emplace_back(live.theta);
-    blocks.scale_moduli(sample, drawn[modulus->at] / outcome.theta[modulus->at]);
+    draws.push_back(parameters.to_theta(parameters.clamp(p + factor.matrixL() * z)));
+  }
+  return draws;
+}
+
+/// The object for each draw, as a page takes it.
+std::vector<LiveSample> posterior_samples(const FitOutcome& outcome, const LiveData& live) {
+  std::vector<LiveSample> samples;
+  const ParameterSet& parameters = outcome.parameters;
+  const auto& of_presses = outcome.law;
+  if (of_presses && of_presses->sampled) return {};  // made from fits, with no uncertainty of its own
+  const Parameter* const modulus = parameters.find("youngs_modulus");
+  const bool has_modulus = modulus && modulus->estimated;
+  if (!of_presses && !has_modulus) return {};
+  const MotionLayout blocks = live_blocks(live.planes);
+  for (const VectorX& drawn : posterior_draws(outcome)) {
+    LiveSample& sample = samples.emplace_back(LiveSample{live.theta, {}});
+    if (of_presses) {
+      sample.law = law_at(*of_presses->scene->body, of_presses->layout, drawn);
+      continue;
+    }
+    const RecordingOutcome& first = outcome.recordings.front();
+    if (const auto& layout = first.discretisation.simulation.law_layout)
+      sample.law = law_at(*first.discretisation.body, *layout, drawn);
+    blocks.scale_moduli(sample.theta, drawn[modulus->at] / outcome.theta[modulus->at]);
     for (const auto& [name, at] :
          {std::pair{"poissons_ratio", blocks.poissons_ratio}, std::pair{"mass_damping", blocks.mass_damping},
           std::pair{"stiffness_damping", blocks.stiffness_damping}})
-      if (const Parameter* const own = parameters.find(name); own && own->estimated) sample[at] = drawn[own->at];
+      if (const Parameter* const own = parameters.find(name); own && own->estimated) sample.theta[at] = drawn[own->at];
   }
   return samples;
 }
 
-/// The page in which the object can be touched. Its name; empty where its law is one that no page knows.
+/// The frames of a motion for a page, with some of the points seen in each.
+void add_motion(LiveRecording& recording, const RecordedCapture& recorded, const FitOutcome& outcome) {
+  constexpr std::size_t most_points = 300;  // a frame
+  const Timing& timing = recorded.capture.scene.timing;
+  for (int frame = timing.start_frame; frame < timing.frame_count(); ++frame) {
+    recording.times.push_back(timing.times[std::size_t(frame)]);
+    std::vector<Vector3>& points = recording.points.emplace_back();
+    const auto seen = std::ranges::find(recorded.observed, frame, &ObservedFrame::frame);
+    if (seen == recorded.observed.end()) continue;
+    const std::vector<Vector3> all = corrected_points(
+        *seen, recorded.capture, outcome.recordings.front().discretisation, outcome.recordings.front().theta);
+    const std::size_t every = std::max<std::size_t>(1, all.size() / most_points);
+    for (std::size_t i = 0; i < all.size(); i += every) points.push_back(all[i]);
+  }
+}
+
+/// The page in which the object can be touched. Its name.
 std::string write_live_page(const fs::path& folder, const RecordedCapture& recorded, const FitOutcome& outcome,
                             const Model& model) {
-  if (model.law || outcome.law) return {};
-  constexpr std::size_t most_points = 300;  // a frame
   LiveRecording recording;
-  const Timing& timing = recorded.capture.scene.timing;
   // A page knows no pose from which an object was let go.
-  if (!timing.is_static && !model.scene.initial.released)
-    for (int frame = timing.start_frame; frame < timing.frame_count(); ++frame) {
-      recording.times.push_back(timing.times[std::size_t(frame)]);
-      std::vector<Vector3>& points = recording.points.emplace_back();
-      const auto seen = std::ranges::find(recorded.observed, frame, &ObservedFrame::frame);
-      if (seen == recorded.observed.end()) continue;
-      const std::vector<Vector3> all = corrected_points(
-          *seen, recorded.capture, outcome.recordings.front().discretisation, outcome.recordings.front().theta);
-      const std::size_t every = std::max<std::size_t>(1, all.size() / most_points);
-      for (std::size_t i = 0; i < all.size(); i += every) points.push_back(all[i]);
+  if (!outcome.law && !recorded.capture.scene.timing.is_static && !model.scene.initial.released)
+    add_motion(recording, recorded, outcome);
+  if (outcome.law)
+    for (std::size_t i = 0; i < outcome.law->scene->presses.size(); ++i) {
+      const Press& press = outcome.law->scene->facts[i];
+      recording.presses.push_back({press.contact_centre, press.contact_radius, press.force});
+      recording.points.push_back(outcome.law->scene->presses[i].loaded);
     }
   const char* const name = "live.html";
   write_file(folder / name, live_page(model, recording, posterior_samples(outcome, live_data(model))));

@@ -530,8 +530,9 @@ std::string usage(const ReportData& data) {
   const std::string model = escape_html(data.model_file);
   const std::string live = data.live_page.empty()
                                ? ""
-                               : "<p><a href=\"" + escape_html(data.live_page) +
-                                     "\">Touch it</a>: pull, poke and throw the fitted object in the browser.</p>\n";
+                               : "<p><a href=\"" + escape_html(data.live_page) + "\">Touch it</a>: " +
+                                     (data.presses.empty() ? "pull, poke and throw" : "press and pull") +
+                                     " the fitted object in the browser.</p>\n";
   return live + "<p>The model stands beside this page: <code>" + model +
          "</code> with its volume mesh and surface. All numbers are SI.</p>\n<pre>"
          "# predict another recording with this model and compare\npliant evaluate " +

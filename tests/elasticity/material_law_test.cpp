@@ -347,5 +347,55 @@ TEST(SampledLaw, ErrorFallsAsTheBasisGrows) {
   EXPECT_THROW((void)sample_material({}), std::invalid_argument);
 }
 
+/// At rest it is Young's modulus, however the object is turned; a linear law's stays so.
+TEST_P(Law, TangentModulusBeginsAsYoungsModulus) {
+  const double E = GetParam().law->small_strain(0).youngs_modulus;
+  Matrix3 F = generic(0.0);
+  EXPECT_NEAR(tangent_modulus(*GetParam().law, 0, F), E, tolerance(1e-6) * E);
+  if (GetParam().name != "Linear") return;
+  F = generic(0.3);
+  EXPECT_NEAR(tangent_modulus(*GetParam().law, 0, F), E, tolerance(1e-9) * E);
+}
+
+/// Stretched along one axis, free across: the slope of the force by the stretch, by central differences. Of isotropic
+/// laws: another one shears.
+TEST_P(Law, TangentModulusIsTheSlopeOfATensionTest) {
+  if (GetParam().name == "Sampled") GTEST_SKIP() << "not isotropic";
+  const auto pulled = [&](double stretch) {  // deformation without stress across
+    const double nu = GetParam().law->small_strain(0).poissons_ratio;
+    Vector3 across(stretch, std::pow(stretch, -nu), std::pow(stretch, -nu));
+    for (int i = 0; i < 50; ++i) {
+      const PointStress s = at(across.asDiagonal(), true);
+      const Matrix9 tangent = world_tangent(s);
+      Eigen::Matrix2d slope;
+      slope << tangent(4, 4), tangent(4, 8), tangent(8, 4), tangent(8, 8);
+      across.tail<2>() -= slope.inverse() * Eigen::Vector2d(s.P(1, 1), s.P(2, 2));
+    }
+    return across;
+  };
+  for (const double stretch : {0.8, 1.15}) {
+    const auto force = [&](double l) { return at(pulled(l).asDiagonal()).P(0, 0); };
+    const double h = 1e-5, slope = (force(stretch + h) - force(stretch - h)) / (2.0 * h);
+    const Matrix3 turned = generic(0.0) * Matrix3(pulled(stretch).asDiagonal());
+    EXPECT_NEAR(tangent_modulus(*GetParam().law, 0, turned), slope, tolerance(2e-5) * slope) << stretch;
+  }
+}
+
+TEST_P(Law, AScaledOneIsAsMuchStiffer) {
+  const auto scaled = scaled_law(GetParam().law, 2.5);
+  const Matrix3 F = generic(0.2), dF = generic(0.9);
+  const PointStress one = at(F, true);
+  PointStress other;
+  scaled->stress(0, F, true, other);
+  EXPECT_NEAR(other.energy, 2.5 * one.energy, 1e-12 * std::abs(other.energy));
+  EXPECT_LT((other.P - 2.5 * one.P).norm(), 1e-12 * other.P.norm());
+  EXPECT_LT((world_tangent(other) - 2.5 * world_tangent(one)).norm(), 1e-12 * other.tangent.norm());
+  EXPECT_LT((scaled->tangent_derivative(0, F, dF) - 2.5 * GetParam().law->tangent_derivative(0, F, dF)).norm(),
+            1e-9 * one.tangent.norm());
+  EXPECT_NEAR(scaled->small_strain(0).youngs_modulus, 2.5 * GetParam().law->small_strain(0).youngs_modulus, 1e-6);
+  EXPECT_EQ(scaled_law(GetParam().law, 1.0), GetParam().law);
+  EXPECT_THROW((void)scaled_law(GetParam().law, 0.0), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace pliant::material_law_test

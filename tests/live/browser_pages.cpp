@@ -5,7 +5,7 @@
 #include <iostream>
 
 #include "base/files.hpp"
-#include "live/live_object.hpp"
+#include "live/live_motion.hpp"
 #include "live/live_page.hpp"
 #include "support/models.hpp"
 
@@ -16,10 +16,13 @@ int main(int argc, char** argv) {
   Model model = test::block(false);
   model.scene.initial.linear_velocity = Vector3(0.4, 0.5, 0.1);
   model.scene.initial.angular_velocity = Vector3(3.0, 0.0, 6.0);
-  const LiveRecording recording{{0.0, 0.1, 0.2}, {{Vector3(0, 0, 0)}, {Vector3(0.05, 0, 0)}, {}}};
-  const std::string page = live_page(model, recording);
+  const LiveRecording recording{{0.0, 0.1, 0.2}, {}, {{Vector3(0, 0, 0)}, {Vector3(0.05, 0, 0)}, {}}};
+  const LiveData data = live_data(model);
+  std::vector<LiveSample> samples(2, LiveSample{data.theta, {}});
+  live_blocks(data.planes).scale_moduli(samples[0].theta, 0.2);
+  const std::string page = live_page(model, recording, samples);
   write_file(folder / "free.html", page);
-  LiveObject object(live_data(model));
+  LiveMotion object(data);
   object.start_as_recorded();
   for (int step = 0; step < 100; ++step)
     if (!object.step()) return std::cerr << "a step cannot be taken\n", 1;
@@ -31,11 +34,23 @@ int main(int argc, char** argv) {
   }
   write_file(folder / "free.json", numbers + "]\n");
   write_file(folder / "held.html", live_page(test::block(true)));
+  LiveRecording presses;
+  presses.presses = {{{0.06, 0.025, 0.0}, 0.015, {0.0, -1.0, 0.0}}, {{0.06, 0.025, 0.0}, 0.015, {0.0, -2.0, 0.0}}};
+  presses.points = {{Vector3(0.06, 0.02, 0.0)}, {Vector3(0.06, 0.015, 0.0)}};
+  const Model pressed = test::pressed_block();
+  std::vector<LiveSample> laws;
+  for (const double factor : {0.5, 2.0}) {
+    Model other = pressed;
+    for (std::vector<double>& row : other.law->rows) row[1] *= factor;
+    const LiveData sample_data = live_data(other);
+    laws.push_back({sample_data.theta, sample_data.law});
+  }
+  write_file(folder / "pressed.html", live_page(pressed, presses, laws));
   Model one = test::block(false);
   one.cell_size = 0.5;
   write_file(folder / "one.html", live_page(one));
   std::string broken = page;
-  const std::string data = "<script id=\"data\" type=\"text/plain\">";
-  broken.erase(broken.find(data) + data.size() + 400, 2000);
+  const std::string head = "<script id=\"data\" type=\"text/plain\">";
+  broken.erase(broken.find(head) + head.size() + 400, 2000);
   write_file(folder / "broken.html", broken);
 }

@@ -194,6 +194,72 @@ def wind_and_colours(browser, folder):
     return "wind moves a held object; stress is coloured"
 
 
+def is_pressed(browser, folder):
+    browser.open(folder / "pressed.html")
+    browser.wait("pliantLive.state && pliantLive.state.settled")
+    assert browser.js("document.getElementById('wind-row').hidden && document.getElementById('run').hidden"), "what moves alone is shown"
+    x, y = browser.js("pliantLive.project([0.06, 0.025, 0])")
+    for kind, name in ((0, "a ball"), (1, "a flat end"), (2, "a rod"), (3, "a glued disc")):
+        browser.js(f"document.getElementById('probe-kind').value = '{kind}'")
+        browser.mouse("mousePressed", x, y)
+        for k in range(1, 11):
+            browser.mouse("mouseMoved", x, y + 4 * k)
+            time.sleep(0.03)
+        browser.wait("pliantLive.state.settled && pliantLive.state.probe[4] < -1e-3")
+        force = browser.js("pliantLive.state.probe")
+        assert force[1] < -0.01, f"{name} presses with {force} N"
+        curve = browser.js("pliantLive.curve.slice()")
+        assert len(curve) > 3 and curve[-1][1] > 0.5 * max(f for _, f in curve), f"{name}: a force-displacement curve {curve}"
+        if kind == 3:
+            for k in range(20):
+                browser.mouse("mouseMoved", x, y + 40 - 4 * k)
+                time.sleep(0.02)
+            browser.wait("pliantLive.state.settled && pliantLive.state.probe[1] > 0.005")
+        browser.mouse("mouseReleased", x, y)
+        browser.wait("pliantLive.state.settled && Math.hypot(...pliantLive.state.probe.slice(0, 3)) === 0")
+    for field in (5, 6):
+        browser.js(f"document.getElementById('field').value = '{field}'; document.getElementById('field').dispatchEvent(new Event('change'))")
+        browser.wait("pliantLive.state.field && document.getElementById('bar').style.display === 'block'")
+        assert browser.js("Math.min(...pliantLive.state.field)") > 0.0
+    browser.wait("pliantLive.frames")
+    return "presses and pulls by four probes, with force, curve, deviation and the modulus under strain"
+
+
+def samples_side_by_side(browser, folder):
+    ends = []
+    for page, count in (("free.html", 3), ("pressed.html", 2)):
+        browser.open(folder / page)
+        browser.wait("pliantLive.frames")
+        browser.js("document.getElementById('aside').value = '2'; document.getElementById('aside').dispatchEvent(new Event('change'))")
+        browser.wait("pliantLive.replays.has(0) && pliantLive.replays.has(1) && pliantLive.copies === 2")
+        assert browser.js("pliantLive.replays.get(0).length") == count
+        apart = browser.js(f"(() => {{ const a = pliantLive.replays.get(0)[{count - 1}], b = pliantLive.replays.get(1)[{count - 1}]; let m = 0; for (let i = 0; i < a.length; ++i) m = Math.max(m, Math.abs(a[i] - b[i])); return m; }})()")
+        assert apart > 1e-5, f"{page}: samples of a fifth or four times the stiffness move alike"
+        browser.wait("document.getElementById('told').textContent.includes('samples 1 to 2')")
+        ends.append(apart)
+    return "samples of the parameters are replayed side by side"
+
+
+def sleeps(browser, folder):
+    """A page behind another tab: time stands still there, and goes on when somebody looks again."""
+    seconds = 60
+    browser.open(folder / "free.html")
+    browser.wait("pliantLive.state && pliantLive.state.time > 0.2")
+    own = next(t["targetId"] for t in browser.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
+    other = browser.call("Target.createTarget", url="about:blank")["targetId"]
+    browser.wait("document.hidden")
+    before = browser.js("pliantLive.state.time")
+    time.sleep(seconds)
+    browser.call("Target.activateTarget", targetId=own)
+    browser.call("Target.closeTarget", targetId=other)
+    browser.wait(f"!document.hidden && pliantLive.state.time > {before} + 0.2")
+    after = browser.js("pliantLive.state.time")
+    assert after - before < 0.2 * seconds, f"{after - before} s passed while nobody looked"
+    assert not browser.js(TROUBLE), browser.js(TROUBLE)
+    assert browser.js("pliantLive.state.positions.every(isFinite)")
+    return f"stands still while {seconds} s pass behind another tab, and goes on"
+
+
 def failures_are_told(browser, folder):
     browser.open(folder / "broken.html")
     browser.wait("document.getElementById('trouble').style.display === 'block'")
@@ -223,7 +289,7 @@ def main():
     subprocess.run([sys.argv[1], folder], check=True)
     browser = Browser()
     try:
-        for test in (moves_as_the_program_does, is_pulled_and_let_go, wind_and_colours, failures_are_told):
+        for test in (moves_as_the_program_does, is_pulled_and_let_go, wind_and_colours, is_pressed, samples_side_by_side, sleeps, failures_are_told):
             print(test(browser, folder), flush=True)
             assert not browser.errors, browser.errors
     finally:

@@ -1,6 +1,7 @@
 #include "live/live_page.hpp"
 
-#include "input_errors.hpp"
+#include <gmock/gmock.h>
+
 #include "support/models.hpp"
 
 namespace pliant::live_page_test {
@@ -12,7 +13,7 @@ using testing::Not;
 TEST(LivePage, IsOneFileThatNeedsNoOther) {
   Model model = test::block(false);
   model.name = "a <block> & more";
-  LiveRecording recording{{1.0, 1.1}, {{Vector3(0, 0, 0)}, {Vector3(1, 0, 0), Vector3(2, 0, 0)}}};
+  LiveRecording recording{{1.0, 1.1}, {}, {{Vector3(0, 0, 0)}, {Vector3(1, 0, 0), Vector3(2, 0, 0)}}};
   const std::string page = live_page(model, recording);
   EXPECT_THAT(page, HasSubstr("<title>a &lt;block> &amp; more"));
   EXPECT_THAT(page, HasSubstr("\"times\":[0,0.1]"));
@@ -23,10 +24,15 @@ TEST(LivePage, IsOneFileThatNeedsNoOther) {
   EXPECT_LT(page.size(), std::size_t(3) << 20);
 }
 
-TEST(LivePage, ModelsOfOtherLawsAreNamed) {
-  Model model = test::block(false);
-  model.law = ModelLaw{"ogden", {"element"}, {}, 0.0};
-  EXPECT_THAT(test::complaint_of([&] { (void)live_page(model); }), HasSubstr("ogden"));
+TEST(LivePage, OfPressesHoldsThem) {
+  LiveRecording recording;
+  recording.presses = {{{0.05, 0.025, 0.0}, 0.01, {0.0, -2.5, 0.0}}};
+  recording.points = {{Vector3(0.05, 0.02, 0.0)}};
+  const std::string page = live_page(test::pressed_block(), recording);
+  EXPECT_THAT(page, HasSubstr("\"pressed\":true"));
+  EXPECT_THAT(page, HasSubstr("\"deviations\":true"));
+  EXPECT_THAT(page, HasSubstr("\"presses\":[2.5]"));
+  EXPECT_THAT(page, HasSubstr("\"gravity\":0,"));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include "geometry/primitives.hpp"
 #include "model/model.hpp"
+#include "support/bodies.hpp"
 
 namespace pliant::test {
 
@@ -19,6 +20,27 @@ inline Model block(bool held) {
   model.scene.planes = {{{0, -0.1, 0}, Vector3::UnitY(), true, 0.5}};
   model.youngs_modulus = 2e5, model.poissons_ratio = 0.3, model.stiffness_damping = 2e-3, model.mass_damping = 0.5;
   model.cell_size = block_edge, model.substeps = 8, model.theta = 0.51;
+  return model;
+}
+
+/// The same block of tetrahedra, held at its low end and pressed: an Ogden law, no frames, no gravity.
+inline Model pressed_block() {
+  Model model = block(true);
+  const auto body = tet_body({0.2, block_edge, block_edge}, {8, 2, 2}, false, 0.0);
+  model.volume.nodes = body->nodes;
+  model.volume.kind = VtuCell::Tetrahedron;
+  model.volume.connectivity = body->connectivity;
+  model.law = ModelLaw{"ogden", {"element", "mu_1", "alpha_1", "nu_1"}, {}, 0.0};
+  for (int e = 0; e < body->element_count(); ++e) {
+    model.law->rows.push_back({double(e), 4000.0, 6.0, 0.3});
+    model.volume.youngs_modulus.push_back(2e5);
+    model.volume.youngs_modulus_std.push_back(2e4);
+    model.volume.poissons_ratio.push_back(0.3);
+    model.volume.fill.push_back(1.0);
+  }
+  model.scene.timing = {};
+  model.scene.world.gravity.reset();
+  model.scene.planes.clear();
   return model;
 }
 

@@ -1,6 +1,6 @@
 // Runs the object. Messages in: commands by name; out: what is to be drawn, as fast as the page takes it.
-let wasm, memory, running = false, speed = 1, field = 0, owed = 0, last = 0, timer = 0, stopped = "", recorded = null;
-let cost = 0, sleeping = false, wants = true;
+let wasm, memory, running = false, speed = 1, field = 0, owed = 0, last = 0, timer = 0, stopped = "";
+let cost = 0, wants = true, pressed = false, changed = true, hidden = false;
 
 const stub = (module) => {
   const imports = {};
@@ -13,43 +13,73 @@ const stub = (module) => {
   return imports;
 };
 const floats = (at, count) => new Float32Array(memory.buffer, at, count).slice();
+const doubles = (at, count) => Array.from(new Float64Array(memory.buffer, at, count));
+const surface = () => floats(wasm.surface(), 3 * wasm.vertex_count());
 
 function report() {
-  const message = { kind: "state", positions: floats(wasm.surface(), 3 * wasm.vertex_count()), time: wasm.time(), running, stopped,
-                    cost, step: wasm.step_length(), energy: wasm.kinetic_energy(), probe: wasm.probe_force() };
+  const message = { kind: "state", positions: surface(), time: wasm.time(), running, stopped, cost, step: wasm.step_length(),
+                    energy: wasm.kinetic_energy(), probe: doubles(wasm.probe(), 6), settled: !!wasm.is_settled() };
   const hand = wasm.hand();
-  if (hand) message.hand = Array.from(new Float64Array(memory.buffer, hand, 9));
+  if (hand) message.hand = doubles(hand, 9);
   if (field) message.field = floats(wasm.field(field), wasm.vertex_count());
   const drops = wasm.drop_count();
   if (drops) message.drops = floats(wasm.drops(), 3 * drops);
   const arrays = [message.positions.buffer];
   if (message.field) arrays.push(message.field.buffer);
-  wants = false;
+  wants = changed = false;
   postMessage(message, arrays);
 }
+const timed = (work) => {
+  const begin = performance.now(), done = work();
+  cost += 0.1 * (performance.now() - begin - cost);
+  return done;
+};
 
-// At most 12 ms of work at once; what cannot be caught up with is given up, and the page says how slow it is.
-function tick() {
+// At most 14 ms of work at once; what cannot be caught up with is given up, and the page says how slow it is.
+function move() {
   const now = performance.now(), since = Math.min(now - last, 50);
   last = now;
-  if (running && !stopped) {
-    const dt = wasm.step_length();
-    owed = Math.min(owed + speed * since / 1e3, 6 * dt + 0.05 * speed);
-    const begin = performance.now();
-    let steps = 0;
-    while (owed >= dt && performance.now() - begin < 14) {
-      if (!wasm.step()) { stopped = "the motion cannot be resolved: nodes leap by several elements within a step"; break; }
-      owed -= dt;
-      ++steps;
-    }
-    if (steps) cost += 0.1 * ((performance.now() - begin) / steps - cost);
-    if (owed >= dt) owed = dt;
+  if (!running || stopped || hidden) return;
+  const dt = wasm.step_length();
+  owed = Math.min(owed + speed * since / 1e3, 6 * dt + 0.05 * speed);
+  while (owed >= dt && performance.now() - now < 14) {
+    if (!timed(() => wasm.step())) { stopped = "the motion cannot be resolved: nodes leap by several elements within a step"; break; }
+    owed -= dt;
   }
-  if (wants) report();
+  if (owed >= dt) owed = dt;
+  changed = true;
+}
+// One equilibrium, where something was moved since the last.
+function lead() {
+  if (wasm.is_settled()) return;
+  stopped = timed(() => wasm.step()) ? "" : "no equilibrium is found any further";
+  changed = true;
+}
+function tick() {
+  pressed ? lead() : move();
+  if (wants && (changed || !pressed)) report();
+}
+const settle = () => { for (let i = 0; i < 200 && !wasm.is_settled(); ++i) if (!wasm.step()) break; };
+
+// What a sample of the parameters makes of the recording: surfaces at the frames' times, or under the presses.
+function replay({ sample, times, presses }) {
+  wasm.set_sample(sample);
+  const frames = [];
+  if (pressed) {
+    for (let i = 0; i < presses; ++i) { wasm.press_as_recorded(i); settle(); frames.push(surface()); }
+  } else {
+    const step = wasm.step_length();
+    wasm.start_as_recorded();
+    for (const t of times) {
+      while (wasm.time() < t - times[0] - 0.5 * step && wasm.step());
+      frames.push(surface());
+    }
+  }
+  postMessage({ kind: "replayed", sample, frames }, frames.map((f) => f.buffer));
 }
 
 const commands = {
-  async load({ module, data }) {
+  async load({ module, data, watched }) {
     const compiled = await WebAssembly.compile(module);
     const instance = await WebAssembly.instantiate(compiled, stub(compiled));
     wasm = instance.exports;
@@ -59,6 +89,8 @@ const commands = {
     const at = wasm.reserve(bytes.length);
     new Uint8Array(memory.buffer, at, bytes.length).set(bytes);
     const nodes = wasm.load();
+    pressed = wasm.step_length() === 0;
+    if (!watched) return;
     postMessage({ kind: "loaded", nodes, elements: wasm.element_count(), vertices: wasm.vertex_count(),
                   triangles: new Int32Array(memory.buffer, wasm.triangles(), 3 * wasm.triangle_count()).slice(), step: wasm.step_length() });
     last = performance.now();
@@ -66,47 +98,41 @@ const commands = {
     timer = setInterval(tick, 4);
   },
   run({ on }) { running = on; stopped = on ? "" : stopped; owed = 0; },
+  // Nobody looks: time stands still until somebody does.
+  hidden({ on }) { hidden = on; owed = 0; },
   speed({ value }) { speed = value; },
   // For one who looks closely, and for tests.
   steps({ count }) {
     for (let i = 0; i < count && !stopped; ++i)
       if (!wasm.step()) stopped = "the motion cannot be resolved";
     report();
-    postMessage({ kind: "stepped", nodes: Array.from(new Float64Array(memory.buffer, wasm.nodes(), 30)), time: wasm.time() });
+    postMessage({ kind: "stepped", nodes: doubles(wasm.nodes(), 30), time: wasm.time() });
   },
   field({ value }) { field = value; report(); },
   reset() { stopped = ""; owed = 0; wasm.reset(); report(); },
-  recorded({ times }) {
-    stopped = "";
-    wasm.start_as_recorded();
-    const frames = [], step = wasm.step_length();
-    for (const t of times) {
-      while (wasm.time() < t - times[0] - 0.5 * step && wasm.step());
-      frames.push(floats(wasm.surface(), 3 * wasm.vertex_count()));
-    }
-    wasm.start_as_recorded();
-    postMessage({ kind: "recorded", frames });
-    report();
-  },
+  replay,
   start() { stopped = ""; wasm.start_as_recorded(); report(); },
-  grab({ triangle, corners, radius, stiffness }) { wasm.grab(triangle, ...corners, radius, stiffness ?? 0); },
+  press({ test }) { stopped = ""; wasm.press_as_recorded(test); changed = true; },
+  grab({ triangle, corners, radius }) { wasm.grab(triangle, ...corners, radius); },
   move({ to }) { wasm.move_hand(...to); },
-  release() { wasm.let_go(); },
+  release() { wasm.let_go(); changed = true; },
+  touch({ kind, triangle, corners, radius, rod }) { wasm.touch(kind, triangle, ...corners, radius, ...rod); },
+  lead({ way }) { wasm.move_probe(...way); },
+  lift() { wasm.lift(); changed = true; },
   gravity({ value }) { wasm.set_gravity(...value); },
   wind({ value, gusts }) { wasm.set_wind(...value, gusts); },
   rain({ rate, diameter }) { wasm.set_rain(rate, diameter); },
-  probe({ from, to, radius }) { wasm.set_probe(...from, ...to, radius); },
   material({ stiffness, damping }) { wasm.set_material(stiffness, damping); },
   push({ value }) { wasm.push(...value); },
   sample({ value }) { wasm.set_sample(value); },
   shown() { wants = true; },
 };
-onmessage = async ({ data }) => {
-  try {
-    await commands[data.name](data);
-  } catch (error) {
+// One after the other: what is asked while the module is loaded waits for it.
+let queue = Promise.resolve();
+onmessage = ({ data }) => {
+  queue = queue.then(() => commands[data.name](data)).catch((error) => {
     stopped = String(error.message ?? error);
     clearInterval(timer);
     postMessage({ kind: "broken", text: stopped });
-  }
+  });
 };
