@@ -46,6 +46,7 @@ VectorX theta_of(const SyntheticScene& synthetic, const MotionLayout& blocks) {
   theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
   theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
   set_planes(scene.planes, blocks, theta);
+  set_loads(scene, blocks, theta);
   return theta;
 }
 
@@ -53,7 +54,8 @@ SimulationOptions options_of(const SyntheticScene& synthetic, const MotionBlocks
   const Scene& scene = synthetic.scene;
   SimulationOptions options;
   const Timing& timing = scene.timing;
-  for (int i = 0; i < timing.frame_count() - timing.start_frame; ++i) options.times.push_back(i / timing.frame_rate);
+  for (int i = 0; i < timing.frame_count() - timing.start_frame; ++i)
+    options.times.push_back(timing.times[std::size_t(timing.start_frame + i)]);
   options.max_dt = 1.0 / (timing.frame_rate * synthetic.substeps);
   options.newmark_theta = synthetic.newmark_theta;
   if (synthetic.is_corotated) options.elastic_law = ElasticLaw::Corotated;
@@ -66,6 +68,7 @@ SimulationOptions options_of(const SyntheticScene& synthetic, const MotionBlocks
   options.holds = held_regions(scene);
   for (const Weight& weight : scene.weights) options.weights.push_back({weight.at, weight.mass});
   if (const auto& weight = scene.initial.release_of) options.released_weights.push_back({weight->at, weight->mass});
+  add_loads(scene, options);
   return options;
 }
 
@@ -75,8 +78,9 @@ std::vector<Points> simulate(const SyntheticScene& synthetic) {
   const TriangleMesh& surface = *synthetic.scene.object.surface;
   const Embedding embedding(*body, surface.vertices);
   std::vector<Points> frames(size_t(timing.start_frame), vertex_points(surface));
-  const MotionLayout blocks(
-      {.moduli = 1 + int(synthetic.region_moduli.size()), .planes = int(synthetic.scene.planes.size())});
+  MotionCounts counts = load_counts(synthetic.scene);
+  counts.moduli = 1 + int(synthetic.region_moduli.size());
+  const MotionLayout blocks(counts);
   Simulation simulation(body, options_of(synthetic, blocks, *body));
   const auto on_frame = [&](int, const State& state, std::span<const State>) {
     frames.push_back(embedding.positions(state.x));

@@ -49,6 +49,8 @@ void check_noise(RuleContext&);
 void check_has_observations(RuleContext&);
 void check_presses(RuleContext&);
 void check_weights(RuleContext&);
+void check_wind(RuleContext&);
+void check_applied_forces(RuleContext&);
 void check_loads(RuleContext&);
 void check_indentations(RuleContext&);
 void check_grips(RuleContext&);

@@ -327,6 +327,31 @@ void check_weights(RuleContext& context) {
   }
 }
 
+void check_wind(RuleContext& context) {
+  const Scene& scene = context.capture.scene;
+  if (!scene.wind || !context.toml.is_sound("wind")) return;
+  if (scene.timing.is_static || scene.timing.times.empty())
+    context.toml.complain("wind", "a wind in a recording at rest", "frames of an object that moves",
+                          "its drag is that of a motion; remove [wind]");
+  if (scene.wind->velocity.norm() > fastest)
+    context.toml.complain("wind.velocity", text_of(scene.wind->velocity.norm(), "m/s"),
+                          "up to " + text_of(fastest, "m/s"), "velocities are in metres a second");
+}
+
+void check_applied_forces(RuleContext& context) {
+  const std::vector<AppliedForce>& forces = context.capture.scene.forces;
+  for (std::size_t i = 0; i < forces.size(); ++i) {
+    if (!context.toml.is_sound(item("force", i))) continue;
+    double greatest = 0.0;
+    for (const auto& key : forces[i].force) greatest = std::max(greatest, key.value.norm());
+    if (!(greatest > 0.0) || greatest > greatest_force)
+      context.toml.complain(item("force", i), "a force of " + text_of(greatest, "N"),
+                            "above 0 and at most " + text_of(greatest_force, "N"),
+                            "write a guess where its strength is not known, and `known = false`");
+    complain_off_surface(context, item("force", i, "at"), forces[i].at);
+  }
+}
+
 void check_release(RuleContext& context) {
   const Capture& capture = context.capture;
   const auto& weight = capture.scene.initial.release_of;

@@ -161,6 +161,8 @@ std::vector<Rule> make_rules() {
           check_has_observations,
           check_presses,
           check_weights,
+          check_wind,
+          check_applied_forces,
           check_release,
           check_loads,
           check_indentations,

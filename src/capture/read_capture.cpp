@@ -59,6 +59,8 @@ class Reader {
     root.each_block("region", [&](TomlTable& block) { scene.regions.push_back(read_material_region(block, files_)); });
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
+    root.with_table("wind", [&](TomlTable& wind) { scene.wind = read_wind(wind, true); });
+    root.each_block("force", [&](TomlTable& block) { scene.forces.push_back(read_force(block, true)); });
     root.with_table("initial", [&](TomlTable& initial) { scene.initial = read_initial(initial); });
   }
 

@@ -15,6 +15,7 @@ constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: 
 constexpr double gravity_guess = 9.81;
 constexpr double contact_std = 1.2;       // of the logarithm of its stiffness: a board, a carpet, a furry skin
 constexpr double hardest_contact = 2.0;   // times that which is as good as rigid: beyond, motions are erratic
+constexpr double least_wind = 1.0;        // [m/s], scale of one that is not known
 constexpr double range_error_std = 0.02;  // [m], of light that enters a translucent material
 
 /// Whether forces are known, which fix the absolute scale of stiffness: a weight that is let go, or weights that hang
@@ -133,10 +134,9 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
 
   ParameterLayout layout;
   CaptureBlocks blocks;
-  blocks.motion = add_motion_blocks(
-      layout,
-      {.moduli = controls, .planes = int(capture.scene.planes.size()), .pulls = pulls, .scan_corrections = shapes},
-      modulus_names(capture, controls));
+  MotionCounts counts = load_counts(capture.scene);
+  counts.moduli = controls, counts.pulls = pulls, counts.scan_corrections = shapes;
+  blocks.motion = add_motion_blocks(layout, counts, modulus_names(capture, controls));
   for (const std::string& sensor : sensor_names(capture)) blocks.sensors.push_back(add_sensor_blocks(layout, sensor));
   const MotionBlocks& m = blocks.motion;
   if (law) blocks.law = LawLayout::of_motion(layout, m, *law);
@@ -191,6 +191,15 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
                        hardest_contact * theta[m.contact_stiffness], std::log(theta[m.contact_stiffness]), contact_std,
                        !capture.scene.timing.is_static));
   }
+  set_loads(capture.scene, m, theta);
+  if (m.wind.exists()) {
+    const Vector3 guess = m.wind.vector(theta);
+    const double scale = std::max(least_wind, guess.norm());
+    p.push_back(vector(layout, m.wind, scale, guess / scale, 1.0, !capture.scene.wind->known));
+  }
+  for (std::size_t k = 0; k < m.strengths.size(); ++k)
+    p.push_back(
+        scalar(layout, m.strengths[k], Transform::Logarithm, 1e-3, 1e3, 0.0, 1.5, !capture.scene.forces[k].known));
   for (std::size_t k = 0; k < m.pulls.size(); ++k) {
     if (k < capture.scene.initial.pulls.size()) theta.segment<3>(m.pulls[k]) = capture.scene.initial.pulls[k];
     p.push_back(vector(layout, m.pulls[k], 1.0, Vector3::Zero(), 0.5, true));

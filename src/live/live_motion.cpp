@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "elasticity/law_layout.hpp"
 #include "motion/contact_samples.hpp"
@@ -72,7 +73,12 @@ LiveMotion::LiveMotion(LiveData data) : LiveObject(std::move(data)), blocks_(liv
 }
 
 void LiveMotion::build() {
-  std::vector<std::unique_ptr<ForceTerm>> terms = scene_forces(body_, options_);
+  SimulationOptions options = options_;
+  if (pace_ > 1.0) {
+    options.contact.stiffness /= pace_ * pace_, options.contact.smoothing *= pace_;
+    options.solver.tolerance = 1e-4;
+  }
+  std::vector<std::unique_ptr<ForceTerm>> terms = scene_forces(body_, options);
   const auto add = [&](ForceTerm::Lag lag, ForceTerm::At at) {
     auto slot = std::make_unique<Slot>(lag, at);
     Slot* const there = slot.get();
@@ -86,8 +92,8 @@ void LiveMotion::build() {
   hand_slot_->force = grip_, wind_slot_->force = blowing_, rain_slot_->force = rain_, probe_slot_->force = probe_;
   stepper_ =
       std::make_unique<Stepper>(body_, std::move(terms), options_.blocks,
-                                StepOptions{options_.max_dt, options_.newmark_theta, options_.contact_weight,
-                                            options_.rotation_prediction, options_.stiffness_damping, options_.solver,
+                                StepOptions{step_length(), options_.newmark_theta, options_.contact_weight,
+                                            options_.rotation_prediction, options_.stiffness_damping, options.solver,
                                             options_.law ? Integrator::Newton : Integrator::Lagged, options_.newton});
   stepper_->hold(eliminated_nodes(*body_, options_));
   if (!options_.weights.empty()) {
@@ -105,6 +111,7 @@ void LiveMotion::apply_parameters() {
   theta_[blocks_.stiffness_damping] *= damping_;
   theta_.segment<3>(blocks_.gravity) = gravity_;
   theta_.segment<3>(blocks_.wind) = wind_;
+  if (blocks_.contact_stiffness.exists()) theta_[blocks_.contact_stiffness] /= pace_ * pace_;
   stepper_->set_parameters(theta_);
 }
 
@@ -135,7 +142,7 @@ bool LiveMotion::take(double dt) {
   const double surprise =
       is_taken ? 0.5 * std::sqrt((delta_ - dt * state_.v).rowwise().squaredNorm().maxCoeff()) / element_edge_
                : infinite;
-  const double shortest = std::ldexp(options_.max_dt, -options_.most_halvings);
+  const double shortest = std::ldexp(step_length(), -options_.most_halvings);
   if (surprise > too_long && 0.5 * dt >= (1.0 - 1e-9) * shortest) return take(0.5 * dt) && take(0.5 * dt);
   if (surprise > explosion) return false;
   stepper_->advance(delta_, state_);
@@ -147,7 +154,7 @@ bool LiveMotion::step() {
   hand_slot_->force = grip_;
   const State before = state_;
   const double then = time_;
-  const bool is_taken = take(options_.max_dt);
+  const bool is_taken = take(step_length());
   if (!is_taken) {
     state_ = before, time_ = then;
     state_.v.setZero();
@@ -229,6 +236,13 @@ void LiveMotion::lift() {
   probe_slot_->force.reset();
   probe_force_.setZero();
   probe_way_.setZero();
+}
+
+void LiveMotion::set_pace(double factor) {
+  if (!(factor >= 1.0)) throw std::invalid_argument("a pace is at least that of the fit");
+  if (factor == pace_) return;
+  pace_ = factor;
+  build();
 }
 
 void LiveMotion::set_law() {

@@ -17,7 +17,11 @@ class LiveMotion : public LiveObject {
   const State& state() const { return state_; }
   const Points& nodes() const override { return state_.x; }
   double time() const { return time_; }
-  double step_length() const { return options_.max_dt; }
+  /// Of a step [s]: that of the fit times the pace.
+  double step_length() const { return pace_ * options_.max_dt; }
+  /// Steps so many times as long as the fit's, >= 1, for a page that shall keep up with time: contact gets as much
+  /// softer as they resolve, and a ten-thousandth of the linear residual is left. 1: as the program steps.
+  void set_pace(double factor);
 
   /// At rest where it was scanned, or, where something is held, in equilibrium.
   void reset() override;
@@ -71,7 +75,7 @@ class LiveMotion : public LiveObject {
   double time_ = 0.0, element_edge_ = 0.0;
   VectorX theta_;
   int sample_ = -1;
-  double stiffness_ = 1.0, damping_ = 1.0;
+  double stiffness_ = 1.0, damping_ = 1.0, pace_ = 1.0;
   Vector3 gravity_ = Vector3::Zero(), wind_ = Vector3::Zero(), probe_force_ = Vector3::Zero();
   Vector3 probe_way_ = Vector3::Zero();
   std::shared_ptr<LedSprings> grip_;

@@ -108,9 +108,9 @@ LiveData live_data(const Model& model) {
   Model free = model;
   free.scene.initial.released = false;
   free.scene.initial.release_of.reset();
+  free.scene.wind.reset(), free.scene.forces.clear();  // hands and sliders take their place
   if (free.scene.timing.times.empty() || free.scene.timing.is_static) free.scene.timing = evenly_timed(30.0, 2);
-  const ModelScene made =
-      make_scene(free, free.scene, scene_distance(free.scene, Resolution{}.band), {}, {.wind = true});
+  const ModelScene made = make_scene(free, free.scene, scene_distance(free.scene, Resolution{}.band), {}, true);
   LiveData data;
   data.mesh = made.body->mesh;
   data.relative_moduli = made.body->modulus.relative;

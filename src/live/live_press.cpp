@@ -24,8 +24,8 @@ void LivePress::set_law() {
 void LivePress::begin() {
   PressSessionOptions options;
   options.held = held_;
-  // Small ways from the last equilibrium: what takes longer is tried by half the way.
-  options.equilibrium.max_iterations = 20, options.equilibrium.max_halvings = 2;
+  // As exact as a picture and a curve show it; what is not followed at once is tried by half the way (`step`).
+  options.equilibrium.tolerance = 1e-5, options.equilibrium.max_iterations = 15, options.equilibrium.max_halvings = 0;
   if (!gravity_.isZero())
     options.dead_load = weight_of(*body_, data_.theta[live_blocks(data_.planes).density], gravity_);
   const Points nodes = session_ ? session_->nodes() : body_->nodes;

@@ -161,6 +161,8 @@ class Reader {
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
     root.each_block("fixed", [&](TomlTable& block) { scene.fixed.push_back(read_fixed(block, files_)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
+    root.with_table("wind", [&](TomlTable& wind) { scene.wind = read_wind(wind, false); });
+    root.each_block("force", [&](TomlTable& block) { scene.forces.push_back(read_force(block, false)); });
     check_vertex_lists(context_, scene);
   }
 

@@ -2,7 +2,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
-#include "motion/key_frames.hpp"
+#include "geometry/key_frames.hpp"
 #include "parameters/motion_blocks.hpp"
 
 namespace pliant {

@@ -4,8 +4,8 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "geometry/key_frames.hpp"
 #include "motion/body_forces.hpp"
-#include "motion/key_frames.hpp"
 
 namespace pliant {
 

@@ -6,8 +6,8 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "geometry/key_frames.hpp"
 #include "motion/contact_samples.hpp"
-#include "motion/key_frames.hpp"
 #include "motion/penalty.hpp"
 #include "motion/rigid_shape.hpp"
 #include "parameters/motion_blocks.hpp"

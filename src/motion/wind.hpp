@@ -6,8 +6,8 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "geometry/key_frames.hpp"
 #include "geometry/triangle_mesh.hpp"
-#include "motion/key_frames.hpp"
 #include "parameters/layout.hpp"
 
 namespace pliant {

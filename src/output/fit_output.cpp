@@ -464,6 +464,16 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   for (Plane& plane : scene.planes) plane.known = true;
   scene.fixed = capture.scene.fixed;
   scene.weights = capture.scene.weights;
+  scene.wind = capture.scene.wind, scene.forces = capture.scene.forces;
+  if (scene.wind) {
+    const Vector3 change = blocks.wind.vector(t) - scene.wind->velocity;
+    scene.wind->velocity += change, scene.wind->known = true;
+    for (auto& key : scene.wind->over_time) key.value += change;
+  }
+  for (std::size_t k = 0; k < scene.forces.size(); ++k) {
+    scene.forces[k].known = true;
+    for (auto& key : scene.forces[k].force) key.value *= t[blocks.strengths[k]];
+  }
   scene.initial = capture.scene.initial;
   scene.initial.linear_velocity = blocks.linear_velocity.vector(t);
   scene.initial.angular_velocity = blocks.angular_velocity.vector(t);

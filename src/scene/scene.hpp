@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "base/types.hpp"
 #include "geometry/camera.hpp"
+#include "geometry/key_frames.hpp"
 #include "geometry/triangle_mesh.hpp"
 #include "geometry/volume_mesh.hpp"
 
@@ -71,6 +73,25 @@ struct Weight {
   bool operator==(const Weight&) const = default;
 };
 
+/// A wind with its turbulence. Times are those of the frames.
+struct WindFacts {
+  Vector3 velocity = Vector3::Zero();              ///< mean [m/s]
+  std::vector<KeyFrames<3>::Key> over_time;        ///< in the place of the mean; empty: it stays
+  bool known = true;                               ///< false: the velocity is a guess, to be estimated
+  double gust_intensity = 0.0, gust_length = 5.0;  ///< [-], [m]
+  std::uint64_t seed = 1;
+  double delay = 0.0;                                         ///< [s] by which its time runs ahead
+  double air_density = 1.2, normal = 1.2, tangential = 0.02;  ///< see `WindOptions`
+};
+
+/// A force on a patch of the object.
+struct AppliedForce {
+  Vector3 at = Vector3::Zero();          ///< on the surface at rest [m]
+  double radius = 0.0;                   ///< of the patch [m]
+  std::vector<KeyFrames<3>::Key> force;  ///< [N] over the frames' time
+  bool known = true;                     ///< false: how strong it is is a guess, to be estimated
+};
+
 /// Motion of the object at the start frame.
 struct Initial {
   Vector3 linear_velocity = Vector3::Zero();   ///< [m/s], of the centre of mass
@@ -129,6 +150,8 @@ struct Scene {
   std::vector<MaterialRegion> regions;
   std::vector<Plane> planes;
   std::vector<Weight> weights;  ///< that hang in every frame
+  std::optional<WindFacts> wind;
+  std::vector<AppliedForce> forces;
   Initial initial;
 };
 

@@ -274,6 +274,67 @@ Weight read_weight(TomlTable& block) {
   return weight;
 }
 
+void check_key_times(TomlTable& owner, const std::string& name, const std::vector<double>& times) {
+  for (std::size_t k = 1; k < times.size(); ++k)
+    if (!(times[k] > times[k - 1])) {
+      owner.context().complain(owner.key_of(name) + fmt::format("[{}].time", k),
+                               fmt::format("{} s after {} s", times[k], times[k - 1]),
+                               "times that increase from key to key", "put the keys in order");
+      return;
+    }
+}
+
+std::vector<KeyFrames<3>::Key> read_key_frames(TomlTable& owner, const std::string& name, const std::string& value) {
+  std::vector<KeyFrames<3>::Key> keys;
+  std::vector<double> times;
+  owner.each_block(name, [&](TomlTable& block) {
+    times.push_back(read_number(block, "time", {.meaning = "a time in seconds"}));
+    keys.push_back({times.back(), block.required<Vector3>(value).value_or(Vector3::Zero())});
+  });
+  check_key_times(owner, name, times);
+  return keys;
+}
+
+void read_patch(TomlTable& table, Vector3& at, double& radius) {
+  at = table.required<Vector3>("at", "a point of the surface at rest").value_or(Vector3::Zero());
+  radius = read_number(table, "radius", {.low = 0.0, .meaning = "a length in metres"}, 0.0);
+}
+
+WindFacts read_wind(TomlTable& table, bool may_be_unknown) {
+  WindFacts wind;
+  wind.over_time = read_key_frames(table, "over_time", "velocity");
+  if (wind.over_time.empty())
+    wind.velocity = table.required<Vector3>("velocity", "of the air, in metres a second").value_or(Vector3::Zero());
+  else
+    for (const auto& key : wind.over_time) wind.velocity += key.value / double(wind.over_time.size());
+  if (may_be_unknown) wind.known = table.optional<bool>("known").value_or(true);
+  wind.air_density =
+      read_number(table, "air_density", {.low = 0.0, .high = 2000.0, .low_allowed = false, .meaning = "in kg/m^3"},
+                  wind.air_density);
+  wind.normal = read_number(table, "normal", {.low = 0.0, .high = 10.0, .meaning = "a drag coefficient"}, wind.normal);
+  wind.tangential = read_number(table, "tangential", {.low = 0.0, .high = 10.0, .meaning = "a friction coefficient"},
+                                wind.tangential);
+  table.with_table("gusts", [&](TomlTable& gusts) {
+    wind.gust_intensity = read_number(
+        gusts, "intensity", {.low = 0.0, .high = 1.0, .meaning = "standard deviation of the speed over its mean"}, 0.2);
+    wind.gust_length = read_number(gusts, "length", {.low = 0.0, .low_allowed = false, .meaning = "a length in metres"},
+                                   wind.gust_length);
+    wind.seed = std::uint64_t(read_count(gusts, "seed", 0, 2'000'000'000, 1));
+  });
+  return wind;
+}
+
+AppliedForce read_force(TomlTable& block, bool may_be_unknown) {
+  AppliedForce force;
+  read_patch(block, force.at, force.radius);
+  force.force = read_key_frames(block, "over_time", "force");
+  if (force.force.empty())
+    force.force = {
+        {0.0, block.required<Vector3>("force", "in newtons, or blocks `over_time`").value_or(Vector3::Zero())}};
+  if (may_be_unknown) force.known = block.optional<bool>("known").value_or(true);
+  return force;
+}
+
 Initial read_initial(TomlTable& table, bool may_pull) {
   Initial initial;
   initial.linear_velocity = table.optional<Vector3>("linear_velocity").value_or(Vector3::Zero());
@@ -327,6 +388,45 @@ void write_toml(std::ostream& out, const Weight& weight) {
       << "   # kg, attached point mass\nat = " << toml_text(weight.at) << "   # m, on the rest surface\n\n";
 }
 
+namespace {
+
+void write_key_frames(std::ostream& out, const std::vector<KeyFrames<3>::Key>& keys, const char* value) {
+  out << "over_time = [";
+  for (std::size_t k = 0; k < keys.size(); ++k)
+    out << (k > 0 ? ", " : " ") << "{ time = " << toml_text(keys[k].time) << ", " << value << " = "
+        << toml_text(keys[k].value) << " }";
+  out << " ]\n";
+}
+
+}  // namespace
+
+void write_toml(std::ostream& out, const WindFacts& wind) {
+  out << "[wind]\n";
+  if (wind.over_time.empty())
+    out << "velocity = " << toml_text(wind.velocity) << "   # m/s\n";
+  else
+    write_key_frames(out, wind.over_time, "velocity");
+  if (!wind.known) out << "known = false\n";
+  out << "air_density = " << toml_text(wind.air_density) << "   # kg/m^3\nnormal = " << toml_text(wind.normal)
+      << "   # drag coefficient of a plate across it\ntangential = " << toml_text(wind.tangential)
+      << "   # friction coefficient of a surface along it\n";
+  if (wind.gust_intensity > 0.0)
+    out << "gusts = { intensity = " << toml_text(wind.gust_intensity) << ", length = " << toml_text(wind.gust_length)
+        << ", seed = " << wind.seed << " }\n";
+  out << "\n";
+}
+
+void write_toml(std::ostream& out, const AppliedForce& force) {
+  out << "[[force]]\nat = " << toml_text(force.at)
+      << "   # m, on the rest surface\nradius = " << toml_text(force.radius) << "   # m, of the patch\n";
+  if (force.force.size() == 1)
+    out << "force = " << toml_text(force.force.front().value) << "   # N\n";
+  else
+    write_key_frames(out, force.force, "force");
+  if (!force.known) out << "known = false\n";
+  out << "\n";
+}
+
 void write_toml(std::ostream& out, const Initial& initial) {
   out << "[initial]\nlinear_velocity = " << toml_text(initial.linear_velocity)
       << "   # m/s, of the centre of mass\nangular_velocity = " << toml_text(initial.angular_velocity)
@@ -361,6 +461,8 @@ void write_toml_blocks(std::ostream& out, const Scene& scene) {
     out << "[[region]]\nname = " << toml_text(scene.regions[i].name) << "\n"
         << region_text(scene.regions[i].region, vertices_name("region", i)) << "\n";
   for (const Weight& weight : scene.weights) write_toml(out, weight);
+  for (const AppliedForce& force : scene.forces) write_toml(out, force);
+  if (scene.wind) write_toml(out, *scene.wind);
 }
 
 void write_scene_files(const fs::path& folder, const Scene& scene) {

@@ -41,6 +41,17 @@ MaterialRegion read_material_region(TomlTable& block, const NamedFiles& files);
 Plane read_plane(TomlTable& block);
 Weight read_weight(TomlTable& block);
 
+/// Keys of one vector over time, such as [ { time = 0, force = [0, 1, 0] } ].
+/// @param value  the vector's name in each: "force"
+std::vector<KeyFrames<3>::Key> read_key_frames(TomlTable& owner, const std::string& name, const std::string& value);
+/// Complains where times [s] of a list of keys do not increase.
+void check_key_times(TomlTable& owner, const std::string& name, const std::vector<double>& times);
+/// Keys `at` and `radius` of a patch of the surface at rest [m].
+void read_patch(TomlTable& table, Vector3& at, double& radius);
+/// Table [wind], blocks [[force]]. @param may_be_unknown  whether the format has the key `known`
+WindFacts read_wind(TomlTable& table, bool may_be_unknown);
+AppliedForce read_force(TomlTable& block, bool may_be_unknown);
+
 /// Table [initial]. @param may_pull  whether the format has the key `pulls`
 Initial read_initial(TomlTable& table, bool may_pull = false);
 
@@ -51,6 +62,8 @@ void write_toml(std::ostream& out, const Timing& timing);
 void write_toml(std::ostream& out, const Initial& initial);
 void write_toml(std::ostream& out, const Plane& plane);
 void write_toml(std::ostream& out, const Weight& weight);
+void write_toml(std::ostream& out, const WindFacts& wind);
+void write_toml(std::ostream& out, const AppliedForce& force);
 
 /// Table [object]. @param file  path of the surface or volume mesh as it shall be written; empty: of neither
 void write_toml(std::ostream& out, const Object& object, const std::string& file);
@@ -60,7 +73,7 @@ void write_region(std::ostream& out, const Region& region, const std::string& ve
 /// Writes that file where the region is a list of vertices. Throws InputError where it cannot be written.
 void write_region_file(const std::filesystem::path& file, const Region& region);
 
-/// Blocks [[plane]], [[fixed]], [[region]] and [[weight]] of a scene.
+/// Blocks [[plane]], [[fixed]], [[region]], [[weight]] and [[force]], and the table [wind] of a scene.
 void write_toml_blocks(std::ostream& out, const Scene& scene);
 
 /// Writes what the text refers to and the value itself holds: `fixed_0.txt`, `region_0.txt`, ... with the vertices of a

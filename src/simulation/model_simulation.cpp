@@ -24,6 +24,7 @@ VectorX model_theta(const Model& model, const Scene& scene, const Vector3& gravi
   theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
   theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
   set_planes(scene.planes, blocks, theta);
+  set_loads(scene, blocks, theta);
   return theta;
 }
 
@@ -91,7 +92,7 @@ ModelScene make_scene(const Model& model) {
 }
 
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
-                      const std::filesystem::path& file, const MotionCounts& further) {
+                      const std::filesystem::path& file, bool has_wind) {
   Scene scene = situation;
   if (scene.initial.released && !scene.initial.release_of && scene.initial.pulls.empty()) {
     if (model.scene.initial.pulls.empty())
@@ -103,8 +104,8 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
   }
   const Vector3 gravity = scene.world.gravity.value_or(model.scene.world.gravity.value_or(-9.81 * scene.world.up));
   ModelScene made;
-  MotionCounts counts = further;
-  counts.planes = int(scene.planes.size());
+  MotionCounts counts = load_counts(scene);
+  counts.wind = counts.wind || has_wind;
   counts.pulls = int(scene.initial.pulls.size());
   const MotionLayout blocks(counts);
   made.layout = blocks.layout();

@@ -23,10 +23,10 @@ ModelScene make_scene(const Model& model);
 /// A model's material in another situation, on a grid as fine as the model's.
 /// @param distance  of the situation's surface, as `scene_distance` makes it
 /// @param file      that the situation was read from, for complaints
-/// @param further   whether the parameters have a wind, and how many strengths; both zero
+/// @param has_wind  the parameters have a wind also where there is none
 /// Throws InputError where the object is released from a pose that neither knows.
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
-                      const std::filesystem::path& file, const MotionCounts& further = {});
+                      const std::filesystem::path& file, bool has_wind = false);
 
 /// The body of a model as tetrahedra, with each element's modulus: its own, or, where the model is of hexahedra,
 /// quadratic ones with about as many nodes along its longest axis, each with the modulus of the hexahedron about it.

@@ -7,6 +7,8 @@
 #include <optional>
 
 #include "meshing/mesh_distance.hpp"
+#include "motion/patch_forces.hpp"
+#include "motion/wind.hpp"
 #include "scene/region.hpp"
 
 namespace pliant {
@@ -204,6 +206,51 @@ void set_planes(const std::vector<Plane>& planes, const MotionBlocks& blocks, Ve
   }
 }
 
+namespace {
+
+/// Changes from the first key on.
+KeyFrames<3> changes(std::vector<KeyFrames<3>::Key> keys, const Vector3& from) {
+  if (keys.empty()) return {};
+  for (auto& key : keys) key.value -= from;
+  return KeyFrames<3>(std::move(keys));
+}
+
+}  // namespace
+
+void add_loads(const Scene& scene, SimulationOptions& simulation) {
+  const MotionBlocks& blocks = simulation.blocks;
+  if (const auto& wind = scene.wind; wind && blocks.wind.exists()) {
+    WindOptions options;
+    options.air_density = wind->air_density, options.normal = wind->normal, options.tangential = wind->tangential;
+    options.change = changes(wind->over_time, wind->velocity);
+    options.gusts = Gusts(wind->velocity, scene.world.up, wind->gust_intensity, wind->gust_length, wind->seed);
+    options.delay = wind->delay;
+    simulation.further_forces.push_back(
+        [surface = *scene.object.surface, options, at = blocks.wind](const auto& body) -> std::unique_ptr<ForceTerm> {
+          return std::make_unique<Wind>(*body, surface, options, at);
+        });
+  }
+  for (std::size_t k = 0; k < blocks.strengths.size(); ++k)
+    simulation.further_forces.push_back(
+        [force = scene.forces[k], at = blocks.strengths[k]](const auto& body) -> std::unique_ptr<ForceTerm> {
+          return std::make_unique<PatchLoad>(*body, surface_patch(*body, force.at, force.radius),
+                                             KeyFrames<3>(force.force), at);
+        });
+}
+
+void set_loads(const Scene& scene, const MotionBlocks& blocks, VectorX& theta) {
+  if (scene.wind && blocks.wind.exists()) theta.segment<3>(blocks.wind) = scene.wind->velocity;
+  for (const ParameterHandle& strength : blocks.strengths) theta[strength] = 1.0;
+}
+
+MotionCounts load_counts(const Scene& scene) {
+  MotionCounts counts;
+  counts.planes = int(scene.planes.size());
+  counts.wind = scene.wind.has_value();
+  counts.strengths = int(scene.forces.size());
+  return counts;
+}
+
 SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
                                   const MotionBlocks& blocks, const VectorX& theta, const SimulationOptions& settings) {
   SimulationOptions simulation = settings;
@@ -226,6 +273,7 @@ SimulationOptions make_simulation(const Scene& scene, const Body& body, const Re
   simulation.pull_points = pull_points(scene, int(blocks.pulls.size()));
   simulation.shape = shape_field(scene, resolution);
   simulation.holds = held_regions(scene);
+  add_loads(scene, simulation);
   return simulation;
 }
 

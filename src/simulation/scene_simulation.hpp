@@ -77,8 +77,16 @@ int pull_count(const Scene& scene, const Resolution& resolution);
 /// Puts a scene's planes into a parameter vector: places and coefficients of friction.
 void set_planes(const std::vector<Plane>& planes, const MotionBlocks& blocks, VectorX& theta);
 
+/// Blocks of a motion's parameters that a scene's planes, wind and forces need.
+MotionCounts load_counts(const Scene& scene);
+/// Puts a scene's wind into a parameter vector, and strengths of one for its forces.
+void set_loads(const Scene& scene, const MotionBlocks& blocks, VectorX& theta);
+/// The scene's wind and forces as force terms, after those that the options have.
+/// @param simulation  whose blocks are those of the scene (`load_counts`)
+void add_loads(const Scene& scene, SimulationOptions& simulation);
+
 /// How a body moves in a scene: its instants and time step, what it touches, what holds and loads it.
-/// @param blocks    of the motion's parameters, with the scene's planes
+/// @param blocks    of the motion's parameters, with the scene's planes, wind and forces
 /// @param theta     by those blocks; its density and gravity scale contact
 /// @param settings  what the scene does not say
 SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,

@@ -6,33 +6,16 @@
 #include <variant>
 #include <vector>
 
+#include "geometry/key_frames.hpp"
 #include "geometry/triangle_mesh.hpp"
 #include "motion/contact_defaults.hpp"
-#include "motion/key_frames.hpp"
 #include "motion/rain.hpp"
-#include "motion/wind.hpp"
 #include "scene/scene.hpp"
 
 // What happens to a model: a situation other than that of its recording (docs/formats.md, `situation/1`). SI units, the
 // model's world.
 
 namespace pliant {
-
-/// A wind with its turbulence.
-struct WindFacts {
-  Vector3 velocity = Vector3::Zero();              ///< mean [m/s]
-  std::vector<KeyFrames<3>::Key> over_time;        ///< in the place of the mean; empty: it stays
-  double gust_intensity = 0.0, gust_length = 5.0;  ///< [-], [m]
-  std::uint64_t seed = 1;
-  double air_density = 1.2, normal = 1.2, tangential = 0.02;  ///< see `WindOptions`
-};
-
-/// A force on a patch of the object.
-struct AppliedForce {
-  Vector3 at = Vector3::Zero();          ///< on the surface at rest [m]
-  double radius = 0.0;                   ///< of the patch [m]
-  std::vector<KeyFrames<3>::Key> force;  ///< [N] over time
-};
 
 /// A hand that takes the object at a point and leads it there on a spring.
 struct Hand {

@@ -13,7 +13,6 @@
 #include "motion/patch_forces.hpp"
 #include "motion/rain.hpp"
 #include "motion/rigid_contact.hpp"
-#include "motion/wind.hpp"
 #include "simulation/scene_simulation.hpp"
 
 namespace pliant {
@@ -25,15 +24,6 @@ KeyFrames<3> changes(std::vector<KeyFrames<3>::Key> keys, const Vector3& from) {
   if (keys.empty()) return {};
   for (auto& key : keys) key.value -= from;
   return KeyFrames<3>(std::move(keys));
-}
-
-WindOptions wind_options(const WindFacts& wind, const Vector3& up, double delay) {
-  WindOptions options;
-  options.air_density = wind.air_density, options.normal = wind.normal, options.tangential = wind.tangential;
-  options.change = changes(wind.over_time, wind.velocity);
-  options.gusts = Gusts(wind.velocity, up, wind.gust_intensity, wind.gust_length, wind.seed);
-  options.delay = delay;
-  return options;
 }
 
 }  // namespace
@@ -116,17 +106,13 @@ SituationScene make_scene(const Model& model, const Situation& situation, int co
   for (const AppliedForce& force : situation.forces) check_place(situation, scene, "force", force.at, force.radius);
   for (const Hand& hand : situation.hands) check_place(situation, scene, "hand", hand.at, hand.radius);
 
-  MotionCounts counts;
-  counts.wind = situation.wind.has_value();
-  counts.strengths = int(situation.forces.size());
+  const double delay = copy > 0 ? situation.copies[std::size_t(copy) - 1].delay : 0.0;
+  scene.wind = situation.wind, scene.forces = situation.forces;
+  if (scene.wind) scene.wind->delay = delay;
   SituationScene made;
-  static_cast<ModelScene&>(made) =
-      make_scene(model, scene, scene_distance(scene, Resolution{}.band), situation.file, counts);
+  static_cast<ModelScene&>(made) = make_scene(model, scene, scene_distance(scene, Resolution{}.band), situation.file);
   SimulationOptions& simulation = made.simulation;
   const MotionBlocks& blocks = simulation.blocks;
-  const double delay = copy > 0 ? situation.copies[std::size_t(copy) - 1].delay : 0.0;
-  if (situation.wind) made.theta.segment<3>(blocks.wind) = situation.wind->velocity;
-  for (const ParameterHandle& strength : blocks.strengths) made.theta[strength] = 1.0;
   const Vector3 gravity = blocks.gravity.vector(made.theta);
   simulation.gravity_change = changes(situation.gravity, gravity);
   simulation.starts_settled = situation.settles.value_or(is_held);
@@ -141,12 +127,6 @@ SituationScene make_scene(const Model& model, const Situation& situation, int co
 
   auto& further = simulation.further_forces;
   const TriangleMesh surface = *scene.object.surface;
-  if (situation.wind) {
-    const WindOptions options = wind_options(*situation.wind, scene.world.up, delay);
-    further.push_back([surface, options, handle = blocks.wind](const auto& body) -> std::unique_ptr<ForceTerm> {
-      return std::make_unique<Wind>(*body, surface, options, handle);
-    });
-  }
   for (std::size_t r = 0; r < situation.rains.size(); ++r) {
     RainOptions options = situation.rains[r];
     options.seed += 1000003u * std::uint64_t(copy);
@@ -158,12 +138,6 @@ SituationScene make_scene(const Model& model, const Situation& situation, int co
       return rain;
     });
   }
-  for (std::size_t f = 0; f < situation.forces.size(); ++f)
-    further.push_back(
-        [force = situation.forces[f], handle = blocks.strengths[f]](const auto& body) -> std::unique_ptr<ForceTerm> {
-          return std::make_unique<PatchLoad>(*body, surface_patch(*body, force.at, force.radius),
-                                             KeyFrames<3>(force.force), handle);
-        });
   const double weight = made.theta[blocks.density] * made.body->volume() * std::max(gravity.norm(), 1.0);
   for (const Hand& hand : situation.hands) {
     LedSpringsOptions options;

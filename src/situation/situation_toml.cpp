@@ -18,26 +18,10 @@ constexpr double degree = std::numbers::pi / 180.0;
 const NumberRule positive_metres{.low = 0.0, .low_allowed = false, .meaning = "a length in metres"};
 const NumberRule any_time{.meaning = "a time in seconds"};
 
-template <class Key>
-void check_times(TomlTable& owner, const std::string& name, const std::vector<Key>& keys) {
-  for (std::size_t k = 1; k < keys.size(); ++k)
-    if (!(keys[k].time > keys[k - 1].time)) {
-      owner.context().complain(owner.key_of(name) + fmt::format("[{}].time", k),
-                               fmt::format("{} s after {} s", keys[k].time, keys[k - 1].time),
-                               "times that increase from key to key", "put the keys in order");
-      return;
-    }
-}
-
-/// Keys of one vector, such as { time = 0, force = [0, 1, 0] }.
-std::vector<KeyFrames<3>::Key> read_keys(TomlTable& owner, const std::string& name, const std::string& value) {
-  std::vector<KeyFrames<3>::Key> keys;
-  owner.each_block(name, [&](TomlTable& block) {
-    const double time = read_number(block, "time", any_time);
-    keys.push_back({time, block.required<Vector3>(value).value_or(Vector3::Zero())});
-  });
-  check_times(owner, name, keys);
-  return keys;
+void check_times(TomlTable& owner, const std::string& name, const std::vector<KeyFrames<6>::Key>& keys) {
+  std::vector<double> times;
+  for (const auto& key : keys) times.push_back(key.time);
+  check_key_times(owner, name, times);
 }
 
 /// Keys of a rigid motion: { time = 0, shift = [0, 0.1, 0], turn_deg = [0, 90, 0] }.
@@ -63,28 +47,6 @@ void read_span(TomlTable& table, double& from, double& until) {
 
 std::uint64_t read_seed(TomlTable& table) { return std::uint64_t(read_count(table, "seed", 0, 2'000'000'000, 1)); }
 
-WindFacts read_wind(TomlTable& table) {
-  WindFacts wind;
-  wind.over_time = read_keys(table, "over_time", "velocity");
-  if (wind.over_time.empty())
-    wind.velocity = table.required<Vector3>("velocity", "of the air, in metres a second").value_or(Vector3::Zero());
-  else
-    for (const auto& key : wind.over_time) wind.velocity += key.value / double(wind.over_time.size());
-  wind.air_density =
-      read_number(table, "air_density", {.low = 0.0, .high = 2000.0, .low_allowed = false, .meaning = "in kg/m^3"},
-                  wind.air_density);
-  wind.normal = read_number(table, "normal", {.low = 0.0, .high = 10.0, .meaning = "a drag coefficient"}, wind.normal);
-  wind.tangential = read_number(table, "tangential", {.low = 0.0, .high = 10.0, .meaning = "a friction coefficient"},
-                                wind.tangential);
-  table.with_table("gusts", [&](TomlTable& gusts) {
-    wind.gust_intensity = read_number(
-        gusts, "intensity", {.low = 0.0, .high = 1.0, .meaning = "standard deviation of the speed over its mean"}, 0.2);
-    wind.gust_length = read_number(gusts, "length", positive_metres, wind.gust_length);
-    wind.seed = read_seed(gusts);
-  });
-  return wind;
-}
-
 RainOptions read_rain(TomlTable& table, double duration) {
   RainOptions rain;
   rain.rate = read_number(
@@ -104,18 +66,13 @@ RainOptions read_rain(TomlTable& table, double duration) {
   return rain;
 }
 
-void read_patch(TomlTable& table, Vector3& at, double& radius) {
-  at = table.required<Vector3>("at", "a point of the surface at rest").value_or(Vector3::Zero());
-  radius = read_number(table, "radius", {.low = 0.0, .meaning = "a length in metres"}, 0.0);
-}
-
 Hand read_hand(TomlTable& table) {
   Hand hand;
   read_patch(table, hand.at, hand.radius);
   hand.stiffness = read_number(table, "stiffness", {.low = 0.0, .meaning = "in newtons a metre"}, 0.0);
   read_span(table, hand.from, hand.until);
   hand.motion = read_motion(table);
-  hand.path = read_keys(table, "path", "at");
+  hand.path = read_key_frames(table, "path", "at");
   if (hand.motion.empty() == hand.path.empty())
     table.context().complain(
         table.key(), hand.path.empty() ? "a hand without `motion` and `path`" : "a hand with `motion` and `path`",
@@ -286,7 +243,7 @@ Situation read_situation(const std::filesystem::path& path) {
       root, "frame_rate", {.low = 0.0, .high = 1e5, .low_allowed = false, .meaning = "frames a second"}, s.frame_rate);
   s.keeps_held = root.optional<bool>("held").value_or(true);
   s.settles = root.optional<bool>("settle");
-  s.gravity = read_keys(root, "gravity", "value");
+  s.gravity = read_key_frames(root, "gravity", "value");
   if (root.has("plane")) s.planes.emplace();
   root.each_block("plane", [&](TomlTable& block) { s.planes->push_back(read_plane(block)); });
   root.with_table("initial", [&](TomlTable& table) {
@@ -295,17 +252,9 @@ Situation read_situation(const std::filesystem::path& path) {
     s.linear_velocity = table.optional<Vector3>("linear_velocity").value_or(Vector3::Zero());
     s.angular_velocity = table.optional<Vector3>("angular_velocity").value_or(Vector3::Zero());
   });
-  root.with_table("wind", [&](TomlTable& table) { s.wind = read_wind(table); });
+  root.with_table("wind", [&](TomlTable& table) { s.wind = read_wind(table, false); });
   root.each_block("rain", [&](TomlTable& table) { s.rains.push_back(read_rain(table, s.duration)); });
-  root.each_block("force", [&](TomlTable& table) {
-    AppliedForce force;
-    read_patch(table, force.at, force.radius);
-    force.force = read_keys(table, "over_time", "force");
-    if (force.force.empty())
-      force.force = {
-          {0.0, table.required<Vector3>("force", "in newtons, or blocks `over_time`").value_or(Vector3::Zero())}};
-    s.forces.push_back(std::move(force));
-  });
+  root.each_block("force", [&](TomlTable& table) { s.forces.push_back(read_force(table, false)); });
   root.each_block("hand", [&](TomlTable& table) { s.hands.push_back(read_hand(table)); });
   root.each_block("led", [&](TomlTable& table) { s.led.push_back(read_led(table, files)); });
   root.each_block("obstacle", [&](TomlTable& table) { s.obstacles.push_back(read_obstacle(table, files)); });

@@ -47,6 +47,8 @@ class Reader {
     root.each_block("fixed", [&](TomlTable& block) { scene_.scene.fixed.push_back(read_fixed(block, files_)); });
     root.each_block("region", [&](TomlTable& block) { read_part(block); });
     root.each_block("weight", [&](TomlTable& block) { read_hung(block); });
+    root.with_table("wind", [&](TomlTable& wind) { scene_.scene.wind = read_wind(wind, true); });
+    root.each_block("force", [&](TomlTable& block) { scene_.scene.forces.push_back(read_force(block, true)); });
     root.each_block("camera", [&](TomlTable& block) { scene_.cameras.push_back(read_camera(block)); });
     if (scene_.cameras.empty() && !root.has("camera"))
       context_.complain("camera", "no camera", "a block [[camera]]", "a recording needs at least one");
@@ -333,6 +335,9 @@ Synthesis synthesise(const SyntheticScene& scene, const Simulate& simulate) {
              {"angular_velocity", scene.scene.initial.angular_velocity, "rad/s"}};
   for (std::size_t i = 0; i < scene.region_moduli.size(); ++i)
     s.truth.push_back({"youngs_modulus@" + scene.scene.regions[i].name, scene.region_moduli[i], "Pa"});
+  if (const auto& wind = scene.scene.wind) s.truth.push_back({"wind", wind->velocity, "m/s"});
+  for (std::size_t k = 0; k < scene.scene.forces.size(); ++k)
+    s.truth.push_back({fmt::format("strength@{}", k + 1), 1.0, "1"});
   s.trajectory = simulate(scene);
   if (int(s.trajectory.size()) != scene.scene.timing.frame_count())
     throw std::invalid_argument(fmt::format("synthesise: the simulation gave {} of {} frames", s.trajectory.size(),

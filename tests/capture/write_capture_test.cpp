@@ -22,6 +22,27 @@ void expect_same_scene(const Scene& is, const Scene& was) {
   EXPECT_EQ(is.planes, was.planes);
   EXPECT_EQ(is.weights, was.weights);
   EXPECT_EQ(is.initial, was.initial);
+  ASSERT_EQ(is.wind.has_value(), was.wind.has_value());
+  if (is.wind) {
+    EXPECT_EQ(is.wind->velocity, was.wind->velocity);
+    EXPECT_EQ(is.wind->over_time.size(), was.wind->over_time.size());
+    EXPECT_EQ(is.wind->known, was.wind->known);
+    EXPECT_EQ(is.wind->gust_intensity, was.wind->gust_intensity);
+    EXPECT_EQ(is.wind->gust_length, was.wind->gust_length);
+    EXPECT_EQ(is.wind->seed, was.wind->seed);
+    EXPECT_EQ(is.wind->air_density, was.wind->air_density);
+    EXPECT_EQ(is.wind->normal, was.wind->normal);
+    EXPECT_EQ(is.wind->tangential, was.wind->tangential);
+  }
+  ASSERT_EQ(is.forces.size(), was.forces.size());
+  for (std::size_t i = 0; i < is.forces.size(); ++i) {
+    EXPECT_EQ(is.forces[i].at, was.forces[i].at);
+    EXPECT_EQ(is.forces[i].radius, was.forces[i].radius);
+    EXPECT_EQ(is.forces[i].known, was.forces[i].known);
+    ASSERT_EQ(is.forces[i].force.size(), was.forces[i].force.size());
+    for (std::size_t k = 0; k < is.forces[i].force.size(); ++k)
+      EXPECT_EQ(is.forces[i].force[k].value, was.forces[i].force[k].value);
+  }
 }
 
 // Everything that a capture.toml can say but its hash and its place.
@@ -71,6 +92,19 @@ known = false
 [[weight]]
 mass = 0.05
 at = [0.1, 0.1, 0.0]
+[wind]
+velocity = [3, 0, 0.3333333333333333]
+known = false
+normal = 1.1
+gusts = { intensity = 0.3, length = 2.0, seed = 7 }
+[[force]]
+at = [0.1, 0.1, 0.0]
+radius = 0.03
+over_time = [ { time = 0, force = [0, 0, 0] }, { time = 0.5, force = [0, 0.125, 0] } ]
+known = false
+[[force]]
+at = [0.1, 0.1, 0.0]
+force = [0, 1, 0]
 [[cloud]]
 points = "clouds/%06d.ply"
 every = 2

@@ -1,18 +1,40 @@
 // Pages for browser_test.py, and where the program itself has the nodes that they are compared with.
-//   pliant_browser_pages FOLDER
+//   pliant_browser_pages FOLDER             for browser_test.py
+//   pliant_browser_pages FOLDER --sizes     for browser_frames.py: torus.html, 1,144 nodes; block.html, 1,764
+//   tetrahedra
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <string>
 
 #include "base/files.hpp"
 #include "live/live_motion.hpp"
 #include "live/live_page.hpp"
 #include "support/models.hpp"
 
+namespace {
+
+using namespace pliant;
+
+int write_sizes(const std::filesystem::path& folder) {
+  Model torus = test::block(false);
+  torus.name = "torus";
+  torus.scene.object.surface = make_torus(0.1, 0.04, 96, 48);
+  for (Vector3& vertex : torus.scene.object.surface->vertices) vertex.y() += 0.1;
+  torus.cell_size = 0.0178;
+  torus.youngs_modulus = 8000.0, torus.scene.object.density = 100.0;
+  torus.scene.object.mass = 100.0 * enclosed_volume(*torus.scene.object.surface);
+  write_file(folder / "torus.html", live_page(torus));
+  write_file(folder / "block.html", live_page(test::pressed_block({14, 7, 3})));
+  return 0;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  using namespace pliant;
-  if (argc != 2) return std::cerr << "pliant_browser_pages FOLDER\n", 2;
-  const std::filesystem::path folder = argv[1];
+  const std::filesystem::path folder = argc > 1 ? argv[1] : "";
+  if (argc == 3 && std::string(argv[2]) == "--sizes") return write_sizes(folder);
+  if (argc != 2) return std::cerr << "pliant_browser_pages FOLDER [--sizes]\n", 2;
   Model model = test::block(false);
   model.scene.initial.linear_velocity = Vector3(0.4, 0.5, 0.1);
   model.scene.initial.angular_velocity = Vector3(3.0, 0.0, 6.0);

@@ -81,7 +81,7 @@ TEST(LiveObject, StepsAsTheProgramDoes) {
   const double dt = live.step_length();
   scene.timing.times.clear();
   for (int frame = 0; frame <= 100; ++frame) scene.timing.times.push_back(frame * dt);
-  const ModelScene made = make_scene(model, scene, scene_distance(scene, Resolution{}.band), {}, {.wind = true});
+  const ModelScene made = make_scene(model, scene, scene_distance(scene, Resolution{}.band), {}, true);
   double worst = 0.0, moved = 0.0;
   (void)Simulation(made.body, made.simulation).run(made.theta, [&](int frame, const State& state, auto) {
     if (frame > 0) {
@@ -93,6 +93,26 @@ TEST(LiveObject, StepsAsTheProgramDoes) {
   });
   EXPECT_GT(moved, 0.05);  // it has bounced
   EXPECT_LT(worst, 1e-9 * made.body->size());
+}
+
+/// Longer steps for a page that shall keep up with time: much the same bounce, and the program's own steps again
+/// afterwards.
+TEST(LiveObject, LongerStepsMoveItMuchTheSame) {
+  Model model = test::block(false);
+  model.scene.initial.linear_velocity = Vector3(0.4, 0.5, 0.1);
+  const auto middle_after = [&](double pace) {
+    LiveMotion live = object_of(model);
+    live.start_as_recorded();
+    live.set_pace(pace);
+    EXPECT_NEAR(live.step_length(), pace * object_of(model).step_length(), 1e-12);
+    while (live.time() < 0.4 - 1e-9) EXPECT_TRUE(live.step());
+    return Vector3(live.state().x.colwise().mean().transpose());
+  };
+  const Vector3 fine = middle_after(1.0);
+  const double way = (fine - object_of(model).body().centre_of_mass()).norm();
+  EXPECT_GT(way, 0.1);
+  EXPECT_LT((middle_after(2.0) - fine).norm(), 0.1 * way);
+  EXPECT_THROW(object_of(model).set_pace(0.5), std::invalid_argument);
 }
 
 TEST(LiveObject, AHeldOneStartsAtRestAndStaysThere) {
@@ -221,7 +241,7 @@ TEST(LivePress, FindsTheEquilibriaOfTheProgram) {
   ASSERT_TRUE(session.move_to({0.0, -0.008, 0.0}).converged);
   EXPECT_LT(session.force().y(), -0.05);
   EXPECT_LT((live.probe_force() - session.force()).norm(), 1e-4 * session.force().norm());
-  EXPECT_LT(difference(live.nodes(), session.nodes()), 1e-6 * body->size());
+  EXPECT_LT(difference(live.nodes(), session.nodes()), 1e-5 * body->size());
   live.lift();
   EXPECT_LT(difference(live.nodes(), body->nodes), 1e-6 * body->size()) << "it comes back";
   EXPECT_EQ(live.probe_force(), Vector3(Vector3::Zero()));

@@ -26,6 +26,8 @@ Model full_model() {
                    {RegionHalfSpace{{0, 0, 0}, {1, 0, 0}}, std::nullopt},
                    {RegionVertices{{3, 1, 4}}, std::nullopt}};
   m.scene.weights = {{0.05, {0.01, -0.06, 0.15}}};
+  m.scene.wind.emplace().over_time = {{0.0, {1, 2, 3}}, {2.0, {3, 2, 1}}};
+  m.scene.forces = {{{0.01, -0.06, 0.15}, 0.02, {{0.0, {0, 0.5, 0}}}}};
   m.scene.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true, {}, Weight{0.02, {0.1, 1.0 / 3.0, 0}}};
   m.scene.timing = evenly_timed(60.0, 80, 4);
   m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
@@ -118,6 +120,12 @@ TEST(Model, PlanesRegionsAndVelocitiesComeBack) {
   ASSERT_EQ(read.scene.weights.size(), 1u);
   EXPECT_EQ(read.scene.weights[0].mass, 0.05);
   EXPECT_EQ(read.scene.weights[0].at, m.scene.weights[0].at);
+  ASSERT_TRUE(read.scene.wind);
+  ASSERT_EQ(read.scene.wind->over_time.size(), 2u);
+  EXPECT_EQ(read.scene.wind->over_time[1].value, Vector3(3, 2, 1));
+  EXPECT_EQ(read.scene.wind->velocity, Vector3(2, 2, 2)) << "the keys' mean";
+  ASSERT_EQ(read.scene.forces.size(), 1u);
+  EXPECT_EQ(read.scene.forces[0].force[0].value, Vector3(0, 0.5, 0));
   ASSERT_EQ(read.scene.fixed.size(), 4u);
   EXPECT_EQ(std::get<RegionBox>(read.scene.fixed[0].region).max, Vector3(0.01, 1, 1));
   EXPECT_EQ(std::get<RegionSphere>(read.scene.fixed[1].region).radius, 0.02);

@@ -24,9 +24,10 @@ inline Model block(bool held) {
 }
 
 /// The same block of tetrahedra, held at its low end and pressed: an Ogden law, no frames, no gravity.
-inline Model pressed_block() {
+/// @param cells  along the block and across it: six tetrahedra each
+inline Model pressed_block(const Eigen::Vector3i& cells = {8, 2, 2}) {
   Model model = block(true);
-  const auto body = tet_body({0.2, block_edge, block_edge}, {8, 2, 2}, false, 0.0);
+  const auto body = tet_body({0.2, block_edge, block_edge}, cells, false, 0.0);
   model.volume.nodes = body->nodes;
   model.volume.kind = VtuCell::Tetrahedron;
   model.volume.connectivity = body->connectivity;

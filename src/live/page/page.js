@@ -113,6 +113,9 @@ function normals(positions, triangles) {
   }
   return n;
 }
+/// To the right of the picture, level.
+let sidewards = right0;
+const viewRight = () => unit(cross(sub(view.at, eye()), up));
 function eye() {
   const c = Math.cos(view.height), s = Math.sin(view.height);
   const aside = add(mul(front0, Math.cos(view.azimuth) * c), mul(right0, Math.sin(view.azimuth) * c));
@@ -154,7 +157,7 @@ function draw() {
   play();
   const copies = shownCopies();
   if (state !== uploaded) follow(copies[0].positions);
-  if (!gl || gl.isContextLost()) { uploaded = state; worker.postMessage({ name: "shown" }); return; }
+  if (!gl || gl.isContextLost()) { if (state !== uploaded) counted(); uploaded = state; worker.postMessage({ name: "shown" }); return; }
   const fineness = devicePixelRatio * (quality ? 1 : 0.6), w = Math.round(canvas.clientWidth * fineness), h = Math.round(canvas.clientHeight * fineness);
   if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
   let values = null;
@@ -190,10 +193,10 @@ function draw() {
 function upload(positions) { fill(buffers.position, positions); fill(buffers.normal, normals(positions, object.triangles)); }
 /// Surfaces to be drawn, and how far from their place: the object, or what samples of its parameters make of the recording, side by side.
 function shownCopies() {
-  if (recordAt < 0 || !replays.has(-1)) return [{ positions: state.positions, offset: [0, 0, 0] }];
-  const samples = aside ? [...Array(aside).keys()].filter((k) => replays.has(k)) : [-1];
-  if (!samples.length) samples.push(-1);
-  return samples.map((k) => ({ positions: replays.get(k)[recordAt], offset: mul(right0, aside ? 1.3 * size * (k - 0.5 * (aside - 1)) : 0) }));
+  const there = (k) => replays.get(k)?.[recordAt];
+  const samples = aside && recordAt >= 0 ? [...Array(aside).keys()].filter(there) : [-1];
+  if (!samples.length || !there(samples[0])) return [{ positions: there(-1) ?? state.positions, offset: [0, 0, 0] }];
+  return samples.map((k) => ({ positions: there(k), offset: mul(sidewards, aside ? 1.3 * size * (k - 0.5 * (aside - 1)) : 0) }));
 }
 /// The view follows what leaves it.
 function follow(positions) {
@@ -214,6 +217,7 @@ function counted() {
   let text = pressed ? `equilibria in <b>${readable(1e-3 * state.cost, 2)}s</b> · ${rate.toFixed(0)} pictures/s` : `<b>${state.time.toFixed(2)} s</b> · ${rate.toFixed(0)} pictures/s · `;
   if (!pressed) text += state.running && !state.stopped ? `${ratio.toFixed(2)} × real time` : "paused";
   if (!pressed && state.running && ratio < 0.8 * speedNow()) text += " (this object is too large for more)";
+  if (!pressed && state.pace > 1) text += ` · steps ${state.pace} times the fit's`;
   if (state.hand) text += ` · pull <b>${readable(norm(state.hand.slice(0, 3)))}N</b>`;
   if (poke) text += ` · probe <b>${readable(norm(state.probe.slice(0, 3)))}N</b>, ${readable(dot(state.probe.slice(3), poke.inward))}m deep`;
   if (recordAt >= 0) text += ` · ${aside ? `samples 1 to ${aside} of the parameters, left to right` : "the recording"}` + (pressed ? `, press ${recordAt + 1} of ${readable(facts.presses[recordAt])}N` : `, ${(facts.times[recordAt]).toFixed(2)} s`);
@@ -265,13 +269,13 @@ worker.onmessage = ({ data }) => {
   if (data.kind === "state") { state = data; }
   if (data.kind === "loaded") {
     object = data;
-    $("about").textContent = `${data.nodes} nodes, ${data.elements} elements, steps of ${readable(data.step)}s`;
+    $("about").textContent = `${data.nodes} nodes, ${data.elements} elements` + (pressed ? ", equilibria" : `, steps of ${readable(data.step)}s`);
     if (gl) { prepare(); gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.index); gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(data.triangles), gl.STATIC_DRAW);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.quad); gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array([0, 1, 2, 0, 2, 3]), gl.STATIC_DRAW); }
     $("drop").hidden = pressed || !frameCount;
     requestAnimationFrame(draw);
     if (!pressed) { if (frameCount) tell("start"); run(true); }
-    if (frameCount) rehearse([-1]);
+    if (frameCount) { $("recording").hidden = false; $("frame").max = frameCount - 1; rehearse(); }
   }
   if (data.kind === "broken") trouble("The simulation cannot go on: " + data.text);
   window.pliantLive.last = data.kind === "stepped" ? data : window.pliantLive.last;
@@ -290,22 +294,38 @@ Promise.all([unpacked("module"), unpacked("data")]).then(([module, data]) => { p
 // What was recorded, as the estimate and samples of the parameters have it: simulated by a second worker, so that nothing waits for it.
 const replays = new Map();
 let rehearser = null;
-function rehearse(samples) {
+function rehearse() {
   if (!rehearser) {
     rehearser = new Worker(script);
     rehearser.onmessage = ({ data }) => {
       if (data.kind === "broken") return trouble("The recording cannot be replayed: " + data.text);
-      replays.set(data.sample, data.frames);
-      if (data.sample === -1) { $("recording").hidden = false; $("frame").max = data.frames.length - 1; }
+      const known = replays.get(data.sample) ?? [];
+      data.frames.forEach((positions, i) => known[i] = positions);
+      replays.set(data.sample, known);
+      waiting = null;
+      ask();
     };
     rehearser.postMessage({ name: "load", ...packed });
   }
-  for (const sample of samples) if (!replays.has(sample)) rehearser.postMessage({ name: "replay", sample, times: facts.times, presses: facts.presses.length });
+  ask();
 }
-let playing = null;
+/// The next that is wanted and not there, one at a time: what is looked at may have changed meanwhile.
+let waiting = null;
+function ask() {
+  if (waiting || !rehearser) return;
+  const frame = Math.max(0, recordAt), wanted = [-1, ...Array(aside).keys()];
+  const sample = wanted.find((k) => !replays.get(k)?.[frame]);
+  if (sample === undefined) return;
+  waiting = { sample, frame };
+  rehearser.postMessage({ name: "replay", sample, times: facts.times, press: frame });
+}
+let playing = null, paused = null;
 /// Goes on to the frame that is due; presses change twice a second.
 function play() {
-  if (!playing || !replays.has(-1)) return;
+  if (!playing || !replays.get(-1)?.[Math.max(0, recordAt)]) return;
+  // What is not simulated yet is waited for.
+  if (pressed && shownCopies().length < (aside || 1)) { playing += performance.now() - (paused ?? performance.now()); paused = performance.now(); return; }
+  paused = null;
   const last = pressed ? frameCount / 2 : facts.times[frameCount - 1] + 0.3, t = speedNow() * (performance.now() - playing) / 1e3 % last;
   const due = pressed ? Math.floor(2 * t) : Math.max(0, facts.times.findLastIndex((x) => x <= t));
   $("frame").value = due; scrub(due);
@@ -316,6 +336,7 @@ function run(on) { running = on; $("run").setAttribute("aria-pressed", on); $("r
 function scrub(frame) { recordAt = frame; if (frame < 0) { $("frame").nextElementSibling.textContent = ""; return; }
   if (running) { run(false); recordAt = frame; }
   if (!poke) uploaded = null;
+  ask();
   $("frame").nextElementSibling.textContent = pressed ? readable(facts.presses[frame]) + "N" : facts.times[frame].toFixed(2) + " s"; }
 const speedNow = () => 2 ** +$("speed").value, fieldNow = () => +$("field").value;
 function slider(id, show, change) { const input = $(id), said = input.nextElementSibling; const apply = () => { said.textContent = show(+input.value); change(+input.value); }; input.oninput = apply; said.textContent = show(+input.value); return apply; }
@@ -329,6 +350,7 @@ slider("rain", (v) => v ? readable(facts.rain * v * v) : "none", (v) => tell("ra
 function weigh(direction) { const s = facts.gravity * +$("gravity").value, a = +$("turn").value * Math.PI / 180;
   tell("gravity", { value: mul(direction ?? add(mul(up, -Math.cos(a)), mul(right0, Math.sin(a))), s) }); }
 slider("gravity", (v) => "× " + v.toFixed(2), () => weigh()); slider("turn", (v) => v + "°", () => weigh());
+$("exact").onchange = () => tell("exact", { on: $("exact").checked });
 $("field").onchange = () => { range = [0, 0]; $("bar").style.display = "none"; tell("field", { value: fieldNow() }); };
 $("run").onclick = () => run(!running);
 $("one").onclick = () => { run(false); scrub(-1); tell("steps", { count: 1 }); };
@@ -337,10 +359,10 @@ $("drop").onclick = () => { trouble(""); scrub(-1); tell("start"); run(true); };
 $("throw").onclick = () => tell("push", { value: add(mul(up, 1.6 * Math.sqrt(9.81 * size)), mul(right0, 0.5 * Math.sqrt(9.81 * size))) });
 $("frame").oninput = () => { playback(false); scrub(+$("frame").value); };
 $("play").onclick = () => playback(!playing);
-$("aside").onchange = () => { aside = +$("aside").value; if (aside) { rehearse([...Array(aside).keys()]); view.distance = Math.max(view.distance, (1.6 + 0.9 * aside) * size); view.at = facts.middle.slice(); playback(true); } else view.distance = 2.6 * size; };
+$("aside").onchange = () => { aside = +$("aside").value; if (aside) { rehearse(); sidewards = viewRight(); view.distance = Math.max(view.distance, (1.6 + 0.9 * aside) * size); view.at = facts.middle.slice(); playback(true); } else view.distance = 2.6 * size; };
 if (facts.samples && frameCount) $("aside-row").hidden = false;
 for (const n of [2, 5]) if (n <= facts.samples) { const o = document.createElement("option"); o.value = n; o.textContent = n + " samples side by side"; $("aside").append(o); }
-for (const row of pressed ? ["speed-row", "damping-row", "wind-row", "from-row", "gusts-row", "rain-row", "run", "one", "throw"] : []) $(row).hidden = true;
+for (const row of pressed ? ["speed-row", "exact-row", "damping-row", "wind-row", "from-row", "gusts-row", "rain-row", "run", "one", "throw"] : []) $(row).hidden = true;
 if (!facts.gravity) for (const row of ["gravity-row", "turn-row"]) $(row).hidden = true;
 if (!facts.deviations) $("field").querySelector('[value="5"]').remove();
 $("frame-name").textContent = pressed ? "press" : "frame";
@@ -422,6 +444,6 @@ addEventListener("keydown", (event) => {
 });
 paintBar();
 // For tests, and for those who look.
-window.pliantLive = { tell, view, get state() { return state; }, get frames() { return replays.get(-1); }, replays, get copies() { return shownCopies().length; }, get curve() { return curve; }, project(p) {
+window.pliantLive = { tell, view, get state() { return state; }, get frames() { return replays.get(-1)?.[0] && replays.get(-1); }, replays, get copies() { return shownCopies().length; }, get curve() { return curve; }, project(p) {
   const c = camera(), q = [0, 1, 2, 3].map((i) => c[i] * p[0] + c[4 + i] * p[1] + c[8 + i] * p[2] + c[12 + i]), box = canvas.getBoundingClientRect();
   return [box.left + (q[0] / q[3] + 1) / 2 * box.width, box.top + (1 - q[1] / q[3]) / 2 * box.height]; }, get rate() { return rate; }, get quality() { return quality; }, get ratio() { return ratio; } };

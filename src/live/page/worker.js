@@ -1,6 +1,6 @@
 // Runs the object. Messages in: commands by name; out: what is to be drawn, as fast as the page takes it.
 let wasm, memory, running = false, speed = 1, field = 0, owed = 0, last = 0, timer = 0, stopped = "";
-let cost = 0, wants = true, pressed = false, changed = true, hidden = false;
+let cost = 0, pace = 1, exact = false, timed_steps = 0, wants = true, pressed = false, changed = true, hidden = false;
 
 const stub = (module) => {
   const imports = {};
@@ -17,7 +17,7 @@ const doubles = (at, count) => Array.from(new Float64Array(memory.buffer, at, co
 const surface = () => floats(wasm.surface(), 3 * wasm.vertex_count());
 
 function report() {
-  const message = { kind: "state", positions: surface(), time: wasm.time(), running, stopped, cost, step: wasm.step_length(),
+  const message = { kind: "state", positions: surface(), time: wasm.time(), running, stopped, cost, pace, step: wasm.step_length(),
                     energy: wasm.kinetic_energy(), probe: doubles(wasm.probe(), 6), settled: !!wasm.is_settled() };
   const hand = wasm.hand();
   if (hand) message.hand = doubles(hand, 9);
@@ -30,10 +30,15 @@ function report() {
   postMessage(message, arrays);
 }
 const timed = (work) => {
-  const begin = performance.now(), done = work();
-  cost += 0.1 * (performance.now() - begin - cost);
+  const begin = performance.now(), done = work(), took = performance.now() - begin;
+  cost += (timed_steps++ ? 0.1 : 1) * (took - cost);
   return done;
 };
+function set_pace(factor) { pace = factor; timed_steps = 0; wasm.set_pace(pace); }
+// Steps are twice as long where a second of them takes longer than a second; still longer ones would move it another way.
+function keep_pace() {
+  if (!exact && timed_steps > 20 && pace < 2 && cost > 0.75e3 * wasm.step_length() / speed) set_pace(2);
+}
 
 // At most 14 ms of work at once; what cannot be caught up with is given up, and the page says how slow it is.
 function move() {
@@ -48,6 +53,7 @@ function move() {
   }
   if (owed >= dt) owed = dt;
   changed = true;
+  keep_pace();
 }
 // One equilibrium, where something was moved since the last.
 function lead() {
@@ -61,12 +67,14 @@ function tick() {
 }
 const settle = () => { for (let i = 0; i < 200 && !wasm.is_settled(); ++i) if (!wasm.step()) break; };
 
-// What a sample of the parameters makes of the recording: surfaces at the frames' times, or under the presses.
-function replay({ sample, times, presses }) {
+// What a sample of the parameters makes of the recording: surfaces at the frames' times, or under one press.
+function replay({ sample, times, press }) {
   wasm.set_sample(sample);
   const frames = [];
   if (pressed) {
-    for (let i = 0; i < presses; ++i) { wasm.press_as_recorded(i); settle(); frames.push(surface()); }
+    wasm.press_as_recorded(press);
+    settle();
+    frames[press] = surface();
   } else {
     const step = wasm.step_length();
     wasm.start_as_recorded();
@@ -75,7 +83,7 @@ function replay({ sample, times, presses }) {
       frames.push(surface());
     }
   }
-  postMessage({ kind: "replayed", sample, frames }, frames.map((f) => f.buffer));
+  postMessage({ kind: "replayed", sample, frames });
 }
 
 const commands = {
@@ -102,7 +110,9 @@ const commands = {
   hidden({ on }) { hidden = on; owed = 0; },
   speed({ value }) { speed = value; },
   // For one who looks closely, and for tests.
+  exact({ on }) { exact = on; if (on) set_pace(1); },
   steps({ count }) {
+    set_pace(1);
     for (let i = 0; i < count && !stopped; ++i)
       if (!wasm.step()) stopped = "the motion cannot be resolved";
     report();

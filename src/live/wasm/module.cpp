@@ -86,6 +86,9 @@ PLIANT_EXPORT(field) const float* field(int which) { return object->field(LiveFi
 
 // An object that moves.
 PLIANT_EXPORT(step_length) double step_length() { return motion ? motion->step_length() : 0.0; }
+PLIANT_EXPORT(set_pace) void set_pace(double factor) {
+  if (motion) motion->set_pace(std::max(1.0, factor));
+}
 PLIANT_EXPORT(time) double time_now() { return motion ? motion->time() : 0.0; }
 PLIANT_EXPORT(kinetic_energy) double kinetic_energy() { return motion ? motion->kinetic_energy() : 0.0; }
 PLIANT_EXPORT(start_as_recorded) void start_as_recorded() {

@@ -1,4 +1,4 @@
-#include "motion/key_frames.hpp"
+#include "geometry/key_frames.hpp"
 
 #include <gtest/gtest.h>
 
