@@ -62,3 +62,4 @@ else
   for object in "${objects[@]}"; do sed -e 's/^[^:]*://' -e 's/\\$//' "${object%.o}.d"; done | tr ' ' '\n' | grep '^src/' | LC_ALL=C sort -u |
     xargs sha256sum > "$page/live.sources.sha256"
 fi
+sha256sum "$work/live.wasm.gz"

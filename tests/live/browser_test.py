@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -62,7 +63,7 @@ class Browser:
         self.process = subprocess.Popen(
             [program(), "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--remote-debugging-port=0", "--remote-allow-origins=*",
              "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--window-size=1000,700", f"--user-data-dir={self.folder}", *flags, "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
         port_file = pathlib.Path(self.folder, "DevToolsActivePort")
         until = time.time() + 60
         while not (port_file.exists() and len(port_file.read_text().splitlines()) > 1):
@@ -111,8 +112,8 @@ class Browser:
         return self.js("(() => { const p = pliantLive.state.positions, m = [0, 0, 0]; for (let i = 0; i < p.length; ++i) m[i % 3] += 3 * p[i] / p.length; return m; })()")
 
     def close(self):
-        self.process.kill()
-        self.process.wait()
+        os.killpg(self.process.pid, signal.SIGKILL)  # its helpers too
+        self.process.wait(timeout=60)
         shutil.rmtree(self.folder, ignore_errors=True)
 
 

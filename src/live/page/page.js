@@ -43,6 +43,8 @@ float sunlight() { if (taps < 0) return 1.; vec3 p = lit.xyz / lit.w * .5 + .5; 
   float sum = 0.; for (int i = -taps; i <= taps; ++i) for (int j = -taps; j <= taps; ++j) sum += texture(shadow, vec3(p.xy + vec2(i, j) * 1.4 / 2048., p.z - .0025)); return sum / float((2 * taps + 1) * (2 * taps + 1)); }
 void main() {
   vec3 N = normalize(n), E = normalize(eye - at); if (ground == 0 && dot(N, E) < 0.) N = -N;
+  vec3 F = normalize(cross(dFdx(at), dFdy(at))); if (dot(F, N) < 0.) F = -F;
+  N = normalize(mix(F, N, smoothstep(.8, .95, dot(F, N)))); // edges stay edges
   float s = sunlight();
   vec3 base = coloured == 1 ? viridis(v) : tint; float alpha = 1.;
   if (ground == 1) {
@@ -365,6 +367,7 @@ for (const n of [2, 5]) if (n <= facts.samples) { const o = document.createEleme
 for (const row of pressed ? ["speed-row", "exact-row", "damping-row", "wind-row", "from-row", "gusts-row", "rain-row", "run", "one", "throw"] : []) $(row).hidden = true;
 if (!facts.gravity) for (const row of ["gravity-row", "turn-row"]) $(row).hidden = true;
 if (!facts.deviations) $("field").querySelector('[value="5"]').remove();
+if (pressed) for (const key of document.querySelectorAll("#keys span")) key.hidden = true;
 $("frame-name").textContent = pressed ? "press" : "frame";
 for (let k = 0; k <= facts.samples && facts.samples; ++k) { $("sample-row").hidden = false; const o = document.createElement("option"); o.value = k - 1; o.textContent = k ? "sample " + k : "estimate"; $("sample").append(o); }
 $("sample").onchange = () => tell("sample", { value: +$("sample").value });
