@@ -14,13 +14,13 @@
 #include "capture/capture_rules.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_picture.hpp"
-#include "capture/observe.hpp"
 #include "capture/pixel_kinds.hpp"
 #include "capture/point_cloud.hpp"
 #include "capture/survey.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
+#include "scan/scan_pose.hpp"
 #include "speech.hpp"
 
 namespace pliant::apps {
@@ -336,8 +336,8 @@ void write_scenes(const Capture& capture, const Arguments& arguments) {
 }
 
 void check(const Arguments& arguments) {
-  const Capture capture = read_capture(arguments.capture);
-  const auto frames = observe(capture, {}, [](int done, int total) {
+  Capture capture = read_capture(arguments.capture);
+  const auto frames = observe_placed(capture, {}, [](int done, int total) {
     stop_if_interrupted();
     show_progress("reading frames", done, total);
   });

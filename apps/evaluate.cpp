@@ -10,6 +10,7 @@
 #include "output/fit_output.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
+#include "scan/scan_pose.hpp"
 
 namespace pliant::apps {
 
@@ -40,10 +41,11 @@ bool evaluate_frames(const Capture& capture, const CaptureScene& scene, const Ob
 
 int run(const Arguments& arguments) {
   const Model model = load_model(arguments.model);
-  const Capture capture = read_capture(arguments.capture);
+  Capture capture = read_capture(arguments.capture);
   ObserveOptions options;
   options.max_points_per_frame = 1000;
-  const auto observed = observe(capture, options, [](int done, int total) { show_progress("read", done, total); });
+  const auto observed =
+      observe_placed(capture, options, [](int done, int total) { show_progress("read", done, total); });
   stop_if_interrupted();
   const auto seen =
       std::make_shared<std::vector<FrameObservations>>(frame_observations(capture, observed, tracked_points(capture)));

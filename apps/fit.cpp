@@ -20,6 +20,8 @@
 #include "output/fit_output.hpp"
 #include "output/press_output.hpp"
 #include "report/report.hpp"
+#include "scan/scan_pose.hpp"
+#include "speech.hpp"
 
 namespace pliant::apps {
 
@@ -243,8 +245,14 @@ int run(const Arguments& arguments) {
   observe_options.max_points_per_frame = options.points_per_frame;
   const auto read = [&](RecordedCapture& recording) {
     if (is_of_static_tests(recording.capture)) return;
-    recording.observed =
-        observe(recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
+    std::optional<ScanPose> pose;
+    recording.observed = observe_placed(
+        recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); }, &pose);
+    if (pose)
+      log.line(formatted("the scan was placed: %.2f mm rms, outlines overlap by %.0f %%", 1e3 * pose->rms,
+                         100.0 * pose->overlap));
+    if (pose && pose->runner_up > 0.0 && pose->runner_up < 1.3)
+      log.line("note: another pose of the scan fits nearly as well; `pliant place` draws the one that was taken");
     stop_if_interrupted();
   };
   for (RecordedCapture& recording : recordings) read(recording);

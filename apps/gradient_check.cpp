@@ -8,6 +8,7 @@
 #include "estimation/gradient_check.hpp"
 #include "estimation/press_scene.hpp"
 #include "estimation/start_objective.hpp"
+#include "scan/scan_pose.hpp"
 
 namespace pliant::apps {
 
@@ -32,8 +33,8 @@ int run_gradient_check(std::vector<RecordedCapture> recordings, const FitOptions
   observe_options.max_points_per_frame = options.points_per_frame;
   for (RecordedCapture& recording : recordings) {
     if (is_of_static_tests(recording.capture)) continue;
-    recording.observed =
-        observe(recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); });
+    recording.observed = observe_placed(recording.capture, observe_options,
+                                        [](int done, int total) { show_progress("read", done, total); });
     stop_if_interrupted();
   }
   const StartObjective start = start_objective(std::move(recordings), options);

@@ -35,6 +35,7 @@ int run(int argc, char** argv) {
   int exit_code = Fine;
   add_check(line, exit_code);
   add_scan(line, exit_code);
+  add_place(line, exit_code);
   add_markers(line, exit_code);
   add_fit(line, exit_code);
   add_simulate(line, exit_code);

@@ -10,6 +10,7 @@
 #include "estimation/fit_config.hpp"
 #include "estimation/followed.hpp"
 #include "output/track_output.hpp"
+#include "scan/scan_pose.hpp"
 
 namespace pliant::apps {
 
@@ -45,11 +46,11 @@ int run(const Arguments& arguments) {
   for (const std::string& assignment : arguments.settings) set_fit_option(options, assignment);
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
-  const Capture capture = read_capture(arguments.capture);
+  Capture capture = read_capture(arguments.capture);
   ObserveOptions observing;
   observing.max_points_per_frame = arguments.points_per_frame;
   const std::vector<ObservedFrame> observed =
-      observe(capture, observing, [](int done, int total) { show_progress("read", done, total); });
+      observe_placed(capture, observing, [](int done, int total) { show_progress("read", done, total); });
   stop_if_interrupted();
   MarkerPositions follow_these;
   if (!arguments.points.empty()) follow_these = read_marker_positions(arguments.points);

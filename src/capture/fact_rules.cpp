@@ -71,8 +71,42 @@ void check_surface_is_solid(RuleContext& context) {
                         "close holes and make orientations agree in a mesh editor");
 }
 
+/// A pose that is to be found needs the object's pixels told apart without it, and regions that can turn.
+void check_pose(RuleContext& context) {
+  const Capture& capture = context.capture;
+  const Object& object = capture.scene.object;
+  if (object.pose_is_known) {
+    if (!object.scale_is_known)
+      context.toml.complain("object.scale", "`scale` is \"unknown\" and `pose` is not", "pose = \"unknown\" beside it",
+                            "a scan in another unit stands elsewhere, too");
+    return;
+  }
+  if (object.volume)
+    context.toml.complain("object.pose", "`pose` is \"unknown\", and the object is a volume mesh", "a `surface`",
+                          "place its surface by `pliant place` and move the volume by what place.json says");
+  if (capture.depth.empty() && capture.clouds.empty())
+    context.toml.complain("object.pose", "`pose` is \"unknown\", and nothing shows the surface",
+                          "depth images or clouds", "");
+  if (capture.scene.initial.released || capture.scene.timing.is_static || object.shape_is == ShapeIs::Static)
+    context.toml.complain("object.pose", "`pose` is \"unknown\" for an object that is seen in another shape",
+                          "an object at rest in the start frame", "place the scan by hand");
+  for (std::size_t i = 0; i < capture.depth.size(); ++i)
+    if (!capture.depth[i].masks && !capture.depth[i].background)
+      context.toml.complain(item("depth", i), "neither `masks` nor `background`, and the scan's pose is unknown",
+                            "one of them: what of an image is the object", "");
+  const auto complain_of_box = [&](const Region& region, const std::string& key) {
+    if (std::holds_alternative<RegionBox>(region))
+      context.toml.complain(key, "a box in the frame of a scan whose pose is unknown",
+                            "`sphere`, `half_space` or `vertices`", "a box cannot be turned");
+  };
+  for (std::size_t i = 0; i < capture.scene.fixed.size(); ++i)
+    complain_of_box(capture.scene.fixed[i].region, item("fixed", i));
+  for (std::size_t i = 0; i < capture.scene.regions.size(); ++i)
+    complain_of_box(capture.scene.regions[i].region, item("region", i));
+}
+
 void check_object_size(RuleContext& context) {
-  if (!context.capture.scene.object.surface) return;
+  if (!context.capture.scene.object.surface || !context.capture.scene.object.scale_is_known) return;
   const double size = size_of(*context.capture.scene.object.surface);
   if (size >= smallest_object && size <= largest_object) return;
   context.toml.complain(surface_key(context.capture), "the object is " + text_of(size, "m") + " long", "1 mm to 10 m",
@@ -91,7 +125,9 @@ void check_mass_or_density(RuleContext& context) {
       (*capture.scene.object.density < least_density || *capture.scene.object.density > greatest_density))
     context.toml.complain("object.density", "a density of " + text_of(*capture.scene.object.density, "kg/m^3"),
                           "3 to 25000 kg/m^3", "1 g/cm^3 is 1000 kg/m^3");
-  if (!capture.scene.object.mass || *capture.scene.object.mass <= 0 || !capture.scene.object.surface) return;
+  if (!capture.scene.object.mass || *capture.scene.object.mass <= 0 || !capture.scene.object.surface ||
+      !capture.scene.object.scale_is_known)
+    return;
   const double volume = enclosed_volume(*capture.scene.object.surface), density = *capture.scene.object.mass / volume;
   if (volume > 0 && (density < least_density || density > greatest_density))
     context.toml.complain("object.mass",
@@ -211,7 +247,9 @@ void check_material_regions(RuleContext& context) {
 void check_planes(RuleContext& context) {
   const Capture& capture = context.capture;
   // A released or static object is not in its rest pose when it is seen.
-  if (!capture.scene.object.surface || capture.scene.initial.released || capture.scene.timing.is_static) return;
+  if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || capture.scene.initial.released ||
+      capture.scene.timing.is_static)
+    return;
   const double size = size_of(*capture.scene.object.surface);
   for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
     const Plane& plane = capture.scene.planes[i];

@@ -144,6 +144,7 @@ int pixels_near(const Capture& capture, const DepthCamera& camera, int frame, co
 std::vector<Rule> make_rules() {
   return {check_surface_is_solid,
           check_object_size,
+          check_pose,
           check_mass_or_density,
           check_gravity,
           check_timing,
@@ -395,7 +396,7 @@ void check_depth_scale(RuleContext& context) {
 
 void check_cameras_see_object(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.scene.object.surface || !has_start(context)) return;
+  if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
   for (std::size_t i = 0; i < capture.depth.size(); ++i) {
     const DepthCamera& camera = capture.depth[i];
@@ -428,7 +429,7 @@ void check_cameras_see_object(RuleContext& context) {
 
 void check_clouds_near_object(RuleContext& context) {
   const Capture& capture = context.capture;
-  if (!capture.scene.object.surface || !has_start(context)) return;
+  if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
   for (std::size_t i = 0; i < capture.clouds.size(); ++i) {
     const CloudSequence& cloud = capture.clouds[i];

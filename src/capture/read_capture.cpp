@@ -45,6 +45,8 @@ class Reader {
     const auto read_object = [&](TomlTable& object) {
       read_object_shape(object, files_, scene.object);
       read_object_facts(object, scene.object);
+      scene.object.pose_is_known = read_choice(object, "pose", {"known", "unknown"}) == "known";
+      scene.object.scale_is_known = read_choice(object, "scale", {"known", "unknown"}) == "known";
     };
     const auto read_own_world = [&](TomlTable& world) { scene.world = read_world(world); };
     if (is_of_curves_alone(root)) {  // a specimen needs neither shape nor place

@@ -116,6 +116,8 @@ struct Object {
   std::optional<double> mass;           ///< [kg]
   std::optional<double> density;        ///< [kg/m^3]
   ShapeIs shape_is = ShapeIs::Reference;
+  bool pose_is_known = true;   ///< false: the surface stands anywhere, and is to be placed in the start frame
+  bool scale_is_known = true;  ///< false: the surface is in any unit; its pose is unknown then too
 
   /// Mass [kg], from the density where that is given. Nothing: neither is known.
   std::optional<double> total_mass() const;

@@ -353,6 +353,8 @@ void write_toml(std::ostream& out, const Object& object, const std::string& file
   if (!file.empty()) out << (object.volume ? "volume_mesh" : "surface") << " = " << toml_text(file) << "\n";
   if (object.mass) out << "mass = " << toml_text(*object.mass) << "   # kg\n";
   if (object.density) out << "density = " << toml_text(*object.density) << "   # kg/m^3\n";
+  if (!object.pose_is_known) out << "pose = \"unknown\"   # of the scan: found in the start frame\n";
+  if (!object.scale_is_known) out << "scale = \"unknown\"   # of the scan: any unit\n";
   if (object.shape_is == ShapeIs::Static) out << "shape_is = \"static\"   # taken as it sagged under gravity\n";
   out << "\n";
 }
