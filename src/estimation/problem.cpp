@@ -12,7 +12,8 @@ namespace pliant {
 namespace {
 
 constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: only ratios follow then
-constexpr double gravity_guess = 9.81;
+constexpr double gravity_guess = 9.81, gravity_std = 10.0;  // [m/s^2]
+constexpr double up_std = 0.05;                             // [rad], of a direction that is given as up
 constexpr double contact_std = 1.2;       // of the logarithm of its stiffness: a board, a carpet, a furry skin
 constexpr double hardest_contact = 2.0;   // times that which is as good as rigid: beyond, motions are erratic
 constexpr double least_wind = 1.0;        // [m/s], scale of one that is not known
@@ -169,7 +170,11 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     direction.origin = *capture.scene.world.gravity;
     p.push_back(std::move(direction));
   } else {
-    p.push_back(vector(layout, m.gravity, 1.0, m.gravity.vector(theta), 10.0, true));
+    // How strong it is nobody said; where up is, the capture does.
+    Parameter strength = vector(layout, m.gravity, 1.0, m.gravity.vector(theta), gravity_std, true);
+    const Matrix3 along = capture.scene.world.up * capture.scene.world.up.transpose();
+    strength.prior_shape = along + up_std * gravity_guess / gravity_std * (Matrix3::Identity() - along);
+    p.push_back(std::move(strength));
   }
   const double speed = std::sqrt(gravity * size);
   const bool moves = !capture.scene.initial.known && !capture.scene.timing.is_static;

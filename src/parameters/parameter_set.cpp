@@ -253,6 +253,15 @@ double ParameterSet::prior(const VectorX& p, VectorX* gradient, MatrixX* curvatu
   if (curvature) curvature->setZero(p.size(), p.size());
   for_each_estimated([&](const Parameter& q, int at) {
     if (!std::isfinite(q.prior_std)) return;
+    if (q.prior_shape.size() > 0) {
+      const MatrixX root = q.prior_shape.inverse() / q.prior_std;
+      const int n = q.dimension();
+      const VectorX r = root * (p.segment(at, n) - q.prior_mean);
+      sum += 0.5 * r.squaredNorm();
+      if (gradient) gradient->segment(at, n) = root.transpose() * r;
+      if (curvature) curvature->block(at, at, n, n) = root.transpose() * root;
+      return;
+    }
     for (int d = 0; d < q.dimension(); ++d) {
       const double t = (p[at + d] - q.prior_mean[d]) / q.prior_std;
       sum += 0.5 * t * t;

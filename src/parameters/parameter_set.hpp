@@ -31,6 +31,8 @@ struct Parameter {
   /// Normal prior in the unconstrained numbers, around `prior_mean`; infinite: none.
   double prior_std = std::numeric_limits<double>::infinity();
   VectorX prior_mean = {};
+  /// Of a vector's prior: symmetric, its deviations are `prior_std` times this; empty: alike in all directions.
+  MatrixX prior_shape = {};
   /// About what a plane (point, normal) or a direction moves; empty: the set's reference.
   VectorX origin = {};
   /// Whether it only stands for something else: forces for whoever held the object, parts of a scan's error. Of no

@@ -109,6 +109,33 @@ TEST(ParameterSet, PriorsAreNormal) {
   }
 }
 
+/// A direction that is known better than the length along it: narrow across, wide along.
+TEST(ParameterSet, AVectorsPriorMayBeNarrowAcrossADirection) {
+  VectorX theta = layout.zero();
+  theta.segment<3>(layout.gravity) = Vector3(0.0, -9.0, 0.5);
+  Parameter gravity{"gravity", "m/s^2", Transform::Vector, layout.gravity};
+  gravity.estimated = true, gravity.prior_std = 10.0, gravity.prior_mean = Vector3(0.0, -9.81, 0.0);
+  const Vector3 up = Vector3(0.1, 1.0, 0.0).normalized();
+  const Matrix3 along = up * up.transpose();
+  gravity.prior_shape = along + 0.05 * (Matrix3::Identity() - along);
+  const ParameterSet set(layout.layout(), {gravity}, theta);
+  const Vector3 mean(0.0, -9.81, 0.0), across = up.cross(Vector3::UnitZ()).normalized();
+  EXPECT_NEAR(set.prior(mean + 10.0 * up), 0.5, 1e-12);
+  EXPECT_NEAR(set.prior(mean + 0.5 * across), 0.5, 1e-12);
+  const VectorX p = set.to_unconstrained(theta);
+  VectorX gradient;
+  MatrixX curvature;
+  (void)set.prior(p, &gradient, &curvature);
+  for (Eigen::Index i = 0; i < p.size(); ++i) {
+    const VectorX e = VectorX::Unit(p.size(), i);
+    EXPECT_NEAR(gradient[i], (set.prior(p + 1e-3 * e) - set.prior(p - 1e-3 * e)) / 2e-3, tolerance(1e-8));
+    VectorX above, below;
+    (void)set.prior(p + 1e-3 * e, &above);
+    (void)set.prior(p - 1e-3 * e, &below);
+    EXPECT_LT((curvature.col(i) - (above - below) / 2e-3).norm(), tolerance(1e-7));
+  }
+}
+
 /// Three moduli tied to one another, the second of them not estimated, the first one with a prior of its own.
 TEST(ParameterSet, AJointPriorTiesLogarithmsTogether) {
   const MotionLayout of_three({.moduli = 3});
