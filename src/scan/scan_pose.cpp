@@ -259,12 +259,12 @@ class PoseSearch {
       for (std::size_t i = 0; i < look.object.size(); ++i) {
         const double scan = double(render.depth[i]) / guess.scale, object = double(look.object[i]),
                      any = double(look.all[i]);
+        // A reading beside the scan may be of an edge of the object that was left out.
+        const bool is_seen_past = scan > 0.0 && any > scan + cut / about_;
         if (scan > 0.0 && object > 0.0) {
           sum += std::pow(std::min(std::abs(scan - object) * about_, cut), 2), count += 1.0;
-        } else if (object > 0.0) {
+        } else if (object > 0.0 || is_seen_past) {
           sum += cut2, count += 1.0;
-        } else if (scan > 0.0 && any > scan + cut / about_) {
-          sum += cut2, count += 1.0;  // the sensor saw past it; a reading beside it may be of an edge that was left out
         } else if (scan > 0.0 && any <= 0.0) {
           sum += 0.1 * cut2, count += 0.1;
         }
