@@ -28,6 +28,7 @@ class Reader {
   }
   void raw(void* data, std::size_t size) {
     if (size > bytes_.size()) throw std::runtime_error("the bytes of the object are cut short");
+    if (size == 0) return;  // an empty list has no address
     std::memcpy(data, bytes_.data(), size);
     bytes_.remove_prefix(size);
   }
