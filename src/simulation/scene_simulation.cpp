@@ -10,6 +10,7 @@
 #include "motion/patch_forces.hpp"
 #include "motion/wind.hpp"
 #include "scene/region.hpp"
+#include "simulation/key_changes.hpp"
 
 namespace pliant {
 
@@ -205,17 +206,6 @@ void set_planes(const std::vector<Plane>& planes, const MotionBlocks& blocks, Ve
     theta[blocks.planes[i].friction] = planes[i].friction;
   }
 }
-
-namespace {
-
-/// Changes from the first key on.
-KeyFrames<3> changes(std::vector<KeyFrames<3>::Key> keys, const Vector3& from) {
-  if (keys.empty()) return {};
-  for (auto& key : keys) key.value -= from;
-  return KeyFrames<3>(std::move(keys));
-}
-
-}  // namespace
 
 void add_loads(const Scene& scene, SimulationOptions& simulation) {
   const MotionBlocks& blocks = simulation.blocks;

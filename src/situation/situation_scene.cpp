@@ -13,20 +13,10 @@
 #include "motion/patch_forces.hpp"
 #include "motion/rain.hpp"
 #include "motion/rigid_contact.hpp"
+#include "simulation/key_changes.hpp"
 #include "simulation/scene_simulation.hpp"
 
 namespace pliant {
-
-namespace {
-
-/// Changes from the first key on.
-KeyFrames<3> changes(std::vector<KeyFrames<3>::Key> keys, const Vector3& from) {
-  if (keys.empty()) return {};
-  for (auto& key : keys) key.value -= from;
-  return KeyFrames<3>(std::move(keys));
-}
-
-}  // namespace
 
 void check_place(const Situation& situation, const Scene& scene, const char* what, const Vector3& at, double radius) {
   const double distance = distances_to_surface(*scene.object.surface, std::span(&at, 1)).front();
