@@ -20,6 +20,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
+#include "plan.hpp"
 #include "scan/scan_pose.hpp"
 #include "speech.hpp"
 
@@ -31,7 +32,7 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 struct Arguments {
-  std::string capture, out, compare_masks;
+  std::string capture, out, compare_masks, plan;
   int pictures = 3;
 };
 
@@ -367,6 +368,7 @@ void check(const Arguments& arguments) {
 constexpr const char* footer = R"(Examples:
   pliant check recordings/bear
   pliant check recordings/bear --out look --pictures 8
+  pliant check --plan scene.toml          (before anything is recorded: docs/recording.md)
 
 Without --out nothing is written. With it, the folder gets check.json (the figures), a picture of a few frames of each
 depth camera (the object from yellow to violet by depth; planes blue; pixels removed at edges red; the rest grey), and
@@ -377,14 +379,25 @@ the points on the object as PLY files. A capture without a scan of the object at
 void add_check(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   Command command = line.add_command("check", "Validate a capture and say what can be estimated from it");
-  command.option("capture", arguments->capture, "the capture's folder, or its capture.toml").required();
+  command.option("capture", arguments->capture, "the capture's folder, or its capture.toml");
+  command
+      .option("--plan", arguments->plan,
+              "instead of a capture, a scene (docs/scene.md) of a recording that is not made yet: say what a fit of it "
+              "would tell, with 90 % intervals")
+      .type_name("SCENE.toml");
   command.option("--out", arguments->out, "folder for pictures, point clouds and figures");
   command.option("--pictures", arguments->pictures, "frames of each camera to picture").show_default().range(1, 100000);
   command.option("--compare-masks", arguments->compare_masks,
                  "pattern of reference masks, relative to the capture: report how well found objects agree with them");
   command.footer(footer);
   command.callback([arguments, &exit_code] {
-    check(*arguments);
+    if (arguments->capture.empty() == arguments->plan.empty())
+      throw InputError(
+          {{}, "check was given neither or both of a capture and --plan", "one of them", "pliant check --help"});
+    if (!arguments->plan.empty())
+      plan(arguments->plan, arguments->out);
+    else
+      check(*arguments);
     exit_code = Fine;
   });
 }

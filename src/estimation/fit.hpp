@@ -50,14 +50,18 @@ struct FitOptions {
   /// of a modulus is more than half of the noise's; 0: none. Where `refine` is 1, alternatives are
   /// tried, and no tracking takes turns with the fit.
   double budget = 1.0;
-  int points_per_frame = 1000;  ///< >= 10: an even subset of the pixels; 0: all
-  int scan_per_decade = 3;      ///< values of Young's modulus tried in each decade, >= 1
-  int starts = 3;               ///< best ones of the scan that are followed, >= 1
-  int most_starts = 7;          ///< with those that are drawn as long as the best one is not good, >= 1
-  int max_iterations = 25;      ///< of each stage of the optimiser, >= 1
-  double wide_band = 0.12;      ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
-  double fine_band = 0.05;      ///< of the last stage, (0, 0.5)
-  double newmark_theta = 0.51;  ///< [0.5, 1)
+  /// Part of each recording that is compared, from where it begins, (0, 1]; 0: all of it, or the part that the model
+  /// explains where the object meets obstacles (`ExplainedSpan`).
+  double span = 0.0;
+  bool ends_if_unexplained = false;  ///< after its first estimate; of a search for that part alone
+  int points_per_frame = 1000;       ///< >= 10: an even subset of the pixels; 0: all
+  int scan_per_decade = 3;           ///< values of Young's modulus tried in each decade, >= 1
+  int starts = 3;                    ///< best ones of the scan that are followed, >= 1
+  int most_starts = 7;               ///< with those that are drawn as long as the best one is not good, >= 1
+  int max_iterations = 25;           ///< of each stage of the optimiser, >= 1
+  double wide_band = 0.12;           ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
+  double fine_band = 0.05;           ///< of the last stage, (0, 0.5)
+  double newmark_theta = 0.51;       ///< [0.5, 1)
   /// Left out: hexahedra, or quadratic tetrahedra where it follows from the fit where the object is stress-free.
   std::optional<ElementKind> element;
   Integrator integrator = Integrator::Lagged;
@@ -188,6 +192,15 @@ struct FitState {
     std::vector<PressSample> samples;
   };
   std::optional<Sampled> sampled;
+  /// Where the part of the recordings is looked for that the model explains.
+  struct SpanSearch {
+    bool has_whole = false;          ///< the whole was fitted, and is not explained
+    bool is_ended = false;           ///< the last part that was tried is not explained
+    double part = 0.0;               ///< the longest that is explained; the first one where none is
+    double next_part = 0.0;          ///< to be tried
+    std::optional<PassState> state;  ///< of the fit to `part`, with its estimate; of the whole before that
+  };
+  std::optional<SpanSearch> span = {};
 };
 
 /// A recording, and what its sensors saw.

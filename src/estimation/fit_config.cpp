@@ -169,6 +169,10 @@ const std::vector<Entry>& entries() {
                  "time within which the estimate is repeated on finer meshes, as long as the mesh's part in the "
                  "uncertainty of a modulus is more than half of the noise's; 0: never",
                  &FitOptions::budget),
+      real_entry("span", "", "0..1",
+                 "part of each recording that is compared, from where it begins; 0: all of it, or the part that the "
+                 "model explains where the object meets obstacles",
+                 &FitOptions::span),
       integer_entry("points_per_frame", "0, or 10 and more",
                     "greatest number of observed points used of each frame, evenly spread; 0: all",
                     &FitOptions::points_per_frame),
@@ -520,6 +524,7 @@ std::string FitOptions::validate() const {
   if (outside(cells, 4, 64)) return "cells must lie in 4..64";
   if (outside(coarse_cells, 4, 64)) return "coarse_cells must lie in 4..64";
   if (!(steps > 0.0 && steps <= 16.0)) return "steps must lie in (0, 16]";
+  if (outside(span, 0.0, 1.0)) return "span must lie in 0..1";
   if (points_per_frame != 0 && points_per_frame < 10) return "points_per_frame must be 0 (all) or at least 10";
   if (scan_per_decade < 1) return "scan_per_decade must be at least 1";
   if (scan_points < 0 || scan_points > 50) return "scan_points must lie in 0..50";

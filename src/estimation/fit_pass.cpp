@@ -1,5 +1,6 @@
 #include "estimation/fit_pass.hpp"
 
+#include "estimation/explained_span.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/fit_run.hpp"
 
@@ -65,6 +66,8 @@ std::unique_ptr<PassPlanner> planner_of_points(std::vector<RecordedCapture> reco
     return std::make_unique<FieldChoice>(std::move(recordings), options, std::move(resume));
   FitOptions given = options;
   if (given.control_points == FitOptions::automatic) given.control_points = 1;  // the regions are the field
+  if (ExplainedSpan::suits(recordings, given))
+    return std::make_unique<ExplainedSpan>(std::move(recordings), given, std::move(resume));
   return std::make_unique<OnePass>(std::move(recordings), given, std::move(resume.pass));
 }
 

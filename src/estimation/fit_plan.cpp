@@ -122,6 +122,7 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
   if (StageChain chain = left_of(fine(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Fine)) return {};
   const StageRecord* first = estimate(done);
+  if (first && facts_.options.ends_if_unexplained && !first->is_explained) return {};
   if (first && facts_.options.correct && !find_record(done, {StageKind::Test})) return {{test(*first)}};
   if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Corrected)) return {};

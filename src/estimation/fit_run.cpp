@@ -310,7 +310,7 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
   record.iterations = s.iterations;
   record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
-  if (s.succeeded) record.misfit = misfit_of(s.evaluation);
+  if (s.succeeded) record.misfit = misfit_of(s.evaluation), record.is_explained = is_explained(s.evaluation);
   record.elements = grid(stage.grid).recording.front().body->element_count();
   if (s.succeeded) record.theta = parameters.to_theta(s.p);
   if (is_on_full_grid(stage.id.kind)) ended_.push_back({stage.id, std::move(s.evaluation)});

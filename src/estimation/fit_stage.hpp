@@ -104,6 +104,7 @@ struct StageRecord {
   VectorX from, theta;                  ///< where it began and ended
   double start_cost = 0.0, cost = 0.0;  ///< infinite where it could not be simulated
   double misfit = infinite;             ///< of a minimisation, at its end: see `misfit_of`
+  bool is_explained = true;             ///< of a minimisation: see `is_explained`
   int iterations = 0;
   bool succeeded = false;
   /// Of a search for a swing: one was found; of a look at the resolution: the next finer mesh is made.

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/13";
+constexpr const char* format = "fit-state/14";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -173,6 +173,7 @@ Json from_record(const StageRecord& r) {
                {"start_cost", from_cost(r.start_cost)},
                {"cost", from_cost(r.cost)},
                {"misfit", from_cost(r.misfit)},
+               {"is_explained", r.is_explained},
                {"iterations", r.iterations},
                {"succeeded", r.succeeded},
                {"converged", r.converged},
@@ -195,6 +196,7 @@ StageRecord to_record(const Json& json) {
   r.from = to_vector(json.at("from")), r.theta = to_vector(json.at("theta"));
   r.start_cost = to_cost(json.at("start_cost")), r.cost = to_cost(json.at("cost"));
   r.misfit = to_cost(json.at("misfit"));
+  r.is_explained = json.at("is_explained").get<bool>();
   r.iterations = json.at("iterations").get<int>();
   r.succeeded = json.at("succeeded").get<bool>(), r.converged = json.at("converged").get<bool>();
   r.reason = json.at("reason").get<std::string>();
@@ -232,10 +234,26 @@ PassState to_pass(const Json& json) {
   return pass;
 }
 
+Json from_span(const FitState::SpanSearch& span) {
+  Json json = {
+      {"has_whole", span.has_whole}, {"is_ended", span.is_ended}, {"part", span.part}, {"next_part", span.next_part}};
+  if (span.state) json["state"] = from_pass(*span.state);
+  return json;
+}
+
+FitState::SpanSearch to_span(const Json& json) {
+  FitState::SpanSearch span;
+  span.has_whole = json.at("has_whole").get<bool>(), span.is_ended = json.at("is_ended").get<bool>();
+  span.part = json.at("part").get<double>(), span.next_part = json.at("next_part").get<double>();
+  if (json.contains("state")) span.state = to_pass(json["state"]);
+  return span;
+}
+
 Json to_json(const FitState& state) {
   Json json = {{"pass", from_pass(state.pass)}};
   if (state.field) json["field"] = from_field(*state.field);
   if (state.tracking) json["tracking"] = from_tracking(*state.tracking);
+  if (state.span) json["span"] = from_span(*state.span);
   if (state.sampled) json["sampled"] = from_sampled(*state.sampled);
   return json;
 }
@@ -245,6 +263,7 @@ FitState to_state(const Json& json) {
   state.pass = to_pass(json.at("pass"));
   if (json.contains("field")) state.field = to_field(json["field"]);
   if (json.contains("tracking")) state.tracking = to_tracking(json["tracking"]);
+  if (json.contains("span")) state.span = to_span(json["span"]);
   if (json.contains("sampled")) state.sampled = to_sampled(json["sampled"]);
   return state;
 }

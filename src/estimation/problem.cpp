@@ -16,6 +16,7 @@ constexpr double gravity_guess = 9.81, gravity_std = 10.0;  // [m/s^2]
 constexpr double up_std = 0.05;                             // [rad], of a direction that is given as up
 constexpr double contact_std = 1.2;       // of the logarithm of its stiffness: a board, a carpet, a furry skin
 constexpr double hardest_contact = 2.0;   // times that which is as good as rigid: beyond, motions are erratic
+constexpr double friction_std = 0.5;      // of its coefficient
 constexpr double least_wind = 1.0;        // [m/s], scale of one that is not known
 constexpr double range_error_std = 0.02;  // [m], of light that enters a translucent material
 
@@ -186,8 +187,8 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     plane.transform = Transform::PlanePosition;
     plane.origin = theta.segment<6>(m.planes[i].whole());
     p.push_back(std::move(plane));
-    p.push_back(
-        scalar(layout, m.planes[i].friction, Transform::Shift, 0.0, 5.0, capture.scene.planes[i].friction, 0.5, false));
+    p.push_back(scalar(layout, m.planes[i].friction, Transform::Shift, 0.0, 5.0, capture.scene.planes[i].friction,
+                       friction_std, !capture.scene.planes[i].knows_friction && !capture.scene.timing.is_static));
   }
   if (m.contact_stiffness.exists()) {
     theta[m.contact_stiffness] = default_contact_stiffness(density * volume * std::max(gravity, 0.1),

@@ -278,6 +278,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
   if (!recording.observations->empty())
     recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
                                     recording.observations->back().frame);
+  if (options_.span > 0.0) recording.last_frame = std::max(1, int(options_.span * recording.last_frame));
   recording.distance = capture_distance(capture, widest_band());
   CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
                                                     pull_count(capture.scene, resolution(0.0, options_.steps)),

@@ -9,8 +9,14 @@ namespace pliant {
 
 namespace {
 
-constexpr double far_above_noise = 1.6;   // root mean square residual over the noise, over the whole recording
-constexpr double far_for_a_while = 2.2;   // likewise, over a tenth of the frames and three at least
+/// Limits of the root mean square residual over the noise.
+struct Limits {
+  double overall;
+  double for_a_while;  // over a tenth of the frames and three at least
+};
+constexpr Limits far_above_noise{1.6, 2.2};
+// Of a part of a recording that is chosen for being explained: what is between was seen to put moduli off by a third.
+constexpr Limits above_noise{1.4, 1.7};
 constexpr double least_matched = 0.85;    // of the points
 constexpr double poorly_known = 0.25;     // deviation of ln E
 constexpr double beyond_tolerance = 0.3;  // of the model's part in ln E
@@ -29,14 +35,14 @@ double residual_over_noise(const CostEvaluation& evaluation) {
   return noise > 0.0 ? std::sqrt(squares / noise) : 0.0;
 }
 
-void look_at_residuals(const CostEvaluation& evaluation, Verdict& verdict) {
+void look_at_residuals(const CostEvaluation& evaluation, const Limits& limits, Verdict& verdict) {
   const double ratio = residual_over_noise(evaluation);
   if (ratio == 0.0) return;
   const auto unexplained = [&](std::string reason) {
     verdict.kind = Verdict::Kind::Unexplained;
     verdict.reasons.push_back(std::move(reason));
   };
-  if (ratio > far_above_noise)
+  if (ratio > limits.overall)
     unexplained(
         fmt::format("The distances between what was seen and the simulated object are {:.1f} times the noise.", ratio));
   if (const double matched = evaluation.matched_fraction(); matched < least_matched)
@@ -44,7 +50,7 @@ void look_at_residuals(const CostEvaluation& evaluation, Verdict& verdict) {
                             100.0 * (1.0 - matched)));
   const std::vector<double> over_time = residuals_over_noise(evaluation);
   const auto worst = std::ranges::max_element(over_time);
-  if (verdict.kind == Verdict::Kind::Explained && worst != over_time.end() && *worst > far_for_a_while)
+  if (verdict.kind == Verdict::Kind::Explained && worst != over_time.end() && *worst > limits.for_a_while)
     unexplained(fmt::format("About frame {} after the start the distances are {:.1f} times the noise.",
                             evaluation.frames[std::size_t(worst - over_time.begin())].frame, *worst));
 }
@@ -77,6 +83,12 @@ double misfit_of(const CostEvaluation& evaluation) {
   return sees_surface ? ratio / std::min(1.0, evaluation.matched_fraction() / least_matched) : ratio;
 }
 
+bool is_explained(const CostEvaluation& evaluation) {
+  Verdict verdict;
+  look_at_residuals(evaluation, above_noise, verdict);
+  return verdict.kind == Verdict::Kind::Explained;
+}
+
 std::vector<double> residuals_over_noise(const CostEvaluation& evaluation) {
   std::vector<double> ratios;
   for (const FrameFit& f : evaluation.frames) {
@@ -95,7 +107,7 @@ std::vector<double> residuals_over_noise(const CostEvaluation& evaluation) {
 
 Verdict verdict_of(const CostEvaluation& evaluation, const Uncertainty& uncertainty, const ParameterSet& parameters) {
   Verdict verdict;
-  look_at_residuals(evaluation, verdict);
+  look_at_residuals(evaluation, far_above_noise, verdict);
   if (uncertainty.std.size() == parameters.dimension()) look_at_moduli(uncertainty, parameters, verdict);
   return verdict;
 }

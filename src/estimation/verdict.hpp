@@ -31,6 +31,10 @@ std::vector<double> residuals_over_noise(const CostEvaluation& evaluation);
 /// matched.
 double misfit_of(const CostEvaluation& evaluation);
 
+/// Whether residuals are near the noise, over all frames and for every while, and most points are matched: within
+/// closer limits than those of a verdict, for choosing what is fitted.
+bool is_explained(const CostEvaluation& evaluation);
+
 /// @param evaluation   at the estimate
 /// @param uncertainty  of the estimate; empty where nothing was estimated
 Verdict verdict_of(const CostEvaluation& evaluation, const Uncertainty& uncertainty, const ParameterSet& parameters);

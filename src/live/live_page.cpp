@@ -107,7 +107,7 @@ std::string facts(const Model& model, const LiveData& data, const LiveRecording&
 LiveData live_data(const Model& model) {
   Model free = model;
   free.scene.initial.released = false;
-  free.scene.initial.release_of.reset();
+  free.scene.initial.release_of.reset(), free.scene.initial.pulls.clear();
   free.scene.wind.reset(), free.scene.forces.clear();  // hands and sliders take their place
   if (free.scene.timing.times.empty() || free.scene.timing.is_static) free.scene.timing = evenly_timed(30.0, 2);
   const ModelScene made = make_scene(free, free.scene, scene_distance(free.scene, Resolution{}.band), {}, true);

@@ -128,6 +128,7 @@ std::vector<Plane> planes_at(const Capture& capture, const MotionBlocks& blocks,
     planes[i].point = blocks.planes[i].point.vector(theta);
     planes[i].normal = blocks.planes[i].normal.vector(theta);
     planes[i].friction = theta[blocks.planes[i].friction];
+    planes[i].knows_friction = true;
   }
   return planes;
 }
@@ -330,7 +331,10 @@ void add_uncertainty_of(ParameterResult& r, const Parameter& p, const FitOutcome
   const VectorX here = outcome.parameters.to_unconstrained(outcome.theta);
   VectorX low = here, high = here;
   low[at] += u.low[at], high[at] += u.high[at];
-  r.interval_90 = std::pair(outcome.parameters.to_theta(low)[p.at], outcome.parameters.to_theta(high)[p.at]);
+  const auto within_bounds = [&](const VectorX& end) {
+    return outcome.parameters.to_theta(outcome.parameters.clamp(end))[p.at];
+  };
+  r.interval_90 = std::pair(within_bounds(low), within_bounds(high));
 }
 
 void add_verdict(Result& result, const FitOutcome& outcome, const MatrixX& jacobian) {

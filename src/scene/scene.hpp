@@ -63,6 +63,7 @@ struct Plane {
   Vector3 normal = Vector3::UnitY();  ///< unit length, to the side where the object may be
   bool known = true;                  ///< false: a rough guess, to be estimated
   double friction = 0.0;              ///< Coulomb's coefficient [-], >= 0
+  bool knows_friction = true;         ///< false: nobody said how large it is; to be estimated where something moves
   bool operator==(const Plane&) const = default;
 };
 

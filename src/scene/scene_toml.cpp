@@ -263,6 +263,7 @@ Plane read_plane(TomlTable& block) {
   plane.point = block.required<Vector3>("point").value_or(plane.point);
   plane.normal = read_direction(block, "normal").value_or(plane.normal);
   plane.known = block.optional<bool>("known").value_or(true);
+  plane.knows_friction = block.has("friction");
   plane.friction = read_number(block, "friction", {.low = 0.0, .high = 5.0, .meaning = "Coulomb's coefficient"}, 0.0);
   return plane;
 }
@@ -381,7 +382,7 @@ void write_toml(std::ostream& out, const Timing& timing) {
 void write_toml(std::ostream& out, const Plane& plane) {
   out << "[[plane]]\npoint = " << toml_text(plane.point) << "   # m\nnormal = " << toml_text(plane.normal)
       << "   # to the side where the object may be\nknown = " << (plane.known ? "true" : "false") << "\n";
-  if (plane.friction > 0.0) out << "friction = " << toml_text(plane.friction) << "   # Coulomb's coefficient\n";
+  if (plane.knows_friction) out << "friction = " << toml_text(plane.friction) << "   # Coulomb's coefficient\n";
   out << "\n";
 }
 

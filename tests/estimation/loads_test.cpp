@@ -4,6 +4,7 @@
 #include "estimation/objective.hpp"
 #include "estimation/optimiser.hpp"
 #include "estimation/problem.hpp"
+#include "geometry/primitives.hpp"
 #include "simulation/scene_simulation.hpp"
 #include "support/bodies.hpp"
 #include "support/derivatives.hpp"

@@ -24,6 +24,14 @@ TEST(LivePage, IsOneFileThatNeedsNoOther) {
   EXPECT_LT(page.size(), std::size_t(3) << 20);
 }
 
+TEST(LivePage, OfAReleasedObjectLetsGoOfIt) {
+  Model model = test::block(true);
+  model.scene.initial.released = true;
+  model.scene.initial.pulls = {Vector3(0.1, 0.0, 0.0), Vector3(0.0, -0.2, 0.0)};
+  const LiveData data = live_data(model);
+  EXPECT_EQ(data.theta.size(), live_data(test::block(true)).theta.size()) << "nothing pulls at it any more";
+}
+
 TEST(LivePage, OfPressesHoldsThem) {
   LiveRecording recording;
   recording.presses = {{{0.05, 0.025, 0.0}, 0.01, {0.0, -2.5, 0.0}}};

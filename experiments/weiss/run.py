@@ -1,0 +1,32 @@
+#!/usr/bin/env python3
+"""The evaluation of Weiss et al. 2020 (its figures 3, 7, 9 to 11 and 18 to 31) on synthetic recordings.
+
+Every recording is simulated on a finer grid and with shorter steps than it is fitted with. Each study writes its part of
+results.json; what has run already, in the folder of --work, is not run again."""
+import pathlib
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+import common
+import studies
+
+
+def main():
+    arguments = common.arguments(__doc__, only={"help": "names of studies, with commas; left out: all of " + ", ".join(studies.ALL)},
+                                 small={"action": "store_true", "help": "two starts and few frames of each, to see that it runs; writes no results"})
+    names = arguments.only.split(",") if arguments.only else list(studies.ALL)
+    unknown = [name for name in names if name not in studies.ALL]
+    if unknown:
+        sys.exit(f"there is no study \"{unknown[0]}\"; there are {', '.join(studies.ALL)}")
+    study = studies.Study(arguments.program, arguments.work, arguments.small)
+    for name in names:
+        found = studies.ALL[name](study)
+        if not arguments.small:
+            path = HERE / "results.json"
+            before = common.read(path)["studies"] if path.exists() else {}
+            common.write_results(__file__, {"studies": before | {name: found}})
+
+
+if __name__ == "__main__":
+    main()
