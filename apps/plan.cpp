@@ -75,11 +75,11 @@ void tell(const Result& result, const SyntheticScene& scene, Json& json) {
     if (!p.estimated || !p.interval_90) continue;
     const double value = std::get<double>(p.value), half = 0.5 * (p.interval_90->second - p.interval_90->first);
     const UncertaintyResult* cause = largest_cause(result, p.name);
-    say(p.name,
-        formatted("%.3g %s, +- %.2g (%.0f %%)%s", value, p.unit == "1" ? "" : p.unit.c_str(), half,
-                  100.0 * half / std::max(std::abs(value), 1e-300),
-                  cause ? (", most of it from " + cause->cause).c_str() : ""),
-        24);
+    const std::string unit = p.unit == "1" ? "" : " " + p.unit;
+    std::string text =
+        formatted("%.3g%s, %.3g to %.3g", value, unit.c_str(), p.interval_90->first, p.interval_90->second);
+    if (half < std::abs(value)) text += formatted(" (± %.0f %%)", 100.0 * half / std::abs(value));
+    say(p.name, text + (cause ? ", most of it from " + cause->cause : ""), 20);
     json["parameters"][p.name] = {{"value", value}, {"interval_90", {p.interval_90->first, p.interval_90->second}}};
     if (cause) json["parameters"][p.name]["largest_cause"] = cause->cause;
   }

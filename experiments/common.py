@@ -68,11 +68,11 @@ def settings(choices):
     return words
 
 
-def fit(program, capture, out, choices=None, threads=None, limit=None):
+def fit(program, capture, out, choices=None, threads=None, limit=None, more=()):
     """Fits a capture, for at most about `limit` seconds. Returns the run's figures, the result, and the iterations by stage.
 
     A fit whose figures are in its folder already is not run again: an experiment that was stopped goes on."""
-    words = ["fit", capture, "--out", out, *settings(choices or {})]
+    words = ["fit", capture, "--out", out, *settings(choices or {}), *more]
     if threads:
         words += ["--threads", threads]
     out = pathlib.Path(out)

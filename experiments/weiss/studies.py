@@ -337,6 +337,13 @@ def ball(study, name, tilt=(0.0, 0.0), height=0.0, velocity=(0.0, 0.0, 0.0), cha
     return study.record(name, text, change)
 
 
+def error_of_fit(study, name, capture):
+    """Of `pliant fit`, which is given no start."""
+    known = {f"{key}.estimate": False for key in BALL_KNOWN if key != "cells"} | {"contact_stiffness.estimate": False, "friction.estimate": False}
+    figures = common.fit(study.pliant, capture, study.work / f"fit-{name}", BALL_KNOWN | known | {"alternatives": False})
+    return common.number(figures["result"]["parameters"]["youngs_modulus"]["value"] / BALL[0] - 1.0, 3)
+
+
 def random_ground(generator):
     return {"tilt": (generator.uniform(-0.5, 0.5), generator.uniform(-0.5, 0.5)), "height": generator.uniform(-0.03, 0.02),
             "velocity": (generator.uniform(-1.0, 1.0), generator.uniform(-1.5, 0.5), generator.uniform(-0.5, 0.5))}
@@ -349,6 +356,8 @@ def grounds(study):
         capture = ball(study, f"ball-{i + 1}", **random_ground(generator))
         starts = log_uniform_starts(study.count(20), BALL[0], SEED)
         found[str(i + 1)] = study_rows(study, f"ground-{i + 1}", capture, starts, BALL[0], BALL_KNOWN | {"wide_band": band(1.0, 10)})
+        if not study.small:
+            found[str(i + 1)]["fit_error"] = error_of_fit(study, f"ground-{i + 1}", capture)
     return found
 
 

@@ -129,5 +129,32 @@ TEST(Synth, RefusesHalfARelease) {
   EXPECT_FALSE(std::filesystem::exists(folder / "never"));
 }
 
+TEST(Plan, SaysWhatARecordingOfASceneWouldTell) {
+  const TemporaryFolder folder;
+  const std::string out = folder / "plan";
+  const ProgramRun run = run_pliant({"check", "--plan", PLIANT_TEST_SCENE, "--out", out});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  for (const char* word : {"90 % intervals", "youngs_modulus", "stiffness_damping", "most of it from"})
+    EXPECT_THAT(run.out, HasSubstr(word));
+  const auto plan = nlohmann::json::parse(read_file(out + "/plan.json"));
+  const auto& modulus = plan.at("parameters").at("youngs_modulus");
+  const double low = modulus.at("interval_90").at(0), high = modulus.at("interval_90").at(1);
+  EXPECT_LT(low, 3000.0);
+  EXPECT_GT(high, 3000.0);
+  EXPECT_LT(high / low, 3.0) << "the recording tells something";
+  EXPECT_FALSE(modulus.at("largest_cause").get<std::string>().empty());
+  EXPECT_NO_THROW((void)read_capture(out)) << "the synthetic recording is there to look at";
+}
+
+TEST(Plan, IsAskedForInsteadOfACapture) {
+  const ProgramRun neither = run_pliant({"check"});
+  EXPECT_EQ(neither.exit_code, 2);
+  EXPECT_THAT(neither.err, HasSubstr("--plan"));
+  EXPECT_EQ(run_pliant({"check", "somewhere", "--plan", PLIANT_TEST_SCENE}).exit_code, 2);
+  const ProgramRun missing = run_pliant({"check", "--plan", "nowhere.toml"});
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.err, HasSubstr("nowhere.toml"));
+}
+
 }  // namespace
 }  // namespace pliant::test::synth_test
