@@ -64,9 +64,21 @@ bool GradientCheck::agrees() const {
   return std::ranges::none_of(derivatives, [](const auto& d) { return d.verdict == Judgement::Disagree; });
 }
 
-GradientCheck check_gradient(CostFunction& cost, const VectorX& p, const GradientCheckOptions& options) {
+namespace {
+
+/// Where the greatest step to either side stays within the bounds: at a bound differences see half a derivative.
+VectorX beside_bounds(const ParameterSet& parameters, VectorX p, double step) {
+  const VectorX up = VectorX::Constant(p.size(), step);
+  p += (parameters.clamp(p - up) - (p - up)) + (parameters.clamp(p + up) - (p + up));
+  return parameters.clamp(p);
+}
+
+}  // namespace
+
+GradientCheck check_gradient(CostFunction& cost, const VectorX& at, const GradientCheckOptions& options) {
   if (!(options.greatest_step > 0.0) || options.steps < 3 || !(options.tolerance >= 0.0))
     throw std::invalid_argument("a gradient's check needs a positive step, three of them and a tolerance");
+  const VectorX p = beside_bounds(cost.parameters(), at, options.greatest_step);
   GradientCheck check;
   const CostEvaluation by_tangents = cost.linearise(p), by_adjoint = cost.gradient(p);
   for (const CostEvaluation* e : {&by_tangents, &by_adjoint})

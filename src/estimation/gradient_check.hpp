@@ -46,10 +46,10 @@ struct GradientCheck {
 };
 
 /// Compares the gradient of a cost at p in every number by tangents, by the adjoint and by central differences over
-/// several step sizes. A difference is trusted as far as its neighbours in the V-curve confirm it: large steps err
-/// by curvature, small ones by rounding and by the tolerance of nonlinear solves. Evaluates the cost twice for
-/// each number and step size.
-/// Throws std::invalid_argument for options outside their ranges.
+/// several step sizes; a number at its bound is moved beside it by the greatest step. A difference is trusted as far as
+/// its neighbours in the V-curve confirm it: large steps err by curvature, small ones by rounding and by the tolerance
+/// of nonlinear solves. Evaluates the cost twice for each number and step size. Throws std::invalid_argument for
+/// options outside their ranges.
 GradientCheck check_gradient(CostFunction& cost, const VectorX& p, const GradientCheckOptions& options = {});
 
 /// The comparison as text: a line for each number with the three derivatives, how well the best difference is known,

@@ -92,23 +92,30 @@ class Run {
   const std::function<bool(const Iteration&)>& on_iteration_;
 };
 
-/// -H^-1 g over the numbers that can move: those that lie at a bound and are pushed outwards take no part, so that the
-/// others go where they would with these fixed. What pushes itself goes first: another may be pushed by that alone.
+/// The least of g.s + s.H s / 2 within the bounds: -H^-1 g where it lies inside. A number that would cross its bound
+/// goes there, and the others go where they then would: by an active set that only grows. What pushes itself across
+/// goes first: another may be pushed by that alone.
 VectorX step_within_bounds(const Run& run, const MatrixX& H) {
   const VectorX &p = run.summary.p, &g = run.summary.evaluation.gradient;
-  std::vector<Eigen::Index> free(std::size_t(p.size()));
+  std::vector<Eigen::Index> free(std::size_t(p.size())), fixed;
   std::iota(free.begin(), free.end(), 0);
+  VectorX step = VectorX::Zero(p.size());
   while (!free.empty()) {
-    VectorX step = VectorX::Zero(p.size());
-    step(free) = -solve_symmetric(MatrixX(H(free, free)), VectorX(g(free)));
+    const VectorX pull = g(free) + H(free, fixed) * step(fixed);
+    step(free) = -solve_symmetric(MatrixX(H(free, free)), pull);
     const VectorX moved = run.clamp(p + step) - p;
-    const auto is_blocked = [&](Eigen::Index i) {
-      return step[i] != 0.0 && std::abs(moved[i]) < 1e-9 * std::abs(step[i]);
-    };
-    const auto pushes_itself = [&](Eigen::Index i) { return is_blocked(i) && g[i] * step[i] < 0.0; };
-    if (std::erase_if(free, pushes_itself) == 0 && std::erase_if(free, is_blocked) == 0) return step;
+    const auto is_cut = [&](Eigen::Index i) { return std::abs(moved[i]) < (1.0 - 1e-9) * std::abs(step[i]); };
+    const auto pushes_itself = [&](Eigen::Index i) { return is_cut(i) && g[i] * step[i] < 0.0; };
+    const bool any_itself = std::ranges::any_of(free, pushes_itself);
+    const auto first_kept =
+        std::ranges::stable_partition(free, [&](Eigen::Index i) { return any_itself ? pushes_itself(i) : is_cut(i); });
+    const std::vector<Eigen::Index> kept(first_kept.begin(), first_kept.end());
+    if (kept.size() == free.size()) return step;
+    fixed.insert(fixed.end(), free.begin(), first_kept.begin());
+    for (const Eigen::Index i : fixed) step[i] = run.clamp(p + step)[i] - p[i];
+    free = kept;
   }
-  return VectorX::Zero(p.size());
+  return step;
 }
 
 /// A step of Levenberg and Marquardt, and what it promises.

@@ -84,6 +84,24 @@ TEST(GradientCheck, RightDerivativesAgree) {
   EXPECT_NE(describe(right).find("agree as far as"), std::string::npos) << describe(right);
 }
 
+TEST(GradientCheck, ANumberAtItsBoundIsCheckedBesideIt) {
+  ParameterLayout layout;
+  std::vector<Parameter> list(2);
+  list[0] = {.name = "first", .unit = "Pa", .at = layout.add({"first", "Pa", 1, Role::Material}), .estimated = true};
+  list[1] = {.name = "second",
+             .unit = "1",
+             .transform = Transform::Shift,
+             .at = layout.add({"second", "1", 1, Role::Obstacle})};
+  list[1].estimated = true, list[1].lower = 0.7, list[1].upper = 5.0;
+  const ParameterSet set(layout, list, (VectorX(2) << 1.5, 0.7).finished());
+  std::vector<std::unique_ptr<Trial>> trials;
+  trials.push_back(std::make_unique<SmallTrial>(SmallTrial::Errors{}));
+  Objective objective(std::move(trials), set);
+  const GradientCheck check = check_gradient(objective, set.to_unconstrained(set.reference()));
+  ASSERT_TRUE(check.succeeded) << check.failure;
+  EXPECT_EQ(check.derivatives[1].verdict, Verdict::Agree) << describe(check);
+}
+
 TEST(GradientCheck, AWrongDerivativeDisagrees) {
   for (const SmallTrial::Errors& errors : {SmallTrial::Errors{.tangents = 1e-3}, SmallTrial::Errors{.adjoint = 1e-3},
                                            SmallTrial::Errors{.tangents = 1e-3, .adjoint = 1e-3}}) {

@@ -194,15 +194,15 @@ TEST_P(BaselineOptimiser, GoesOnFromAnyIterationAlongTheSamePath) {
   }
 }
 
-/// x^T H x / 2 - b x of numbers between -1 and 1.
+/// x^T H x / 2 - b x of numbers between -1 and 1, or other bounds.
 class BoundedQuadratic : public CostFunction {
  public:
-  BoundedQuadratic(MatrixX H, VectorX b) : H_(std::move(H)), b_(std::move(b)) {
+  BoundedQuadratic(MatrixX H, VectorX b, double bound = 1.0) : H_(std::move(H)), b_(std::move(b)) {
     ParameterLayout layout;
     std::vector<Parameter> list;
     for (int i = 0; i < b_.size(); ++i) {
       const std::string name(1, char('x' + i));
-      list.push_back({name, "1", Transform::Shift, layout.add({name, "1"}), 1.0, -1.0, 1.0, true});
+      list.push_back({name, "1", Transform::Shift, layout.add({name, "1"}), 1.0, -bound, bound, true});
     }
     set_ = ParameterSet(std::move(layout), std::move(list), VectorX::Zero(b_.size()));
   }
@@ -279,10 +279,25 @@ TEST(LevenbergMarquardt, WhatOnlyAnotherNumberPushesOutwardsIsLetIn) {
   EXPECT_NEAR(s.p[1], 0.6, 1e-3);
 }
 
+TEST(LevenbergMarquardt, ANumberCloseToItsBoundDoesNotHoldUpTheOthers) {
+  // The first would go far beyond its bound, and take the second along; with the first at 1 the second's minimum is
+  // 0.5.
+  const MatrixX H = (MatrixX(2, 2) << 1.0, 0.999, 0.999, 1.0).finished();
+  const Eigen::Vector2d minimum(200.0, 0.5 - 0.999 * 199.0);
+  for (const double below : {1e-5, 1e-3, 0.1}) {
+    BoundedQuadratic cost(H, H * minimum);
+    OptimiserOptions options;
+    options.promise_tolerance = 1e-6;
+    const OptimiserSummary s = minimise(cost, Eigen::Vector2d(1.0 - below, -0.5), options);
+    EXPECT_NEAR(s.p[0], 1.0, 1e-6) << below;
+    EXPECT_NEAR(s.p[1], 0.5, 1e-2) << below << ": " << s.reason;
+  }
+}
+
 TEST(LevenbergMarquardt, DampingOfLongStepsLetsWhatIsKnownArrive) {
   // Of two numbers the sum is known, 0.4; their difference hardly is, and asks for a step of a hundred.
   const MatrixX H = (MatrixX(2, 2) << 1.0, 1.0 - 1e-6, 1.0 - 1e-6, 1.0).finished();
-  BoundedQuadratic cost(H, H * Eigen::Vector2d(50.2, -49.8));
+  BoundedQuadratic cost(H, H * Eigen::Vector2d(50.2, -49.8), 1e3);
   OptimiserOptions options;
   options.max_iterations = 1;
   options.max_step = 0.5;
