@@ -48,7 +48,7 @@ SimulationOptions options_of(const SyntheticScene& synthetic, const MotionBlocks
   SimulationOptions options;
   const Timing& timing = scene.timing;
   for (int i = 0; i < timing.frame_count() - timing.start_frame; ++i)
-    options.times.push_back(timing.times[std::size_t(timing.start_frame + i)]);
+    options.times.push_back(timing.times[std::size_t(timing.start_frame) + std::size_t(i)]);
   options.max_dt = 1.0 / (timing.frame_rate * synthetic.substeps);
   options.newmark_theta = synthetic.newmark_theta;
   if (synthetic.is_corotated) options.elastic_law = ElasticLaw::Corotated;

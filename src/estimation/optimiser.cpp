@@ -107,13 +107,12 @@ VectorX step_within_bounds(const Run& run, const MatrixX& H) {
     const auto is_cut = [&](Eigen::Index i) { return std::abs(moved[i]) < (1.0 - 1e-9) * std::abs(step[i]); };
     const auto pushes_itself = [&](Eigen::Index i) { return is_cut(i) && g[i] * step[i] < 0.0; };
     const bool any_itself = std::ranges::any_of(free, pushes_itself);
-    const auto first_kept =
-        std::ranges::stable_partition(free, [&](Eigen::Index i) { return any_itself ? pushes_itself(i) : is_cut(i); });
-    const std::vector<Eigen::Index> kept(first_kept.begin(), first_kept.end());
-    if (kept.size() == free.size()) return step;
-    fixed.insert(fixed.end(), free.begin(), first_kept.begin());
-    for (const Eigen::Index i : fixed) step[i] = run.clamp(p + step)[i] - p[i];
-    free = kept;
+    const auto kept = std::stable_partition(free.begin(), free.end(),
+                                            [&](Eigen::Index i) { return any_itself ? pushes_itself(i) : is_cut(i); });
+    if (kept == free.begin()) return step;
+    for (auto i = free.begin(); i != kept; ++i) step[*i] = moved[*i];
+    fixed.insert(fixed.end(), free.begin(), kept);
+    free.erase(free.begin(), kept);
   }
   return step;
 }
