@@ -103,14 +103,15 @@ def joint(studies):
     if others:
         text += f"\n{len(others)} starts ended elsewhere, at {min(r['cost'] for r in others) / least:.3g} times the lowest cost and more.\n"
     ridge = found["ridge"]
-    panel = plots.Panel(80, 20, 520, 300, (3.0, 3.7), (math.log10(min(r["stiffness_damping"] for r in ridge)) - 0.1, math.log10(max(r["stiffness_damping"] for r in ridge)) + 0.1))
-    panel.axes("Young's modulus [Pa]", "stiffness damping [s]")
-    panel.line([(r["youngs_modulus"], r["stiffness_damping"]) for r in ridge], plots.COLOURS[0], "lowest cost at each modulus", 0)
+    panel = plots.EvenPanel(80, 20, 520, 300, 4.5, 7.0)
+    panel.axes("Young's modulus [kPa]", "stiffness damping [ms]")
+    panel.parts.append('<polyline points="' + " ".join(f"{panel.x(1e-3 * r['youngs_modulus']):.1f},{panel.y(1e3 * r['stiffness_damping']):.1f}" for r in ridge) +
+                       f'" fill="none" stroke="{plots.COLOURS[0]}" stroke-width="2"/>')
     for r in good:
-        panel.parts.append(f'<circle cx="{panel.x(r["youngs_modulus"]):.1f}" cy="{panel.y(r["stiffness_damping"]):.1f}" r="3" fill="{plots.COLOURS[1]}"/>')
-    panel.cross(truth["youngs_modulus"], truth["stiffness_damping"])
+        panel.mark(1e-3 * r["youngs_modulus"], 1e3 * r["stiffness_damping"], plots.COLOURS[1])
+    panel.cross(1e-3 * truth["youngs_modulus"], 1e3 * truth["stiffness_damping"])
     plots.write(IMAGES / "weiss-ridge.svg", 640, 390, panel.parts)
-    text += "\nThe ridge: Young's modulus held at values about the truth, stiffness damping and gravity as they are best then. Points: where the starts ended; cross: the truth.\n\n![The ridge](images/weiss-ridge.svg)\n\n"
+    text += "\nThe ridge of figure 28, between modulus and damping: Young's modulus held at values about the truth, stiffness damping and gravity as they are best then (line). It is no valley of equal costs: the cost rises along it, by hundreds to the next moduli, and starts that go to the end of it meet at one place. Points: where the starts ended; cross: the truth.\n\n![The ridge](images/weiss-ridge.svg)\n\n"
     return text + table(["Young's modulus held [Pa]", "stiffness damping [ms]", "cost above the lowest"],
                         [[f"{r['youngs_modulus']:g}", f"{1e3 * r['stiffness_damping']:.3g}", f"{r['cost'] - min(least, min(q['cost'] for q in ridge)):.3g}"] for r in ridge])
 
