@@ -519,6 +519,9 @@ CaptureScene make_scene(const Model& model, const Capture& recorded) {
     capture.scene.object.surface = model.scene.object.surface;
     capture.scene.object.shape_is = ShapeIs::Reference;
   }
+  std::vector<Plane>& planes = capture.scene.planes;  // how they rub the model knows, where nobody said it
+  for (std::size_t i = 0; i < std::min(planes.size(), model.scene.planes.size()); ++i)
+    if (!planes[i].knows_friction) planes[i].friction = model.scene.planes[i].friction;
   ModelScene made = make_scene(model, capture.scene, capture_distance(capture, Resolution{}.band), capture.file);
   Resolution resolution;
   resolution.cells = object_size(capture.scene) / model.cell_size;

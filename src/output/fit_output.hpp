@@ -29,8 +29,8 @@ Model make_model(const Capture& capture, const FitOutcome& outcome);
 Model make_model(const Capture& capture, const Discretisation& discretisation, const VectorX& theta,
                  const ModulusStatistics& modulus, double cells);
 
-/// A model's material in a capture's situation, on a grid as fine as the model's.
-/// Throws InputError where the capture has no moving object.
+/// A model's material in a capture's situation, on a grid as fine as the model's. Planes whose friction the capture
+/// does not state rub as those of the model do. Throws InputError where the capture has no moving object.
 struct CaptureScene {
   Discretisation discretisation;
   ParameterLayout layout;
