@@ -15,6 +15,7 @@ constexpr double least_part = 0.15;     // of a recording
 constexpr double after_touch = 1.25;    // times the part until the obstacle is touched
 constexpr double growth = 1.2;          // of the part, from one that is explained
 constexpr double as_good_as_all = 0.9;  // a part that is not tried beside the whole
+constexpr double whole = 1.0;
 
 bool meets_obstacles(const RecordedCapture& r) {
   return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static && !r.capture.scene.initial.released;
@@ -67,10 +68,12 @@ std::optional<Pass> ExplainedSpan::next() {
   is_last_ = is_decided();
   if (search_.has_whole) {
     pass.options.span = is_last_ ? search_.part : search_.next_part;
-    pass.options.cells = std::min(64.0, options_.cells * Refinement::mesh_ratio);
+    if (search_.part < whole) {
+      pass.options.cells = std::min(64.0, options_.cells * Refinement::mesh_ratio);
+      pass.stage = fmt::format("first {:.0f} %", 100.0 * pass.options.span);
+    }
     pass.options.alternatives = options_.alternatives && is_last_;
     pass.begin = is_last_ ? *search_.state : begun_from(*search_.state);
-    pass.stage = fmt::format("first {:.0f} %", 100.0 * pass.options.span);
     pass.done_from = pass.done_to = 0.9;
   }
   if (is_left_) pass.begin = left_, is_left_ = false;
@@ -91,11 +94,11 @@ bool ExplainedSpan::take(FitOutcome outcome, PassState reached) {
         const RecordingOutcome& r = outcome.recordings[i];
         part = std::max(part, part_until_touch(r, last_seen(r.evaluation)));
       }
-    search_.next_part = search_.part = std::max(least_part, after_touch * part);
+    const double first = std::max(least_part, after_touch * part);
+    search_.next_part = search_.part = first > as_good_as_all ? whole : first;
   }
-  // Whole and explained, or nothing else can be tried.
-  if (has_failed || is_last_ || (was_whole && (fits || search_.next_part > as_good_as_all))) {
-    if (!was_whole) {
+  if (has_failed || is_last_ || (was_whole && fits)) {
+    if (!was_whole && search_.part < whole) {
       outcome.starts = starts_;
       say(outcome);
     }

@@ -53,7 +53,7 @@ struct FitOptions {
   /// Part of each recording that is compared, from where it begins, (0, 1]; 0: all of it, or the part that the model
   /// explains where the object meets obstacles (`ExplainedSpan`).
   double span = 0.0;
-  bool ends_if_unexplained = false;  ///< after its first estimate; of a search for that part alone
+  bool ends_if_unexplained = false;  ///< after its estimate; of a search for that part alone
   int points_per_frame = 1000;       ///< >= 10: an even subset of the pixels; 0: all
   int scan_per_decade = 3;           ///< values of Young's modulus tried in each decade, >= 1
   int starts = 3;                    ///< best ones of the scan that are followed, >= 1
@@ -196,7 +196,7 @@ struct FitState {
   struct SpanSearch {
     bool has_whole = false;          ///< the whole was fitted, and is not explained
     bool is_ended = false;           ///< the last part that was tried is not explained
-    double part = 0.0;               ///< the longest that is explained; the first one where none is
+    double part = 0.0;               ///< the longest that is explained; the first one where none is; 1: none is tried
     double next_part = 0.0;          ///< to be tried
     std::optional<PassState> state;  ///< of the fit to `part`, with its estimate; of the whole before that
   };

@@ -122,10 +122,10 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
   if (StageChain chain = left_of(fine(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Fine)) return {};
   const StageRecord* first = estimate(done);
-  if (first && facts_.options.ends_if_unexplained && !first->is_explained) return {};
   if (first && facts_.options.correct && !find_record(done, {StageKind::Test})) return {{test(*first)}};
   if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Corrected)) return {};
+  if (const StageRecord* at = estimate(done); at && facts_.options.ends_if_unexplained && !at->is_explained) return {};
   if (StageChain chain = finer(done); !chain.empty()) return {chain};
   if (std::vector<StageChain> left = alternatives(done); !left.empty()) return left;
   return resolution(done);

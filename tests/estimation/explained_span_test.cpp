@@ -85,6 +85,20 @@ TEST(ExplainedSpan, EndsBeforeWhatNoParametersExplain) {
   EXPECT_LT(off(part), off(whole));
 }
 
+TEST(ExplainedSpan, OfWhatTouchesNothingIsTheWholeWithItsAlternatives) {
+  RecordedCapture block = kicked_block();
+  for (Plane& plane : block.capture.scene.planes) plane.point = Vector3(0.0, -5.0, 0.0);  // far below
+  FitOptions options = quick();
+  options.alternatives = true;
+  const FitOutcome outcome = fit({block}, options);
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  EXPECT_EQ(outcome.verdict.kind, Verdict::Kind::Unexplained);
+  EXPECT_EQ(last_frame(outcome), 29);
+  EXPECT_DOUBLE_EQ(outcome.cells, options.cells);
+  EXPECT_GT(outcome.uncertainty.budget.size(), 1u) << "other models are tried all the same";
+  EXPECT_THAT(outcome.notes, ::testing::Not(::testing::Contains(::testing::HasSubstr("whole motion"))));
+}
+
 TEST(ExplainedSpan, GoesOnAfterAnInterruption) {
   const RecordedCapture block = kicked_block();
   const FitOutcome undisturbed = fit({block}, quick());
