@@ -127,6 +127,7 @@ void ExplainedSpan::say(FitOutcome& outcome) const {
                          times[std::size_t(std::min(last, int(times.size()) - 1))] - times.front(),
                          times.back() - times.front());
   }
+  outcome.verdict.reasons.push_back("That is said of the first " + until + " of the motion, which alone was fitted.");
   outcome.notes.insert(outcome.notes.begin(),
                        "No parameters explain the whole motion: small errors of a model grow with every impact. The "
                        "estimate is that of the first " +

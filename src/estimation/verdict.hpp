@@ -16,7 +16,7 @@ struct Verdict {
     Undetermined,  ///< the recording cannot tell a modulus
   };
   Kind kind = Kind::Explained;
-  std::vector<std::string> reasons;  ///< plain sentences; none where all is well
+  std::vector<std::string> reasons;  ///< plain sentences; none where all is well with the whole
 };
 
 /// "explained", "unexplained" or "undetermined".

@@ -73,6 +73,7 @@ TEST(ExplainedSpan, EndsBeforeWhatNoParametersExplain) {
   EXPECT_LE(last_frame(part), kicked + 4);
   EXPECT_DOUBLE_EQ(part.cells, 1.5 * options.cells);
   EXPECT_THAT(part.notes, ::testing::Contains(::testing::HasSubstr("whole motion")));
+  EXPECT_THAT(part.verdict.reasons, ::testing::Contains(::testing::HasSubstr("of the motion")));
   EXPECT_FALSE(part.starts.empty());
   options.span = 1.0;
   const FitOutcome whole = fit({block}, options);
