@@ -20,6 +20,15 @@ std::vector<RigidContact> contacts_of(const Body& body, const MaterialLaw& law, 
   return contacts;
 }
 
+std::vector<ProbeMove> changes_between(const std::vector<ProbeMove>& before, const std::vector<ProbeMove>& after) {
+  std::vector<ProbeMove> changes = after;
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    changes[i].turn -= before[i].turn;
+    if (after[i].by == before[i].by) changes[i].vector -= before[i].vector;
+  }
+  return changes;
+}
+
 }  // namespace
 
 PressSession::PressSession(const std::shared_ptr<const Body>& body, const std::shared_ptr<const MaterialLaw>& law,
@@ -55,15 +64,51 @@ void PressSession::apply(const std::vector<ProbeMove>& moves) {
 
 SolveSummary PressSession::lead(const std::vector<ProbeMove>& moves) {
   if (moves.size() != probes_.size()) throw std::invalid_argument("a session of presses needs a move for each probe");
-  const std::vector<ProbeMove> before = moves_;
+  const std::vector<ProbeMove> before = moves_, changes = changes_between(before, moves);
+  const std::optional<double> times = times_repeated(changes);
   apply(moves);
-  Placement next = placement_;
-  const SolveSummary summary = equilibrium_.solve(next);
-  if (summary.converged)
+  SolveSummary summary;
+  Placement next;
+  if (times) {
+    next = {placement_.nodes + *times * way_.nodes, placement_.translations + *times * way_.translations};
+    summary = equilibrium_.solve(next);
+  }
+  if (!summary.converged) {
+    const int in_vain = summary.iterations;
+    next = placement_;
+    summary = equilibrium_.solve(next);
+    summary.iterations += in_vain;
+  }
+  if (summary.converged) {
+    way_ = {next.nodes - placement_.nodes, next.translations - placement_.translations};
+    changes_ = changes;
     placement_ = std::move(next);
-  else
+  } else {
     apply(before);
+  }
   return summary;
+}
+
+void PressSession::start_from(Points nodes) {
+  placement_.nodes = std::move(nodes);
+  changes_.clear();
+}
+
+std::optional<double> PressSession::times_repeated(const std::vector<ProbeMove>& changes) const {
+  constexpr double most = 2.0, off = 0.3;  // farther, or this share to the side, the last way says little
+  if (changes_.empty()) return std::nullopt;
+  std::optional<double> times;
+  for (int i = 0; i < probe_count(); ++i) {
+    const ProbeMove &next = changes[std::size_t(i)], &last = changes_[std::size_t(i)];
+    if (next.by != last.by) return std::nullopt;
+    for (const auto part : {&ProbeMove::vector, &ProbeMove::turn}) {
+      const double square = (last.*part).squaredNorm();
+      if (!times && square > 0.0) times = (next.*part).dot(last.*part) / square;
+      if ((next.*part - times.value_or(0.0) * last.*part).norm() > off * (next.*part).norm()) return std::nullopt;
+    }
+  }
+  if (!times || *times <= 0.0 || *times > most) return std::nullopt;
+  return times;
 }
 
 SolveSummary PressSession::move_to(const Vector3& displacement) {

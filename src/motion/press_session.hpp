@@ -21,8 +21,9 @@ struct ProbeMove {
   Vector3 turn = Vector3::Zero();    ///< rotation vector [rad] about where it touches
 };
 
-/// An object and its probes, led interactively: each call goes on from the last equilibrium with the factorisation at
-/// hand, so that small moves take two or three cheap iterations. For one thread.
+/// An object and its probes, led interactively: each call goes on from the last equilibrium, further along the last way
+/// where the probes go on as they did, with the factorisation at hand, so that small moves take one or two cheap
+/// iterations. For one thread.
 class PressSession {
  public:
   /// Without a probe: the object under its dead load alone. Throws InputError where a bonded probe touches nothing.
@@ -49,15 +50,19 @@ class PressSession {
   Vector3 force(int probe = 0) const { return equilibrium_.contact_force(probe, placement_); }
   const std::string& failure() const { return equilibrium_.failure(); }
   /// The next equilibrium is sought from these nodes, n x 3 [m].
-  void start_from(Points nodes) { placement_.nodes = std::move(nodes); }
+  void start_from(Points nodes);
   Equilibrium& equilibrium() { return equilibrium_; }
 
  private:
   void apply(const std::vector<ProbeMove>& moves);
+  /// How many times `changes` of the moves are the last ones; nothing where they lead elsewhere.
+  std::optional<double> times_repeated(const std::vector<ProbeMove>& changes) const;
   std::vector<ProbeOptions> probes_;
   std::vector<ProbeMove> moves_;  // that led to the placement
   Equilibrium equilibrium_;
   Placement placement_;
+  Placement way_;                   // of the last `lead`: where it goes on, the next one begins further along it
+  std::vector<ProbeMove> changes_;  // that led along it; empty: there is none
 };
 
 /// Points of a finer surface that follow a coarse mesh by moving least squares (Kaufmann et al. 2008): the deformation

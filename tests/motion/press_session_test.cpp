@@ -40,6 +40,33 @@ TEST_F(Session, SmallMovesTakeFewIterations) {
   }
 }
 
+TEST_F(Session, GoingOnAsBeforeTakesFewerIterationsToTheSameEquilibria) {
+  for (const ProbeKind kind : {ProbeKind::BondedDisc, ProbeKind::Ball}) {
+    PressSession goes_on = make(kind), begins_anew = make(kind);
+    int going_on = 0, anew = 0;
+    for (int k = 1; k <= 40; ++k) {  // in and out again, with a pause
+      const double depth = 0.0007 * (k <= 20 ? k : std::min(20, 41 - k));
+      const Vector3 place(0.2 * depth, -depth, 0.0);
+      const SolveSummary further = goes_on.move_to(place);
+      begins_anew.start_from(begins_anew.nodes());
+      const SolveSummary fresh = begins_anew.move_to(place);
+      ASSERT_TRUE(further.converged && fresh.converged) << goes_on.failure() << begins_anew.failure();
+      going_on += further.iterations, anew += fresh.iterations;
+      EXPECT_LT((goes_on.force() - begins_anew.force()).norm(), tolerance(1e-5) * goes_on.force().norm());
+    }
+    EXPECT_LT(going_on, 0.7 * anew);
+  }
+}
+
+TEST_F(Session, TurnsToAndFroEndWhereADirectTurnDoes) {
+  PressSession turned = make(ProbeKind::BondedDisc), direct = make(ProbeKind::BondedDisc);
+  const ProbeMove on{ProbeMove::By::Displacement, {0.0, -0.004, 0.0}, {0.0, 0.1, 0.0}};
+  const ProbeMove back{ProbeMove::By::Displacement, {0.0, -0.004, 0.0}, {0.0, -0.1, 0.0}};
+  for (const ProbeMove& move : {on, back}) ASSERT_TRUE(turned.lead({move}).converged);
+  ASSERT_TRUE(direct.lead({back}).converged);
+  EXPECT_LT((turned.nodes() - direct.nodes()).rowwise().norm().maxCoeff(), 1e-5 * body->size());
+}
+
 TEST_F(Session, PushingAndMovingAgree) {
   PressSession by_force = make(ProbeKind::BondedDisc), by_place = make(ProbeKind::BondedDisc);
   ASSERT_TRUE(by_force.push({1.0, -12.0, 0.0}).converged);
