@@ -48,9 +48,10 @@ FitOptions options_at(const SyntheticScene& scene) {
   const auto start = [&](const std::string& name, double value) {
     options.parameters[name].start = VectorX::Constant(1, value);
   };
-  start("youngs_modulus", scene.youngs_modulus);
-  for (std::size_t k = 0; k < scene.region_moduli.size(); ++k)
-    start("youngs_modulus@" + scene.scene.regions[k].name, scene.region_moduli[k]);
+  std::vector<std::string> names = named_moduli(scene.scene);
+  if (names.empty()) names.emplace_back("youngs_modulus");
+  const std::vector<double> moduli = scene.youngs_moduli();
+  for (std::size_t k = 0; k < names.size(); ++k) start(names[k], moduli[k]);
   start("poissons_ratio", scene.poissons_ratio);
   start("mass_damping", scene.mass_damping);
   start("stiffness_damping", scene.stiffness_damping);

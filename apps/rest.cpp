@@ -95,7 +95,7 @@ int run(const Arguments& arguments) {
   resolution.element = options.element.value_or(ElementKind::QuadraticTetrahedron);
   resolution.cells = options.cells;
   resolution.field = {options.controls(), options.control_weights};
-  const int controls = capture.scene.regions.empty() ? options.controls() : int(capture.scene.regions.size()) + 1;
+  const int controls = control_count(capture.scene, options.controls());
   CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls);
   apply_overrides(parameters.set, options);
   const VectorX theta = parameters.set.reference();

@@ -21,16 +21,15 @@ std::shared_ptr<const Body> body_of(const SyntheticScene& synthetic) {
   const double size = box.extent().maxCoeff(), spacing = std::min(size / 80.0, 0.5 * synthetic.cell_size);
   const SignedDistance distance = signed_distance(surface, spacing, 0.1 * size + 2.0 * synthetic.cell_size);
   Body body = make_body(make_hex_grid(distance, box, synthetic.cell_size));
-  if (!synthetic.scene.regions.empty()) body.modulus = region_field(body, region_tests(synthetic.scene)).field;
+  body.modulus = modulus_field(body, synthetic.scene, {}).field;
   return std::make_shared<Body>(std::move(body));
 }
 
 VectorX theta_of(const SyntheticScene& synthetic, const MotionLayout& blocks) {
   const Scene& scene = synthetic.scene;
   VectorX theta = blocks.zero();
-  theta[blocks.youngs_moduli.front()] = synthetic.youngs_modulus;
-  for (std::size_t k = 1; k < blocks.youngs_moduli.size(); ++k)
-    theta[blocks.youngs_moduli[k]] = synthetic.region_moduli[k - 1];
+  const std::vector<double> moduli = synthetic.youngs_moduli();
+  for (std::size_t k = 0; k < moduli.size(); ++k) theta[blocks.youngs_moduli[k]] = moduli[k];
   theta[blocks.poissons_ratio] = synthetic.poissons_ratio;
   theta[blocks.mass_damping] = synthetic.mass_damping;
   theta[blocks.stiffness_damping] = synthetic.stiffness_damping;
@@ -72,7 +71,7 @@ std::vector<Points> simulate(const SyntheticScene& synthetic) {
   const Embedding embedding(*body, surface.vertices);
   std::vector<Points> frames(size_t(timing.start_frame), vertex_points(surface));
   MotionCounts counts = load_counts(synthetic.scene);
-  counts.moduli = 1 + int(synthetic.region_moduli.size());
+  counts.moduli = int(synthetic.youngs_moduli().size());
   const MotionLayout blocks(counts);
   Simulation simulation(body, options_of(synthetic, blocks, *body));
   const auto on_frame = [&](int, const State& state, std::span<const State>) {

@@ -41,7 +41,7 @@ void check_initial_velocity(RuleContext&);
 void check_release(RuleContext&);
 void check_vertex_lists(RuleContext&);
 void check_fixed_regions(RuleContext&);
-void check_material_regions(RuleContext&);
+void check_materials(RuleContext&);
 void check_planes(RuleContext&);
 void check_camera_names(RuleContext&);
 void check_intrinsics(RuleContext&);

@@ -207,6 +207,8 @@ void check_initial_velocity(RuleContext& context) {
 
 void check_vertex_lists(RuleContext& context) { check_vertex_lists(context.toml, context.capture.scene); }
 
+void check_materials(RuleContext& context) { check_materials(context.toml, context.capture.scene); }
+
 void check_fixed_regions(RuleContext& context) {
   const Capture& capture = context.capture;
   if (!capture.scene.object.surface) return;
@@ -224,23 +226,6 @@ void check_fixed_regions(RuleContext& context) {
     if (holds_all)
       context.toml.complain(item("fixed", i), "the whole object lies in this fixed region", "a part of it",
                             "nothing could move");
-  }
-}
-
-void check_material_regions(RuleContext& context) {
-  const Capture& capture = context.capture;
-  std::set<std::string> names;
-  for (std::size_t i = 0; i < capture.scene.regions.size(); ++i) {
-    const MaterialRegion& part = capture.scene.regions[i];
-    if (!context.toml.is_sound(item("region", i))) continue;
-    if (!names.insert(part.name).second)
-      context.toml.complain(item("region", i, "name"), "a second region \"" + part.name + "\"", "different names");
-    if (part.name.find('@') != std::string::npos)
-      context.toml.complain(item("region", i, "name"), "the name \"" + part.name + "\"", "a name without @",
-                            "parameters are listed as name@region");
-    if (capture.scene.object.surface && !touches_solid(part.region, *capture.scene.object.surface))
-      context.toml.complain(item("region", i), "no point of the object lies in region \"" + part.name + "\"",
-                            "a region that holds a part of it", "check its unit and the side of its normal");
   }
 }
 

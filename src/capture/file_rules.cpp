@@ -153,7 +153,7 @@ std::vector<Rule> make_rules() {
           check_initial_velocity,
           check_vertex_lists,
           check_fixed_regions,
-          check_material_regions,
+          check_materials,
           check_planes,
           check_camera_names,
           check_intrinsics,

@@ -59,6 +59,8 @@ class Reader {
     root.with_table("timing", [&](TomlTable& timing) { scene.timing = read_timing(timing, files_); });
     root.each_block("fixed", [&](TomlTable& block) { scene.fixed.push_back(read_fixed(block, files_)); });
     root.each_block("region", [&](TomlTable& block) { scene.regions.push_back(read_material_region(block, files_)); });
+    root.each_block("control",
+                    [&](TomlTable& block) { scene.controls.push_back(read_material_control(block, files_)); });
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
     root.with_table("wind", [&](TomlTable& wind) { scene.wind = read_wind(wind, true); });

@@ -362,6 +362,9 @@ void add_surroundings(const Capture& capture, const Survey& seen, Identifiabilit
         "elastostatics).");
   for (std::size_t i = 0; i < capture.scene.regions.size(); ++i)
     result.possible.push_back("Region \"" + capture.scene.regions[i].name + "\" can have a stiffness of its own.");
+  if (!capture.scene.controls.empty())
+    result.possible.push_back("Young's modulus blends from " + std::to_string(capture.scene.controls.size()) +
+                              " control points.");
   for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
     const std::string name = "Plane " + std::to_string(i + 1);
     if (seen.planes[i].seen && !capture.scene.planes[i].known)

@@ -145,6 +145,43 @@ ControlledField inverse_distance_field(const Body& body, const std::vector<Vecto
   return with_weights(body, std::move(weights), points);
 }
 
+ControlledField extended_field(const Body& body, const std::vector<Vector3>& points, const MatrixX& weights) {
+  // Least squares of |grad w|^2 and, much heavier, of what the points say.
+  constexpr double heavy = 1e3;
+  const Eigen::SparseMatrix<double> L = laplacian(body);
+  const double stiff = heavy * L.diagonal().sum() / double(points.size());
+  const Embedding embedding(body, points);
+  std::vector<Eigen::Triplet<double>> entries;
+  MatrixX right = MatrixX::Zero(body.node_count(), weights.cols());
+  for (int i = 0; i < embedding.point_count(); ++i) {
+    const auto nodes = embedding.nodes(i);
+    const auto shares = embedding.weights(i);
+    const Eigen::RowVectorXd told = weights.row(i) / weights.row(i).sum();
+    for (std::size_t a = 0; a < nodes.size(); ++a) {
+      right.row(nodes[a]) += stiff * shares[a] * told;
+      for (std::size_t b = 0; b < nodes.size(); ++b)
+        entries.emplace_back(nodes[a], nodes[b], stiff * shares[a] * shares[b]);
+    }
+  }
+  Eigen::SparseMatrix<double> A(body.node_count(), body.node_count());
+  A.setFromTriplets(entries.begin(), entries.end());
+  A += L;
+  const MatrixX at_nodes = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(A).solve(right);
+  MatrixX of_elements = MatrixX::Zero(body.element_count(), weights.cols());
+  for (int e = 0; e < body.element_count(); ++e) {
+    for (const int n : body.element(e)) of_elements.row(e) += at_nodes.row(n);
+    of_elements.row(e) = of_elements.row(e).cwiseMax(0.0);  // points that contradict each other overshoot
+    of_elements.row(e) /= of_elements.row(e).sum();
+  }
+  std::vector<Vector3> middles;
+  for (Eigen::Index k = 0; k < weights.cols(); ++k) {
+    Vector3 sum = Vector3::Zero();
+    for (int e = 0; e < body.element_count(); ++e) sum += of_elements(e, k) * element_centre(body, e);
+    middles.push_back(sum / std::max(of_elements.col(k).sum(), 1e-300));
+  }
+  return with_weights(body, std::move(of_elements), std::move(middles));
+}
+
 ControlledField region_field(const Body& body, const std::vector<std::function<bool(const Vector3&)>>& regions) {
   MatrixX weights = MatrixX::Zero(body.element_count(), Eigen::Index(regions.size()) + 1);
   for (int e = 0; e < body.element_count(); ++e) {

@@ -24,6 +24,12 @@ ControlledField harmonic_field(const Body& body, const std::vector<Vector3>& poi
 /// Weights by inverse square distance (Shepard 1968) from the elements' centres.
 ControlledField inverse_distance_field(const Body& body, const std::vector<Vector3>& points);
 
+/// Weights that are given at points of the object, over all of it: harmonic in between, and near the points what they
+/// say (each row of weights divided by its sum).
+/// @param points   [m] at rest
+/// @param weights  points x controls, >= 0, none of a row's sums 0
+ControlledField extended_field(const Body& body, const std::vector<Vector3>& points, const MatrixX& weights);
+
 /// One modulus a region and, first, one for what is in none. An element on a border mixes by how many of its sample
 /// points lie on either side; where regions overlap, the later one wins.
 ControlledField region_field(const Body& body, const std::vector<std::function<bool(const Vector3&)>>& regions);

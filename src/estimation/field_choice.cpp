@@ -144,7 +144,7 @@ PassState FieldChoice::with_field(int count, TriedField& promised) {
 }
 
 ModulusField FieldChoice::field_of(const Body& body, int count) const {
-  return control_field(body, recordings_.front().capture.scene, {count, options_.control_weights}).field;
+  return modulus_field(body, recordings_.front().capture.scene, {count, options_.control_weights}).field;
 }
 
 void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {

@@ -62,10 +62,10 @@ bool OnePass::take(FitOutcome outcome, PassState) {
 
 std::unique_ptr<PassPlanner> planner_of_points(std::vector<RecordedCapture> recordings, const FitOptions& options,
                                                FitState resume) {
-  if (options.control_points == FitOptions::automatic && recordings.front().capture.scene.regions.empty())
+  if (options.control_points == FitOptions::automatic && named_moduli(recordings.front().capture.scene).empty())
     return std::make_unique<FieldChoice>(std::move(recordings), options, std::move(resume));
   FitOptions given = options;
-  if (given.control_points == FitOptions::automatic) given.control_points = 1;  // the regions are the field
+  if (given.control_points == FitOptions::automatic) given.control_points = 1;  // the capture names the field
   if (ExplainedSpan::suits(recordings, given))
     return std::make_unique<ExplainedSpan>(std::move(recordings), given, std::move(resume));
   return std::make_unique<OnePass>(std::move(recordings), given, std::move(resume.pass));

@@ -112,15 +112,11 @@ std::vector<std::string> sensor_names(const Capture& capture) {
 }
 
 std::vector<std::string> modulus_names(const Capture& capture, int controls) {
-  std::vector<std::string> names;
-  for (int k = 0; k < controls; ++k) {
-    if (controls == 1 || (k == 0 && !capture.scene.regions.empty()))
-      names.emplace_back("youngs_modulus");
-    else if (!capture.scene.regions.empty())
-      names.push_back("youngs_modulus@" + capture.scene.regions[std::size_t(k) - 1].name);
-    else
-      names.push_back("youngs_modulus@" + std::to_string(k + 1));
-  }
+  std::vector<std::string> names = named_moduli(capture.scene);
+  if (controls == 1) return {"youngs_modulus"};
+  if (int(names.size()) == controls) return names;
+  names.clear();
+  for (int k = 1; k <= controls; ++k) names.push_back("youngs_modulus@" + std::to_string(k));
   return names;
 }
 

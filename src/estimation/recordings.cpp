@@ -267,11 +267,11 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                       "no frame shows any point of the object",
                       "depth images or clouds that see it",
                       "run `pliant check` on the capture to see what the cameras saw"});
-  const int controls = capture.scene.regions.empty() ? options_.controls() : int(capture.scene.regions.size()) + 1;
+  const int controls = control_count(capture.scene, options_.controls());
   if (all_.size() > 1 && controls != controls_)
     throw InputError({{capture.file},
-                      "the object has " + std::to_string(capture.scene.regions.size()) + " regions",
-                      "those of the first recording, " + std::to_string(controls_ - 1),
+                      "the object has " + std::to_string(controls) + " moduli, by its regions or control points",
+                      "those of the first recording, " + std::to_string(controls_),
                       "name the same materials in every recording of the object"});
   controls_ = controls;
   recording.size = object_size(capture.scene);

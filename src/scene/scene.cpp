@@ -8,6 +8,14 @@ std::optional<double> Object::total_mass() const {
   return std::nullopt;
 }
 
+std::vector<std::string> named_moduli(const Scene& scene) {
+  std::vector<std::string> names;
+  if (!scene.regions.empty()) names.emplace_back("youngs_modulus");
+  for (const MaterialRegion& region : scene.regions) names.push_back("youngs_modulus@" + region.name);
+  for (const MaterialControl& control : scene.controls) names.push_back("youngs_modulus@" + control.name);
+  return names;
+}
+
 Timing evenly_timed(double frame_rate, int frame_count, int start_frame) {
   Timing timing;
   timing.frame_rate = frame_rate;

@@ -57,6 +57,14 @@ struct MaterialRegion {
   bool operator==(const MaterialRegion&) const = default;
 };
 
+/// A control point of Young's modulus as the user places it: the field blends the moduli of all of them.
+struct MaterialControl {
+  std::string name;
+  Vector3 point = Vector3::Zero();   ///< at rest [m]
+  std::vector<double> weights = {};  ///< of the modulus at each vertex of the surface, >= 0; empty: those of `point`
+  bool operator==(const MaterialControl&) const = default;
+};
+
 /// Plane obstacle.
 struct Plane {
   Vector3 point = Vector3::Zero();    ///< [m]
@@ -151,11 +159,16 @@ struct Scene {
   Timing timing;
   std::vector<FixedRegion> fixed;
   std::vector<MaterialRegion> regions;
+  std::vector<MaterialControl> controls;  ///< all with points or all with weights; none where there are regions
   std::vector<Plane> planes;
   std::vector<Weight> weights;  ///< that hang in every frame
   std::optional<WindFacts> wind;
   std::vector<AppliedForce> forces;
   Initial initial;
 };
+
+/// Parameters of the Young's moduli that a scene tells apart: `youngs_modulus`, the object's own, and
+/// `youngs_modulus@NAME` of each region; or the latter of each control point. Empty: it tells none apart.
+std::vector<std::string> named_moduli(const Scene& scene);
 
 }  // namespace pliant

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
+#include "scene/region.hpp"
 
 namespace pliant {
 
@@ -66,6 +68,17 @@ std::vector<int> read_indices(const fs::path& path) {
     return true;
   });
   return indices;
+}
+
+std::vector<double> read_weights(const fs::path& path) {
+  std::vector<double> weights;
+  read_lines(path, "one weight from 0 a line", [&](const std::string& line) {
+    const auto weight = parsed<double>(line);
+    if (!weight || !std::isfinite(*weight) || *weight < 0.0) return false;
+    weights.push_back(*weight);
+    return true;
+  });
+  return weights;
 }
 
 std::optional<Region> read_box(TomlTable& table) {
@@ -244,6 +257,64 @@ void check_vertex_lists(TomlContext& context, const Scene& scene) {
   for (std::size_t i = 0; i < scene.regions.size(); ++i) check(scene.regions[i].region, fmt::format("region[{}]", i));
 }
 
+namespace {
+
+void check_material_name(TomlContext& context, const std::string& key, const std::string& name,
+                         std::set<std::string>& names) {
+  if (!names.insert(name).second)
+    context.complain(key + ".name", "a second material \"" + name + "\"", "different names");
+  if (name.find('@') != std::string::npos)
+    context.complain(key + ".name", "the name \"" + name + "\"", "a name without @",
+                     "parameters are listed as name@region");
+}
+
+void check_weights(TomlContext& context, const Scene& scene) {
+  const std::size_t vertices = scene.object.surface->vertices.size();
+  std::vector<double> sum(vertices, 0.0);
+  for (std::size_t i = 0; i < scene.controls.size(); ++i) {
+    const std::vector<double>& weights = scene.controls[i].weights;
+    const std::string key = fmt::format("control[{}]", i);
+    if (weights.empty() != scene.controls.front().weights.empty())
+      return context.complain(key, "control points with `point` and with `weights`", "all with the same", "");
+    if (weights.empty()) continue;
+    if (weights.size() != vertices)
+      return context.complain(key + ".weights", fmt::format("{} weights", weights.size()),
+                              fmt::format("{}, one for each vertex of the surface", vertices), "");
+    for (std::size_t v = 0; v < vertices; ++v) sum[v] += weights[v];
+  }
+  const auto none = std::ranges::find(sum, 0.0);
+  if (none != sum.end() && !scene.controls.front().weights.empty())
+    context.complain("control", fmt::format("no weight at vertex {} of the surface", none - sum.begin()),
+                     "at least one above 0 at each vertex", "weights are divided by their sum");
+}
+
+}  // namespace
+
+void check_materials(TomlContext& context, const Scene& scene) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < scene.regions.size(); ++i) {
+    const std::string key = fmt::format("region[{}]", i);
+    if (!context.is_sound(key)) continue;
+    check_material_name(context, key, scene.regions[i].name, names);
+    if (scene.object.surface && !scene.object.surface->vertices.empty() &&
+        !touches_solid(scene.regions[i].region, *scene.object.surface))
+      context.complain(key, "no point of the object lies in region \"" + scene.regions[i].name + "\"",
+                       "a region that holds a part of it", "check its unit and the side of its normal");
+  }
+  for (std::size_t i = 0; i < scene.controls.size(); ++i) {
+    const std::string key = fmt::format("control[{}]", i);
+    if (!context.is_sound(key)) return;
+    check_material_name(context, key, scene.controls[i].name, names);
+  }
+  if (scene.controls.empty()) return;
+  if (!scene.regions.empty())
+    return context.complain("control", "both [[control]] and [[region]]", "one of the two",
+                            "regions are of one modulus each, control points blend");
+  if (scene.controls.size() == 1)
+    return context.complain("control", "one control point", "two at least", "one modulus needs none");
+  if (scene.object.surface && !scene.object.surface->vertices.empty()) check_weights(context, scene);
+}
+
 FixedRegion read_fixed(TomlTable& block, const NamedFiles& files) {
   FixedRegion fixed;
   if (auto region = read_region(block, files)) fixed.region = std::move(*region);
@@ -256,6 +327,19 @@ MaterialRegion read_material_region(TomlTable& block, const NamedFiles& files) {
   part.name = block.required<std::string>("name", "results are listed under it").value_or("");
   if (auto region = read_region(block, files)) part.region = std::move(*region);
   return part;
+}
+
+MaterialControl read_material_control(TomlTable& block, const NamedFiles& files) {
+  MaterialControl control;
+  control.name = block.required<std::string>("name", "results are listed under it").value_or("");
+  const auto file = read_optional_path(block, "weights", files);
+  const auto point = block.optional<Vector3>("point");
+  if (point.has_value() == block.has("weights"))
+    block.context().reject(block.key(), point ? "both `point` and `weights`" : "neither `point` nor `weights`",
+                           "one of the two", "`weights` is a file with one number a line, one for each vertex");
+  control.point = point.value_or(control.point);
+  if (file) read_file_of(block, "weights", *file, [&](const fs::path& path) { control.weights = read_weights(path); });
+  return control;
 }
 
 Plane read_plane(TomlTable& block) {
@@ -463,6 +547,14 @@ void write_toml_blocks(std::ostream& out, const Scene& scene) {
   for (std::size_t i = 0; i < scene.regions.size(); ++i)
     out << "[[region]]\nname = " << toml_text(scene.regions[i].name) << "\n"
         << region_text(scene.regions[i].region, vertices_name("region", i)) << "\n";
+  for (std::size_t i = 0; i < scene.controls.size(); ++i) {
+    const MaterialControl& control = scene.controls[i];
+    out << "[[control]]\nname = " << toml_text(control.name) << "\n";
+    if (control.weights.empty())
+      out << "point = " << toml_text(control.point) << "\n\n";
+    else
+      out << "weights = " << toml_text(vertices_name("control", i)) << "   # one for each vertex of the surface\n\n";
+  }
   for (const Weight& weight : scene.weights) write_toml(out, weight);
   for (const AppliedForce& force : scene.forces) write_toml(out, force);
   if (scene.wind) write_toml(out, *scene.wind);
@@ -473,6 +565,12 @@ void write_scene_files(const fs::path& folder, const Scene& scene) {
     write_vertices(folder / vertices_name("fixed", i), scene.fixed[i].region);
   for (std::size_t i = 0; i < scene.regions.size(); ++i)
     write_vertices(folder / vertices_name("region", i), scene.regions[i].region);
+  for (std::size_t i = 0; i < scene.controls.size(); ++i) {
+    if (scene.controls[i].weights.empty()) continue;
+    std::string lines;
+    for (const double weight : scene.controls[i].weights) lines += fmt::format("{}\n", weight);
+    write_file(folder / vertices_name("control", i), lines);
+  }
   if (scene.timing.times.empty() || scene.timing.frame_rate > 0.0) return;
   std::string times;
   for (const double time : scene.timing.times) times += fmt::format("{}\n", time);

@@ -34,10 +34,14 @@ std::optional<Region> read_region(TomlTable& table, const NamedFiles& files);
 /// Complains about vertices in the lists of [[fixed]] and [[region]] that the surface has not; about none without
 /// surface.
 void check_vertex_lists(TomlContext& context, const Scene& scene);
+/// Complains about names in [[region]] and [[control]] that are not their own, regions without a point of the object,
+/// control points together with regions, and weights that do not suit the surface.
+void check_materials(TomlContext& context, const Scene& scene);
 
-/// Blocks [[fixed]], [[region]], [[plane]], [[weight]]; and any table with a weight's keys.
+/// Blocks [[fixed]], [[region]], [[control]], [[plane]], [[weight]]; and any table with a weight's keys.
 FixedRegion read_fixed(TomlTable& block, const NamedFiles& files);
 MaterialRegion read_material_region(TomlTable& block, const NamedFiles& files);
+MaterialControl read_material_control(TomlTable& block, const NamedFiles& files);
 Plane read_plane(TomlTable& block);
 Weight read_weight(TomlTable& block);
 
@@ -73,11 +77,12 @@ void write_region(std::ostream& out, const Region& region, const std::string& ve
 /// Writes that file where the region is a list of vertices. Throws InputError where it cannot be written.
 void write_region_file(const std::filesystem::path& file, const Region& region);
 
-/// Blocks [[plane]], [[fixed]], [[region]], [[weight]] and [[force]], and the table [wind] of a scene.
+/// Blocks [[plane]], [[fixed]], [[region]], [[control]], [[weight]] and [[force]], and the table [wind] of a scene.
 void write_toml_blocks(std::ostream& out, const Scene& scene);
 
 /// Writes what the text refers to and the value itself holds: `fixed_0.txt`, `region_0.txt`, ... with the vertices of a
-/// region that lists them, by its number, and `timestamps.txt` [s]. Throws InputError where a file cannot be written.
+/// region that lists them, by its number, `control_0.txt`, ... with the weights of a control point, and
+/// `timestamps.txt` [s]. Throws InputError where a file cannot be written.
 void write_scene_files(const std::filesystem::path& folder, const Scene& scene);
 
 }  // namespace pliant

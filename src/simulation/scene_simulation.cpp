@@ -14,16 +14,39 @@
 
 namespace pliant {
 
-ControlledField control_field(const Body& body, const Scene& scene, const FieldOptions& options) {
-  const int count = options.control_points;
-  if (options.weights == FieldOptions::Weights::Linear) {
+namespace {
+
+ControlledField painted_field(const Body& body, const Scene& scene) {
+  const std::vector<Vector3>& vertices = scene.object.surface->vertices;
+  MatrixX weights(Eigen::Index(vertices.size()), Eigen::Index(scene.controls.size()));
+  for (std::size_t k = 0; k < scene.controls.size(); ++k)
+    weights.col(Eigen::Index(k)) = Eigen::Map<const VectorX>(scene.controls[k].weights.data(), weights.rows());
+  return extended_field(body, vertices, weights);
+}
+
+}  // namespace
+
+int control_count(const Scene& scene, int asked_for) {
+  const int named = int(named_moduli(scene).size());
+  return named > 0 ? named : asked_for;
+}
+
+ControlledField modulus_field(const Body& body, const Scene& scene, const FieldOptions& options) {
+  if (!scene.regions.empty()) return region_field(body, region_tests(scene));
+  const bool is_placed = !scene.controls.empty();
+  if (is_placed && !scene.controls.front().weights.empty()) return painted_field(body, scene);
+  const int count = control_count(scene, options.control_points);
+  if (count == 1) return {{1, {}, body.modulus.relative}, {}};
+  if (options.weights == FieldOptions::Weights::Linear && !is_placed) {
     Eigen::Index longest = 0;
     bounding_box(*scene.object.surface).extent().maxCoeff(&longest);
     return linear_field(body, Vector3::Unit(longest), count);
   }
-  const std::vector<Vector3> points = farthest_points(body, count);
-  return options.weights == FieldOptions::Weights::Harmonic ? harmonic_field(body, points)
-                                                            : inverse_distance_field(body, points);
+  std::vector<Vector3> points;
+  for (const MaterialControl& control : scene.controls) points.push_back(control.point);
+  if (!is_placed) points = farthest_points(body, count);
+  return options.weights == FieldOptions::Weights::InverseDistance ? inverse_distance_field(body, points)
+                                                                   : harmonic_field(body, points);
 }
 
 double object_size(const Scene& scene) { return bounding_box(*scene.object.surface).extent().maxCoeff(); }
@@ -147,13 +170,9 @@ std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistanc
     for (const Hold& hold : held_regions(scene)) options.parts.push_back(hold.contains);
     body = make_body(make_tet_mesh(*scene.object.surface, options));
   }
-  if (!scene.regions.empty()) {
-    body.modulus = region_field(body, region_tests(scene)).field;
-  } else if (resolution.field.control_points > 1) {
-    ControlledField field = control_field(body, scene, resolution.field);
-    body.modulus = std::move(field.field);
-    control_points = std::move(field.points);
-  }
+  ControlledField field = modulus_field(body, scene, resolution.field);
+  body.modulus = std::move(field.field);
+  control_points = std::move(field.points);
   return std::make_shared<Body>(std::move(body));
 }
 

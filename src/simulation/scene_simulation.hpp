@@ -14,11 +14,13 @@
 
 namespace pliant {
 
-/// How Young's modulus varies over the object where the scene names no regions.
+/// How Young's modulus varies over the object where the scene names neither regions nor control points.
 struct FieldOptions {
   enum class Weights { Linear, Harmonic, InverseDistance };
-  int control_points = 1;             ///< >= 1; 1: homogeneous
-  Weights weights = Weights::Linear;  ///< linear ones stand along the object's longest axis, the others spread over it
+  int control_points = 1;  ///< >= 1; 1: homogeneous
+  /// Linear ones stand along the object's longest axis, the others spread over it. Of points that the scene places,
+  /// linear ones are harmonic.
+  Weights weights = Weights::Linear;
 };
 
 /// How finely the body and its motion are resolved, and by what elements.
@@ -34,8 +36,11 @@ struct Resolution {
   double band = 0.15;              ///< of the mismatch, times the object's longest axis
 };
 
-/// The field of a body where the scene names no regions.
-ControlledField control_field(const Body& body, const Scene& scene, const FieldOptions& options);
+/// Moduli of the scene's regions or control points, or as many as are asked for where it names none.
+int control_count(const Scene& scene, int asked_for);
+
+/// The field of a body: of the scene's regions or control points, or as the options say where it names none.
+ControlledField modulus_field(const Body& body, const Scene& scene, const FieldOptions& options);
 
 /// Longest edge of the surface's box [m].
 double object_size(const Scene& scene);

@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <set>
 #include <stdexcept>
 
 #include "base/files.hpp"
@@ -38,6 +37,7 @@ class Reader {
     scene_.seed = std::uint64_t(read_count(root, "seed", 0, 2'000'000'000, 1));
     scene_.write_trajectory = root.optional<bool>("truth_trajectory").value_or(false);
     read_table(root, "object", &Reader::read_object);
+    has_controls_ = root.has("control");
     read_table(root, "material", &Reader::read_material);
     read_table(root, "world", &Reader::read_gravity);
     read_table(root, "timing", &Reader::read_frames);
@@ -45,7 +45,14 @@ class Reader {
     root.with_table("initial", [&](TomlTable& initial) { read_start(initial); });
     root.each_block("plane", [&](TomlTable& block) { read_scenery(block); });
     root.each_block("fixed", [&](TomlTable& block) { scene_.scene.fixed.push_back(read_fixed(block, files_)); });
-    root.each_block("region", [&](TomlTable& block) { read_part(block); });
+    root.each_block("region", [&](TomlTable& block) {
+      read_part_modulus(block);
+      scene_.scene.regions.push_back(read_material_region(block, files_));
+    });
+    root.each_block("control", [&](TomlTable& block) {
+      read_part_modulus(block);
+      scene_.scene.controls.push_back(read_material_control(block, files_));
+    });
     root.each_block("weight", [&](TomlTable& block) { read_hung(block); });
     root.with_table("wind", [&](TomlTable& wind) { scene_.scene.wind = read_wind(wind, true); });
     root.each_block("force", [&](TomlTable& block) { scene_.scene.forces.push_back(read_force(block, true)); });
@@ -53,7 +60,8 @@ class Reader {
     if (scene_.cameras.empty() && !root.has("camera"))
       context_.complain("camera", "no camera", "a block [[camera]]", "a recording needs at least one");
     check_names();
-    check_parts();
+    check_vertex_lists(context_, scene_.scene);
+    check_materials(context_, scene_.scene);
     root.finish();
     return std::move(scene_);
   }
@@ -147,7 +155,7 @@ class Reader {
   // ---- physics
 
   void read_material(TomlTable& t) {
-    scene_.youngs_modulus = read_number(t, "youngs_modulus", positive("in pascals"));
+    if (!has_controls_) scene_.youngs_modulus = read_number(t, "youngs_modulus", positive("in pascals"));
     scene_.poissons_ratio = read_number(
         t, "poissons_ratio",
         {.low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"});
@@ -184,9 +192,8 @@ class Reader {
     scene_.scene.planes.push_back(read_plane(block));
   }
 
-  void read_part(TomlTable& block) {
-    scene_.region_moduli.push_back(read_number(block, "youngs_modulus", positive("in pascals")));
-    scene_.scene.regions.push_back(read_material_region(block, files_));
+  void read_part_modulus(TomlTable& block) {
+    scene_.part_moduli.push_back(read_number(block, "youngs_modulus", positive("in pascals")));
   }
 
   void read_hung(TomlTable& block) {
@@ -284,25 +291,10 @@ class Reader {
                           "a name of its own");
   }
 
-  // Regions are named apart, and each holds a part of the object.
-  void check_parts() {
-    check_vertex_lists(context_, scene_.scene);
-    std::set<std::string> names;
-    for (size_t i = 0; i < scene_.scene.regions.size(); ++i) {
-      const MaterialRegion& region = scene_.scene.regions[i];
-      const std::string key = fmt::format("region[{}]", i);
-      if (!context_.is_sound(key) || !context_.is_sound("object")) continue;
-      if (!names.insert(region.name).second || region.name.find('@') != std::string::npos)
-        context_.reject(key + ".name", "the name \"" + region.name + "\"", "a name of its own, without @");
-      if (!touches_solid(region.region, surface()))
-        context_.reject(key, "no point of the object lies in region \"" + region.name + "\"",
-                        "a region that holds a part of it", "check its unit and the side of its normal");
-    }
-  }
-
   NamedFiles files_;
   TomlContext& context_;
   SyntheticScene scene_;
+  bool has_controls_ = false;
 };
 
 }  // namespace
@@ -310,6 +302,12 @@ class Reader {
 double SyntheticScene::true_density() const {
   const Object& object = scene.object;
   return object.density ? *object.density : object.mass.value_or(0.0) / enclosed_volume(*object.surface);
+}
+
+std::vector<double> SyntheticScene::youngs_moduli() const {
+  std::vector<double> moduli = part_moduli;
+  if (scene.controls.empty()) moduli.insert(moduli.begin(), youngs_modulus);
+  return moduli;
 }
 
 SyntheticScene read_synthetic_scene(const fs::path& path) {
@@ -325,16 +323,18 @@ Synthesis synthesise(const SyntheticScene& scene, const Simulate& simulate) {
   s.name = scene.name, s.scene = scene.scene, s.plane_half_sizes = scene.plane_half_sizes;
   s.scan_noise = scene.scan_noise, s.cameras = scene.cameras, s.seed = scene.seed;
   s.write_trajectory = scene.write_trajectory;
-  s.truth = {{"youngs_modulus", scene.youngs_modulus, "Pa"},
-             {"poissons_ratio", scene.poissons_ratio, "1"},
+  s.truth = {{"poissons_ratio", scene.poissons_ratio, "1"},
              {"mass_damping", scene.mass_damping, "1/s"},
              {"stiffness_damping", scene.stiffness_damping, "s"},
              {"density", scene.true_density(), "kg/m^3"},
              {"gravity", *scene.scene.world.gravity, "m/s^2"},
              {"linear_velocity", scene.scene.initial.linear_velocity, "m/s"},
              {"angular_velocity", scene.scene.initial.angular_velocity, "rad/s"}};
-  for (std::size_t i = 0; i < scene.region_moduli.size(); ++i)
-    s.truth.push_back({"youngs_modulus@" + scene.scene.regions[i].name, scene.region_moduli[i], "Pa"});
+  std::vector<std::string> names = named_moduli(scene.scene);
+  if (names.empty()) names.emplace_back("youngs_modulus");
+  const std::vector<double> moduli = scene.youngs_moduli();
+  for (std::size_t i = 0; i < names.size(); ++i)
+    s.truth.insert(s.truth.begin() + std::ptrdiff_t(i), {names[i], moduli[i], "Pa"});
   if (const auto& wind = scene.scene.wind) s.truth.push_back({"wind", wind->velocity, "m/s"});
   for (std::size_t k = 0; k < scene.scene.forces.size(); ++k)
     s.truth.push_back({fmt::format("strength@{}", k + 1), 1.0, "1"});

@@ -18,8 +18,8 @@ struct SyntheticScene {
   std::vector<double> plane_half_sizes;  ///< [m] of each plane: half the edge of the square that cameras see; 0: none
   double scan_noise = 0.0;               ///< [m] deviation of the vertices of rest.ply along their normals
 
-  double youngs_modulus = 0.0;        ///< [Pa], outside of all regions
-  std::vector<double> region_moduli;  ///< [Pa] of each region
+  double youngs_modulus = 0.0;      ///< [Pa], outside of all regions; where there are no control points
+  std::vector<double> part_moduli;  ///< [Pa] of each region or control point
   double poissons_ratio = 0.0;
   double mass_damping = 0.0;       ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;  ///< [s]
@@ -38,6 +38,8 @@ struct SyntheticScene {
 
   /// Mass over the surface's volume where the density was not given [kg/m^3].
   double true_density() const;
+  /// Of `named_moduli`, or the one of all [Pa].
+  std::vector<double> youngs_moduli() const;
 };
 
 /// Reads a scene strictly. Throws InputError with every problem found, with file, line and column.

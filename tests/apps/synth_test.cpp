@@ -93,6 +93,20 @@ TEST(Synth, SharesAScenesFactsWithCaptures) {
   ASSERT_EQ(soft.capture.scene.regions.size(), 1u);
   EXPECT_EQ(soft.capture.scene.regions[0].name, "root");
 
+  std::string blended = bar;
+  const std::string own = "youngs_modulus = 2e5\n";
+  ASSERT_NE(blended.find(own), std::string::npos);
+  blended.erase(blended.find(own), own.size());
+  const std::string points =
+      "[[control]]\nname = \"root\"\npoint = [-0.1, 0, 0]\nyoungs_modulus = 2e4\n"
+      "[[control]]\nname = \"tip\"\npoint = [0.1, 0, 0]\nyoungs_modulus = 2e5\n";
+  const Recorded graded = recorded(folder, blended + held + points);
+  EXPECT_LT(graded.tip.back(), plain.tip.back() - 2e-4) << "softer at the root";
+  EXPECT_EQ(graded.truth["parameters"]["youngs_modulus@tip"]["value"], 2e5);
+  EXPECT_FALSE(graded.truth["parameters"].contains("youngs_modulus"));
+  ASSERT_EQ(graded.capture.scene.controls.size(), 2u);
+  EXPECT_EQ(graded.capture.scene.controls[0].point, Vector3(-0.1, 0, 0));
+
   const Recorded freed =
       recorded(folder, bar + held + "[initial]\nreleased = true\nrelease_of = { mass = 0.02, at = [0.1, 0, 0] }\n");
   ASSERT_TRUE(freed.capture.scene.initial.release_of);

@@ -70,6 +70,36 @@ TEST_P(Field, RegionsAreSharpAwayFromTheirBorder) {
   EXPECT_GT(pure, 0);
 }
 
+TEST_P(Field, WeightsAtPointsOfTheSurfaceFillTheInside) {
+  // What is linear along x at the surface is so inside; given up to a factor at each point.
+  const double low = body->nodes.col(0).minCoeff(), high = body->nodes.col(0).maxCoeff();
+  std::vector<int> elements(std::size_t(body->node_count()), 0);
+  for (const int n : body->connectivity) ++elements[std::size_t(n)];
+  std::vector<Vector3> points;
+  for (int n = 0; n < body->node_count(); ++n) {
+    const Vector3 p = body->nodes.row(n).transpose();
+    bool is_outside = body->kind == ElementKind::Hexahedron && elements[std::size_t(n)] < 8;
+    for (int d = 0; d < 3; ++d)
+      is_outside |= p[d] < body->nodes.col(d).minCoeff() + 1e-9 || p[d] > body->nodes.col(d).maxCoeff() - 1e-9;
+    if (is_outside) points.push_back(p);
+  }
+  MatrixX weights(Eigen::Index(points.size()), 2);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double s = (points[i].x() - low) / (high - low), factor = 1.0 + double(i % 3);
+    weights.row(Eigen::Index(i)) << factor * (1.0 - s), factor * s;
+  }
+  const ControlledField field = extended_field(*body, points, weights);
+  ASSERT_EQ(field.field.controls, 2);
+  for (int e = 0; e < body->element_count(); ++e) {
+    double mean = 0.0;  // of the element's nodes, as weights are
+    for (const int n : body->element(e)) mean += (body->nodes(n, 0) - low) / (high - low) / body->nodes_per_element();
+    EXPECT_NEAR(field.field.weights(e, 1), mean, 0.01)
+        << "the graph's Laplacian is not quite exact for linear functions";
+    EXPECT_NEAR(field.field.weights.row(e).sum(), 1.0, 1e-12);
+  }
+  EXPECT_LT(field.points[0].x(), field.points[1].x());
+}
+
 TEST_P(Field, PointsOnOneNodeAreRefused) {
   const Vector3 p = body->nodes.row(0).transpose();
   EXPECT_THROW(harmonic_field(*body, {p, p}), InputError);

@@ -260,6 +260,22 @@ TEST(FieldChoice, RegionsLeaveNothingToChoose) {
   EXPECT_TRUE(outcome.fields.empty());
 }
 
+TEST(FieldChoice, ControlPointsOfTheCaptureAreTheField) {
+  RecordedCapture bar = sagging_bar(soft);
+  const Box box = bounding_box(*bar.capture.scene.object.surface);
+  const Vector3 middle = 0.5 * (box.min + box.max);
+  bar.capture.scene.controls = {{"root", {box.min.x(), middle.y(), middle.z()}},
+                                {"tip", {box.max.x(), middle.y(), middle.z()}}};
+  const FitOutcome outcome = fit({bar}, quick());
+  EXPECT_EQ(controls(outcome), 2);
+  EXPECT_TRUE(outcome.fields.empty());
+  ASSERT_EQ(outcome.recordings.front().discretisation.control_points.size(), 2u);
+  const ParameterLayout& layout = outcome.parameters.layout();
+  const double root = outcome.theta[layout.at("youngs_modulus@root")],
+               tip = outcome.theta[layout.at("youngs_modulus@tip")];
+  EXPECT_GT(root / tip, 1.5) << "the far half of the bar is softer";
+}
+
 TEST(FieldChoice, IsAKeyOfAFit) {
   FitOptions options;
   set_fit_option(options, "control_points=auto");

@@ -30,9 +30,11 @@ Scene read_scene(const TemporaryFolder& folder, const std::string& text, bool ma
   root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
   root.each_block("fixed", [&](TomlTable& block) { scene.fixed.push_back(read_fixed(block, files)); });
   root.each_block("region", [&](TomlTable& block) { scene.regions.push_back(read_material_region(block, files)); });
+  root.each_block("control", [&](TomlTable& block) { scene.controls.push_back(read_material_control(block, files)); });
   root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
   root.finish();
   check_vertex_lists(context, scene);
+  check_materials(context, scene);
   context.throw_problems();
   return scene;
 }
@@ -81,6 +83,16 @@ TEST(SceneToml, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.weights, scene.weights);
 }
 
+TEST(SceneToml, ControlPointsComeBack) {
+  Scene scene;
+  scene.controls = {{"foot", {0, 0.1, 1.0 / 3.0}}, {"tip", {0, 1, 0}}};
+  EXPECT_EQ(written_and_read(scene).controls, scene.controls);
+  EXPECT_THAT(named_moduli(scene), testing::ElementsAre("youngs_modulus@foot", "youngs_modulus@tip"));
+  scene.controls = {{"foot", Vector3::Zero(), {1, 0, 0.1, 1, 1, 1, 1, 1.0 / 3.0}},
+                    {"tip", Vector3::Zero(), {0, 1, 1, 0, 0, 0, 0, 0}}};
+  EXPECT_EQ(written_and_read(scene).controls, scene.controls);
+}
+
 TEST(SceneToml, UnevenTimesAndLooksAtOneEquilibriumComeBack) {
   Scene scene;
   scene.timing.times = {0.0, 0.1, 1.0 / 3.0};
@@ -111,6 +123,8 @@ TEST_P(WrongScene, IsToldWithItsPlace) {
   folder.write("times.txt", "0.0\n0.1\n");
   folder.write("late.txt", "0.0\nlate\n");
   folder.write("empty.txt", "\n");
+  folder.write("eight.txt", "1\n0\n1\n1\n1\n1\n1\n1\n");
+  folder.write("negative.txt", "1\n-1\n");
   EXPECT_THAT(complaint_of([&] { read_scene(folder, GetParam().text); }), HasSubstr(GetParam().said));
 }
 
@@ -134,6 +148,31 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"ListMissing", "[[region]]\nname = \"a\"\nvertices = \"none.txt\"",
               "scene.toml:3:1: the file \"none.txt\" is"},
         Wrong{"RegionWithoutName", "[[region]]\nsphere = { centre = [0,0,0], radius = 1 }", "has no `name`"},
+        Wrong{"RegionBeyond", "[[region]]\nname = \"a\"\nsphere = { centre = [9,9,9], radius = 1 }",
+              "scene.toml:1:1: no point of the object lies in region"},
+        Wrong{"ControlOfNothing", "[[control]]\nname = \"a\"", "neither `point` nor `weights`"},
+        Wrong{"OneControl", "[[control]]\nname = \"a\"\npoint = [0,0,0]", "one control point; expected two"},
+        Wrong{"ControlsOfOneName",
+              "[[control]]\nname = \"a\"\npoint = [0,0,0]\n[[control]]\nname = \"a\"\npoint = [1,0,0]",
+              "scene.toml:5:1: a second material"},
+        Wrong{"ControlNamedAsAParameter",
+              "[[control]]\nname = \"a@b\"\npoint = [0,0,0]\n[[control]]\nname = \"a\"\npoint = [1,0,0]",
+              "expected a name without @"},
+        Wrong{"ControlsOfTwoKinds",
+              "[[control]]\nname = \"a\"\npoint = [0,0,0]\n[[control]]\nname = \"b\"\nweights = \"eight.txt\"",
+              "control points with `point` and with `weights`"},
+        Wrong{"ControlsAndRegions",
+              "[[control]]\nname = \"a\"\npoint = [0,0,0]\n[[region]]\nname = \"b\"\nsphere = { centre = [0,0,0], "
+              "radius = 1 }",
+              "both [[control]] and [[region]]"},
+        Wrong{"TooFewWeights",
+              "[[control]]\nname = \"a\"\nweights = \"times.txt\"\n[[control]]\nname = \"b\"\nweights = \"times.txt\"",
+              "2 weights; expected 8, one for each vertex"},
+        Wrong{"NoWeight",
+              "[[control]]\nname = \"a\"\nweights = \"eight.txt\"\n[[control]]\nname = \"b\"\nweights = \"eight.txt\"",
+              "no weight at vertex 1 of the surface"},
+        Wrong{"NegativeWeight", "[[control]]\nname = \"a\"\nweights = \"negative.txt\"",
+              "negative.txt:2:1: \"-1\"; expected one weight from 0"},
         Wrong{"BothTimings", "[timing]\nframe_rate = 1.0\ntimestamps = \"times.txt\"",
               "both `frame_rate` and `timestamps`"},
         Wrong{"NoTiming", "[timing]\nframe_count = 2", "neither `frame_rate` nor `timestamps`"},
