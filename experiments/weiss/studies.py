@@ -60,8 +60,8 @@ class Study:
 
 # Scenes -----------------------------------------------------------------------------------------------------------------
 
-def scene_text(name, shape, placed, density, material, frames, cell, cameras, planes="", world="gravity = [0.0, -9.81, 0.0]", more="", start_frame=0, trajectory=False):
-    """A scene that is simulated on cells 0.69 times those of the fit and with shorter steps. `material`: E, nu, mass and
+def scene_text(name, shape, placed, density, material, frames, cell, cameras, planes="", world="gravity = [0.0, -9.81, 0.0]", more="", start_frame=0, trajectory=False, finer=0.69):
+    """A scene that is simulated on cells `finer` times those of the fit and with shorter steps. `material`: E, nu, mass and
     stiffness damping."""
     E, nu, mass_damping, stiffness_damping = material
     return f"""format = "scene/1"
@@ -89,7 +89,7 @@ frame_count = {frames + 1 + start_frame}
 start_frame = {start_frame}
 
 [simulation]
-cell_size = {0.69 * cell!r}
+cell_size = {finer * cell!r}
 substeps = 12
 newmark_theta = 0.5
 
@@ -124,10 +124,10 @@ TORUS = (5000.0, 0.3, 0.1, 0.004)
 TORUS_KNOWN = {"cells": 15.4, "poissons_ratio": 0.3, "mass_damping": 0.1, "stiffness_damping": 0.004}
 
 
-def torus(study, name, cameras, frames=40, trajectory=False):
+def torus(study, name, cameras, frames=40, trajectory=False, finer=0.69):
     text = scene_text("torus bouncing off the floor", "torus = { ring_radius = 0.1, tube_radius = 0.04, ring_segments = 96, tube_segments = 48 }",
                       "translation = [0.0, 0.22, 0.0]\naxis = [1.0, 0.0, 0.4]\nangle_deg = 25.0", "density = 100.0", TORUS, frames, TORUS_CELL, "\n".join(cameras),
-                      plane(), trajectory=trajectory)
+                      plane(), trajectory=trajectory, finer=finer)
     return study.record(name, text)
 
 
@@ -195,6 +195,14 @@ def views(study):
         starts = log_uniform_starts(study.count(20), TORUS[0], SEED)
         found[str(count)] = study_rows(study, f"views-{count}", capture, starts, TORUS[0], TORUS_KNOWN | {"wide_band": band(PAPER_BAND, 15.4)})
     return found
+
+
+def same_cells(study):
+    """One camera as of `views`, of a recording that is simulated on the fit's own cells: what of an error is the mesh's."""
+    place = on_hemisphere(random.Random(SEED), 0.75)
+    capture = torus(study, "torus-same-cells", [torus_camera(name="camera_1", eye=place)], finer=1.0)
+    starts = log_uniform_starts(study.count(5), TORUS[0], SEED)
+    return {"1": study_rows(study, "same-cells", capture, starts, TORUS[0], TORUS_KNOWN | {"wide_band": band(PAPER_BAND, 15.4)})}
 
 
 def resolutions(study):
@@ -509,5 +517,5 @@ def optimisers(study):
     return found
 
 
-ALL = {"views": views, "resolutions": resolutions, "bands": bands, "differences": differences, "steps": steps, "widths": widths,
+ALL = {"views": views, "same-cells": same_cells, "resolutions": resolutions, "bands": bands, "differences": differences, "steps": steps, "widths": widths,
        "difference-gradients": difference_gradients, "costs": costs, "grounds": grounds, "joint": joint, "bodies": bodies, "optimisers": optimisers}
