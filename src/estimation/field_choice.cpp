@@ -190,23 +190,24 @@ FitOutcome FieldChoice::with_history(FitOutcome outcome) {
       outcome.history.push_back(std::move(event));
     }
   }
-  outcome.notes.insert(outcome.notes.begin(), explained());
+  outcome.notes.insert(outcome.notes.begin(), explained(choice_.tried));
   return outcome;
 }
 
-std::string FieldChoice::explained() const {
-  std::string text = "Young's modulus was given " + points(best().control_points) +
-                     ", as many as the recordings support. Logarithm of the evidence";
-  int before = 1;
-  for (std::size_t i = 1; i < choice_.tried.size(); ++i) {
-    const TriedField& tried = choice_.tried[i];
-    const bool is_possible = std::isfinite(tried.log_bayes_factor);
-    text += std::string(i == 1 ? "" : ",") + " of " + points(tried.control_points) + " over " + std::to_string(before) +
-            ": " + (is_possible ? text_of(tried.log_bayes_factor, "%+.1f") : "cannot be simulated");
-    if (is_possible && !tried.estimated) text += " (promised by one step)";
-    if (tried.estimated && tried.log_bayes_factor > strong_evidence) before = tried.control_points;
+std::string explained(const std::vector<TriedField>& tried) {
+  std::string evidence;
+  int best = 1;
+  for (std::size_t i = 1; i < tried.size(); ++i) {
+    const TriedField& t = tried[i];
+    const bool is_possible = std::isfinite(t.log_bayes_factor);
+    evidence += std::string(i == 1 ? "" : ",") + " of " + points(t.control_points) + " over " + std::to_string(best) +
+                ": " + (is_possible ? text_of(t.log_bayes_factor, "%+.1f") : "cannot be simulated");
+    if (is_possible && !t.estimated) evidence += " (promised by one step)";
+    if (t.estimated && t.log_bayes_factor > strong_evidence) best = t.control_points;
   }
-  return text + ". More points need more than " + text_of(strong_evidence, "%.0f") + ".";
+  return "Young's modulus was given " + points(best) +
+         ", as many as the recordings support. Logarithm of the evidence" + evidence + ". More points need more than " +
+         text_of(strong_evidence, "%.0f") + ".";
 }
 
 MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusField& to) {

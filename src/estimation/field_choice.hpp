@@ -34,7 +34,6 @@ class FieldChoice : public PassPlanner {
   void judge(const FitOutcome& outcome, PassState reached);
   /// With all that was done on the way.
   FitOutcome with_history(FitOutcome outcome);
-  std::string explained() const;
   JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }
   ModulusField field_of(const Body& body, int count) const;
 
@@ -53,6 +52,10 @@ class FieldChoice : public PassPlanner {
 
 /// ln of the Bayes factor B above which evidence is called strong: 2 ln B > 6 (Kass and Raftery 1995).
 inline constexpr double strong_evidence = 3.0;
+
+/// How many control points were chosen, and by what evidence, in a sentence.
+/// @param tried  as a choice tried them, the homogeneous object first
+std::string explained(const std::vector<TriedField>& tried);
 
 /// The moduli of one field that come closest to another field of the same body, by ln E of its elements and their
 /// volumes: ln E_to = M ln E_from.

@@ -73,7 +73,7 @@ struct FitOptions {
   double scan_std = 0.01;  ///< by how much, times the object's size, (0, 0.2]
   /// Of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous; `automatic`: as many as the
   /// recordings support.
-  /// `unsaid`: automatic in a fit of points that is made beside the tracked motion's, else 1.
+  /// `unsaid`: automatic where the object is tracked (where both ways are tried, in the fit of points); else 1.
   int control_points = unsaid;
   static constexpr int automatic = 0, unsaid = -1;
   int controls() const { return control_points < 1 ? 1 : control_points; }  ///< where there is no choice to make
@@ -146,14 +146,15 @@ struct TriedField {
 
 /// One round of tracking and estimation in turns.
 struct TrackingRound {
-  double youngs_modulus = 0.0;  ///< [Pa] that the object was tracked with; with control points the first one's
-  double surface_rms = 0.0;     ///< [m] from points that are no outliers to the tracked surface
-  double confidence = 0.0;      ///< least of all frames in which the object was seen
-  double fit_rms = 0.0;         ///< [m] from the tracked points to the simulated ones, with the estimate
-  double change = 0.0;          ///< of ln E by the estimate, the greatest of all moduli
-  bool lost = false;            ///< in some frame
-  VectorX theta;                ///< estimated
-  int controls = 1;             ///< control moduli of `theta`
+  double youngs_modulus = 0.0;          ///< [Pa] that the object was tracked with; with control points the first one's
+  double surface_rms = 0.0;             ///< [m] from points that are no outliers to the tracked surface
+  double confidence = 0.0;              ///< least of all frames in which the object was seen
+  double fit_rms = 0.0;                 ///< [m] from the tracked points to the simulated ones, with the estimate
+  double change = 0.0;                  ///< of ln E by the estimate, the greatest of all moduli
+  bool lost = false;                    ///< in some frame
+  VectorX theta;                        ///< estimated
+  int controls = 1;                     ///< control moduli of `theta`
+  std::vector<TriedField> fields = {};  ///< where their number was chosen in this round
 };
 
 /// One form of the law of a pressed object that was fitted.

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/14";
+constexpr const char* format = "fit-state/15";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -27,13 +27,26 @@ Json from_cost(double cost) { return std::isfinite(cost) ? Json(cost) : Json(); 
 Json from_pass(const PassState& pass);
 PassState to_pass(const Json& json);
 
+Json from_tried(const std::vector<TriedField>& fields) {
+  Json json = Json::array();
+  for (const TriedField& t : fields)
+    json.push_back({{"control_points", t.control_points},
+                    {"estimated", t.estimated},
+                    {"cost", from_cost(t.cost)},
+                    {"against", from_cost(-t.log_bayes_factor)}});
+  return json;
+}
+
+std::vector<TriedField> to_tried(const Json& json) {
+  std::vector<TriedField> fields;
+  for (const Json& t : json)
+    fields.push_back({t.at("control_points").get<int>(), t.at("estimated").get<bool>(), to_cost(t.at("cost")),
+                      -to_cost(t.at("against"))});
+  return fields;
+}
+
 Json from_field(const FitState::FieldChoice& field) {
-  Json json = {{"tried", Json::array()}, {"best", field.best}, {"under_way", field.under_way}};
-  for (const TriedField& t : field.tried)
-    json["tried"].push_back({{"control_points", t.control_points},
-                             {"estimated", t.estimated},
-                             {"cost", from_cost(t.cost)},
-                             {"against", from_cost(-t.log_bayes_factor)}});
+  Json json = {{"tried", from_tried(field.tried)}, {"best", field.best}, {"under_way", field.under_way}};
   if (field.state) json["state"] = from_pass(*field.state);
   return json;
 }
@@ -42,9 +55,7 @@ FitState::FieldChoice to_field(const Json& json) {
   FitState::FieldChoice field;
   field.best = json.at("best").get<int>();
   field.under_way = json.at("under_way").get<int>();
-  for (const Json& t : json.at("tried"))
-    field.tried.push_back({t.at("control_points").get<int>(), t.at("estimated").get<bool>(), to_cost(t.at("cost")),
-                           -to_cost(t.at("against"))});
+  field.tried = to_tried(json.at("tried"));
   if (json.contains("state")) field.state = to_pass(json["state"]);
   return field;
 }
@@ -59,7 +70,8 @@ Json from_tracking(const FitState::Tracking& tracking) {
                               {"change", r.change},
                               {"lost", r.lost},
                               {"theta", from_vector(r.theta)},
-                              {"controls", r.controls}});
+                              {"controls", r.controls},
+                              {"fields", from_tried(r.fields)}});
   if (tracking.loop) json["loop"] = from_pass(*tracking.loop);
   if (tracking.direct) json["direct"] = from_pass(*tracking.direct);
   return json;
@@ -73,7 +85,7 @@ FitState::Tracking to_tracking(const Json& json) {
     tracking.rounds.push_back({r.at("youngs_modulus").get<double>(), r.at("surface_rms").get<double>(),
                                r.at("confidence").get<double>(), r.at("fit_rms").get<double>(),
                                r.at("change").get<double>(), r.at("lost").get<bool>(), to_vector(r.at("theta")),
-                               r.at("controls").get<int>()});
+                               r.at("controls").get<int>(), to_tried(r.at("fields"))});
   if (json.contains("loop")) tracking.loop = to_pass(json["loop"]);
   if (json.contains("direct")) tracking.direct = to_pass(json["direct"]);
   return tracking;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "estimation/field_choice.hpp"
 #include "estimation/fit_plan.hpp"
 #include "estimation/followed.hpp"
 #include "estimation/recordings.hpp"
@@ -53,7 +54,7 @@ class TrackingLoop : public PassPlanner {
       left_.tracking.reset();
     }
     for (const RecordedCapture& r : all_) split(r);
-    for (const RecordedCapture& r : is_both_ ? training_ : all_) followed_.emplace_back(r, options_, notes_);
+    for (const RecordedCapture& r : looped()) followed_.emplace_back(r, options_, notes_);
   }
 
   std::optional<Pass> next() override {
@@ -103,6 +104,15 @@ class TrackingLoop : public PassPlanner {
   bool interrupted() const { return interrupted_ && interrupted_(); }
 
   JointLayout layout_of(int controls) const { return joint_layout(all_, options_, controls); }
+  /// Follows with so many control moduli from now on.
+  void follow_with_controls(int controls) {
+    if (controls == followed_controls()) return;
+    FitOptions options = options_;
+    options.control_points = controls;
+    std::vector<std::string> told_before;
+    followed_.clear();
+    for (const RecordedCapture& r : looped()) followed_.emplace_back(r, options, told_before);
+  }
   /// Control moduli that the object is followed with.
   int followed_controls() const { return int(followed_.front().material().youngs_moduli.size()); }
 
@@ -229,13 +239,16 @@ class TrackingLoop : public PassPlanner {
     return options;
   }
 
-  /// Points of the surface tell how its modulus varies; where the tracked motion bends is partly how the tracker bent
-  /// it.
-  static FitOptions for_points(FitOptions options) {
+  /// As many control points as the recordings support, where nothing else is said.
+  static FitOptions with_choice_of_controls(FitOptions options) {
     if (options.control_points == FitOptions::unsaid && !options.parameters.contains("youngs_modulus"))
       options.control_points = FitOptions::automatic;
     return options;
   }
+
+  /// Where points are fitted too, these tell how the modulus varies: where the tracked motion bends is partly how the
+  /// tracker bent it.
+  FitOptions options_of_rounds() const { return is_both_ ? options_ : with_choice_of_controls(options_); }
 
   double share(int round) const { return (is_both_ ? 0.5 : 1.0) * round / options_.tracking_rounds; }
   const std::vector<RecordedCapture>& looped() const { return is_both_ ? training_ : all_; }
@@ -244,7 +257,8 @@ class TrackingLoop : public PassPlanner {
   void begin_part() {
     if (state_.phase == Phase::Loop) return begin_round();
     if (state_.phase == Phase::Direct && is_both_ && !direct_)
-      return begin(Part::Points, "points", 0.5, 0.9, training_, for_points(options_), std::exchange(left_, {}));
+      return begin(Part::Points, "points", 0.5, 0.9, training_, with_choice_of_controls(options_),
+                   std::exchange(left_, {}));
     if (state_.phase != Phase::Last && !loop_) return begin_rounds_again();
     if (!is_both_) {
       final_ = std::move(loop_);
@@ -258,6 +272,7 @@ class TrackingLoop : public PassPlanner {
     const int round = int(state_.rounds.size()),
               controls = is_first ? followed_controls() : state_.rounds.back().controls;
     const VectorX theta = is_first ? VectorX() : state_.rounds.back().theta;
+    if (!is_first) follow_with_controls(controls);
     const std::vector<VectorX> own = is_first ? known_at_first() : to_follow_with(theta, controls);
     if (!follow(followed_, own)) return stop(std::move(loop_));
     round_ = described(own.front());
@@ -267,23 +282,25 @@ class TrackingLoop : public PassPlanner {
     const bool is_resumed = !from.pass.done.empty() || from.pass.under_way || from.pass.begin;
     if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
     begin(Part::Round, "round " + std::to_string(round + 1), share(round), share(round + 1),
-          followed_captures(looped()), without_start(is_first ? options_ : with_chosen_controls(options_, controls)),
+          followed_captures(looped()),
+          without_start(with_chosen_controls(options_of_rounds(), is_first ? FitOptions::automatic : controls)),
           std::move(from));
   }
 
   /// All rounds were done before an interruption.
   void begin_rounds_again() {
     const TrackingRound& round = state_.rounds.back();
+    follow_with_controls(round.controls);
     if (!follow(followed_, to_follow_with(round.theta, round.controls))) return stop(std::move(direct_));
     begin(Part::RoundsAgain, "rounds", 0.5, 0.5, followed_captures(looped()),
-          with_chosen_controls(without_start(options_), round.controls), {*state_.loop, {}, {}, {}});
+          with_chosen_controls(without_start(options_of_rounds()), round.controls), {*state_.loop, {}, {}, {}});
   }
 
   /// The better one again, from where it is, with all frames.
   void begin_last() {
     const PassState& best = state_.keeps_loop ? *state_.loop : *state_.direct;
     const VectorX theta = estimate_of(best)->theta;
-    FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
+    FitOptions options = state_.keeps_loop ? without_start(options_) : with_choice_of_controls(options_);
     options = with_chosen_controls(std::move(options), best.controls);
     std::vector<FollowedRecording> all;
     std::vector<std::string> ignored;
@@ -321,7 +338,7 @@ class TrackingLoop : public PassPlanner {
       final_ = std::move(outcome);
       return;
     }
-    round_.theta = outcome.theta, round_.controls = controls_of(outcome);
+    round_.theta = outcome.theta, round_.controls = controls_of(outcome), round_.fields = outcome.fields;
     round_.fit_rms = outcome.evaluation.track_rms();
     round_.change = change(moduli_before_, layout_of(round_.controls).blocks.front().motion.moduli(outcome.theta));
     state_.loop = std::move(reached);
@@ -393,6 +410,10 @@ class TrackingLoop : public PassPlanner {
       outcome.history.push_back(std::move(event));
     }
     outcome.forward_steps = forward_steps_;
+    if (!is_both_ && !state_.rounds.empty() && !state_.rounds.front().fields.empty() && outcome.fields.empty()) {
+      outcome.fields = state_.rounds.front().fields;
+      outcome.notes.insert(outcome.notes.begin(), explained(outcome.fields));
+    }
     result_.rounds = state_.rounds;
     result_.keeps_loop = state_.keeps_loop;
     result_.tracks = tracks_;

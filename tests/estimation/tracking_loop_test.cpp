@@ -20,7 +20,8 @@ constexpr int frames = 30;
 
 /// A bar along x, clamped at its low end, let go straight; half of its surface is seen as points. Made by the same
 /// elements and law as it is fitted with, on a finer mesh with shorter steps: an inverse crime in part.
-RecordedCapture swinging_bar(int frames_seen = frames) {
+/// @param beyond  Young's modulus of the half that is not held [Pa]
+RecordedCapture swinging_bar(int frames_seen = frames, double beyond = modulus) {
   RecordedCapture recorded;
   Capture& capture = recorded.capture;
   capture.name = "bar";
@@ -30,9 +31,10 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
   for (int f = 0; f < frames_seen; ++f) capture.scene.timing.times.push_back(f / 30.0);
   capture.scene.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, {}}};
   capture.clouds = {{{"cloud.ply"}, 1, noise}};
-  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.scene.object.surface));
+  capture.scene.regions = {{"beyond", RegionHalfSpace{Vector3::Zero(), Vector3::UnitX()}}};
+  const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), 2);
   VectorX theta = parameters.reference();
-  blocks.motion.set_moduli(theta, modulus);
+  theta[blocks.motion.youngs_moduli[0]] = modulus, theta[blocks.motion.youngs_moduli[1]] = beyond;
   theta[blocks.motion.mass_damping] = 0.4;
   theta[blocks.motion.stiffness_damping] = 4e-3;
   Resolution resolution;
@@ -57,6 +59,7 @@ RecordedCapture swinging_bar(int frames_seen = frames) {
     return true;
   });
   EXPECT_TRUE(summary.succeeded) << summary.failure;
+  capture.scene.regions.clear();
   return recorded;
 }
 
@@ -87,6 +90,20 @@ TEST(TrackingLoop, LeadsToTheModulusFromOneTenTimesOff) {
     EXPECT_LT(outcome.evaluation.surface_rms(), 1.5 * noise) << "the agreement told is that with the points";
     EXPECT_GT(outcome.evaluation.surface_rms(), 0.5 * noise);
   }
+}
+
+TEST(TrackingLoop, FindsThatOneModulusIsNotEnough) {
+  constexpr double soft = 0.3 * modulus;
+  const FitOutcome outcome = fit({swinging_bar(frames, soft)}, quick(TrackingUse::Loop));
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  const auto& moduli = outcome.recordings.front().discretisation.simulation.blocks.youngs_moduli;
+  ASSERT_GT(moduli.size(), 1u);
+  EXPECT_GT(outcome.fields.size(), 1u);
+  // Moduli that blend cannot step, and nothing bends at the free end.
+  EXPECT_NEAR(std::log(outcome.theta[moduli.front()] / modulus), 0.0, std::log(2.0));
+  EXPECT_GT(outcome.theta[moduli.front()], 1.5 * outcome.theta[moduli.back()]);
+  EXPECT_EQ(outcome.tracking->rounds.front().controls, int(moduli.size())) << "chosen in the first round";
+  EXPECT_GE(outcome.tracking->rounds.size(), 2u) << "and tracked with what was found";
 }
 
 TEST(TrackingLoop, AndThePointsAreComparedByFramesLeftOut) {
