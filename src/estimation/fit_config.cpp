@@ -139,8 +139,7 @@ Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*membe
 
 Entry control_points_entry() {
   Entry entry = integer_entry(
-      "control_points",
-      "1..500, auto: as many as the recordings support, or default: auto where the object is tracked, else 1",
+      "control_points", "1..500, auto: as many as the recordings support, or default: auto with tracking=both, else 1",
       "number of control points of the field of Young's modulus, where the capture names no regions",
       &FitOptions::control_points);
   entry.key.type = "whole number or auto";

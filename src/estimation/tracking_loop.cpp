@@ -239,16 +239,13 @@ class TrackingLoop : public PassPlanner {
     return options;
   }
 
-  /// As many control points as the recordings support, where nothing else is said.
-  static FitOptions with_choice_of_controls(FitOptions options) {
+  /// Points of the surface tell how its modulus varies. Where the tracked motion bends is partly how the tracker bent
+  /// it, with an object of one modulus at first: that is asked on request alone.
+  static FitOptions for_points(FitOptions options) {
     if (options.control_points == FitOptions::unsaid && !options.parameters.contains("youngs_modulus"))
       options.control_points = FitOptions::automatic;
     return options;
   }
-
-  /// Where points are fitted too, these tell how the modulus varies: where the tracked motion bends is partly how the
-  /// tracker bent it.
-  FitOptions options_of_rounds() const { return is_both_ ? options_ : with_choice_of_controls(options_); }
 
   double share(int round) const { return (is_both_ ? 0.5 : 1.0) * round / options_.tracking_rounds; }
   const std::vector<RecordedCapture>& looped() const { return is_both_ ? training_ : all_; }
@@ -257,8 +254,7 @@ class TrackingLoop : public PassPlanner {
   void begin_part() {
     if (state_.phase == Phase::Loop) return begin_round();
     if (state_.phase == Phase::Direct && is_both_ && !direct_)
-      return begin(Part::Points, "points", 0.5, 0.9, training_, with_choice_of_controls(options_),
-                   std::exchange(left_, {}));
+      return begin(Part::Points, "points", 0.5, 0.9, training_, for_points(options_), std::exchange(left_, {}));
     if (state_.phase != Phase::Last && !loop_) return begin_rounds_again();
     if (!is_both_) {
       final_ = std::move(loop_);
@@ -282,8 +278,7 @@ class TrackingLoop : public PassPlanner {
     const bool is_resumed = !from.pass.done.empty() || from.pass.under_way || from.pass.begin;
     if (!is_resumed && state_.loop) from = from_there(*state_.loop, theta);
     begin(Part::Round, "round " + std::to_string(round + 1), share(round), share(round + 1),
-          followed_captures(looped()),
-          without_start(with_chosen_controls(options_of_rounds(), is_first ? FitOptions::automatic : controls)),
+          followed_captures(looped()), without_start(is_first ? options_ : with_chosen_controls(options_, controls)),
           std::move(from));
   }
 
@@ -293,14 +288,14 @@ class TrackingLoop : public PassPlanner {
     follow_with_controls(round.controls);
     if (!follow(followed_, to_follow_with(round.theta, round.controls))) return stop(std::move(direct_));
     begin(Part::RoundsAgain, "rounds", 0.5, 0.5, followed_captures(looped()),
-          with_chosen_controls(without_start(options_of_rounds()), round.controls), {*state_.loop, {}, {}, {}});
+          with_chosen_controls(without_start(options_), round.controls), {*state_.loop, {}, {}, {}});
   }
 
   /// The better one again, from where it is, with all frames.
   void begin_last() {
     const PassState& best = state_.keeps_loop ? *state_.loop : *state_.direct;
     const VectorX theta = estimate_of(best)->theta;
-    FitOptions options = state_.keeps_loop ? without_start(options_) : with_choice_of_controls(options_);
+    FitOptions options = state_.keeps_loop ? without_start(options_) : for_points(options_);
     options = with_chosen_controls(std::move(options), best.controls);
     std::vector<FollowedRecording> all;
     std::vector<std::string> ignored;

@@ -94,7 +94,9 @@ TEST(TrackingLoop, LeadsToTheModulusFromOneTenTimesOff) {
 
 TEST(TrackingLoop, FindsThatOneModulusIsNotEnough) {
   constexpr double soft = 0.3 * modulus;
-  const FitOutcome outcome = fit({swinging_bar(frames, soft)}, quick(TrackingUse::Loop));
+  FitOptions options = quick(TrackingUse::Loop);
+  options.control_points = FitOptions::automatic;
+  const FitOutcome outcome = fit({swinging_bar(frames, soft)}, options);
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
   const auto& moduli = outcome.recordings.front().discretisation.simulation.blocks.youngs_moduli;
   ASSERT_GT(moduli.size(), 1u);
