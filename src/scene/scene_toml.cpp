@@ -259,10 +259,10 @@ void check_vertex_lists(TomlContext& context, const Scene& scene) {
 
 namespace {
 
-void check_material_name(TomlContext& context, const std::string& key, const std::string& name,
+void check_material_name(TomlContext& context, const std::string& kind, const std::string& key, const std::string& name,
                          std::set<std::string>& names) {
   if (!names.insert(name).second)
-    context.complain(key + ".name", "a second material \"" + name + "\"", "different names");
+    context.complain(key + ".name", "a second " + kind + " \"" + name + "\"", "different names");
   if (name.find('@') != std::string::npos)
     context.complain(key + ".name", "the name \"" + name + "\"", "a name without @",
                      "parameters are listed as name@region");
@@ -295,7 +295,7 @@ void check_materials(TomlContext& context, const Scene& scene) {
   for (std::size_t i = 0; i < scene.regions.size(); ++i) {
     const std::string key = fmt::format("region[{}]", i);
     if (!context.is_sound(key)) continue;
-    check_material_name(context, key, scene.regions[i].name, names);
+    check_material_name(context, "region", key, scene.regions[i].name, names);
     if (scene.object.surface && !scene.object.surface->vertices.empty() &&
         !touches_solid(scene.regions[i].region, *scene.object.surface))
       context.complain(key, "no point of the object lies in region \"" + scene.regions[i].name + "\"",
@@ -304,7 +304,7 @@ void check_materials(TomlContext& context, const Scene& scene) {
   for (std::size_t i = 0; i < scene.controls.size(); ++i) {
     const std::string key = fmt::format("control[{}]", i);
     if (!context.is_sound(key)) return;
-    check_material_name(context, key, scene.controls[i].name, names);
+    check_material_name(context, "control point", key, scene.controls[i].name, names);
   }
   if (scene.controls.empty()) return;
   if (!scene.regions.empty())

@@ -154,7 +154,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"OneControl", "[[control]]\nname = \"a\"\npoint = [0,0,0]", "one control point; expected two"},
         Wrong{"ControlsOfOneName",
               "[[control]]\nname = \"a\"\npoint = [0,0,0]\n[[control]]\nname = \"a\"\npoint = [1,0,0]",
-              "scene.toml:5:1: a second material"},
+              "scene.toml:5:1: a second control point"},
         Wrong{"ControlNamedAsAParameter",
               "[[control]]\nname = \"a@b\"\npoint = [0,0,0]\n[[control]]\nname = \"a\"\npoint = [1,0,0]",
               "expected a name without @"},
