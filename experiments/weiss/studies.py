@@ -198,11 +198,13 @@ def views(study):
 
 
 def same_cells(study):
-    """One camera as of `views`, of a recording that is simulated on the fit's own cells: what of an error is the mesh's."""
+    """One camera as of `views`, of a recording that is simulated on the fit's own cells: what of an error is the mesh's, and what the steps'."""
     place = on_hemisphere(random.Random(SEED), 0.75)
     capture = torus(study, "torus-same-cells", [torus_camera(name="camera_1", eye=place)], finer=1.0)
     starts = log_uniform_starts(study.count(5), TORUS[0], SEED)
-    return {"1": study_rows(study, "same-cells", capture, starts, TORUS[0], TORUS_KNOWN | {"wide_band": band(PAPER_BAND, 15.4)})}
+    settings = TORUS_KNOWN | {"wide_band": band(PAPER_BAND, 15.4)}
+    return {"1": study_rows(study, "same-cells", capture, starts, TORUS[0], settings),
+            "third": study_rows(study, "same-cells-short-steps", capture, starts[:2], TORUS[0], settings | {"steps": 3})}
 
 
 def resolutions(study):
