@@ -83,7 +83,9 @@ class Record {
     if (folder_.empty()) return;
     const std::string name = fmt::format("frames/{:06}", frame);
     const State state{session.nodes(), Points::Zero(session.nodes().rows(), 3)};
-    write_vtu(folder_ / (name + ".vtu"), frame_grid(*probing_.body(), state, *elasticity_), VtuPrecision::Single);
+    write_vtu(folder_ / (name + ".vtu"),
+              frame_grid(*probing_.body(), state, body_fields(*probing_.body(), *elasticity_, state.x)),
+              VtuPrecision::Single);
     TriangleMesh deformed = fine_;
     const Points positions = follower_->positions(session.nodes());
     for (std::size_t v = 0; v < deformed.vertices.size(); ++v)

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "elasticity/local_stiffness.hpp"
+#include "elasticity/material_law.hpp"
 #include "elasticity/reference_forces.hpp"
 
 namespace pliant {
@@ -32,6 +33,7 @@ class CorotatedElasticity : public Elasticity {
   void add_reference_adjoint(const Points& w, Points& reference_bar) override;
   double energy(const Points& z) const override;
   Matrix3 cauchy_stress(int element) const override;
+  double tangent_modulus(int element) const override;
 
  private:
   using Vector = Eigen::Matrix<double, 3 * N, 1>;
@@ -123,13 +125,25 @@ void CorotatedElasticity<N>::set_parameters(const VectorX& parameters) {
 
 template <int N>
 Matrix3 CorotatedElasticity<N>::cauchy_stress(int e) const {
-  const Matrix3 in_body = polar_[e].S - Matrix3::Identity();
-  const Matrix3 in_world = polar_[e].R * in_body * polar_[e].R.transpose();
-  const Matrix3 linear = lame_.lambda * in_body.trace() * Matrix3::Identity() + 2.0 * lame_.mu * in_world;
-  if (!is_corrected()) return modulus_[e] * linear;
+  const Matrix3 strain = polar_[e].S - Matrix3::Identity();
+  const Matrix3 linear = lame_.lambda * strain.trace() * Matrix3::Identity() + 2.0 * lame_.mu * strain;
+  Matrix3 first = polar_[e].R * linear;
+  if (is_corrected()) first += correction(e).stress();
   const Matrix3& F = gradients_[std::size_t(e)];
-  const Matrix3 first = linear * polar_[e].R + correction(e).stress();
   return modulus_[e] / F.determinant() * first * F.transpose();
+}
+
+template <int N>
+double CorotatedElasticity<N>::tangent_modulus(int e) const {
+  if (!is_corrected()) return modulus_[e];
+  const MeanStrainCorrection mean = correction(e);
+  Matrix9 tangent;
+  for (int k = 0; k < 9; ++k) {
+    Matrix3 dF = Matrix3::Zero();
+    dF(k % 3, k / 3) = 1.0;
+    tangent.col(k) = vec(mean.law_tangent(dF));
+  }
+  return modulus_[e] * pliant::tangent_modulus(tangent, polar_[std::size_t(e)]);
 }
 
 template <int N>

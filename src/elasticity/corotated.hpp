@@ -22,8 +22,12 @@ class Elasticity : public ForceTerm {
   /// Elastic energy [J] of the positions with the rotations of the lag point; of the neo-Hookean law, whose mean strain
   /// is the lag point's, only where the positions are that point.
   virtual double energy(const Points& z) const = 0;
-  /// Mean Cauchy stress of an element at the lag point [Pa].
+  /// Mean Cauchy stress of an element at the lag point, P F^T / det F [Pa]; not a number where the law knows no such
+  /// deformation. Safe from several threads.
   virtual Matrix3 cauchy_stress(int element) const = 0;
+  /// Young's modulus of an element at its mean deformation at the lag point [Pa] (`tangent_modulus` of its law). Safe
+  /// from several threads.
+  virtual double tangent_modulus(int element) const = 0;
   /// Of an element at the lag point.
   const Polar& rotation(int element) {
     find_rotations();

@@ -81,6 +81,7 @@ class TetLawElasticity : public LawElasticity {
   void add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const override;
   void for_parameter_derivatives(const VisitDerivatives& visit) const override;
   Matrix3 cauchy_stress(int element) const override;
+  double tangent_modulus(int element) const override;
   MatrixX strains() const override;
   bool set_reference_positions(const Points& reference) override;
   double least_volume_ratio() const override { return least_volume_ratio_; }
@@ -116,6 +117,17 @@ class TetLawElasticity : public LawElasticity {
     Nodes own;
     for (int a = 0; a < N; ++a) own.row(a) = all.row(nodes_of(e)[a]);
     return own;
+  }
+  /// By volume of an element's points, at the last `evaluate`.
+  Matrix3 mean_deformation(int e) const {
+    Matrix3 F = Matrix3::Zero();
+    double volume = 0.0;
+    for (int q = 0; q < points; ++q) {
+      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
+      F += point.volume * point.F;
+      volume += point.volume;
+    }
+    return F / volume;
   }
   /// Volumes of all points where the nodes are stress-free here.
   std::vector<double> volumes(const Points& reference) const;
@@ -323,10 +335,16 @@ Matrix3 TetLawElasticity<N>::cauchy_stress(int e) const {
   double volume = 0.0;
   for (int q = 0; q < points; ++q) {
     const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
+    if (!std::isfinite(point.stress.energy)) return Matrix3::Constant(std::numeric_limits<double>::quiet_NaN());
     sum += point.volume / point.F.determinant() * point.stress.P * point.F.transpose();
     volume += point.volume;
   }
   return sum / volume;
+}
+
+template <int N>
+double TetLawElasticity<N>::tangent_modulus(int e) const {
+  return pliant::tangent_modulus(*law_, e, mean_deformation(e));
 }
 
 template <int N>
@@ -367,16 +385,8 @@ void TetLawElasticity<N>::linearise(const Points& lag) {
 template <int N>
 void TetLawElasticity<N>::find_rotations() {
   if (std::exchange(has_rotations_, true)) return;
-  for (int e = 0; e < body_->element_count(); ++e) {
-    Matrix3 F = Matrix3::Zero();
-    double volume = 0.0;
-    for (int q = 0; q < points; ++q) {
-      const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
-      F += point.volume * point.F;
-      volume += point.volume;
-    }
-    polar_[std::size_t(e)] = polar_decomposition(F / volume, polar_[std::size_t(e)].quaternion);
-  }
+  for (int e = 0; e < body_->element_count(); ++e)
+    polar_[std::size_t(e)] = polar_decomposition(mean_deformation(e), polar_[std::size_t(e)].quaternion);
 }
 
 template <int N>

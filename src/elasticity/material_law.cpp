@@ -59,7 +59,10 @@ double tangent_modulus(const MaterialLaw& law, int element, const Matrix3& F) {
   PointStress at;
   law.stress(element, F, true, at);
   if (!std::isfinite(at.energy)) return std::numeric_limits<double>::quiet_NaN();
-  const Polar polar = polar_decomposition(F);
+  return tangent_modulus(world_tangent(at), polar_decomposition(F));
+}
+
+double tangent_modulus(const Matrix9& tangent, const Polar& polar) {
   const Eigen::SelfAdjointEigenSolver<Matrix3> strain(Matrix3(polar.S - Matrix3::Identity()));
   Eigen::Index greatest = 0;
   strain.eigenvalues().cwiseAbs().maxCoeff(&greatest);
@@ -69,7 +72,6 @@ double tangent_modulus(const MaterialLaw& law, int element, const Matrix3& F) {
     const auto [i, j] = pairs[k];
     return i == j ? m(i, i) : std::sqrt(0.5) * (m(i, j) + m(j, i));
   };
-  const Matrix9 tangent = world_tangent(at);
   Matrix6 stiffness;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const auto [i, j] = pairs[k];

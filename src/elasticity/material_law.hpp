@@ -67,6 +67,8 @@ Matrix9 world_tangent(const PointStress& stress);
 /// principal direction of the greatest strain |U - I|, the stress in all other directions staying as it is. Of a linear
 /// law it is Young's modulus whatever the strain. Not a number where the law knows no such deformation.
 double tangent_modulus(const MaterialLaw& law, int element, const Matrix3& F);
+/// The same of a tangent dP/dF [Pa] in the frame of the world, columns of F first, at F = R S.
+double tangent_modulus(const Matrix9& tangent, const Polar& polar);
 
 /// A law whose energy is another's times a factor > 0: everything is as much stiffer. It has no parameters of its own.
 std::shared_ptr<const MaterialLaw> scaled_law(std::shared_ptr<const MaterialLaw> law, double factor);

@@ -43,12 +43,16 @@ MeanStrainCorrection::MeanStrainCorrection(const Matrix3& F, const Polar& polar,
 
 /// Symmetric as a map of 3 x 3 matrices: a second derivative of `energy`.
 Matrix3 MeanStrainCorrection::own_tangent(const Matrix3& dF) const {
-  const double sum = lame_.lambda + lame_.mu;
   const Matrix3 turn = cross_matrix(rotation_rate(*polar_, dF));
   const Matrix3 d_strain = polar_->R.transpose() * dF - turn * polar_->S;
   const Matrix3 d_linear = turn * linear_ + linear_stress(lame_.lambda, lame_.mu, d_strain);
+  return law_tangent(dF) - polar_->R * d_linear;
+}
+
+Matrix3 MeanStrainCorrection::law_tangent(const Matrix3& dF) const {
+  const double sum = lame_.lambda + lame_.mu;
   return lame_.mu * dF + sum * cofactors_.cwiseProduct(dF).sum() * cofactors_ +
-         (sum * (J_ - 1.0) - lame_.mu) * cofactor_change(*F_, dF) - polar_->R * d_linear;
+         (sum * (J_ - 1.0) - lame_.mu) * cofactor_change(*F_, dF);
 }
 
 Matrix3 MeanStrainCorrection::tangent(const Matrix3& H, const Matrix3& dF, const Matrix3& dH) const {

@@ -30,6 +30,8 @@ class MeanStrainCorrection {
   Matrix3 stress(const Matrix3& H) const { return stress_ + ahead(lame_.lambda + lame_.mu, H); }
   /// Its change for those of F and H.
   Matrix3 tangent(const Matrix3& H, const Matrix3& dF, const Matrix3& dH) const;
+  /// Change of the whole law's P at F for that of F, without what the corotated one takes away.
+  Matrix3 law_tangent(const Matrix3& dF) const;
   /// Cotangents of F and H for W, that of P.
   struct Cotangents {
     Matrix3 F, H;

@@ -1,10 +1,9 @@
 #include "live/live_object.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <stdexcept>
 
-#include "elasticity/point_averages.hpp"
+#include "elasticity/body_fields.hpp"
 #include "live/live_motion.hpp"
 #include "live/live_press.hpp"
 
@@ -50,7 +49,6 @@ const std::vector<float>& LiveObject::field(LiveField which) {
   }
   const std::shared_ptr<const MaterialLaw> law = this->law();
   std::vector<double> of_elements(std::size_t(body_->element_count()));
-  PointStress stress;
   for (int e = 0; e < body_->element_count(); ++e) {
     Matrix3 F = Matrix3::Zero();
     const auto element = body_->element(e);
@@ -62,16 +60,8 @@ const std::vector<float>& LiveObject::field(LiveField which) {
     if (which == LiveField::Deviation && e < data_.relative_deviations.size())
       value = law->small_strain(e).youngs_modulus * data_.relative_deviations[e];
     if (which == LiveField::ModulusAtStrain) value = tangent_modulus(*law, e, F);
-    if (which == LiveField::Strain)
-      value = Eigen::SelfAdjointEigenSolver<Matrix3>(Matrix3(polar_decomposition(F).S - Matrix3::Identity()),
-                                                     Eigen::EigenvaluesOnly)
-                  .eigenvalues()
-                  .cwiseAbs()
-                  .maxCoeff();
-    if (which == LiveField::VonMises) {
-      law->stress(e, F, false, stress);
-      value = von_mises(stress.P * F.transpose() / F.determinant());
-    }
+    if (which == LiveField::Strain) value = greatest_strain(polar_decomposition(F).S);
+    if (which == LiveField::VonMises) value = von_mises(cauchy_stress(*law, e, F));
   }
   const std::vector<double> averages = averages_at(*body_, vertices_, of_elements);
   std::ranges::transform(averages, field_.begin(), [](double v) { return float(v); });

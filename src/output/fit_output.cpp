@@ -11,8 +11,8 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "elasticity/body_fields.hpp"
 #include "elasticity/element_moduli.hpp"
-#include "elasticity/point_averages.hpp"
 #include "live/live_page.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
@@ -379,22 +379,13 @@ using Progress = std::function<void(const char*, int, int)>;
 /// Fields of a motion, for the page: the stress where it is greatest, and a modulus that varies, with its deviation.
 class FieldPictures {
  public:
-  FieldPictures(const Capture& capture, const RecordingOutcome& outcome)
-      : capture_(capture),
-        outcome_(outcome),
-        elasticity_(scene_elasticity(outcome.discretisation.body, outcome.discretisation.simulation)) {
-    elasticity_->set_parameters(outcome.theta);
-  }
+  FieldPictures(const Capture& capture, const RecordingOutcome& outcome) : capture_(capture), outcome_(outcome) {}
 
   /// Takes the stress of a frame.
-  void add(int frame, const State& state) {
-    const Body& body = *outcome_.discretisation.body;
-    elasticity_->linearise(state.x);
-    std::vector<double> stress(std::size_t(body.element_count()));
-    for (std::size_t e = 0; e < stress.size(); ++e) stress[e] = von_mises(elasticity_->cauchy_stress(int(e)));
+  void add(int frame, const State& state, const std::vector<double>& stress) {
     const double greatest = *std::ranges::max_element(stress);
     if (!greatest_.empty() && greatest <= *std::ranges::max_element(greatest_)) return;
-    greatest_ = std::move(stress), frame_ = frame, nodes_ = state.x;
+    greatest_ = stress, frame_ = frame, nodes_ = state.x;
   }
 
   void draw(const Gallery& gallery, const ModulusStatistics& modulus, std::vector<ReportField>& fields) const {
@@ -422,7 +413,6 @@ class FieldPictures {
  private:
   const Capture& capture_;
   const RecordingOutcome& outcome_;
-  std::unique_ptr<Elasticity> elasticity_;
   std::vector<double> greatest_;  // of each element [Pa]
   int frame_ = 0;
   Points nodes_;
@@ -436,7 +426,7 @@ void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& re
   write_trajectory(
       folder, first.discretisation.body, first.discretisation.simulation, first.theta,
       [&](int done, int total) { return tell("trajectory", done, total), true; },
-      [&](int frame, const State& state) { fields.add(frame, state); });
+      [&](int frame, const State& state, const BodyFields& of) { fields.add(frame, state, of.von_mises); });
   for (const auto& f : surface_errors(first.evaluation).frames) {
     const int frame = f.frame + capture.scene.timing.start_frame;
     report.residuals.push_back({frame, capture.scene.timing.times[std::size_t(frame)], f.rms, f.points, f.noise});

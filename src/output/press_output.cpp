@@ -119,7 +119,9 @@ void write_deformed(const fs::path& folder, const LawOutcome& outcome,
     if (!p.succeeded) continue;
     const std::string name = fmt::format("presses/{:03d}.vtu", i + 1);
     const State state{p.placement.nodes, Points::Zero(p.placement.nodes.rows(), 3)};
-    write_vtu(folder / name, frame_grid(*outcome.scene->body, state, *elasticity), VtuPrecision::Single);
+    write_vtu(folder / name,
+              frame_grid(*outcome.scene->body, state, body_fields(*outcome.scene->body, *elasticity, state.x)),
+              VtuPrecision::Single);
     entries.push_back({double(i + 1), name});
   }
   write_pvd(folder / "presses.pvd", entries);

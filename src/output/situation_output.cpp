@@ -203,7 +203,7 @@ RolloutSummary write_situation(const Model& model, const Situation& situation, c
     const RolloutSummary summary = write_trajectory(
         folder, scene.body, scene.simulation, scene.theta,
         [&](int done, int total) { return !(was_stopped = progress && !progress("simulated", done, total)); },
-        [&](int frame, const State& state) {
+        [&](int frame, const State& state, const BodyFields&) {
           const Points now = vertices.positions(state.x);
           copy.surfaces.push_back(now.cast<float>());
           std::vector<Vector3>&drops = copy.drops.emplace_back(), &falls = copy.falls.emplace_back();

@@ -151,7 +151,8 @@ void write_track(const fs::path& folder, const Capture& capture, const std::vect
   std::vector<PvdEntry> entries;
   for (std::size_t i = 0; i < states.size(); ++i) {
     const std::string name = fmt::format("frames/{:06d}.vtu", track.frames[i].frame);
-    write_vtu(folder / name, frame_grid(*track.body, states[i], *elasticity), VtuPrecision::Single);
+    write_vtu(folder / name, frame_grid(*track.body, states[i], body_fields(*track.body, *elasticity, states[i].x)),
+              VtuPrecision::Single);
     entries.push_back({track.frames[i].time - track.frames.front().time, name});
     if (progress) progress("written", int(i) + 1, int(states.size()));
   }

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <random>
+
 #include "elasticity/modulus_field.hpp"
 #include "support/bodies.hpp"
 
@@ -48,6 +51,33 @@ TEST(ModulusStatistics, DeviationsFollowTheFieldsDerivatives) {
   EXPECT_NEAR(s.mean_std, std::sqrt(variance[scene.body->element_count()]), 1e-6 * s.mean);
   EXPECT_GT(s.mean, s.value.minCoeff());
   EXPECT_LT(s.mean, s.value.maxCoeff());
+}
+
+/// ln E of an element is linear in those of the controls: its deviation is exact, and that of E itself to first order.
+TEST(ModulusStatistics, DeviationsAreThoseOfSampledControls) {
+  TwoControls scene;
+  const ModulusStatistics s = scene.statistics();
+  const MatrixX factor = scene.covariance.llt().matrixL();
+  const Eigen::Vector2d centre(std::log(2e4), std::log(5e5));
+  constexpr int samples = 20000;
+  const auto count = Eigen::Index(scene.body->element_count());
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  VectorX sum = VectorX::Zero(count), squares = sum;
+  for (int i = 0; i < samples; ++i) {
+    const Eigen::Vector2d z(normal(random), normal(random));
+    const Eigen::Vector2d log_moduli = centre + factor * z;
+    for (int k = 0; k < 2; ++k) scene.set(k, std::exp(log_moduli[k]));
+    const VectorX log_value = scene.statistics().value.array().log();
+    sum += log_value, squares += log_value.cwiseAbs2();
+  }
+  const double error = 4.0 / std::sqrt(2.0 * samples);  // of a sampled deviation, four of its own
+  for (Eigen::Index e = 0; e < count; ++e) {
+    const double mean = sum[e] / samples, sampled = std::sqrt(squares[e] / samples - mean * mean);
+    EXPECT_NEAR(s.std[e] / s.value[e], sampled, error * sampled) << e;
+    EXPECT_NEAR(mean, std::log(s.value[e]), 4.0 * sampled / std::sqrt(samples)) << e;
+  }
+  EXPECT_LT(s.std.minCoeff() / s.std.maxCoeff(), 0.5) << "it varies over the body";
 }
 
 TEST(ModulusStatistics, OneModulusIsItsOwnMean) {

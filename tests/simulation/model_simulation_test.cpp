@@ -93,5 +93,39 @@ TEST(Trajectory, HasAFileForEachFrame) {
   EXPECT_LT(last.points.col(2).minCoeff(), first.points.col(2).minCoeff() - 1e-4) << "it sinks";
 }
 
+TEST(Trajectory, FilesHaveTheFieldsOfTheBody) {
+  const TemporaryFolder folder;
+  const ModelScene made = make_scene(bar());
+  std::vector<BodyFields> fields;
+  (void)write_trajectory(folder.path(), made.body, made.simulation, made.theta, {},
+                         [&](int, const State&, const BodyFields& of) { fields.push_back(of); });
+  ASSERT_EQ(fields.size(), 4u);
+  const VtuGrid last = read_vtu(folder / "frames/000003.vtu");
+  ASSERT_EQ(last.cell_count(), made.body->element_count());
+  std::vector<std::string> names;
+  for (const VtuArray& array : last.cell_data) names.push_back(array.name);
+  EXPECT_THAT(names, testing::UnorderedElementsAre("strain [1]", "stress [Pa]", "von_mises [Pa]", "greatest_strain [1]",
+                                                   "tangent_modulus [Pa]"));
+  const auto expect_read = [&](const char* name, const std::vector<double>& written) {
+    const VtuArray* array = last.find_cell_data(name);
+    ASSERT_TRUE(array) << name;
+    EXPECT_EQ(array->components, 1);
+    ASSERT_EQ(array->values.size(), written.size()) << name;
+    const double most = *std::ranges::max_element(written);
+    for (std::size_t e = 0; e < written.size(); ++e)
+      ASSERT_NEAR(array->values[e], written[e], 1e-6 * most) << name << ": written in single precision";
+  };
+  expect_read("von_mises [Pa]", fields.back().von_mises);
+  expect_read("greatest_strain [1]", fields.back().greatest_strain);
+  expect_read("tangent_modulus [Pa]", fields.back().tangent_modulus);
+  const double most = *std::ranges::max_element(fields.back().von_mises);
+  const VtuArray& stress = *last.find_cell_data("stress [Pa]");
+  for (std::size_t e = 0; e < fields.back().von_mises.size(); ++e) {
+    const double* s = stress.values.data() + 6 * e;  // xx yy zz xy yz xz
+    const Matrix3 tensor{{s[0], s[3], s[5]}, {s[3], s[1], s[4]}, {s[5], s[4], s[2]}};
+    ASSERT_NEAR(von_mises(tensor), fields.back().von_mises[e], 1e-5 * most);
+  }
+}
+
 }  // namespace
 }  // namespace pliant::model_simulation_test
