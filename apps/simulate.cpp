@@ -6,8 +6,6 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "output/situation_output.hpp"
-#include "simulation/model_simulation.hpp"
-#include "simulation/trajectory.hpp"
 
 namespace pliant::apps {
 
@@ -25,7 +23,8 @@ int finish(const RolloutSummary& summary, const std::string& out) {
     std::cerr << "pliant: the simulation stopped in frame " << summary.frames << ": " << summary.failure << "\n";
     return NotConverged;
   }
-  std::cout << summary.frames << " frames in " << out << "/trajectory.pvd (opens in ParaView)\n";
+  std::cout << summary.frames << " frames in " << out << "/trajectory.pvd (opens in ParaView); stress and strain in "
+            << out << "/fields.html\n";
   return Fine;
 }
 
@@ -53,8 +52,7 @@ int run(const Arguments& arguments) {
                       "--situation FILE beside them",
                       "a file with `format = \"situation/1\"` alone is a situation: the model under gravity"});
   const Model model = load_model(arguments.model);
-  const ModelScene scene = make_scene(model);
-  return finish(write_trajectory(arguments.out, scene.body, scene.simulation, scene.theta,
+  return finish(write_simulation(model, arguments.out,
                                  [](int done, int total) {
                                    show_progress("simulated", done, total);
                                    return !is_interrupted();

@@ -11,13 +11,15 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "elasticity/body_fields.hpp"
 #include "elasticity/element_moduli.hpp"
+#include "elasticity/law_elasticity.hpp"
 #include "live/live_page.hpp"
+#include "output/field_pictures.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
 #include "output/track_output.hpp"
 #include "report/gallery.hpp"
+#include "report/plot.hpp"
 #include "report/report.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
@@ -376,57 +378,27 @@ namespace {
 
 using Progress = std::function<void(const char*, int, int)>;
 
-/// Fields of a motion, for the page: the stress where it is greatest, and a modulus that varies, with its deviation.
-class FieldPictures {
- public:
-  FieldPictures(const Capture& capture, const RecordingOutcome& outcome) : capture_(capture), outcome_(outcome) {}
-
-  /// Takes the stress of a frame.
-  void add(int frame, const State& state, const std::vector<double>& stress) {
-    const double greatest = *std::ranges::max_element(stress);
-    if (!greatest_.empty() && greatest <= *std::ranges::max_element(greatest_)) return;
-    greatest_ = stress, frame_ = frame, nodes_ = state.x;
-  }
-
-  void draw(const Gallery& gallery, const ModulusStatistics& modulus, std::vector<ReportField>& fields) const {
-    const Body& body = *outcome_.discretisation.body;
-    const Embedding vertices(body, capture_.scene.object.surface->vertices);
-    if (!greatest_.empty()) {
-      const Timing& timing = capture_.scene.timing;
-      const int recorded = frame_ + timing.start_frame;
-      const double time = timing.times[std::size_t(recorded)] - timing.times[std::size_t(timing.start_frame)];
-      fields.push_back(draw_field(gallery, vertices.positions(nodes_), averages_at(body, vertices, greatest_),
-                                  "von Mises stress", "Pa",
-                                  fmt::format("Where stress is greatest: frame {}, {:.3g} s", recorded, time)));
-    }
-    if (body.modulus.controls == 1) return;
-    const Points at_rest = vertices.positions(body.nodes);
-    const auto draw_modulus = [&](const VectorX& values, const char* name, const char* unit, const char* caption) {
-      const std::vector<double> of_elements(values.data(), values.data() + values.size());
-      fields.push_back(draw_field(gallery, at_rest, averages_at(body, vertices, of_elements), name, unit, caption));
-    };
-    draw_modulus(modulus.value, "Young's modulus", "Pa", "Young's modulus over the object");
-    if (modulus.mean_std > 0.0)
-      draw_modulus(modulus.std, "standard deviation", "Pa", "How sure Young's modulus is over the object");
-  }
-
- private:
-  const Capture& capture_;
-  const RecordingOutcome& outcome_;
-  std::vector<double> greatest_;  // of each element [Pa]
-  int frame_ = 0;
-  Points nodes_;
-};
+/// From where the fields of presses are seen.
+Gallery gallery_of(const Capture& capture) {
+  Gallery gallery;
+  gallery.triangles = capture.scene.object.surface->triangles;
+  gallery.up = capture.scene.world.up;
+  gallery.width = 480, gallery.height = 400;
+  return gallery;
+}
 
 void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& recordings, const FitOutcome& outcome,
-                  ReportData& report, const Progress& tell) {
+                  const std::vector<double>& modulus_std, ReportData& report, const Progress& tell) {
   const Capture& capture = recordings.front().capture;
   const RecordingOutcome& first = outcome.recordings.front();
-  FieldPictures fields(capture, first);
+  const auto elasticity = scene_elasticity(first.discretisation.body, first.discretisation.simulation);
+  elasticity->set_parameters(first.theta);
+  FieldPictures fields(first.discretisation.body, *elasticity, *capture.scene.object.surface, modulus_std,
+                       frames_at(first.discretisation.simulation.times, capture.scene.timing.start_frame));
   write_trajectory(
       folder, first.discretisation.body, first.discretisation.simulation, first.theta,
       [&](int done, int total) { return tell("trajectory", done, total), true; },
-      [&](int frame, const State& state, const BodyFields& of) { fields.add(frame, state, of.von_mises); });
+      [&](int frame, const State& state, const BodyFields& of) { fields.add(frame, state.x, of); });
   for (const auto& f : surface_errors(first.evaluation).frames) {
     const int frame = f.frame + capture.scene.timing.start_frame;
     report.residuals.push_back({frame, capture.scene.timing.times[std::size_t(frame)], f.rms, f.points, f.noise});
@@ -438,7 +410,7 @@ void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& re
   tell("pictures", 0, 1);
   const Gallery gallery = gallery_of(recordings.front(), first);
   add_pictures(report, gallery);
-  fields.draw(gallery, modulus_statistics(outcome), report.fields);
+  report.fields = fields.draw(gallery);
   tell("pictures", 1, 1);
 }
 
@@ -522,8 +494,24 @@ std::string write_live_page(const fs::path& folder, const RecordedCapture& recor
   return name;
 }
 
-void write_law(const fs::path& folder, const LawOutcome& law, ReportData& report, const Progress& tell) {
-  write_presses(folder, law, tell);
+void write_law(const fs::path& folder, const Capture& capture, const LawOutcome& law,
+               const std::vector<double>& modulus_std, ReportData& report, const Progress& tell) {
+  std::optional<FieldPictures> fields;
+  if (capture.scene.object.surface && !law.predictions.empty()) {
+    FieldStates states{"press"};
+    for (std::size_t i = 0; i < law.predictions.size(); ++i) {
+      const ObservedPress& press = law.scene->presses[i];
+      states.at.push_back(double(i + 1));
+      states.names.push_back(fmt::format("Press {}{}, {} N", press.name, press.role == "test" ? " (test)" : "",
+                                         readable(press.force.norm(), 3)));
+    }
+    const auto elasticity = LawElasticity::make(law.scene->body, law.law);
+    fields.emplace(law.scene->body, *elasticity, *capture.scene.object.surface, modulus_std, std::move(states));
+  }
+  write_presses(folder, law, tell, [&](int press, const Points& nodes, const BodyFields& of) {
+    if (fields) fields->add(press, nodes, of);
+  });
+  if (fields) report.fields = fields->draw(gallery_of(capture));
   report.presses = press_errors(*law.scene, law.predictions);
   for (const ObservedPress& press : law.scene->presses) report.press_forces.push_back(press.force.norm());
   if (law.sampled) report.basis_errors = law.sampled->error_by_size;
@@ -556,15 +544,17 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     report.correlations = {outcome.parameters.coordinate_names(), outcome.correlation};
   write_result(folder / "result.json", report.result);
   write_convergence(folder / "convergence.csv", history_of(outcome, true));
+  std::vector<double> modulus_std;
   if (capture.scene.object.surface) {
     const Model model = make_model(capture, outcome);
     save_model(folder, model);
+    modulus_std = model.volume.youngs_modulus_std;
     report.live_page = write_live_page(folder, recordings.front(), outcome, model);
   }
   if (outcome.law)
-    write_law(folder, *outcome.law, report, tell);
+    write_law(folder, capture, *outcome.law, modulus_std, report, tell);
   else
-    write_motion(folder, recordings, outcome, report, tell);
+    write_motion(folder, recordings, outcome, modulus_std, report, tell);
   write_report(folder / "report.html", report);
   if (outcome.tracking) write_tracks(folder, recordings, outcome, tell);
 }

@@ -110,7 +110,8 @@ std::string basis_csv(const SampledMaterial& material) {
 }
 
 void write_deformed(const fs::path& folder, const LawOutcome& outcome,
-                    const std::function<void(const char*, int, int)>& progress) {
+                    const std::function<void(const char*, int, int)>& progress,
+                    const std::function<void(int, const Points&, const BodyFields&)>& on_press) {
   std::vector<PvdEntry> entries;
   const auto elasticity = LawElasticity::make(outcome.scene->body, outcome.law);
   for (std::size_t i = 0; i < outcome.predictions.size(); ++i) {
@@ -119,9 +120,9 @@ void write_deformed(const fs::path& folder, const LawOutcome& outcome,
     if (!p.succeeded) continue;
     const std::string name = fmt::format("presses/{:03d}.vtu", i + 1);
     const State state{p.placement.nodes, Points::Zero(p.placement.nodes.rows(), 3)};
-    write_vtu(folder / name,
-              frame_grid(*outcome.scene->body, state, body_fields(*outcome.scene->body, *elasticity, state.x)),
-              VtuPrecision::Single);
+    const BodyFields fields = body_fields(*outcome.scene->body, *elasticity, state.x);
+    write_vtu(folder / name, frame_grid(*outcome.scene->body, state, fields), VtuPrecision::Single);
+    if (on_press) on_press(int(i), state.x, fields);
     entries.push_back({double(i + 1), name});
   }
   write_pvd(folder / "presses.pvd", entries);
@@ -130,10 +131,11 @@ void write_deformed(const fs::path& folder, const LawOutcome& outcome,
 }  // namespace
 
 void write_presses(const fs::path& folder, const LawOutcome& outcome,
-                   const std::function<void(const char*, int, int)>& progress) {
+                   const std::function<void(const char*, int, int)>& progress,
+                   const std::function<void(int, const Points&, const BodyFields&)>& on_press) {
   if (!outcome.predictions.empty()) write_file(folder / "presses.csv", presses_csv(outcome));
   if (outcome.sampled) write_file(folder / "basis.csv", basis_csv(*outcome.sampled));
-  if (!outcome.predictions.empty()) write_deformed(folder, outcome, progress);
+  if (!outcome.predictions.empty()) write_deformed(folder, outcome, progress, on_press);
 }
 
 }  // namespace pliant

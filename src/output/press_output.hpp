@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "elasticity/body_fields.hpp"
 #include "estimation/fit.hpp"
 #include "model/model.hpp"
 #include "model/result.hpp"
@@ -24,7 +25,9 @@ std::string press_sentence(const StaticError& press);
 
 /// Writes what a fit leaves of its presses: presses.csv, presses.pvd with a deformed mesh for each press, and of a
 /// sampled material basis.csv.
+/// @param on_press  called with the number of each press that has an equilibrium, from 0, its nodes [m] and its fields
 void write_presses(const std::filesystem::path& folder, const LawOutcome& outcome,
-                   const std::function<void(const char*, int, int)>& progress = {});
+                   const std::function<void(const char*, int, int)>& progress = {},
+                   const std::function<void(int, const Points&, const BodyFields&)>& on_press = {});
 
 }  // namespace pliant

@@ -13,7 +13,10 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
+#include "output/field_pictures.hpp"
 #include "report/picture.hpp"
+#include "report/report.hpp"
+#include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
 #include "situation/situation_scene.hpp"
 
@@ -183,7 +186,39 @@ void draw_pictures(const SituationFiles& files, const Scene& scene, const Situat
   }
 }
 
+/// Fields of a model's body in motion, for `fields.html`.
+FieldPictures fields_of(const Model& model, const std::shared_ptr<const Body>& body, const SimulationOptions& options,
+                        const VectorX& theta) {
+  const auto elasticity = scene_elasticity(body, options);
+  elasticity->set_parameters(theta);
+  const std::vector<double>& std = model.volume.youngs_modulus_std;
+  const bool has_std = std.size() == std::size_t(body->element_count());
+  return {body, *elasticity, *model.scene.object.surface, has_std ? std : std::vector<double>(),
+          frames_at(options.times)};
+}
+
+void write_fields(const fs::path& folder, const Model& model, const std::vector<Plane>& planes,
+                  const FieldPictures& fields) {
+  Gallery gallery;
+  gallery.triangles = model.scene.object.surface->triangles;
+  gallery.planes = planes;
+  gallery.up = model.scene.world.up;
+  gallery.width = 480, gallery.height = 400;
+  write_file(folder / "fields.html", fields_html(model.name, fields.draw(gallery)));
+}
+
 }  // namespace
+
+RolloutSummary write_simulation(const Model& model, const fs::path& folder,
+                                const std::function<bool(int, int)>& progress) {
+  const ModelScene scene = make_scene(model);
+  FieldPictures fields = fields_of(model, scene.body, scene.simulation, scene.theta);
+  const RolloutSummary summary =
+      write_trajectory(folder, scene.body, scene.simulation, scene.theta, progress,
+                       [&](int frame, const State& state, const BodyFields& of) { fields.add(frame, state.x, of); });
+  write_fields(folder, model, model.scene.planes, fields);
+  return summary;
+}
 
 RolloutSummary write_situation(const Model& model, const Situation& situation, const SituationFiles& files,
                                const std::function<bool(const char*, int, int)>& progress) {
@@ -200,10 +235,12 @@ RolloutSummary write_situation(const Model& model, const Situation& situation, c
     SeenCopy& copy = copies.emplace_back();
     if (k > 0) copy.shift = situation.copies[std::size_t(k) - 1].shift;
     const Embedding vertices(*scene.body, surface.vertices);
+    FieldPictures fields = fields_of(model, scene.body, scene.simulation, scene.theta);
     const RolloutSummary summary = write_trajectory(
         folder, scene.body, scene.simulation, scene.theta,
         [&](int done, int total) { return !(was_stopped = progress && !progress("simulated", done, total)); },
-        [&](int frame, const State& state, const BodyFields&) {
+        [&](int frame, const State& state, const BodyFields& of) {
+          fields.add(frame, state.x, of);
           const Points now = vertices.positions(state.x);
           copy.surfaces.push_back(now.cast<float>());
           std::vector<Vector3>&drops = copy.drops.emplace_back(), &falls = copy.falls.emplace_back();
@@ -220,6 +257,7 @@ RolloutSummary write_situation(const Model& model, const Situation& situation, c
           write_mesh(folder / "surface" / fmt::format("{:06}.ply", frame), mesh);
         });
     write_surfaces(folder / "surface.trajectory", times, copy);
+    write_fields(folder, model, situation.planes.value_or(model.scene.planes), fields);
     if (k == 0) first = summary;
     if (!summary.succeeded && first.succeeded) first = summary;
   }

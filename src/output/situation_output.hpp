@@ -20,8 +20,16 @@ struct SituationFiles {
   double azimuth_deg = 34.0, elevation_deg = 20.0;  ///< from where it is seen [degrees]
 };
 
-/// Simulates a model in a situation and writes `trajectory.pvd` with `frames/*.vtu`, the surfaces of all frames in
-/// `surface.trajectory` (docs/formats.md), and what else is asked for; copies of the object in folders `copy_1`, ...
+/// Simulates a model in its own situation and writes `trajectory.pvd` with `frames/*.vtu` and `fields.html`
+/// (docs/formats.md, section 5).
+/// @param progress  frames done and their total; false stops
+/// Returns why it ended early, empty where it did not. Throws InputError where files cannot be written.
+RolloutSummary write_simulation(const Model& model, const std::filesystem::path& folder,
+                                const std::function<bool(int done, int total)>& progress = {});
+
+/// Simulates a model in a situation and writes `trajectory.pvd` with `frames/*.vtu`, `fields.html`, the surfaces of all
+/// frames in `surface.trajectory` (docs/formats.md), and what else is asked for; copies of the object in folders
+/// `copy_1`, ...
 /// @param progress  what is done, how much of it and the whole; false stops
 /// Returns why it ended early, empty where it did not. Throws InputError where files cannot be written, or where there
 /// shall be a video and no ffmpeg is installed: before anything is simulated.

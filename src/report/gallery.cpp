@@ -24,6 +24,11 @@ Box motion_box(const Gallery& gallery) {
   return box;
 }
 
+PinholeCamera view_of(const Gallery& gallery, const Box& box) {
+  return gallery.camera ? framed(*gallery.camera, box, gallery.width, gallery.height)
+                        : pliant::view_of(box, gallery.up, gallery.width, gallery.height);
+}
+
 std::string caption(const Gallery& gallery, const GalleryFrame& frame) {
   std::string text = fmt::format("Frame {}, {} s", frame.frame, readable(frame.time, 3));
   double squares = 0.0;
@@ -59,8 +64,7 @@ std::vector<double> all_residuals(const Gallery& gallery) {
 std::vector<ReportPicture> draw_gallery(const Gallery& gallery, double range) {
   if (gallery.frames.empty()) return {};
   const Box box = motion_box(gallery);
-  const PinholeCamera view = gallery.camera ? framed(*gallery.camera, box, gallery.width, gallery.height)
-                                            : view_of(box, gallery.up, gallery.width, gallery.height);
+  const PinholeCamera view = view_of(gallery, box);
   PictureOptions options;
   options.samples = gallery.samples;
   options.residual_range = range > 0.0 ? range : residual_range(all_residuals(gallery));
@@ -72,19 +76,27 @@ std::vector<ReportPicture> draw_gallery(const Gallery& gallery, double range) {
   return pictures;
 }
 
-ReportField draw_field(const Gallery& gallery, const Points& surface, const std::vector<double>& values,
-                       const std::string& name, const std::string& unit, const std::string& caption) {
-  ReportField field{name, unit, 0.0, 1.0, {}};
-  const auto [least, most] = std::ranges::minmax(values);
-  field.low = least, field.high = most > least ? most : least + std::max(1e-12, 1e-6 * std::abs(least));
-  PictureScene scene{surface, gallery.triangles, gallery.planes, {}, {}};
-  for (const double v : values) scene.colours.push_back(sequential_colour((v - field.low) / (field.high - field.low)));
-  const Box box = box_of(surface);
-  const PinholeCamera view = gallery.camera ? framed(*gallery.camera, box, gallery.width, gallery.height)
-                                            : view_of(box, gallery.up, gallery.width, gallery.height);
+ReportField draw_field(const Gallery& gallery, const std::vector<FieldState>& states, const std::string& name,
+                       const std::string& unit, ScaleEnds ends) {
+  ReportField field{name, unit};
+  std::vector<double> all;
+  Box box;
+  for (const FieldState& state : states) {
+    all.insert(all.end(), state.values.begin(), state.values.end());
+    for (Eigen::Index i = 0; i < state.surface.rows(); ++i) box.extend(state.surface.row(i));
+  }
+  if (states.empty()) return field;
+  field.scale = colour_scale(all, ends);
+  const PinholeCamera view = view_of(gallery, box);
   PictureOptions options;
   options.samples = gallery.samples;
-  field.picture = {encode_png(draw(scene, view, options)), caption};
+  options.even_light = 0.75;
+  for (const FieldState& state : states) {
+    PictureScene scene{state.surface, gallery.triangles, gallery.planes, {}, {}};
+    for (const double v : state.values) scene.colours.push_back(field.scale.colour(v));
+    scene.about = box;
+    field.pictures.push_back({encode_png(draw(scene, view, options)), state.caption});
+  }
   return field;
 }
 

@@ -38,11 +38,18 @@ std::vector<int> spread_frames(int first, int last, int count);
 ///               ReportData::residual_range
 std::vector<ReportPicture> draw_gallery(const Gallery& gallery, double range = 0.0);
 
-/// A number at each vertex of a surface, drawn in colours from the same place as a gallery.
-/// @param surface  the vertices [m]; as many as `values`
-/// @param caption  plain text
-ReportField draw_field(const Gallery& gallery, const Points& surface, const std::vector<double>& values,
-                       const std::string& name, const std::string& unit, const std::string& caption);
+/// A field in one state of the object.
+struct FieldState {
+  Points surface;              ///< vertices [m], n x 3
+  std::vector<double> values;  ///< at each of them, in the field's unit; not a number: grey
+  std::string caption;         ///< plain text
+};
+
+/// Pictures of a field's states from one place, that of the gallery, which shows all of them; its frames are not drawn.
+/// @param unit  of the values, plain: "Pa"
+/// Throws std::invalid_argument where a state has not a value for each vertex.
+ReportField draw_field(const Gallery& gallery, const std::vector<FieldState>& states, const std::string& name,
+                       const std::string& unit, ScaleEnds ends);
 
 /// All residuals of a gallery, for residual_range.
 std::vector<double> all_residuals(const Gallery& gallery);

@@ -14,6 +14,7 @@ body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.55 system-ui,
 main{max-width:980px;margin:0 auto;padding:36px 20px 60px}
 h1{font-size:1.75rem;line-height:1.2;margin:0 0 .2rem;font-weight:650}
 h2{font-size:1.15rem;margin:2.4rem 0 .7rem;font-weight:650}
+h3{font-size:1rem;margin:1.6rem 0 .5rem;font-weight:620}h3::first-letter{text-transform:uppercase}
 .sub{color:var(--muted);margin:0 0 1.6rem}
 .verdict{border-left:4px solid var(--series-2);padding:.3rem 0 .3rem .8rem;margin:0 0 1.4rem}
 .verdict.unexplained{border-color:var(--series-5)}.verdict.undetermined{border-color:var(--series-4)}

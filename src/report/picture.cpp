@@ -214,7 +214,9 @@ class Painter {
     const double facing = std::max(0.0, normal.dot(key_));
     const Vector3 half = (key_ - direction).normalized();
     const double shine = 0.05 * std::pow(std::max(0.0, normal.dot(half)), 24.0) * light_here.key;
-    return albedo(hit) * (0.62 * ambient + 0.75 * light_here.key * facing * key) + shine;
+    const Colour lit = 0.62 * ambient + 0.75 * light_here.key * facing * key;
+    const double even = options_.even_light;
+    return albedo(hit) * (even + (1.0 - even) * lit) + (1.0 - even) * shine;
   }
 
   Colour floor_colour(const Vector3& point, const Plane& plane, const Colour& sky, uint32_t pixel,
@@ -258,6 +260,8 @@ void check(const PictureScene& scene, const PictureOptions& options) {
     throw std::invalid_argument("draw: as many colours as vertices are needed, or none");
   if (options.samples < 1 || options.samples > 8) throw std::invalid_argument("draw: samples must be 1..8");
   if (options.light_rays < 1 || options.light_rays > 64) throw std::invalid_argument("draw: light_rays must be 1..64");
+  if (!(options.even_light >= 0.0 && options.even_light <= 1.0))
+    throw std::invalid_argument("draw: even_light must be 0..1");
   if (options.max_points < 1) throw std::invalid_argument("draw: max_points must be at least 1");
 }
 

@@ -29,6 +29,8 @@ struct PictureOptions {
   int light_rays = 2;  ///< rays towards the sky for each of them, 1..64: how soft and how clean the shadows are
   double residual_range = 0.0;  ///< [m], residual that gets the full colour; 0: the scene's own (see residual_range)
   double disc_radius = 0.0;     ///< [pixels]; 0: by the number of points
+  double even_light = 0.0;      ///< 0..1, the part of the object's light that is the same all over, so that colours can
+                                ///< be read off a scale
   int max_points = 900;         ///< about so many of the points are drawn where there are more, always the same ones
 };
 

@@ -9,15 +9,7 @@
 
 namespace pliant {
 
-namespace {
-
-struct Scaled {
-  double factor;
-  std::string unit;
-};
-
-// A prefix that brings the value to 1..1000, for units that people write with one.
-Scaled scaled_unit(double value, const std::string& unit) {
+SpokenUnit spoken_unit(double value, const std::string& unit) {
   const double size = std::abs(value);
   if (unit == "Pa" && size >= 1e9) return {1e-9, "GPa"};
   if (unit == "Pa" && size >= 1e6) return {1e-6, "MPa"};
@@ -31,6 +23,8 @@ Scaled scaled_unit(double value, const std::string& unit) {
   const auto found = spoken.find(unit);
   return {1.0, found == spoken.end() ? unit : found->second};
 }
+
+namespace {
 
 std::string with_unit(const std::string& number, const std::string& unit) {
   return unit.empty() ? number : number + "\u00a0" + unit;
@@ -72,7 +66,7 @@ std::string agreement_sentence(const ReportData& data) {
 
 // A number in the unit in which the parameter's value is shown.
 std::string in_unit(double number, int digits, const ParameterResult& p) {
-  const Scaled scaled = scaled_unit(std::get<double>(p.value), p.unit);
+  const SpokenUnit scaled = spoken_unit(std::get<double>(p.value), p.unit);
   return with_unit(readable(number * scaled.factor, digits), scaled.unit);
 }
 
@@ -150,7 +144,7 @@ std::string spoken_name(const std::string& name) {
 }
 
 std::string value_with_uncertainty(double value, std::optional<double> std, const std::string& unit) {
-  const Scaled scaled = scaled_unit(value, unit);
+  const SpokenUnit scaled = spoken_unit(value, unit);
   const double shown = value * scaled.factor;
   if (!std || !std::isfinite(*std) || *std <= 0.0 || !std::isfinite(value))
     return with_unit(readable(shown, 4), scaled.unit);

@@ -103,7 +103,18 @@ std::string words(const ReportData& data) {
 
 // ---- pictures
 
-std::string colour_scale(double range) {
+std::string figures(const std::vector<ReportPicture>& pictures) {
+  if (pictures.empty()) return "";
+  std::string html = "<div class=\"pictures\">\n";
+  for (const ReportPicture& picture : pictures) {
+    const std::string caption = escape_html(picture.caption);
+    html += "<figure><img alt=\"" + caption + "\" src=\"data:image/png;base64," + encode_base64(picture.png) +
+            "\"><figcaption>" + caption + "</figcaption></figure>\n";
+  }
+  return html + "</div>\n";
+}
+
+std::string residual_scale(double range) {
   if (range <= 0.0) return "";
   std::string svg =
       R"svg(<div class="scale"><svg viewBox="0 0 520 46" role="img" aria-label="colours of the residuals" )svg"
@@ -125,43 +136,43 @@ std::string pictures(const ReportData& data) {
   if (data.pictures.empty()) return "";
   std::string html =
       "<p>Dots are observed points; the grey surface is the simulation with the estimated parameters.</p>\n" +
-      colour_scale(data.residual_range) + "<div class=\"pictures\">\n";
-  for (const ReportPicture& picture : data.pictures) {
-    const std::string caption = escape_html(picture.caption);
-    html += "<figure><img alt=\"" + caption + "\" src=\"data:image/png;base64," + encode_base64(picture.png) +
-            "\"><figcaption>" + caption + "</figcaption></figure>\n";
-  }
-  return html + "</div>\n";
-}
-
-std::string fields_section(const std::vector<ReportField>& fields) {
-  if (fields.empty()) return "";
-  std::string html = "<div class=\"pictures\">\n";
-  int number = 0;
-  for (const ReportField& field : fields) {
-    const std::string caption = escape_html(field.picture.caption), id = fmt::format("field-{}", ++number);
-    html +=
-        "<figure><img alt=\"" + caption + "\" src=\"data:image/png;base64," + encode_base64(field.picture.png) + "\">" +
-        fmt::format(R"svg(<svg viewBox="0 0 480 44" role="img" aria-label="colours of {0}" )svg"
-                    R"svg(style="font:13px system-ui,sans-serif;fill:var(--muted)"><defs><linearGradient id="{1}">)svg",
-                    escape_html(field.name), id);
-    for (int k = 0; k <= 16; ++k)
-      html +=
-          fmt::format(R"svg(<stop offset="{:.4f}" stop-color="{}"/>)svg", k / 16.0, css(sequential_colour(k / 16.0)));
-    html +=
-        fmt::format(R"svg(</linearGradient></defs><rect x="1" y="4" width="478" height="14" rx="3" fill="url(#{})" )svg"
-                    R"svg(style="stroke:var(--grid)"/><text x="1" y="36">{}</text><text x="240" y="36" )svg"
-                    R"svg(text-anchor="middle">{}</text><text x="479" y="36" text-anchor="end">{}</text></svg>)svg",
-                    id, value_with_uncertainty(field.low, {}, field.unit), escape_html(field.name),
-                    value_with_uncertainty(field.high, {}, field.unit));
-    html += "<figcaption>" + caption + "</figcaption></figure>\n";
-  }
-  return html + "</div>\n";
+      residual_scale(data.residual_range);
+  return html + figures(data.pictures);
 }
 
 // ---- plots
 
 std::string panel(const std::string& content) { return "<div class=\"panel\">" + content + "</div>\n"; }
+
+std::string field_plot(const ReportField& field) {
+  if (field.at.size() < 2) return "";
+  double most = 0.0;
+  for (const double v : field.greatest)
+    if (std::isfinite(v)) most = std::max(most, std::abs(v));
+  const auto [factor, unit] = spoken_unit(most, field.unit);
+  std::array<Series, 2> series;
+  series[0].label = "greatest of all elements", series[1].label = "mean by volume";
+  for (std::size_t i = 0; i < field.at.size(); ++i) {
+    for (Series& s : series) s.x.push_back(field.at[i]);
+    series[0].y.push_back(factor * field.greatest[i]);
+    series[1].y.push_back(factor * field.mean[i]);
+  }
+  PlotOptions options;
+  options.x_label = field.abscissa, options.y_label = unit.empty() ? field.name : field.name + " [" + unit + "]";
+  options.zero_y = true, options.height = 260;
+  return panel(plot_svg({series[0], series[1]}, options));
+}
+
+std::string fields_section(const std::vector<ReportField>& fields) {
+  std::string html;
+  int number = 0;
+  for (const ReportField& field : fields) {
+    html += "<h3>" + escape_html(field.name) + "</h3>\n<div class=\"scale\">" +
+            colour_bar_svg(field.scale, field.name, field.unit, fmt::format("field-{}", ++number)) + "</div>\n" +
+            figures(field.pictures) + field_plot(field);
+  }
+  return html;
+}
 
 std::string residual_plot(const std::vector<FrameResidual>& residuals) {
   if (residuals.empty()) return "";
@@ -552,15 +563,24 @@ std::string footer(const Result& result) {
   return "<footer>" + escape_html(text) + "</footer>\n";
 }
 
+std::string page_head(const std::string& title) {
+  return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+         "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+         "<meta name=\"color-scheme\" content=\"light dark\"><title>" +
+         title + "</title><style>" + page_style + "</style></head><body><main>\n";
+}
+
 }  // namespace
+
+std::string fields_html(const std::string& title, const std::vector<ReportField>& fields) {
+  const std::string name = escape_html(title);
+  return page_head(name) + "<h1>" + name + "</h1>\n" + section("Fields over the object", fields_section(fields)) +
+         "</main></body></html>\n";
+}
 
 std::string report_html(const ReportData& data) {
   const std::string title = escape_html(data.title.empty() ? data.result.capture.name : data.title);
-  std::string html =
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
-      "<meta name=\"color-scheme\" content=\"light dark\"><title>" +
-      title + "</title><style>" + page_style + "</style></head><body><main>\n";
+  std::string html = page_head(title);
   const std::string recording = escape_html(data.result.capture.name);
   html += "<h1>" + title + "</h1>\n<p class=\"sub\">" + (recording == title ? "" : recording) + "</p>\n";
   html += verdict(data.result) + headline(data.result);

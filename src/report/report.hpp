@@ -7,6 +7,7 @@
 
 #include "base/types.hpp"
 #include "model/result.hpp"
+#include "report/colour_scale.hpp"
 
 namespace pliant {
 
@@ -25,11 +26,14 @@ struct ReportPicture {
   std::string caption;  ///< plain text
 };
 
-/// A number over the object's surface, drawn in colours.
+/// A number over the object's surface in some of its states, all drawn in colours of one scale.
 struct ReportField {
-  std::string name, unit;        ///< "von Mises stress", "Pa"
-  double low = 0.0, high = 1.0;  ///< where the colours end
-  ReportPicture picture;
+  std::string name, unit;  ///< "von Mises stress", "Pa"
+  ColourScale scale = {};
+  std::vector<ReportPicture> pictures = {};
+  std::string abscissa = {};                     ///< of the plot below: "time [s]"
+  std::vector<double> at = {};                   ///< of every state; fewer than two: no plot
+  std::vector<double> greatest = {}, mean = {};  ///< of the elements in each state, the mean by volume; as many as `at`
 };
 
 /// Correlation of every pair of estimated parameters at the solution.
@@ -63,6 +67,17 @@ std::string report_html(const ReportData& data);
 
 /// Writes the page, whole or not at all. Throws InputError where it cannot be written.
 void write_report(const std::filesystem::path& path, const ReportData& data);
+
+/// One self-contained page of fields alone, of a simulation.
+std::string fields_html(const std::string& title, const std::vector<ReportField>& fields);
+
+/// A unit as people write it and what a number is multiplied by for it: a prefix brings `value` to 1..1000 where people
+/// use one.
+struct SpokenUnit {
+  double factor;
+  std::string unit;  ///< empty: a number without a unit
+};
+SpokenUnit spoken_unit(double value, const std::string& unit);
 
 /// A parameter's name for people: "youngs_modulus@red half" gives "Young's modulus (red half)".
 std::string spoken_name(const std::string& name);

@@ -2,6 +2,7 @@
 
 #include "geometry/primitives.hpp"
 #include "rays/ray_scene.hpp"
+#include "report/plot.hpp"
 
 namespace pliant::gallery_test {
 namespace {
@@ -55,16 +56,28 @@ TEST(Gallery, DrawsANumberInColoursWithItsRange) {
   Gallery gallery;
   gallery.triangles = ring.triangles;
   gallery.width = 120, gallery.height = 90;
-  std::vector<double> values;
-  for (const Vector3& v : ring.vertices) values.push_back(1e3 + 1e4 * v.x());
-  const ReportField field = draw_field(gallery, vertex_points(ring), values, "stress", "Pa", "where it is greatest");
-  EXPECT_NEAR(field.low, 1e3 - 2100.0, 1e-9);
-  EXPECT_NEAR(field.high, 1e3 + 2100.0, 1e-9);
+  std::vector<FieldState> states;
+  for (const double factor : {1.0, 2.0}) {
+    FieldState& state = states.emplace_back(FieldState{vertex_points(ring), {}, "times " + readable(factor)});
+    for (const Vector3& v : ring.vertices) state.values.push_back(factor * (2500.0 + 1e4 * v.x()));
+  }
+  ReportField field = draw_field(gallery, states, "stress", "Pa", ScaleEnds::All);
+  EXPECT_NEAR(field.scale.low, 2500.0 - 2100.0, 1e-9);
+  EXPECT_NEAR(field.scale.high, 2.0 * (2500.0 + 2100.0), 1e-9);
+  ASSERT_EQ(field.pictures.size(), 2u);
+  EXPECT_NE(field.pictures[0].png, field.pictures[1].png) << "one scale for both";
+  field.abscissa = "time [s]", field.at = {0.0, 1.0}, field.greatest = {4600.0, 9200.0}, field.mean = {2500.0, 5000.0};
   ReportData data;
   data.fields = {field};
-  const std::string page = report_html(data);
-  EXPECT_NE(page.find("Fields over the object"), std::string::npos);
-  EXPECT_NE(page.find(">" + value_with_uncertainty(field.high, {}, "Pa") + "<"), std::string::npos);
+  for (const std::string& page : {report_html(data), fields_html("a ring", {field})}) {
+    EXPECT_THAT(page, HasSubstr("Fields over the object"));
+    EXPECT_THAT(page, HasSubstr("stress [Pa]"));
+    EXPECT_THAT(page, HasSubstr("times 2"));
+    EXPECT_THAT(page, HasSubstr(">5000</text>"));
+    EXPECT_THAT(page, HasSubstr("mean by volume"));
+  }
+  states[1].values.pop_back();
+  EXPECT_THROW((void)draw_field(gallery, states, "stress", "Pa", ScaleEnds::All), std::invalid_argument);
 }
 
 }  // namespace

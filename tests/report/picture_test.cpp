@@ -126,6 +126,25 @@ TEST(Picture, SurfacesHaveTheColoursOfTheirVertices) {
   EXPECT_THROW((void)draw(scene, camera), std::invalid_argument);
 }
 
+TEST(Picture, ColoursInEvenLightAreThoseOfTheScale) {
+  PictureScene scene = ring_on_floor();
+  scene.planes.clear();
+  const Rgb colour = sequential_colour(0.4);
+  scene.colours.assign(std::size_t(scene.surface.rows()), colour);
+  PictureOptions options = quick();
+  options.even_light = 1.0;
+  const Picture picture = draw(scene, view_of(box_of(scene), Vector3::UnitY(), 90, 60), options);
+  int like = 0;
+  for (const Rgb& pixel : picture.pixels) {
+    int off = 0;
+    for (std::size_t k = 0; k < 3; ++k) off = std::max(off, std::abs(int(pixel[k]) - int(colour[k])));
+    like += off <= 1;
+  }
+  EXPECT_GT(like, 0.2 * double(picture.pixels.size()));
+  options.even_light = 1.5;
+  EXPECT_THROW((void)draw(scene, view_of(box_of(scene), Vector3::UnitY(), 90, 60), options), std::invalid_argument);
+}
+
 TEST(Image, SequentialColoursGrowLighterAndAreClamped) {
   double before = 0.0;
   for (int k = 0; k <= 10; ++k) {
