@@ -17,6 +17,7 @@ from page import IMAGES, ROOT, judged, machine, percent, results, table, with_tr
 from presses_page import presses
 from real_tracks_page import real_tracks
 from silicone_beam_page import silicone_beam
+from stress_fields_page import stress_fields
 from touched_page import organ_probing, skin, slab_pokes
 from tracking_page import swinging
 from twins_page import plans, twins
@@ -438,6 +439,8 @@ SECTIONS = [
     ("A bar of two stiffnesses that sags", "two-zone-sag",
      "Wang et al. 2015, figures 6 and 9 with the reference shape unknown: moduli and load-free shape together, with derivatives through the equilibrium, beside a splitting: three iterations of Levenberg-Marquardt "
      "with the shape held, then the shape anew, and so on. The paper's own solves for the shape before every evaluation of its simplex and begins where the modes' frequencies say; it is not run.", two_zones),
+    ("Stress by a material that was found", "stress-fields",
+     "Wang et al. 2015, figure 8: a foam bar of two stiffnesses is held at one end and falls into its swing under gravity; one depth camera sees it. Stress in its equilibrium by the material that was fitted, by two even ones, and by the true one.", stress_fields),
     ("A scan that is only roughly right", "rough-scan",
      "The dropped ring of the example, one depth camera, with its scan bent on purpose: the shape as an unknown of a dynamic fit, by a smooth field with a prior.", rough_scan),
     ("Objects that swing before three sensors", "tracking",
