@@ -502,7 +502,7 @@ void write_law(const fs::path& folder, const Capture& capture, const LawOutcome&
     for (std::size_t i = 0; i < law.predictions.size(); ++i) {
       const ObservedPress& press = law.scene->presses[i];
       states.at.push_back(double(i + 1));
-      states.names.push_back(fmt::format("Press {}{}, {} N", press.name, press.role == "test" ? " (test)" : "",
+      states.names.push_back(fmt::format("{}{}, {} N", press.name, press.role == "test" ? " (test)" : "",
                                          readable(press.force.norm(), 3)));
     }
     const auto elasticity = LawElasticity::make(law.scene->body, law.law);

@@ -30,6 +30,7 @@ ul.words{margin:.2rem 0 0;padding-left:1.15rem}ul.words li{margin:.3rem 0}
 .plot{display:block;width:100%;height:auto}
 .small-plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(400px,100%),1fr));gap:14px}
 .pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(380px,100%),1fr));gap:14px}
+.pictures+.panel{margin-top:14px}
 figure{margin:0;background:var(--card);border:1px solid var(--grid);border-radius:10px;overflow:hidden}
 figure img{display:block;width:100%;height:auto}
 figcaption{padding:8px 14px;color:var(--muted);font-size:.88rem}
