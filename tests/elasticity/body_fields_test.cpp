@@ -54,7 +54,7 @@ Along ogden(double l, double t) {
 }
 
 template <class Law>
-auto with_law(std::vector<double> row) {
+auto with_law(const std::vector<double>& row) {
   return [row](const std::shared_ptr<const Body>& body) -> std::unique_ptr<Elasticity> {
     const MatrixX table =
         Eigen::Map<const Eigen::RowVectorXd>(row.data(), Eigen::Index(row.size())).replicate(body->element_count(), 1);
