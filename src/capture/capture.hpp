@@ -57,8 +57,9 @@ struct Press {
   Vector3 contact_centre = Vector3::Zero();  ///< on the undeformed surface
   double contact_radius = 0.0;               ///< [m]
   std::optional<Plane> probe;
-  std::filesystem::path markers, markers_rest;  ///< absolute
-  std::string role = "fit";                     ///< "fit" or "test"
+  std::filesystem::path markers, markers_rest;       ///< absolute
+  std::optional<std::filesystem::path> markers_std;  ///< absolute; standard deviations of `markers`
+  std::string role = "fit";                          ///< "fit" or "test"
   bool glued = true;
   bool operator==(const Press&) const = default;
 };

@@ -233,10 +233,11 @@ void check_marker_rate(RuleContext& context, const std::string& key, const fs::p
                         "one rate", "correct [timing], or export the track at the rate of the other sensors");
 }
 
-void check_marker_pair(RuleContext& context, const std::string& block, const fs::path& rest,
-                       const fs::path& under_load) {
+void check_marker_pair(RuleContext& context, const std::string& block, const fs::path& rest, const fs::path& under_load,
+                       const std::optional<fs::path>& deviations = {}) {
   try {
     const MarkerSet markers = read_marker_pair(rest, under_load);
+    if (deviations) (void)read_marker_deviations(*deviations, markers.ids);
     check_markers_on_object(context, block + ".markers_rest", markers);
     check_marker_unit(context, block + ".markers", markers);
   } catch (const InputError& error) {
@@ -317,7 +318,7 @@ void check_press_markers(RuleContext& context) {
   for (std::size_t i = 0; i < context.capture.presses.size(); ++i)
     if (context.toml.is_sound(item("press", i)))
       check_marker_pair(context, item("press", i), context.capture.presses[i].markers_rest,
-                        context.capture.presses[i].markers);
+                        context.capture.presses[i].markers, context.capture.presses[i].markers_std);
 }
 
 void check_load_files(RuleContext& context) {

@@ -25,6 +25,7 @@ namespace {
 
 constexpr std::size_t most_problems = 20;  // told of one pair of files; the rest is counted
 constexpr const char* header_of_positions = "id,x,y,z";
+constexpr const char* header_of_deviations = "id,sx,sy,sz";
 constexpr const char* header_of_track = "frame,id,x,y,z";
 
 using Problems = std::vector<Problem>;
@@ -67,12 +68,12 @@ std::optional<Vector3> position_in(CsvRow& row, std::size_t first) {
 }
 
 // Rows of a file `id,x,y,z`, each id once. An id counts as there also where its position is broken.
-MarkerPositions read_positions(const fs::path& path, Problems& problems) {
+MarkerPositions read_positions(const fs::path& path, Problems& problems, const char* header = header_of_positions) {
   MarkerPositions markers;
   std::vector<Vector3> positions;
   std::map<std::string, int> line_of;
   gather(problems, [&] {
-    read_csv(path, header_of_positions, problems, [&](CsvRow& row) {
+    read_csv(path, header, problems, [&](CsvRow& row) {
       const auto id = row.text(0);
       const auto position = position_in(row, 1);
       if (!id) return;
@@ -225,6 +226,32 @@ MarkerPositions read_marker_positions(const fs::path& path) {
   MarkerPositions markers = read_positions(path, problems);
   throw_problems(problems, path);
   return markers;
+}
+
+Points read_marker_deviations(const fs::path& path, std::span<const std::string> ids) {
+  Problems problems;
+  const MarkerPositions read = read_positions(path, problems, header_of_deviations);
+  throw_problems(problems, path);
+  Points deviations = Points::Constant(Eigen::Index(ids.size()), 3, std::numeric_limits<double>::quiet_NaN());
+  const Numbers numbers = numbers_of({ids.begin(), ids.end()});
+  for (std::size_t i = 0; i < read.ids.size(); ++i) {
+    const auto row = read.positions.row(Eigen::Index(i));
+    const auto found = numbers.find(read.ids[i]);
+    if (found == numbers.end())
+      problems.push_back({{path},
+                          marker_named(read.ids[i]) + " is not among the markers at rest",
+                          "ids as in the file of rest positions",
+                          "remove its row"});
+    else if (!(row.minCoeff() > 0.0))
+      problems.push_back({{path},
+                          marker_named(read.ids[i]) + " has a deviation that is not positive",
+                          "three standard deviations [m], > 0",
+                          "leave out the row of a marker whose deviation is not known"});
+    else
+      deviations.row(found->second) = row;
+  }
+  throw_problems(problems, path);
+  return deviations;
 }
 
 MarkerSet read_marker_pair(const fs::path& rest, const fs::path& under_load) {

@@ -40,6 +40,12 @@ MarkerPositions read_marker_positions(const std::filesystem::path& path);
 /// Throws InputError with every problem of both files, also for ids that are not among those at rest.
 MarkerSet read_marker_pair(const std::filesystem::path& rest, const std::filesystem::path& under_load);
 
+/// Reads the standard deviations of markers' coordinates [m], CSV with the header `id,sx,sy,sz`, in the order of `ids`
+/// (m x 3); NaN rows where the file has none.
+/// Throws InputError with every problem: what the CSV's reader finds, ids that are unknown or appear twice, numbers
+/// that are not positive.
+Points read_marker_deviations(const std::filesystem::path& path, std::span<const std::string> ids);
+
 /// Reads the markers of a [[markers]] block. The track is CSV with the header `frame,id,x,y,z`, or C3D by the path's
 /// ending: its first frame is frame 0 of the capture, its labels are the ids; each marker at rest must have one
 /// trajectory there, and trajectories that no marker at rest names are left out.

@@ -164,6 +164,7 @@ class Reader {
     });
     press.markers = required_path(block, "markers");
     press.markers_rest = required_path(block, "markers_rest");
+    press.markers_std = optional_path(block, "markers_std");
     press.role = read_role(block);
     press.glued = block.optional<bool>("glued").value_or(true);
     return press;

@@ -84,8 +84,9 @@ class Writer {
     if (press.probe)
       out_ << "probe = { point = " << toml_text(press.probe->point) << ", normal = " << toml_text(press.probe->normal)
            << " }\n";
-    out_ << "markers = " << file_text(press.markers) << "\nmarkers_rest = " << file_text(press.markers_rest)
-         << "\nrole = " << toml_text(press.role) << "\nglued = " << text_of(press.glued) << "\n\n";
+    out_ << "markers = " << file_text(press.markers) << "\nmarkers_rest = " << file_text(press.markers_rest) << "\n";
+    write_file_key("markers_std", press.markers_std);
+    out_ << "role = " << toml_text(press.role) << "\nglued = " << text_of(press.glued) << "\n\n";
   }
 
   void write(const Load& load) {

@@ -10,8 +10,8 @@
 
 #include "estimation/fit_stage.hpp"
 #include "estimation/law_zones.hpp"
+#include "estimation/press_sampling.hpp"
 #include "estimation/problem.hpp"
-#include "estimation/sample_fit.hpp"
 #include "estimation/verdict.hpp"
 #include "tracking/tracker.hpp"
 
@@ -188,11 +188,7 @@ struct FitState {
     bool keeps_loop = true;             ///< in the last phase
   };
   std::optional<Tracking> tracking;
-  /// Of a sampled material: the presses that are done, in order.
-  struct Sampled {
-    std::vector<PressSample> samples;
-  };
-  std::optional<Sampled> sampled;
+  std::optional<PressSampling::State> sampled;  ///< of a sampled material
   /// Where the part of the recordings is looked for that the model explains.
   struct SpanSearch {
     bool has_whole = false;          ///< the whole was fitted, and is not explained
@@ -240,7 +236,7 @@ struct LawOutcome {
   std::shared_ptr<const PressScene> scene;
   std::shared_ptr<const MaterialLaw> law;
   LawLayout layout;
-  double noise = 0.0;         ///< deviation of a marker's coordinate [m]
+  MarkerNoise noise = {};     ///< of a marker's coordinate
   std::vector<ZoneCut> cuts;  ///< of the zones, one after the other
   std::vector<TriedLaw> tried;
   std::optional<SampledMaterial> sampled;  ///< with `samples`, one a press that was fitted

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/15";
+constexpr const char* format = "fit-state/16";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -133,29 +133,32 @@ OptimiserState to_optimiser(const Json& json) {
   return {json.at("iterations").get<int>(), to_vector(json.at("p")), to_vector(json.at("memory"))};
 }
 
-Json from_sampled(const FitState::Sampled& sampled) {
-  Json json = Json::array();
-  for (const PressSample& s : sampled.samples) json.push_back(from_sample(s));
+Json from_sampled(const PressSampling::State& sampled) {
+  Json json = {{"kept", Json::array()}, {"under", Json::array()}};
+  for (const PressSample& s : sampled.kept) json["kept"].push_back(from_sample(s));
+  for (const PressSample& s : sampled.under) json["under"].push_back(from_sample(s));
   return json;
 }
-FitState::Sampled to_sampled(const Json& json) {
-  FitState::Sampled sampled;
-  for (const Json& s : json) sampled.samples.push_back(to_sample(s));
+PressSampling::State to_sampled(const Json& json) {
+  PressSampling::State sampled;
+  for (const Json& s : json.at("kept")) sampled.kept.push_back(to_sample(s));
+  for (const Json& s : json.at("under")) sampled.under.push_back(to_sample(s));
   return sampled;
 }
 
 Json from_finding(const LawFinding& law) {
-  Json json = {{"noise", law.noise},           {"track_squares", law.track_squares},
-               {"curve_cost", law.curve_cost}, {"observations", law.observations},
-               {"dimension", law.dimension},   {"against", from_cost(-law.evidence)},
-               {"points", Json::array()}};
+  Json json = {
+      {"noise", law.noise.at_rest},         {"noise_growth", law.noise.growth},    {"deviation", law.deviation},
+      {"track_squares", law.track_squares}, {"curve_cost", law.curve_cost},        {"observations", law.observations},
+      {"dimension", law.dimension},         {"against", from_cost(-law.evidence)}, {"points", Json::array()}};
   if (law.cut) json["cut"] = {law.cut->zone, int(law.cut->by), law.cut->at};
   for (const Vector3& p : law.points) json["points"].push_back({p.x(), p.y(), p.z()});
   return json;
 }
 LawFinding to_finding(const Json& json) {
   LawFinding law;
-  law.noise = json.at("noise").get<double>();
+  law.noise = {json.at("noise").get<double>(), json.at("noise_growth").get<double>()};
+  law.deviation = json.at("deviation").get<double>();
   law.track_squares = json.at("track_squares").get<double>();
   law.curve_cost = json.at("curve_cost").get<double>();
   law.observations = json.at("observations").get<double>();

@@ -16,6 +16,8 @@ constexpr std::array field_sizes = {4, 8, 16, 32};
 constexpr double needed_evidence = 3.0;  // e^3 to 1
 constexpr int most_zones = 8, most_passes = 4, brief_iterations = 8;
 constexpr double least_gain = 0.03;  // by a zone more, of the squares of the residuals
+constexpr int most_rounds = 4;
+constexpr double least_round_gain = 0.05;  // of the cost, for which another round is worth its time
 
 /// Every control and law as it is.
 std::vector<int> as_they_are(const LawForm& form) {
@@ -82,8 +84,22 @@ class LawPlan::Replay {
       fit_terms(3);  // an object of several materials looks like one of more terms
       if (facts_.modulus_names.empty() && best().shape.form.laws == 1) fit_fields();
     }
-    if (material == MaterialKind::Sampled)
-      for (int begin = 0; begin < facts_.presses; begin += samples_a_stage) (void)ask(task_stage(StageKind::Sample));
+    if (material == MaterialKind::Sampled) {
+      fit_terms(2);
+      sample();
+    }
+  }
+
+  /// Rounds of the presses' own fields, as long as one brings the material closer to the markers.
+  void sample() {
+    for (int round = 0; round < most_rounds; ++round) {
+      const StageRecord* record = nullptr;
+      for (int begin = 0; begin < facts_.presses; begin += int(samples_a_stage)) {
+        record = ask(task_stage(StageKind::Sample));
+        if (!record) return;
+      }
+      if (!record || !record->converged || record->cost > (1.0 - least_round_gain) * record->start_cost) return;
+    }
   }
 
   /// The record of a stage; null where it is next, or another is.
@@ -132,7 +148,7 @@ class LawPlan::Replay {
   bool is_pending() const { return now_.next.has_value(); }
 
   /// Keeps the estimate as the best, where it is that, and writes down that it was tried.
-  void conclude(std::optional<Estimate> next, const TriedLaw& tried, double noise_before) {
+  void conclude(std::optional<Estimate> next, const TriedLaw& tried, const MarkerNoise& noise_before) {
     if (is_pending()) return;
     now_.tried.push_back(tried);
     if (next) now_.tried.back().youngs_modulus = next->layout.mean_modulus(next->theta);
@@ -151,10 +167,11 @@ class LawPlan::Replay {
     std::optional<Estimate> first = estimate(shape, scaled(shape, start, name), name);
     // Curves of growing load fit exponents of either sign, each in a valley of its own: the better is kept.
     if (terms == 1 && facts_.has_curves && !is_pending()) {
-      const double noise = now_.noise;
+      const MarkerNoise noise = now_.noise;
       start[facts_.layout(shape.form).exponent(0)] *= -2.0;
       std::optional<Estimate> other = estimate(shape, scaled(shape, start, name), name);
-      if (other && (!first || other->found.squares(noise) < first->found.squares(noise)))
+      if (other &&
+          (!first || other->found.squares(first->found.deviation) < first->found.squares(first->found.deviation)))
         first = std::move(other);
       else
         now_.noise = noise;
@@ -178,16 +195,17 @@ class LawPlan::Replay {
 
   /// More terms, or Poisson's ratios of their own for them. False where that is not kept.
   bool fit_freer(const LawForm& form, const VectorX& start, const std::string& name) {
-    const double noise = now_.noise;
+    const MarkerNoise noise = now_.noise;
     LawShape shape = best().shape;
     shape.form = form;
     std::optional<Estimate> next = estimate(shape, start, name);
     TriedLaw tried{form, next ? next->cost : infinite, -infinite, false};
     if (next) {
       // Half the BIC by residuals whose deviation is unknown: n/2 ln(sum r^2) + k/2 ln n.
+      const double deviation = next->found.deviation;
       const double n = next->found.observations;
       const auto more = double(next->found.dimension - best().found.dimension);
-      tried.evidence = 0.5 * n * std::log(best().found.squares(now_.noise) / next->found.squares(now_.noise)) -
+      tried.evidence = 0.5 * n * std::log(best().found.squares(deviation) / next->found.squares(deviation)) -
                        0.5 * more * std::log(n);
       tried.kept =
           (options().law_terms > 0 && form.terms > best().shape.form.terms) || tried.evidence > needed_evidence;
@@ -230,7 +248,7 @@ class LawPlan::Replay {
       return false;
     }
     shape.cuts.push_back(*promised->law->cut);
-    const double noise = now_.noise;
+    const MarkerNoise noise = now_.noise;
     const int from = shape.cuts.back().zone;
     std::optional<Estimate> next =
         estimate(shape, with_zone(best().layout, best().theta, facts_.layout(shape.form), from), name,
@@ -240,8 +258,9 @@ class LawPlan::Replay {
       move_cuts(*next, from, name);
       tried.cost = next->cost;
       tried.evidence = next->found.evidence;
+      const double deviation = best().found.deviation;
       tried.kept = is_chosen || (tried.evidence > needed_evidence &&
-                                 next->found.squares(noise) < (1.0 - least_gain) * best().found.squares(noise));
+                                 next->found.squares(deviation) < (1.0 - least_gain) * best().found.squares(deviation));
       // While its cuts move, it is the best already where it will be kept as it is.
       if (is_pending() && tried.kept) now_.best = next;
     }
@@ -273,7 +292,7 @@ class LawPlan::Replay {
       any = any || gained > 0;
     }
     if (!any) return;
-    const double noise = now_.noise;
+    const MarkerNoise noise = now_.noise;
     if (std::optional<Estimate> converged = estimate(e.shape, e.theta, name, LawTask::Evidence::Zone, split))
       e = std::move(*converged);
     else
@@ -284,7 +303,7 @@ class LawPlan::Replay {
   /// A law of its own for each region, against one shape of the law for all.
   void fit_laws_of_regions() {
     if (options().law_zones == 1 || is_pending()) return;
-    const double noise = now_.noise;
+    const MarkerNoise noise = now_.noise;
     const LawForm& one = best().shape.form;
     const LawShape shape{{one.controls, one.terms, one.controls, one.own_ratios}};
     const VectorX start = carry_law(best().layout, best().theta, facts_.layout(shape.form), as_they_are(shape.form));
@@ -309,7 +328,7 @@ class LawPlan::Replay {
   }
 
   void fit_field(int size) {
-    const double noise = now_.noise;
+    const MarkerNoise noise = now_.noise;
     const bool is_chosen = options().control_points > 1;
     const LawForm& before = best().shape.form;
     LawShape shape{{size, before.terms, 1, before.own_ratios}};

@@ -12,7 +12,7 @@ struct LawFacts {
   FitOptions options;
   std::vector<std::string> modulus_names;  ///< of the object's regions; empty: it has none
   double start_modulus = 0.0;              ///< [Pa]
-  double noise = 0.0;                      ///< deviation of a marker's coordinate before any fit [m]
+  MarkerNoise noise = {};                  ///< before any fit
   double size = 0.0;                       ///< of the object [m]
   int presses = 0;                         ///< to be fitted
   bool has_curves = false;                 ///< forces at given depths or stresses are to be fitted
@@ -49,7 +49,7 @@ class LawPlan {
     std::optional<Stage> next;     ///< nothing: all is done
     std::optional<Estimate> best;  ///< nothing: no law could be fitted yet
     std::vector<TriedLaw> tried;   ///< in order
-    double noise = 0.0;            ///< [m] with the best
+    MarkerNoise noise = {};        ///< with the best
   };
   /// Throws InputError where the records are of another plan.
   Standing after(const std::vector<StageRecord>& done) const;
@@ -62,6 +62,6 @@ class LawPlan {
 };
 
 /// How many presses are sampled in one stage: few, so that an interruption loses little.
-inline constexpr int samples_a_stage = 4;
+inline constexpr std::size_t samples_a_stage = 4;
 
 }  // namespace pliant

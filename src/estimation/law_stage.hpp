@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "elasticity/law_layout.hpp"
+#include "estimation/marker_noise.hpp"
 #include "estimation/zone_cut.hpp"
 
 namespace pliant {
@@ -18,17 +19,18 @@ struct LawShape {
 /// What a stage of a search for the law of a pressed object does, beside what every `Stage` says.
 struct LawTask {
   LawShape shape;
-  double noise = 0.0;     ///< deviation of a marker's coordinate at the beginning [m]
-  bool is_brief = false;  ///< of a minimisation: once and with that noise; else twice, the second time with its own
-  int cut = 0;            ///< of a move: which of the cuts; with evidence of a zone: the zone that it was cut from
+  MarkerNoise noise = {};  ///< at the beginning
+  bool is_brief = false;   ///< of a minimisation: once and with that noise; else twice, the second time with its own
+  int cut = 0;             ///< of a move: which of the cuts; with evidence of a zone: the zone that it was cut from
   enum class Evidence { None, Zone, OwnLaws, Field } evidence = Evidence::None;  ///< to be computed where it ends
   LawShape before = {};  ///< what the evidence of a field is against
 };
 
 /// What a stage of a search for the law of a pressed object found, beside what every `StageRecord` says.
 struct LawFinding {
-  double noise = 0.0;          ///< deviation of a marker's coordinate after it [m]
-  double track_squares = 0.0;  ///< of the residuals of markers [m^2]
+  MarkerNoise noise = {};      ///< after it
+  double deviation = 0.0;      ///< geometric mean of the coordinates' deviations by that noise [m]
+  double track_squares = 0.0;  ///< of the residuals of markers, each by that mean over its own deviation [m^2]
   double curve_cost = 0.0;     ///< of curves and grips [-]
   double observations = 0.0;   ///< independent ones
   int dimension = 0;           ///< numbers that were estimated
@@ -37,7 +39,7 @@ struct LawFinding {
   std::vector<Vector3> points = {};  ///< [m] of a field
 
   /// Sum of the squares of all residuals [m^2], those of curves times the square of a deviation [m].
-  double squares(double deviation) const { return track_squares + 2.0 * curve_cost * deviation * deviation; }
+  double squares(double unit) const { return track_squares + 2.0 * curve_cost * unit * unit; }
 };
 
 }  // namespace pliant

@@ -145,7 +145,11 @@ void add_law_notes(std::vector<std::string>& notes, const LawOutcome& law, const
   for (std::size_t c = 0; c < law.cuts.size(); ++c)
     notes.push_back(fmt::format("Zones: {}.", describe(law.cuts[c], int(c) + 1)));
   if (!law.scene->presses.empty())
-    notes.push_back(fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * law.noise));
+    notes.push_back(law.noise.growth > 0.0
+                        ? fmt::format("A marker's coordinate is taken to err by {:.3g} mm and, on top of it, by "
+                                      "{:.2g} % of how far the marker moves.",
+                                      1e3 * law.noise.at_rest, 100.0 * law.noise.growth)
+                        : fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * law.noise.at_rest));
   if (law.sampled) notes.push_back(told(*law.sampled, law.samples));
 }
 

@@ -27,19 +27,6 @@ namespace {
 
 constexpr double outlier_scale = 6.0;  // deviations
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
-/// The deviation that residuals show, by the median of their sizes; the least where there are none.
-double robust_deviation(std::vector<double> residuals, double least) {
-  if (residuals.empty()) return least;
-  for (double& r : residuals) r = std::abs(r);
-  return std::max(least, 1.4826 * median(std::move(residuals)));
-}
-
 std::shared_ptr<const Body> with_field(const Body& body, ModulusField field) {
   auto copy = std::make_shared<Body>(body);
   copy->modulus = std::move(field);
@@ -54,7 +41,7 @@ class LawRun : StageLoop {
       : StageLoop(options, monitor, std::move(state.pass)),
         capture_(capture),
         scene_(scene_to_fit()),
-        samples_(state.sampled ? std::move(state.sampled->samples) : std::vector<PressSample>()),
+        sampled_(state.sampled ? std::move(*state.sampled) : PressSampling::State()),
         plan_(facts()) {}
 
   FitOutcome run() {
@@ -116,7 +103,7 @@ class LawRun : StageLoop {
 
   FitState whole_state() const override {
     FitState state{state_, {}, {}, {}};
-    if (!samples_.empty()) state.sampled = FitState::Sampled{samples_};
+    if (sampling_) state.sampled = sampling_->state();
     return state;
   }
 
@@ -162,7 +149,7 @@ class LawRun : StageLoop {
     form.parameters.set_reference(theta);
     return form;
   }
-  PressObjective objective_of(const Form& form, double noise) const {
+  PressObjective objective_of(const Form& form, const MarkerNoise& noise) const {
     return {form.scene, fitted_, form.layout, form.parameters, {noise, outlier_scale}};
   }
   MatrixX carried(const LawShape& before, const PressScene& scene) const {
@@ -172,7 +159,7 @@ class LawRun : StageLoop {
   static StageRecord begun(const Stage& stage) {
     StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
     record.start_cost = record.cost = infinite;
-    record.law = LawFinding{stage.law->noise};
+    record.law.emplace().noise = stage.law->noise;
     return record;
   }
 
@@ -182,7 +169,7 @@ class LawRun : StageLoop {
   StageRecord minimise_law(const Stage& stage, bool& is_cut) {
     const LawTask& task = *stage.law;
     StageRecord record = begun(stage);
-    double& noise = record.law->noise;
+    MarkerNoise& noise = record.law->noise;
     const VectorX& theta = record.from;
     Form form = form_at(task.shape, theta);
     std::optional<PressObjective> objective;
@@ -205,8 +192,7 @@ class LawRun : StageLoop {
       objective.emplace(std::move(*next));
       if (!s.succeeded) break;
       form.parameters.set_reference(form.parameters.to_theta(s.p));
-      if (!task.is_brief && options_.marker_noise <= 0.0)
-        noise = robust_deviation(objective->residuals(), 1e-6 * scene_->body->size());
+      if (!task.is_brief && options_.marker_noise <= 0.0) noise = objective->own_noise(1e-6 * scene_->body->size());
       objective->set_options({noise, outlier_scale});
       from = {0, s.p, {}};
     }
@@ -224,19 +210,18 @@ class LawRun : StageLoop {
     if (!evaluation.succeeded) return record;
     record.succeeded = true;
     record.cost = evaluation.cost;
-    find_out(record, task, form, evaluation);
+    find_out(record, task, form, *objective, evaluation);
     ended_[stage.id.number] = std::move(evaluation);
     return record;
   }
 
-  void find_out(StageRecord& record, const LawTask& task, const Form& form, const CostEvaluation& evaluation) const {
+  void find_out(StageRecord& record, const LawTask& task, const Form& form, const PressObjective& objective,
+                const CostEvaluation& evaluation) const {
     LawFinding& found = *record.law;
-    for (const FrameFit& f : evaluation.frames) {
-      if (f.tracks > 0)
-        found.track_squares += f.track_sum_squares;
-      else
-        found.curve_cost += f.cost;
-    }
+    for (const FrameFit& f : evaluation.frames)
+      if (f.tracks == 0) found.curve_cost += f.cost;
+    found.track_squares = objective.weighed_squares();
+    found.deviation = fitted_.empty() ? found.noise.at_rest : objective.typical_deviation();
     found.observations = evaluation.independent_observations();
     found.dimension = form.parameters.dimension();
     const VectorX p = form.parameters.to_unconstrained(record.theta);
@@ -352,47 +337,44 @@ class LawRun : StageLoop {
     record.succeeded = true;
     const LawPlan::Estimate best = *plan_.after(state_.done).best;
     const auto law = press_law(*scene_of(best.shape)->body, best.layout, best.theta);
-    // Each press shows its own mean stiffness: smooth about what the law of all has near rest.
-    const SmallStrainModuli start{mean_modulus(*scene_->body, *law), best.theta[best.layout.poissons_ratio()]};
-    const ElementSmoothness smoothness(*scene_->body);
-    SampleFitOptions options;
-    options.max_iterations = stage.iterations;
-    const std::size_t begin = samples_.size(), end = std::min(begin + samples_a_stage, fitted_.size());
-    std::vector<PressSample> part(end - begin);
-    parallel_for(begin, end, [&](std::size_t i) {
-      SampleFitOptions own = options;
-      own.noise = stage.law->noise;
-      const ObservedPress& seen = scene_->presses[std::size_t(fitted_[i])];
-      // The misfit of one law for all is no noise: what a press' markers show by themselves is, where that is less.
-      if (options_.marker_noise <= 0.0)
-        own.noise = std::min(own.noise, std::max(marker_noise(seen), 1e-3 * seen.greatest_displacement));
-      part[i - begin] = fit_sample(*scene_, fitted_[i], start, smoothness, own);
-    });
-    for (PressSample& s : part) {
+    PressSampling& presses = sampling();
+    const std::size_t begin = presses.state().under.size();
+    std::size_t number = 0;
+    for (const PressSample& s : presses.sample(samples_a_stage, law, stage.law->noise, stage.iterations)) {
       FitEvent event;
-      event.kind = StageKind::Sample, event.stage = "press " + std::to_string(samples_.size() + 1);
+      event.kind = StageKind::Sample, event.stage = fmt::format("press {}", begin + ++number);
       event.iteration = s.iterations, event.cost = s.weight, event.marker_rms = s.rms;
-      event.youngs_modulus = start.youngs_modulus;
+      event.youngs_modulus = mean_modulus(*scene_->body, *law);
       emit(std::move(event));
       record.iterations += s.iterations;
-      samples_.push_back(std::move(s));
     }
+    if (!presses.is_round_done()) return record;
+    const PressSampling::Round round = presses.conclude(law, stage.law->noise);
+    record.start_cost = round.cost_before, record.cost = round.cost, record.converged = round.is_kept;
     return record;
+  }
+
+  PressSampling& sampling() {
+    if (!sampling_)
+      sampling_.emplace(scene_, fitted_, BasisOptions{options_.basis_tolerance, options_.basis_samples},
+                        options_.marker_noise > 0.0, std::move(sampled_));
+    return *sampling_;
   }
 
   // What came out ----------------------------------------------------------------------------------------------------
 
   void add_sampled(LawOutcome& law) {
-    if (samples_.empty()) return;
-    law.samples = samples_;
-    std::vector<MaterialSample> usable;
-    for (std::size_t i = 0; i < samples_.size(); ++i)
-      if (samples_[i].succeeded)
-        usable.push_back(samples_[i].sample);
-      else
+    if (options_.material != MaterialKind::Sampled) return;
+    law.samples = sampling().state().kept;
+    law.sampled = sampling().material();
+    for (std::size_t i = 0; i < law.samples.size(); ++i)
+      if (!law.samples[i].succeeded)
         outcome_.notes.push_back(fmt::format("{} takes no part in the sampled material: {}",
-                                             scene_->presses[std::size_t(fitted_[i])].name, samples_[i].failure));
-    if (!usable.empty()) law.sampled = sample_material(usable, {options_.basis_tolerance, options_.basis_samples});
+                                             scene_->presses[std::size_t(fitted_[i])].name, law.samples[i].failure));
+    if (!law.sampled && !interrupted_)
+      outcome_.notes.emplace_back(
+          "No material that is interpolated between the presses comes closer to their markers than the law that they "
+          "share: that law stands.");
   }
 
   FitOutcome finish(const LawPlan::Standing& standing) {
@@ -434,7 +416,8 @@ class LawRun : StageLoop {
   const Capture& capture_;
   std::vector<int> fitted_;  // numbers of presses
   std::shared_ptr<const PressScene> scene_;
-  std::vector<PressSample> samples_;  // of the sampled material, in order
+  PressSampling::State sampled_;  // of a fit that was interrupted, until it goes on
+  std::optional<PressSampling> sampling_;
   LawPlan plan_;
   std::map<int, CostEvaluation> ended_;  // of this run, by the stage's number
 };

@@ -18,8 +18,8 @@ std::optional<double> known_poissons_ratio(const FitOptions& options);
 /// of laws of their own, cut one after the other where that promises most, as long as the evidence supports them
 /// (`log_bayes_factor`) and each takes three per cent off the squares of the residuals, or, where a capture names
 /// regions, a law for each of them; and where no zone is kept, control points of Young's modulus by their evidence. The
-/// noise is what the residuals say, robustly. For a sampled material the law of one term is what each press's field is
-/// smooth about.
+/// noise, and how it grows with displacement, is what the residuals say, robustly (`robust_noise`). A sampled material
+/// (`PressSampling`) begins with one law of one or two terms.
 /// @return  with `FitOutcome::law`
 /// Throws InputError where the capture has no static test to fit or cannot be fitted, or where options are chosen that
 /// static tests do not know.

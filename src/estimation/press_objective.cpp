@@ -1,5 +1,7 @@
 #include "estimation/press_objective.hpp"
 
+#include <cmath>
+
 #include "estimation/grip_trial.hpp"
 #include "estimation/indentation_trial.hpp"
 
@@ -85,6 +87,33 @@ std::vector<double> PressObjective::residuals() const {
     all.insert(all.end(), r.data(), r.data() + r.size());
   }
   return all;
+}
+
+MarkerNoise PressObjective::own_noise(double least) const {
+  const std::vector<double> all = residuals();
+  std::vector<double> weights, displacements;
+  for (const PressTrial* trial : trials_) {
+    for (std::size_t k = 0; k < 3 * trial->seen().rest.size(); ++k) weights.push_back(trial->seen().weight(k));
+    for (const double moved : trial->displacements()) displacements.insert(displacements.end(), 3, moved);
+  }
+  return robust_noise(all, weights, displacements, least);
+}
+
+double PressObjective::typical_deviation() const {
+  double logs = 0.0, count = 0.0;
+  for (const PressTrial* trial : trials_) {
+    logs += trial->deviations().array().log().sum();
+    count += double(trial->deviations().size());
+  }
+  return count > 0.0 ? std::exp(logs / count) : 0.0;
+}
+
+double PressObjective::weighed_squares() const {
+  const double typical = typical_deviation();
+  double sum = 0.0;
+  for (const PressTrial* trial : trials_)
+    sum += (trial->residuals().array() * typical / trial->deviations().array()).square().sum();
+  return sum;
 }
 
 }  // namespace pliant

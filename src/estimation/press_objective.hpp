@@ -27,8 +27,15 @@ class PressObjective {
   /// @param body  the same but for its modulus field
   void set_form(std::shared_ptr<const Body> body, const LawLayout& layout, ParameterSet parameters);
   void set_options(const PressTrialOptions& options);
-  /// All residuals of the presses' points at the last evaluation [m], three a point; for the noise.
+  /// All residuals of the presses' points at the last evaluation [m], three a point.
   std::vector<double> residuals() const;
+  /// The noise that these residuals show (`robust_noise`).
+  MarkerNoise own_noise(double least) const;
+  /// Geometric mean of the deviations that residuals are weighed by [m]; 0 where there are no presses.
+  double typical_deviation() const;
+  /// Sum of the squares of the residuals, each by the typical deviation over its own [m^2]: n/2 times its logarithm is
+  /// what the likelihood with the best scale of these deviations has, less what depends on n alone.
+  double weighed_squares() const;
 
  private:
   std::shared_ptr<PressedMaterial> material_;

@@ -23,8 +23,12 @@ ObservedPress observe_press(const Capture& capture, std::size_t i) {
   seen.role = press.role;
   seen.force = press.force;
   const MarkerSet markers = read_marker_pair(press.markers_rest, press.markers);
+  Points deviations;
+  if (press.markers_std) deviations = read_marker_deviations(*press.markers_std, markers.ids);
   for (int m = 0; m < markers.marker_count(); ++m) {
     if (!markers.is_seen(0, m)) continue;
+    if (press.markers_std)
+      for (int d = 0; d < 3; ++d) seen.weights.push_back(deviations(m, d));
     seen.rest.emplace_back(markers.rest.row(m).transpose());
     seen.loaded.emplace_back(markers.frames[0].row(m).transpose());
     seen.greatest_displacement = std::max(seen.greatest_displacement, (seen.loaded.back() - seen.rest.back()).norm());
@@ -93,8 +97,23 @@ PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> 
   scene.tests = std::make_shared<StaticTests>(observe_static_tests(capture, *body));
   scene.body = std::move(body);
   for (std::size_t i = 0; i < capture.presses.size(); ++i) scene.presses.push_back(observe_press(capture, i));
+  weigh_by_stated_deviations(scene.presses);
   scene.facts = capture.presses;
   return scene;
+}
+
+void weigh_by_stated_deviations(std::vector<ObservedPress>& presses) {
+  std::vector<double> stated;
+  for (const ObservedPress& press : presses)
+    std::ranges::copy_if(press.weights, std::back_inserter(stated), [](double s) { return std::isfinite(s); });
+  if (stated.empty()) return;
+  const auto middle = stated.begin() + std::ptrdiff_t(stated.size() / 2);
+  std::ranges::nth_element(stated, middle);
+  for (ObservedPress& press : presses) {
+    if (press.weights.empty()) continue;
+    for (double& w : press.weights) w = std::isfinite(w) ? w / *middle : 1.0;
+    press.weights.resize(3 * press.rest.size(), 1.0);  // the probe's
+  }
 }
 
 const StaticTests& PressScene::static_tests() const {
@@ -163,10 +182,9 @@ std::vector<PressPrediction> predict_presses(const PressScene& scene, const std:
   return predictions;
 }
 
-double marker_noise(const ObservedPress& press) {
+void LocalResiduals::add(const ObservedPress& press) {
   const int count = int(press.rest.size()) - int(press.has_probe);
   constexpr int neighbours = 8;
-  std::vector<double> sizes;
   std::vector<int> order;
   for (int m = 0; m < count; ++m) {
     order.resize(std::size_t(count));
@@ -184,11 +202,22 @@ double marker_noise(const ObservedPress& press) {
     }
     // Markers of one face say nothing about the normal direction: the least change along it.
     const VectorX row = pseudo_inverse(A).row(0).transpose();  // of the value at the marker
-    const Vector3 error = press.loaded[std::size_t(m)] - at - b.transpose() * row;
+    const Vector3 moved = b.transpose() * row, error = press.loaded[std::size_t(m)] - at - moved;
     const double spread = std::sqrt(1.0 + row.squaredNorm());
-    for (int d = 0; d < 3; ++d) sizes.push_back(std::abs(error[d]) / spread);
+    for (std::size_t d = 0; d < 3; ++d) {
+      residuals.push_back(error[Eigen::Index(d)] / spread);
+      weights.push_back(press.weight(3 * std::size_t(m) + d));
+      displacements.push_back(moved.norm());
+    }
   }
+}
+
+double marker_noise(const ObservedPress& press) {
+  LocalResiduals local;
+  local.add(press);
+  std::vector<double>& sizes = local.residuals;
   if (sizes.empty()) return 0.0;
+  for (double& r : sizes) r = std::abs(r);
   const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
   std::ranges::nth_element(sizes, middle);
   return 1.4826 * *middle;

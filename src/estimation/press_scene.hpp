@@ -6,6 +6,7 @@
 
 #include "capture/capture.hpp"
 #include "capture/markers.hpp"
+#include "estimation/marker_noise.hpp"
 #include "estimation/static_tests.hpp"
 #include "motion/equilibrium.hpp"
 #include "parameters/parameter_set.hpp"
@@ -21,6 +22,9 @@ struct ObservedPress {
   std::vector<Vector3> loaded;         ///< where they were seen [m]
   bool has_probe = false;              ///< the last point is the disc's middle, by the probe's pose
   double greatest_displacement = 0.0;  ///< [m]
+  std::vector<double> weights = {};    ///< of each coordinate's deviation (`MarkerNoise`), three a point; none: all 1
+
+  double weight(std::size_t coordinate) const { return weights.empty() ? 1.0 : weights[coordinate]; }
 };
 
 /// Whether static tests with known forces are all that a capture has to fit: no frames, and no load to fit.
@@ -47,6 +51,10 @@ struct PressScene {
 /// Throws InputError where nothing holds an object that is pressed or gripped, a press' markers are too few, or its
 /// disc covers nothing.
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body);
+
+/// Makes weights of the deviations [m] that `weights` of presses hold where captures state them: each over the median
+/// of all; 1 for what states none. How large they are is what residuals say (`robust_noise`).
+void weigh_by_stated_deviations(std::vector<ObservedPress>& presses);
 
 /// One press, ready to be solved: its rigid contact on the body, led by its force, and its points' embedding.
 class PressedBody {
@@ -92,6 +100,13 @@ std::vector<PressPrediction> predict_presses(const PressScene& scene, const std:
 /// displacement from the affine one of its nearest neighbours, the median over markers. Displacements that bend between
 /// neighbours count as noise, so it is rather too great where markers are few.
 double marker_noise(const ObservedPress& press);
+
+/// What markers' displacements have that the affine ones of their nearest neighbours have not, as residuals of
+/// coordinates [m] of a marker's own deviation, with each coordinate's weight and how far the neighbours moved [m].
+struct LocalResiduals {
+  std::vector<double> residuals, weights, displacements;
+  void add(const ObservedPress& press);
+};
 
 /// A Young's modulus to set out from [Pa]: that of half spaces under flat punches (Sneddon 1965), E = F (1 - nu^2) /
 /// (2 a u), the median of the presses to fit; and what curves and grips to fit say by `guessed_moduli`.

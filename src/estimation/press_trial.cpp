@@ -29,7 +29,11 @@ PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press,
                        const PressTrialOptions& options, int number)
     : PressTrial(std::move(scene), press, material,
                  ContactMaterial{material->law(reference), mean_modulus(material->body(), *material->law(reference))},
-                 options, number) {}
+                 options, number) {
+  if (options.noise.growth == 0.0) return;
+  is_placed_ = body_.solve().converged;
+  set_options(options);
+}
 
 PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
                        const ContactMaterial& contact, const PressTrialOptions& options, int number)
@@ -39,18 +43,43 @@ PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::
       material_(std::move(material)),
       options_(options),
       contact_(contact),
-      body_(*scene_, press, contact_.law, contact_.youngs_modulus) {}
+      body_(*scene_, press, contact_.law, contact_.youngs_modulus) {
+  set_options(options);
+}
+
+VectorX PressTrial::displacements() const {
+  const ObservedPress& observed = seen();
+  const Points placed = is_placed_ ? body_.points() : Points();
+  VectorX moved{Eigen::Index(observed.rest.size())};
+  for (Eigen::Index m = 0; m < moved.size(); ++m) {
+    const auto k = std::size_t(m);
+    const Vector3 now = is_placed_ ? Vector3(placed.row(m).transpose()) : observed.loaded[k];
+    moved[m] = (now - observed.rest[k]).norm();
+  }
+  return moved;
+}
+
+void PressTrial::set_options(const PressTrialOptions& options) {
+  options_ = options;
+  const VectorX moved = displacements();
+  deviations_.resize(moved.size(), 3);
+  for (Eigen::Index k = 0; k < deviations_.size(); ++k)
+    deviations_.data()[k] = options.noise.deviation(seen().weight(std::size_t(k)), moved[k / 3]);
+}
 
 std::unique_ptr<Trial> PressTrial::anew() const {
   const auto material = std::make_shared<PressedMaterial>(material_->shared_body(), material_->layout());
-  return std::unique_ptr<Trial>(new PressTrial(scene_, press_, material, contact_, options_, number_));
+  std::unique_ptr<PressTrial> trial(new PressTrial(scene_, press_, material, contact_, options_, number_));
+  trial->deviations_ = deviations_;
+  return trial;
 }
 
 bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight) {
   const ObservedPress& seen = scene_->presses[std::size_t(press_)];
   body_.equilibrium().set_law(material_->law(theta));
   result.steps = 1;
-  if (!body_.solve().converged) return result.failure = seen.name + ": " + body_.equilibrium().failure(), false;
+  is_placed_ = body_.solve().converged;
+  if (!is_placed_) return result.failure = seen.name + ": " + body_.equilibrium().failure(), false;
   Points residuals = body_.points();
   for (Eigen::Index m = 0; m < residuals.rows(); ++m) residuals.row(m) -= seen.loaded[std::size_t(m)].transpose();
   residuals_ = residuals;
@@ -58,10 +87,11 @@ bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& 
   fit.recording = number_;
   fit.frame = press_;
   // Pseudo-Huber in each coordinate: c^2 (sqrt(1 + r^2 / c^2) - 1).
-  const double c = options_.outlier_scale, inverse = 1.0 / options_.noise;
+  const double c = options_.outlier_scale;
   slope.resize(residuals.size()), weight.resize(residuals.size());
   for (Eigen::Index k = 0; k < residuals.size(); ++k) {
-    const double r = residuals.data()[k] * inverse, root = std::sqrt(1.0 + r * r / (c * c));
+    const double inverse = 1.0 / deviations_.data()[k], r = residuals.data()[k] * inverse,
+                 root = std::sqrt(1.0 + r * r / (c * c));
     fit.cost += c * c * (root - 1.0);
     slope[k] = r / root * inverse;
     weight[k] = inverse * inverse / root;
@@ -69,7 +99,7 @@ bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& 
   fit.tracks = int(residuals.rows());
   fit.independent = 3.0 * fit.tracks;
   fit.track_sum_squares = residuals.squaredNorm();
-  fit.sum_noise_squares = fit.tracks * options_.noise * options_.noise;
+  fit.sum_noise_squares = deviations_.squaredNorm() / 3.0;
   result.cost = fit.cost;
   result.frames.push_back(std::move(fit));
   result.succeeded = true;

@@ -33,12 +33,14 @@ class PressedMaterial {
 };
 
 struct PressTrialOptions {
-  double noise = 0.0;          ///< standard deviation of a coordinate [m], > 0
+  MarkerNoise noise;           ///< of a coordinate, > 0
   double outlier_scale = 0.0;  ///< residuals beyond this many deviations count less (pseudo-Huber), > 0
 };
 
 /// One press with known force: over points' coordinates, half the square of where the equilibrium has them less where
-/// they were seen, over the noise, robust beyond `outlier_scale`. Derivatives are those of the equilibrium, by its
+/// they were seen, over the noise, robust beyond `outlier_scale`. Noise that grows with displacement goes by where the
+/// simulation has the points when the options are set (by what was measured before it has any): measured displacements
+/// would weigh those markers most that noise has moved least. Derivatives are those of the equilibrium, by its
 /// exact Hessian: a back-substitution a parameter, or one for all by the adjoint. Each run sets out from the last
 /// equilibrium.
 class PressTrial : public Trial {
@@ -52,9 +54,13 @@ class PressTrial : public Trial {
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
   [[nodiscard]] std::unique_ptr<Trial> anew() const override;
 
-  void set_options(const PressTrialOptions& options) { options_ = options; }
-  /// Residuals of the last run [m], n x 3.
+  void set_options(const PressTrialOptions& options);
+  /// Residuals of the last run [m], and deviations they are weighed by [m], n x 3.
   const Points& residuals() const { return residuals_; }
+  const Points& deviations() const { return deviations_; }
+  const ObservedPress& seen() const { return scene_->presses[std::size_t(press_)]; }
+  /// How far each point was moved in the last run [m]; as measured where none has succeeded.
+  VectorX displacements() const;
 
  private:
   /// How stiff the contact is: the law at the reference, and its mean modulus [Pa].
@@ -74,7 +80,8 @@ class PressTrial : public Trial {
   PressTrialOptions options_;
   ContactMaterial contact_;
   PressedBody body_;
-  Points residuals_;
+  bool is_placed_ = false;
+  Points residuals_, deviations_;
 };
 
 }  // namespace pliant

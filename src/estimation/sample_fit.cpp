@@ -15,6 +15,7 @@ constexpr double least_ratio = -0.5;
 /// The misfit aimed at is a little above what noise makes: that is itself a matter of chance, and the last of it would
 /// be bought by wild fields.
 constexpr double slack = 1.2;
+constexpr double least_fall = 0.005;  // of the cost in one iteration
 
 using Sparse = Eigen::SparseMatrix<double>;
 
@@ -156,18 +157,20 @@ namespace {
 
 class SampleFit {
  public:
-  SampleFit(const PressScene& scene, int press, const SmallStrainModuli& start, const ElementSmoothness& smoothness,
-            const SampleFitOptions& options)
+  SampleFit(const PressScene& scene, int press, const std::vector<SmallStrainModuli>& start,
+            const ElementSmoothness& smoothness, const SampleFitOptions& options)
       : mesh_(*scene.body),
         seen_(scene.presses[std::size_t(press)]),
         smoothness_(smoothness),
         options_(options),
         q_(2 * smoothness.size()) {
-    q_.head(smoothness.size()).setConstant(std::log(start.youngs_modulus));
-    q_.tail(smoothness.size()).setConstant(unconstrained_ratio(start.poissons_ratio));
+    for (Eigen::Index e = 0; e < smoothness.size(); ++e) {
+      q_[e] = std::log(start[std::size_t(e)].youngs_modulus);
+      q_[smoothness.size() + e] = unconstrained_ratio(start[std::size_t(e)].poissons_ratio);
+    }
     start_ = q_;
     law_ = std::make_shared<LinearLaw>(table_of(q_));
-    body_.emplace(scene, press, law_, start.youngs_modulus);
+    body_.emplace(scene, press, law_, mean_modulus(mesh_, *law_));
   }
 
   PressSample run() {
@@ -185,7 +188,8 @@ class SampleFit {
         return result;
       }
       const VectorX last = q_;
-      const double gamma = std::max(choose_weight(), 1e-3 * result.weight), cost = cost_of(gamma);
+      const double last_weight = result.weight, gamma = std::max(choose_weight(), 1e-3 * last_weight),
+                   cost = cost_of(gamma);
       VectorX step = step_for(gamma, damping);
       const double longest = step.cwiseAbs().maxCoeff();
       if (longest > 1.0) step /= longest;  // a factor of e at most
@@ -196,9 +200,10 @@ class SampleFit {
       if (is_new) {
         rejected = 0;
         damping *= 0.3;
-        const bool is_at_noise = r_.squaredNorm() < 1.1 * slack * double(r_.size());
+        // A cost that no longer falls is the end only where gamma has come to rest, too.
+        const bool is_at_rest = std::abs(std::log(gamma / last_weight)) < 1.0;
         if (step.cwiseAbs().maxCoeff() < options_.step_tolerance ||
-            (is_at_noise && cost - cost_of(gamma) < 0.02 * cost))
+            (is_at_rest && cost - cost_of(gamma) < least_fall * cost))
           result.converged = true;
       } else {
         q_ = last;
@@ -224,10 +229,10 @@ class SampleFit {
     if (!body_->solve().converged) return false;
     Points residuals = body_->points();
     for (Eigen::Index m = 0; m < residuals.rows(); ++m) residuals.row(m) -= seen_.loaded[std::size_t(m)].transpose();
-    r_ = flat(residuals) / options_.noise;
+    r_ = flat(residuals).cwiseQuotient(options_.deviations);
     return true;
   }
-  double rms() const { return options_.noise * std::sqrt(3.0 * r_.squaredNorm() / double(r_.size())); }
+  double rms() const { return std::sqrt(3.0 * r_.cwiseProduct(options_.deviations).squaredNorm() / double(r_.size())); }
 
   VectorX smooth(const VectorX& d) const {
     VectorX out(d.size());
@@ -244,7 +249,7 @@ class SampleFit {
     Equilibrium& equilibrium = body_->equilibrium();
     if (!equilibrium.prepare_derivatives(body_->placement())) return false;
     const auto by = r_.size() < q_.size() ? JacobianBy::Adjoints : JacobianBy::Tangents;
-    J_ = sample_jacobian(*body_, mesh_, *law_, by) / options_.noise;
+    J_ = options_.deviations.cwiseInverse().asDiagonal() * sample_jacobian(*body_, mesh_, *law_, by);
     const Eigen::Index half = q_.size() / 2;
     MatrixX G = MatrixX::Zero(J_.rows(), J_.rows());
     for (const Eigen::Index begin : {Eigen::Index(0), half}) {
@@ -255,28 +260,40 @@ class SampleFit {
     return G_.info() == Eigen::Success;
   }
 
-  /// Where the linearised model is fitted with gamma, its residual is gamma (gamma I + G)^-1 b, b = r - J (q - q0).
+  /// Where the noise is known, the greatest weight with which the linearised misfit is what noise makes (discrepancy
+  /// principle): where the field is fitted with gamma, the residual is gamma (gamma I + G)^-1 b, b = r - J (q - q0).
+  /// Where its scale s is not, the weight of the greatest evidence: with fields of covariance s^2 A^-1 / gamma, b has
+  /// s^2 (I + G / gamma), and with b_k along G's eigenvectors, for the best s,
+  ///   ln p = -1/2 sum ln(1 + g_k / gamma) - n/2 ln sum b_k^2 / (1 + g_k / gamma).
+  /// In either case no further in one step than the linear model is good for: to a tenth of the squares.
   double choose_weight() const {
     const VectorX b = G_.eigenvectors().transpose() * (r_ - J_ * (q_ - start_));
-    // No further in one step than the linear model is good for: to a tenth of the squares.
-    const double aim = std::max(slack * double(r_.size()), 0.1 * r_.squaredNorm()),
-                 top = std::max(G_.eigenvalues().maxCoeff(), 1e-300);
-    const auto misfit = [&](double gamma) {
-      double sum = 0.0;
-      for (Eigen::Index k = 0; k < b.size(); ++k) {
-        const double share = gamma / (gamma + std::max(G_.eigenvalues()[k], 0.0));
-        sum += share * share * b[k] * b[k];
-      }
-      return sum;
+    const Eigen::ArrayXd squares = b.cwiseAbs2().array(), g = G_.eigenvalues().cwiseMax(0.0).array();
+    const double top = std::max(g.maxCoeff(), 1e-300), count = double(b.size()), tenth = 0.1 * r_.squaredNorm();
+    const auto misfit = [&](double t) { return ((1.0 + g * std::exp(-t)).inverse().square() * squares).sum(); };
+    const auto against = [&](double t) {
+      const Eigen::ArrayXd spread = 1.0 + g * std::exp(-t);
+      return 0.5 * spread.log().sum() + 0.5 * count * std::log((squares / spread).sum() + 1e-300);
     };
-    double low = 1e-13 * top, high = 1e3 * top;
-    if (misfit(low) > aim) return low;
-    if (misfit(high) < aim) return high;
-    for (int k = 0; k < 60; ++k) {
-      const double middle = std::sqrt(low * high);
-      (misfit(middle) > aim ? high : low) = middle;
-    }
-    return low;
+    const double lowest = std::log(1e-13 * top), highest = std::log(1e3 * top);
+    // The greatest with no more than this misfit.
+    const auto greatest = [&](double aim) {
+      double low = lowest, high = highest;
+      if (misfit(low) > aim) return low;
+      if (misfit(high) < aim) return high;
+      for (int k = 0; k < 60; ++k) {
+        const double middle = 0.5 * (low + high);
+        (misfit(middle) > aim ? high : low) = middle;
+      }
+      return low;
+    };
+    if (options_.is_scale_known) return std::exp(greatest(std::max(slack * count, tenth)));
+    constexpr double step = 0.7;
+    const double end = greatest(tenth);
+    double best = highest, least = against(highest);
+    for (double t = highest - step; t >= end; t -= step)
+      if (const double value = against(t); value < least) best = t, least = value;
+    return std::exp(best);
   }
 
   /// -(J^T J + (1 + damping) gamma A)^-1 (J^T r + gamma A d), d = q - q0, by G alone:
@@ -309,7 +326,38 @@ class SampleFit {
 
 }  // namespace
 
-PressSample fit_sample(const PressScene& scene, int press, const SmallStrainModuli& start,
+std::vector<SmallStrainModuli> secant_moduli(const MaterialLaw& law, const MatrixX& strains) {
+  constexpr double hold = 0.01;  // of the moduli at rest, as a share of the squares of strain
+  constexpr double least_part = 0.05, least_nu = -0.45, most_nu = 0.49;
+  std::vector<SmallStrainModuli> moduli;
+  PointStress point;
+  for (int e = 0; e < int(strains.rows()); ++e) {
+    const SmallStrainModuli rest = law.small_strain(e);
+    SmallStrainModuli& secant = moduli.emplace_back(rest);
+    Matrix3 strain;
+    strain << strains(e, 0), strains(e, 3), strains(e, 4),  //
+        strains(e, 3), strains(e, 1), strains(e, 5),        //
+        strains(e, 4), strains(e, 5), strains(e, 2);
+    law.stress(e, Matrix3::Identity() + strain, false, point);
+    if (!std::isfinite(point.energy)) continue;
+    // Stress a e + b tr(e) I, with a = lambda (1 - 2 nu), b = lambda nu.
+    const LambdaAlpha at_rest = lambda_alpha(rest);
+    const Eigen::Vector2d before(at_rest.lambda - 2.0 * at_rest.alpha, at_rest.alpha);
+    const double trace = strain.trace(), square = strain.squaredNorm();
+    if (!(square > 0.0)) continue;
+    Eigen::Matrix2d A;
+    A << square, trace * trace, trace * trace, 3.0 * trace * trace;
+    A.diagonal().array() += hold * square;
+    const Eigen::Vector2d right(point.P.cwiseProduct(strain).sum(), trace * point.P.trace());
+    const Eigen::Vector2d ab = A.ldlt().solve(right + hold * square * before);
+    const double lambda = std::max(ab[0] + 2.0 * ab[1], least_part * at_rest.lambda);
+    const double nu = std::clamp(ab[1] / lambda, least_nu, most_nu);
+    secant = moduli_of({lambda, lambda * nu});
+  }
+  return moduli;
+}
+
+PressSample fit_sample(const PressScene& scene, int press, const std::vector<SmallStrainModuli>& start,
                        const ElementSmoothness& smoothness, const SampleFitOptions& options) {
   return SampleFit(scene, press, start, smoothness, options).run();
 }

@@ -27,7 +27,8 @@ class ElementSmoothness {
 };
 
 struct SampleFitOptions {
-  double noise = 0.0;            ///< deviation of a coordinate [m], > 0: the misfit that is aimed at (Morozov 1966)
+  VectorX deviations;            ///< of each coordinate of the press' points [m], > 0
+  bool is_scale_known = false;   ///< of the deviations; else they are known up to a factor
   int max_iterations = 15;       ///< >= 1
   double step_tolerance = 5e-3;  ///< of ln E and of Poisson's ratio's logit, > 0
 };
@@ -47,16 +48,21 @@ struct PressSample {
 /// Levenberg-Marquardt. The Jacobian (appendix, but with the rotations' derivatives, at the exact equilibrium) comes by
 /// the adjoint of each measured coordinate, or the tangent of each unknown, whichever are fewer. With A the smoothness,
 /// steps follow from the matrix J A^-1 J^T of measurements alone. gamma is the greatest weight at which the linearised
-/// misfit is what noise makes (discrepancy principle), or a tenth of what it was, anew in every iteration; where none
-/// is, the least that is tried.
-/// @param start  law of one E and one nu, which the field is smooth about
-PressSample fit_sample(const PressScene& scene, int press, const SmallStrainModuli& start,
+/// misfit is what noise makes (discrepancy principle, Morozov 1966), or, where the noise's scale is not known, that of
+/// the greatest evidence; anew in every iteration, and no less than what brings the misfit to a tenth.
+/// @param start  of every element, what the field is smooth about
+PressSample fit_sample(const PressScene& scene, int press, const std::vector<SmallStrainModuli>& start,
                        const ElementSmoothness& smoothness, const SampleFitOptions& options);
 
 /// Jacobian of a press' coordinates [m] by the elements' ln E and logit of nu (2 T columns: first all ln E), at the
 /// equilibrium of `body`.
 enum class JacobianBy { Tangents, Adjoints };
 MatrixX sample_jacobian(PressedBody& body, const Body& mesh, const LinearLaw& law, JacobianBy by);
+
+/// The linear law that comes closest to a law's stress at one deformation, element by element: least squares over
+/// lambda ((1 - 2 nu) e + nu tr(e) I), held lightly to what the law is at rest.
+/// @param strains  elements x 6: xx, yy, zz, xy, xz, yz, of S - I in the turning frame
+std::vector<SmallStrainModuli> secant_moduli(const MaterialLaw& law, const MatrixX& strains);
 
 /// Poisson's ratio's unconstrained number, nu in (-0.5, 0.5), and back.
 double unconstrained_ratio(double nu);

@@ -50,6 +50,7 @@ Capture capture_of(const PhotoSession& session, const MarkerMeasurement& measure
     press.probe = Plane{measured.probe.tip, measured.probe.direction};
     press.markers = folder / (press_name(measured) + ".csv");
     press.markers_rest = folder / "markers_rest.csv";
+    press.markers_std = folder / (press_name(measured) + "_std.csv");
     press.role = measured.press.role;
     press.glued = measured.press.glued.value_or(true);
   }

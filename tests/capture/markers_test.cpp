@@ -160,5 +160,25 @@ TEST_F(MarkerFiles, C3dSlipsAreTold) {
   EXPECT_THAT(said(file), HasSubstr("expected labels in POINT:LABELS"));
 }
 
+TEST_F(MarkerFiles, DeviationsAreMatchedById) {
+  const std::vector<std::string> ids = {"3", "tip 1"};
+  const Points read = read_marker_deviations(folder.write("std.csv", "id,sx,sy,sz\ntip 1,1e-4,2e-4,3e-4\n"), ids);
+  ASSERT_EQ(read.rows(), 2);
+  EXPECT_TRUE(read.row(0).array().isNaN().all());
+  EXPECT_EQ(read(1, 2), 3e-4);
+}
+
+TEST_F(MarkerFiles, DeviationsThatAreNoneAreRefused) {
+  const std::vector<std::string> ids = {"3"};
+  const auto of = [&](const char* text) {
+    return complaint_of([&] { (void)read_marker_deviations(folder.write("std.csv", text), ids); });
+  };
+  EXPECT_THAT(of("id,sx,sy,sz\n4,1,1,1\n"),
+              AllOf(HasSubstr("std.csv"), HasSubstr("\"4\" is not among the markers at rest")));
+  EXPECT_THAT(of("id,sx,sy,sz\n3,1,0,1\n"), HasSubstr("not positive"));
+  EXPECT_THAT(of("id,x,y,z\n3,1,1,1\n"), HasSubstr("id,sx,sy,sz"));
+  EXPECT_THAT(of("id,sx,sy,sz\n3,1,1,1\n3,1,1,1\n"), HasSubstr("a second time"));
+}
+
 }  // namespace
 }  // namespace pliant::markers_test

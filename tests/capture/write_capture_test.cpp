@@ -69,6 +69,7 @@ void fill(SmallCapture& small) {
   write_points(small.folder / "clouds/000000.ply", std::vector<Vector3>{{0, 0, -0.1}});
   write_points(small.folder / "clouds/000002.ply", std::vector<Vector3>{{0, 0.08, -0.1}});
   small.folder.write("press/000.csv", "id,x,y,z\n0,0,0,-0.09\n");
+  small.folder.write("press/000_std.csv", "id,sx,sy,sz\n0,1e-4,1e-4,2e-4\n");
   write_png(small.folder / "load.png", SmallCapture::depth_image(0.0));
   write_png(small.folder / "load_mask.png", SmallCapture::mask_image(0.0));
   small.edit("mass = 0.8", "density = 100.0\nshape_is = \"static\"");
@@ -117,6 +118,7 @@ force = [0.0, 0.1, -3.3333333333333335]
 contact = { centre = [0, 0, -0.1], radius = 0.01 }
 probe = { point = [0, 0, -0.1], normal = [0, 0, 1] }
 markers = "press/000.csv"
+markers_std = "press/000_std.csv"
 markers_rest = "markers_rest.csv"
 role = "test"
 glued = false

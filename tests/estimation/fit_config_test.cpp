@@ -257,7 +257,8 @@ FitState some_state() {
                           {4, VectorX::Constant(3, -1.0 / 7.0), VectorX::Constant(9, 1e-7 / 3.0)}};
   state.pass.begin = {VectorX::Constant(20, 5.0 / 7.0), 2};
   StageRecord cut{{StageKind::Cut, 0, 3}, "2 zones", VectorX::Constant(6, 1.0 / 9.0), VectorX::Constant(6, 0.1)};
-  cut.law = LawFinding{1e-4 / 3.0,
+  cut.law = LawFinding{{1e-4 / 3.0, 0.1 / 3.0},
+                       2e-4 / 3.0,
                        1e-9 / 3.0,
                        1.0 / 3.0,
                        77.0,
@@ -266,11 +267,13 @@ FitState some_state() {
                        ZoneCut{1, ZoneCut::By::Depth, 1e-3 / 3.0},
                        {Vector3(0.1, -1.0 / 3.0, 0.0)}};
   state.pass.done.push_back(cut);
-  FitState::Sampled& law = state.sampled.emplace();
-  law.samples.emplace_back();
-  law.samples[0].succeeded = true, law.samples[0].weight = 1.0 / 7.0, law.samples[0].iterations = 5;
-  law.samples[0].sample.strains = MatrixX::Constant(2, 6, 1.0 / 3.0);
-  law.samples[0].sample.p = {{100.0 / 3.0, 0.3}, {200.0 / 3.0, 0.4}};
+  PressSampling::State& sampling = state.sampled.emplace();
+  PressSample& sample = sampling.kept.emplace_back();
+  sample.succeeded = true, sample.weight = 1.0 / 7.0, sample.iterations = 5;
+  sample.sample.strains = MatrixX::Constant(2, 6, 1.0 / 3.0);
+  sample.sample.p = {{100.0 / 3.0, 0.3}, {200.0 / 3.0, 0.4}};
+  sampling.under.push_back(sample);
+  sampling.under[0].rms = 1.0 / 3.0;
   return state;
 }
 
@@ -313,16 +316,19 @@ TEST(FitState, RoundTripsToTheLastBit) {
   EXPECT_FALSE(read.pass.done.front().law.has_value());
   EXPECT_EQ(found.noise, found_written.noise);
   EXPECT_EQ(found.track_squares, found_written.track_squares);
+  EXPECT_EQ(found.deviation, found_written.deviation);
   EXPECT_EQ(found.curve_cost, found_written.curve_cost);
   EXPECT_EQ(found.observations, found_written.observations);
   EXPECT_EQ(found.dimension, found_written.dimension);
   EXPECT_EQ(found.evidence, found_written.evidence);
   EXPECT_EQ(found.cut, found_written.cut);
   EXPECT_EQ(found.points, found_written.points);
-  ASSERT_EQ(read.sampled->samples.size(), 1u);
-  EXPECT_EQ(read.sampled->samples[0].sample.strains, written.sampled->samples[0].sample.strains);
-  EXPECT_EQ(read.sampled->samples[0].sample.p[1].alpha, 0.4);
-  EXPECT_EQ(read.sampled->samples[0].weight, 1.0 / 7.0);
+  ASSERT_EQ(read.sampled->kept.size(), 1u);
+  EXPECT_EQ(read.sampled->kept[0].sample.strains, written.sampled->kept[0].sample.strains);
+  EXPECT_EQ(read.sampled->kept[0].sample.p[1].alpha, 0.4);
+  EXPECT_EQ(read.sampled->kept[0].weight, 1.0 / 7.0);
+  ASSERT_EQ(read.sampled->under.size(), 1u);
+  EXPECT_EQ(read.sampled->under[0].rms, 1.0 / 3.0);
   write_fit_state(folder / "empty.json", {}, "key");
   EXPECT_TRUE(read_fit_state(folder / "empty.json", "key").pass.done.empty());
   EXPECT_FALSE(read_fit_state(folder / "empty.json", "key").sampled.has_value());

@@ -24,7 +24,8 @@ struct LawPlans : testing::Test {
   StageRecord record_of(const Stage& stage) const {
     StageRecord r{stage.id, stage.name, stage.from.front(), stage.from.front()};
     r.succeeded = true, r.cost = 150.0;
-    r.law = LawFinding{stage.law->noise};
+    r.law.emplace().noise = stage.law->noise;
+    r.law->deviation = noise;
     r.law->track_squares = 300.0 * noise * noise, r.law->observations = 300.0;
     r.law->dimension = facts.parameters({stage.law->shape.form}).dimension();
     if (stage.id.kind == StageKind::Cut || stage.id.kind == StageKind::Move) r.succeeded = false;
@@ -125,7 +126,7 @@ struct TwoZones : LawPlans {
         r.law->evidence = is_moved ? 60.0 : 40.0;
         r.cost = is_moved ? 100.0 : 120.0;
         r.law->track_squares *= zone_squares;
-        r.law->noise = stage.law->is_brief ? stage.law->noise : 0.9 * noise;
+        r.law->noise = stage.law->is_brief ? stage.law->noise : MarkerNoise(0.9 * noise);
       }
     };
   }
@@ -214,12 +215,28 @@ TEST_F(LawPlans, FieldsAreFittedWhereAStepPromisesSomething) {
   EXPECT_EQ(end.best->shape.points.size(), 8u);
 }
 
-TEST_F(LawPlans, SamplesFollowTheLawOfOneTerm) {
+TEST_F(LawPlans, SamplesFollowTheLawOfAllPressesInRoundsWhileThatGains) {
   facts.options.material = MaterialKind::Sampled;
+  double gain = 0.2;
+  answer = [&](const Stage& stage, StageRecord& r) {
+    if (stage.id.kind != StageKind::Sample) return;
+    r.converged = true, r.start_cost = 100.0, r.cost = 100.0 * (1.0 - gain);
+  };
   (void)names();
-  ASSERT_EQ(done.size(), 3u) << "six presses, four at a time";
-  EXPECT_EQ(done[1].id.kind, StageKind::Sample);
-  EXPECT_EQ(done[2].id.kind, StageKind::Sample);
+  ASSERT_EQ(done.size(), 10u) << "two laws; four rounds of six presses, four at a time";
+  for (std::size_t i = 2; i < done.size(); ++i) EXPECT_EQ(done[i].id.kind, StageKind::Sample);
+  gain = 0.01;
+  (void)names();
+  EXPECT_EQ(done.size(), 4u) << "not worth another round";
+}
+
+TEST_F(LawPlans, NoRoundOfSamplesFollowsOneThatDoesNotCount) {
+  facts.options.material = MaterialKind::Sampled;
+  answer = [](const Stage& stage, StageRecord& r) {
+    if (stage.id.kind == StageKind::Sample) r.converged = false, r.cost = 0.0, r.start_cost = 100.0;
+  };
+  (void)names();
+  EXPECT_EQ(done.size(), 4u);
 }
 
 TEST_F(LawPlans, HaveNoLawWhereTheFirstCannotBeEvaluated) {

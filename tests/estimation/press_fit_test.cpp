@@ -68,7 +68,7 @@ TEST_F(PressedLayers, AreFoundWithTheirLawsAndPredictAnotherPress) {
   for (const PressPrediction& p : fit.predictions) EXPECT_TRUE(p.succeeded) << p.failure;
   // The noise of a marker's place, 0.1 mm a coordinate, is 0.17 mm.
   EXPECT_NEAR(fit.predictions.back().marker_rms, 1.73e-4, 0.4e-4);
-  EXPECT_NEAR(fit.noise, 1e-4, 0.2e-4);
+  EXPECT_NEAR(fit.noise.at_rest, 1e-4, 0.2e-4);
   int right = 0;  // the border may go by another row of elements' centres, or bend around the edges
   for (int e = 0; e < block.body->element_count(); ++e) {
     const double truth = law->small_strain(e).youngs_modulus;

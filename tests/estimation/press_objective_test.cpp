@@ -71,6 +71,43 @@ TEST_P(Presses, GradientByTheAdjointIsThatByTangents) {
   EXPECT_LT((adjoint.gradient - tangents.gradient).norm(), tolerance(1e-6) * tangents.gradient.norm());
 }
 
+TEST_P(Presses, NoiseThatGrowsGoesByWhereTheLawHasThePoints) {
+  PressObjective cost(scene, {0, 1, 2, 3}, layout, set, {{1e-4, 0.05}, 5.0});
+  const VectorX p = set.to_unconstrained(set.reference());
+  ASSERT_TRUE(cost.evaluate(p).succeeded);
+  EXPECT_GT(cost.typical_deviation(), 1.05e-4);
+  EXPECT_GT(cost.weighed_squares(), 0.0);
+  // Where all deviations are the same, squares are weighed by nothing.
+  double squares = 0.0;
+  for (const double r : cost.residuals()) squares += r * r;
+  cost.set_options({1e-4, 5.0});
+  EXPECT_NEAR(cost.weighed_squares(), squares, 1e-9 * squares);
+  EXPECT_NEAR(cost.typical_deviation(), 1e-4, 1e-12);
+  cost.set_options({{1e-4, 0.05}, 5.0});
+  const CostEvaluation at = cost.linearise(p), adjoint = cost.cost().gradient(p);
+  ASSERT_TRUE(at.succeeded && adjoint.succeeded) << at.failure << adjoint.failure;
+  EXPECT_LT((adjoint.gradient - at.gradient).norm(), tolerance(1e-6) * at.gradient.norm());
+  const auto along = [&](double h) {
+    return VectorX::Constant(1, cost.evaluate(p + h * VectorX::Unit(p.size(), 0)).cost);
+  };
+  EXPECT_LT(test::best_relative_error(along, at.gradient.segment(0, 1), 0.1), tolerance(1e-5));
+}
+
+TEST_P(Presses, StatedDeviationsWeighCoordinatesAgainstEachOther) {
+  std::vector<ObservedPress> stated = scene->presses;
+  ASSERT_TRUE(stated[0].has_probe);
+  const std::size_t markers = stated[0].rest.size() - 1;
+  stated[0].weights.assign(3 * markers, 2e-4);
+  stated[0].weights[4] = 1e-3;
+  stated[0].weights[5] = std::numeric_limits<double>::quiet_NaN();
+  weigh_by_stated_deviations(stated);
+  EXPECT_DOUBLE_EQ(stated[0].weight(0), 1.0);
+  EXPECT_DOUBLE_EQ(stated[0].weight(4), 5.0);
+  EXPECT_DOUBLE_EQ(stated[0].weight(5), 1.0) << "not stated";
+  EXPECT_DOUBLE_EQ(stated[0].weight(3 * markers), 1.0) << "the probe's";
+  EXPECT_DOUBLE_EQ(stated[1].weight(4), 1.0);
+}
+
 TEST_P(Presses, GaussNewtonMatrixIsThatOfTheResidualsDerivatives) {
   PressObjective cost = objective(1e9);  // no loss: the matrix is J^T J
   const VectorX p = set.to_unconstrained(set.reference());
