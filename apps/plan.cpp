@@ -48,13 +48,18 @@ FitOptions options_at(const SyntheticScene& scene) {
   const auto start = [&](const std::string& name, double value) {
     options.parameters[name].start = VectorX::Constant(1, value);
   };
-  std::vector<std::string> names = named_moduli(scene.scene);
-  if (names.empty()) names.emplace_back("youngs_modulus");
-  const std::vector<double> moduli = scene.youngs_moduli();
-  for (std::size_t k = 0; k < names.size(); ++k) start(names[k], moduli[k]);
-  start("poissons_ratio", scene.poissons_ratio);
-  start("mass_damping", scene.mass_damping);
-  start("stiffness_damping", scene.stiffness_damping);
+  const LawLayout layout = scene.law_layout();
+  const VectorX numbers = scene.law_parameters(layout);
+  for (const ParameterHandle& handle : layout.all()) start(layout.layout().block_of(handle).name, numbers[handle]);
+  const Timing& timing = scene.scene.timing;
+  if (!timing.times.empty() && !timing.is_static) {
+    start("mass_damping", scene.mass_damping);
+    start("stiffness_damping", scene.stiffness_damping);
+  }
+  if (!scene.law) options.material = MaterialKind::Linear;
+  if (scene.law && scene.law->terms == 0 && scene.law->two_numbers == TwoNumberLaw::NeoHookean)
+    options.material = MaterialKind::NeoHookean;
+  if (scene.law && scene.law->terms > 0) options.material = MaterialKind::Ogden, options.law_terms = scene.law->terms;
   options.starts = options.most_starts = 1;
   options.budget = 0.0;
   return options;

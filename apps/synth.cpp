@@ -21,9 +21,21 @@ void run(const Arguments& arguments) {
   SyntheticScene scene = read_synthetic_scene(arguments.scene);
   if (arguments.seed) scene.seed = *arguments.seed;
   write_recording(arguments.out, scene);
-  std::cout << arguments.out << ": " << scene.scene.timing.frame_count() << " frames of " << scene.cameras.size()
-            << " camera" << (scene.cameras.size() > 1 ? "s" : "") << ", seed " << scene.seed << "\nthe truth is in "
-            << arguments.out << "/truth.json; next: pliant check " << arguments.out << "\n";
+  const auto counted = [](std::size_t count, const std::string& what, const std::string& more = "s") {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : more);
+  };
+  std::string made;
+  const auto add = [&](std::size_t count, const std::string& what, const std::string& more = "s") {
+    if (count > 0) made += (made.empty() ? "" : ", ") + counted(count, what, more);
+  };
+  add(std::size_t(scene.scene.timing.frame_count()), "frame");
+  add(scene.cameras.size(), "camera");
+  add(scene.markers ? scene.markers->points.size() : 0, "marker");
+  add(scene.loads.size(), "load");
+  add(scene.presses.size(), "press", "es");
+  add(scene.indentations.size(), "force-depth curve");
+  std::cout << arguments.out << ": " << made << "; seed " << scene.seed << "\nthe truth is in " << arguments.out
+            << "/truth.json; next: pliant check " << arguments.out << "\n";
 }
 
 }  // namespace

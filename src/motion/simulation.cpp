@@ -109,6 +109,8 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     stepper_.carry(hung.points(), hung.masses());
   }
   element_edge_ = std::cbrt(body_->volume() / std::max(1, body_->element_count()));
+  if (options_.start.rows() > 0 && (options_.start.rows() != rest_.rows() || starts_held() || options_.is_static))
+    throw std::invalid_argument("a start that is given has a row for each node, and no equilibrium is looked for");
   prepare_holds();
   if (options_.scan_sags || !options_.shape.points.empty()) {
     const std::vector<int> held = held_nodes(*body_, options_.holds);
@@ -181,7 +183,7 @@ void Simulation::hold_start(bool held) {
 }
 
 bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& summary) {
-  state = {rest_, velocities(parameters)};
+  state = {options_.start.rows() > 0 ? options_.start : rest_, velocities(parameters)};
   if (!starts_held()) return true;
   hold_start(true);
   RolloutSummary search;

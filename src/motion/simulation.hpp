@@ -49,7 +49,10 @@ struct SimulationOptions {
   std::vector<std::function<std::unique_ptr<ForceTerm>(const std::shared_ptr<const Body>& body)>> further_forces;
   RigidMotion start_pose;       ///< from rest to where the object is at the start, where nothing is held
   bool starts_settled = false;  ///< the motion starts from the equilibrium under the forces of its first instant
-  bool is_static = false;       ///< every frame sees the same equilibrium; steps, velocities and damping play no part
+  /// Where nodes are at the start, n x 3 [m]: what led them there lets go then. Empty: where they rest, or where the
+  /// equilibrium of what holds the object until then has them. The same for every parameter vector.
+  Points start;
+  bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
   /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then.
   std::shared_ptr<const MaterialLaw> law;

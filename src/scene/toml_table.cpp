@@ -106,6 +106,15 @@ std::optional<Mismatch> convert(const toml::node& node, std::vector<Vector3>& va
   return {};
 }
 
+std::optional<Mismatch> convert(const toml::node& node, std::vector<double>& values) {
+  const toml::array* list = node.as_array();
+  if (!list) return Mismatch{kind_of(node), "a list of numbers [x, y, ...]", ""};
+  for (const toml::node& item : *list)
+    if (auto mismatch = convert(item, values.emplace_back()))
+      return Mismatch{mismatch->found + " as number " + std::to_string(values.size()), "a list of numbers", ""};
+  return {};
+}
+
 std::optional<Mismatch> convert(const toml::node& node, RigidMotion& value) {
   const toml::array* rows = node.as_array();
   const char* expected = "a 4 x 4 matrix, row by row: [[..4 numbers..], [..], [..], [0, 0, 0, 1]]";
@@ -264,6 +273,7 @@ PLIANT_INSTANTIATE(bool)
 PLIANT_INSTANTIATE(std::string)
 PLIANT_INSTANTIATE(Vector3)
 PLIANT_INSTANTIATE(std::vector<Vector3>)
+PLIANT_INSTANTIATE(std::vector<double>)
 PLIANT_INSTANTIATE(RigidMotion)
 #undef PLIANT_INSTANTIATE
 

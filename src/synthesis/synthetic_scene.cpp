@@ -3,15 +3,20 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <stdexcept>
 
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
 #include "rays/look_at.hpp"
+#include "rays/ray_scene.hpp"
 #include "scene/region.hpp"
 #include "scene/scene_toml.hpp"
+#include "synthesis/synthetic_markers.hpp"
 
 namespace pliant {
 
@@ -36,11 +41,12 @@ class Reader {
     scene_.name = root.required<std::string>("name", "give the recording a name").value_or("");
     scene_.seed = std::uint64_t(read_count(root, "seed", 0, 2'000'000'000, 1));
     scene_.write_trajectory = root.optional<bool>("truth_trajectory").value_or(false);
+    has_tests_ = root.has("press") || root.has("load") || root.has("indentation");
     read_table(root, "object", &Reader::read_object);
     has_controls_ = root.has("control");
     read_table(root, "material", &Reader::read_material);
     read_table(root, "world", &Reader::read_gravity);
-    read_table(root, "timing", &Reader::read_frames);
+    if (root.has("timing") || !has_tests_) read_table(root, "timing", &Reader::read_frames);
     read_table(root, "simulation", &Reader::read_simulation);
     root.with_table("initial", [&](TomlTable& initial) { read_start(initial); });
     root.each_block("plane", [&](TomlTable& block) { read_scenery(block); });
@@ -57,11 +63,19 @@ class Reader {
     root.with_table("wind", [&](TomlTable& wind) { scene_.scene.wind = read_wind(wind, true); });
     root.each_block("force", [&](TomlTable& block) { scene_.scene.forces.push_back(read_force(block, true)); });
     root.each_block("camera", [&](TomlTable& block) { scene_.cameras.push_back(read_camera(block)); });
-    if (scene_.cameras.empty() && !root.has("camera"))
-      context_.complain("camera", "no camera", "a block [[camera]]", "a recording needs at least one");
+    root.with_table("cloud", [&](TomlTable& cloud) { read_cloud(cloud); });
+    root.with_table("markers", [&](TomlTable& markers) { read_markers(markers); });
+    root.each_block("load", [&](TomlTable& block) { read_load(block); });
+    root.each_block("press", [&](TomlTable& block) { read_press(block); });
+    root.each_block("indentation", [&](TomlTable& block) { read_indentation(block); });
+    if (!root.has("camera") && !root.has("markers") && !root.has("indentation"))
+      context_.complain("camera", "no camera", "a block [[camera]], or [markers]", "a recording needs at least one");
     check_names();
     check_vertex_lists(context_, scene_.scene);
     check_materials(context_, scene_.scene);
+    check_what_is_held(root);
+    check_what_is_seen(root);
+    settle_law(root);
     root.finish();
     return std::move(scene_);
   }
@@ -89,6 +103,8 @@ class Reader {
     require_mass_or_density(object);
     if (object.has("mass")) scene_.scene.object.mass = read_number(object, "mass", positive("in kilograms"));
     if (object.has("density")) scene_.scene.object.density = read_number(object, "density", positive("in kg/m^3"));
+    if (read_choice(object, "shape_is", {"reference", "static"}) == "static")
+      scene_.scene.object.shape_is = ShapeIs::Static;
   }
 
   void read_surface(TomlTable& object) {
@@ -156,9 +172,9 @@ class Reader {
 
   void read_material(TomlTable& t) {
     if (!has_controls_) scene_.youngs_modulus = read_number(t, "youngs_modulus", positive("in pascals"));
-    scene_.poissons_ratio = read_number(
-        t, "poissons_ratio",
-        {.low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"});
+    if (!t.has("poissons_ratios")) scene_.poissons_ratio = read_number(t, "poissons_ratio", ratio_rule);
+    law_name_ = read_choice(t, "law", {"linear", "neo_hookean", "ogden"});
+    own_numbers_.push_back(read_law_numbers(t, {scene_.poissons_ratio, {}, {}, {}}));
     scene_.mass_damping = read_number(t, "mass_damping", at_least_zero("Rayleigh's, in 1/s"), 0.0);
     scene_.stiffness_damping = read_number(t, "stiffness_damping", at_least_zero("in s"), 0.0);
     scene_.is_corotated = read_choice(t, "mean_strain", {"neo_hookean", "corotated"}) == "corotated";
@@ -167,9 +183,74 @@ class Reader {
 
   void read_gravity(TomlTable& t) { scene_.scene.world = read_world(t, true); }
 
-  void read_frames(TomlTable& t) { scene_.scene.timing = read_even_timing(t, 100'000); }
+  void read_frames(TomlTable& t) {
+    scene_.scene.timing = read_even_timing(t, 100'000);
+    scene_.scene.timing.is_static = t.optional<bool>("static").value_or(false);
+  }
+
+  /// Of Ogden's law; what is not written is that of `otherwise`.
+  LawNumbers read_law_numbers(TomlTable& t, LawNumbers otherwise) {
+    LawNumbers& numbers = otherwise;
+    using List = std::vector<double>;
+    for (const auto& [key, list] : {std::pair<const char*, List*>{"exponents", &numbers.exponents},
+                                    {"stiffness_ratios", &numbers.stiffness_ratios},
+                                    {"poissons_ratios", &numbers.poissons_ratios}})
+      if (auto values = t.optional<List>(key)) {
+        *list = std::move(*values);
+        if (law_name_ != "ogden")
+          context_.reject(t.key_of(key), "`" + std::string(key) + "` of a law without terms", "law = \"ogden\"",
+                          "in [material]");
+      }
+    if (law_name_ != "ogden") return numbers;
+    const std::size_t terms = numbers.exponents.size();
+    const auto check = [&](bool good, const char* key, const std::string& expected) {
+      if (!good && context_.is_sound(t.key()))
+        context_.reject(t.key_of(key), "`" + std::string(key) + "` does not suit", expected, "see docs/scene.md");
+    };
+    check(terms >= 1 && terms <= 4 && std::ranges::none_of(numbers.exponents, [](double a) { return a == 0.0; }),
+          "exponents", "one to four numbers, none of them 0");
+    check(numbers.stiffness_ratios.size() + 1 == terms &&
+              std::ranges::all_of(numbers.stiffness_ratios, [](double r) { return r > 0.0; }),
+          "stiffness_ratios", "a number above 0 for each term but the first");
+    const auto is_ratio = [](double nu) { return nu > -1.0 && nu < 0.5; };
+    check((numbers.poissons_ratios.empty() || numbers.poissons_ratios.size() == terms) &&
+              std::ranges::all_of(numbers.poissons_ratios, is_ratio),
+          "poissons_ratios", "a number between -1 and 0.5 for each term");
+    if (!numbers.poissons_ratios.empty()) numbers.poissons_ratio = numbers.poissons_ratios.front();
+    return numbers;
+  }
+
+  /// What the parts' laws have of their own, and what elements that asks for.
+  void settle_law(TomlTable& root) {
+    const bool has_own = std::ranges::find(part_has_own_, true) != part_has_own_.end();
+    const bool is_tested = root.has("press") || root.has("indentation");
+    if (has_own || law_name_ != "linear") {
+      LawForm form;
+      form.controls = int(scene_.youngs_moduli().size());
+      form.terms = int(own_numbers_.front().exponents.size());
+      form.laws = has_own ? form.controls : 1;
+      form.own_ratios = !own_numbers_.front().poissons_ratios.empty();
+      if (law_name_ == "neo_hookean") form.two_numbers = TwoNumberLaw::NeoHookean;
+      scene_.law = form;
+      scene_.law_numbers = own_numbers_;
+      if (!has_own) scene_.law_numbers.resize(1);
+      if (has_own && has_controls_) scene_.law_numbers.erase(scene_.law_numbers.begin());
+      for (const LawNumbers& numbers : scene_.law_numbers)
+        if (numbers.exponents.size() != std::size_t(form.terms) || numbers.poissons_ratios.empty() == form.own_ratios)
+          context_.reject("material", "laws of different forms", "as many terms everywhere",
+                          "give each region as many `exponents` as [material]");
+    }
+    if (!has_element_) scene_.element = scene_.law || is_tested ? ElementKind::QuadraticTetrahedron : scene_.element;
+    if (scene_.element == ElementKind::Hexahedron && (scene_.law || is_tested))
+      context_.reject("simulation.element", "hexahedra that are pressed, or of a law of their own",
+                      "\"quadratic_tetrahedra\" or \"tetrahedra\"", "leave the key out");
+  }
 
   void read_simulation(TomlTable& t) {
+    has_element_ = t.has("element");
+    const std::string element = read_choice(t, "element", {"hexahedra", "tetrahedra", "quadratic_tetrahedra"});
+    if (element == "tetrahedra") scene_.element = ElementKind::Tetrahedron;
+    if (element == "quadratic_tetrahedra") scene_.element = ElementKind::QuadraticTetrahedron;
     scene_.cell_size = read_number(t, "cell_size", positive("in metres"));
     scene_.substeps = read_count(t, "substeps", 1, 100'000, 4);
     scene_.newmark_theta =
@@ -181,10 +262,32 @@ class Reader {
   void read_start(TomlTable& table) {
     Initial& initial = scene_.scene.initial;
     initial = read_initial(table);
-    if (initial.released != initial.release_of.has_value())
-      context_.reject("initial", "only one of `released` and `release_of`", "both, or neither",
-                      "a released object begins at its equilibrium under a weight whose string is cut");
+    table.with_table("pulled", [&](TomlTable& pull) { read_pull(pull); });
+    if (initial.released != (initial.release_of.has_value() || scene_.pull.has_value()))
+      context_.reject("initial",
+                      initial.released ? "`released` without `release_of` or `pulled`"
+                                       : "`release_of` or `pulled` without `released`",
+                      "`released` and one of `release_of` and `pulled`, or none of them",
+                      "a released object begins at its equilibrium under what held it");
+    if (initial.release_of && scene_.pull)
+      context_.reject("initial", "both `release_of` and `pulled`", "one of them", "a [[weight]] hangs in every frame");
     if (initial.release_of) check_weight("initial.release_of", *initial.release_of);
+  }
+
+  void read_pull(TomlTable& table) {
+    SyntheticPull& pull = scene_.pull.emplace();
+    read_patch(table, pull.at, pull.radius);
+    pull.at = on_surface(table, "at", pull.at);
+    pull.force = table.optional<Vector3>("force");
+    const auto shift = table.optional<Vector3>("shift"), turn = table.optional<Vector3>("turn_deg");
+    if (pull.force.has_value() == (shift || turn))
+      context_.reject(table.key(), "neither or both of a force and a way", "`force`, or `shift` and `turn_deg`",
+                      "a hand pulls with a force, or leads what it grips to a place");
+    if (!pull.force && context_.is_sound(table.key()) && !(pull.radius > 0.0))
+      context_.reject(table.key_of("radius"), "a grip without a size", "above 0", "in metres");
+    const Vector3 angle = degree * turn.value_or(Vector3::Zero());
+    if (angle.norm() > 0.0) pull.to.rotation = Eigen::AngleAxisd(angle.norm(), angle.normalized()).toRotationMatrix();
+    pull.to.translation = pull.at - pull.to.rotation * pull.at + shift.value_or(Vector3::Zero());
   }
 
   void read_scenery(TomlTable& block) {
@@ -194,6 +297,19 @@ class Reader {
 
   void read_part_modulus(TomlTable& block) {
     scene_.part_moduli.push_back(read_number(block, "youngs_modulus", positive("in pascals")));
+    LawNumbers numbers = own_numbers_.empty() ? LawNumbers{} : own_numbers_.front();
+    bool has_own = false;
+    for (const char* key : {"poissons_ratio", "exponents", "stiffness_ratios", "poissons_ratios"})
+      has_own = has_own || block.has(key);
+    numbers.poissons_ratio = read_poissons_ratio(block, numbers.poissons_ratio);
+    own_numbers_.push_back(read_law_numbers(block, numbers));
+    part_has_own_.push_back(has_own);
+  }
+
+  static constexpr NumberRule ratio_rule = {
+      .low = -1.0, .high = 0.5, .low_allowed = false, .high_allowed = false, .meaning = "0.3 is usual for foam"};
+  double read_poissons_ratio(TomlTable& block, double fallback) {
+    return read_number(block, "poissons_ratio", ratio_rule, fallback);
   }
 
   void read_hung(TomlTable& block) {
@@ -283,6 +399,163 @@ class Reader {
     return s;
   }
 
+  // ---- clouds, markers, static tests
+
+  void read_cloud(TomlTable& t) {
+    SyntheticCloud& cloud = scene_.cloud.emplace();
+    cloud.every = read_count(t, "every", 1, 100'000, 1);
+    cloud.with_background = t.optional<bool>("background").value_or(false);
+    cloud.with_images = t.optional<bool>("images").value_or(false);
+  }
+
+  void read_markers(TomlTable& t) {
+    SyntheticMarkers& markers = scene_.markers.emplace();
+    markers.noise = read_number(t, "noise", at_least_zero("of a coordinate, in metres"), 0.0);
+    markers.relative_noise = read_number(t, "relative_noise", part("of how far a marker moved"), 0.0);
+    markers.lost = read_number(t, "lost", part("a probability"), 0.0);
+    const bool is_listed = t.has("points");
+    if (is_listed == t.has("count"))
+      context_.reject(t.key(), "neither or both of `points` and `count`", "one of them",
+                      "`count` markers are spread over the surface");
+    if (is_listed) {
+      for (const Vector3& p : t.optional<std::vector<Vector3>>("points").value_or(std::vector<Vector3>{}))
+        markers.points.push_back(on_surface(t, "points", p));
+      return;
+    }
+    const int count = read_count(t, "count", 3, 100'000, 3);
+    std::function<bool(const Vector3&)> is_wanted;
+    for (const char* key : {"box", "sphere", "half_space"})
+      if (t.has(key) && !is_wanted)
+        if (const auto region = read_region(t, files_))
+          is_wanted = [region = *region](const Vector3& p) { return contains(region, p); };
+    if (!context_.is_sound("object") || !context_.is_sound(t.key()) || surface().triangles.empty()) return;
+    std::vector<Vector3> held;
+    for (const FixedRegion& fixed : scene_.scene.fixed)
+      std::ranges::copy_if(surface().vertices, std::back_inserter(held), is_in_region(surface(), fixed.region));
+    try {
+      markers.points = spread_markers(surface(), count, is_wanted, held, scene_.seed);
+    } catch (const std::invalid_argument& error) {
+      context_.reject(t.key(), error.what(), "a region with more of the surface");
+    }
+  }
+
+  std::string read_role(TomlTable& block) { return read_choice(block, "role", {"fit", "test"}); }
+
+  /// The point of the surface nearest to one that a key names; a complaint where that is far away.
+  Vector3 on_surface(TomlTable& table, const std::string& name, const Vector3& point) {
+    constexpr double slack = 0.05;  // of the object's size
+    if (!context_.is_sound("object") || surface().triangles.empty()) return point;
+    const Vector3 there = nearest_place(surface(), point)(surface(), vertex_points(surface()));
+    if (const double off = (there - point).norm(); off > slack * bounding_box(surface()).extent().maxCoeff())
+      context_.reject(table.key_of(name), fmt::format("a point {:.3g} m off the object's surface", off),
+                      "a point of the stress-free surface, in metres");
+    return there;
+  }
+
+  void read_load(TomlTable& block) {
+    SyntheticScene::HungLoad load{read_weight(block), read_role(block)};
+    check_weight(block.key(), load.weight);
+    load.weight.at = on_surface(block, "at", load.weight.at);
+    scene_.loads.push_back(load);
+  }
+
+  void read_press(TomlTable& block) {
+    SyntheticPress press;
+    press.at = on_surface(block, "at", block.required<Vector3>("at", "where it touches").value_or(Vector3::Zero()));
+    press.radius = read_number(block, "radius", positive("in metres"));
+    if (block.has("axis")) press.axis = read_direction(block, "axis", "it points into the object");
+    press.glued = block.optional<bool>("glued").value_or(true);
+    press.force_noise = read_number(block, "force_noise", at_least_zero("in newtons"), 0.0);
+    press.role = read_role(block);
+    using Led = SyntheticPress::Led;
+    int ways = 0;
+    for (const auto& [key, led] : {std::pair{"force", Led::Force}, {"shift", Led::Shift}})
+      if (const auto vector = block.optional<Vector3>(key)) press.led = led, press.vector = *vector, ++ways;
+    for (const auto& [key, led] : {std::pair{"push", Led::Push}, {"depth", Led::Depth}})
+      if (block.has(key)) press.led = led, press.number = read_number(block, key, NumberRule{}), ++ways;
+    if (ways != 1)
+      context_.reject(block.key(), fmt::format("{} ways to press", ways == 0 ? "no" : std::to_string(ways)),
+                      "one of `push` and `force` [N], `depth` and `shift` [m]");
+    scene_.presses.push_back(press);
+  }
+
+  void read_indentation(TomlTable& block) {
+    SyntheticIndentation test;
+    test.facts.name = block.optional<std::string>("name").value_or("");
+    test.facts.probe =
+        read_choice(block, "probe", {"ball", "punch"}) == "ball" ? IndenterShape::Ball : IndenterShape::Punch;
+    test.facts.radius = read_number(block, "radius", positive("in metres"));
+    test.facts.contact =
+        on_surface(block, "contact", block.required<Vector3>("contact", "where it touches").value_or(Vector3::Zero()));
+    test.facts.direction = Vector3::Zero();
+    if (block.has("direction"))
+      test.facts.direction = read_direction(block, "direction", "into the object").value_or(Vector3::Zero());
+    test.depths = block.required<std::vector<double>>("depths", "in metres").value_or(std::vector<double>{});
+    if (context_.is_sound(block.key()) &&
+        (test.depths.empty() || !(test.depths.front() > 0.0) ||
+         std::ranges::adjacent_find(test.depths, std::greater_equal<>()) != test.depths.end()))
+      context_.reject(block.key_of("depths"), "depths that do not grow from above 0", "[0.001, 0.002, ...]",
+                      "in metres");
+    test.force_noise = read_number(block, "force_noise", positive("in newtons"));
+    test.facts.role = read_role(block);
+    scene_.indentations.push_back(std::move(test));
+  }
+
+  // ---- what does not go together
+
+  void check_what_is_held(TomlTable& root) {
+    const Scene& scene = scene_.scene;
+    const bool is_pressed = root.has("press") || root.has("indentation");
+    const auto need_fixed = [&](const std::string& key, const char* what) {
+      if (scene.fixed.empty() && !root.has("fixed"))
+        context_.complain(key, std::string(what) + " that nothing holds", "a block [[fixed]]",
+                          "say where the object stands or is clamped");
+    };
+    if (scene_.sags()) {
+      need_fixed("object.shape_is", "an object that sags");
+      if (scene.world.gravity && scene.world.gravity->isZero())
+        context_.complain("object.shape_is", "an object that sags without gravity", "a gravity that pulls at it");
+      for (std::size_t i = 0; i < scene.fixed.size(); ++i)
+        if (scene.fixed[i].displaced_to && !scene.timing.is_static)
+          context_.complain(fmt::format("fixed[{}].displaced_to", i), "a held region that moved since the scan",
+                            "static = true in [timing], or no `displaced_to`");
+      if (is_pressed)
+        context_.complain("object.shape_is", "presses of an object that is scanned as it sags",
+                          "shape_is = \"reference\"", "fits of presses take the scan as stress-free");
+    }
+    if (scene_.pull) need_fixed("initial.pulled", "a pulled object");
+    if (is_pressed) {
+      need_fixed(root.has("press") ? "press[0]" : "indentation[0]", "a pressed object");
+      if (!scene.weights.empty())
+        context_.complain("weight[0]", "a weight at an object that is pressed", "one of them",
+                          "fits of presses know no weights");
+    }
+    if (root.has("load") && scene.fixed.empty() && scene.planes.empty())
+      context_.complain("load[0]", "a load on an object that nothing holds", "a block [[fixed]]",
+                        "say where the object stands or is clamped");
+    if (scene.timing.is_static) {
+      if (scene.fixed.empty())
+        context_.complain("timing.static", "an object at rest that nothing holds", "a block [[fixed]]",
+                          "say where the object stands or is clamped");
+      if (scene.initial != Initial{})
+        context_.complain("timing.static", "an object at rest, and how it begins to move", "no [initial]");
+    }
+  }
+
+  void check_what_is_seen(TomlTable& root) {
+    const bool moves = root.has("timing"),
+               has_images = root.has("camera") && (!scene_.cloud || scene_.cloud->with_images);
+    if (scene_.cloud && !root.has("camera"))
+      context_.complain("cloud", "a cloud without a camera", "a block [[camera]]", "clouds are fused from cameras");
+    if (!moves && has_images)
+      context_.complain("camera[0]", "images without frames", "[timing], or [cloud] without images",
+                        "loads alone are seen as clouds or markers");
+    if (root.has("press") && !root.has("markers"))
+      context_.complain("press[0]", "presses without markers", "[markers]", "markers are how a press is seen");
+    if (root.has("load") && !root.has("camera") && !root.has("markers"))
+      context_.complain("load[0]", "loads that nobody sees", "[[camera]] or [markers]");
+  }
+
   void check_names() {
     for (size_t i = 0; i < scene_.cameras.size(); ++i)
       for (size_t j = 0; j < i; ++j)
@@ -294,7 +567,10 @@ class Reader {
   NamedFiles files_;
   TomlContext& context_;
   SyntheticScene scene_;
-  bool has_controls_ = false;
+  bool has_controls_ = false, has_tests_ = false, has_element_ = false;
+  std::string law_name_ = "linear";
+  std::vector<LawNumbers> own_numbers_;  // of the object's own material, then of each region or control point
+  std::vector<bool> part_has_own_;       // of each of the latter
 };
 
 }  // namespace
@@ -318,30 +594,124 @@ SyntheticScene read_synthetic_scene(const fs::path& path) {
   return scene;
 }
 
+LawLayout SyntheticScene::law_layout() const {
+  const LawForm linear{int(youngs_moduli().size()), 0};
+  return LawLayout(law.value_or(linear), named_moduli(scene));
+}
+
+VectorX SyntheticScene::law_parameters(const LawLayout& layout) const {
+  VectorX theta = VectorX::Zero(layout.size());
+  const std::vector<double> moduli = youngs_moduli();
+  for (std::size_t k = 0; k < moduli.size(); ++k) theta[layout.modulus(int(k))] = moduli[k];
+  for (int l = 0; l < layout.form().laws; ++l) {
+    const LawNumbers numbers = law ? law_numbers[std::size_t(l)] : LawNumbers{poissons_ratio, {}, {}, {}};
+    theta[layout.poissons_ratio(0, l)] = numbers.poissons_ratio;
+    for (int i = 0; i < layout.form().terms; ++i) {
+      theta[layout.exponent(i, l)] = numbers.exponents[std::size_t(i)];
+      if (i > 0) theta[layout.stiffness_ratio(i, l)] = numbers.stiffness_ratios[std::size_t(i) - 1];
+      if (layout.form().own_ratios) theta[layout.poissons_ratio(i, l)] = numbers.poissons_ratios[std::size_t(i)];
+    }
+  }
+  return theta;
+}
+
+namespace {
+
+/// Points of the stress-free surface to where they are in the scan.
+class ToScan {
+ public:
+  ToScan(const TriangleMesh& surface, const Points& scan) : surface_(surface), scan_(scan) {}
+  Vector3 operator()(const Vector3& point) const {
+    return scan_.rows() == 0 ? point : nearest_place(surface_, point)(surface_, scan_);
+  }
+
+ private:
+  const TriangleMesh& surface_;
+  const Points& scan_;
+};
+
+/// What the capture says of places, in the pose of its scan.
+void move_to_scan(Scene& scene, const ToScan& to_scan) {
+  for (Weight& weight : scene.weights) weight.at = to_scan(weight.at);
+  for (AppliedForce& force : scene.forces) force.at = to_scan(force.at);
+  for (MaterialControl& control : scene.controls) control.point = to_scan(control.point);
+  if (scene.initial.release_of) scene.initial.release_of->at = to_scan(scene.initial.release_of->at);
+}
+
+std::vector<TrueParameter> true_parameters(const SyntheticScene& scene) {
+  std::vector<TrueParameter> truth;
+  const LawLayout layout = scene.law_layout();
+  const VectorX numbers = scene.law_parameters(layout);
+  for (const ParameterHandle& handle : layout.all()) {
+    const ParameterBlock& block = layout.layout().block_of(handle);
+    truth.push_back({block.name, numbers[handle], block.unit});
+  }
+  const auto add = [&](const char* name, const auto& value, const char* unit) { truth.push_back({name, value, unit}); };
+  if (!scene.scene.timing.times.empty()) {
+    add("mass_damping", scene.mass_damping, "1/s");
+    add("stiffness_damping", scene.stiffness_damping, "s");
+  }
+  add("density", scene.true_density(), "kg/m^3");
+  add("gravity", *scene.scene.world.gravity, "m/s^2");
+  if (!scene.scene.timing.times.empty()) {
+    add("linear_velocity", scene.scene.initial.linear_velocity, "m/s");
+    add("angular_velocity", scene.scene.initial.angular_velocity, "rad/s");
+  }
+  if (const auto& wind = scene.scene.wind) add("wind", wind->velocity, "m/s");
+  for (std::size_t k = 0; k < scene.scene.forces.size(); ++k)
+    truth.push_back({fmt::format("strength@{}", k + 1), 1.0, "1"});
+  return truth;
+}
+
+void check_count(const char* what, std::size_t simulated, std::size_t asked) {
+  if (simulated != asked)
+    throw std::invalid_argument(fmt::format("synthesise: the simulation gave {} of {} {}", simulated, asked, what));
+}
+
+}  // namespace
+
 Synthesis synthesise(const SyntheticScene& scene, const Simulate& simulate) {
   Synthesis s;
   s.name = scene.name, s.scene = scene.scene, s.plane_half_sizes = scene.plane_half_sizes;
   s.scan_noise = scene.scan_noise, s.cameras = scene.cameras, s.seed = scene.seed;
+  s.cloud = scene.cloud, s.markers = scene.markers;
   s.write_trajectory = scene.write_trajectory;
-  s.truth = {{"poissons_ratio", scene.poissons_ratio, "1"},
-             {"mass_damping", scene.mass_damping, "1/s"},
-             {"stiffness_damping", scene.stiffness_damping, "s"},
-             {"density", scene.true_density(), "kg/m^3"},
-             {"gravity", *scene.scene.world.gravity, "m/s^2"},
-             {"linear_velocity", scene.scene.initial.linear_velocity, "m/s"},
-             {"angular_velocity", scene.scene.initial.angular_velocity, "rad/s"}};
-  std::vector<std::string> names = named_moduli(scene.scene);
-  if (names.empty()) names.emplace_back("youngs_modulus");
-  const std::vector<double> moduli = scene.youngs_moduli();
-  for (std::size_t i = 0; i < names.size(); ++i)
-    s.truth.insert(s.truth.begin() + std::ptrdiff_t(i), {names[i], moduli[i], "Pa"});
-  if (const auto& wind = scene.scene.wind) s.truth.push_back({"wind", wind->velocity, "m/s"});
-  for (std::size_t k = 0; k < scene.scene.forces.size(); ++k)
-    s.truth.push_back({fmt::format("strength@{}", k + 1), 1.0, "1"});
-  s.trajectory = simulate(scene);
-  if (int(s.trajectory.size()) != scene.scene.timing.frame_count())
-    throw std::invalid_argument(fmt::format("synthesise: the simulation gave {} of {} frames", s.trajectory.size(),
-                                            scene.scene.timing.frame_count()));
+  s.truth = true_parameters(scene);
+  SceneMotion motion = simulate(scene);
+  check_count("frames", motion.frames.size(), std::size_t(scene.scene.timing.frame_count()));
+  check_count("loads", motion.loads.size(), scene.loads.size());
+  check_count("presses", motion.presses.size(), scene.presses.size());
+  check_count("indentations", motion.indentations.size(), scene.indentations.size());
+  s.frames = std::move(motion.frames);
+  if (motion.scan) s.scan = std::move(motion.scan->vertices), s.scan_markers = std::move(motion.scan->markers);
+  if (scene.markers && !motion.scan) s.scan_markers = vertex_points({scene.markers->points, {}});
+  if (Initial& initial = s.scene.initial; !initial.known)  // the capture knows nothing of them
+    initial.linear_velocity = initial.angular_velocity = Vector3::Zero();
+  const ToScan to_scan(*scene.scene.object.surface, s.scan);
+  move_to_scan(s.scene, to_scan);
+  if (scene.sags()) {  // densities are over the scan's volume
+    s.scene.object.mass = scene.true_density() * enclosed_volume(*scene.scene.object.surface);
+    s.scene.object.density.reset();
+  }
+  for (std::size_t i = 0; i < scene.loads.size(); ++i)
+    s.loads.push_back({{scene.loads[i].weight.mass, to_scan(scene.loads[i].weight.at)},
+                       scene.loads[i].role,
+                       std::move(motion.loads[i])});
+  for (std::size_t i = 0; i < scene.presses.size(); ++i) {
+    const SyntheticPress& press = scene.presses[i];
+    SceneMotion::Pressed& pressed = motion.presses[i];
+    Press facts;
+    facts.force = pressed.force, facts.contact_centre = press.at, facts.contact_radius = press.radius;
+    facts.glued = press.glued, facts.role = press.role;
+    s.presses.push_back({facts, pressed.axis, pressed.shift, press.force_noise, std::move(pressed.shape)});
+  }
+  for (std::size_t i = 0; i < scene.indentations.size(); ++i) {
+    const SyntheticIndentation& test = scene.indentations[i];
+    TrueIndentation made{test.facts, {test.depths, motion.indentations[i].forces, {}}};
+    made.facts.direction = motion.indentations[i].axis;
+    made.curve.stds.assign(test.depths.size(), test.force_noise);
+    s.indentations.push_back(std::move(made));
+  }
   return s;
 }
 

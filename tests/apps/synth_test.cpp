@@ -136,7 +136,7 @@ TEST(Synth, RefusesHalfARelease) {
   const auto said = [&](const std::string& more) {
     return run_pliant({"synth", folder.write("scene.toml", bar + held + more), "--out", folder / "never"}).err;
   };
-  EXPECT_THAT(said("[initial]\nreleased = true\n"), HasSubstr("only one of `released` and `release_of`"));
+  EXPECT_THAT(said("[initial]\nreleased = true\n"), HasSubstr("`released` without `release_of` or `pulled`"));
   EXPECT_THAT(said("[[region]]\nname = \"a\"\nsphere = { centre = [9, 9, 9], radius = 1 }\nyoungs_modulus = 1.0\n"),
               HasSubstr("no point of the object lies in region \"a\""));
   EXPECT_THAT(said("[[weight]]\nmass = 0.0\nat = [0, 0, 0]\n"), HasSubstr("`mass` is 0; expected above 0"));

@@ -45,7 +45,7 @@ class StillObject {
     Synthesis s;
     s.name = "still";
     s.scene.object.surface = truth;
-    s.trajectory.assign(still_frames, vertex_points(truth));
+    s.frames.assign(still_frames, {vertex_points(truth), {}});
     s.scene.timing = evenly_timed(60.0, still_frames, still_frames - 1);
     s.scene.object.mass = 0.1;
     s.scene.world.gravity = Vector3(0.0, -9.81, 0.0);

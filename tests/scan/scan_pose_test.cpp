@@ -50,7 +50,7 @@ struct Recording {
     Synthesis s;
     s.name = "in the air";
     s.scene.object.surface = object;
-    s.trajectory.assign(3, vertex_points(object));
+    s.frames.assign(3, {vertex_points(object), {}});
     s.scene.timing = evenly_timed(60.0, 3, 1);
     s.scene.object.mass = 0.1;
     s.scene.world.gravity = Vector3(0.0, -9.81, 0.0);

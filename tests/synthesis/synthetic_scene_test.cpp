@@ -60,16 +60,16 @@ SyntheticScene read_ring() {
 }
 
 // Stands in for the simulation: the object falls rigidly.
-std::vector<Points> fall(const SyntheticScene& scene) {
-  std::vector<Points> frames;
+SceneMotion fall(const SyntheticScene& scene) {
+  SceneMotion motion;
   const Timing& timing = scene.scene.timing;
   const Points rest = vertex_points(*scene.scene.object.surface);
   for (int i = 0; i < timing.frame_count(); ++i) {
     const double t = std::max(0, i - timing.start_frame) / timing.frame_rate;
     const Vector3 shift = t * scene.scene.initial.linear_velocity + 0.5 * t * t * *scene.scene.world.gravity;
-    frames.push_back(rest.rowwise() + shift.transpose());
+    motion.frames.push_back({rest.rowwise() + shift.transpose(), {}});
   }
-  return frames;
+  return motion;
 }
 
 TEST(SyntheticScene, IsReadWithItsUnitsAndDefaults) {
@@ -137,7 +137,8 @@ TEST_F(SceneFile, RefusesWhatMakesNoSense) {
   EXPECT_THAT(after("eye = [0.0, 0.9, 1.0]\n", ""), HasSubstr("no single pose"));
   EXPECT_THAT(after("\"front\"", "\"../front\""), HasSubstr("can be a folder"));
   EXPECT_THAT(after("[world]\ngravity = [0.0, -9.81, 0.0]", ""), HasSubstr("no table [world]"));
-  EXPECT_THAT(after("linear_velocity", "released = true\nlinear_velocity"), HasSubstr("released"));
+  EXPECT_THAT(after("linear_velocity", "released = true\nlinear_velocity"),
+              HasSubstr("`released` without `release_of` or `pulled`"));
   EXPECT_THAT(after("linear_velocity", "release_of = { mass = 0.1, at = [0.0, 0.3, 0.0] }\nlinear_velocity"),
               HasSubstr("release_of"));
   EXPECT_THAT(after("normal = [0.0, 1.0, 0.0]", "normal = [0.0, 0.0, 0.0]"), HasSubstr("without length"));
@@ -174,7 +175,7 @@ TEST(Synthesis, ObservedPointsLieOnTheTrueSurface) {
   for (const ObservedFrame& frame : frames) {
     EXPECT_GT(frame.points.size(), 200u);
     RayScene truth;
-    truth.add(synthesis.trajectory[frame.frame], scene.scene.object.surface->triangles);
+    truth.add(synthesis.frames[std::size_t(frame.frame)].vertices, scene.scene.object.surface->triangles);
     const Vector3 eye = scene.cameras[0].camera.camera_to_world.translation;
     for (const Vector3& point : frame.points) {
       const auto hit = truth.cast(eye, (point - eye).normalized());
@@ -196,7 +197,7 @@ TEST(Synthesis, TruthIsWrittenApart) {
   EXPECT_EQ(truth["parameters"]["gravity"]["value"], nlohmann::json({0.0, -9.81, 0.0}));
   EXPECT_THAT(read_file(folder / "capture.toml"), testing::Not(HasSubstr("2000")));
   const TriangleMesh last = read_mesh(folder / "truth/000004.ply");
-  EXPECT_LT((last.vertices[0] - Vector3(fall(scene)[4].row(0))).norm(), 1e-6);
+  EXPECT_LT((last.vertices[0] - Vector3(fall(scene).frames[4].vertices.row(0))).norm(), 1e-6);
 }
 
 TEST(Synthesis, IsRepeatableAndChangesWithTheSeed) {
@@ -226,9 +227,9 @@ TEST(Synthesis, ScanNoiseMovesRestVerticesAlongTheirNormals) {
 
 TEST(Synthesis, RefusesATrajectoryThatDoesNotFit) {
   const SyntheticScene scene = read_ring();
-  EXPECT_THROW(synthesise(scene, [](const SyntheticScene&) { return std::vector<Points>(); }), std::invalid_argument);
+  EXPECT_THROW(synthesise(scene, [](const SyntheticScene&) { return SceneMotion(); }), std::invalid_argument);
   Synthesis s = synthesise(scene, fall);
-  s.trajectory[2](3, 1) = std::nan("");
+  s.frames[2].vertices(3, 1) = std::nan("");
   EXPECT_THROW(write_synthetic_capture("never", s), std::invalid_argument);
   s = synthesise(scene, fall);
   s.scene.object.density = 90.0;
