@@ -249,9 +249,9 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                                          std::vector<std::string>& notes) {
   recording.capture = std::move(recorded.capture);
   Capture& capture = recording.capture;
-  require_fittable(capture, options_);
   if (capture.scene.timing.times.empty())
     capture.scene.timing.times = {0.0}, capture.scene.timing.is_static = true;  // loads and presses alone
+  require_fittable(capture, options_);
   for (const Load& load : capture.loads)
     if (is_fitted(load.role)) recording.loads.push_back(load_case(capture, load, options_.points_per_frame));
   const std::vector<int> planes_seen = take_planes_from_images(capture);
@@ -397,7 +397,7 @@ void Recordings::add_loads(const Recording& recording, const Discretisation& d, 
     ObservedMotion at_rest{d.mismatch, d.body, d.simulation, load.observations, options};
     at_rest.simulation.is_static = true;
     at_rest.simulation.times = {0.0};
-    at_rest.simulation.weights.push_back({load.load.at, load.load.mass});
+    at_rest.simulation.loads.push_back({load.load.at, load.load.mass});
     at_rest.simulation.released_weights.clear();
     at_rest.options.last_frame = 0;
     at_rest.mismatch.tracks =

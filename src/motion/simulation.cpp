@@ -28,6 +28,12 @@ PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) 
   return {there.empty() ? all : far_points(all, there, count), body.size()};
 }
 
+std::vector<PointMass> hung_weights(const SimulationOptions& options) {
+  std::vector<PointMass> hung = options.weights;
+  hung.insert(hung.end(), options.loads.begin(), options.loads.end());
+  return hung;
+}
+
 std::unique_ptr<ForceTerm> plane_contact(const Body& body, const PlaneBlock& plane, const SimulationOptions& options) {
   auto contact =
       std::make_unique<RigidContact>(RigidContact::sliding(body, surface_samples(body), plane, options.contact));
@@ -46,9 +52,8 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
     terms.push_back(make_viscous_forces(body, options.blocks, options.blocks.stiffness_damping));
   terms.push_back(std::make_unique<Gravity>(*body, options.blocks, options.gravity_change));
   for (const PlaneBlock& plane : options.blocks.planes) terms.push_back(plane_contact(*body, plane, options));
-  if (!options.weights.empty())
-    terms.push_back(
-        std::make_unique<PointWeights>(*body, options.weights, options.blocks.gravity, options.gravity_change));
+  if (const std::vector<PointMass> hung = hung_weights(options); !hung.empty())
+    terms.push_back(std::make_unique<PointWeights>(*body, hung, options.blocks.gravity, options.gravity_change));
   if (!options.released_weights.empty()) {
     auto weights = std::make_unique<PointWeights>(*body, options.released_weights, options.blocks.gravity);
     let_go = weights.get();
@@ -104,8 +109,8 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   } else {
     statics_.anchor(held_nodes(*body_, options_.holds));
   }
-  if (!options_.weights.empty()) {
-    const PointWeights hung(*body_, options_.weights, options_.blocks.gravity);
+  if (const std::vector<PointMass> weights = hung_weights(options_); !weights.empty()) {
+    const PointWeights hung(*body_, weights, options_.blocks.gravity);
     stepper_.carry(hung.points(), hung.masses());
   }
   element_edge_ = std::cbrt(body_->volume() / std::max(1, body_->element_count()));

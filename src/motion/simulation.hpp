@@ -44,6 +44,7 @@ struct SimulationOptions {
   ShapeField shape;         ///< how the scan may err: one point a block of scan corrections. Tetrahedra only
   std::vector<Hold> holds;  ///< held regions
   std::vector<PointMass> weights;  ///< hung from the object: point masses that move along with their points
+  std::vector<PointMass> loads;    ///< the same, hung since the scan was taken: a scan that sags does not show them
   KeyFrames<3> gravity_change;     ///< of gravity over time, added to that of the parameter vector [m/s^2]
   /// Makers of forces beyond those above, such as wind, hands and led shapes; each is called once a simulation.
   std::vector<std::function<std::unique_ptr<ForceTerm>(const std::shared_ptr<const Body>& body)>> further_forces;

@@ -13,6 +13,7 @@
 #include "base/files.hpp"
 #include "elasticity/element_moduli.hpp"
 #include "elasticity/law_elasticity.hpp"
+#include "estimation/load_free.hpp"
 #include "live/live_page.hpp"
 #include "output/field_pictures.hpp"
 #include "output/prediction.hpp"
@@ -534,6 +535,11 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
   const Progress tell = [&](const char* what, int done, int total) {
     if (progress) progress(what, done, total);
   };
+  if (!outcome.law && recordings.front().capture.scene.timing.times.empty()) {  // of loads alone
+    std::vector<RecordedCapture> still = recordings;
+    for (RecordedCapture& recorded : still) recorded.capture = at_rest(recorded.capture);
+    return write_fit_output(folder, still, outcome, result, facts, progress);
+  }
   const Capture& capture = recordings.front().capture;
   ReportData report;
   report.title = capture.name;
