@@ -10,6 +10,7 @@
 #ifdef PLIANT_WITH_OPENCV
 #include "photos/measure.hpp"
 #include "photos/paint.hpp"
+#include "synthesis/scene_motion.hpp"
 #endif
 
 namespace pliant::apps {
@@ -17,7 +18,7 @@ namespace pliant::apps {
 namespace {
 
 struct Arguments {
-  std::string session, out, example;
+  std::string session, out, example, scene;
 };
 
 #ifdef PLIANT_WITH_OPENCV
@@ -62,12 +63,56 @@ void describe_press(const MeasuredPress& press) {
     say("", formatted("note: %d markers are left out, as it is not clear which they are", figures.ambiguous));
 }
 
-void make_example(const std::string& folder) {
+// The object of a scene under its presses, as simulated.
+PressedObject pressed_object(const std::string& file) {
+  const SyntheticScene synthetic = read_synthetic_scene(file);
+  const auto refuse = [&](std::size_t i, const char* found, const char* expected) {
+    throw InputError(Problem{{file}, formatted("press %d ", int(i) + 1) + found, expected, "see docs/markers.md"});
+  };
+  if (synthetic.presses.empty())
+    throw InputError(Problem{{file}, "no [[press]]", "a scene with presses", "see docs/scene.md"});
+  for (std::size_t i = 0; i < synthetic.presses.size(); ++i) {
+    const SyntheticPress& press = synthetic.presses[i];
+    if (press.led != SyntheticPress::Led::Push) refuse(i, "is not led by `push`", "a force along the shaft alone");
+    if (!press.glued) refuse(i, "slides", "glued = true");
+    if (press.radius != synthetic.presses.front().radius) refuse(i, "has another radius", "one probe");
+  }
+  SyntheticScene presses = synthetic;  // alone: nothing else is photographed
+  presses.scene.timing = {}, presses.scene.initial = {}, presses.pull.reset();
+  presses.loads.clear(), presses.indentations.clear();
+  const SceneMotion motion = simulate_scene(presses);
+  PressedObject object{synthetic.name, {}, {}, synthetic.presses.front().radius};
+  object.scene.object = synthetic.scene.object, object.scene.world = synthetic.scene.world;
+  object.scene.fixed = synthetic.scene.fixed;
+  for (std::size_t i = 0; i < motion.presses.size(); ++i) {
+    const SceneMotion::Pressed& pressed = motion.presses[i];
+    PressedObject::Press& press = object.presses.emplace_back();
+    press.contact = synthetic.presses[i].at, press.direction = pressed.axis, press.shift = pressed.shift;
+    press.force = pressed.force.dot(pressed.axis), press.role = synthetic.presses[i].role;
+    press.contact_is_written = true;
+    for (Eigen::Index v = 0; v < pressed.shape.vertices.rows(); ++v)
+      press.vertices.emplace_back(pressed.shape.vertices.row(v));
+  }
+  return object;
+}
+
+void make_example(const std::string& folder, const std::string& scene) {
   PhotoExampleOptions options;
   options.dots = 80;
   options.width = 1296;
   options.height = 864;
   options.depths = {0.012, 0.024};
+  if (!scene.empty()) {
+    const PressedObject object = pressed_object(scene);
+    const double size = bounding_box(*object.scene.object.surface).extent().maxCoeff();
+    options.dots = 120, options.width = 1944, options.height = 1296;
+    options.dot_diameter = size / 45.0;
+    PhotoExample(options, object).write(folder);
+    std::cout << folder << ": three cameras' photographs of \"" << object.name << "\", painted, at rest and under "
+              << object.presses.size() << " presses\nthe truth is in " << folder << "/truth; next: pliant markers "
+              << folder << " --out CAPTURE\n";
+    return;
+  }
   PhotoExample(options).write(folder);
   std::cout << folder
             << ": three cameras' photographs of a painted dome, at rest and under four presses\nthe truth is in "
@@ -76,7 +121,7 @@ void make_example(const std::string& folder) {
 
 int run(const Arguments& arguments) {
   if (!arguments.example.empty()) {
-    make_example(arguments.example);
+    make_example(arguments.example, arguments.scene);
     return Fine;
   }
   if (arguments.session.empty() || arguments.out.empty())
@@ -110,6 +155,7 @@ int run(const Arguments&) {
 constexpr const char* footer = R"(Examples:
   pliant markers session --out recording            then: pliant check recording
   pliant markers --example session                  photographs of a painted dome whose truth is known
+  pliant markers --example session --scene scene.toml   the same of a scene's object under its presses
 
 SESSION is a folder with a file markers.toml in it, or that file (docs/markers.md). The folder gets capture.toml,
 markers_rest.csv, press/NNN.csv, standard deviations beside them (..._std.csv), and markers.json (the figures).
@@ -123,6 +169,8 @@ void add_markers(CommandLine& line, int& exit_code) {
   command.option("session", arguments->session, "the session's folder, or its markers.toml").type_name("SESSION");
   command.option("--out", arguments->out, "folder for the capture").type_name("DIR");
   command.option("--example", arguments->example, "instead: write a session with known truth here").type_name("DIR");
+  command.option("--scene", arguments->scene, "of the example: a scene whose presses are photographed (docs/scene.md)")
+      .type_name("SCENE.toml");
   command.footer(footer);
   command.callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

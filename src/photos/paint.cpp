@@ -5,12 +5,14 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <ostream>
 #include <random>
 #include <stdexcept>
+#include <utility>
 
 #include "base/files.hpp"
 #include "base/parallel.hpp"
@@ -334,16 +336,19 @@ TriangleMesh dome() {
   return mesh;
 }
 
-std::vector<LensCamera> example_cameras(int width, int height) {
+// About the middle of an object, as far away as it is large.
+std::vector<LensCamera> example_cameras(int width, int height, const Vector3& middle, double scale) {
   std::vector<LensCamera> cameras;
   const Vector3 along = view_axis.unitOrthogonal();
   const char* const sides[] = {"left", "right", "top"};
   for (int k = 0; k < 3; ++k) {
     const Vector3 axis = Eigen::AngleAxisd((20.0 + 120.0 * k) * degree, view_axis) * along;
-    const Vector3 eye = distance_of_cameras * (Eigen::AngleAxisd((22.0 + 2.0 * k) * degree, axis) * view_axis);
+    const Vector3 eye =
+        middle + scale * distance_of_cameras * (Eigen::AngleAxisd((22.0 + 2.0 * k) * degree, axis) * view_axis);
     const double focal = 2.0 * width;
-    const PinholeCamera pinhole = look_at(eye, Vector3(0.002 * k, 0.03, 0.01), Vector3(0.1 * k, 1.0, 0.05), width,
-                                          height, 2.0 * std::atan(0.5 * height / focal));
+    const PinholeCamera pinhole =
+        look_at(eye, middle + scale * Vector3(0.002 * k, 0.03, 0.01), Vector3(0.1 * k, 1.0, 0.05), width, height,
+                2.0 * std::atan(0.5 * height / focal));
     LensCamera camera;
     camera.name = sides[k];
     camera.width = width;
@@ -360,7 +365,10 @@ Vector3 outward(const Vector3& place) { return place.cwiseQuotient(half_axes.cwi
 
 // Dots at random places that all cameras see not too obliquely, none too near another.
 std::vector<PaintedDot> scatter_dots(const TriangleMesh& mesh, const std::vector<LensCamera>& cameras,
-                                     const PhotoExampleOptions& options) {
+                                     const PhotoExampleOptions& options,
+                                     const std::function<Vector3(const PaintedDot&, const Vector3&)>& normal) {
+  RayScene rays;
+  rays.add(mesh);
   std::mt19937_64 random(options.seed);
   std::uniform_real_distribution<double> share(0.0, 1.0);
   std::vector<double> sums;
@@ -370,9 +378,11 @@ std::vector<PaintedDot> scatter_dots(const TriangleMesh& mesh, const std::vector
     area += 0.5 * (mesh.vertices[std::size_t(b)] - corner).cross(mesh.vertices[std::size_t(c)] - corner).norm();
     sums.push_back(area);
   }
-  const auto is_seen = [&](const Vector3& place) {
+  const auto is_seen = [&](const PaintedDot& dot, const Vector3& place) {
+    const Vector3 out = normal(dot, place);
     return std::ranges::all_of(cameras, [&](const LensCamera& camera) {
-      return outward(place).dot((camera.centre() - place).normalized()) > std::cos(63.0 * degree);
+      const Vector3 way = camera.centre() - place;
+      return out.dot(way.normalized()) > std::cos(63.0 * degree) && !rays.is_blocked(place, way, 0.005, 1.0);
     });
   };
   constexpr int tries = 200'000;
@@ -392,7 +402,8 @@ std::vector<PaintedDot> scatter_dots(const TriangleMesh& mesh, const std::vector
     Vector3 place = Vector3::Zero();
     for (int i = 0; i < 3; ++i) place += dot.weights[i] * mesh.vertices[std::size_t(mesh.triangles[t][std::size_t(i)])];
     const double least = std::max(apart, 1.6 * options.dot_diameter);
-    if (!is_seen(place) || std::ranges::any_of(places, [&](const Vector3& p) { return (p - place).norm() < least; }))
+    if (!is_seen(dot, place) ||
+        std::ranges::any_of(places, [&](const Vector3& p) { return (p - place).norm() < least; }))
       continue;
     dots.push_back(dot);
     places.push_back(place);
@@ -404,36 +415,71 @@ std::vector<PaintedDot> scatter_dots(const TriangleMesh& mesh, const std::vector
 
 }  // namespace
 
-PhotoExample::PhotoExample(const PhotoExampleOptions& options) : options_(options) {
-  painted_.rest = dome();
+namespace {
+
+// Pushed in obliquely: much of the motion is along the surface.
+PressedObject pressed_dome(const std::vector<double>& depths) {
+  PressedObject object;
+  object.name = "painted dome, pressed at two places";
+  const TriangleMesh mesh = dome();
+  object.scene.object.surface = mesh;
+  object.scene.object.density = 60.0;
+  object.scene.world.gravity = {0.0, -9.81, 0.0};
+  object.scene.fixed.push_back({RegionHalfSpace{{0.0, -0.03, 0.0}, {0.0, -1.0, 0.0}}, {}});
+  for (const auto& [up, tilt] : {std::pair(Vector3(0.25, 1.0, 0.35), Vector3(0.45, 0.0, -0.3)),
+                                 std::pair(Vector3(-0.45, 1.0, 0.3), Vector3(-0.2, 0.0, -0.5))})
+    for (const double depth : depths) {
+      const Vector3 ray = up.normalized(), place = ray / ray.cwiseQuotient(half_axes).norm();
+      PressedObject::Press press;
+      press.contact = place, press.direction = (-outward(place) + tilt).normalized();
+      press.shift = depth * press.direction, press.force = stiffness_of_press * depth;
+      press.role = object.presses.size() % 3 == 2 ? "test" : "fit";
+      press.vertices = mesh.vertices;
+      for (Vector3& vertex : press.vertices) {
+        const double fade = std::clamp((vertex.y() + 0.03) / 0.02, 0.0, 1.0);
+        const double squared = (vertex - place).squaredNorm() / (press_width * press_width);
+        vertex += fade * depth * std::exp(-0.5 * squared) * press.direction;
+      }
+      object.presses.push_back(std::move(press));
+    }
+  return object;
+}
+
+}  // namespace
+
+PhotoExample::PhotoExample(const PhotoExampleOptions& options) : PhotoExample(options, pressed_dome(options.depths)) {}
+
+PhotoExample::PhotoExample(const PhotoExampleOptions& options, PressedObject object)
+    : options_(options), presses_(std::move(object.presses)) {
+  painted_.rest = *object.scene.object.surface;
   painted_.vertices = painted_.rest.vertices;
-  painted_.lamp = {0.5, 0.7, 0.2};
-  session_.name = "painted dome, pressed at two places";
+  const Box box = bounding_box(painted_.rest);
+  const Vector3 middle = 0.5 * (box.min + box.max);
+  const double scale = 0.5 * box.extent().maxCoeff() / half_axes.maxCoeff();
+  painted_.lamp = middle + scale * Vector3(0.5, 0.7, 0.2);
+  session_.name = object.name;
   session_.file = "markers.toml";
-  session_.scene.object.surface = painted_.rest;
+  session_.scene = std::move(object.scene);
   session_.scene.object.file = "rest.ply";
-  session_.scene.object.density = 60.0;
-  session_.scene.world.gravity = {0.0, -9.81, 0.0};
-  session_.scene.fixed.push_back({RegionHalfSpace{{0.0, -0.03, 0.0}, {0.0, -1.0, 0.0}}, {}});
-  session_.cameras = example_cameras(options.width, options.height);
+  session_.cameras = example_cameras(options.width, options.height, middle, scale);
   for (const LensCamera& camera : session_.cameras) session_.images.push_back({camera.name + "/%03d.png"});
   session_.markers = {DotColour::Dark, options.dot_diameter, 0.1};
   session_.probe_dots = {DotColour::Red, 0.008, 0.1};
-  session_.probe = {0.05, 0.06, 0.006};
+  session_.probe = {0.05, 0.06, object.probe_radius};
   session_.force_window = 0.2;
   session_.greatest_gap = 0.5;
-  painted_.dots = scatter_dots(painted_.rest, session_.cameras, options);
-  // Pushed in obliquely: much of the motion is along the surface.
-  for (const auto& [up, tilt] : {std::pair(Vector3(0.25, 1.0, 0.35), Vector3(0.45, 0.0, -0.3)),
-                                 std::pair(Vector3(-0.45, 1.0, 0.3), Vector3(-0.2, 0.0, -0.5))})
-    for (const double depth : options.depths) {
-      const Vector3 ray = up.normalized(), place = ray / ray.cwiseQuotient(half_axes).norm();
-      presses_.push_back({place, (-outward(place) + tilt).normalized(), depth});
-    }
+  const std::vector<Vector3> normals = vertex_normals(painted_.rest);
+  painted_.dots =
+      scatter_dots(painted_.rest, session_.cameras, options, [&](const PaintedDot& dot, const Vector3&) -> Vector3 {
+        return weighted(normals, painted_.rest.triangles[std::size_t(dot.triangle)], dot.weights).normalized();
+      });
   std::mt19937_64 random(options.seed + 1);
   std::normal_distribution<double> noise(0.0, 0.02);
-  for (std::size_t k = 0; k < presses_.size(); ++k)
-    session_.presses.push_back({int(k) + 1, time_between * double(k + 1), k % 3 == 2 ? "test" : "fit", {}, {}});
+  for (std::size_t k = 0; k < presses_.size(); ++k) {
+    PhotographedPress& own = session_.presses.emplace_back();
+    own.number = int(k) + 1, own.time = time_between * double(k + 1), own.role = presses_[k].role;
+    if (presses_[k].contact_is_written) own.contact = presses_[k].contact;
+  }
   for (int i = 0; i < int(sample_rate * time_between * double(presses_.size() + 1)); ++i) {
     const double time = i / sample_rate;
     const int number = int(std::lround(time / time_between));
@@ -443,23 +489,17 @@ PhotoExample::PhotoExample(const PhotoExampleOptions& options) : options_(option
   }
 }
 
-const PhotoExample::Press& PhotoExample::press(int number) const { return presses_.at(std::size_t(number) - 1); }
+const PressedObject::Press& PhotoExample::press(int number) const { return presses_.at(std::size_t(number) - 1); }
 Vector3 PhotoExample::contact(int number) const { return press(number).contact; }
-double PhotoExample::force(int number) const { return stiffness_of_press * press(number).depth; }
+double PhotoExample::force(int number) const { return press(number).force; }
 
 PaintedScene PhotoExample::scene(int number) const {
   PaintedScene out = painted_;
   if (number == 0) return out;
-  const Press& own = press(number);
-  for (Vector3& vertex : out.vertices) {
-    const double fade = std::clamp((vertex.y() + 0.03) / 0.02, 0.0, 1.0);
-    const double squared = (vertex - own.contact).squaredNorm() / (press_width * press_width);
-    vertex += fade * own.depth * std::exp(-0.5 * squared) * own.direction;
-  }
-  out.probe = PaintedProbe{session_.probe,
-                           {own.contact + own.depth * own.direction, own.direction, 0.0},
-                           0.001,
-                           0.5 * session_.probe_dots.diameter};
+  const PressedObject::Press& own = press(number);
+  out.vertices = own.vertices;
+  out.probe = PaintedProbe{
+      session_.probe, {own.contact + own.shift, own.direction, 0.0}, 0.001, 0.5 * session_.probe_dots.diameter};
   return out;
 }
 
@@ -506,7 +546,8 @@ void PhotoExample::write(const fs::path& folder) const {
           << "\nimages = " << toml_text(session_.images[c].pattern) << "\n\n";
     out << "[rest]\nnumber = 0\n\n";
     for (const PhotographedPress& own : session_.presses)
-      out << "[[press]]\nnumber = " << own.number << "\nrole = " << toml_text(own.role) << "\n\n";
+      out << "[[press]]\nnumber = " << own.number << "\nrole = " << toml_text(own.role) << "\n"
+          << (own.contact ? "contact = " + toml_text(*own.contact) + "\n" : "") << "\n";
   });
 }
 

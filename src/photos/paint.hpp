@@ -53,17 +53,36 @@ Image<Rgb> take_photograph(const PaintedScene& scene, const LensCamera& camera, 
 /// a surface that bends with a radius R it lies radius^2 / (2 R) below it.
 Points dot_centres(const PaintedScene& scene);
 
-/// A session with known truth: a soft dome with dots, three cameras with lenses, pushed in at two places.
+/// An object under presses, as it truly deforms.
+struct PressedObject {
+  std::string name;
+  Scene scene;  ///< surface, mass or density, gravity, and where the object is held
+  struct Press {
+    Vector3 contact, direction;     ///< where the probe first touched [m]; unit, into the object
+    Vector3 shift;                  ///< of its tip since [m]
+    double force = 0.0;             ///< along its direction [N]
+    std::vector<Vector3> vertices;  ///< of the surface [m]
+    std::string role = "fit";
+    bool contact_is_written = false;  ///< in markers.toml: a probe that drifted touched elsewhere than on its axis
+  };
+  std::vector<Press> presses;
+  double probe_radius = 0.006;  ///< [m]
+};
+
+/// A session with known truth: an object with dots, three cameras with lenses, pressed. Left to itself it is a soft
+/// dome that is pushed in at two places.
 struct PhotoExampleOptions {
   int dots = 200, width = 3888, height = 2592;
   double dot_diameter = 0.004;                         ///< [m]
-  std::vector<double> depths = {0.012, 0.024, 0.036};  ///< [m] of the presses at each of the two places
+  std::vector<double> depths = {0.012, 0.024, 0.036};  ///< [m] of the dome's presses at each of the two places
   std::uint64_t seed = 1;
 };
 class PhotoExample {
  public:
-  /// Throws std::invalid_argument where so many dots have no room.
+  /// The dome. Throws std::invalid_argument where so many dots have no room.
   explicit PhotoExample(const PhotoExampleOptions& options);
+  /// Another object, before cameras that stand as those of the dome do, as far away as it is large.
+  PhotoExample(const PhotoExampleOptions& options, PressedObject object);
 
   /// What is written in its markers.toml; file names as `write` uses them.
   const PhotoSession& session() const { return session_; }
@@ -78,16 +97,12 @@ class PhotoExample {
   void write(const std::filesystem::path& folder) const;
 
  private:
-  struct Press {
-    Vector3 contact, direction;
-    double depth = 0.0;
-  };
-  const Press& press(int number) const;
+  const PressedObject::Press& press(int number) const;
 
   PhotoExampleOptions options_;
   PhotoSession session_;
   PaintedScene painted_;
-  std::vector<Press> presses_;
+  std::vector<PressedObject::Press> presses_;
 };
 
 }  // namespace pliant
