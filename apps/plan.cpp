@@ -10,6 +10,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "commands.hpp"
+#include "estimation/press_scene.hpp"
 #include "output/fit_output.hpp"
 #include "scan/scan_pose.hpp"
 #include "speech.hpp"
@@ -42,8 +43,9 @@ class ScratchFolder {
   fs::path path_;
 };
 
-/// The fit begins where the scene says that the truth is: what it states there is asked, not whether it is found.
-FitOptions options_at(const SyntheticScene& scene) {
+/// The fit begins where the scene says that the truth is: what it states there is asked, not whether it is found. (Fits
+/// of static tests find their start themselves.)
+FitOptions options_at(const SyntheticScene& scene, bool finds_start) {
   FitOptions options;
   const auto start = [&](const std::string& name, double value) {
     options.parameters[name].start = VectorX::Constant(1, value);
@@ -55,6 +57,11 @@ FitOptions options_at(const SyntheticScene& scene) {
   if (!timing.times.empty() && !timing.is_static) {
     start("mass_damping", scene.mass_damping);
     start("stiffness_damping", scene.stiffness_damping);
+  }
+  if (finds_start) {
+    options.parameters.clear();
+    options.law_zones = scene.law ? scene.law->laws : 1;
+    if (named_moduli(scene.scene).empty()) options.control_points = 1;
   }
   if (!scene.law) options.material = MaterialKind::Linear;
   if (scene.law && scene.law->terms == 0 && scene.law->two_numbers == TwoNumberLaw::NeoHookean)
@@ -101,8 +108,8 @@ void plan(const fs::path& path, const fs::path& out) {
   if (out.empty()) scratch.emplace();
   const fs::path folder = out.empty() ? scratch->path() : out;
   write_recording(folder, scene);
-  const FitOptions options = options_at(scene);
   RecordedCapture recording{read_capture(folder), {}};
+  const FitOptions options = options_at(scene, is_of_static_tests(recording.capture));
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
   recording.observed = observe_placed(recording.capture, observe_options);

@@ -20,6 +20,7 @@ from silicone_beam_page import silicone_beam
 from stress_fields_page import stress_fields
 from touched_page import organ_probing, skin, slab_pokes
 from tracking_page import swinging
+from photo_chain_page import photo_chain
 from twins_page import plans, twins
 import weiss_page
 
@@ -406,6 +407,9 @@ SECTIONS = [
      "Given: mass, scan, which way is up, the floor; of the ramp a guess 9 degrees and 30 mm off. Neither gravity's strength nor friction, dampings or velocities are known. Fitted with no choice of ours; the truth is read for judging only.", twins),
     ("What a recording would tell", "recording-plans",
      "`pliant check --plan` of the ring of `examples/synthetic-ring` and of changes to it, one at a time: half the width of the 90 % interval that a fit of such a recording states, over the value, and in brackets what contributes most.", plans),
+    ("From photographs to a prediction", "photo-chain",
+     "A stiffening ball (Ogden's law), pressed in a simulation; its dots are painted and photographed, measured by `pliant markers`, fitted, and a wider disc is pressed elsewhere by `pliant press`, against the simulation's own surface. "
+     "Beside it the same with markers that are known exactly.", photo_chain),
     ("Another simulator's bars, bent and let go", "oracle-release",
      "A bar, and a bar of two stiffnesses, held at one end, pulled aside and let go; three depth sensors fused to clouds at 30 Hz. Made by the same simulator. The even bar is fitted with no choice of ours. "
      "Where the other's materials meet is told to no fit but those of two regions; the truth is read for judging only.", release),

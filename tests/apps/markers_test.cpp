@@ -1,5 +1,7 @@
 // From photographs to a capture and its check, as a user goes.
 
+#include "capture/markers.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +10,7 @@
 
 #include "apps/program.hpp"
 #include "base/files.hpp"
+#include "capture/capture.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant::test::markers_test {
@@ -42,6 +45,56 @@ TEST(Markers, PhotographsBecomeACaptureThatIsFine) {
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("press 1: no two dots of the probe's colour are 80.0 mm apart"));
   EXPECT_FALSE(std::filesystem::exists(folder / "other"));
+}
+
+// A ball under one press: what its dots are measured to do is what the simulation did.
+TEST(Markers, PhotographsOfAScenesPressesShowTheTruth) {
+  const TemporaryFolder folder;
+  const std::string scene = folder.write("scene.toml", R"toml(format = "scene/1"
+name = "ball"
+[object]
+sphere = { radius = 0.08, subdivisions = 5 }
+density = 60.0
+[material]
+youngs_modulus = 15000.0
+poissons_ratio = 0.25
+[world]
+gravity = [0.0, -9.81, 0.0]
+[simulation]
+cell_size = 0.03
+[[fixed]]
+half_space = { point = [0, -0.03, 0], normal = [0, -1, 0] }
+[markers]
+count = 3
+[[press]]
+at = [0.01837, 0.07349, 0.02572]
+radius = 0.012
+axis = [-0.2296, -0.9186, -0.3215]
+push = 2.0
+)toml");
+  const std::string session = folder / "session", capture = folder / "capture";
+  const ProgramRun example = run_pliant({"markers", "--example", session, "--scene", scene});
+  ASSERT_EQ(example.exit_code, 0) << example.err;
+  const ProgramRun run = run_pliant({"markers", session, "--out", capture});
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  const Capture measured = read_capture(capture);
+  ASSERT_EQ(measured.presses.size(), 1u);
+  EXPECT_NEAR(measured.presses[0].force.norm(), 2.0, 0.05);
+  EXPECT_GT(measured.presses[0].force.normalized().dot(-Vector3(0.01837, 0.07349, 0.02572).normalized()), 0.999);
+  EXPECT_LT((measured.presses[0].contact_centre - Vector3(0.01837, 0.07349, 0.02572)).norm(), 1e-3);
+  // Ids differ from the truth's: each measured marker lies on one of the true dots.
+  const MarkerPositions found = read_marker_positions(measured.presses[0].markers),
+                        truth = read_marker_positions(folder / "session/truth/001.csv");
+  EXPECT_GT(found.ids.size(), 60u);
+  for (Eigen::Index i = 0; i < found.positions.rows(); ++i)
+    EXPECT_LT((truth.positions.rowwise() - found.positions.row(i)).rowwise().norm().minCoeff(), 2e-4);
+
+  std::string text = read_file(scene);
+  text.replace(text.find("push = 2.0"), 10, "depth = 0.01");
+  const ProgramRun wrong =
+      run_pliant({"markers", "--example", folder / "never", "--scene", folder.write("other.toml", text)});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("press 1 is not led by `push`"));
 }
 
 TEST(Markers, AsksForASession) {

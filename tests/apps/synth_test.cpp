@@ -143,6 +143,24 @@ TEST(Synth, RefusesHalfARelease) {
   EXPECT_FALSE(std::filesystem::exists(folder / "never"));
 }
 
+TEST(Synth, MakesTheExamples) {
+  const TemporaryFolder folder;
+  const auto made = [&](const std::string& name) {
+    const std::string scene = PLIANT_SOURCE_DIR "/examples/" + name + "/scene.toml";
+    const ProgramRun run = run_pliant({"synth", scene, "--out", folder / name});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    const ProgramRun check = run_pliant({"check", folder / name});
+    EXPECT_EQ(check.exit_code, 0) << check.err;
+    return check.out;
+  };
+  const std::string released = made("released-bar");
+  for (const char* part : {"released from a held, deformed pose", "clouds/%06d.ply", "2, of them 2 for test only"})
+    EXPECT_THAT(released, HasSubstr(part));
+  const std::string block = made("pressed-block");
+  for (const char* part : {"4, of them 1 for test only", "60 under 4 presses and loads"})
+    EXPECT_THAT(block, HasSubstr(part));
+}
+
 TEST(Plan, SaysWhatARecordingOfASceneWouldTell) {
   const TemporaryFolder folder;
   const std::string out = folder / "plan";
