@@ -15,7 +15,7 @@ namespace {
 constexpr std::array field_sizes = {4, 8, 16, 32};
 constexpr double needed_evidence = 3.0;  // e^3 to 1
 constexpr int most_zones = 8, most_passes = 4, brief_iterations = 8;
-constexpr double least_gain = 0.03;  // by a zone more, of the squares of the residuals
+constexpr double least_gain = 0.03;  // by a zone or a field more, of the squares of the residuals
 constexpr int most_rounds = 4;
 constexpr double least_round_gain = 0.05;  // of the cost, for which another round is worth its time
 
@@ -258,9 +258,7 @@ class LawPlan::Replay {
       move_cuts(*next, from, name);
       tried.cost = next->cost;
       tried.evidence = next->found.evidence;
-      const double deviation = best().found.deviation;
-      tried.kept = is_chosen || (tried.evidence > needed_evidence &&
-                                 next->found.squares(deviation) < (1.0 - least_gain) * best().found.squares(deviation));
+      tried.kept = is_chosen || (tried.evidence > needed_evidence && gains_enough(*next));
       // While its cuts move, it is the best already where it will be kept as it is.
       if (is_pending() && tried.kept) now_.best = next;
     }
@@ -345,10 +343,17 @@ class LawPlan::Replay {
       if (next) {
         tried.cost = next->cost;
         tried.evidence = next->found.evidence;
-        tried.kept = is_chosen || tried.evidence > needed_evidence;
+        tried.kept = is_chosen || (tried.evidence > needed_evidence && gains_enough(*next));
       }
     }
     conclude(std::move(next), tried, noise);
+  }
+
+  /// Whether moduli of their own for parts of the object take enough off the squares of the residuals: what a mesh
+  /// lacks is no noise, and many markers make evidence of little.
+  bool gains_enough(const Estimate& next) {
+    const double deviation = best().found.deviation;
+    return next.found.squares(deviation) < (1.0 - least_gain) * best().found.squares(deviation);
   }
 
   const LawFacts& facts_;

@@ -17,7 +17,7 @@ std::optional<double> known_poissons_ratio(const FitOptions& options);
 /// terms, and Poisson's ratios of their own for them, as long as the Bayesian information criterion falls; then zones
 /// of laws of their own, cut one after the other where that promises most, as long as the evidence supports them
 /// (`log_bayes_factor`) and each takes three per cent off the squares of the residuals, or, where a capture names
-/// regions, a law for each of them; and where no zone is kept, control points of Young's modulus by their evidence. The
+/// regions, a law for each of them; and where no zone is kept, control points of Young's modulus by the same rule. The
 /// noise, and how it grows with displacement, is what the residuals say, robustly (`robust_noise`). A sampled material
 /// (`PressSampling`) begins with one law of one or two terms.
 /// @return  with `FitOutcome::law`

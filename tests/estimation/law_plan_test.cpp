@@ -198,7 +198,8 @@ TEST_F(LawPlans, RegionsGetALawEachByTheEvidence) {
 }
 
 TEST_F(LawPlans, FieldsAreFittedWhereAStepPromisesSomething) {
-  answer = [](const Stage& stage, StageRecord& r) {
+  double squares = 0.9;
+  answer = [&squares](const Stage& stage, StageRecord& r) {
     if (stage.id.kind == StageKind::ControlPoints) {
       const int size = stage.law->shape.form.controls;
       r.law->points.assign(std::size_t(size), Vector3::Zero());
@@ -206,13 +207,17 @@ TEST_F(LawPlans, FieldsAreFittedWhereAStepPromisesSomething) {
       r.theta = VectorX::Constant(stage.from.front().size() + size - stage.law->before.form.controls, 0.1);
       r.law->evidence = size == 8 ? 1.0 : -1.0;
     }
-    if (stage.id.kind == StageKind::Law && stage.law->shape.form.controls == 8) r.law->evidence = 5.0;
+    if (stage.id.kind == StageKind::Law && stage.law->shape.form.controls == 8)
+      r.law->evidence = 5.0, r.law->track_squares *= squares;
   };
   const std::vector<std::string> all = names();
   EXPECT_EQ(std::ranges::count(all, "4 control points"), 1) << "promised only";
   EXPECT_EQ(std::ranges::count(all, "8 control points"), 2);
   EXPECT_EQ(end.best->shape.form.controls, 8);
   EXPECT_EQ(end.best->shape.points.size(), 8u);
+  squares = 0.98;
+  (void)names();
+  EXPECT_EQ(end.best->shape.form.controls, 1) << "evidence, and hardly anything taken off the residuals";
 }
 
 TEST_F(LawPlans, SamplesFollowTheLawOfAllPressesInRoundsWhileThatGains) {
