@@ -44,7 +44,7 @@ BLOCK_WORDS = ("After Bickel et al. 2009, section 6: a block of three layers of 
                "Errors are against markers without noise: root mean squares over the greatest displacement of each press, averaged over presses. "
                "The target is for the mean of Ogden's fit over all presses, fitted and test.\n\n"
                "What limits the fits: a zone is kept only where it takes three per cent off the squares of the residuals, too, and under much noise that turns away zones for which the evidence is strong (the fits' notes, in results.json). "
-               "The sampled material was fitted to markers without noise alone: with noise that grows with displacement it follows the noise, for it knows one deviation for all markers of a press, and many presses then find no equilibrium. "
+               "The figures of all three materials are of a program that knew one deviation for all markers of a press; with it the sampled material followed noise that grows with displacement, and many presses then found no equilibrium, so it was fitted to markers without noise alone. pliant now estimates how noise grows, and takes samples in rounds (`pliant fit --set material=sampled`): these rows have not been made anew. "
                f"Bickel et al. give, for their sampled material on a block of theirs, {', '.join(f'{100 * paper:.1f} % at {int(noise)} %' for noise, (_, paper) in NOISE.items())} noise; that method is run here without noise alone.\n\n")
 
 
