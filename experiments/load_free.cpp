@@ -1,12 +1,14 @@
 // A bar of two stiffnesses, scanned as it sags, then struck: its load-free shape and both moduli are unknown.
 //   pliant_load_free compare CELLS NOISE
-//     both moduli from several starts, with derivatives through the equilibrium, by the splitting of Wang 2015
-//     (algorithm 1), and with the scan taken for load-free; JSON on stdout
+//     both moduli from several starts, with derivatives through the equilibrium, by a splitting, and with the scan
+//     taken for load-free; and as Wang 2015 does it (algorithm 1, section 6.3): by a downhill simplex that finds the
+//     load-free shape before each evaluation, from where the vibrations' frequencies lead. JSON on stdout
 //   pliant_load_free landscape CELLS NOISE COUNT
 //     the cost over a grid of COUNT x COUNT moduli; null where no load-free shape holds the scan up
 // CELLS are elements along the bar, those of the truth twice as many; NOISE [m] is that of the points that are
 // followed.
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +20,7 @@
 #include <string>
 
 #include "elasticity/modulus_field.hpp"
+#include "estimation/modal_start.hpp"
 #include "estimation/optimiser.hpp"
 
 namespace pliant {
@@ -159,47 +162,69 @@ Objective objective_of(const Recorded& recorded, const ParameterSet& parameters,
   return {mismatch, recorded.scanned, options, recorded.seen, parameters, compare};
 }
 
+/// Factors of the true moduli that the vibrations' frequencies about the scan lead to, from equal moduli.
+std::array<double, 2> modal_start_of(const Recorded& recorded) {
+  TrackedPoints tracked;
+  tracked.rest = recorded.followed;
+  for (const FrameObservations& frame : *recorded.seen) tracked.frames[frame.frame] = frame.tracks;
+  const VectorX theta = make_theta(1e6, 1e6);
+  const ModalStart start = modal_start(recorded.scanned, layout, theta, held_nodes(*recorded.scanned, hold()), tracked,
+                                       scene_of(1).times, {.curve_samples = 0});
+  if (!start.found) throw std::runtime_error("no start by vibrations: " + start.reason);
+  return {start.moduli[0] / youngs_moduli[0], start.moduli[1] / youngs_moduli[1]};
+}
+
+constexpr const char* simplex = "simplex, shape before each evaluation";
+
+/// One fit of both moduli, over more and more frames.
+json fitted(const Recorded& recorded, const std::string& scheme, const std::array<double, 2>& times_truth) {
+  const bool scan_sags = scheme.front() != 's' || scheme == simplex;
+  const ParameterSet parameters = parameters_from(times_truth[0] * youngs_moduli[0], times_truth[1] * youngs_moduli[1]);
+  OptimiserOptions options;
+  options.max_iterations = !scan_sags ? 8 : 60;  // it runs to a bound, slowly
+  options.step_tolerance = 1e-4;
+  options.cost_tolerance = 1e-6;
+  if (scheme == simplex) options.kind = OptimiserKind::NelderMead, options.max_iterations = 400;
+  const auto begin = std::chrono::steady_clock::now();
+  OptimiserSummary s;
+  s.p = parameters.to_unconstrained(parameters.reference());
+  int iterations = 0, evaluations = 0;
+  for (const int last_frame : {frames / 4, frames / 2, frames - 1}) {  // swings out of step are all alike
+    Objective objective = objective_of(recorded, parameters, scan_sags, last_frame);
+    const OptimiserState start{0, s.p, {}};
+    s = scheme == "in turns" ? minimise_staggered(objective, start, options) : minimise(objective, start, options);
+    iterations += s.iterations, evaluations += s.evaluations;
+    if (!s.succeeded) break;
+  }
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const VectorX theta = parameters.to_theta(s.p);
+  json run = {{"scheme", scheme},           {"start", times_truth}, {"succeeded", s.succeeded},
+              {"converged", s.converged},   {"reason", s.reason},   {"iterations", iterations},
+              {"evaluations", evaluations}, {"seconds", seconds}};
+  if (s.succeeded) {
+    run["cost"] = s.evaluation.cost;
+    run["errors"] = {theta[layout.youngs_moduli[0]] / youngs_moduli[0] - 1.0,
+                     theta[layout.youngs_moduli[1]] / youngs_moduli[1] - 1.0};
+    if (scan_sags) {
+      SimulationOptions own = scene_of(4);
+      own.scan_sags = true;
+      const Points X = Simulation(recorded.scanned, own).rest_body(theta)->nodes;
+      run["shape_error"] =
+          (X.topRows(recorded.straight.rows()) - recorded.straight).rowwise().norm().maxCoeff() / length;
+    }
+  }
+  std::fprintf(stderr, "%s\n", run.dump().c_str());
+  return run;
+}
+
 json compare(const Recorded& recorded) {
   json runs = json::array();
-  const std::pair<double, double> starts[] = {{2.0, 0.5}, {3.0, 3.0}};
-  for (const auto& [held, free] : starts)
-    for (const std::string scheme : {"together", "in turns", "scan taken for load-free"}) {
-      const ParameterSet parameters = parameters_from(held * youngs_moduli[0], free * youngs_moduli[1]);
-      OptimiserOptions options;
-      options.max_iterations = scheme.front() == 's' ? 8 : 60;  // it runs to a bound, slowly
-      options.step_tolerance = 1e-4;
-      options.cost_tolerance = 1e-6;
-      const auto begin = std::chrono::steady_clock::now();
-      OptimiserSummary s;
-      s.p = parameters.to_unconstrained(parameters.reference());
-      int iterations = 0, evaluations = 0;
-      for (const int last_frame : {frames / 4, frames / 2, frames - 1}) {  // swings out of step are all alike
-        Objective objective = objective_of(recorded, parameters, scheme.front() != 's', last_frame);
-        const OptimiserState start{0, s.p, {}};
-        s = scheme == "in turns" ? minimise_staggered(objective, start, options) : minimise(objective, start, options);
-        iterations += s.iterations, evaluations += s.evaluations;
-        if (!s.succeeded) break;
-      }
-      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      const VectorX theta = parameters.to_theta(s.p);
-      json run = {{"scheme", scheme},           {"start", {held, free}}, {"succeeded", s.succeeded},
-                  {"converged", s.converged},   {"reason", s.reason},    {"iterations", iterations},
-                  {"evaluations", evaluations}, {"seconds", seconds}};
-      if (s.succeeded) {
-        run["cost"] = s.evaluation.cost;
-        run["errors"] = {theta[layout.youngs_moduli[0]] / youngs_moduli[0] - 1.0,
-                         theta[layout.youngs_moduli[1]] / youngs_moduli[1] - 1.0};
-        if (scheme.front() != 's') {
-          SimulationOptions own = scene_of(4);
-          own.scan_sags = true;
-          const Points X = Simulation(recorded.scanned, own).rest_body(theta)->nodes;
-          run["shape_error"] =
-              (X.topRows(recorded.straight.rows()) - recorded.straight).rowwise().norm().maxCoeff() / length;
-        }
-      }
-      runs.push_back(run);
-      std::fprintf(stderr, "%s\n", run.dump().c_str());
-    }
+  const std::array<double, 2> starts[] = {{2.0, 0.5}, {3.0, 3.0}};
+  for (const std::array<double, 2>& start : starts)
+    for (const char* scheme : {"together", "in turns", "scan taken for load-free"})
+      runs.push_back(fitted(recorded, scheme, start));
+  const std::array<double, 2> by_modes = modal_start_of(recorded);
+  for (const char* scheme : {"together", simplex}) runs.push_back(fitted(recorded, scheme, by_modes));
   return runs;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <random>
 #include <stdexcept>
 
 #include "elasticity/modulus_field.hpp"
@@ -65,14 +67,57 @@ Box box_of(const Vector3& min, const Vector3& max) {
 
 }  // namespace
 
-TrackedObject make_bar(int controls) {
-  constexpr double length = 1.0, edge = 0.25;  // [m]
+namespace {
+
+constexpr double length = 1.0, edge = 0.25;  // of the bar [m]
+
+/// Nodes of a body, each at most once.
+std::vector<Vector3> random_nodes(const Body& body, int count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<int> chosen;
+  std::vector<Vector3> points;
+  while (int(points.size()) < count) {
+    const int n = int(random() % unsigned(body.node_count()));
+    if (std::ranges::find(chosen, n) != chosen.end()) continue;
+    chosen.push_back(n);
+    points.push_back(body.nodes.row(n).transpose());
+  }
+  return points;
+}
+
+std::vector<StartingMotion> struck_bar() {
+  return {{"twist", {0, 0, 0}, {10, 0, 0}, {}},
+          {"bend", {0, 0.5, 0}, {0, 0, 1}, {}},
+          {"stretch", {1.5, 0, 0}, {0, 0, 0}, {}}};
+}
+
+/// The free end turned about the bar's axis, bent up, or pulled out.
+std::vector<StartingMotion> led_bar() {
+  const auto at_end = [](const Vector3& p) { return p.x() > (1.0 - 1e-6) * length; };
+  const auto led = [&](const char* name, const Matrix3& rotation, const Vector3& end) {
+    const Vector3 middle(length, 0, 0);
+    return StartingMotion{name, Vector3::Zero(), Vector3::Zero(), Hold{at_end, rotation, end - rotation * middle}};
+  };
+  const auto turned = [](double degrees, const Vector3& axis) {
+    return Eigen::AngleAxisd(degrees * std::numbers::pi / 180.0, axis).toRotationMatrix();
+  };
+  return {led("twist", turned(60.0, Vector3::UnitX()), {length, 0, 0}),
+          led("bend", turned(30.0, Vector3::UnitZ()), {0.95 * length, 0.25 * length, 0}),
+          led("stretch", Matrix3::Identity(), {1.15 * length, 0, 0})};
+}
+
+}  // namespace
+
+TrackedObject make_bar(int controls, unsigned seed, bool deformed_starts) {
   const Box box = box_of({0, -0.5 * edge, -0.5 * edge}, {length, 0.5 * edge, 0.5 * edge});
   Body body = make_body(make_tet_box(box, {20, 5, 5}, false));
-  if (controls > 1) body.modulus = linear_field(body, Vector3::UnitX(), controls).field;
+  if (controls > 1)
+    body.modulus = (seed == 0 ? linear_field(body, Vector3::UnitX(), controls)
+                              : harmonic_field(body, random_nodes(body, controls, seed)))
+                       .field;
   return {std::make_shared<Body>(std::move(body)),
           {[](const Vector3& p) { return p.x() < 1e-6 * length; }},
-          {{"twist", {0, 0, 0}, {10, 0, 0}}, {"bend", {0, 0.5, 0}, {0, 0, 1}}, {"stretch", {1.5, 0, 0}, {0, 0, 0}}},
+          deformed_starts ? led_bar() : struck_bar(),
           length};
 }
 
@@ -91,7 +136,7 @@ TrackedObject make_dinosaur(int controls, double cell_size) {
   const double size = body.size();
   return {std::make_shared<Body>(std::move(body)),
           {[](const Vector3& p) { return p.y() < 0.03; }},
-          {{"swing", {0.3, 0, 0.3}, {0, 1, 0}}},
+          {{"swing", {0.3, 0, 0.3}, {0, 1, 0}, {}}},
           size};
 }
 

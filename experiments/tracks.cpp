@@ -1,6 +1,8 @@
 // Moduli and dampings of an object from the motion of all its nodes (Wang 2015), as JSON on stdout.
 //   pliant_tracks [NAME=VALUE]...
 // object=bar|dinosaur   see tracked_objects.hpp; cell_size=L of the dinosaur [m]
+// seed=N                of the bar's control points' places; 0: evenly along it
+// starts=struck|deformed of the bar: with a velocity from rest, or at rest from poses in which its end was held
 // task=fit|landscape|deviations
 // moduli=E,E,...        of the truth, one for all or one a control point [Pa]
 // controls=N            that are fitted
@@ -16,7 +18,8 @@
 // budget=S              wall time [s] after which it is stopped; evaluations=N likewise
 // samples=N, from=E, to=E   of the landscape: the cost at N x N pairs of the first two moduli [Pa], all else true
 //
-// Objects are set in motion at rest, once a recording, without gravity.
+// Without gravity, one recording a motion. Where a deformed object is at the start is known, as it would be from its
+// track.
 
 #include <sys/resource.h>
 
@@ -49,6 +52,8 @@ constexpr double off = 10.0;
 
 const Choices standard_choices = {{"object", "bar"},
                                   {"cell_size", "0.03"},
+                                  {"seed", "0"},
+                                  {"starts", "struck"},
                                   {"task", "fit"},
                                   {"moduli", "6.8e5"},
                                   {"controls", "1"},
@@ -96,7 +101,8 @@ std::vector<double> numbers(const std::string& list) {
 
 TrackedObject make_object(const Choices& choices, int controls) {
   if (choices.at("object") == "dinosaur") return make_dinosaur(controls, std::stod(choices.at("cell_size")));
-  if (choices.at("object") == "bar") return make_bar(controls);
+  if (choices.at("object") == "bar")
+    return make_bar(controls, unsigned(std::stoul(choices.at("seed"))), choices.at("starts") == "deformed");
   throw std::invalid_argument("\"" + choices.at("object") + "\" is not an object; see experiments/tracks.cpp");
 }
 
@@ -199,6 +205,8 @@ class Experiment {
       const int last = m == observed_motion_for_modes() ? integer("frames") - 1 : horizons().back();
       auto frames = std::make_shared<std::vector<FrameObservations>>();
       double farthest = 0.0;
+      options.start = start_of(truth, motion, options);
+      starts_.push_back(options.start);
       Simulation simulation(truth.body, options);
       const VectorX theta = make_theta(layout, motion, {truth_, alpha, beta});
       const RolloutSummary summary =
@@ -212,6 +220,24 @@ class Experiment {
       observations_.push_back(std::move(frames));
     }
     return seen;
+  }
+
+  /// Where a motion's nodes are when it begins: in the equilibrium in which a part of the object is led; empty where
+  /// none is, and it begins at rest.
+  Points start_of(const TrackedObject& object, const StartingMotion& motion, SimulationOptions options) const {
+    if (!motion.led) return {};
+    options.start = {};
+    options.holds.push_back(*motion.led);
+    options.is_static = true;
+    options.times = {0.0};
+    Points start;
+    const VectorX theta = make_theta(MotionLayout({.moduli = int(truth_.size())}), motion, {truth_, alpha, beta});
+    const RolloutSummary summary = Simulation(object.body, options).run(theta, [&](int, const State& state, auto) {
+      start = state.x;
+      return true;
+    });
+    if (!summary.succeeded) throw std::runtime_error("the deformed start has no equilibrium: " + summary.failure);
+    return start;
   }
 
   std::vector<TrackObservation> followed(const Points& positions, std::mt19937& random) const {
@@ -373,6 +399,7 @@ class Experiment {
       set_motion(joint.blocks[r].motion, object_.motions[r], {moduli_, mass_damping_, stiffness_damping_}, start);
       ObservedMotion motion{{nullptr, tracks}, body_, options_, observations_[r], {}};
       motion.simulation.blocks = joint.blocks[r].motion;
+      motion.simulation.start = starts_[r];
       motion.options.outlier_scale = 10.0 * object_.size;  // squares, as in the paper
       motion.options.last_frame = last_frame;
       recordings.push_back(std::move(motion));
@@ -475,6 +502,7 @@ class Experiment {
   std::vector<int> held_;
   std::vector<Vector3> rest_;
   std::vector<std::shared_ptr<const std::vector<FrameObservations>>> observations_;
+  std::vector<Points> starts_;  // one a motion; empty: at rest
   VectorX truth_, moduli_;
   double mass_damping_ = 0.0, stiffness_damping_ = 0.0;
 };

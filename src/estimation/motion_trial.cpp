@@ -117,8 +117,7 @@ void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const P
   const RobustLoss loss{outlier_scale};
   const double share = frame_weight(seen);
   MatrixX J = MatrixX::Zero(fit.points, tangents.directions);
-  for (std::size_t c = 0; c < tangents.along.size(); ++c)
-    J.col(tangents.along[c]) = surface.tangent(matches, tangents.positions[c]);
+  J(Eigen::all, tangents.along) = surface.tangents(matches, tangents.positions);
   VectorX weight(fit.points), weighted(fit.points);
   fit.distances.assign(std::size_t(fit.points), float(outlier_scale));
   for (int i = 0; i < fit.points; ++i) {

@@ -112,6 +112,9 @@ DisplacementExtension::DisplacementExtension(const HexGrid& grid, const SignedDi
   rest_.resize(count, 3);
   for (int n = 0; n < count; ++n) rest_.row(n) = position(index[n]).transpose();
 
+  row_of_band_.resize(std::size_t(count));
+  for (std::size_t k = 0; k < known_band_.size(); ++k) row_of_band_[std::size_t(known_band_[k])] = int(k);
+  for (std::size_t f = 0; f < free_band_.size(); ++f) row_of_band_[std::size_t(free_band_[f])] = -1 - int(f);
   std::vector<int> known_of(std::size_t(count), -1);
   for (std::size_t k = 0; k < known_band_.size(); ++k) known_of[std::size_t(known_band_[k])] = int(k);
   const auto knowns = Eigen::Index(known_band_.size()), frees = Eigen::Index(free_band_.size());
@@ -177,6 +180,29 @@ Points DisplacementExtension::apply(const Points& u) const {
   Points g(rest_.rows(), 3);
   for (std::size_t k = 0; k < known_band_.size(); ++k) g.row(known_band_[k]) = known.row(Eigen::Index(k));
   for (std::size_t f = 0; f < free_band_.size(); ++f) g.row(free_band_[f]) = free.row(Eigen::Index(f));
+  return g;
+}
+
+DisplacementExtension::Fields DisplacementExtension::apply_at(std::span<const int> band_nodes, const Fields& u) const {
+  Fields known(Eigen::Index(known_body_.size()), u.cols());
+  for (std::size_t k = 0; k < known_body_.size(); ++k) known.row(Eigen::Index(k)) = u.row(known_body_[k]);
+  std::array<Fields, 3> gradient;
+  for (std::size_t d = 0; d < 3; ++d) gradient[d] = operators_->gradient[d] * known;
+  Fields g = Fields::Zero(Eigen::Index(band_nodes.size()), u.cols());
+  const auto add_row = [&](const auto& matrix, int row, const Fields& fields, Eigen::Index to) {
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(matrix, row); entry; ++entry)
+      g.row(to) += entry.value() * fields.row(entry.col());
+  };
+  for (std::size_t i = 0; i < band_nodes.size(); ++i) {
+    const int row = row_of_band_[std::size_t(band_nodes[i])];
+    const auto to = Eigen::Index(i);
+    if (row >= 0) {
+      g.row(to) = known.row(row);
+      continue;
+    }
+    add_row(operators_->value, -1 - row, known, to);
+    for (std::size_t d = 0; d < 3; ++d) add_row(operators_->lever[d], -1 - row, gradient[d], to);
+  }
   return g;
 }
 

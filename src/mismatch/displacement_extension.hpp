@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "mesh/hex_grid.hpp"
@@ -14,6 +15,9 @@ namespace pliant {
 /// rest by more than about a quarter, and points seen a little outside of it would lie nowhere.
 class DisplacementExtension {
  public:
+  /// Displacements side by side, x y z of each, one row a node.
+  using Fields = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
   /// @param band  how far from the surface the extension reaches [m], > 0
   DisplacementExtension(const HexGrid& grid, const SignedDistance& distance, double band);
   ~DisplacementExtension();
@@ -27,6 +31,9 @@ class DisplacementExtension {
 
   /// g = E u: n x 3 at the body's nodes to m x 3 at the band's.
   [[nodiscard]] Points apply(const Points& u) const;
+  /// Rows of E U for several displacements side by side: n x 3 q at the body's nodes to one row a band node asked for.
+  /// What points lie in is a small part of a wide band.
+  [[nodiscard]] Fields apply_at(std::span<const int> band_nodes, const Fields& u) const;
   /// E^T g: m x 3 to n x 3.
   [[nodiscard]] Points apply_transpose(const Points& g) const;
 
@@ -39,6 +46,7 @@ class DisplacementExtension {
   std::vector<Vector3> cell_corners_;
   std::vector<int> known_band_, known_body_;  // band nodes that are body nodes, and which
   std::vector<int> free_band_;                // the others
+  std::vector<int> row_of_band_;  // of each band node: its row among the known ones, or -1 - among the others
   std::unique_ptr<Operators> operators_;
 };
 

@@ -119,15 +119,35 @@ std::vector<PointMatch> SurfaceConstraints::match(std::span<const SurfaceObserva
   return matches;
 }
 
-VectorX SurfaceConstraints::tangent(const std::vector<PointMatch>& matches, const Points& d_positions) const {
-  const Points g = extended(d_positions);
-  VectorX change = VectorX::Zero(Eigen::Index(matches.size()));
+MatrixX SurfaceConstraints::tangents(const std::vector<PointMatch>& matches,
+                                     std::span<const Points> d_positions) const {
+  const auto count = Eigen::Index(d_positions.size());
+  MatrixX change = MatrixX::Zero(Eigen::Index(matches.size()), count);
+  if (count == 0) return change;
+  std::vector<int> row_of(std::size_t(extension_.rest_positions().rows()), -1), wanted;
+  for (const PointMatch& m : matches) {
+    if (m.cell < 0) continue;
+    for (const int node : extension_.cells()[m.cell]) {
+      int& row = row_of[std::size_t(node)];
+      if (row >= 0) continue;
+      row = int(wanted.size());
+      wanted.push_back(node);
+    }
+  }
+  const bool is_embedded = lattice_in_body_.point_count() > 0;
+  DisplacementExtension::Fields u(is_embedded ? lattice_in_body_.point_count() : body_->node_count(), 3 * count);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    const Points& d = d_positions[std::size_t(c)];
+    u.middleCols<3>(3 * c) = is_embedded ? lattice_in_body_.positions(d) : d;
+  }
+  const DisplacementExtension::Fields g = extension_.apply_at(wanted, u);
+  Eigen::RowVectorXd moved(3 * count);
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const PointMatch& m = matches[i];
     if (m.cell < 0) continue;
-    Vector3 moved = Vector3::Zero();
-    for (int a = 0; a < 8; ++a) moved += m.weights[a] * g.row(extension_.cells()[m.cell][a]).transpose();
-    change[Eigen::Index(i)] = m.direction.dot(moved);
+    moved.setZero();
+    for (int a = 0; a < 8; ++a) moved += m.weights[a] * g.row(row_of[std::size_t(extension_.cells()[m.cell][a])]);
+    change.row(Eigen::Index(i)) = m.direction.transpose() * moved.reshaped(3, count);
   }
   return change;
 }

@@ -42,8 +42,8 @@ class SurfaceConstraints {
   [[nodiscard]] std::vector<PointMatch> match(std::span<const SurfaceObservation> points,
                                               const Points& positions) const;
 
-  /// Changes of the distances for a change of the node positions (n x 3); 0 for unmatched points.
-  [[nodiscard]] VectorX tangent(const std::vector<PointMatch>& matches, const Points& d_positions) const;
+  /// Changes of the distances, one a column, for changes of the node positions (n x 3 each); 0 for unmatched points.
+  [[nodiscard]] MatrixX tangents(const std::vector<PointMatch>& matches, std::span<const Points> d_positions) const;
 
   /// Cotangent of the node positions (n x 3) for one of the distances.
   [[nodiscard]] Points adjoint(const std::vector<PointMatch>& matches, const VectorX& distance_bar) const;

@@ -179,7 +179,8 @@ TEST(SurfaceConstraints, PointsBeyondTheBandAreNotMatched) {
   for (const PointMatch& m : torus.constraints.match(observed(torus_points(0.95 * band, 300)), torus.X()))
     EXPECT_GE(m.cell, 0);
   const auto matches = torus.constraints.match(observed(far), torus.X());
-  EXPECT_EQ(torus.constraints.tangent(matches, torus.X()).norm(), 0.0);
+  const Points d = torus.X();
+  EXPECT_EQ(torus.constraints.tangents(matches, {&d, 1}).norm(), 0.0);
   EXPECT_EQ(torus.constraints.adjoint(matches, VectorX::Ones(3)).norm(), 0.0);
 }
 
@@ -245,7 +246,7 @@ TEST(SurfaceConstraints, TangentMatchesCentralDifferencesAndAdjointTheTangent) {
   points.emplace_back(9, 9, 9);  // and one that matches nothing
   const auto seen = observed(points);
   const auto matches = torus.constraints.match(seen, x);
-  const VectorX tangent = torus.constraints.tangent(matches, direction);
+  const VectorX tangent = torus.constraints.tangents(matches, {&direction, 1}).col(0);
   ASSERT_GT(tangent.head(60).cwiseAbs().minCoeff(), 0.0);
   EXPECT_EQ(tangent[60], 0.0);
   const auto along = [&](double h) {
@@ -262,6 +263,31 @@ TEST(SurfaceConstraints, TangentMatchesCentralDifferencesAndAdjointTheTangent) {
   for (double& b : bar) b = normal(random);
   const Points x_bar = torus.constraints.adjoint(matches, bar);
   EXPECT_NEAR(bar.dot(tangent), x_bar.cwiseProduct(direction).sum(), tolerance(1e-12) * bar.norm() * tangent.norm());
+}
+
+TEST(SurfaceConstraints, TangentsOfSeveralDirectionsAreThoseOfTheWholeExtension) {
+  const Torus torus(0.04, 0.002);
+  const DisplacementExtension& E = torus.constraints.extension();
+  const Points x = bent(torus.X());
+  std::vector<Vector3> points = torus_points(0.007, 60);
+  for (Vector3& p : points) p = bent(p);
+  points.emplace_back(9, 9, 9);
+  const auto matches = torus.constraints.match(observed(points), x);
+  const std::vector<Points> directions = {test::deformed(torus.X(), 0.8, 0.5), test::deformed(torus.X(), -0.3, 0.2)};
+  const MatrixX tangents = torus.constraints.tangents(matches, directions);
+  ASSERT_EQ(tangents.rows(), 61);
+  ASSERT_EQ(tangents.cols(), 2);
+  for (int c = 0; c < 2; ++c) {
+    const Points g = E.apply(directions[std::size_t(c)]);
+    for (int i = 0; i < 60; ++i) {
+      const PointMatch& m = matches[std::size_t(i)];
+      Vector3 moved = Vector3::Zero();
+      for (int a = 0; a < 8; ++a) moved += m.weights[a] * g.row(E.cells()[m.cell][a]).transpose();
+      EXPECT_NEAR(tangents(i, c), m.direction.dot(moved), tolerance(1e-12)) << i;
+    }
+  }
+  EXPECT_GT((tangents.col(0) - tangents.col(1)).norm(), 1e-3);
+  EXPECT_EQ(torus.constraints.tangents(matches, {}).cols(), 0);
 }
 
 TEST(RobustLoss, IsHalfTheSquareNearZeroAndConstantBeyondItsScale) {
