@@ -151,7 +151,7 @@ def truth_of_paper(runs):
         rows.append([name, found] + [small(r["errors"][key]) for r in shown.values()])
     rows.append(["processor time [s]", "1.5 h, 8 cores"] + [f"{r['processor_seconds']:.0f}" for r in shown.values()])
     rows.append(["evaluations", ""] + [str(r["evaluations"]) for r in shown.values()])
-    text = ("\n**The paper's own truth**: its eight moduli, over three decades, at nodes drawn at random (two draws), mixed by harmonic weights; the bar is let go from the equilibria in which its end "
+    text = ("\n**The paper's own truth**: its eight moduli, over three decades, at nodes drawn at random, mixed by harmonic weights; the bar is let go from the equilibria in which its end "
             "is twisted by 60 degrees, bent up by a quarter of its length, and pulled out by 15 %; 250 frames of each. Which of its control points had which modulus the paper does not say. Errors:\n\n" +
             table(["truth [Pa]", "Wang 2015"] + list(heads.values()), rows))
     even = runs.get("paper_even_1-8")
