@@ -72,6 +72,8 @@ void describe_world(const Capture& capture) {
                             capture.scene.timing.times.back() - capture.scene.timing.times.front(),
                             capture.scene.timing.start_frame,
                             capture.scene.timing.is_static ? ", all of one equilibrium (static)" : ""));
+  if (const auto& inner = capture.scene.inner; !inner.empty())
+    say("inside", formatted("%zu rigid bod%s", inner.size(), inner.size() == 1 ? "y" : "ies"));
   if (!capture.scene.fixed.empty())
     say("held", formatted("%zu region%s", capture.scene.fixed.size(), capture.scene.fixed.size() == 1 ? "" : "s"));
   if (!capture.scene.weights.empty()) {

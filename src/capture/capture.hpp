@@ -142,7 +142,7 @@ struct Capture {
   std::filesystem::path folder;  ///< absolute; patterns of the capture are relative to it
   std::filesystem::path file;    ///< the capture.toml itself
   std::string name;
-  std::string sha256;  ///< of capture.toml and the surface file, hexadecimal
+  std::string sha256;  ///< of capture.toml and the files of surfaces, hexadecimal
 
   Scene scene;
 
@@ -164,10 +164,10 @@ struct Capture {
 Capture read_capture(const std::filesystem::path& path);
 
 /// Writes `capture.toml` into a folder, and the files beside it that hold what the value itself holds: `rest.ply` where
-/// the surface has no file, `timestamps.txt` where frames have no common rate, lists of vertices. Files that the value
-/// names by their paths are there already, and are named relative to the folder. `read_capture` gives the same facts
-/// back; rotations and unit vectors to the last digit but one. `capture.toml` is written last: a folder with it is
-/// whole.
+/// the surface has no file, `timestamps.txt` where frames have no common rate, lists of vertices, inner bodies. Files
+/// that the value names by their paths are there already, and are named relative to the folder. `read_capture` gives
+/// the same facts back; rotations and unit vectors to the last digit but one. `capture.toml` is written last: a folder
+/// with it is whole.
 /// @param comment  first line of the file, without its number sign; "" for none
 /// Throws InputError where a file cannot be written.
 void write_capture(const std::filesystem::path& folder, const Capture& capture, const std::string& comment = "");

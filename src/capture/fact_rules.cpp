@@ -84,6 +84,9 @@ void check_pose(RuleContext& context) {
   if (object.volume)
     context.toml.complain("object.pose", "`pose` is \"unknown\", and the object is a volume mesh", "a `surface`",
                           "place its surface by `pliant place` and move the volume by what place.json says");
+  if (!capture.scene.inner.empty())
+    context.toml.complain("object.pose", "`pose` is \"unknown\", and a rigid body lies inside the object",
+                          "a known pose", "place the scan by `pliant place` first");
   if (capture.depth.empty() && capture.clouds.empty())
     context.toml.complain("object.pose", "`pose` is \"unknown\", and nothing shows the surface",
                           "depth images or clouds", "");

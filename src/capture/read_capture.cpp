@@ -4,6 +4,7 @@
 #include "base/sha256.hpp"
 #include "capture/capture.hpp"
 #include "capture/capture_rules.hpp"
+#include "scene/inner_body.hpp"
 #include "scene/scene_toml.hpp"
 
 namespace pliant {
@@ -62,10 +63,12 @@ class Reader {
     root.each_block("control",
                     [&](TomlTable& block) { scene.controls.push_back(read_material_control(block, files_)); });
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
+    root.each_block("inner", [&](TomlTable& block) { scene.inner.push_back(read_inner(block, files_)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
     root.with_table("wind", [&](TomlTable& wind) { scene.wind = read_wind(wind, true); });
     root.each_block("force", [&](TomlTable& block) { scene.forces.push_back(read_force(block, true)); });
     root.with_table("initial", [&](TomlTable& initial) { scene.initial = read_initial(initial); });
+    cut_out_inner_bodies(context_, scene);
   }
 
   static bool is_of_curves_alone(const TomlTable& root) {
@@ -277,7 +280,9 @@ Capture read_capture(const fs::path& path) {
   for (const Rule rule : capture_rules()) rule(rules);
   context.throw_problems();
   const fs::path& shape = capture.scene.object.file;
-  capture.sha256 = sha256({content, shape.empty() ? std::string() : read_file(shape)});
+  std::string surfaces = shape.empty() ? std::string() : read_file(shape);
+  for (const InnerBody& body : capture.scene.inner) surfaces += read_file(body.file);
+  capture.sha256 = sha256({content, surfaces});
   return capture;
 }
 

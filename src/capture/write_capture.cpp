@@ -3,6 +3,7 @@
 #include "base/files.hpp"
 #include "capture/capture.hpp"
 #include "geometry/mesh_io.hpp"
+#include "scene/inner_body.hpp"
 #include "scene/scene_toml.hpp"
 
 namespace pliant {
@@ -157,7 +158,7 @@ void write_capture(const fs::path& folder, const Capture& capture, const std::st
   if (const auto& surface = capture.scene.object.surface; surface && capture.scene.object.file.empty()) {
     written.scene.object.file = place / "rest.ply";
     written.scene.object.volume.reset();
-    write_mesh(written.scene.object.file, *surface);
+    write_mesh(written.scene.object.file, scanned_surface(*surface, capture.scene.inner));
   }
   write_scene_files(place, capture.scene);
   for (std::size_t i = 0; i < capture.grips.size(); ++i)

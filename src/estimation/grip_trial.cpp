@@ -24,12 +24,15 @@ std::vector<int> held_by_all(const PressScene& scene, const ObservedGrip& test) 
 GrippedBody::GrippedBody(const PressScene& scene, const ObservedGrip& test, std::shared_ptr<const MaterialLaw> law)
     : body_(scene.body),
       test_(test),
-      equilibrium_(scene.body, law, held_by_all(scene, test), {}, EquilibriumOptions{.tolerance = 1e-9}),
+      equilibrium_(scene.body, law, held_by_all(scene, test),
+                   scene.contacts(std::nullopt, mean_modulus(*scene.body, *law)),
+                   EquilibriumOptions{.tolerance = 1e-9}),
       forces_(LawElasticity::make(scene.body, std::move(law))),
       markers_(*scene.body, test.rest),
       dead_load_(scene.dead_load()),
       direction_(Points::Zero(scene.body->node_count(), 3)) {
   equilibrium_.set_dead_load(dead_load_);
+  keep_inner_bodies(equilibrium_, 0);
   for (const int n : test_.nodes) direction_.row(n) = test_.direction.transpose();
 }
 
@@ -59,7 +62,21 @@ Points GrippedBody::internal_forces() const {
   Points forces = Points::Zero(body_->node_count(), 3);
   (void)forces_->evaluate(placement_.nodes, false);
   forces_->add_gradient(forces);
+  for (int c = 0; c < equilibrium_.contact_count(); ++c) {
+    const RigidContact& contact = equilibrium_.contact(c);
+    for (int i = 0; i < contact.points().point_count(); ++i) {
+      const Vector3 y = contact.points().position(i, placement_.nodes);
+      contact.points().add_transpose(i, contact.potential(i, y, false).gradient, forces);
+    }
+  }
   return forces;
+}
+
+Points GrippedBody::response(const Points& forces) {
+  if (equilibrium_.contact_count() == 0) return equilibrium_.response(forces);
+  Points all = Points::Zero(forces.rows() + equilibrium_.contact_count(), 3);
+  all.topRows(forces.rows()) = forces;
+  return equilibrium_.response(all).topRows(forces.rows());
 }
 
 double GrippedBody::force() const { return (internal_forces() - dead_load_).cwiseProduct(direction_).sum(); }
@@ -73,6 +90,15 @@ bool GrippedBody::prepare_derivatives() {
   VectorX product;
   stiffness.multiply(flat(direction_), product);
   force_by_nodes_ = Eigen::Map<const Points>(product.data(), body_->node_count(), 3);
+  for (int c = 0; c < equilibrium_.contact_count(); ++c) {
+    const RigidContact& contact = equilibrium_.contact(c);
+    for (int i = 0; i < contact.points().point_count(); ++i) {
+      const Vector3 along = contact.points().position(i, direction_);
+      if (along.isZero()) continue;
+      const Vector3 y = contact.points().position(i, placement_.nodes);
+      contact.points().add_transpose(i, contact.potential(i, y, false).hessian * along, force_by_nodes_);
+    }
+  }
   return true;
 }
 

@@ -23,7 +23,7 @@ class GrippedBody {
   /// Ready for the calls below. False where the equilibrium is not stable.
   [[nodiscard]] bool prepare_derivatives();
   /// Change of the nodes for a change of the forces on them: see `Equilibrium::response`.
-  const Points& response(const Points& forces) { return equilibrium_.response(forces); }
+  [[nodiscard]] Points response(const Points& forces);
   /// Change of the measured force for a change of the nodes that are free [N/m], one row a node.
   const Points& force_by_nodes() const { return force_by_nodes_; }
   /// The measured force's direction at the nodes that are moved, zero elsewhere.

@@ -4,24 +4,16 @@
 
 namespace pliant {
 
-namespace {
-
-std::vector<RigidContact> one(RigidContact contact) {
-  std::vector<RigidContact> contacts;
-  contacts.push_back(std::move(contact));
-  return contacts;
-}
-
-}  // namespace
-
 IndentedBody::IndentedBody(const PressScene& scene, const ObservedIndentation& test,
                            std::shared_ptr<const MaterialLaw> law, double modulus)
     : depths_(test.curve.depths),
       axis_(probe_axis(*scene.body, test.probe)),
-      equilibrium_(scene.body, std::move(law), scene.held, one(probe_contact(*scene.body, test.probe, modulus)),
+      equilibrium_(scene.body, std::move(law), scene.held,
+                   scene.contacts(probe_contact(*scene.body, test.probe, modulus), modulus),
                    EquilibriumOptions{.tolerance = 1e-8}),
       placements_(depths_.size()) {
   equilibrium_.set_dead_load(scene.dead_load());
+  keep_inner_bodies(equilibrium_, 1);
 }
 
 bool IndentedBody::solve(std::size_t depth) {
@@ -48,7 +40,7 @@ bool IndentedBody::force_derivative(std::size_t depth, const PressedMaterial& ma
   if (!equilibrium_.prepare_derivatives(placement)) return false;
   const RigidContact& contact = equilibrium_.contact(0);
   const int n = equilibrium_.body().node_count();
-  Points bar = Points::Zero(n + 1, 3), of_nodes = Points::Zero(n, 3);
+  Points bar = Points::Zero(n + equilibrium_.contact_count(), 3), of_nodes = Points::Zero(n, 3);
   for (int i = 0; i < contact.points().point_count(); ++i) {
     const Vector3 y =
         contact.points().position(i, placement.nodes) - Vector3(placement.translations.row(0).transpose());

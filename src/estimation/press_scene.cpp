@@ -11,6 +11,7 @@
 #include "base/parallel.hpp"
 #include "estimation/problem.hpp"
 #include "motion/press_session.hpp"
+#include "simulation/inner_bodies.hpp"
 
 namespace pliant {
 
@@ -63,12 +64,6 @@ ProbeControl control_of(const Press& press) {
   return control;
 }
 
-std::vector<RigidContact> one(RigidContact contact) {
-  std::vector<RigidContact> contacts;
-  contacts.push_back(std::move(contact));
-  return contacts;
-}
-
 std::vector<Vector3> without_probe(const ObservedPress& seen) {
   return {seen.rest.begin(), seen.rest.end() - (seen.has_probe ? 1 : 0)};
 }
@@ -82,12 +77,13 @@ bool is_of_static_tests(const Capture& capture) {
 
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body) {
   PressScene scene;
-  scene.held = held_nodes(*body, held_regions(capture.scene));
+  scene.held = held_nodes(*body, capture.scene);
+  scene.sliding = sliding_bodies(capture.scene);
   const bool is_pressed = !capture.presses.empty() || !capture.indentations.empty() || !capture.grips.empty();
   if (is_pressed && scene.held.size() < 3)
     throw InputError({{capture.file},
                       "nothing holds the object while it is pressed",
-                      "a block [[fixed]] that holds nodes of the mesh",
+                      "a block [[fixed]] that holds nodes of the mesh, or a glued [[inner]]",
                       "say where the object stands or is clamped"});
   const double volume = body->volume();
   scene.density =
@@ -116,6 +112,18 @@ void weigh_by_stated_deviations(std::vector<ObservedPress>& presses) {
   }
 }
 
+std::vector<RigidContact> PressScene::contacts(std::optional<RigidContact> probe, double youngs_modulus) const {
+  std::vector<RigidContact> contacts;
+  if (probe) contacts.push_back(std::move(*probe));
+  for (RigidContact& inner : inner_contacts(*body, sliding, youngs_modulus)) contacts.push_back(std::move(inner));
+  return contacts;
+}
+
+void keep_inner_bodies(Equilibrium& equilibrium, int first) {
+  for (int i = first; i < equilibrium.contact_count(); ++i)
+    equilibrium.set_control(i, {ProbeControl::Kind::Position, {}, Vector3::Zero(), {}});
+}
+
 const StaticTests& PressScene::static_tests() const {
   static const StaticTests no_tests;
   return tests ? *tests : no_tests;
@@ -124,11 +132,12 @@ const StaticTests& PressScene::static_tests() const {
 PressedBody::PressedBody(const PressScene& scene, int press, std::shared_ptr<const MaterialLaw> law,
                          double youngs_modulus)
     : equilibrium_(scene.body, std::move(law), scene.held,
-                   one(contact_of(scene, scene.facts[std::size_t(press)], youngs_modulus))),
+                   scene.contacts(contact_of(scene, scene.facts[std::size_t(press)], youngs_modulus), youngs_modulus)),
       points_(*scene.body, without_probe(scene.presses[std::size_t(press)])),
       centre_(scene.facts[std::size_t(press)].contact_centre),
       has_probe_(scene.presses[std::size_t(press)].has_probe) {
   equilibrium_.set_dead_load(scene.dead_load());
+  keep_inner_bodies(equilibrium_, 1);
   equilibrium_.set_control(0, control_of(scene.facts[std::size_t(press)]));
 }
 

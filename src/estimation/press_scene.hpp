@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,16 +42,23 @@ struct PressScene {
   std::vector<ObservedPress> presses;
   std::vector<Press> facts;                       ///< of the same presses
   std::shared_ptr<const StaticTests> tests = {};  ///< curves and grips; null: none
+  /// Rigid bodies inside or under the object on which it slides; those that it is glued to are held nodes.
+  std::vector<std::shared_ptr<const RigidShape>> sliding = {};
 
   Points dead_load() const { return density * unit_weight; }
+  /// Contacts of an equilibrium: a probe's, if any, and those of the rigid bodies, which stay where they are.
+  std::vector<RigidContact> contacts(std::optional<RigidContact> probe, double youngs_modulus) const;
   /// Curves and grips; none where there are none.
   const StaticTests& static_tests() const;
 };
 
 /// Reads a capture's presses (all roles) around a body of its object.
-/// Throws InputError where nothing holds an object that is pressed or gripped, a press' markers are too few, or its
-/// disc covers nothing.
+/// Throws InputError where neither region nor glued body holds an object that is pressed or gripped, a press' markers
+/// are too few, or its disc covers nothing.
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body);
+
+/// Rigid bodies of an equilibrium from this one on stay where they are.
+void keep_inner_bodies(Equilibrium& equilibrium, int first);
 
 /// Makes weights of the deviations [m] that `weights` of presses hold where captures state them: each over the median
 /// of all; 1 for what states none. How large they are is what residuals say (`robust_noise`).

@@ -8,7 +8,8 @@
 #include <stdexcept>
 
 #include "base/base64.hpp"
-#include "motion/fixed_regions.hpp"
+#include "base/error.hpp"
+#include "simulation/inner_bodies.hpp"
 #include "simulation/scene_simulation.hpp"
 
 // The files beside this one, as they are: what users get needs no other file.
@@ -105,7 +106,13 @@ std::string facts(const Model& model, const LiveData& data, const LiveRecording&
 }  // namespace
 
 LiveData live_data(const Model& model) {
+  if (has_sliding_bodies(model.scene))
+    throw InputError({{},
+                      "a model that slides on a rigid body inside it ([[inner]] with contact = \"sliding\")",
+                      "glued bodies, or none",
+                      "pages know no sliding bodies: `pliant press` does"});
   Model free = model;
+  free.scene.inner.clear();  // what they hold is among the held nodes
   free.scene.initial.released = false;
   free.scene.initial.release_of.reset(), free.scene.initial.pulls.clear();
   free.scene.wind.reset(), free.scene.forces.clear();  // hands and sliders take their place
@@ -135,7 +142,7 @@ LiveData live_data(const Model& model) {
   }
   const Timing& timing = model.scene.timing;
   if (data.law && (timing.is_static || timing.times.empty()) && made.body->kind != ElementKind::Hexahedron)
-    data.held = held_nodes(*made.body, held_regions(model.scene));
+    data.held = held_nodes(*made.body, model.scene);
   data.is_pressed = !data.held.empty();
   // A model of presses that says nothing of gravity has none: it is stress-free as it was scanned.
   if (data.is_pressed && !model.scene.world.gravity) data.theta.segment<3>(live_blocks(data.planes).gravity).setZero();

@@ -11,6 +11,7 @@
 #include "geometry/mesh_io.hpp"
 #include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
+#include "scene/inner_body.hpp"
 #include "scene/scene_toml.hpp"
 
 namespace pliant {
@@ -159,10 +160,12 @@ class Reader {
     root.with_table("timing", [&](TomlTable& timing) { scene.timing = read_even_timing(timing, 10'000'000); });
     root.with_table("initial", [&](TomlTable& initial) { scene.initial = read_initial(initial, true); });
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
+    root.each_block("inner", [&](TomlTable& block) { scene.inner.push_back(read_inner(block, files_)); });
     root.each_block("fixed", [&](TomlTable& block) { scene.fixed.push_back(read_fixed(block, files_)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
     root.with_table("wind", [&](TomlTable& wind) { scene.wind = read_wind(wind, false); });
     root.each_block("force", [&](TomlTable& block) { scene.forces.push_back(read_force(block, false)); });
+    cut_out_inner_bodies(context_, scene);
     check_vertex_lists(context_, scene);
   }
 
@@ -266,7 +269,7 @@ class Reader {
 
 void save_model(const fs::path& folder, const Model& model) {
   if (!model.volume.connectivity.empty()) write_volume(folder / "model.vtu", model.volume);
-  write_mesh(folder / "surface.ply", model.scene.object.surface.value());
+  write_mesh(folder / "surface.ply", scanned_surface(model.scene.object.surface.value(), model.scene.inner));
   write_scene_files(folder, model.scene);
   if (model.law) write_law(folder / "material.csv", *model.law);
   write_file(folder / "model.toml", model_toml(model));

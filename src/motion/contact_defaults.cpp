@@ -15,6 +15,9 @@ constexpr double ball_stiffness = 100.0;   // of a ball, which touches a small p
 constexpr double punch_smoothing = 0.005;  // over which pressure sets in, in radii
 constexpr double ball_smoothing = 0.01;    // likewise
 constexpr double punch_rim = 0.05;         // radius of the rounded rim, in radii
+constexpr double inner_stiffness = 50.0;   // of a body on which the object slides, in layers of elements
+constexpr double inner_smoothing = 0.01;   // over which its pressure sets in, in edges
+constexpr int inner_cuts = 2;              // of a face, for the samples where it acts
 constexpr auto quadratic = Penalty::Onset::Quadratic;  // of probes: at a distance they do not touch
 constexpr int fewest_cuts = 4, most_cuts = 8;          // of a face, for the samples where contact acts
 
@@ -70,6 +73,24 @@ RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double y
                                  Penalty{ball_stiffness * youngs_modulus / edge, ball_smoothing * radius, quadratic});
   return RigidContact::sliding(body, samples, rigid_punch(probe.centre, axis, radius, punch_rim * radius),
                                Penalty{bond_stiffness(youngs_modulus, edge), punch_smoothing * radius, quadratic});
+}
+
+RigidContact inner_contact(const Body& body, std::shared_ptr<const RigidShape> shape, double youngs_modulus) {
+  const double edge = mean_edge(body);
+  const ContactSamples all = boundary_samples(body, inner_cuts);
+  ContactSamples facing;
+  for (std::size_t i = 0; i < all.rest.size(); ++i)
+    if (shape->sample(all.rest[i]).gradient.dot(all.normal[i]) < 0.0) {
+      facing.rest.push_back(all.rest[i]);
+      facing.area.push_back(all.area[i]);
+    }
+  if (facing.rest.empty())
+    throw InputError({{}, "a rigid body that nothing of the object faces", "one inside the object or under it", ""});
+  RigidContact contact =
+      RigidContact::sliding(body, facing, std::move(shape),
+                            Penalty{inner_stiffness * youngs_modulus / edge, inner_smoothing * edge, quadratic});
+  contact.touch_at_rest();
+  return contact;
 }
 
 double bond_stiffness(double youngs_modulus, double edge) { return bond * youngs_modulus / edge; }

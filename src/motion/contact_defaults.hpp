@@ -53,6 +53,12 @@ Vector3 probe_axis(const Body& body, const ProbeOptions& probe);
 /// Throws InputError where the probe is bonded and covers nothing of the object, std::invalid_argument for hexahedra.
 RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double youngs_modulus);
 
+/// The contact of a body of tetrahedra that slides on a rigid body inside or under it. Only what faces it can touch it,
+/// and what touches it at rest is not pressed there.
+/// @param youngs_modulus  about which the contact is stiff [Pa]: the object's mean
+/// Throws InputError where nothing of the object faces the body, std::invalid_argument for hexahedra.
+RigidContact inner_contact(const Body& body, std::shared_ptr<const RigidShape> shape, double youngs_modulus);
+
 /// Stiffness [Pa/m] of a disc's bond on elements of some edge [m]. Faces that a disc covers in part would follow it as
 /// a whole were it much stiffer, as if it were wider by about half an edge, or held what is held; softer by much, the
 /// disc would sink in. At ten times the stiffness of a layer of elements both are small.

@@ -77,11 +77,14 @@ ContactSamples surface_samples(const Body& body) {
 
 ContactSamples boundary_samples(const Body& body, int cuts) {
   ContactSamples samples;
-  for (const Face& face : boundary_faces(body))
+  for (const Face& face : boundary_faces(body)) {
+    const Vector3 normal = face.normal();
     cut(face, cuts, [&](const Vector3& point, double area) {
       samples.rest.push_back(point);
       samples.area.push_back(area);
+      samples.normal.push_back(normal);
     });
+  }
   return samples;
 }
 

@@ -8,8 +8,9 @@ namespace pliant {
 
 /// Points of an object's surface with areas, as finely spread as a contact asks for.
 struct ContactSamples {
-  std::vector<Vector3> rest;  ///< rest positions [m]
-  std::vector<double> area;   ///< area of each [m^2]
+  std::vector<Vector3> rest;         ///< rest positions [m]
+  std::vector<double> area;          ///< area of each [m^2]
+  std::vector<Vector3> normal = {};  ///< outwards, unit, of samples of a boundary's faces; else empty
 };
 
 /// The samples of the surface that a body of any kind comes with: about one a surface triangle or cell.

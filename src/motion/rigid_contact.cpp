@@ -1,5 +1,6 @@
 #include "motion/rigid_contact.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -103,8 +104,19 @@ bool RigidContact::may_rub() const {
   return start_ && friction_speed_ > 0.0 && (friction_ > 0.0 || (plane_ && plane_->friction.exists()));
 }
 
-RigidShape::Sample RigidContact::surface(const Vector3& y) const {
-  if (shape_) return shape_->sample(y);
+void RigidContact::touch_at_rest() {
+  if (!shape_) throw std::invalid_argument("a bond or a plane of the parameter vector has no gap at rest");
+  overlap_.clear();
+  for (const Vector3& point : rest_)
+    overlap_.push_back(std::min(0.0, shape_->sample(point).distance - penalty_.reach()));
+}
+
+RigidShape::Sample RigidContact::surface(int point, const Vector3& y) const {
+  if (shape_) {
+    RigidShape::Sample at = shape_->sample(y);
+    if (!overlap_.empty()) at.distance -= overlap_[std::size_t(point)];
+    return at;
+  }
   return {plane_normal_.dot(y - plane_point_), plane_normal_, Matrix3::Zero()};
 }
 
@@ -154,7 +166,7 @@ void RigidContact::linearise(const Points& lag) {
   for (int p = 0; p < points_.point_count(); ++p) {
     const Vector3 y = relative(p, lag);
     if (shape_) {
-      const RigidShape::Sample at = shape_->sample(y);
+      const RigidShape::Sample at = surface(p, y);
       if (at.distance > reach) continue;
       touch(p, y, at.distance, at.gradient);
       details_.emplace_back().bend = at.hessian;
@@ -374,7 +386,7 @@ RigidContact::Potential RigidContact::potential(int i, const Vector3& y, bool po
     p.hessian = k * Matrix3::Identity();
     return p;
   }
-  const RigidShape::Sample at = surface(y);
+  const RigidShape::Sample at = surface(i, y);
   if (at.distance >= penalty_.reach()) return p;
   const Penalty::Value value = penalty_.at(at.distance);
   p.energy = area * value.energy;

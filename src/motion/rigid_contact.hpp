@@ -59,6 +59,10 @@ class RigidContact : public ForceTerm {
   /// The rigid body is turned about a point, which its translation then moves; bonded samples turn along. Throws
   /// std::invalid_argument for a plane of the parameter vector and for a shape that is led.
   void turn(const Matrix3& rotation, const Vector3& centre);
+  /// What lies nearer at rest than pressure sets in touches there without pressure: elements cut corners of a curved
+  /// body, and would be pressed by it in their stress-free shape. The gap of each sample counts from there.
+  /// Throws std::invalid_argument for a bond or a plane of the parameter vector.
+  void touch_at_rest();
   /// Where the rigid body is [m], unless its translation is unknown.
   void set_translation(const Vector3& translation) { translation_ = translation; }
   /// From now on the translation is unknown: this row of positions, forces and matrices.
@@ -120,7 +124,8 @@ class RigidContact : public ForceTerm {
   /// Whether there is a step in which friction acts, and whether it does with the coefficient at hand.
   bool may_rub() const;
   bool rubs() const { return friction_ > 0.0 && may_rub(); }
-  RigidShape::Sample surface(const Vector3& y) const;
+  /// Of the shape or plane, with the distance from which a sample's gap counts.
+  RigidShape::Sample surface(int point, const Vector3& y) const;
   Vector3 relative(int point, const Points& positions) const;
   Vector3 relative_change(int point, const Points& changes) const;
   /// The transpose of `relative_change`.
@@ -139,7 +144,8 @@ class RigidContact : public ForceTerm {
   Embedding points_;
   std::vector<Vector3> rest_, bond_;  // of samples [m]: at rest; where a turned bond would have them
   std::vector<double> area_;
-  std::vector<int> blocks_;  // where each element's blocks go in the matrix
+  std::vector<double> overlap_;  // of samples [m]: less than nothing where they touch at rest; empty: none does
+  std::vector<int> blocks_;      // where each element's blocks go in the matrix
   std::shared_ptr<const RigidShape> shape_;
   std::optional<PlaneBlock> plane_;
   Penalty penalty_;

@@ -1,7 +1,9 @@
 #include "motion/rigid_shape.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 namespace pliant {
 
@@ -122,6 +124,93 @@ class Grid : public RigidShape {
   double sign_;
 };
 
+/// A distance as a uniform cubic spline of its values at grid points, by the quasi-interpolant that keeps cubic
+/// polynomials: coefficients (-f_-1 + 8 f_0 - f_1) / 6 along each axis.
+class SmoothGrid : public RigidShape {
+ public:
+  explicit SmoothGrid(SignedDistance distance) : distance_(std::move(distance)) {
+    const Box box = distance_.box();
+    const double h = distance_.spacing();
+    origin_ = box.min;
+    size_ = (box.extent() / h).array().round().cast<int>() + 1;
+    const std::size_t n = std::size_t(size_.x()) * std::size_t(size_.y()) * std::size_t(size_.z());
+    std::vector<float> values(n), filtered(n);
+    for (int k = 0; k < size_.z(); ++k)
+      for (int j = 0; j < size_.y(); ++j)
+        for (int i = 0; i < size_.x(); ++i)
+          values[at(i, j, k)] = float(distance_.value(origin_ + h * Vector3(i, j, k)));
+    const std::array<std::size_t, 3> stride = {1, std::size_t(size_.x()),
+                                               std::size_t(size_.x()) * std::size_t(size_.y())};
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int k = 0; k < size_.z(); ++k)
+        for (int j = 0; j < size_.y(); ++j)
+          for (int i = 0; i < size_.x(); ++i) {
+            const std::size_t here = at(i, j, k), step = stride[std::size_t(axis)];
+            const int place = Eigen::Vector3i(i, j, k)[axis];
+            const bool is_inside = place > 0 && place + 1 < size_[axis];
+            filtered[here] =
+                is_inside ? (8.0f * values[here] - values[here - step] - values[here + step]) / 6.0f : values[here];
+          }
+      values.swap(filtered);
+    }
+    coefficients_ = std::move(values);
+  }
+
+  Sample sample(const Vector3& p) const override {
+    const double h = distance_.spacing();
+    const Vector3 place = (p - origin_) / h;
+    Eigen::Vector3i first;
+    for (int axis = 0; axis < 3; ++axis) {
+      first[axis] = int(std::floor(place[axis])) - 1;
+      if (!(place[axis] >= 1.0) || first[axis] + 3 >= size_[axis]) {  // at its border and beyond nobody touches it
+        const SignedDistance::Sample far = distance_.sample(p);
+        return {far.value, far.gradient, Matrix3::Zero()};
+      }
+    }
+    std::array<std::array<std::array<double, 4>, 3>, 3> basis;  // [axis][derivative]
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto a = Eigen::Index(axis);
+      const double t = place[a] - double(first[a] + 1), s = 1.0 - t;
+      basis[axis][0] = {s * s * s / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+                        (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0, t * t * t / 6.0};
+      basis[axis][1] = {-0.5 * s * s, 1.5 * t * t - 2.0 * t, 2.0 * s - 1.5 * s * s, 0.5 * t * t};
+      basis[axis][2] = {s, 3.0 * t - 2.0, 3.0 * s - 2.0, t};
+    }
+    Sample out{0.0, Vector3::Zero(), Matrix3::Zero()};
+    const auto& [bx, by, bz] = basis;
+    for (std::size_t c = 0; c < 4; ++c)
+      for (std::size_t b = 0; b < 4; ++b) {
+        const float* row = &coefficients_[at(first.x(), first.y() + int(b), first.z() + int(c))];
+        std::array<double, 3> along{};
+        for (std::size_t a = 0; a < 4; ++a)
+          for (std::size_t d = 0; d < 3; ++d) along[d] += bx[d][a] * double(row[a]);
+        out.distance += along[0] * by[0][b] * bz[0][c];
+        out.gradient +=
+            Vector3(along[1] * by[0][b] * bz[0][c], along[0] * by[1][b] * bz[0][c], along[0] * by[0][b] * bz[1][c]);
+        out.hessian(0, 0) += along[2] * by[0][b] * bz[0][c];
+        out.hessian(1, 1) += along[0] * by[2][b] * bz[0][c];
+        out.hessian(2, 2) += along[0] * by[0][b] * bz[2][c];
+        out.hessian(0, 1) += along[1] * by[1][b] * bz[0][c];
+        out.hessian(0, 2) += along[1] * by[0][b] * bz[1][c];
+        out.hessian(1, 2) += along[0] * by[1][b] * bz[1][c];
+      }
+    out.gradient /= h;
+    out.hessian(1, 0) = out.hessian(0, 1), out.hessian(2, 0) = out.hessian(0, 2), out.hessian(2, 1) = out.hessian(1, 2);
+    out.hessian /= h * h;
+    return out;
+  }
+
+ private:
+  std::size_t at(int i, int j, int k) const {
+    return (std::size_t(k) * std::size_t(size_.y()) + std::size_t(j)) * std::size_t(size_.x()) + std::size_t(i);
+  }
+
+  SignedDistance distance_;
+  Vector3 origin_;
+  Eigen::Vector3i size_;
+  std::vector<float> coefficients_;
+};
+
 }  // namespace
 
 std::shared_ptr<const RigidShape> rigid_half_space(const Vector3& point, const Vector3& normal) {
@@ -144,6 +233,9 @@ std::shared_ptr<const RigidShape> rigid_moved(std::shared_ptr<const RigidShape> 
 }
 std::shared_ptr<const RigidShape> rigid_grid(SignedDistance distance, bool hollow) {
   return std::make_shared<Grid>(std::move(distance), hollow);
+}
+std::shared_ptr<const RigidShape> rigid_smooth_grid(SignedDistance distance) {
+  return std::make_shared<SmoothGrid>(std::move(distance));
 }
 
 }  // namespace pliant

@@ -32,6 +32,9 @@ std::shared_ptr<const RigidShape> rigid_punch(const Vector3& tip, const Vector3&
 /// Any closed mesh as its signed distance on a grid, or its outside (`hollow`: an object that lies in a mould).
 /// Gradient and curvature are those of the interpolated distance: the gradient jumps a little from cell to cell.
 std::shared_ptr<const RigidShape> rigid_grid(SignedDistance distance, bool hollow = false);
+/// The same by cubic splines, with a gradient and a curvature that change smoothly: an equilibrium with much of the
+/// surface on the body is found to the last digit, and its derivatives are exact.
+std::shared_ptr<const RigidShape> rigid_smooth_grid(SignedDistance distance);
 /// A box about a point, with edges rounded.
 /// @param half    of its edges [m], > 0
 /// @param edge    radius by which edges and corners are rounded [m], in (0, least half edge]

@@ -22,6 +22,7 @@
 #include "report/gallery.hpp"
 #include "report/plot.hpp"
 #include "report/report.hpp"
+#include "simulation/inner_bodies.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
@@ -555,7 +556,8 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     const Model model = make_model(capture, outcome);
     save_model(folder, model);
     modulus_std = model.volume.youngs_modulus_std;
-    report.live_page = write_live_page(folder, recordings.front(), outcome, model);
+    if (!has_sliding_bodies(model.scene))  // of which pages know nothing
+      report.live_page = write_live_page(folder, recordings.front(), outcome, model);
   }
   if (outcome.law)
     write_law(folder, capture, *outcome.law, modulus_std, report, tell);

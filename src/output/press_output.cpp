@@ -30,6 +30,7 @@ Model make_model(const Capture& capture, const LawOutcome& outcome) {
   model.scene.world = capture.scene.world;
   model.scene.planes = capture.scene.planes;
   model.scene.fixed = capture.scene.fixed;
+  model.scene.inner = capture.scene.inner;
   model.cell_size = mean_edge(body);
   model.volume.nodes = body.nodes;
   model.volume.kind = body.kind == ElementKind::Tetrahedron ? VtuCell::Tetrahedron : VtuCell::QuadraticTetrahedron;

@@ -7,6 +7,7 @@
 
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
+#include "scene/inner_body.hpp"
 #include "scene/scene_toml.hpp"
 
 namespace pliant {
@@ -34,6 +35,8 @@ class Reader {
     read_part(root, "object", &Reader::read_object);
     read_part(root, "world", &Reader::read_gravity);
     root.each_block("fixed", [&](TomlTable& block) { session_.scene.fixed.push_back(read_fixed(block, files_)); });
+    root.each_block("inner", [&](TomlTable& block) { session_.scene.inner.push_back(read_inner(block, files_)); });
+    cut_out_inner_bodies(context_, session_.scene);
     check_vertex_lists(context_, session_.scene);
     read_part(root, "markers", &Reader::read_markers);
     read_part(root, "probe", &Reader::read_probe);

@@ -19,17 +19,6 @@ struct Contains {
   bool operator()(const RegionVertices&) const { return false; }
 };
 
-// Van Oosterom and Strackee 1983: the solid angle of a triangle.
-double winding_number(const TriangleMesh& surface, const Vector3& point) {
-  double angle = 0.0;
-  for (const auto& [i, j, k] : surface.triangles) {
-    const Vector3 a = surface.vertices[i] - point, b = surface.vertices[j] - point, c = surface.vertices[k] - point;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    angle += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return angle / (4.0 * std::numbers::pi);
-}
-
 // The part of the surface's bounding box in which the region lies.
 Box overlap(const Region& region, const TriangleMesh& surface) {
   Box box = bounding_box(surface);
@@ -45,6 +34,16 @@ Box overlap(const Region& region, const TriangleMesh& surface) {
 }
 
 }  // namespace
+
+double winding_number(const TriangleMesh& surface, const Vector3& point) {
+  double angle = 0.0;
+  for (const auto& [i, j, k] : surface.triangles) {
+    const Vector3 a = surface.vertices[i] - point, b = surface.vertices[j] - point, c = surface.vertices[k] - point;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    angle += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return angle / (4.0 * std::numbers::pi);
+}
 
 bool contains(const Region& region, const Vector3& point) { return std::visit(Contains{point}, region); }
 

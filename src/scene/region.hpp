@@ -6,6 +6,10 @@
 
 namespace pliant {
 
+/// How often a closed surface encloses a point: 1 inside a solid, 0 outside and in its cavities (Van Oosterom and
+/// Strackee 1983: the solid angle of a triangle).
+double winding_number(const TriangleMesh& surface, const Vector3& point);
+
 /// Whether a point [m] at rest lies in a region or on its border. A list of vertices contains no point of space: false.
 bool contains(const Region& region, const Vector3& point);
 

@@ -75,6 +75,19 @@ struct Plane {
   bool operator==(const Plane&) const = default;
 };
 
+/// Rigid body inside or under the object that stays where it is: a skull under the skin, a core, a table.
+struct InnerBody {
+  enum class Contact {
+    Sliding,  ///< the object slides on it and may lift off, without friction
+    Glued,    ///< the object's surface sticks where it touches it
+  };
+  TriangleMesh surface;        ///< closed, at rest [m]
+  std::filesystem::path file;  ///< of the surface, absolute; empty: of none
+  Contact contact = Contact::Sliding;
+  /// The object's `surface` is its scan less this body: the body's surface stands reversed at its end.
+  bool is_cut_out = false;
+};
+
 /// Attached point mass: hangs at a point of the object, and moves along with it.
 struct Weight {
   double mass = 0.0;             ///< [kg]
@@ -119,11 +132,12 @@ enum class ShapeIs { Reference, Static };
 
 /// The object itself.
 struct Object {
-  std::optional<TriangleMesh> surface;  ///< [m]; nothing: no rest scan, nothing can be fitted
-  std::optional<VolumeMesh> volume;     ///< tetrahedra made elsewhere, whose boundary `surface` then is
-  std::filesystem::path file;           ///< file of the surface or the volume, absolute; empty: of neither
-  std::optional<double> mass;           ///< [kg]
-  std::optional<double> density;        ///< [kg/m^3]
+  /// Boundary of the solid [m], of bodies inside it too; nothing: no rest scan, nothing can be fitted.
+  std::optional<TriangleMesh> surface;
+  std::optional<VolumeMesh> volume;  ///< tetrahedra made elsewhere, whose boundary `surface` then is
+  std::filesystem::path file;        ///< file of the surface or the volume, absolute; empty: of neither
+  std::optional<double> mass;        ///< [kg]
+  std::optional<double> density;     ///< [kg/m^3]
   ShapeIs shape_is = ShapeIs::Reference;
   bool pose_is_known = true;   ///< false: the surface stands anywhere, and is to be placed in the start frame
   bool scale_is_known = true;  ///< false: the surface is in any unit; its pose is unknown then too
@@ -161,6 +175,7 @@ struct Scene {
   std::vector<MaterialRegion> regions;
   std::vector<MaterialControl> controls;  ///< all with points or all with weights; none where there are regions
   std::vector<Plane> planes;
+  std::vector<InnerBody> inner;
   std::vector<Weight> weights;  ///< that hang in every frame
   std::optional<WindFacts> wind;
   std::vector<AppliedForce> forces;

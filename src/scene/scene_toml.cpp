@@ -10,6 +10,7 @@
 
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
+#include "scene/inner_body.hpp"
 #include "scene/region.hpp"
 
 namespace pliant {
@@ -538,6 +539,7 @@ void write_region_file(const fs::path& file, const Region& region) { write_verti
 
 void write_toml_blocks(std::ostream& out, const Scene& scene) {
   for (const Plane& plane : scene.planes) write_toml(out, plane);
+  write_inner_blocks(out, scene);
   for (std::size_t i = 0; i < scene.fixed.size(); ++i) {
     const FixedRegion& fixed = scene.fixed[i];
     out << "[[fixed]]\n" << region_text(fixed.region, vertices_name("fixed", i));
@@ -561,6 +563,7 @@ void write_toml_blocks(std::ostream& out, const Scene& scene) {
 }
 
 void write_scene_files(const fs::path& folder, const Scene& scene) {
+  write_inner_files(folder, scene);
   for (std::size_t i = 0; i < scene.fixed.size(); ++i)
     write_vertices(folder / vertices_name("fixed", i), scene.fixed[i].region);
   for (std::size_t i = 0; i < scene.regions.size(); ++i)

@@ -77,12 +77,13 @@ void write_region(std::ostream& out, const Region& region, const std::string& ve
 /// Writes that file where the region is a list of vertices. Throws InputError where it cannot be written.
 void write_region_file(const std::filesystem::path& file, const Region& region);
 
-/// Blocks [[plane]], [[fixed]], [[region]], [[control]], [[weight]] and [[force]], and the table [wind] of a scene.
+/// Blocks [[plane]], [[inner]], [[fixed]], [[region]], [[control]], [[weight]] and [[force]], and the table [wind] of a
+/// scene.
 void write_toml_blocks(std::ostream& out, const Scene& scene);
 
 /// Writes what the text refers to and the value itself holds: `fixed_0.txt`, `region_0.txt`, ... with the vertices of a
-/// region that lists them, by its number, `control_0.txt`, ... with the weights of a control point, and
-/// `timestamps.txt` [s]. Throws InputError where a file cannot be written.
+/// region that lists them, by its number, `control_0.txt`, ... with the weights of a control point, `inner_0.ply`,
+/// ... with inner bodies, and `timestamps.txt` [s]. Throws InputError where a file cannot be written.
 void write_scene_files(const std::filesystem::path& folder, const Scene& scene);
 
 }  // namespace pliant

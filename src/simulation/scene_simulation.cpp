@@ -6,6 +6,7 @@
 #include <iterator>
 #include <optional>
 
+#include "base/error.hpp"
 #include "meshing/mesh_distance.hpp"
 #include "motion/patch_forces.hpp"
 #include "motion/wind.hpp"
@@ -262,6 +263,12 @@ MotionCounts load_counts(const Scene& scene) {
 
 SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
                                   const MotionBlocks& blocks, const VectorX& theta, const SimulationOptions& settings) {
+  if (!scene.inner.empty())
+    throw InputError({{scene.inner.front().file},
+                      "a rigid body inside the object ([[inner]]) in what moves or carries loads",
+                      "presses, indentations and grips alone",
+                      "equilibria under probes know inner bodies (`pliant fit` of presses, `pliant press`); hold the "
+                      "object by [[fixed]] where it is glued, and leave out [[inner]]"});
   SimulationOptions simulation = settings;
   simulation.is_static = scene.timing.is_static;
   simulation.times.assign(scene.timing.times.begin() + scene.timing.start_frame, scene.timing.times.end());

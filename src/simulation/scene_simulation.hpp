@@ -94,6 +94,7 @@ void add_loads(const Scene& scene, SimulationOptions& simulation);
 /// @param blocks    of the motion's parameters, with the scene's planes, wind and forces
 /// @param theta     by those blocks; its density and gravity scale contact
 /// @param settings  what the scene does not say
+/// Throws InputError for a scene with inner bodies, of which motions know nothing.
 SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
                                   const MotionBlocks& blocks, const VectorX& theta,
                                   const SimulationOptions& settings = {});

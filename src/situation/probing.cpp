@@ -7,8 +7,8 @@
 
 #include "base/error.hpp"
 #include "meshing/mesh_distance.hpp"
-#include "motion/fixed_regions.hpp"
 #include "scene/region.hpp"
+#include "simulation/inner_bodies.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/scene_simulation.hpp"
@@ -46,7 +46,8 @@ Probing::Probing(const Model& model, const Situation& situation)
   refuse_what_takes_time(situation);
   const Scene& scene = model.scene;
   PressSessionOptions options;
-  options.held = held_nodes(*body_, held_regions(scene));
+  options.held = held_nodes(*body_, scene);
+  options.inner = inner_contacts(*body_, sliding_bodies(scene), mean_modulus(*body_, *law_));
   if (const auto& gravity = scene.world.gravity) {
     const Vector3 now = situation.gravity.empty() ? *gravity : situation.gravity.front().value;
     options.dead_load = weight_of(*body_, scene.object.density.value(), now);

@@ -10,6 +10,7 @@
 #include "motion/continuation.hpp"
 #include "motion/press_session.hpp"
 #include "rays/ray_scene.hpp"
+#include "simulation/inner_bodies.hpp"
 #include "simulation/scene_simulation.hpp"
 
 namespace pliant {
@@ -35,6 +36,7 @@ class Simulated {
         vertices_(*body_, synthetic.scene.object.surface->vertices) {
     if (synthetic.markers) markers_ = Embedding(*body_, synthetic.markers->points);
     if (synthetic.law) law_ = law_at(*body_, synthetic.law_layout(), parameters(synthetic.law_layout()));
+    sliding_ = sliding_bodies(scene());
     total_ = scene().timing.frame_count() + int(synthetic.loads.size() + synthetic.presses.size());
   }
 
@@ -187,10 +189,12 @@ class Simulated {
 
   PressSession session(const ProbeOptions& probe) const {
     PressSessionOptions options;
-    options.held = held_nodes(*body_, held_regions(scene()));
+    options.held = held_nodes(*body_, scene());
     options.dead_load = weight_of(*body_, synthetic_.true_density(), *scene().world.gravity);
     const LawLayout layout = synthetic_.law_layout();
-    return {body_, law_ ? law_ : law_at(*body_, layout, parameters(layout)), probe, options};
+    const auto law = law_ ? law_ : law_at(*body_, layout, parameters(layout));
+    options.inner = inner_contacts(*body_, sliding_, mean_modulus(*body_, *law));
+    return {body_, law, probe, options};
   }
 
   /// All the way, in parts where that is too far at once.
@@ -240,6 +244,7 @@ class Simulated {
   const std::function<bool(int, int)>& on_progress_;
   std::shared_ptr<const Body> body_;
   Embedding vertices_, markers_;
+  std::vector<std::shared_ptr<const RigidShape>> sliding_;
   std::shared_ptr<const MaterialLaw> law_;  // null: linear elasticity
   Points start_;                            // where nodes are at the start; empty: where they rest
   int done_ = 0, total_ = 0;

@@ -17,6 +17,7 @@
 #include "capture/point_cloud.hpp"
 #include "geometry/mesh_io.hpp"
 #include "rays/ray_scene.hpp"
+#include "scene/inner_body.hpp"
 #include "synthesis/synthetic_markers.hpp"
 
 namespace pliant {
@@ -102,6 +103,7 @@ TriangleMesh with_vertices(const TriangleMesh& surface, const Points& vertices) 
 TriangleMesh scanned(const Synthesis& s) {
   const TriangleMesh& surface = *s.scene.object.surface;
   TriangleMesh mesh = s.scan.rows() > 0 ? with_vertices(surface, s.scan) : surface;
+  mesh = scanned_surface(std::move(mesh), s.scene.inner);
   const std::vector<Vector3> normals = vertex_normals(mesh);
   if (s.scan_noise > 0.0)
     for (size_t i = 0; i < mesh.vertices.size(); ++i)

@@ -12,6 +12,7 @@
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
 #include "rays/look_at.hpp"
+#include "scene/inner_body.hpp"
 #include "scene/region.hpp"
 #include "scene/scene_toml.hpp"
 #include "synthesis/synthetic_markers.hpp"
@@ -49,6 +50,8 @@ class Reader {
     root.with_table("initial", [&](TomlTable& initial) { read_start(initial); });
     root.each_block("plane", [&](TomlTable& block) { read_scenery(block); });
     root.each_block("fixed", [&](TomlTable& block) { scene_.scene.fixed.push_back(read_fixed(block, files_)); });
+    root.each_block("inner", [&](TomlTable& block) { scene_.scene.inner.push_back(read_inner(block, files_)); });
+    cut_out_inner_bodies(context_, scene_.scene);
     root.each_block("region", [&](TomlTable& block) {
       read_part_modulus(block);
       scene_.scene.regions.push_back(read_material_region(block, files_));
@@ -504,11 +507,16 @@ class Reader {
   void check_what_is_held(TomlTable& root) {
     const Scene& scene = scene_.scene;
     const bool is_pressed = root.has("press") || root.has("indentation");
+    const bool is_glued =
+        std::ranges::find(scene.inner, InnerBody::Contact::Glued, &InnerBody::contact) != scene.inner.end();
     const auto need_fixed = [&](const std::string& key, const char* what) {
-      if (scene.fixed.empty() && !root.has("fixed"))
-        context_.complain(key, std::string(what) + " that nothing holds", "a block [[fixed]]",
+      if (scene.fixed.empty() && !root.has("fixed") && !is_glued)
+        context_.complain(key, std::string(what) + " that nothing holds", "a block [[fixed]], or a glued [[inner]]",
                           "say where the object stands or is clamped");
     };
+    if (!scene.inner.empty() && (root.has("timing") || root.has("load") || scene_.sags()))
+      context_.complain("inner[0]", "a rigid body inside an object that moves, carries loads or sags",
+                        "presses and indentations alone", "equilibria under probes alone know inner bodies");
     if (scene_.sags()) {
       need_fixed("object.shape_is", "an object that sags");
       if (scene.world.gravity && scene.world.gravity->isZero())

@@ -1,5 +1,6 @@
 #include "model/model.hpp"
 
+#include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
 #include "input_errors.hpp"
 #include "temporary_folder.hpp"
@@ -69,6 +70,25 @@ TEST(Model, ComesBackAsItWasSaved) {
   EXPECT_EQ(read.volume.youngs_modulus_std, m.volume.youngs_modulus_std);
   EXPECT_EQ(read.volume.poissons_ratio, m.volume.poissons_ratio);
   EXPECT_EQ(read.volume.fill, m.volume.fill);
+}
+
+TEST(Model, KeepsTheRigidBodyInside) {
+  const TemporaryFolder folder;
+  Model m = full_model();
+  const TriangleMesh skin = make_sphere(0.15, 3), core = make_sphere(0.09, 3);
+  m.scene.object.surface = skin;
+  m.scene.fixed.clear();
+  const int first = int(skin.vertices.size());
+  TriangleMesh& layer = *m.scene.object.surface;  // as a capture's reader leaves it
+  layer.vertices.insert(layer.vertices.end(), core.vertices.begin(), core.vertices.end());
+  for (const auto& [a, b, c] : core.triangles) layer.triangles.push_back({first + a, first + c, first + b});
+  m.scene.inner = {{core, {}, InnerBody::Contact::Glued, true}};
+  save_model(folder.path(), m);
+  const Model read = load_model(folder / "model.toml");
+  ASSERT_EQ(read.scene.inner.size(), 1u);
+  EXPECT_EQ(read.scene.inner[0].contact, InnerBody::Contact::Glued);
+  EXPECT_EQ(read.scene.object.surface->triangles, layer.triangles);
+  EXPECT_EQ(read_mesh(folder / "surface.ply").vertices.size(), skin.vertices.size()) << "the skin alone";
 }
 
 TEST(Model, FormerNamesAreRead) {

@@ -53,6 +53,48 @@ TEST(RigidGrid, IsTheMeshsDistanceAndItsOutside) {
   EXPECT_NEAR(rigid_grid(ball, true)->sample(p).distance, 0.03 - p.norm(), 1e-4);
 }
 
+TEST(RigidSmoothGrid, IsTheMeshsDistanceWithSmoothDerivatives) {
+  const double radius = 0.03;
+  const auto shape = rigid_smooth_grid(test::sphere_distance(radius, 0.001, 0.02));
+  for (int k = 0; k < 60; ++k) {
+    const Vector3 way = Vector3(std::sin(3.1 * k), std::sin(1.7 * k + 1.0), std::cos(2.3 * k)).normalized();
+    const Vector3 p = (radius + 0.005 * std::sin(5.0 * k)) * way, direction = Vector3(0.3, -0.5, 0.8).normalized();
+    const RigidShape::Sample s = shape->sample(p);
+    EXPECT_NEAR(s.distance, p.norm() - radius, 1e-6);
+    EXPECT_LT((s.gradient - way).norm(), 1e-3);
+    EXPECT_LT((s.hessian - (Matrix3::Identity() - way * way.transpose()) / p.norm()).norm(), 1.0);
+    const double h = 1e-6;
+    const RigidShape::Sample a = shape->sample(p - h * direction), b = shape->sample(p + h * direction);
+    EXPECT_NEAR((b.distance - a.distance) / (2 * h), s.gradient.dot(direction), 1e-7);
+    EXPECT_LT(((b.gradient - a.gradient) / (2 * h) - s.hessian * direction).norm(), 1e-4 * s.hessian.norm());
+  }
+  const Vector3 far(0.2, 0.0, 0.0);
+  EXPECT_NEAR(shape->sample(far).distance, 0.17, 1e-3);
+}
+
+TEST(RigidContact, TouchesAtRestWithoutPressure) {
+  // Faces of coarse elements lie inside a ball that their nodes lie on: without more they would be pressed at rest.
+  const auto body = test::tet_body({0.1, 0.02, 0.1}, {3, 1, 3}, false);
+  const auto ball = rigid_ball({0.0, -0.11, 0.0}, 0.103);
+  RigidContact contact =
+      RigidContact::sliding(*body, boundary_samples(*body, 2), ball, Penalty{1e6, 1e-4, Penalty::Onset::Quadratic});
+  EXPECT_GT(contact.force(body->nodes, Vector3::Zero()).y(), 1.0);
+  contact.touch_at_rest();
+  EXPECT_LT(contact.force(body->nodes, Vector3::Zero()).norm(), tolerance(1e-12)) << "rounding alone";
+  Points lower = body->nodes;
+  lower.col(1).array() -= 1e-3;
+  const double force = contact.force(lower, Vector3::Zero()).y();
+  EXPECT_GT(force, 1.0);
+  // The same way once more meets the full stiffness of what touches.
+  lower.col(1).array() -= 1e-3;
+  EXPECT_GT(contact.force(lower, Vector3::Zero()).y(), 1.8 * force);
+  contact.linearise(lower);
+  Points forces = Points::Zero(body->node_count(), 3);
+  contact.add_force(lower, forces);
+  EXPECT_NEAR(forces.col(1).sum(), contact.force(lower, Vector3::Zero()).y(), tolerance(1e-12) * 1e3);
+  EXPECT_THROW(RigidContact::bonded(*body, boundary_samples(*body, 1), 1e3).touch_at_rest(), std::invalid_argument);
+}
+
 TEST(DiscSamples, CoverTheDiscWhateverTheMesh) {
   for (const int cells : {2, 5}) {
     const auto body = test::tet_body({0.2, 0.1, 0.2}, {cells, 2, cells}, false);
