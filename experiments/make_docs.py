@@ -14,6 +14,7 @@ from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_mount
 from material_curves_page import material_curves
 from oracle_tracking_page import clouds
 from page import IMAGES, ROOT, judged, machine, percent, results, table, with_truth
+from pressed_bodies_page import pressed_bodies
 from presses_page import presses
 from real_tracks_page import real_tracks
 from silicone_beam_page import silicone_beam
@@ -458,6 +459,8 @@ SECTIONS = [
      "Real: a knobbly ball, a plush dog and two cloths, moved by hands and a robot; rest surfaces made of their own frames. `pliant track`, with no choice of ours.", real_tracks),
     ("Presses with known force", None,
      "Simulated: blocks that are pressed at many places by a disc with a known force, markers on their surface followed. The material is fitted to most presses and predicts the others (Bickel et al. 2009).", presses),
+    ("A face, a pillow and a foam under presses", "pressed-bodies",
+     "Simulated, by Bickel et al. 2009, figures 1, 3, 8, 9 and 10: a layer that slides over a skull, a pillow with a hard part, and a foam that is pressed on. Each is fitted to some presses by `pliant fit` and pressed by another probe with `pliant press`.", pressed_bodies),
     ("Stress-strain curves", "material-curves",
      "Real: tension of silicones, several modes of loading of rubbers, a gel and brain tissue, and a shoe's foam. One cube each, fitted with the law and the parameters of presses.", material_curves),
     ("Balls pushed into organs and phantoms", "organ-probing",
