@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """The virtual block of Bickel 2009, section 6: noise in the markers against the error of the fitted material.
 
-    python3 experiments/virtual-block/run.py OUT [--pliant PROGRAM] [--make PROGRAM] [--laws ogden fung]
+    python3 experiments/virtual-block/run.py OUT [--pliant PROGRAM] [--make PROGRAM] [--seeds 1 2 3] [--laws ogden fung]
 
 For each law of the true material every noise level is fitted with each material. Errors are those of all presses (fitted
 and test) against markers without noise: root mean square over the greatest displacement of the press, averaged over
-presses. Figures are written after each fit; those of fits that are not asked for stay. Standard library only."""
+presses. Seeds are those of presses and noise. Figures are written after each fit; those of fits that are not asked for stay. Standard library only."""
 import argparse
+import itertools
 import pathlib
 import subprocess
 import sys
@@ -54,9 +55,9 @@ def judged(program, out, judge):
 
 
 def stored():
-    """Figures of earlier fits; nothing of files of another layout."""
+    """Figures of earlier fits by seed, law, noise and material; nothing of files of another layout."""
     file = HERE / "results.json"
-    return common.read(file).get("laws", {}) if file.exists() else {}
+    return common.read(file).get("seeds", {}) if file.exists() else {}
 
 
 def main():
@@ -64,32 +65,31 @@ def main():
     parser.add_argument("out", type=pathlib.Path, help="folder for captures and fits")
     parser.add_argument("--pliant", type=pathlib.Path, default=common.DEFAULT_PROGRAM)
     parser.add_argument("--make", type=pathlib.Path, default=common.ROOT / "build/release/experiments/pliant_virtual_block")
-    parser.add_argument("--seed", default="1")
+    parser.add_argument("--seeds", nargs="*", default=["1"])
     parser.add_argument("--laws", nargs="*", default=["ogden", "fung"], help="of the true material")
     parser.add_argument("--noise", nargs="*", default=["00", "10", "20", "30"], help="percent")
     parser.add_argument("--materials", nargs="*", default=["ogden", "sampled", "linear"], help="that are fitted")
     arguments = parser.parse_args()
     failed = []
-    for law in arguments.laws:
-        folder = arguments.out / law
+    for seed, law in itertools.product(arguments.seeds, arguments.laws):
+        folder = arguments.out / seed / law
         folder.mkdir(parents=True, exist_ok=True)
-        subprocess.run([str(arguments.make), str(folder), arguments.seed, law], check=True)
-        for noise in arguments.noise:
+        subprocess.run([str(arguments.make), str(folder), seed, law], check=True)
+        for noise, material in itertools.product(arguments.noise, arguments.materials):
             judge = truth_capture(folder / noise)
-            for material in arguments.materials:
-                out = folder / f"{material}-{noise}"
-                seconds, code = fit(arguments.pliant, folder / noise, out, material)
-                if code not in (0, 3):
-                    failed.append(f"{out}.log")
-                    print(law, noise, material, f"returned {code}: see {out}.log", flush=True)
-                    continue
-                notes = common.read(out / "result.json").get("notes", [])
-                entry = {"seconds": round(seconds, 1), "converged": code == 0, **judged(arguments.pliant, out, judge),
-                         "notes": notes, "zones": [n for n in notes if n.startswith("Zones:")]}
-                laws = stored()  # anew: another run may have written since
-                laws.setdefault(law, {}).setdefault(noise, {})[material] = entry
-                print(law, noise, material, entry, flush=True)
-                common.write_results(__file__, {"laws": laws})
+            out = folder / f"{material}-{noise}"
+            seconds, code = fit(arguments.pliant, folder / noise, out, material)
+            if code not in (0, 3):
+                failed.append(f"{out}.log")
+                print(seed, law, noise, material, f"returned {code}: see {out}.log", flush=True)
+                continue
+            notes = common.read(out / "result.json").get("notes", [])
+            entry = {"seconds": round(seconds, 1), "converged": code == 0, **judged(arguments.pliant, out, judge),
+                     "notes": notes, "zones": [n for n in notes if n.startswith("Zones:")]}
+            seeds = stored()  # anew: another run may have written since
+            seeds.setdefault(seed, {}).setdefault(law, {}).setdefault(noise, {})[material] = entry
+            print(seed, law, noise, material, entry, flush=True)
+            common.write_results(__file__, {"seeds": seeds})
     if failed:
         sys.exit("these fits failed: " + ", ".join(failed))
 

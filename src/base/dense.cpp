@@ -1,6 +1,7 @@
 #include "base/dense.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 
@@ -10,6 +11,11 @@ VectorX solve_symmetric(const MatrixX& A, const VectorX& b) { return A.ldlt().so
 MatrixX solve_symmetric(const MatrixX& A, const MatrixX& B) { return A.ldlt().solve(B); }
 
 double log_determinant(const MatrixX& A) { return A.ldlt().vectorD().array().abs().log().sum(); }
+
+SymmetricEigen symmetric_eigen(const MatrixX& A) {
+  const Eigen::SelfAdjointEigenSolver<MatrixX> solver(A);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
 
 MatrixX inverse(const MatrixX& A) { return A.inverse(); }
 

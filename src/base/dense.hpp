@@ -14,6 +14,13 @@ MatrixX solve_symmetric(const MatrixX& A, const MatrixX& B);
 /// ln |det A| of a symmetric matrix, by L D L^T; minus infinity where it is singular.
 double log_determinant(const MatrixX& A);
 
+/// Eigenvalues of a symmetric matrix, ascending, and orthonormal eigenvectors. The lower triangle is read.
+struct SymmetricEigen {
+  VectorX values;
+  MatrixX vectors;
+};
+SymmetricEigen symmetric_eigen(const MatrixX& A);
+
 /// A^-1 of a regular matrix, by LU with row pivots.
 MatrixX inverse(const MatrixX& A);
 

@@ -209,6 +209,54 @@ void set_strain_stress(const Polar& polar, const Matrix3& T, const Matrix6* C, P
   }
 }
 
+void add_strain_stress(const Polar& polar, const Matrix3& T, const Matrix6* C, PointStress& out) {
+  PointStress own;
+  set_strain_stress(polar, T, C, own);
+  out.P += own.P;
+  if (!C) return;
+  const Matrix3 left = polar.R.transpose() * out.left;
+  Matrix9 turn;  // vec(left A right^T) = turn vec(A)
+  for (int j = 0; j < 3; ++j)
+    for (int l = 0; l < 3; ++l) turn.block<3, 3>(3 * j, 3 * l) = out.right(j, l) * left;
+  const Matrix9 turned = turn * out.tangent;
+  own.tangent.noalias() += turned * turn.transpose();
+  out.left = own.left, out.right = own.right, out.tangent = own.tangent;
+}
+
+std::shared_ptr<TabulatedLaw> tabulated_law(const std::string& name, MatrixX table) {
+  if (name == "linear") return std::make_shared<LinearLaw>(std::move(table));
+  if (name == "neo_hookean") return std::make_shared<NeoHookeanLaw>(std::move(table));
+  if (name == "ogden") return std::make_shared<OgdenLaw>(std::move(table));
+  return nullptr;
+}
+
+Matrix3 tensor_of(const Strain6& e) {
+  Matrix3 tensor;
+  tensor << e[0], e[3], e[4],  //
+      e[3], e[1], e[5],        //
+      e[4], e[5], e[2];
+  return tensor;
+}
+
+Strain6 components_of(const Matrix3& t) {
+  Strain6 components;
+  components << t(0, 0), t(1, 1), t(2, 2), 0.5 * (t(0, 1) + t(1, 0)), 0.5 * (t(0, 2) + t(2, 0)),
+      0.5 * (t(1, 2) + t(2, 1));
+  return components;
+}
+
+Strain6 to_mandel(const Strain6& components) {
+  Strain6 m = components;
+  m.tail<3>() *= std::sqrt(2.0);
+  return m;
+}
+
+Strain6 from_mandel(const Strain6& mandel) {
+  Strain6 e = mandel;
+  e.tail<3>() *= root_half;
+  return e;
+}
+
 // ---- linear
 
 void LinearLaw::check(const MatrixX& table) const {

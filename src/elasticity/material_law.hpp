@@ -78,6 +78,8 @@ class TabulatedLaw : public MaterialLaw {
  public:
   int element_count() const override { return int(table_.rows()); }
   const MatrixX& table() const { return table_; }
+  /// The same law of other elements. Throws std::invalid_argument for inadmissible numbers.
+  [[nodiscard]] virtual std::shared_ptr<TabulatedLaw> with_table(MatrixX table) const = 0;
   /// @param table  elements x `parameter_names().size()`. Throws std::invalid_argument for inadmissible numbers.
   void set_table(MatrixX table);
 
@@ -93,6 +95,9 @@ class TabulatedLaw : public MaterialLaw {
 class LinearLaw : public TabulatedLaw {
  public:
   explicit LinearLaw(MatrixX table) { set_table(std::move(table)); }
+  std::shared_ptr<TabulatedLaw> with_table(MatrixX table) const override {
+    return std::make_shared<LinearLaw>(std::move(table));
+  }
   std::string name() const override { return "linear"; }
   std::vector<std::string> parameter_names() const override { return {"lambda", "alpha"}; }
   void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override;
@@ -119,6 +124,9 @@ SmallStrainModuli moduli_of(const LambdaAlpha& p);
 class OgdenLaw : public TabulatedLaw {
  public:
   explicit OgdenLaw(MatrixX table) { set_table(std::move(table)); }
+  std::shared_ptr<TabulatedLaw> with_table(MatrixX table) const override {
+    return std::make_shared<OgdenLaw>(std::move(table));
+  }
   std::string name() const override { return "ogden"; }
   int terms() const { return int(table_.cols()) / 3; }
   std::vector<std::string> parameter_names() const override;
@@ -140,6 +148,9 @@ class OgdenLaw : public TabulatedLaw {
 class NeoHookeanLaw : public TabulatedLaw {
  public:
   explicit NeoHookeanLaw(MatrixX table) { set_table(std::move(table)); }
+  std::shared_ptr<TabulatedLaw> with_table(MatrixX table) const override {
+    return std::make_shared<NeoHookeanLaw>(std::move(table));
+  }
   std::string name() const override { return "neo_hookean"; }
   std::vector<std::string> parameter_names() const override { return {"mu", "lambda"}; }
   void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override;
@@ -158,5 +169,19 @@ class NeoHookeanLaw : public TabulatedLaw {
 /// @param C  d2W/de2 [Pa] in Mandel's components (xx, yy, zz, sqrt 2 xy, sqrt 2 xz, sqrt 2 yz), symmetric; null: stress
 ///           alone
 void set_strain_stress(const Polar& polar, const Matrix3& T, const Matrix6* C, PointStress& out);
+/// Adds them to the stress and, where there is a C, to the tangent of another energy at the same F, which then stands
+/// in the frame of R.
+void add_strain_stress(const Polar& polar, const Matrix3& T, const Matrix6* C, PointStress& out);
+
+/// The law of a name ("linear", "neo_hookean", "ogden") and a table; null for other names. Throws
+/// std::invalid_argument for inadmissible numbers.
+std::shared_ptr<TabulatedLaw> tabulated_law(const std::string& name, MatrixX table);
+
+/// Symmetric strains or stresses as tensors; and in Mandel's components, in which the product of two is that of the
+/// tensors: xx, yy, zz, sqrt 2 xy, sqrt 2 xz, sqrt 2 yz.
+Matrix3 tensor_of(const Strain6& components);
+Strain6 components_of(const Matrix3& tensor);
+Strain6 to_mandel(const Strain6& components);
+Strain6 from_mandel(const Strain6& mandel);
 
 }  // namespace pliant

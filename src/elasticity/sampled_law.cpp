@@ -1,8 +1,11 @@
 #include "elasticity/sampled_law.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "base/dense.hpp"
@@ -13,454 +16,433 @@ namespace pliant {
 
 namespace {
 
-using Vector2 = Eigen::Vector2d;
-using Columns6 = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+/// Derivative by d of d / rho, rho^2 = |d|^2 + width^2: I / rho - d d^T / rho^3.
+Matrix6 kernel(const Strain6& d, double width) {
+  const double square = d.squaredNorm() + width * width, inverse = 1.0 / std::sqrt(square);
+  Matrix6 H = inverse * Matrix6::Identity();
+  H.noalias() -= (inverse / square) * d * d.transpose();
+  return H;
+}
 
-/// The kernel's tip is rounded at this strain, so that it has a second derivative.
-constexpr double tip = 1e-3;
+/// Energy, stress and, where asked for, stiffness of weights v at d from their sample.
+struct FieldAt {
+  double energy = 0.0;
+  Strain6 stress = Strain6::Zero();
+  Matrix6 stiffness = Matrix6::Zero();
 
-/// Gauss-Legendre on (0, 1).
-struct GaussPoint {
-  double t, weight;
+  void add(const Strain6& d, const Strain6& v, double width, bool with_stiffness) {
+    const double square = d.squaredNorm() + width * width, inverse = 1.0 / std::sqrt(square), along = d.dot(v);
+    const double cubed = inverse / square;
+    energy += inverse * along;
+    stress += inverse * v - cubed * along * d;
+    if (!with_stiffness) return;
+    stiffness.diagonal().array() -= cubed * along;
+    stiffness.noalias() -= cubed * (v * d.transpose() + d * v.transpose());
+    stiffness.noalias() += (3.0 * cubed / square * along) * d * d.transpose();
+  }
 };
-constexpr std::array<GaussPoint, 5> path = {{{0.046910077030668, 0.118463442528095},
-                                             {0.230765344947158, 0.239314335249683},
-                                             {0.5, 0.284444444444444},
-                                             {0.769234655052842, 0.239314335249683},
-                                             {0.953089922969332, 0.118463442528095}}};
-
-/// A value that leaves [least, most] levels off within `below` and `above` of it, with continuous curvature.
-struct Bounded {
-  double value, first, second;
-};
-Bounded bounded(double v, double least, double most, double below, double above) {
-  const auto level = [](double excess, double room, double edge, double sign) -> Bounded {
-    const double x = std::tanh(excess / room);
-    return {edge + sign * room * x, 1.0 - x * x, -2.0 * sign * x * (1.0 - x * x) / room};
-  };
-  if (v > most) return level(v - most, above, most, 1.0);
-  if (v < least) return level(least - v, below, least, -1.0);
-  return {v, 1.0, 0.0};
-}
-
-Strain6 mandel(const Strain6& e) {
-  Strain6 m = e;
-  m.tail<3>() *= std::sqrt(2.0);
-  return m;
-}
-
-/// A symmetric L with |L m|^2 = (1 - 2 nu) e : e + nu tr(e)^2.
-Matrix6 metric_root(double nu) {
-  const double shape = std::sqrt(1.0 - 2.0 * nu), volume = std::sqrt(1.0 - 2.0 * nu + 3.0 * nu);
-  Matrix6 L = shape * Matrix6::Identity();
-  L.topLeftCorner<3, 3>().array() += (volume - shape) / 3.0;
-  return L;
-}
-
-Bounded bounded_lambda(const StrainSamples& s, double v) {
-  return bounded(v, s.least[0], s.most[0], 0.5 * s.least[0], s.most[0]);
-}
-Bounded bounded_nu(const StrainSamples& s, double v) {
-  return bounded(v, s.least[1], s.most[1], 0.9 * (1.0 + s.least[1]), 0.9 * (0.5 - s.most[1]));
-}
 
 }  // namespace
 
-SampledLaw::SampledLaw(std::vector<StrainSamples> elements, double metric_nu)
-    : metric_nu_(metric_nu), to_metric_(metric_root(metric_nu)) {
-  for (StrainSamples& samples : elements) {
-    if (samples.strains.size() != samples.weights.size() || !(samples.least[0] > 0.0) || !(samples.least[1] > -1.0) ||
-        !(samples.most[1] < 0.5) || !(samples.most[0] < 1e30))
-      throw std::invalid_argument("sampled stiffness needs lambda > 0 and -1 < nu < 1/2, and a weight a strain");
+SampledLaw::SampledLaw(std::shared_ptr<const TabulatedLaw> law, std::vector<StressSamples> elements)
+    : law_(std::move(law)) {
+  if (!law_ || law_->element_count() != int(elements.size()))
+    throw std::invalid_argument("sampled stresses need a law of as many elements");
+  for (StressSamples& samples : elements) {
+    if (samples.strains.size() != samples.weights.size() || !(samples.width > 0.0))
+      throw std::invalid_argument("sampled stresses need a width > 0, and a weight a strain");
     Element& element = elements_.emplace_back();
-    for (const Strain6& strain : samples.strains) element.centres.push_back(to_metric_ * mandel(strain));
+    element.centres.emplace_back(Strain6::Zero());
+    element.weights.emplace_back(Strain6::Zero());
+    for (std::size_t i = 0; i < samples.strains.size(); ++i) {
+      element.centres.push_back(to_mandel(samples.strains[i]));
+      element.weights.push_back(to_mandel(samples.weights[i]));
+      element.weights[0] -= samples.width * kernel(element.centres.back(), samples.width) * element.weights.back();
+    }
     element.given = std::move(samples);
   }
 }
 
-Eigen::Vector2d SampledLaw::interpolated(int e, const Strain6& strain) const {
-  const Element& element = elements_[std::size_t(e)];
-  const Vector6 y = to_metric_ * mandel(strain);
-  Vector2 p = element.given.constant;
-  for (std::size_t i = 0; i < element.centres.size(); ++i)
-    p += element.given.weights[i] * std::sqrt((y - element.centres[i]).squaredNorm() + tip * tip);
-  return {bounded_lambda(element.given, p[0]).value, bounded_nu(element.given, p[1]).value};
-}
-
-/// With m the strain and p(t m) = (lambda, nu) at the path's points,
-///   W = sum_g w t Q(m; p_g),   Q = lambda ((1 - 2 nu) |m|^2 + nu tr^2).
 void SampledLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
+  law_->stress(e, F, with_tangent, out);
   const Element& element = elements_[std::size_t(e)];
-  const StrainSamples& given = element.given;
+  if (element.given.strains.empty() || !std::isfinite(out.energy)) return;
   const Polar polar = polar_decomposition(F);
-  const Matrix3& S = polar.S;
-  Vector6 m;
-  m << S(0, 0) - 1.0, S(1, 1) - 1.0, S(2, 2) - 1.0, S(0, 1), S(0, 2), S(1, 2);
-  m = mandel(m);
-  const Vector6 y = to_metric_ * m;
-  const double square = m.squaredNorm(), trace = m.head<3>().sum();
-  Vector6 ones = Vector6::Zero();
-  ones.head<3>().setOnes();
-  double energy = 0.0;
-  Vector6 gradient = Vector6::Zero();
-  Matrix6 hessian = Matrix6::Zero(), of_y = Matrix6::Zero();  // the second by y, from both sides still without L
-  for (const GaussPoint& g : path) {
-    Vector2 value = given.constant;
-    Vector6 d_lambda = Vector6::Zero(), d_nu = Vector6::Zero();  // by y at t y
-    for (std::size_t i = 0; i < element.centres.size(); ++i) {
-      const Vector6 d = g.t * y - element.centres[i];
-      const double r = std::sqrt(d.squaredNorm() + tip * tip);
-      const Vector2& w = given.weights[i];
-      value += w * r;
-      d_lambda += w[0] / r * d;
-      d_nu += w[1] / r * d;
-    }
-    const Bounded lambda = bounded_lambda(given, value[0]), nu = bounded_nu(given, value[1]);
-    const double shape = 1.0 - 2.0 * nu.value, weight = g.weight * g.t;
-    const double by_lambda = shape * square + nu.value * trace * trace;               // dQ / d lambda
-    const double slope = trace * trace - 2.0 * square, by_nu = lambda.value * slope;  // dQ / d nu
-    const Vector6 by_m = 2.0 * lambda.value * (shape * m + nu.value * trace * ones);
-    // lambda and nu by m: through t L
-    const Vector6 m_lambda = g.t * lambda.first * (to_metric_ * d_lambda), m_nu = g.t * nu.first * (to_metric_ * d_nu);
-    energy += weight * lambda.value * by_lambda;
-    gradient += weight * (by_m + by_lambda * m_lambda + by_nu * m_nu);
-    if (!with_tangent) continue;
-    const Vector6 m_by_lambda = by_m / lambda.value;                        // d2Q / dm dlambda
-    const Vector6 m_by_nu = 2.0 * lambda.value * (trace * ones - 2.0 * m);  // d2Q / dm dnu
-    const Matrix6 mixed =
-        m_by_lambda * m_lambda.transpose() + m_by_nu * m_nu.transpose() + slope * m_lambda * m_nu.transpose();
-    hessian += weight * (mixed + mixed.transpose());
-    hessian.topLeftCorner<3, 3>().array() += weight * 2.0 * lambda.value * nu.value;
-    hessian.diagonal().array() += weight * 2.0 * lambda.value * shape;
-    const double back = weight * g.t * g.t;
-    for (std::size_t i = 0; i < element.centres.size(); ++i) {  // I / r - d d^T / r^3
-      const Vector6 d = g.t * y - element.centres[i];
-      const double square_r = d.squaredNorm() + tip * tip;
-      const Vector2& w = given.weights[i];
-      const double c = back * (by_lambda * lambda.first * w[0] + by_nu * nu.first * w[1]) / std::sqrt(square_r);
-      of_y.diagonal().array() += c;
-      of_y.noalias() -= (c / square_r) * d * d.transpose();
-    }
-    if (lambda.second != 0.0) of_y += back * by_lambda * lambda.second * d_lambda * d_lambda.transpose();
-    if (nu.second != 0.0) of_y += back * by_nu * nu.second * d_nu * d_nu.transpose();
+  const Strain6 m = to_mandel(components_of(polar.S - Matrix3::Identity()));
+  FieldAt at, rest;
+  for (std::size_t i = 0; i < element.centres.size(); ++i) {
+    at.add(m - element.centres[i], element.weights[i], element.given.width, with_tangent);
+    rest.add(-element.centres[i], element.weights[i], element.given.width, false);
   }
-  if (with_tangent) hessian += to_metric_ * of_y * to_metric_;
-  out.energy = energy;
-  const double half = std::sqrt(0.5);
-  Matrix3 T;
-  T << gradient[0], half * gradient[3], half * gradient[4],  //
-      half * gradient[3], gradient[1], half * gradient[5],   //
-      half * gradient[4], half * gradient[5], gradient[2];
-  set_strain_stress(polar, T, with_tangent ? &hessian : nullptr, out);
+  out.energy += at.energy - rest.energy;
+  add_strain_stress(polar, tensor_of(from_mandel(at.stress)), with_tangent ? &at.stiffness : nullptr, out);
 }
 
 SmallStrainModuli SampledLaw::small_strain(int e) const {
-  const Vector2 p = interpolated(e, Strain6::Zero());
-  return moduli_of({p[0], p[0] * p[1]});
+  constexpr double least_part = 0.05;  // of the law's own
+  const SmallStrainModuli own = law_->small_strain(e);
+  const Element& element = elements_[std::size_t(e)];
+  FieldAt rest;
+  for (std::size_t i = 0; i < element.centres.size(); ++i)
+    rest.add(-element.centres[i], element.weights[i], element.given.width, true);
+  const double bulk = own.youngs_modulus / (3.0 * (1.0 - 2.0 * own.poissons_ratio)),
+               mu = own.youngs_modulus / (2.0 * (1.0 + own.poissons_ratio));
+  // Of an isotropic stiffness, 3 K along the identity and 2 mu five times across.
+  const double thrice = rest.stiffness.topLeftCorner<3, 3>().sum() / 3.0;
+  const double K = std::max(bulk + thrice / 3.0, least_part * bulk),
+               G = std::max(mu + (rest.stiffness.trace() - thrice) / 10.0, least_part * mu);
+  return {9.0 * K * G / (3.0 * K + G), (3.0 * K - 2.0 * G) / (2.0 * (3.0 * K + G))};
 }
 
 // ---- from fits
 
 namespace {
 
-/// One element's samples in the coordinates of the norm.
+constexpr double least_share = 0.05;  // of the greatest strain: what is strained less says little
+
+/// One element's samples, in Mandel's components.
 struct ElementSamples {
-  std::vector<Strain6> strains, y;
-  std::vector<Vector2> p;    // (lambda, nu)
-  std::vector<double> size;  // |y|
+  std::vector<Strain6> strains, stresses;
+  double greatest_strain = 0.0, greatest_stress = 0.0;
+
+  void add(const Strain6& strain, const Strain6& stress) {
+    strains.push_back(to_mandel(strain));
+    stresses.push_back(to_mandel(stress));
+    greatest_strain = std::max(greatest_strain, strains.back().norm());
+    greatest_stress = std::max(greatest_stress, stresses.back().norm());
+  }
 };
 
-/// Values of the basis, c first and then the weights with their sum taken away: N x centres.
-MatrixX basis(const std::vector<Strain6>& points, const std::vector<Strain6>& centres) {
-  const auto kernel = [](const Strain6& a, const Strain6& b) { return std::sqrt((a - b).squaredNorm() + tip * tip); };
-  MatrixX B(Eigen::Index(points.size()), Eigen::Index(centres.size()));
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    B(Eigen::Index(i), 0) = 1.0;
-    for (std::size_t c = 1; c < centres.size(); ++c)
-      B(Eigen::Index(i), Eigen::Index(c)) = kernel(points[i], centres[c]) - kernel(points[i], centres[0]);
-  }
-  return B;
+/// dW/de of a law's only element in Mandel's components; nothing where the law knows no such strain.
+std::optional<Strain6> stress_of(const MaterialLaw& law, const Strain6& strain) {
+  const Matrix3 S = Matrix3::Identity() + tensor_of(from_mandel(strain));
+  PointStress at;
+  law.stress(0, S, false, at);
+  if (!std::isfinite(at.energy) || !(S.determinant() > 0.0)) return std::nullopt;
+  return to_mandel(components_of(at.P));
 }
 
-/// Stress of `SampledLaw`, dW/de in Mandel's components, at a strain m.
-/// @param by_lambda, by_nu  6 x (1 + centres): its derivatives by what is added to lambda (nu): constant, then weights
-Strain6 path_stress(const StrainSamples& s, const std::vector<Strain6>& centres, const Matrix6& L, const Strain6& m,
-                    Columns6& by_lambda, Columns6& by_nu) {
-  const auto count = Eigen::Index(centres.size());
-  by_lambda.setZero(6, 1 + count);
-  by_nu.setZero(6, 1 + count);
-  const Strain6 y = L * m;
-  const double square = m.squaredNorm(), trace = m.head<3>().sum(), slope = trace * trace - 2.0 * square;
-  Strain6 ones = Strain6::Zero();
-  ones.head<3>().setOnes();
-  Strain6 stress = Strain6::Zero();
-  VectorX kernel(1 + count);
-  Columns6 along(6, 1 + count);  // t L d kernel / dy
-  kernel[0] = 1.0;
-  along.col(0).setZero();
-  for (const GaussPoint& g : path) {
-    Vector2 value = s.constant;
-    Strain6 m_lambda = Strain6::Zero(), m_nu = Strain6::Zero();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Strain6 d = g.t * y - centres[std::size_t(i)];
-      kernel[i + 1] = std::sqrt(d.squaredNorm() + tip * tip);
-      const Strain6 back = L * d;
-      along.col(i + 1) = g.t / kernel[i + 1] * back;
-      const Vector2& w = s.weights[std::size_t(i)];
-      value += w * kernel[i + 1];
-      m_lambda += w[0] * along.col(i + 1);
-      m_nu += w[1] * along.col(i + 1);
-    }
-    const Bounded lambda = bounded_lambda(s, value[0]), nu = bounded_nu(s, value[1]);
-    const double weight = g.weight * g.t, of_lambda = (1.0 - 2.0 * nu.value) * square + nu.value * trace * trace;
-    const Strain6 linear = 2.0 * ((1.0 - 2.0 * nu.value) * m + nu.value * trace * ones),
-                  turning = 2.0 * (trace * ones - 2.0 * m);
-    stress +=
-        weight * (lambda.value * linear + of_lambda * lambda.first * m_lambda + lambda.value * slope * nu.first * m_nu);
-    by_lambda +=
-        weight *
-        ((lambda.first * linear + of_lambda * lambda.second * m_lambda + lambda.first * slope * nu.first * m_nu) *
-             kernel.transpose() +
-         of_lambda * lambda.first * along);
-    by_nu += weight * ((lambda.value * nu.first * turning + slope * nu.first * lambda.first * m_lambda +
-                        lambda.value * slope * nu.second * m_nu) *
-                           kernel.transpose() +
-                       lambda.value * slope * nu.first * along);
-  }
-  return stress;
-}
-
-/// Weights with which the energy's own stress comes closest to the samples', by Levenberg-Marquardt from those that
-/// interpolate p: where stiffness depends on the direction of strains, the energy's stress is not E(p(e)) e.
-class StressFit {
+/// The numbers of one element's law by its samples' stresses: Levenberg-Marquardt from the shared numbers, and held to
+/// them, as normal priors are. Unknowns are logarithms of moduli, exponents over three, and logits of Poisson's ratios
+/// over (-1/2, 1/2); laws without exponents have one factor of all moduli.
+class OwnLaw {
  public:
-  StressFit(const ElementSamples& samples, const Matrix6& to_metric, double ridge, double greatest_stress,
-            StrainSamples& law)
-      : samples_(samples), L_(to_metric), ridge_(ridge), unit_(greatest_stress), law_(law) {
-    for (const Strain6& strain : law.strains) centres_.push_back(L_ * mandel(strain));
-    for (std::size_t i = 0; i < samples.strains.size(); ++i) {
-      const Strain6 m = mandel(samples.strains[i]);
-      Strain6 stress = samples.p[i][0] * (1.0 - 2.0 * samples.p[i][1]) * m;
-      stress.head<3>().array() += samples.p[i][0] * samples.p[i][1] * m.head<3>().sum();
-      strains_.push_back(m);
-      stresses_.push_back(stress);
+  OwnLaw(const TabulatedLaw& shared, int e, const ElementSamples& samples)
+      : samples_(samples), shared_(shared.with_table(shared.table().row(e))), law_(shared_) {
+    const std::vector<std::string> names = shared.parameter_names();
+    const bool has_exponents = std::ranges::any_of(names, &OwnLaw::is_exponent);
+    int moduli = -1;
+    for (const std::string& name : names) {
+      const bool is_modulus = !is_exponent(name) && !is_ratio(name);
+      if (is_modulus && !has_exponents && moduli >= 0) {
+        unknown_.push_back(moduli);
+        continue;
+      }
+      if (is_modulus) moduli = count_;
+      unknown_.push_back(count_++);
     }
-    start_ = interpolated_at_rest();
+    names_ = names;
   }
 
-  /// Returns the sum of the squares of stresses' errors that are left, relative to the greatest stress of a sample.
-  double run() {
-    VectorX residuals;
-    MatrixX J;
-    double cost = linearise(residuals, J), damping = 1e-3;
-    for (int iteration = 0; iteration < 10; ++iteration) {
-      MatrixX H = J.transpose() * J;
-      H.diagonal() *= 1.0 + damping;
-      const VectorX step = -solve_symmetric(H, VectorX(J.transpose() * residuals));
-      const StrainSamples before = law_;
-      add(step);
-      VectorX next_residuals;
-      MatrixX next_J;
-      const double next = linearise(next_residuals, next_J);
-      if (next < cost) {
-        const bool is_done = cost - next < 1e-3 * cost;
-        cost = next, residuals = std::move(next_residuals), J = std::move(next_J);
-        damping *= 0.2;
-        if (is_done) break;
-      } else {
-        law_ = before;
-        damping = 10.0 * std::max(damping, 1e-3);
-      }
+  /// Three times: the samples are trusted as far as the law before can meet them.
+  std::shared_ptr<const TabulatedLaw> run() {
+    if (!(samples_.greatest_stress > 0.0)) return law_;
+    VectorX x = VectorX::Zero(count_);
+    for (int pass = 0; pass < 3; ++pass) {
+      minimise(x);
+      trusted_ = std::clamp(1.5 * misfit_, most_trusted, least_trusted);
     }
-    double greatest = 0.0;
-    for (const Strain6& stress : stresses_) greatest = std::max(greatest, stress.squaredNorm());
-    return residuals.head(6 * Eigen::Index(strains_.size())).squaredNorm() * unit_ * unit_ / greatest;
+    return law_;
   }
 
  private:
-  Vector2 interpolated_at_rest() const {
-    Vector2 p = law_.constant;
-    for (std::size_t i = 0; i < centres_.size(); ++i)
-      p += law_.weights[i] * std::sqrt(centres_[i].squaredNorm() + tip * tip);
-    return p;
-  }
-  /// lambda's constant and weights but the first, then nu's times the stiffness at rest; weights sum to nothing.
-  void add(const VectorX& step) {
-    const Eigen::Index half = step.size() / 2;
-    for (const int k : {0, 1}) {
-      const double unit = k == 0 ? 1.0 : 1.0 / start_[0];
-      law_.constant[k] += unit * step[k * half];
-      for (Eigen::Index i = 1; i < half; ++i) {
-        law_.weights[std::size_t(i)][k] += unit * step[k * half + i];
-        law_.weights[0][k] -= unit * step[k * half + i];
+  void minimise(VectorX& x) {
+    constexpr int most_iterations = 15;
+    MatrixX H;
+    VectorX g;
+    double cost = linearise(x, H, g), damping = 1e-3;
+    for (int iteration = 0; iteration < most_iterations && std::isfinite(cost); ++iteration) {
+      MatrixX damped = H;
+      damped.diagonal() *= 1.0 + damping;
+      VectorX step = -solve_symmetric(damped, g);
+      step *= 1.0 / std::max(1.0, step.cwiseAbs().maxCoeff());
+      const auto before = law_;
+      const double misfit_before = misfit_;
+      MatrixX next_H;
+      VectorX next_g;
+      const double next = set(x + step) ? linearise(x + step, next_H, next_g) : std::numeric_limits<double>::infinity();
+      if (next < cost) {
+        const bool is_done = cost - next < 1e-4 * cost;
+        x += step, cost = next, H = std::move(next_H), g = std::move(next_g);
+        damping *= 0.2;
+        if (is_done) break;
+      } else {
+        law_ = before, misfit_ = misfit_before;
+        damping = 10.0 * std::max(damping, 1e-3);
+        if (damping > 1e6) break;
       }
     }
   }
-  /// Columns of constant and weights as `add` changes them.
-  template <class Columns>
-  static MatrixX tied(const Columns& of) {
-    MatrixX columns(of.rows(), of.cols() - 1);
-    columns.col(0) = of.col(0);
-    columns.rightCols(columns.cols() - 1) = of.rightCols(of.cols() - 2).colwise() - of.col(1);
-    return columns;
+
+  static constexpr double exponent_unit = 3.0;
+  /// Of stress, relative to the greatest: what the samples are trusted to against the shared numbers.
+  static constexpr double most_trusted = 0.002, least_trusted = 0.1;
+  static bool is_exponent(const std::string& name) { return name.starts_with("exponent"); }
+  static bool is_ratio(const std::string& name) { return name.starts_with("poissons_ratio"); }
+
+  double number(std::size_t c, double x) const {
+    const double before = shared_->table()(0, Eigen::Index(c));
+    if (is_exponent(names_[c])) return before + exponent_unit * x;
+    if (is_ratio(names_[c])) return 1.0 / (1.0 + (0.5 - before) / (0.5 + before) * std::exp(-x)) - 0.5;
+    return before * std::exp(x);
   }
-  double linearise(VectorX& residuals, MatrixX& J) const {
-    const auto count = Eigen::Index(strains_.size()), half = Eigen::Index(centres_.size());
-    residuals.setZero(6 * count + 2 + 2 * half);
-    J.setZero(residuals.size(), 2 * half);
-    Columns6 by_lambda, by_nu;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const auto k = std::size_t(i);
-      residuals.segment<6>(6 * i) =
-          (path_stress(law_, centres_, L_, strains_[k], by_lambda, by_nu) - stresses_[k]) / unit_;
-      J.block(6 * i, 0, 6, half) = tied(by_lambda) / unit_;
-      J.block(6 * i, half, 6, half) = tied(by_nu) / (unit_ * start_[0]);
+  double slope(std::size_t c, double value) const {
+    if (is_exponent(names_[c])) return exponent_unit;
+    if (is_ratio(names_[c])) return (0.5 + value) * (0.5 - value);
+    return value;
+  }
+  bool set(const VectorX& x) {
+    MatrixX table = shared_->table();
+    for (std::size_t c = 0; c < names_.size(); ++c) {
+      double& value = table(0, Eigen::Index(c));
+      value = number(c, x[unknown_[c]]);
+      if (!std::isfinite(value) || (is_exponent(names_[c]) && std::abs(value) < 0.01)) return false;
     }
-    // At rest as the smallest strains say; and small weights where samples nearly coincide.
-    const Vector2 off = interpolated_at_rest() - start_;
-    MatrixX kernel(1, 1 + half);
-    kernel(0, 0) = 1.0;
-    for (Eigen::Index i = 0; i < half; ++i)
-      kernel(0, 1 + i) = std::sqrt(centres_[std::size_t(i)].squaredNorm() + tip * tip);
-    const double at_rest = 0.3 * largest() / unit_;
-    residuals[6 * count] = at_rest * off[0], residuals[6 * count + 1] = at_rest * start_[0] * off[1];
-    J.block(6 * count, 0, 1, half) = at_rest * tied(kernel);
-    J.block(6 * count + 1, half, 1, half) = at_rest * tied(kernel);
-    for (Eigen::Index i = 1; i < half; ++i)
-      for (const int k : {0, 1}) {
-        const Eigen::Index row = 6 * count + 2 + k * half + i;
-        residuals[row] = ridge_ / unit_ * law_.weights[std::size_t(i)][k] * (k == 0 ? 1.0 : start_[0]);
-        J(row, k * half + i) = ridge_ / unit_;
-      }
-    return residuals.squaredNorm();
+    law_ = shared_->with_table(table);
+    return true;
   }
-  double largest() const { return std::max(*std::ranges::max_element(samples_.size), 1e-12); }
+  /// Half the squares with the priors', their gradient and Gauss and Newton's matrix.
+  double linearise(const VectorX& x, MatrixX& H, VectorX& g) {
+    const double weight = 1.0 / (trusted_ * samples_.greatest_stress);
+    H = MatrixX::Identity(count_, count_);
+    g = x;
+    double cost = 0.5 * x.squaredNorm(), squares = 0.0, told = 1e-12;
+    std::vector<Matrix3> by(names_.size());
+    MatrixX J(6, count_);
+    for (std::size_t i = 0; i < samples_.strains.size(); ++i) {
+      const std::optional<Strain6> stress = stress_of(*law_, samples_.strains[i]);
+      if (!stress) continue;
+      law_->parameter_derivatives(0, Matrix3::Identity() + tensor_of(from_mandel(samples_.strains[i])), by);
+      J.setZero();
+      for (std::size_t c = 0; c < names_.size(); ++c)
+        J.col(unknown_[c]) += weight * slope(c, law_->table()(0, Eigen::Index(c))) * to_mandel(components_of(by[c]));
+      const VectorX r = weight * (*stress - samples_.stresses[i]);
+      cost += 0.5 * r.squaredNorm();
+      const double telling = samples_.stresses[i].norm() / samples_.greatest_stress;
+      squares += telling * r.squaredNorm(), told += telling;
+      H.noalias() += J.transpose() * J;
+      g.noalias() += J.transpose() * r;
+    }
+    misfit_ = trusted_ * std::sqrt(squares / told);
+    return cost;
+  }
 
   const ElementSamples& samples_;
-  const Matrix6& L_;
-  double ridge_, unit_;
-  StrainSamples& law_;
-  std::vector<Strain6> centres_, strains_, stresses_;
-  Vector2 start_;
+  std::shared_ptr<const TabulatedLaw> shared_, law_;
+  std::vector<std::string> names_;
+  std::vector<int> unknown_;  // of each number
+  int count_ = 0;
+  double trusted_ = 0.05;
+  double misfit_ = 0.0;  // relative to the greatest stress, by how much each sample tells
 };
 
 struct Selection {
-  StrainSamples samples;
-  double square_misfit = 0.0;        // of the energy's stress, summed over the element's samples
-  std::vector<double> square_error;  // summed over the element's samples, with 1, 2, ... in the basis
+  std::shared_ptr<const TabulatedLaw> law;
+  StressSamples samples;
+  double square_misfit = 0.0;        // of the law's stress, summed over the element's samples
+  std::vector<double> square_error;  // summed over the element's samples, with 0, 1, ... in the basis
 };
 
-Selection select(const ElementSamples& s, const Matrix6& to_metric, const BasisOptions& options) {
-  const std::size_t n = s.y.size();
-  // Zero strain first: the mean of the smallest strains, a fifth of all, by how much each tells.
-  std::vector<std::size_t> order(n);
-  for (std::size_t i = 0; i < n; ++i) order[i] = i;
-  std::ranges::sort(order, {}, [&](std::size_t i) { return s.size[i]; });
-  Vector2 start = Vector2::Zero();
-  double told = 0.0;
-  for (std::size_t k = 0; k < std::max<std::size_t>(1, n / 5); ++k) {
-    const double weight = s.size[order[k]] + 1e-12;
-    start += weight * s.p[order[k]];
-    told += weight;
-  }
-  start /= told;
-  std::vector<Strain6> points = s.y;
-  points.push_back(Strain6::Zero());
-  MatrixX values(Eigen::Index(n + 1), 2);
-  VectorX weight{Eigen::Index(n + 1)};
-  const double largest = std::max(*std::ranges::max_element(s.size), 1e-12);
-  double greatest_stress = 0.0;
-  Selection selection;
-  selection.samples.least = selection.samples.most = start;
-  for (std::size_t i = 0; i < n; ++i) {
-    values.row(Eigen::Index(i)) = s.p[i].transpose();
-    weight[Eigen::Index(i)] = s.size[i];
-    greatest_stress = std::max(greatest_stress, s.size[i] * s.p[i][0]);
-    if (s.size[i] < 0.05 * largest) continue;  // hardly strained: says little, bounds nothing
-    selection.samples.least = selection.samples.least.cwiseMin(s.p[i]);
-    selection.samples.most = selection.samples.most.cwiseMax(s.p[i]);
-  }
-  values.row(Eigen::Index(n)) = start.transpose();
-  weight[Eigen::Index(n)] = 0.3 * largest;
-  constexpr double ridge = 0.02;
-  std::vector<Strain6> centres = {Strain6::Zero()}, strains = {Strain6::Zero()};
-  std::vector<bool> is_taken(n, false);
-  MatrixX coefficients;
-  for (;;) {
-    const MatrixX B = basis(points, centres);
-    // A trace of ridge keeps weights small where samples nearly coincide.
-    const Eigen::Index m = B.cols();
-    MatrixX system(B.rows() + m, m), right(B.rows() + m, 2);
-    system << weight.asDiagonal() * B, MatrixX::Zero(m, m);
-    right << weight.asDiagonal() * values, MatrixX::Zero(m, 2);
-    for (Eigen::Index k = 1; k < m; ++k) system(B.rows() + k, k) = ridge * largest * largest;
-    coefficients = system.colPivHouseholderQr().solve(right);
-    const MatrixX error = B * coefficients - values;
-    std::size_t worst = n;
-    double worst_error = options.tolerance * greatest_stress, sum = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vector2 d = error.row(Eigen::Index(i)).transpose();
-      const double stress = s.size[i] * std::hypot(d[0], s.p[i][0] * d[1]);
-      sum += stress * stress / (greatest_stress * greatest_stress + 1e-300);
-      if (!is_taken[i] && stress > worst_error) worst = i, worst_error = stress;
+/// What an element's law leaves of its samples, by few of them.
+class Remainder {
+ public:
+  Remainder(const ElementSamples& samples, const TabulatedLaw& law, const BasisOptions& options)
+      : samples_(samples), law_(law), options_(options), n_(Eigen::Index(samples.strains.size())) {}
+
+  void select(Selection& selection) {
+    selection.samples.width = width_ = width_share * std::max(samples_.greatest_strain, 1e-9);
+    left_ = VectorX::Zero(6 * n_);
+    for (Eigen::Index i = 0; i < n_; ++i)
+      if (const auto own = stress_of(law_, samples_.strains[std::size_t(i)]))
+        left_.segment<6>(6 * i) = samples_.stresses[std::size_t(i)] - *own;
+    const double unit = samples_.greatest_stress;
+    selection.square_error.push_back(unit > 0.0 ? left_.squaredNorm() / (unit * unit) : 0.0);
+    if (!(unit > 0.0)) return;
+    VectorX error = left_, weights;
+    for (;;) {
+      const Eigen::Index worst = worst_of(error);
+      if (worst < 0 || int(taken_.size()) == options_.max_samples) break;
+      take(worst);
+      weights = weights_at(choice_ridge);
+      error = left_ - basis() * weights;
+      selection.square_error.push_back(error.squaredNorm() / (unit * unit));
     }
-    selection.square_error.push_back(sum);
-    if (worst == n || int(centres.size()) == options.max_samples) break;
-    is_taken[worst] = true;
-    centres.push_back(s.y[worst]);
-    strains.push_back(s.strains[worst]);
+    if (taken_.empty()) {
+      selection.square_misfit = selection.square_error.back();
+      return;
+    }
+    weights = weights_at(best_ridge());
+    double share = 1.0;
+    while (share > 0.1 && !is_stiff_enough(share * weights)) share *= 0.5;
+    if (share < 0.1) share = 0.0;
+    selection.square_misfit = (left_ - share * basis() * weights).squaredNorm() / (unit * unit);
+    if (share == 0.0) return;
+    for (std::size_t k = 0; k < taken_.size(); ++k) {
+      selection.samples.strains.push_back(from_mandel(samples_.strains[std::size_t(taken_[k])]));
+      // The basis is the kernel times the width.
+      selection.samples.weights.push_back(from_mandel(share * width_ * weights.segment<6>(6 * Eigen::Index(k))));
+    }
   }
-  selection.samples.constant = coefficients.row(0).transpose();
-  selection.samples.strains = std::move(strains);
-  Vector2 sum = Vector2::Zero();
-  selection.samples.weights.emplace_back(Vector2::Zero());
-  for (Eigen::Index k = 1; k < coefficients.rows(); ++k) {
-    selection.samples.weights.push_back(coefficients.row(k).transpose());
-    sum += selection.samples.weights.back();
+
+ private:
+  static constexpr double width_share = 0.5;  // of the greatest strain
+  static constexpr double choice_ridge = 1e-3;
+  static constexpr double telling_share = 0.1;  // of the greatest stress
+
+  Eigen::Index worst_of(const VectorX& error) const {
+    double greatest = options_.tolerance * samples_.greatest_stress;
+    Eigen::Index worst = -1;
+    for (Eigen::Index i = 0; i < n_; ++i)
+      if (const double size = error.segment<6>(6 * i).norm();
+          size > greatest && std::ranges::find(taken_, i) == taken_.end())
+        greatest = size, worst = i;
+    return worst;
   }
-  selection.samples.weights[0] = -sum;
-  if (greatest_stress > 0.0)
-    selection.square_misfit =
-        StressFit(s, to_metric, ridge * largest * largest, greatest_stress, selection.samples).run();
-  return selection;
-}
+
+  /// Covariance of stresses at two strains, with no stress at no strain, times the width.
+  Matrix6 covariance(const Strain6& a, const Strain6& b) const {
+    return width_ * kernel(a - b, width_) - width_ * width_ * kernel(a, width_) * kernel(b, width_);
+  }
+  MatrixX::ConstColsBlockXpr basis() const { return basis_.leftCols(6 * Eigen::Index(taken_.size())); }
+
+  void take(Eigen::Index sample) {
+    const Eigen::Index before = 6 * Eigen::Index(taken_.size());
+    if (basis_.size() == 0) {
+      const Eigen::Index most = 6 * std::min<Eigen::Index>(options_.max_samples, n_);
+      basis_.resize(6 * n_, most), squares_.resize(most, most), norm_.resize(most, most);
+    }
+    taken_.push_back(sample);
+    for (Eigen::Index i = 0; i < n_; ++i)
+      basis_.block<6, 6>(6 * i, before) =
+          covariance(samples_.strains[std::size_t(i)], samples_.strains[std::size_t(sample)]);
+    const MatrixX cross = basis().transpose() * basis_.middleCols<6>(before);
+    squares_.block(0, before, before + 6, 6) = cross;
+    squares_.block(before, 0, 6, before + 6) = cross.transpose();
+    for (std::size_t k = 0; k < taken_.size(); ++k) {
+      const Matrix6 between = basis_.block<6, 6>(6 * taken_[k], before);
+      norm_.block<6, 6>(6 * Eigen::Index(k), before) = between;
+      norm_.block<6, 6>(before, 6 * Eigen::Index(k)) = between.transpose();
+    }
+  }
+  /// Least |left - B w|^2 + ridge w . K w.
+  VectorX weights_at(double ridge) const {
+    const Eigen::Index m = 6 * Eigen::Index(taken_.size());
+    MatrixX A = squares_.topLeftCorner(m, m) + ridge * norm_.topLeftCorner(m, m);
+    A.diagonal().array() += 1e-9;
+    return A.llt().solve(basis().transpose() * left_);
+  }
+
+  /// Of the greatest evidence: where stresses are a Gaussian process with the kernel as covariance and errors of ridge
+  /// times its scale, which is unknown. Samples of little stress have little to say about errors.
+  double best_ridge() const {
+    const Eigen::Index m = 6 * Eigen::Index(taken_.size());
+    Eigen::Index n = 0;
+    MatrixX B(6 * n_, m);
+    VectorX left(6 * n_);
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      if (samples_.stresses[std::size_t(i)].norm() < telling_share * samples_.greatest_stress) continue;
+      B.middleRows<6>(n) = basis().middleRows<6>(6 * i);
+      left.segment<6>(n) = left_.segment<6>(6 * i);
+      n += 6;
+    }
+    MatrixX K = norm_.topLeftCorner(m, m);
+    K.diagonal().array() += 1e-9;
+    const Eigen::LLT<MatrixX> root(K);
+    const MatrixX half = root.matrixL().solve(MatrixX(B.topRows(n).transpose()));
+    const SymmetricEigen eigen = symmetric_eigen(half * half.transpose());
+    const Eigen::ArrayXd z = (eigen.vectors.transpose() * (half * left.head(n))).array().square();
+    const Eigen::ArrayXd lambda = eigen.values.array().max(0.0);
+    const double square = left.head(n).squaredNorm();
+    double best = choice_ridge, least = std::numeric_limits<double>::infinity();
+    for (double ridge = 1e-5; ridge < 200.0; ridge *= std::sqrt(10.0)) {
+      const double form = (square - (z / (lambda + ridge)).sum()) / ridge;
+      const double against = 0.5 * ((lambda + ridge).log().sum() + double(n - m) * std::log(ridge)) +
+                             0.5 * double(n) * std::log(std::max(form, 1e-300));
+      if (against < least) best = ridge, least = against;
+    }
+    return best;
+  }
+
+  Strain6 own(const Strain6& m, const VectorX& weights) const {
+    Strain6 stress = Strain6::Zero();
+    for (std::size_t k = 0; k < taken_.size(); ++k)
+      stress += covariance(m, samples_.strains[std::size_t(taken_[k])]) * weights.segment<6>(6 * Eigen::Index(k));
+    return stress;
+  }
+  /// Whether the work of stress grows along the straight paths through the samples, and three times as far, at least a
+  /// fifth as much as that of the law alone.
+  bool is_stiff_enough(const VectorX& weights) const {
+    constexpr std::array parts = {0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0};
+    constexpr double least_part = 0.2;
+    for (const Strain6& strain : samples_.strains) {
+      if (strain.norm() < least_share * samples_.greatest_strain) continue;
+      double law_before = 0.0, all_before = 0.0;
+      for (const double t : parts) {
+        const Strain6 m = t * strain;
+        const std::optional<Strain6> of_law = stress_of(law_, m);
+        if (!of_law) break;
+        const double by_law = strain.dot(*of_law), all = by_law + strain.dot(own(m, weights));
+        if (all < least_part * by_law) return false;
+        if (all - all_before < least_part * std::min(by_law - law_before, by_law / t * 0.5)) return false;
+        law_before = by_law, all_before = all;
+      }
+    }
+    return true;
+  }
+
+  const ElementSamples& samples_;
+  const TabulatedLaw& law_;
+  const BasisOptions& options_;
+  Eigen::Index n_;
+  double width_ = 1.0;
+  VectorX left_;                     // of the samples' stresses by the law
+  std::vector<Eigen::Index> taken_;  // numbers of samples
+  MatrixX basis_, squares_, norm_;   // B, B^T B, K of those
+};
 
 }  // namespace
 
-SampledMaterial sample_material(const std::vector<MaterialSample>& samples, const BasisOptions& options) {
+SampledMaterial sample_material(const std::shared_ptr<const TabulatedLaw>& shared,
+                                const std::vector<MaterialSample>& samples, const BasisOptions& options) {
   if (samples.empty()) throw std::invalid_argument("a sampled material needs samples");
-  const int count = int(samples[0].p.size());
-  double metric_nu = 0.0;
-  for (const MaterialSample& sample : samples)
-    for (const LambdaAlpha& p : sample.p) metric_nu += p.alpha / p.lambda / double(count) / double(samples.size());
-  const Matrix6 to_metric = metric_root(metric_nu);
+  const int count = shared->element_count();
   std::vector<Selection> selections{std::size_t(count)};
   parallel_for(0, count, [&](int e) {
     ElementSamples own;
-    for (const MaterialSample& sample : samples) {
-      own.strains.emplace_back(sample.strains.row(e).transpose());
-      own.y.emplace_back(to_metric * mandel(own.strains.back()));
-      own.size.push_back(own.y.back().norm());
-      const LambdaAlpha& p = sample.p[std::size_t(e)];
-      own.p.emplace_back(p.lambda, p.alpha / p.lambda);
-    }
-    selections[std::size_t(e)] = select(own, to_metric, options);
+    for (const MaterialSample& sample : samples)
+      own.add(sample.strains.row(e).transpose(), sample.stresses.row(e).transpose());
+    Selection& selection = selections[std::size_t(e)];
+    selection.law = OwnLaw(*shared, e, own).run();
+    Remainder(own, *selection.law, options).select(selection);
   });
   SampledMaterial material;
-  std::vector<StrainSamples> elements;
-  for (std::size_t size = 0; size < std::size_t(options.max_samples); ++size) {
+  std::vector<StressSamples> elements;
+  for (std::size_t size = 0; size <= std::size_t(options.max_samples); ++size) {
     double sum = 0.0;
     for (const Selection& s : selections) sum += s.square_error[std::min(size, s.square_error.size() - 1)];
     material.error_by_size.push_back(std::sqrt(sum / double(count) / double(samples.size())));
   }
   double misfit = 0.0;
-  for (Selection& s : selections) {
+  MatrixX table(count, shared->table().cols());
+  for (int e = 0; e < count; ++e) {
+    Selection& s = selections[std::size_t(e)];
+    table.row(e) = s.law->table();
     misfit += s.square_misfit;
     material.mean_samples += double(s.samples.strains.size()) / double(count);
     elements.push_back(std::move(s.samples));
   }
   material.stress_misfit = std::sqrt(misfit / double(count) / double(samples.size()));
-  material.law = std::make_shared<SampledLaw>(std::move(elements), metric_nu);
+  material.law = std::make_shared<SampledLaw>(shared->with_table(std::move(table)), std::move(elements));
   return material;
 }
 

@@ -101,13 +101,14 @@ MatrixX to_matrix(const Json& json) {
 }
 
 Json from_sample(const PressSample& s) {
-  MatrixX p(Eigen::Index(s.sample.p.size()), 2);
-  for (Eigen::Index e = 0; e < p.rows(); ++e)
-    p.row(e) << s.sample.p[std::size_t(e)].lambda, s.sample.p[std::size_t(e)].alpha;
-  return {{"succeeded", s.succeeded},  {"converged", s.converged},
-          {"failure", s.failure},      {"strains", from_matrix(s.sample.strains)},
-          {"p", from_matrix(p)},       {"weight", s.weight},
-          {"start_rms", s.start_rms},  {"rms", s.rms},
+  return {{"succeeded", s.succeeded},
+          {"converged", s.converged},
+          {"failure", s.failure},
+          {"strains", from_matrix(s.sample.strains)},
+          {"stresses", from_matrix(s.sample.stresses)},
+          {"weight", s.weight},
+          {"start_rms", s.start_rms},
+          {"rms", s.rms},
           {"iterations", s.iterations}};
 }
 
@@ -117,8 +118,7 @@ PressSample to_sample(const Json& json) {
   s.converged = json.at("converged").get<bool>();
   s.failure = json.at("failure").get<std::string>();
   s.sample.strains = to_matrix(json.at("strains"));
-  const MatrixX p = to_matrix(json.at("p"));
-  for (Eigen::Index e = 0; e < p.rows(); ++e) s.sample.p.push_back({p(e, 0), p(e, 1)});
+  s.sample.stresses = to_matrix(json.at("stresses"));
   s.weight = json.at("weight").get<double>();
   s.start_rms = json.at("start_rms").get<double>();
   s.rms = json.at("rms").get<double>();

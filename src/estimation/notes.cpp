@@ -130,10 +130,11 @@ std::string told(const SampledMaterial& sampled, const std::vector<PressSample>&
   double least = std::numeric_limits<double>::infinity(), most = 0.0;
   for (const PressSample& s : samples) least = std::min(least, s.weight), most = std::max(most, s.weight);
   return fmt::format(
-      "The sampled material has {:.1f} samples an element, from {} presses; the weight of smoothness was chosen by "
+      "The sampled material has {:.1f} samples an element beside the element's own law, from {} presses; the weight of "
+      "smoothness was chosen by "
       "the noise in each, between {:.3g} and {:.3g}. Its stress misses that of the presses' own fields by "
-      "{:.1f} % of the greatest, root mean square. The parameters above are those of the law that it is smooth "
-      "about.",
+      "{:.1f} % of the greatest, root mean square. The parameters above are those of the law that all presses "
+      "share, from which the elements' laws depart.",
       sampled.mean_samples, samples.size(), least, most, 100.0 * sampled.stress_misfit);
 }
 

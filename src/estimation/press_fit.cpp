@@ -363,10 +363,10 @@ class LawRun : StageLoop {
 
   // What came out ----------------------------------------------------------------------------------------------------
 
-  void add_sampled(LawOutcome& law) {
+  void add_sampled(LawOutcome& law, const std::shared_ptr<const TabulatedLaw>& shared) {
     if (options_.material != MaterialKind::Sampled) return;
     law.samples = sampling().state().kept;
-    law.sampled = sampling().material();
+    law.sampled = sampling().material(shared);
     for (std::size_t i = 0; i < law.samples.size(); ++i)
       if (!law.samples[i].succeeded)
         outcome_.notes.push_back(fmt::format("{} takes no part in the sampled material: {}",
@@ -389,8 +389,9 @@ class LawRun : StageLoop {
     LawOutcome law;
     law.scene = form.scene, law.layout = form.layout, law.noise = best.found.noise, law.cuts = best.shape.cuts;
     law.tried = standing.tried;
-    add_sampled(law);
-    law.law = press_law(*form.scene->body, form.layout, best.theta);
+    const std::shared_ptr<const TabulatedLaw> shared = press_law(*form.scene->body, form.layout, best.theta);
+    add_sampled(law, shared);
+    law.law = shared;
     if (law.sampled) law.law = law.sampled->law;
     if (!interrupted_) law.predictions = predict_presses(*form.scene, law.law);
     outcome_.theta = best.theta;

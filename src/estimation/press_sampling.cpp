@@ -21,16 +21,10 @@ double displacement(const ObservedPress& seen, const Points& placed, std::size_t
   return (now - seen.rest[m]).norm();
 }
 
-/// The field that lies a share of the way from the moduli before to those of a sample, in ln E and Poisson's ratio's
-/// unconstrained number.
-void lead_back(PressSample& sample, const std::vector<SmallStrainModuli>& before, double share) {
-  for (std::size_t e = 0; e < before.size(); ++e) {
-    const SmallStrainModuli found = moduli_of(sample.sample.p[e]);
-    const auto between = [share](double a, double b) { return a + share * (b - a); };
-    const double E = std::exp(between(std::log(before[e].youngs_modulus), std::log(found.youngs_modulus)));
-    const double z = between(unconstrained_ratio(before[e].poissons_ratio), unconstrained_ratio(found.poissons_ratio));
-    sample.sample.p[e] = lambda_alpha({E, ratio_of(z)});
-  }
+/// The stresses that lie a share of the way from those of the law before to those of a sample.
+void lead_back(MaterialSample& sample, const MaterialLaw& before, double share) {
+  const MatrixX stresses = stresses_of(before, sample.strains);
+  if (stresses.allFinite()) sample.stresses = stresses + share * (sample.stresses - stresses);
 }
 
 }  // namespace
@@ -50,12 +44,13 @@ PressSampling::PressSampling(std::shared_ptr<const PressScene> scene, std::vecto
 
 double PressSampling::least_noise() const { return 1e-6 * scene_->body->size(); }
 
-std::optional<SampledMaterial> PressSampling::material_of(const std::vector<PressSample>& samples) const {
+std::optional<SampledMaterial> PressSampling::material_of(const std::shared_ptr<const TabulatedLaw>& shared,
+                                                          const std::vector<PressSample>& samples) const {
   std::vector<MaterialSample> usable;
   for (const PressSample& s : samples)
     if (s.succeeded) usable.push_back(s.sample);
   if (usable.empty()) return std::nullopt;
-  return sample_material(usable, basis_);
+  return sample_material(shared, usable, basis_);
 }
 
 PressSampling::Pressed PressSampling::pressed(int press, const std::shared_ptr<const MaterialLaw>& law,
@@ -79,10 +74,10 @@ std::vector<PressSampling::Pressed> PressSampling::all_pressed(const std::shared
 }
 
 /// What the round is about, with its presses and their noise.
-std::shared_ptr<const MaterialLaw> PressSampling::before(const std::shared_ptr<const MaterialLaw>& law) {
+std::shared_ptr<const MaterialLaw> PressSampling::before(const std::shared_ptr<const TabulatedLaw>& law) {
   if (before_) return before_;
   before_ = law;
-  if (const std::optional<SampledMaterial> last = material()) before_ = last->law;
+  if (const std::optional<SampledMaterial> last = material(law)) before_ = last->law;
   placed_ = all_pressed(before_);
   noise_ = own_noise(placed_);
   return before_;
@@ -124,7 +119,7 @@ double PressSampling::cost_of(const std::vector<Pressed>& presses, const MarkerN
   return cost;
 }
 
-std::vector<PressSample> PressSampling::sample(std::size_t count, const std::shared_ptr<const MaterialLaw>& law,
+std::vector<PressSample> PressSampling::sample(std::size_t count, const std::shared_ptr<const TabulatedLaw>& law,
                                                const MarkerNoise& noise, int iterations) {
   const std::shared_ptr<const MaterialLaw> about = before(law);
   const std::size_t begin = state_.under.size(), end = std::min(begin + count, presses_.size());
@@ -146,21 +141,21 @@ std::vector<PressSample> PressSampling::sample(std::size_t count, const std::sha
         deviation = std::max(least_share * seen.greatest_displacement,
                              std::min({deviation, local_.deviation(weight, moved), noise_.deviation(weight, moved)}));
     }
-    part[i - begin] = fit_sample(*scene_, presses_[i], secant_moduli(*about, placed_[i].strains), smoothness_, options);
+    part[i - begin] = fit_sample(*scene_, presses_[i], about, placed_[i].strains, smoothness_, options);
   });
   state_.under.insert(state_.under.end(), part.begin(), part.end());
   return part;
 }
 
-PressSampling::Round PressSampling::conclude(const std::shared_ptr<const MaterialLaw>& law, const MarkerNoise& noise) {
+PressSampling::Round PressSampling::conclude(const std::shared_ptr<const TabulatedLaw>& law, const MarkerNoise& noise) {
   const std::shared_ptr<const MaterialLaw> about = before(law);
   Round round;
   round.cost_before = round.cost = cost_of(placed_, noise);
   for (const double share : {1.0, 0.5, 0.25}) {
     std::vector<PressSample> led = state_.under;
     for (std::size_t i = 0; i < led.size() && share < 1.0; ++i)
-      if (led[i].succeeded) lead_back(led[i], secant_moduli(*about, placed_[i].strains), share);
-    const std::optional<SampledMaterial> material = material_of(led);
+      if (led[i].succeeded) lead_back(led[i].sample, *about, share);
+    const std::optional<SampledMaterial> material = material_of(law, led);
     if (!material) break;
     const double cost = cost_of(all_pressed(material->law), noise);
     if (!(cost < round.cost_before)) continue;

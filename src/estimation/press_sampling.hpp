@@ -34,15 +34,17 @@ class PressSampling {
   /// The next presses of the round, at most `count`.
   /// @param law    that all presses share; of its body
   /// @param noise  that its residuals show
-  std::vector<PressSample> sample(std::size_t count, const std::shared_ptr<const MaterialLaw>& law,
+  std::vector<PressSample> sample(std::size_t count, const std::shared_ptr<const TabulatedLaw>& law,
                                   const MarkerNoise& noise, int iterations);
   bool is_round_done() const { return state_.under.size() == presses_.size(); }
   /// Ends a round that is done, and begins the next.
-  Round conclude(const std::shared_ptr<const MaterialLaw>& law, const MarkerNoise& noise);
+  Round conclude(const std::shared_ptr<const TabulatedLaw>& law, const MarkerNoise& noise);
 
   const State& state() const { return state_; }
   /// Of the rounds that count; nothing where there are none.
-  std::optional<SampledMaterial> material() const { return material_of(state_.kept); }
+  std::optional<SampledMaterial> material(const std::shared_ptr<const TabulatedLaw>& law) const {
+    return material_of(law, state_.kept);
+  }
 
  private:
   struct Pressed {
@@ -50,12 +52,13 @@ class PressSampling {
     MatrixX strains;  // elements x 6
     Points points;
   };
-  std::shared_ptr<const MaterialLaw> before(const std::shared_ptr<const MaterialLaw>& law);
+  std::shared_ptr<const MaterialLaw> before(const std::shared_ptr<const TabulatedLaw>& law);
   Pressed pressed(int press, const std::shared_ptr<const MaterialLaw>& law, double modulus) const;
   std::vector<Pressed> all_pressed(const std::shared_ptr<const MaterialLaw>& law) const;
   double cost_of(const std::vector<Pressed>& presses, const MarkerNoise& noise) const;
   MarkerNoise own_noise(const std::vector<Pressed>& presses) const;
-  std::optional<SampledMaterial> material_of(const std::vector<PressSample>& samples) const;
+  std::optional<SampledMaterial> material_of(const std::shared_ptr<const TabulatedLaw>& shared,
+                                             const std::vector<PressSample>& samples) const;
   double least_noise() const;
 
   std::shared_ptr<const PressScene> scene_;

@@ -5,7 +5,11 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
+#include <stdexcept>
+
+#include "elasticity/lame.hpp"
 
 namespace pliant {
 
@@ -78,30 +82,71 @@ MatrixX ElementSmoothness::half_solve(const MatrixX& x) const {
 double unconstrained_ratio(double nu) { return std::log((nu - least_ratio) / (0.5 - nu)); }
 double ratio_of(double z) { return least_ratio + (0.5 - least_ratio) / (1.0 + std::exp(-z)); }
 
+ChangedLaw::ChangedLaw(std::shared_ptr<const MaterialLaw> about, std::vector<SmallStrainModuli> secant, MatrixX table)
+    : about_(std::move(about)), secant_(std::move(secant)) {
+  set_table(std::move(table));
+}
+
+void ChangedLaw::check(const MatrixX& table) const {
+  if (table.cols() != 2 || table.rows() != Eigen::Index(secant_.size()) || table.rows() != about_->element_count())
+    throw std::invalid_argument("a changed law has two parameters an element");
+  for (Eigen::Index e = 0; e < table.rows(); ++e)
+    if (!(table(e, 0) > 0.0 && table(e, 1) > -1.0 && table(e, 1) < 0.5))
+      throw std::invalid_argument("a changed law needs a factor > 0 and -1 < nu < 1/2");
+}
+
+void ChangedLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
+  about_->stress(e, F, with_tangent, out);
+  if (!std::isfinite(out.energy)) return;
+  const double factor = table_(e, 0), E = secant_[std::size_t(e)].youngs_modulus;
+  out.energy *= factor;
+  out.P *= factor;
+  if (with_tangent) out.tangent *= factor;
+  const UnitLame now = unit_lame(table_(e, 1)), begin = unit_lame(secant_[std::size_t(e)].poissons_ratio);
+  const double mu = factor * E * (now.mu - begin.mu), lambda = factor * E * (now.lambda - begin.lambda);
+  if (mu == 0.0 && lambda == 0.0) return;
+  const Polar polar = polar_decomposition(F);
+  const Matrix3 strain = polar.S - Matrix3::Identity();
+  Matrix3 T = 2.0 * mu * strain;
+  T.diagonal().array() += lambda * strain.trace();
+  out.energy += 0.5 * T.cwiseProduct(strain).sum();
+  Matrix6 C = 2.0 * mu * Matrix6::Identity();
+  C.topLeftCorner<3, 3>().array() += lambda;
+  add_strain_stress(polar, T, with_tangent ? &C : nullptr, out);
+}
+
+void ChangedLaw::parameter_derivatives(int e, const Matrix3& F, std::span<Matrix3> out) const {
+  PointStress at;
+  stress(e, F, false, at);
+  const double factor = table_(e, 0), E = secant_[std::size_t(e)].youngs_modulus;
+  out[0] = at.P / factor;
+  const UnitLame now = unit_lame(table_(e, 1));
+  const Polar polar = polar_decomposition(F);
+  const Matrix3 strain = polar.S - Matrix3::Identity();
+  Matrix3 T = 2.0 * now.d_mu * strain;
+  T.diagonal().array() += now.d_lambda * strain.trace();
+  out[1] = factor * E * polar.R * T;
+}
+
+SmallStrainModuli ChangedLaw::small_strain(int e) const { return about_->small_strain(e); }
+
 namespace {
 
 MatrixX table_of(const VectorX& q) {
   const Eigen::Index count = q.size() / 2;
   MatrixX table(count, 2);
-  for (Eigen::Index e = 0; e < count; ++e) {
-    const LambdaAlpha p = lambda_alpha({std::exp(q[e]), ratio_of(q[count + e])});
-    table.row(e) << p.lambda, p.alpha;
-  }
+  for (Eigen::Index e = 0; e < count; ++e) table.row(e) << std::exp(q[e]), ratio_of(q[count + e]);
   return table;
 }
 
-/// d(lambda, alpha) / d(ln E, z) of an element.
-Eigen::Matrix2d table_derivative(double lambda, double alpha) {
-  const double nu = alpha / lambda, by_z = (nu - least_ratio) * (0.5 - nu) / (0.5 - least_ratio);
-  const double by_nu = lambda * (1.0 + 4.0 * nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
-  Eigen::Matrix2d by;
-  by << lambda, by_nu * by_z, alpha, (lambda + nu * by_nu) * by_z;
-  return by;
+/// d(factor, nu) / d(ln factor, z) of an element.
+Eigen::Vector2d table_derivative(double factor, double nu) {
+  return {factor, (nu - least_ratio) * (0.5 - nu) / (0.5 - least_ratio)};
 }
 
 }  // namespace
 
-MatrixX sample_jacobian(PressedBody& body, const Body& mesh, const LinearLaw& law, JacobianBy by) {
+MatrixX sample_jacobian(PressedBody& body, const Body& mesh, const ChangedLaw& law, JacobianBy by) {
   const int n = mesh.node_count(), count = mesh.element_count();
   const Embedding& points = body.embedding();
   Equilibrium& equilibrium = body.equilibrium();
@@ -111,7 +156,7 @@ MatrixX sample_jacobian(PressedBody& body, const Body& mesh, const LinearLaw& la
   const auto for_elements = [&](const auto& visit) {
     equilibrium.elasticity().for_parameter_derivatives(
         [&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
-          const MatrixX derivative = by_q * table_derivative(law.table()(e, 0), law.table()(e, 1));
+          const MatrixX derivative = by_q * table_derivative(law.table()(e, 0), law.table()(e, 1)).asDiagonal();
           visit(e, nodes, derivative);
         });
   };
@@ -157,20 +202,20 @@ namespace {
 
 class SampleFit {
  public:
-  SampleFit(const PressScene& scene, int press, const std::vector<SmallStrainModuli>& start,
+  SampleFit(const PressScene& scene, int press, const std::shared_ptr<const MaterialLaw>& about, const MatrixX& strains,
             const ElementSmoothness& smoothness, const SampleFitOptions& options)
       : mesh_(*scene.body),
         seen_(scene.presses[std::size_t(press)]),
         smoothness_(smoothness),
         options_(options),
         q_(2 * smoothness.size()) {
-    for (Eigen::Index e = 0; e < smoothness.size(); ++e) {
-      q_[e] = std::log(start[std::size_t(e)].youngs_modulus);
-      q_[smoothness.size() + e] = unconstrained_ratio(start[std::size_t(e)].poissons_ratio);
-    }
+    std::vector<SmallStrainModuli> secant = secant_moduli(*about, strains);
+    q_.setZero();
+    for (Eigen::Index e = 0; e < smoothness.size(); ++e)
+      q_[smoothness.size() + e] = unconstrained_ratio(secant[std::size_t(e)].poissons_ratio);
     start_ = q_;
-    law_ = std::make_shared<LinearLaw>(table_of(q_));
-    body_.emplace(scene, press, law_, mean_modulus(mesh_, *law_));
+    law_ = std::make_shared<ChangedLaw>(about, std::move(secant), table_of(q_));
+    body_.emplace(scene, press, law_, mean_modulus(mesh_, *about));
   }
 
   PressSample run() {
@@ -214,17 +259,17 @@ class SampleFit {
       if (result.converged) break;
     }
     result.rms = rms();
-    const MatrixX table = table_of(q_);
-    for (Eigen::Index e = 0; e < table.rows(); ++e) result.sample.p.push_back({table(e, 0), table(e, 1)});
     body_->equilibrium().elasticity().evaluate(body_->placement().nodes, false);
     result.sample.strains = body_->equilibrium().elasticity().strains();
-    result.succeeded = true;
+    result.sample.stresses = stresses_of(*law_, result.sample.strains);
+    result.succeeded = result.sample.stresses.allFinite();
+    if (!result.succeeded) result.failure = "an element is turned inside out";
     return result;
   }
 
  private:
   bool solve(const VectorX& q) {
-    law_ = std::make_shared<LinearLaw>(table_of(q));
+    law_ = std::dynamic_pointer_cast<const ChangedLaw>(law_->with_table(table_of(q)));
     body_->equilibrium().set_law(law_);
     if (!body_->solve().converged) return false;
     Points residuals = body_->points();
@@ -318,7 +363,7 @@ class SampleFit {
   const ElementSmoothness& smoothness_;
   SampleFitOptions options_;
   VectorX q_, start_, r_;
-  std::shared_ptr<const LinearLaw> law_;
+  std::shared_ptr<const ChangedLaw> law_;
   std::optional<PressedBody> body_;
   MatrixX J_;
   Eigen::SelfAdjointEigenSolver<MatrixX> G_;
@@ -326,40 +371,52 @@ class SampleFit {
 
 }  // namespace
 
-std::vector<SmallStrainModuli> secant_moduli(const MaterialLaw& law, const MatrixX& strains) {
+SmallStrainModuli secant_moduli(const Matrix3& strain, const Matrix3& stress, const SmallStrainModuli& at_rest) {
   constexpr double hold = 0.01;  // of the moduli at rest, as a share of the squares of strain
   constexpr double least_part = 0.05, least_nu = -0.45, most_nu = 0.49;
+  // Stress a e + b tr(e) I, with a = lambda (1 - 2 nu), b = lambda nu.
+  const LambdaAlpha rest = lambda_alpha(at_rest);
+  const Eigen::Vector2d before(rest.lambda - 2.0 * rest.alpha, rest.alpha);
+  const double trace = strain.trace(), square = strain.squaredNorm();
+  if (!(square > 0.0)) return at_rest;
+  Eigen::Matrix2d A;
+  A << square, trace * trace, trace * trace, 3.0 * trace * trace;
+  A.diagonal().array() += hold * square;
+  const Eigen::Vector2d right(stress.cwiseProduct(strain).sum(), trace * stress.trace());
+  const Eigen::Vector2d ab = A.ldlt().solve(right + hold * square * before);
+  const double lambda = std::max(ab[0] + 2.0 * ab[1], least_part * rest.lambda);
+  const double nu = std::clamp(ab[1] / lambda, least_nu, most_nu);
+  return moduli_of({lambda, lambda * nu});
+}
+
+std::vector<SmallStrainModuli> secant_moduli(const MaterialLaw& law, const MatrixX& strains) {
+  const MatrixX stresses = stresses_of(law, strains);
   std::vector<SmallStrainModuli> moduli;
-  PointStress point;
   for (int e = 0; e < int(strains.rows()); ++e) {
     const SmallStrainModuli rest = law.small_strain(e);
-    SmallStrainModuli& secant = moduli.emplace_back(rest);
-    Matrix3 strain;
-    strain << strains(e, 0), strains(e, 3), strains(e, 4),  //
-        strains(e, 3), strains(e, 1), strains(e, 5),        //
-        strains(e, 4), strains(e, 5), strains(e, 2);
-    law.stress(e, Matrix3::Identity() + strain, false, point);
-    if (!std::isfinite(point.energy)) continue;
-    // Stress a e + b tr(e) I, with a = lambda (1 - 2 nu), b = lambda nu.
-    const LambdaAlpha at_rest = lambda_alpha(rest);
-    const Eigen::Vector2d before(at_rest.lambda - 2.0 * at_rest.alpha, at_rest.alpha);
-    const double trace = strain.trace(), square = strain.squaredNorm();
-    if (!(square > 0.0)) continue;
-    Eigen::Matrix2d A;
-    A << square, trace * trace, trace * trace, 3.0 * trace * trace;
-    A.diagonal().array() += hold * square;
-    const Eigen::Vector2d right(point.P.cwiseProduct(strain).sum(), trace * point.P.trace());
-    const Eigen::Vector2d ab = A.ldlt().solve(right + hold * square * before);
-    const double lambda = std::max(ab[0] + 2.0 * ab[1], least_part * at_rest.lambda);
-    const double nu = std::clamp(ab[1] / lambda, least_nu, most_nu);
-    secant = moduli_of({lambda, lambda * nu});
+    moduli.push_back(stresses.row(e).allFinite() ? secant_moduli(tensor_of(strains.row(e).transpose()),
+                                                                 tensor_of(stresses.row(e).transpose()), rest)
+                                                 : rest);
   }
   return moduli;
 }
 
-PressSample fit_sample(const PressScene& scene, int press, const std::vector<SmallStrainModuli>& start,
-                       const ElementSmoothness& smoothness, const SampleFitOptions& options) {
-  return SampleFit(scene, press, start, smoothness, options).run();
+MatrixX stresses_of(const MaterialLaw& law, const MatrixX& strains) {
+  MatrixX stresses(strains.rows(), 6);
+  PointStress point;
+  for (int e = 0; e < int(strains.rows()); ++e) {
+    law.stress(e, Matrix3::Identity() + tensor_of(strains.row(e).transpose()), false, point);
+    if (std::isfinite(point.energy))
+      stresses.row(e) = components_of(point.P).transpose();
+    else
+      stresses.row(e).setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return stresses;
+}
+
+PressSample fit_sample(const PressScene& scene, int press, const std::shared_ptr<const MaterialLaw>& about,
+                       const MatrixX& strains, const ElementSmoothness& smoothness, const SampleFitOptions& options) {
+  return SampleFit(scene, press, about, strains, smoothness, options).run();
 }
 
 }  // namespace pliant

@@ -137,44 +137,45 @@ void visit(Archive& archive, TetMesh& mesh) {
     mesh = make_tet_mesh(std::move(mesh.nodes), std::move(mesh.tets), std::move(mesh.mid_nodes));
 }
 template <class Archive>
-void visit(Archive& archive, StrainSamples& s) {
-  visit(archive, s.strains), visit(archive, s.weights);
-  visit(archive, s.constant), visit(archive, s.least), visit(archive, s.most);
+void visit(Archive& archive, StressSamples& s) {
+  visit(archive, s.width), visit(archive, s.strains), visit(archive, s.weights);
 }
 template <class Archive>
-void visit(Archive& archive, std::shared_ptr<const MaterialLaw>& law) {
-  std::string name = law ? law->name() : "";
-  visit(archive, name);
-  if (name.empty()) return;
-  if (name == "sampled") {
-    std::vector<StrainSamples> elements;
-    double metric_nu = 0.0;
-    if constexpr (!Archive::reads) {
-      const auto& sampled = dynamic_cast<const SampledLaw&>(*law);
-      for (int e = 0; e < sampled.element_count(); ++e) elements.push_back(sampled.samples(e));
-      metric_nu = sampled.metric_nu();
-    }
-    visit(archive, elements), visit(archive, metric_nu);
-    if constexpr (Archive::reads) law = std::make_shared<SampledLaw>(std::move(elements), metric_nu);
-    return;
-  }
+void visit(Archive& archive, const std::string& name, std::shared_ptr<const TabulatedLaw>& law) {
   MatrixX table;
-  if constexpr (!Archive::reads) table = dynamic_cast<const TabulatedLaw&>(*law).table();
+  if constexpr (!Archive::reads) table = law->table();
   int columns = int(table.cols());
   VectorX numbers = table.reshaped();
   visit(archive, columns), visit(archive, numbers);
   if constexpr (Archive::reads) {
     if (columns < 1 || numbers.size() % columns != 0) throw std::runtime_error("the bytes of the object make no sense");
     table = numbers.reshaped(numbers.size() / columns, columns);
-    if (name == "linear")
-      law = std::make_shared<LinearLaw>(std::move(table));
-    else if (name == "neo_hookean")
-      law = std::make_shared<NeoHookeanLaw>(std::move(table));
-    else if (name == "ogden")
-      law = std::make_shared<OgdenLaw>(std::move(table));
-    else
-      throw std::runtime_error("the bytes of the object make no sense");
+    law = tabulated_law(name, std::move(table));
+    if (!law) throw std::runtime_error("the bytes of the object make no sense");
   }
+}
+template <class Archive>
+void visit(Archive& archive, std::shared_ptr<const MaterialLaw>& law) {
+  std::string name = law ? law->name() : "";
+  visit(archive, name);
+  if (name.empty()) return;
+  std::shared_ptr<const TabulatedLaw> own;
+  if (name != "sampled") {
+    if constexpr (!Archive::reads) own = std::dynamic_pointer_cast<const TabulatedLaw>(law);
+    visit(archive, name, own);
+    if constexpr (Archive::reads) law = own;
+    return;
+  }
+  std::vector<StressSamples> elements;
+  std::string own_name;
+  if constexpr (!Archive::reads) {
+    const auto& sampled = dynamic_cast<const SampledLaw&>(*law);
+    for (int e = 0; e < sampled.element_count(); ++e) elements.push_back(sampled.samples(e));
+    own = sampled.law().with_table(sampled.law().table());
+    own_name = own->name();
+  }
+  visit(archive, own_name), visit(archive, own_name, own), visit(archive, elements);
+  if constexpr (Archive::reads) law = std::make_shared<SampledLaw>(std::move(own), std::move(elements));
 }
 template <class Archive>
 void visit(Archive& archive, LiveSample& sample) {

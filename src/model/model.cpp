@@ -22,6 +22,7 @@ namespace {
 
 constexpr const char *corotated = "corotated", *neo_hookean = "neo_hookean";  // mean_strain
 constexpr const char *rayleigh = "rayleigh", *kelvin_voigt = "kelvin_voigt";  // damping_law
+constexpr const char* sampled = "sampled";                                    // a law
 
 constexpr const char* modulus_field = "youngs_modulus [Pa]";
 constexpr const char* modulus_std_field = "youngs_modulus_std [Pa]";
@@ -53,7 +54,11 @@ std::string model_toml(const Model& m) {
                 : "\n[material]                          # isotropic\n");
   if (m.law) {
     out << fmt::format("law = \"{}\"\ntable = \"material.csv\"            # of the law, by element\n", m.law->name);
-    if (m.law->metric_nu != 0.0) line(out, "metric_nu", m.law->metric_nu, "Poisson's ratio of the norm of strains");
+    if (m.law->name == sampled)
+      out << fmt::format(
+          "own_law = \"{}\"            # of each element, whose numbers the table holds\n"
+          "samples = \"samples.csv\"      # stresses on top of it\n",
+          m.law->own_law);
   }
   line(out, "youngs_modulus", m.youngs_modulus, "Pa; the mean where elements differ");
   line(out, "poissons_ratio", m.poissons_ratio, "-1 .. 0.5");
@@ -96,17 +101,18 @@ void write_volume(const fs::path& path, const ModelVolume& volume) {
   write_vtu(path, grid);
 }
 
-void write_law(const fs::path& path, const ModelLaw& law) {
-  std::string text = fmt::format("{}\n", fmt::join(law.columns, ","));
-  for (const std::vector<double>& row : law.rows) {
-    if (row.size() != law.columns.size()) throw std::invalid_argument("a law's rows have a number a column");
+void write_table(const fs::path& path, const std::vector<std::string>& columns,
+                 const std::vector<std::vector<double>>& rows) {
+  std::string text = fmt::format("{}\n", fmt::join(columns, ","));
+  for (const std::vector<double>& row : rows) {
+    if (row.size() != columns.size()) throw std::invalid_argument("a law's rows have a number a column");
     text += fmt::format("{:.17g}\n", fmt::join(row, ","));
   }
   write_file(path, text);
 }
 
 ModelLaw read_law(const fs::path& path, std::string name) {
-  ModelLaw law{std::move(name), {}, {}, 0.0};
+  ModelLaw law{std::move(name), {}, {}};
   const std::string text = read_file(path);
   std::string header = text.substr(0, text.find_first_of("\r\n"));
   for (std::size_t begin = 0; begin <= header.size();) {
@@ -186,11 +192,29 @@ class Reader {
         read_number(object, "density", {.low = 0.0, .low_allowed = false, .meaning = "the density in kg/m^3"});
   }
 
+  void read_samples(TomlTable& material) {
+    if (material.has("metric_nu")) {
+      (void)material.optional<double>("metric_nu");
+      material.context().complain(
+          material.key_of("metric_nu"), "a sampled law of samples of stiffness, as it was saved until 2026",
+          "own_law and samples: a law of each element, and stresses on top of it", "fit the presses again");
+      return;
+    }
+    model_.law->own_law = read_choice(material, "own_law", {"ogden", "neo_hookean", "linear"});
+    with_file(material, "samples", [&](const fs::path& path) {
+      std::vector<Problem> problems;
+      read_csv(path, fmt::format("{}", fmt::join(sample_columns, ",")), problems, [&](CsvRow& row) {
+        std::vector<double>& numbers = model_.law->samples.emplace_back();
+        for (std::size_t c = 0; c < sample_columns.size(); ++c) numbers.push_back(row.number(c).value_or(0.0));
+      });
+      if (!problems.empty()) throw InputError(std::move(problems));
+    });
+  }
+
   void read_material(TomlTable& material) {
     if (const auto law = material.optional<std::string>("law"))
       with_file(material, "table", [&](const fs::path& path) { model_.law = read_law(path, *law); });
-    const double metric_nu = read_number(material, "metric_nu", {.low = -1.0, .high = 0.5, .meaning = "a norm's"}, 0.0);
-    if (model_.law) model_.law->metric_nu = metric_nu;
+    if (model_.law && model_.law->name == sampled) read_samples(material);
     model_.youngs_modulus = read_number(material, "youngs_modulus",
                                         {.low = 0.0, .low_allowed = false, .meaning = "Young's modulus in pascals"});
     model_.poissons_ratio = read_number(
@@ -271,7 +295,8 @@ void save_model(const fs::path& folder, const Model& model) {
   if (!model.volume.connectivity.empty()) write_volume(folder / "model.vtu", model.volume);
   write_mesh(folder / "surface.ply", scanned_surface(model.scene.object.surface.value(), model.scene.inner));
   write_scene_files(folder, model.scene);
-  if (model.law) write_law(folder / "material.csv", *model.law);
+  if (model.law) write_table(folder / "material.csv", model.law->columns, model.law->rows);
+  if (model.law && model.law->name == sampled) write_table(folder / "samples.csv", sample_columns, model.law->samples);
   write_file(folder / "model.toml", model_toml(model));
 }
 

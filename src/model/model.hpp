@@ -24,12 +24,18 @@ struct ModelVolume {
 /// A material of its own in the place of Young's modulus and Poisson's ratio, as a table (`material.csv`). What its
 /// columns mean depends on the law: see docs/model.md.
 struct ModelLaw {
-  std::string name;                       ///< "ogden", "linear" or "sampled"
+  std::string name;                       ///< "ogden", "neo_hookean", "linear" or "sampled"
   std::vector<std::string> columns;       ///< the first is "element"
   std::vector<std::vector<double>> rows;  ///< as many numbers each
-  double metric_nu = 0.0;                 ///< of a sampled law
+  std::string own_law = {};               ///< of a sampled law: that of each element, whose table the rows are
+  /// Of a sampled law (`samples.csv`), as many numbers each as `sample_columns`.
+  std::vector<std::vector<double>> samples = {};
   bool operator==(const ModelLaw&) const = default;
 };
+
+inline const std::vector<std::string> sample_columns = {"element",   "width",     "xx",        "yy",        "zz",
+                                                        "xy",        "xz",        "yz",        "weight_xx", "weight_yy",
+                                                        "weight_zz", "weight_xy", "weight_xz", "weight_yz"};
 
 /// A fitted object, ready to be simulated. SI units, the capture's world frame.
 struct Model {

@@ -106,7 +106,7 @@ std::string presses_csv(const LawOutcome& outcome) {
 std::string basis_csv(const SampledMaterial& material) {
   std::string text = "samples an element,relative error of stress\n";
   for (std::size_t i = 0; i < material.error_by_size.size(); ++i)
-    text += fmt::format("{},{:.6g}\n", i + 1, material.error_by_size[i]);
+    text += fmt::format("{},{:.6g}\n", i, material.error_by_size[i]);
   return text;
 }
 

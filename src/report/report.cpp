@@ -470,11 +470,12 @@ std::string presses_section(const ReportData& data) {
     Series errors;
     errors.mark = Mark::LineAndDots;
     for (std::size_t k = 0; k < data.basis_errors.size(); ++k) {
-      errors.x.push_back(double(k + 1));
+      errors.x.push_back(double(k));
       errors.y.push_back(100.0 * data.basis_errors[k]);
     }
     options.x_label = "samples of an element", options.y_label = "error of stress [%]";
-    html += "<p>How well few of the presses' stiffnesses stand for all of them:</p>\n" + plot_svg({errors}, options);
+    html += "<p>What the elements' own laws and few of the samples leave of all of them:</p>\n" +
+            plot_svg({errors}, options);
   }
   return html + "<details><summary>All presses</summary>\n" +
          table("<th></th><th>force</th><th>greatest displacement</th><th>markers, rms</th><th>of the displacement</th>",

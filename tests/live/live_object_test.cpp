@@ -57,7 +57,8 @@ TEST(LiveData, LawsComeBackToo) {
   const MatrixX numbers = Eigen::RowVector2d(3.0, 1.0).replicate(elements, 1);
   data.samples = {{data.theta, std::make_shared<LinearLaw>(numbers)},
                   {data.theta, std::make_shared<NeoHookeanLaw>(numbers)},
-                  {data.theta, std::make_shared<SampledLaw>(std::vector<StrainSamples>(std::size_t(elements)), 0.2)}};
+                  {data.theta, std::make_shared<SampledLaw>(std::make_shared<LinearLaw>(numbers),
+                                                            std::vector<StressSamples>(std::size_t(elements)))}};
   const std::string bytes = encode(data);
   EXPECT_EQ(encode(decode(bytes)), bytes);
   const LiveData back = decode(bytes);

@@ -10,6 +10,7 @@
 #include "motion/pull.hpp"
 #include "motion/rigid_contact.hpp"
 #include "support/force_terms.hpp"
+#include "support/samples.hpp"
 
 namespace pliant::force_term_test {
 namespace {
@@ -53,15 +54,14 @@ std::shared_ptr<const Body> with_three_moduli(Body body) {
 
 /// Stiffness that was sampled under a few strains, stiffer the greater they are.
 std::shared_ptr<const MaterialLaw> sampled(const Body& body) {
-  std::vector<MaterialSample> samples(4);
-  for (std::size_t k = 0; k < samples.size(); ++k) {
-    samples[k].strains.resize(body.element_count(), 6);
-    for (int e = 0; e < body.element_count(); ++e) {
-      for (int i = 0; i < 6; ++i) samples[k].strains(e, i) = 0.1 * double(k) * std::sin(1.0 + e + 3.1 * i + 7.3 * k);
-      samples[k].p.push_back(lambda_alpha({3000.0 * (1.0 + 5.0 * samples[k].strains.row(e).norm()), 0.3}));
-    }
+  MatrixX strains(body.element_count(), 6);
+  std::vector<MaterialSample> samples;
+  for (int k = 0; k < 4; ++k) {
+    for (int e = 0; e < body.element_count(); ++e)
+      for (int i = 0; i < 6; ++i) strains(e, i) = 0.1 * k * std::sin(1.0 + e + 3.1 * i + 7.3 * k);
+    samples.push_back(test::stiffening_sample(strains, 3000.0, 5.0, 0.3));
   }
-  return sample_material(samples, {1e-6, 4}).law;
+  return sample_material(test::one_term_ogden(body.element_count(), 1000.0, 0.3), samples, {1e-6, 4}).law;
 }
 
 /// Every law, on linear and quadratic tetrahedra: of one modulus, of three, of three laws.

@@ -3,6 +3,7 @@
 #include "motion/equilibrium.hpp"
 #include "support/bodies.hpp"
 #include "support/derivatives.hpp"
+#include "support/samples.hpp"
 #include "support/tolerance.hpp"
 
 namespace pliant::law_equilibrium_test {
@@ -201,17 +202,16 @@ TEST(LawEquilibrium, OfASampledMaterialIsFoundToo) {
   const Block block;
   std::vector<MaterialSample> samples;
   for (int k = 0; k < 4; ++k) {
-    MaterialSample s;
-    s.strains = MatrixX::Zero(block.body->element_count(), 6);
-    s.strains.col(1).setConstant(-0.05 * (k + 1));
-    s.strains.col(3).setConstant(0.02 * k);
-    s.p.assign(std::size_t(block.body->element_count()), lambda_alpha({3000.0 * (1.0 + k), 0.25}));
-    samples.push_back(s);
+    MatrixX strains = MatrixX::Zero(block.body->element_count(), 6);
+    strains.col(1).setConstant(-0.05 * (k + 1));
+    strains.col(3).setConstant(0.02 * k);
+    samples.push_back(test::stiffening_sample(strains, 3000.0, 15.0, 0.25));
   }
-  const auto law = sample_material(samples).law;
+  const auto law = sample_material(test::one_term_ogden(block.body->element_count(), 1200.0, 0.25), samples).law;
   Equilibrium equilibrium = block.make(law);
   MatrixX unstrained(block.body->element_count(), 2);
-  unstrained.rowwise() = Eigen::RowVector2d(samples[0].p[0].lambda, samples[0].p[0].alpha);
+  const LambdaAlpha p = lambda_alpha({3000.0, 0.25});
+  unstrained.rowwise() = Eigen::RowVector2d(p.lambda, p.alpha);
   const auto press = [&](std::shared_ptr<const MaterialLaw> of) {
     equilibrium.set_law(std::move(of));
     equilibrium.set_control(0, {ProbeControl::Kind::Force, {0.0, -20.0, 0.0}, {}, {}});

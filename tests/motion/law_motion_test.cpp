@@ -3,6 +3,7 @@
 #include "elasticity/sampled_law.hpp"
 #include "motion/simulation.hpp"
 #include "support/bodies.hpp"
+#include "support/samples.hpp"
 
 namespace pliant::law_motion_test {
 namespace {
@@ -19,16 +20,15 @@ std::shared_ptr<const MaterialLaw> ogden(const Body& body) {
 
 /// Twice as stiff where it is strained by a tenth.
 std::shared_ptr<const MaterialLaw> sampled(const Body& body) {
-  std::vector<MaterialSample> samples(4);
+  MatrixX strains(body.element_count(), 6);
+  std::vector<MaterialSample> samples;
   for (int k = 0; k < 4; ++k) {
-    MaterialSample& s = samples[std::size_t(k)];
-    s.strains.resize(body.element_count(), 6);
-    for (int e = 0; e < body.element_count(); ++e) {
-      for (int i = 0; i < 6; ++i) s.strains(e, i) = 0.04 * k * std::sin(1.0 + e + 3.1 * i + 7.3 * k);
-      s.p.push_back(lambda_alpha({modulus * (1.0 + 10.0 * s.strains.row(e).norm()), nu}));
-    }
+    for (int e = 0; e < body.element_count(); ++e)
+      for (int i = 0; i < 6; ++i) strains(e, i) = 0.04 * k * std::sin(1.0 + e + 3.1 * i + 7.3 * k);
+    samples.push_back(test::stiffening_sample(strains, modulus, 10.0, nu));
   }
-  return sample_material(samples, {1e-6, 4}).law;
+  return sample_material(test::one_term_ogden(body.element_count(), 0.5 * modulus / (1.0 + nu), nu), samples, {1e-6, 4})
+      .law;
 }
 
 struct LetGo {

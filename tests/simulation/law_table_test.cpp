@@ -6,6 +6,7 @@
 #include "elasticity/sampled_law.hpp"
 #include "geometry/primitives.hpp"
 #include "input_errors.hpp"
+#include "support/samples.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant::law_table_test {
@@ -48,15 +49,14 @@ std::shared_ptr<const MaterialLaw> neo_hookean() {
   return std::make_shared<NeoHookeanLaw>(q);
 }
 std::shared_ptr<const MaterialLaw> sampled() {
-  std::vector<MaterialSample> samples(5);
-  for (std::size_t k = 0; k < samples.size(); ++k) {
-    samples[k].strains.resize(elements, 6);
-    for (int e = 0; e < elements; ++e) {
-      for (int i = 0; i < 6; ++i) samples[k].strains(e, i) = 0.1 * std::sin(1.0 + e + 3.1 * i + 7.3 * double(k));
-      samples[k].p.push_back(lambda_alpha({5000.0 * (1.0 + 0.2 * double(k) + 0.1 * e), 0.2 + 0.03 * double(k)}));
-    }
+  std::vector<MaterialSample> samples;
+  MatrixX strains(elements, 6);
+  for (int k = 0; k < 5; ++k) {
+    for (int e = 0; e < elements; ++e)
+      for (int i = 0; i < 6; ++i) strains(e, i) = 0.1 * std::sin(1.0 + e + 3.1 * i + 7.3 * k);
+    samples.push_back(test::stiffening_sample(strains, 5000.0 * (1.0 + 0.2 * k), 4.0, 0.2 + 0.03 * k));
   }
-  return sample_material(samples, {1e-9, 5}).law;
+  return sample_material(test::one_term_ogden(elements, 2000.0, 0.25), samples, {1e-9, 5}).law;
 }
 
 struct KeptLaw : ::testing::TestWithParam<std::shared_ptr<const MaterialLaw> (*)()> {};
@@ -102,15 +102,31 @@ TEST(KeptLaws, ThatAreDamagedAreToldWithWhatToDo) {
   other.rows[1][3] = 0.7;
   EXPECT_THAT(refusal(other), HasSubstr("nu < 1/2"));
   other = model_law(*sampled());
-  other.rows[0][0] = 17;
+  ASSERT_FALSE(other.samples.empty());
+  other.samples[0][0] = 17;
   EXPECT_THAT(refusal(other), HasSubstr("element 17"));
   other = model_law(*sampled());
-  other.rows[0][1] = 9;
-  EXPECT_THAT(refusal(other), HasSubstr("a row of kind 9"));
+  other.samples[0][1] = 0.0;
+  EXPECT_THAT(refusal(other), HasSubstr("one width in all rows"));
+  for (std::vector<double>& row : other.samples) row[1] = 0.0;
+  EXPECT_THAT(refusal(other), HasSubstr("a width > 0"));
   const TemporaryFolder folder;
   save_model(folder.path(), model_with(*ogden()));
   folder.write("material.csv", "mu_1,exponent_1\n1,2\n");
   EXPECT_THAT(complaint_of([&] { (void)load_model(folder / "model.toml"); }), HasSubstr("material.csv"));
+  save_model(folder.path(), model_with(*sampled()));
+  folder.write("samples.csv", "element,width\n1,2\n");
+  EXPECT_THAT(complaint_of([&] { (void)load_model(folder / "model.toml"); }), HasSubstr("samples.csv"));
+}
+
+TEST(KeptLaws, OfSampledStiffnessAreRefusedWithWhatToDo) {
+  const TemporaryFolder folder;
+  save_model(folder.path(), model_with(*sampled()));
+  std::string text = read_file(folder / "model.toml");
+  const std::size_t begin = text.find("own_law"), end = text.find("\n", text.find("samples = "));
+  text.replace(begin, end - begin, "metric_nu = 0.2");
+  folder.write("model.toml", text);
+  EXPECT_THAT(complaint_of([&] { (void)load_model(folder / "model.toml"); }), HasSubstr("fit the presses again"));
 }
 
 }  // namespace
