@@ -92,13 +92,17 @@ void describe_sensors(const Capture& capture) {
   for (const DepthCamera& camera : capture.depth) {
     const PinholeCamera& lens = camera.camera;
     const double fov = 2.0 * degrees(std::atan(0.5 * lens.width / lens.fx));
-    say("camera",
-        formatted("\"%s\" %d x %d, view of %.0f degrees, %s%s", camera.name.c_str(), lens.width, lens.height, fov,
-                  camera.masks        ? "masks"
-                  : camera.background ? "background image"
-                                      : "neither masks nor background",
-                  camera.every > 1 ? formatted(", every %d frames", camera.every).c_str() : ""));
+    say("camera", formatted("\"%s\" %d x %d, view of %.0f degrees%s, %s%s", camera.name.c_str(), lens.width,
+                            lens.height, fov, lens.lens.bends() ? " through a lens that bends" : "",
+                            camera.masks        ? "masks"
+                            : camera.background ? "background image"
+                                                : "neither masks nor background",
+                            camera.every > 1 ? formatted(", every %d frames", camera.every).c_str() : ""));
   }
+  for (const DepthCamera& camera : capture.depth)
+    if (camera.time_offset != 0.0)
+      say("", formatted("\"%s\" takes its images %.2f ms after their frames", camera.name.c_str(),
+                        1e3 * camera.time_offset));
   for (const CloudSequence& cloud : capture.clouds) say("clouds", cloud.points.pattern);
   const auto is_test = [](const auto& item) { return item.role == "test"; };
   if (!capture.presses.empty())
@@ -152,6 +156,23 @@ void describe_markers(const Capture& capture, const Survey& seen, Json& json) {
                             {"measurements", loaded.frames},
                             {"missing", loaded.missing},
                             {"travel", loaded.travel}};
+}
+
+void describe_cleaning(const std::vector<ObservedFrame>& frames, Json& json) {
+  CloudCounts all;
+  for (const ObservedFrame& frame : frames) {
+    all.read += frame.cloud.read, all.out_of_reach += frame.cloud.out_of_reach, all.on_plane += frame.cloud.on_plane;
+    all.background += frame.cloud.background, all.isolated += frame.cloud.isolated;
+  }
+  if (all.read == 0) return;
+  const auto percent = [&](int count) { return 100.0 * count / all.read; };
+  say("", formatted("left out of the clouds: %.1f %% far away, %.1f %% on planes, %.1f %% background, %.1f %% alone",
+                    percent(all.out_of_reach), percent(all.on_plane), percent(all.background), percent(all.isolated)));
+  json["clouds_left_out"] = {{"read", all.read},
+                             {"out_of_reach", all.out_of_reach},
+                             {"on_plane", all.on_plane},
+                             {"background", all.background},
+                             {"isolated", all.isolated}};
 }
 
 void describe_observations(const Capture& capture, const Survey& seen, Json& json) {
@@ -352,6 +373,7 @@ void check(const Arguments& arguments) {
   describe_sensors(capture);
   describe_markers(capture, seen, json);
   describe_observations(capture, seen, json);
+  describe_cleaning(frames, json);
   describe_planes(capture, seen, json);
   for (std::size_t i = 0; i < seen.scenes.size(); ++i) describe_scene(seen.scenes[i], capture.depth[i].name, json);
   for (const CloudScene& scene : seen.clouds) describe_cloud(scene, json);

@@ -1,5 +1,6 @@
 #include "capture/capture.hpp"
 
+#include <algorithm>
 #include <cctype>
 #include <cstdio>
 
@@ -30,6 +31,26 @@ const std::vector<std::string>& test_mode_names() {
 const std::vector<std::string>& stress_measure_names() {
   static const std::vector<std::string> names = {"first", "second", "cauchy_difference"};
   return names;
+}
+
+bool has_time_offsets(const Capture& capture) {
+  return !capture.scene.timing.is_static &&
+         std::ranges::any_of(capture.depth, [](const DepthCamera& camera) { return camera.time_offset != 0.0; });
+}
+
+Capture as_seen_from(Capture capture, const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  const fs::path there = (fs::absolute(folder) / "").lexically_normal().parent_path();
+  const auto lead = [&](FramePattern& pattern) {
+    pattern.pattern = (capture.folder / pattern.pattern).lexically_normal().lexically_relative(there).generic_string();
+  };
+  for (DepthCamera& camera : capture.depth) {
+    lead(camera.images);
+    if (camera.masks) lead(*camera.masks);
+  }
+  for (CloudSequence& cloud : capture.clouds) lead(cloud.points);
+  capture.folder = there, capture.file = there / "capture.toml";
+  return capture;
 }
 
 bool FramePattern::is_valid() const { return number_field(pattern).has_value(); }

@@ -33,7 +33,8 @@ struct DepthCamera {
   std::optional<FramePattern> masks;
   std::optional<std::filesystem::path> background;  ///< absolute
   int every = 1;
-  std::optional<double> noise;  ///< standard deviation of a reading [m]
+  std::optional<double> noise = {};  ///< standard deviation of a reading [m]
+  double time_offset = 0.0;          ///< [s] its images are taken that much later than their frames
   bool operator==(const DepthCamera&) const = default;
 };
 
@@ -41,6 +42,7 @@ struct CloudSequence {
   FramePattern points;
   int every = 1;
   std::optional<double> noise;
+  std::optional<std::filesystem::path> background = {};  ///< absolute; a cloud of the scene without the object
   bool operator==(const CloudSequence&) const = default;
 };
 
@@ -157,6 +159,12 @@ struct Capture {
 
   int frame_count() const { return scene.timing.frame_count(); }
 };
+
+/// Whether a depth camera takes its images at other times than the frames', of an object in motion.
+bool has_time_offsets(const Capture& capture);
+
+/// The same recording described from another folder: its patterns lead there from `folder`.
+Capture as_seen_from(Capture capture, const std::filesystem::path& folder);
 
 /// Reads and validates a capture: `path` is the folder or its capture.toml.
 /// Throws InputError with every problem found, each with file, line and column, what was found, what was expected

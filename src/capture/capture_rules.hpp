@@ -45,6 +45,8 @@ void check_materials(RuleContext&);
 void check_planes(RuleContext&);
 void check_camera_names(RuleContext&);
 void check_intrinsics(RuleContext&);
+void check_lenses(RuleContext&);
+void check_time_offsets(RuleContext&);
 void check_every(RuleContext&);
 void check_noise(RuleContext&);
 void check_has_observations(RuleContext&);

@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <set>
 
 #include "capture/capture_rules.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/surface_distance.hpp"
+#include "geometry/whole_picture.hpp"
 #include "scene/region.hpp"
 #include "scene/scene_toml.hpp"
 
@@ -37,6 +39,7 @@ constexpr double least_gravity = 1.0, greatest_gravity = 30.0;       // [m/s^2] 
 constexpr double shortest_interval = 1e-5, longest_interval = 10.0;  // [s] between frames
 constexpr double fastest = 100.0, fastest_spin = 1000.0;             // [m/s], [rad/s]
 constexpr double least_noise = 1e-6, greatest_noise = 0.25;          // [m]
+constexpr double greatest_offset = 1.0;                              // [s]
 constexpr double greatest_force = 1e5;                               // [N]
 constexpr double greatest_load = 100.0;                              // times the object's own mass
 constexpr double surface_tolerance = 0.05;                           // of the object's size
@@ -286,6 +289,30 @@ void check_intrinsics(RuleContext& context) {
       context.toml.reject(item("depth", i, "cx"),
                           "the principal point (" + text_of(camera.cx, "") + ", " + text_of(camera.cy, "") + ")",
                           "a point in the image, in pixels", "mostly near (width / 2, height / 2)");
+  }
+}
+
+void check_lenses(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
+    const PinholeCamera& camera = context.capture.depth[i].camera;
+    if (!context.toml.is_sound(item("depth", i)) || !camera.lens.bends()) continue;
+    if (!sees_whole_picture(camera))
+      context.toml.reject(item("depth", i, "distortion"),
+                          "a lens through which no ray reaches some pixels: beyond " +
+                              text_of(std::atan(camera.lens.reach()) * 180.0 / std::numbers::pi, "degrees") +
+                              " from its axis it folds back",
+                          "a lens that shows each place of the image once",
+                          "k1, k2, p1, p2, k3 in the order of OpenCV; calibrate with corners near the image's edges");
+  }
+}
+
+void check_time_offsets(RuleContext& context) {
+  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
+    const double offset = context.capture.depth[i].time_offset;
+    if (!context.toml.is_sound(item("depth", i))) continue;
+    if (std::abs(offset) > greatest_offset)
+      context.toml.complain(item("depth", i, "time_offset"), "a `time_offset` of " + text_of(offset, "s"), "-1 to 1 s",
+                            "in seconds; whole frames are better left out of the recording");
   }
 }
 

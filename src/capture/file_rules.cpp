@@ -157,6 +157,8 @@ std::vector<Rule> make_rules() {
           check_planes,
           check_camera_names,
           check_intrinsics,
+          check_lenses,
+          check_time_offsets,
           check_every,
           check_noise,
           check_has_observations,
@@ -292,6 +294,7 @@ void check_clouds(RuleContext& context) {
     if (complain_missing(context, item("cloud", i, "points"), cloud.points, frames)) continue;
     try {
       for (const int frame : frames) (void)read_point_count(context.capture.folder / cloud.points(frame));
+      if (cloud.background) (void)read_point_count(*cloud.background);
     } catch (const InputError& error) {
       add_problems(context, item("cloud", i), error);
     }

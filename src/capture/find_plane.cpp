@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/cloud_kinds.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
 #include "capture/depth_points.hpp"
 #include "capture/plane_fit.hpp"
+#include "capture/point_cloud.hpp"
 
 namespace pliant {
 
@@ -45,11 +47,20 @@ void append_camera(DepthPoints& all, const Capture& capture, const DepthCamera& 
   }
 }
 
+void append_cloud(DepthPoints& all, const CloudSequence& cloud, const Plane& guess) {
+  if (!cloud.background) return;  // nothing tells a flat side of the object from a plane
+  DepthPoints points;
+  points.points = read_points(*cloud.background);
+  points.noise.assign(points.points.size(), float(cloud.noise.value_or(default_cloud_noise)));
+  append_near(all, points, guess);
+}
+
 }  // namespace
 
 std::optional<FoundPlane> find_plane(const Capture& capture, const Plane& guess) {
   DepthPoints readings;
   for (const DepthCamera& camera : capture.depth) append_camera(readings, capture, camera, guess);
+  for (const CloudSequence& cloud : capture.clouds) append_cloud(readings, cloud, guess);
   PlaneFitOptions options;
   options.normal = guess.normal;
   const auto fit = fit_plane(readings.points, readings.noise, options);

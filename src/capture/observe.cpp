@@ -7,9 +7,9 @@
 
 #include "base/parallel.hpp"
 #include "capture/capture_rules.hpp"
+#include "capture/cloud_kinds.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_points.hpp"
-#include "capture/isolated_points.hpp"
 #include "capture/pixel_kinds.hpp"
 #include "capture/pixel_scatter.hpp"
 #include "capture/point_cloud.hpp"
@@ -17,8 +17,6 @@
 namespace pliant {
 
 namespace {
-
-constexpr double default_cloud_noise = 0.002;  // [m] fused structured-light or time-of-flight sensors at a metre
 
 void append_pixels(ObservedFrame& frame, const PixelSorter& sorter, const DepthCamera& camera, int index,
                    const DepthImage& depth, const Image<PixelKind>& kinds) {
@@ -46,20 +44,6 @@ void append_camera(ObservedFrame& frame, const Capture& capture, const PixelSort
   const DepthImage depth = read_depth(capture, camera, frame.frame);
   const auto mask = read_object_mask(capture, camera, frame.frame);
   append_pixels(frame, sorter, camera, index, depth, sorter.sort(depth, mask));
-}
-
-/// Points of a cloud that may be the object's.
-std::vector<Vector3> reachable_points(const Capture& capture, const std::filesystem::path& path,
-                                      const ObserveOptions& options) {
-  const double size =
-      capture.scene.object.surface ? bounding_box(*capture.scene.object.surface).extent().maxCoeff() : 0.0;
-  const auto reachable = reachable_box(capture, options.band > 0 ? options.band : size);
-  std::vector<Vector3> points = read_points(path);
-  std::erase_if(points, [&](const Vector3& point) {
-    return reachable &&
-           ((point.array() < reachable->min.array()).any() || (point.array() > reachable->max.array()).any());
-  });
-  return points;
 }
 
 void append_points(ObservedFrame& frame, const std::vector<Vector3>& points, std::optional<double> noise) {
@@ -103,6 +87,8 @@ std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions&
                                    const std::function<void(int, int)>& progress) {
   std::vector<PixelSorter> sorters;
   for (const DepthCamera& camera : capture.depth) sorters.emplace_back(capture, camera, options);
+  std::vector<CloudSorter> cloud_sorters;
+  for (const CloudSequence& cloud : capture.clouds) cloud_sorters.emplace_back(capture, &cloud, options);
   const std::vector<int> numbers = observed_frames(capture);
   std::vector<ObservedFrame> frames(numbers.size());
   std::mutex mutex;
@@ -112,10 +98,13 @@ std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions&
     frame.frame = numbers[i];
     for (std::size_t c = 0; c < capture.depth.size(); ++c)
       if (frame.frame % capture.depth[c].every == 0) append_camera(frame, capture, sorters[c], int(c));
-    for (const CloudSequence& cloud : capture.clouds)
+    for (std::size_t k = 0; k < capture.clouds.size(); ++k) {
+      const CloudSequence& cloud = capture.clouds[k];
       if (frame.frame % cloud.every == 0)
-        append_points(frame, reachable_points(capture, capture.folder / cloud.points(frame.frame), options),
+        append_points(frame,
+                      cloud_sorters[k].sorted(read_points(capture.folder / cloud.points(frame.frame)), frame.cloud),
                       cloud.noise);
+    }
     thin_out(frame, options.max_points_per_frame);
     if (!progress) return;
     const std::lock_guard lock(mutex);
@@ -138,12 +127,9 @@ ObservedLoad observe_load(const Capture& capture, const Load& load, const Observ
     append_pixels(observed.seen, sorter, camera, int(c), depth, sorter.sort(depth, mask));
   }
   if (load.cloud) {
-    std::vector<Vector3> points = reachable_points(capture, *load.cloud, options);
-    const std::vector<bool> alone = isolated_points(points);
-    std::vector<Vector3> kept;
-    for (std::size_t i = 0; i < points.size(); ++i)
-      if (!alone[i]) kept.push_back(points[i]);
-    observed.outliers = int(points.size() - kept.size());
+    const CloudSorter sorter(capture, nullptr, options);
+    const std::vector<Vector3> kept = sorter.sorted(read_points(*load.cloud), observed.seen.cloud);
+    observed.outliers = observed.seen.cloud.isolated;
     append_points(observed.seen, kept, capture.clouds.empty() ? std::nullopt : capture.clouds.front().noise);
   }
   thin_out(observed.seen, options.max_points_per_frame);

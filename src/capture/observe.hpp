@@ -7,6 +7,15 @@
 
 namespace pliant {
 
+/// Points of clouds, and why some of them were left out.
+struct CloudCounts {
+  int read = 0;
+  int out_of_reach = 0;  ///< far from the object
+  int on_plane = 0;      ///< on planes, or behind them
+  int background = 0;    ///< as in the background cloud
+  int isolated = 0;      ///< standing alone
+};
+
 /// What sensors saw of the object in one frame.
 struct ObservedFrame {
   int frame = 0;
@@ -17,6 +26,7 @@ struct ObservedFrame {
   std::vector<int> pixel;       ///< row * width + column; -1 for clouds
   /// Of each depth camera, how far neighbouring pixels scatter over the noise (`pixel_scatter`); 0 where nothing tells.
   std::vector<double> scatter;
+  CloudCounts cloud = {};  ///< of all clouds of the frame
 };
 
 struct ObserveOptions {
@@ -29,7 +39,8 @@ struct ObserveOptions {
 
 /// Points on the object for every frame that was observed, in order of frames (several cameras and clouds merged).
 /// Per camera: mask, else background subtraction, else everything within the band; then pixels of planes and flying
-/// pixels at depth edges are removed; noise from the sensor model. Frames are read in parallel.
+/// pixels at depth edges are removed; noise from the sensor model. Of clouds, what lies far from the object, on planes,
+/// as in the background cloud, or alone (`CloudSorter`) is left out. Frames are read in parallel.
 /// @param progress  called with the number of frames done and their total; may be empty
 /// Throws InputError where an image cannot be decoded.
 std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions& options = {},
@@ -41,8 +52,7 @@ struct ObservedLoad {
   int outliers = 0;    ///< points of the cloud that were dropped for standing alone
 };
 
-/// The cloud and the depth images of a load, as `observe` reads those of a frame; of the cloud, points that stand alone
-/// (`isolated_points`) are dropped too. Markers are not looked at.
+/// The cloud and the depth images of a load, as `observe` reads those of a frame. Markers are not looked at.
 /// Throws InputError where a file cannot be read.
 ObservedLoad observe_load(const Capture& capture, const Load& load, const ObserveOptions& options = {});
 

@@ -7,12 +7,10 @@
 #include "capture/capture.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
+#include "capture/object_space.hpp"
 #include "capture/observe.hpp"
 
 namespace pliant {
-
-/// Standard deviations of a reading within which a pixel counts as one of a plane.
-inline constexpr double plane_reach = 3.0;
 
 /// What a pixel of a depth image shows.
 enum class PixelKind : std::uint8_t {
@@ -33,24 +31,18 @@ class PixelSorter {
 
   const DepthNoise& noise() const { return noise_; }
   double jump(double depth) const { return edge_jump_ > 0 ? edge_jump_ : noise_.jump(depth); }
-  const std::vector<Plane>& planes() const { return planes_; }
+  const std::vector<Plane>& planes() const { return space_.planes(); }
 
  private:
   bool may_show_object(float z, int u, int v, const Vector3& point, const Image<std::uint8_t>* mask) const;
-  bool is_on_plane(const Vector3& point, double sigma) const;
   bool is_at_edge(const DepthImage& depth, const Image<std::uint8_t>* mask, int u, int v) const;
   void find_undeclared_planes(const Capture& capture, const DepthCamera& camera);
 
   PinholeCamera camera_;
   DepthNoise noise_;
-  double plane_margin_, edge_jump_;
-  std::vector<Plane> planes_;
+  double edge_jump_;
+  ObjectSpace space_;
   std::optional<DepthImage> background_;
-  std::optional<Box> band_;
 };
-
-/// Where the object may be: the rest surface's bounding box grown by `margin` [m] on all sides, and down to where it
-/// may fall. Nothing without a rest surface.
-std::optional<Box> reachable_box(const Capture& capture, double margin);
 
 }  // namespace pliant

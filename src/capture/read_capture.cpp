@@ -116,6 +116,7 @@ class Reader {
     camera.cx = block.required<double>("cx", "the principal point in pixels").value_or(0);
     camera.cy = block.required<double>("cy", "the principal point in pixels").value_or(0);
     if (const auto pose = block.required<RigidMotion>("camera_to_world")) camera.camera_to_world = *pose;
+    camera.lens = read_lens(block);
     depth.images = required_pattern(block, "images");
     depth.depth_scale = block.required<double>("depth_scale", "1000 for millimetres").value_or(1000.0);
     if (!(depth.depth_scale > 0))
@@ -124,6 +125,7 @@ class Reader {
     depth.background = optional_path(block, "background");
     depth.every = block.optional<int>("every").value_or(1);
     depth.noise = block.optional<double>("noise");
+    depth.time_offset = block.optional<double>("time_offset").value_or(0.0);
     return depth;
   }
 
@@ -132,6 +134,7 @@ class Reader {
     cloud.points = required_pattern(block, "points");
     cloud.every = block.optional<int>("every").value_or(1);
     cloud.noise = block.optional<double>("noise");
+    cloud.background = optional_path(block, "background");
     return cloud;
   }
 

@@ -61,18 +61,21 @@ class Writer {
          << "\n";
     for (const auto& [key, value] : {std::pair{"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}})
       out_ << key << " = " << toml_text(value) << "\n";
+    if (!c.lens.coefficients().empty()) out_ << "distortion = " << toml_text(c.lens.coefficients()) << "\n";
     out_ << "camera_to_world = " << toml_text(c.camera_to_world) << "\nimages = " << toml_text(depth.images.pattern)
          << "\n";
     if (depth.masks) out_ << "masks = " << toml_text(depth.masks->pattern) << "\n";
     write_file_key("background", depth.background);
     out_ << "depth_scale = " << toml_text(depth.depth_scale) << "\n";
     write_every(depth.every);
+    if (depth.time_offset != 0.0) out_ << "time_offset = " << toml_text(depth.time_offset) << "   # s\n";
     write_noise(depth.noise);
     out_ << "\n";
   }
 
   void write(const CloudSequence& cloud) {
     out_ << "[[cloud]]\npoints = " << toml_text(cloud.points.pattern) << "\n";
+    write_file_key("background", cloud.background);
     write_every(cloud.every);
     write_noise(cloud.noise);
     out_ << "\n";

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/instants.hpp"
 #include "base/parallel.hpp"
 
 namespace pliant {
@@ -12,7 +13,10 @@ namespace pliant {
 class MotionTrial::Comparison {
  public:
   Comparison(ObservedMotion motion, int number)
-      : motion_(std::move(motion)), number_(number), simulation_(motion_.body, motion_.simulation) {
+      : motion_(std::move(motion)),
+        number_(number),
+        instants_(instants_to_compare(motion_)),
+        simulation_(motion_.body, with_times(motion_.simulation, instants_)) {
     const auto add = [this](std::vector<ParameterHandle>& blocks, const std::vector<ParameterHandle>& all) {
       blocks.insert(blocks.end(), all.begin(), all.end());
       for (const ParameterHandle& block : all)
@@ -63,6 +67,34 @@ class MotionTrial::Comparison {
   /// Cotangents of positions and of the sensors' corrections for the cost of a frame.
   void add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar, VectorX& theta_bar) const;
 
+  /// Times of the frames up to the horizon, and of what sensors saw between them.
+  static std::vector<double> instants_to_compare(const ObservedMotion& motion) {
+    const std::vector<double>& frames = motion.simulation.times;
+    const std::size_t count = std::min(frames.size(), std::size_t(motion.options.last_frame) + 1);
+    std::vector<double> times(frames.begin(), frames.begin() + std::ptrdiff_t(count));
+    for (const FrameObservations& seen : *motion.observations)
+      if (seen.frame < int(count) && seen.after > 0.0) times.push_back(frames[std::size_t(seen.frame)] + seen.after);
+    return motion.simulation.is_static ? times : instants_of(std::move(times));
+  }
+  static SimulationOptions with_times(SimulationOptions options, const std::vector<double>& times) {
+    options.times = times;
+    return options;
+  }
+  int last_instant() const { return int(instants_.size()) - 1; }
+  /// What was seen at an instant of the simulation; nothing where no sensor looked.
+  const FrameObservations* seen_at(int instant) const {
+    const std::vector<FrameObservations>& all = *motion_.observations;
+    const std::vector<double>& frames = motion_.simulation.times;
+    if (motion_.simulation.is_static) {
+      const auto it = std::ranges::lower_bound(all, instant, {}, &FrameObservations::frame);
+      return it != all.end() && it->frame == instant ? &*it : nullptr;
+    }
+    const double time = instants_[std::size_t(instant)];
+    const auto time_of = [&](const FrameObservations& o) { return frames[std::size_t(o.frame)] + o.after; };
+    const auto it = std::ranges::lower_bound(all, time - same_instant, {}, time_of);
+    return it != all.end() && time_of(*it) <= time + same_instant ? &*it : nullptr;
+  }
+
   void require_all_blocks(const VectorX& theta) const {
     if (theta.size() < least_size_)
       throw std::invalid_argument("the parameter vector is not of the layout that the motion's blocks are of");
@@ -72,6 +104,7 @@ class MotionTrial::Comparison {
   std::vector<ParameterHandle> blocks_of_motion_, blocks_of_sensors_;
   Eigen::Index least_size_ = 0;  // of a parameter vector that has them
   int number_;
+  std::vector<double> instants_;  // [s] of the simulation
   Simulation simulation_;
   Sensors sensors_;
 };
@@ -213,24 +246,22 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
   }
   const MatrixX directions = all_directions(Eigen::all, columns);
   sensors_ = sensors_at(theta, directions);
-  const auto& observations = *motion_.observations;
   CostEvaluation evaluation;
-  std::vector<FrameFit> fits(observations.size());
+  std::vector<FrameFit> fits(motion_.observations->size());
   std::size_t next = 0;
   TaskGroup beside;
-  const int last_frame = motion_.options.last_frame;
   const RolloutSummary summary =
-      simulation_.run(theta, directions(Eigen::all, along), last_frame,
-                      [&](int frame, const State& state, std::span<const State> tangents) {
-                        if (next < observations.size() && observations[next].frame == frame) {
+      simulation_.run(theta, directions(Eigen::all, along), last_instant(),
+                      [&](int instant, const State& state, std::span<const State> tangents) {
+                        if (const FrameObservations* seen = seen_at(instant)) {
                           Tangents changes{directions.cols(), along, {}};
                           for (const State& t : tangents) changes.positions.push_back(t.x);
                           const std::size_t slot = next++;
-                          beside.run([this, &observations, &fits, slot, x = state.x, changes = std::move(changes)] {
-                            fits[slot] = fit_frame(observations[slot], x, changes);
+                          beside.run([this, seen, &fits, slot, x = state.x, changes = std::move(changes)] {
+                            fits[slot] = fit_frame(*seen, x, changes);
                           });
                         }
-                        return frame < last_frame;
+                        return instant < last_instant();
                       });
   beside.wait();
   evaluation.steps = summary.steps;
@@ -288,22 +319,16 @@ void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, cons
 CostEvaluation MotionTrial::Comparison::gradient(const VectorX& theta, VectorX& theta_bar) {
   require_all_blocks(theta);
   sensors_ = sensors_at(theta, MatrixX(theta.size(), 0));
-  const auto& observations = *motion_.observations;
   CostEvaluation evaluation;
-  const auto seen_in = [&](int frame) -> const FrameObservations* {
-    const auto it = std::lower_bound(observations.begin(), observations.end(), frame,
-                                     [](const FrameObservations& o, int f) { return o.frame < f; });
-    return it != observations.end() && it->frame == frame ? &*it : nullptr;
-  };
   VectorX sensor_bar = VectorX::Zero(theta.size());
   const RolloutSummary summary = simulation_.run_adjoint(
-      theta, motion_.options.last_frame,
-      [&](int frame, const State& state) {
-        if (const auto* seen = seen_in(frame)) evaluation.frames.push_back(fit_frame(*seen, state.x, {}));
+      theta, last_instant(),
+      [&](int instant, const State& state) {
+        if (const auto* seen = seen_at(instant)) evaluation.frames.push_back(fit_frame(*seen, state.x, {}));
         return true;
       },
-      [&](int frame, const State& state, Points& x_bar) {
-        if (const auto* seen = seen_in(frame)) add_cotangents(*seen, state.x, x_bar, sensor_bar);
+      [&](int instant, const State& state, Points& x_bar) {
+        if (const auto* seen = seen_at(instant)) add_cotangents(*seen, state.x, x_bar, sensor_bar);
       },
       theta_bar);
   evaluation.steps = summary.steps;

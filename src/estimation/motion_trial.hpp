@@ -16,6 +16,7 @@ struct FrameObservations {
   int frame = 0;                                ///< of the simulation: 0 is when the object is let go
   std::vector<SurfaceObservation> points = {};  ///< somewhere on the surface
   std::vector<TrackObservation> tracks = {};    ///< known points of the object
+  double after = 0.0;                           ///< [s] since that frame, and before the next
 };
 
 struct ObjectiveOptions {

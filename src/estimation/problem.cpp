@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "base/error.hpp"
+#include "base/instants.hpp"
 #include "capture/markers.hpp"
 #include "estimation/press_law.hpp"
 
@@ -246,28 +249,42 @@ TrackedPoints tracked_points(const Capture& capture) {
 
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
                                                   const TrackedPoints& tracked) {
-  const auto frame_of = [&](int recorded) {
-    const int frame = recorded - capture.scene.timing.start_frame;
-    return capture.scene.initial.released ? std::max(frame, 0) : frame;
+  const Timing& timing = capture.scene.timing;
+  using Instant = std::pair<int, double>;  // frame of the simulation, and time after it
+  const auto instant_of = [&](int recorded, double offset) -> Instant {
+    int frame = recorded;
+    double after = 0.0;
+    if (offset != 0.0 && !timing.is_static) {
+      const double time = timing.times[std::size_t(recorded)] + offset;
+      const auto next = std::ranges::upper_bound(timing.times, time + same_instant);
+      frame = int(next - timing.times.begin()) - 1;
+      after = frame < 0 ? 0.0 : std::max(0.0, time - timing.times[std::size_t(frame)]);
+      if (after < same_instant) after = 0.0;
+    }
+    frame -= timing.start_frame;
+    if (capture.scene.initial.released && frame < 0) return {0, 0.0};  // it is still held as it is let go
+    return {frame, after};
   };
   const int cameras = int(capture.depth.size());
-  std::map<int, FrameObservations> frames;
+  std::map<Instant, FrameObservations> frames;
   for (const ObservedFrame& seen : observed) {
-    std::vector<SurfaceObservation>& points = frames[frame_of(seen.frame)].points;
+    if (seen.points.empty()) frames[instant_of(seen.frame, 0.0)];  // seen without a point
     for (std::size_t i = 0; i < seen.points.size(); ++i) {
       const int camera = i < seen.camera.size() ? seen.camera[i] : -1;
-      points.push_back({seen.points[i], double(seen.noise[i]), camera < 0 ? cameras : camera,
-                        i < seen.view.size() ? seen.view[i] : Vector3::Zero()});
+      const double offset = camera < 0 ? 0.0 : capture.depth[std::size_t(camera)].time_offset;
+      frames[instant_of(seen.frame, offset)].points.push_back({seen.points[i], double(seen.noise[i]),
+                                                               camera < 0 ? cameras : camera,
+                                                               i < seen.view.size() ? seen.view[i] : Vector3::Zero()});
     }
   }
   for (const auto& [frame, points] : tracked.frames) {
-    auto& tracks = frames[frame_of(frame)].tracks;
+    auto& tracks = frames[instant_of(frame, 0.0)].tracks;
     tracks.insert(tracks.end(), points.begin(), points.end());
   }
   std::vector<FrameObservations> from_start;
-  for (auto& [frame, seen] : frames) {
-    if (frame < 0 || frame >= capture.scene.timing.frame_count() - capture.scene.timing.start_frame) continue;
-    seen.frame = frame;
+  for (auto& [instant, seen] : frames) {
+    if (instant.first < 0 || instant.first >= timing.frame_count() - timing.start_frame) continue;
+    std::tie(seen.frame, seen.after) = instant;
     from_start.push_back(std::move(seen));
   }
   return from_start;

@@ -61,7 +61,7 @@ Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<dou
     if (there.size() < fewest) continue;
     Points points(Eigen::Index(there.size()), 3);
     for (std::size_t i = 0; i < there.size(); ++i) points.row(Eigen::Index(i)) = there[i].transpose();
-    path.times.push_back(times[std::size_t(frame.frame)]);
+    path.times.push_back(times[std::size_t(frame.frame)] + frame.after);
     path.points.push_back(middle(points));
   }
   return path;

@@ -244,9 +244,17 @@ ErrorResult surface_errors(const CostEvaluation& evaluation) {
   for (const FrameFit& f : evaluation.frames) {
     errors.points += f.points + f.tracks;
     max = std::max(max, f.max_distance);
-    if (is_one && f.points > 0)
+    if (!is_one || f.points == 0) continue;
+    if (!errors.frames.empty() && errors.frames.back().frame == f.frame) {  // seen by sensors one after the other
+      auto& same = errors.frames.back();
+      const double all = same.points + f.points;
+      same.rms = std::sqrt((same.points * same.rms * same.rms + f.sum_squares) / all);
+      same.noise = std::sqrt((same.points * same.noise * same.noise + f.sum_noise_squares) / all);
+      same.points += f.points;
+    } else {
       errors.frames.push_back(
           {f.frame, std::sqrt(f.sum_squares / f.points), std::sqrt(f.sum_noise_squares / f.points), f.points});
+    }
   }
   const bool has_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
   const bool has_tracks = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.tracks > 0; });

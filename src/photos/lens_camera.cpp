@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
@@ -18,7 +17,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double rotation_tolerance = 2e-3;  // files carry three decimals or more
-constexpr double lens_tolerance = 0.01;  // [pixels] that a pixel may be off after the lens was taken out and put back
 
 cv::Matx33d to_cv(const Matrix3& m) {
   cv::Matx33d out;
@@ -169,10 +167,11 @@ LensCamera read_lens_camera(const fs::path& calibration, const fs::path& extrins
       file.matrix("camera_matrix", "3 x 3", [](int rows, int columns) { return rows == 3 && columns == 3; }));
   check_camera(file, camera);
   const cv::Mat lens = file.matrix("distortion_coefficients", "4, 5, 8, 12 or 14 numbers", [](int rows, int columns) {
-    constexpr std::array sizes = {4, 5, 8, 12, 14};
-    return (rows == 1 || columns == 1) && std::ranges::find(sizes, rows * columns) != sizes.end();
+    return (rows == 1 || columns == 1) && LensDistortion::takes(std::size_t(rows * columns));
   });
-  for (int i = 0; i < int(lens.total()); ++i) camera.distortion_coefficients.push_back(lens.at<double>(i));
+  std::vector<double> coefficients;
+  for (int i = 0; i < int(lens.total()); ++i) coefficients.push_back(lens.at<double>(i));
+  camera.lens = LensDistortion(coefficients);
   const Storage pose(extrinsics);
   camera.world_to_camera = read_extrinsics(pose, camera.camera_matrix, unit);
   return camera;
@@ -182,7 +181,7 @@ void write_lens_camera(const fs::path& path, const LensCamera& camera) {
   cv::FileStorage file(".yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
   file << "image_width" << camera.width << "image_height" << camera.height;
   file << "camera_matrix" << cv::Mat(to_cv(camera.camera_matrix));
-  std::vector<double> lens = camera.distortion_coefficients;
+  std::vector<double> lens = camera.lens.coefficients();
   lens.resize(std::max<std::size_t>(lens.size(), 5));
   file << "distortion_coefficients" << cv::Mat(lens, true).t();
   const Vector3& t = camera.world_to_camera.translation;
@@ -191,18 +190,12 @@ void write_lens_camera(const fs::path& path, const LensCamera& camera) {
 }
 
 std::vector<Vector2> project(const LensCamera& camera, std::span<const Vector3> points) {
-  std::vector<cv::Point3d> local;
+  std::vector<Vector2> out;
   for (const Vector3& point : points) {
     const Vector3 p = camera.world_to_camera(point);
-    local.emplace_back(p.x(), p.y(), p.z());
+    const Vector3 seen = camera.camera_matrix * camera.lens.distorted(p.hnormalized()).homogeneous();
+    out.push_back(p.z() > 0 ? Vector2(seen.head<2>()) : Vector2(not_a_number, not_a_number));
   }
-  std::vector<cv::Point2d> pixels;
-  if (!local.empty())
-    cv::projectPoints(local, cv::Vec3d(), cv::Vec3d(), to_cv(camera.camera_matrix), camera.distortion_coefficients,
-                      pixels);
-  std::vector<Vector2> out;
-  for (std::size_t i = 0; i < pixels.size(); ++i)
-    out.push_back(local[i].z > 0 ? Vector2(pixels[i].x, pixels[i].y) : Vector2(not_a_number, not_a_number));
   return out;
 }
 
@@ -211,20 +204,11 @@ Vector2 project(const LensCamera& camera, const Vector3& point) {
 }
 
 std::vector<Vector2> without_lens(const LensCamera& camera, std::span<const Vector2> pixels) {
-  if (pixels.empty()) return {};
-  const cv::Matx33d k = to_cv(camera.camera_matrix);
-  std::vector<cv::Point2d> seen, straight, again;
-  for (const Vector2& p : pixels) seen.emplace_back(p.x(), p.y());
-  cv::undistortPoints(seen, straight, k, camera.distortion_coefficients, cv::noArray(), cv::noArray(),
-                      cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-10));
-  std::vector<cv::Point3d> rays;
-  for (const cv::Point2d& p : straight) rays.emplace_back(p.x, p.y, 1.0);
-  cv::projectPoints(rays, cv::Vec3d(), cv::Vec3d(), k, camera.distortion_coefficients, again);
   std::vector<Vector2> out;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    const bool came_back = std::hypot(again[i].x - seen[i].x, again[i].y - seen[i].y) < lens_tolerance;
-    const Vector3 pixel = camera.camera_matrix * Vector3(straight[i].x, straight[i].y, 1.0);
-    out.push_back(came_back ? Vector2(pixel.head<2>()) : Vector2(not_a_number, not_a_number));
+  for (const Vector2& pixel : pixels) {
+    const Vector3 seen = camera.camera_matrix.triangularView<Eigen::Upper>().solve(pixel.homogeneous());
+    const Vector3 straight = camera.camera_matrix * camera.lens.straight(seen.head<2>()).homogeneous();
+    out.emplace_back(straight.head<2>());
   }
   return out;
 }

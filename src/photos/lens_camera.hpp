@@ -11,16 +11,14 @@
 
 namespace pliant {
 
-using Vector2 = Eigen::Vector2d;
-
 /// A calibrated photo camera: OpenCV's pinhole with a lens. Axes as in OpenCV (x right, y down, z forward); pixel
 /// centres at whole numbers.
 struct LensCamera {
   std::string name;
-  int width = 0, height = 0;                      ///< [pixels]
-  Matrix3 camera_matrix = Matrix3::Identity();    ///< [pixels]
-  std::vector<double> distortion_coefficients{};  ///< OpenCV's k1 k2 p1 p2 k3 ...; 0, 4, 5, 8, 12 or 14 of them [-]
-  RigidMotion world_to_camera;                    ///< [m]
+  int width = 0, height = 0;                    ///< [pixels]
+  Matrix3 camera_matrix = Matrix3::Identity();  ///< [pixels]
+  LensDistortion lens{};
+  RigidMotion world_to_camera;  ///< [m]
 
   /// Where it stands in the world [m].
   Vector3 centre() const { return world_to_camera.inverse().translation; }

@@ -354,7 +354,7 @@ std::vector<LensCamera> example_cameras(int width, int height, const Vector3& mi
     camera.width = width;
     camera.height = height;
     camera.camera_matrix << focal, 0.0, 0.5 * width + 11.3 * k, 0.0, 1.002 * focal, 0.5 * height - 7.7, 0.0, 0.0, 1.0;
-    camera.distortion_coefficients = {-0.25 + 0.02 * k, 0.11, 8e-4, -5e-4, -0.03};
+    camera.lens = LensDistortion({-0.25 + 0.02 * k, 0.11, 8e-4, -5e-4, -0.03});
     camera.world_to_camera = pinhole.camera_to_world.inverse();
     cameras.push_back(camera);
   }

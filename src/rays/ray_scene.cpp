@@ -24,7 +24,7 @@ struct Direction {
 };
 
 Direction pixel_ray(const PinholeCamera& camera, double u, double v) {
-  const Vector3 in_camera((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+  const Vector3 in_camera = camera.ray(u, v);
   const double length = in_camera.norm();
   return {camera.camera_to_world.rotation * in_camera / length, 1.0 / length};
 }

@@ -336,12 +336,14 @@ PinholeCamera framed(const PinholeCamera& camera, const Box& box, int width, int
 }
 
 PinholeCamera framed(const PinholeCamera& camera, std::span<const Vector3> points, int width, int height) {
-  PinholeCamera result = camera;
+  PinholeCamera straight = camera;  // a picture shows straight lines straight
+  straight.lens = {};
+  PinholeCamera result = straight;
   result.width = width, result.height = height;
   Eigen::Array2d low = Eigen::Array2d::Constant(1e300), high = -low;
   bool in_front = true;
   for (const Vector3& point : points) {
-    const Vector3 seen = camera.project(point);
+    const Vector3 seen = straight.project(point);
     in_front = in_front && seen.z() > 0.0;
     low = low.min(seen.head<2>().array()), high = high.max(seen.head<2>().array());
   }

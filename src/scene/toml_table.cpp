@@ -370,6 +370,15 @@ std::optional<Vector3> read_direction(TomlTable& table, const std::string& name,
   return std::nullopt;
 }
 
+LensDistortion read_lens(TomlTable& table) {
+  const auto coefficients = table.optional<std::vector<double>>("distortion");
+  if (!coefficients || coefficients->empty()) return {};
+  if (LensDistortion::takes(coefficients->size())) return LensDistortion(*coefficients);
+  table.context().reject(table.key_of("distortion"), fmt::format("{} coefficients", coefficients->size()),
+                         std::string(LensDistortion::counts) + " of them", "k1, k2, p1, p2, k3, ... as in OpenCV");
+  return {};
+}
+
 std::optional<fs::path> read_path(TomlTable& table, const std::string& name, const NamedFiles& files) {
   const auto text = table.required<std::string>(name);
   return text ? existing(table, name, *text, files) : std::nullopt;
@@ -400,6 +409,12 @@ std::string toml_text(const std::string& text) {
 
 std::string toml_text(const Vector3& v) {
   return "[" + toml_text(v.x()) + ", " + toml_text(v.y()) + ", " + toml_text(v.z()) + "]";
+}
+
+std::string toml_text(const std::vector<double>& numbers) {
+  std::string out;
+  for (const double number : numbers) out += (out.empty() ? "" : ", ") + toml_text(number);
+  return "[" + out + "]";
 }
 
 std::string toml_text(const RigidMotion& motion) {

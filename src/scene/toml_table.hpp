@@ -141,6 +141,9 @@ int read_count(TomlTable& table, const std::string& name, int low, int high, std
 /// A direction [-], required, of unit length. Nothing, with a complaint, where it is missing or has no length.
 std::optional<Vector3> read_direction(TomlTable& table, const std::string& name, const std::string& advice = "");
 
+/// A lens, `distortion = [k1, k2, p1, p2, ...]`; a straight one where the key is missing.
+LensDistortion read_lens(TomlTable& table);
+
 /// Where the files that a TOML file names are looked for.
 struct NamedFiles {
   std::filesystem::path folder;  ///< below which relative paths lie
@@ -167,6 +170,7 @@ void read_file_of(TomlTable& table, const std::string& name, const std::filesyst
 std::string toml_text(double value);
 std::string toml_text(const std::string& text);
 std::string toml_text(const Vector3& vector);
+std::string toml_text(const std::vector<double>& numbers);
 std::string toml_text(const RigidMotion& motion);
 
 /// Parses a TOML file's content; a syntax error becomes an InputError with its place.

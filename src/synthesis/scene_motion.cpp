@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/instants.hpp"
 #include "meshing/mesh_distance.hpp"
 #include "motion/continuation.hpp"
 #include "motion/press_session.hpp"
@@ -46,7 +47,7 @@ class Simulated {
       start_ = equilibrium({.at_scan = true}, "the scan");
       motion.scan = shape(start_);
     }
-    if (!scene().timing.times.empty()) motion.frames = frames();
+    if (!scene().timing.times.empty()) motion.frames = frames(), motion.camera_frames = std::move(camera_frames_);
     for (std::size_t i = 0; i < synthetic_.loads.size(); ++i) {
       motion.loads.push_back(
           shape(equilibrium({.weights = {synthetic_.loads[i].weight}}, fmt::format("load {}", i + 1))));
@@ -160,31 +161,49 @@ class Simulated {
     if (synthetic_.pull) start_ = equilibrium({.pull = synthetic_.pull}, "the pulled object");
     const MotionLayout blocks = blocks_of(scene());
     SimulationOptions options = options_of(scene(), blocks);
-    options.times.clear();
-    for (int i = timing.start_frame; i < timing.frame_count(); ++i)
-      options.times.push_back(timing.times[std::size_t(i)]);
+    const double start = timing.times[std::size_t(timing.start_frame)];
+    const std::vector<double> instants = instants_seen(start);
+    options.times = instants;
     options.max_dt = 1.0 / (timing.frame_rate * synthetic_.substeps);
     if (const auto& weight = scene().initial.release_of)
       options.released_weights.push_back({weight->at, weight->mass});
     else
       options.start = start_;
     const TrueShape rest = start_.rows() > 0 ? shape(start_) : shape(body_->nodes);
-    std::vector<TrueShape> frames(
-        std::size_t(timing.start_frame),
-        start_.rows() > 0 ? rest : TrueShape{vertex_points(*scene().object.surface), rest.markers});
+    TrueShape held = start_.rows() > 0 ? rest : TrueShape{vertex_points(*scene().object.surface), rest.markers};
+    std::vector<TrueShape> shapes;
     Simulation simulation(body_, options);
     const RolloutSummary summary =
         simulation.run(theta_of(scene(), blocks), [&](int, const State& state, std::span<const State>) {
-          frames.push_back(shape(state.x));
-          step();
+          shapes.push_back(shape(state.x));
+          if (int(shapes.size()) <= timing.frame_count() - timing.start_frame) step();
           return true;
         });
     if (!summary.succeeded)
-      throw std::runtime_error("the simulation stopped in frame " + std::to_string(frames.size()) + ": " +
-                               summary.failure + advice);
-    if (scene().initial.released)  // held there until it is let go
-      std::fill_n(frames.begin(), timing.start_frame, frames[std::size_t(timing.start_frame)]);
+      throw std::runtime_error("the simulation stopped " + fmt::format("{:.3g} s", instants[shapes.size()] - start) +
+                               " after the start: " + summary.failure + advice);
+    if (scene().initial.released) held = shapes.front();  // until it is let go
+    const auto seen_at = [&](double time) {
+      return time < start - same_instant ? held : shapes[instant_at(instants, time)];
+    };
+    std::vector<TrueShape> frames;
+    for (const double time : timing.times) frames.push_back(seen_at(time));
+    camera_frames_.resize(synthetic_.cameras.size());
+    for (std::size_t k = 0; k < camera_frames_.size(); ++k)
+      if (const double offset = synthetic_.cameras[k].time_offset; offset != 0.0)
+        for (const double time : timing.times) camera_frames_[k].push_back(seen_at(time + offset));
     return frames;
+  }
+
+  /// From the start on: of all frames, and of the images of cameras that take them at other times.
+  std::vector<double> instants_seen(double start) const {
+    std::vector<double> times;
+    for (const double time : scene().timing.times) {
+      times.push_back(time);
+      for (const SyntheticCamera& camera : synthetic_.cameras) times.push_back(time + camera.time_offset);
+    }
+    std::erase_if(times, [&](double time) { return time < start - same_instant; });
+    return instants_of(std::move(times));
   }
 
   PressSession session(const ProbeOptions& probe) const {
@@ -246,7 +265,8 @@ class Simulated {
   Embedding vertices_, markers_;
   std::vector<std::shared_ptr<const RigidShape>> sliding_;
   std::shared_ptr<const MaterialLaw> law_;  // null: linear elasticity
-  Points start_;                            // where nodes are at the start; empty: where they rest
+  std::vector<std::vector<TrueShape>> camera_frames_;
+  Points start_;  // where nodes are at the start; empty: where they rest
   int done_ = 0, total_ = 0;
 };
 

@@ -55,6 +55,9 @@ void check(const Synthesis& s) {
            shape.markers.allFinite();
   };
   for (const TrueShape& frame : s.frames) require(fits(frame), "a frame does not fit the surface, or is not finite");
+  for (const auto& frames : s.camera_frames)
+    require(frames.empty() || (frames.size() == s.frames.size() && std::ranges::all_of(frames, fits)),
+            "what a camera sees does not fit the frames");
   for (const TrueLoad& load : s.loads) require(fits(load.shape), "a load's shape does not fit the surface");
   for (const TruePress& press : s.presses) require(fits(press.shape), "a press' shape does not fit the surface");
   require(s.scan.rows() == 0 || s.scan.rows() == vertices, "the scan does not fit the surface");
@@ -139,7 +142,7 @@ Capture capture_of(const Synthesis& s, const fs::path& folder) {
   capture.scene = s.scene;
   capture.scene.object.file = folder / "rest.ply";
   if (has_images(s))
-    for (const SyntheticCamera& camera : s.cameras)
+    for (const SyntheticCamera& camera : s.cameras) {
       capture.depth.push_back({camera.name,
                                camera.camera,
                                {camera.name + "/%06d.png"},
@@ -147,7 +150,12 @@ Capture capture_of(const Synthesis& s, const fs::path& folder) {
                                FramePattern{camera.name + "/mask_%06d.png"},
                                {},
                                camera.every,
-                               rounded(typical_noise(s, camera))});
+                               rounded(typical_noise(s, camera)),
+                               camera.stated.time_offset.value_or(camera.time_offset)});
+      PinholeCamera& stated = capture.depth.back().camera;
+      stated.camera_to_world = camera.stated.camera_to_world.value_or(stated.camera_to_world);
+      stated.lens = camera.stated.lens.value_or(stated.lens);
+    }
   const fs::path rest = folder / "markers_rest.csv";
   if (!s.frames.empty() && s.cloud)
     capture.clouds.push_back({{"clouds/%06d.ply"}, s.cloud->every, rounded(cloud_noise(s))});
@@ -195,6 +203,15 @@ std::string truth_json(const Synthesis& s) {
             {"unit", p.unit}};
   }
   json["scan_noise"] = s.scan_noise;
+  for (const SyntheticCamera& camera : s.cameras) {
+    const RigidMotion& pose = camera.camera.camera_to_world;
+    nlohmann::ordered_json& own = json["cameras"][camera.name];
+    for (int i = 0; i < 3; ++i)
+      own["camera_to_world"].push_back(
+          {pose.rotation(i, 0), pose.rotation(i, 1), pose.rotation(i, 2), pose.translation[i]});
+    own["camera_to_world"].push_back({0.0, 0.0, 0.0, 1.0});
+    own["distortion"] = camera.camera.lens.coefficients(), own["time_offset"] = camera.time_offset;
+  }
   if (s.scan.rows() > 0) json["load_free"] = "truth/load_free.ply";
   for (const TruePress& press : s.presses)
     json["presses"].push_back({{"force", vector_json(press.facts.force)}, {"shift", vector_json(press.shift)}});
@@ -279,11 +296,14 @@ void write_frame(const fs::path& folder, const Synthesis& s, int frame) {
   const bool has_cloud = s.cloud && frame % s.cloud->every == 0;
   std::vector<Vector3> points;
   if (!s.cameras.empty()) {
-    const RayScene scene = scene_of(s, s.frames[std::size_t(frame)].vertices);
+    const RayScene at_frame = scene_of(s, s.frames[std::size_t(frame)].vertices);
     for (std::size_t k = 0; k < s.cameras.size(); ++k) {
       const bool has_image = has_images(s) && frame % s.cameras[k].every == 0;
       if (!has_image && !has_cloud) continue;
-      const SensedFrame seen = sensed(s, scene, k, frame);
+      const bool is_later = k < s.camera_frames.size() && !s.camera_frames[k].empty();
+      const SensedFrame seen = is_later
+                                   ? sensed(s, scene_of(s, s.camera_frames[k][std::size_t(frame)].vertices), k, frame)
+                                   : sensed(s, at_frame, k, frame);
       if (has_cloud) add_points(s, k, seen, points);
       if (!has_image) continue;
       write_png(folder / image_name(s.cameras[k], frame), seen.depth);

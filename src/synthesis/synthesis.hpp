@@ -14,6 +14,13 @@
 
 namespace pliant {
 
+/// What the recording says of a camera in the place of the truth, as of one that was badly calibrated.
+struct StatedCamera {
+  std::optional<RigidMotion> camera_to_world;
+  std::optional<LensDistortion> lens;
+  std::optional<double> time_offset;  ///< [s]
+};
+
 /// A depth camera of a synthetic recording.
 struct SyntheticCamera {
   std::string name;
@@ -21,6 +28,8 @@ struct SyntheticCamera {
   SensorModel sensor;
   double depth_scale = 1000.0;  ///< raw units per metre
   int every = 1;
+  double time_offset = 0.0;  ///< [s] its images are taken that much later than their frames
+  StatedCamera stated = {};
 };
 
 /// Fused point clouds of all cameras: the object's points in world coordinates.
@@ -81,6 +90,8 @@ struct Synthesis {
                                          ///< object; 0: invisible
   Points scan;  ///< vertices of rest.ply, n x 3 [m]: of an object that sags; empty: those of the surface, stress-free
   std::vector<TrueShape> frames;  ///< the object in each frame; none: static tests alone
+  /// Of each camera, the object when it takes the image of each frame; empty, also of one camera: as in `frames`.
+  std::vector<std::vector<TrueShape>> camera_frames = {};
   std::vector<SyntheticCamera> cameras;
   std::optional<SyntheticCloud> cloud;
   std::optional<SyntheticMarkers> markers;

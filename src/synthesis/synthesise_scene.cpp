@@ -84,6 +84,7 @@ Synthesis synthesise(const SyntheticScene& scene, const Simulate& simulate) {
   check_count("presses", motion.presses.size(), scene.presses.size());
   check_count("indentations", motion.indentations.size(), scene.indentations.size());
   s.frames = std::move(motion.frames);
+  s.camera_frames = std::move(motion.camera_frames);
   if (motion.scan) s.scan = std::move(motion.scan->vertices), s.scan_markers = std::move(motion.scan->markers);
   if (scene.markers && !motion.scan) s.scan_markers = vertex_points({scene.markers->points, {}});
   if (Initial& initial = s.scene.initial; !initial.known)  // the capture knows nothing of them

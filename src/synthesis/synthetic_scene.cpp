@@ -338,8 +338,31 @@ class Reader {
       camera.camera = block.has("eye") ? read_look_at(block, width, height) : read_pinhole(block, width, height);
     camera.depth_scale = read_number(block, "depth_scale", positive("raw units per metre"), 1000.0);
     camera.every = read_count(block, "every", 1, 100'000, 1);
+    camera.camera.lens = read_lens(block);
+    camera.time_offset = read_number(block, "time_offset", offset_rule, 0.0);
+    block.with_table("stated", [&](TomlTable& stated) { camera.stated = read_stated(stated, camera); });
     block.with_table("sensor", [&](TomlTable& sensor) { camera.sensor = read_sensor(sensor); });
     return camera;
+  }
+
+  static constexpr NumberRule offset_rule = {.low = -1.0, .high = 1.0, .meaning = "in seconds"};
+
+  // The pose is turned about where the optical axis passes the object, and moved.
+  StatedCamera read_stated(TomlTable& table, const SyntheticCamera& camera) {
+    StatedCamera stated;
+    if (table.has("turn_deg") || table.has("shift")) {
+      const Vector3 turn = degree * table.optional<Vector3>("turn_deg").value_or(Vector3::Zero());
+      const Vector3 shift = table.optional<Vector3>("shift").value_or(Vector3::Zero());
+      const Box box = scene_.scene.object.surface ? bounding_box(*scene_.scene.object.surface) : Box{};
+      const Vector3 about = scene_.scene.object.surface ? Vector3(0.5 * (box.min + box.max)) : Vector3(Vector3::Zero());
+      Matrix3 R = Matrix3::Identity();
+      if (turn.norm() > 0.0) R = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+      const RigidMotion& truth = camera.camera.camera_to_world;
+      stated.camera_to_world = RigidMotion{R * truth.rotation, R * (truth.translation - about) + about + shift};
+    }
+    if (table.has("distortion")) stated.lens = read_lens(table);
+    if (table.has("time_offset")) stated.time_offset = read_number(table, "time_offset", offset_rule, 0.0);
+    return stated;
   }
 
   Vector3 gravity() const { return scene_.scene.world.gravity.value_or(Vector3::Zero()); }

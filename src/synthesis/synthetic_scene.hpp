@@ -108,9 +108,10 @@ SyntheticScene read_synthetic_scene(const std::filesystem::path& path);
 
 /// What a simulated scene did.
 struct SceneMotion {
-  std::optional<TrueShape> scan;  ///< the pose in which it was scanned; nothing: stress-free
-  std::vector<TrueShape> frames;  ///< up to the start they show the object as it is held
-  std::vector<TrueShape> loads;   ///< at rest under each load
+  std::optional<TrueShape> scan;                           ///< the pose in which it was scanned; nothing: stress-free
+  std::vector<TrueShape> frames;                           ///< up to the start they show the object as it is held
+  std::vector<std::vector<TrueShape>> camera_frames = {};  ///< as `Synthesis::camera_frames`
+  std::vector<TrueShape> loads;                            ///< at rest under each load
   struct Pressed {
     TrueShape shape;
     Vector3 force, shift, axis;  ///< of the probe on the object [N], its way [m], into the object [-]

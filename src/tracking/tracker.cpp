@@ -454,6 +454,11 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
                       "a held region is moved from rest (displaced_to)",
                       "regions held where they are at rest",
                       "tracking does not follow clamps that move; leave displaced_to out"});
+  if (has_time_offsets(capture))
+    throw InputError({{capture.file},
+                      "a depth camera with a `time_offset`",
+                      "cameras that take their images at the times of the frames",
+                      "tracking goes from frame to frame: fit the points themselves, with --set tracking=off"});
   std::map<int, TrackView> views;
   std::vector<double> counts;
   double squares = 0.0;

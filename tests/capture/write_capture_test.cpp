@@ -73,7 +73,9 @@ void fill(SmallCapture& small) {
   write_png(small.folder / "load.png", SmallCapture::depth_image(0.0));
   write_png(small.folder / "load_mask.png", SmallCapture::mask_image(0.0));
   small.edit("mass = 0.8", "density = 100.0\nshape_is = \"static\"");
-  small.edit("noise = 0.002", "background = \"front/background.png\"\nevery = 1\nnoise = 0.002");
+  small.edit("noise = 0.002",
+             "background = \"front/background.png\"\nevery = 1\nnoise = 0.002\ntime_offset = -0.004\n"
+             "distortion = [-0.1, 0.02, 0.001, -0.002, 0.003]");
   small.append(R"([initial]
 linear_velocity = [0, 0.5, 0]
 angular_velocity = [0, 0, 0.1]
@@ -110,6 +112,7 @@ force = [0, 1, 0]
 points = "clouds/%06d.ply"
 every = 2
 noise = 0.003
+background = "clouds/000000.ply"
 [[markers]]
 rest = "markers_rest.csv"
 track = "markers.csv"

@@ -1,6 +1,9 @@
 #include "estimation/objective.hpp"
 
+#include <algorithm>
+
 #include "base/parallel.hpp"
+#include "estimation/problem.hpp"
 #include "support/derivatives.hpp"
 #include "support/recordings.hpp"
 #include "support/tolerance.hpp"
@@ -79,6 +82,98 @@ TEST_P(Gradient, MatchesCentralDifferencesInEveryParameter) {
       return VectorX::Constant(1, objective.evaluate(scene.p + h * VectorX::Unit(scene.p.size(), i)).cost);
     };
     const double error = test::best_relative_error(along, VectorX::Constant(1, gradient[i]), 0.1);
+    EXPECT_LT(error, tolerance(1e-5)) << scene.parameters.coordinate_names()[std::size_t(i)];
+  }
+}
+
+/// Every other sensor looks at 0.4 of the way to the next frame: frames are seen twice, at two times.
+test::Recording seen_between_frames(int planes, bool only_between = false) {
+  test::Recording r = test::torus_recording(cell_size, 6, planes, 1e-3);
+  SimulationOptions options = r.scene.options;
+  const std::vector<double> frames = options.times;
+  const double late = 0.4 * (frames[1] - frames[0]);
+  options.times = {frames[0]};
+  for (std::size_t f = 1; f + 1 < frames.size(); ++f) options.times.push_back(frames[f] + late);
+  std::vector<Vector3> samples;
+  for (const SurfacePoint& p : r.scene.body->surface) samples.push_back(p.position);
+  const Embedding surface(*r.scene.body, samples);
+  std::vector<FrameObservations> between;
+  Simulation simulation(r.scene.body, options);
+  simulation.run(r.truth, [&](int frame, const State& state, auto) {
+    if (frame == 0) return true;
+    FrameObservations seen{frame, {}, {}, late};
+    const Points x = surface.positions(state.x);
+    for (Eigen::Index i = 0; i < x.rows(); i += x.rows() / 40) seen.points.push_back({x.row(i).transpose(), 1e-3});
+    between.push_back(std::move(seen));
+    return true;
+  });
+  if (only_between) r.observations->clear();
+  std::vector<FrameObservations> all;
+  std::ranges::merge(*r.observations, between, std::back_inserter(all), {}, &FrameObservations::frame,
+                     &FrameObservations::frame);
+  *r.observations = std::move(all);
+  return r;
+}
+
+/// What was seen between frames agrees with the motion at its own time, and not with that at the frame.
+TEST(TimeOffset, IsThatOfTheMotion) {
+  test::Recording r = seen_between_frames(1, true);
+  std::vector<Parameter> list = r.parameters.parameters();
+  const ParameterSet parameters(r.scene.layout.layout(), list, r.truth);
+  const VectorX p = parameters.to_unconstrained(r.truth);
+  const CostEvaluation at_its_time = r.objective(parameters).evaluate(p);
+  ASSERT_TRUE(at_its_time.succeeded) << at_its_time.failure;
+  EXPECT_EQ(at_its_time.frames.size(), 4u);
+  for (FrameObservations& seen : *r.observations) seen.after = 0.0;
+  const CostEvaluation at_the_frame = r.objective(parameters).evaluate(p);
+  EXPECT_LT(at_its_time.surface_rms(), 0.1 * at_the_frame.surface_rms());
+  EXPECT_GT(at_the_frame.surface_rms(), 2e-3);
+}
+
+/// Frames at 0, 0.1, 0.2, 0.3 s, let go at 0.1 s; the second camera is 0.13 s late, the third 0.04 s early.
+TEST(TimeOffset, PutsWhatASensorSawWhereItLooked) {
+  Capture capture;
+  capture.scene.timing = evenly_timed(10.0, 4, 1);
+  capture.depth.resize(3);
+  capture.depth[1].time_offset = 0.13;
+  capture.depth[2].time_offset = -0.04;
+  std::vector<ObservedFrame> observed(4);
+  for (int f = 0; f < 4; ++f) {
+    observed[std::size_t(f)].frame = f;
+    for (int c = 0; c < 3; ++c) {
+      observed[std::size_t(f)].points.push_back(Vector3(f, c, 0));
+      observed[std::size_t(f)].noise.push_back(1e-3f);
+      observed[std::size_t(f)].camera.push_back(c);
+    }
+  }
+  std::string seen;  // frame of the simulation + time after it: recorded frame and camera of each point
+  const auto written = [&] {
+    seen.clear();
+    for (const FrameObservations& o : frame_observations(capture, observed, {})) {
+      seen += " " + std::to_string(o.frame) + "+" + std::to_string(int(std::lround(1e3 * o.after))) + ":";
+      for (const SurfaceObservation& p : o.points)
+        seen += std::to_string(int(p.position.x())) + "abc"[int(p.position.y())] + ",";
+    }
+    return seen;
+  };
+  EXPECT_EQ(written(), " 0+0:1a, 0+30:0b, 0+60:2c, 1+0:2a, 1+30:1b, 1+60:3c, 2+0:3a, 2+30:2b, 2+130:3b,");
+  capture.scene.timing.is_static = true;
+  EXPECT_EQ(written(), " 0+0:1a,1b,1c, 1+0:2a,2b,2c, 2+0:3a,3b,3c,");
+}
+
+TEST_P(Gradient, OfWhatIsSeenBetweenFramesMatchesCentralDifferences) {
+  Scene scene(GetParam());
+  const test::Recording r = seen_between_frames(GetParam());
+  Objective objective = r.objective(scene.parameters);
+  const CostEvaluation by_adjoint = objective.gradient(scene.p), by_tangents = objective.linearise(scene.p);
+  ASSERT_TRUE(by_adjoint.succeeded && by_tangents.succeeded);
+  EXPECT_EQ(by_adjoint.frames.size(), 9u);
+  EXPECT_LT((by_adjoint.gradient - by_tangents.gradient).norm(), tolerance(1e-8) * by_tangents.gradient.norm());
+  for (const Eigen::Index i : {Eigen::Index(0), scene.p.size() / 2, scene.p.size() - 1}) {
+    const auto along = [&](double h) {
+      return VectorX::Constant(1, objective.evaluate(scene.p + h * VectorX::Unit(scene.p.size(), i)).cost);
+    };
+    const double error = test::best_relative_error(along, VectorX::Constant(1, by_adjoint.gradient[i]), 0.1);
     EXPECT_LT(error, tolerance(1e-5)) << scene.parameters.coordinate_names()[std::size_t(i)];
   }
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <opencv2/calib3d.hpp>
 #include <string>
 
 #include "input_errors.hpp"
@@ -19,7 +20,7 @@ LensCamera some_camera() {
   camera.width = 1200;
   camera.height = 800;
   camera.camera_matrix << 2400, 0, 610, 0, 2410, 390, 0, 0, 1;
-  camera.distortion_coefficients = {-0.25, 0.1, 8e-4, -5e-4, -0.02};
+  camera.lens = LensDistortion({-0.25, 0.1, 8e-4, -5e-4, -0.02});
   camera.world_to_camera = {Eigen::AngleAxisd(0.4, Vector3(1, -2, 0.5).normalized()).toRotationMatrix(),
                             Vector3(0.1, -0.05, 0.9)};
   return camera;
@@ -46,7 +47,7 @@ TEST(LensCamera, ComesBackFromItsFile) {
   EXPECT_EQ(again.width, 1200);
   EXPECT_EQ(again.height, 800);
   EXPECT_TRUE(again.camera_matrix.isApprox(camera.camera_matrix, 1e-12));
-  EXPECT_EQ(again.distortion_coefficients, camera.distortion_coefficients);
+  EXPECT_EQ(again.lens, camera.lens);
   EXPECT_TRUE(again.world_to_camera.rotation.isApprox(camera.world_to_camera.rotation, 1e-12));
   EXPECT_TRUE(again.world_to_camera.translation.isApprox(camera.world_to_camera.translation, 1e-12));
 }
@@ -106,6 +107,23 @@ TEST(LensCamera, LensAndPinholeAgree) {
   EXPECT_GT(ray.dot(to), 0);
   const Vector3 behind = camera.world_to_camera.inverse()(Vector3(0, 0, -1));
   EXPECT_FALSE(project(camera, behind).allFinite());
+}
+
+/// Against OpenCV itself, with as many coefficients as it knows.
+TEST(LensCamera, SeesWhereOpenCvSees) {
+  const std::vector<double> all = {-0.25, 0.1,  8e-4,  -5e-4, -0.02, 0.03, -0.02,
+                                   0.01,  1e-3, -2e-3, 5e-4,  1e-3,  0.05, -0.03};
+  for (const std::size_t count : {4, 5, 8, 12, 14}) {
+    LensCamera camera = some_camera();
+    const std::vector<double> lens(all.begin(), all.begin() + long(count));
+    camera.lens = LensDistortion(lens);
+    const Vector3 local(0.14, -0.1, 0.8);
+    std::vector<cv::Point2d> theirs;
+    cv::projectPoints(std::vector{cv::Point3d(local.x(), local.y(), local.z())}, cv::Vec3d(), cv::Vec3d(),
+                      cv::Matx33d(2400, 0, 610, 0, 2410, 390, 0, 0, 1), lens, theirs);
+    const Vector2 ours = project(camera, camera.world_to_camera.inverse()(local));
+    EXPECT_LT((ours - Vector2(theirs[0].x, theirs[0].y)).norm(), 1e-8) << count << " coefficients";
+  }
 }
 
 TEST(LensCamera, DerivativeAgreesWithDifferences) {

@@ -3,6 +3,8 @@
 
 #include "synthesis/scene_motion.hpp"
 
+#include <Eigen/Geometry>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/files.hpp"
@@ -344,6 +346,51 @@ TEST_F(Recorded, RefusesWhatDoesNotGoTogether) {
   EXPECT_THAT(complaint(replaced(base, timing, "") + held + camera), HasSubstr("[timing]"));
   EXPECT_THAT(complaint(replaced(base, "frame_rate", "static = true\nframe_rate") + camera),
               HasSubstr("nothing holds"));
+}
+
+/// Half a frame late, by no fault of the capture: what the camera sees has fallen half a frame further. The capture
+/// says what the scene has it say of the camera.
+TEST_F(Recorded, ACameraMayBeLateAndBadlyCalibrated) {
+  const std::string late = camera + R"toml(distortion = [-0.1, 0.02, 0.0, 0.0]
+time_offset = 0.0083333333
+stated = { turn_deg = [0, 2, 0], shift = [0.01, 0, 0], distortion = [], time_offset = 0.0 }
+)toml";
+  const Made m = made(head + object + material + world + timing + simulation + late);
+  ASSERT_EQ(m.motion.camera_frames.size(), 1u);
+  ASSERT_EQ(m.motion.camera_frames[0].size(), 5u);
+  for (int f = 0; f < 5; ++f) {
+    const double t = std::max(0.0, (f - 2) / 60.0 + 0.0083333333);
+    const Points& seen = m.motion.camera_frames[0][std::size_t(f)].vertices;
+    const double fallen = (vertex_points(*m.scene.scene.object.surface) - seen).col(1).mean();
+    EXPECT_NEAR(fallen, 0.5 * 9.81 * t * t, 0.03 * 0.5 * 9.81 * t * t + 1e-6) << f;
+  }
+  const DepthCamera& stated = m.capture.depth[0];
+  EXPECT_EQ(stated.time_offset, 0.0);
+  EXPECT_FALSE(stated.camera.lens.bends());
+  const RigidMotion& truth = m.scene.cameras[0].camera.camera_to_world;
+  EXPECT_NEAR(Eigen::AngleAxisd(Matrix3(stated.camera.camera_to_world.rotation.transpose() * truth.rotation)).angle(),
+              2.0 * M_PI / 180.0, 1e-9);
+  const nlohmann::json& own = m.truth["cameras"]["front"];
+  EXPECT_EQ(own["time_offset"], 0.0083333333);
+  EXPECT_EQ(own["distortion"], nlohmann::json({-0.1, 0.02, 0.0, 0.0}));
+  EXPECT_NEAR(own["camera_to_world"][2][3], truth.translation.z(), 1e-12);
+}
+
+/// Through the lens that it was seen with every reading lies on the true surface; taken for a pinhole's they do not.
+TEST_F(Recorded, AReadingComesBackThroughTheLens) {
+  const std::string bent = replaced(camera, "up =", "distortion = [0.4, 0.05, 0.001, 0.002]\nup =");
+  const Made m = made(head + object + material + weightless + replaced(timing, "start_frame = 2", "static = true") +
+                      simulation + held + replaced(bent, "[0.0, 0.0, 0.5]", "[0.15, 0.1, 0.2]"));
+  const auto greatest = [&](const Capture& capture) {
+    double most = 0.0;
+    for (const double d : distances_to_surface(*m.scene.scene.object.surface, observe(capture).front().points))
+      most = std::max(most, d);
+    return most;
+  };
+  EXPECT_LT(greatest(m.capture), 1e-3);  // readings are whole millimetres
+  Capture straight = m.capture;
+  straight.depth[0].camera.lens = {};
+  EXPECT_GT(greatest(straight), 1.5e-3);
 }
 
 }  // namespace
