@@ -22,6 +22,7 @@ void add_rest(CommandLine& line, int& exit_code);
 void add_mesh(CommandLine& line, int& exit_code);
 void add_markers(CommandLine& line, int& exit_code);
 void add_scan(CommandLine& line, int& exit_code);
+void add_calibrate(CommandLine& line, int& exit_code);
 void add_fuse(CommandLine& line, int& exit_code);
 void add_place(CommandLine& line, int& exit_code);
 

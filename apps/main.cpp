@@ -34,6 +34,7 @@ int run(int argc, char** argv) {
                    footer);
   int exit_code = Fine;
   add_check(line, exit_code);
+  add_calibrate(line, exit_code);
   add_fuse(line, exit_code);
   add_scan(line, exit_code);
   add_place(line, exit_code);
