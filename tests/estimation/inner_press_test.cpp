@@ -111,7 +111,7 @@ TEST_F(OnASlide, TheTruthFitsAndWithoutTheSlideItDoesNot) {
     const CostEvaluation evaluation = objective.evaluate(set.to_unconstrained(theta));
     EXPECT_TRUE(evaluation.succeeded) << evaluation.failure;
     EXPECT_EQ(evaluation.frames.size(), 4u);  // a press, two depths, a grip
-    double sum = 0.0;  // without what priors add
+    double sum = 0.0;                         // without what priors add
     for (const FrameFit& frame : evaluation.frames) sum += frame.cost;
     return sum;
   };
