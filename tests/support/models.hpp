@@ -31,7 +31,7 @@ inline Model pressed_block(const Eigen::Vector3i& cells = {8, 2, 2}) {
   model.volume.nodes = body->nodes;
   model.volume.kind = VtuCell::Tetrahedron;
   model.volume.connectivity = body->connectivity;
-  model.law = ModelLaw{"ogden", {"element", "mu_1", "alpha_1", "nu_1"}, {}, 0.0};
+  model.law = ModelLaw{"ogden", {"element", "mu_1", "alpha_1", "nu_1"}, {}};
   for (int e = 0; e < body->element_count(); ++e) {
     model.law->rows.push_back({double(e), 4000.0, 6.0, 0.3});
     model.volume.youngs_modulus.push_back(2e5);
