@@ -77,7 +77,9 @@ def foam(f):
     else:
         text += f"\nThe linear law turns no element over on this way (least det F {last['least_volume_ratio']:.2f}); "
     text += ("it goes on to the end of the way. " if f["fits"]["linear"]["complete"] else f"it finds no equilibrium beyond {1e3 * last['depth']:.3g} mm. ")
-    text += f"Ogden's keeps every element to the end (least det F {min(r['least_volume_ratio'] for r in f['curves']['ogden']):.2f}). Markers are fitted to {1e3 * f['fits']['ogden']['marker_rms']:.2f} mm rms by Ogden's law, {1e3 * f['fits']['linear']['marker_rms']:.2f} mm by the linear one.\n\n"
+    text += (f"Ogden's keeps every element to the end (least det F {min(r['least_volume_ratio'] for r in f['curves']['ogden']):.2f}). Markers are fitted to {1e3 * f['fits']['ogden']['marker_rms']:.2f} mm rms by Ogden's law, {1e3 * f['fits']['linear']['marker_rms']:.2f} mm by the linear one. ")
+    text += ("Small presses meet forces that are too high on these coarse linear elements, an edge of which is about as long as the disc's radius; and the fitted law stiffens less than the true one beyond what it was fitted to: "
+             "it is nearer than the linear law there, and not near.\n\n")
     return text
 
 
