@@ -115,12 +115,12 @@ TEST(LensCamera, SeesWhereOpenCvSees) {
                                    0.01,  1e-3, -2e-3, 5e-4,  1e-3,  0.05, -0.03};
   for (const std::size_t count : {4, 5, 8, 12, 14}) {
     LensCamera camera = some_camera();
-    const std::vector<double> lens(all.begin(), all.begin() + long(count));
-    camera.lens = LensDistortion(lens);
+    const std::vector<double> distortion(all.begin(), all.begin() + long(count));
+    camera.lens = LensDistortion(distortion);
     const Vector3 local(0.14, -0.1, 0.8);
     std::vector<cv::Point2d> theirs;
     cv::projectPoints(std::vector{cv::Point3d(local.x(), local.y(), local.z())}, cv::Vec3d(), cv::Vec3d(),
-                      cv::Matx33d(2400, 0, 610, 0, 2410, 390, 0, 0, 1), lens, theirs);
+                      cv::Matx33d(2400, 0, 610, 0, 2410, 390, 0, 0, 1), distortion, theirs);
     const Vector2 ours = project(camera, camera.world_to_camera.inverse()(local));
     EXPECT_LT((ours - Vector2(theirs[0].x, theirs[0].y)).norm(), 1e-8) << count << " coefficients";
   }
