@@ -34,6 +34,19 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
   return log_bayes_factor(evaluation, parameters, p, contrasts, own * covariance * own.transpose());
 }
 
+namespace {
+
+/// Whether a number of p lies on a bound beyond which the cost would fall.
+bool is_held_by_bound(const ParameterSet& parameters, const VectorX& p, const VectorX& gradient, Eigen::Index i) {
+  constexpr double step = 1e-6;
+  if (gradient[i] == 0.0) return false;
+  VectorX further = p;
+  further[i] -= std::copysign(step, gradient[i]);
+  return std::abs(parameters.clamp(further)[i] - p[i]) < 0.5 * step;
+}
+
+}  // namespace
+
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& contrasts, const MatrixX& prior) {
   // The field's prior belongs to the hypotheses, not to the estimate; a trace of it stays for where nothing is seen.
@@ -44,6 +57,12 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
     const std::vector<Eigen::Index> rows = parameters.joint_coordinates();
     H(rows, rows) -= (1.0 - trace) * precision;
     g(rows) -= (1.0 - trace) * precision * p(rows);
+  }
+  // What a bound holds cannot make up for what a field would change.
+  for (Eigen::Index i = 0; i < g.size(); ++i) {
+    if (!is_held_by_bound(parameters, p, evaluation.gradient, i)) continue;
+    H.row(i).setZero(), H.col(i).setZero();
+    H(i, i) = 1.0, g[i] = 0.0;
   }
   const VectorX scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // pulls and dampings differ by 1e10
   const MatrixX inverse = scale.asDiagonal() *

@@ -124,6 +124,34 @@ TEST(Evidence, ResidualsLargerThanTheNoiseCountLess) {
   EXPECT_NEAR(large, model.log_factor(model.at(p), p), tolerance(1e-3));
 }
 
+/// A damping of zero, of which less would make up for what the moduli lack.
+TEST(Evidence, WhatABoundHoldsMakesUpForNothing) {
+  const LinearModel model;
+  const VectorX p = Eigen::Vector2d(-0.5, 1.0);
+  const CostEvaluation of_moduli = model.at(p);
+  const MotionLayout layout({.moduli = 2});
+  std::vector<Parameter> list = model.parameters.parameters();
+  list.push_back({"mass_damping", "1/s", Transform::Shift, layout.mass_damping, 0.3, 0.0, 1e2, true});
+  ParameterSet parameters(layout.layout(), list, VectorX::Ones(layout.size()));
+  parameters.set_joint_prior({"youngs_modulus@1", "youngs_modulus@2"}, model.parameters.joint_precision());
+  const auto with_damping = [&](double slope) {
+    CostEvaluation e = of_moduli;
+    e.gauss_newton.conservativeResizeLike(MatrixX::Zero(3, 3));
+    e.gauss_newton.row(2) << -1.0, 1.5, 4.0;
+    e.gauss_newton.col(2) << -1.0, 1.5, 4.0;
+    for (VectorX* gradient : {&e.gradient, &e.frames[0].gradient}) {
+      gradient->conservativeResize(3);
+      (*gradient)[2] = slope;
+    }
+    VectorX at(3);
+    at << p, 0.0;
+    return log_bayes_factor(e, parameters, at, MatrixX::Ones(2, 1));
+  };
+  const double alone = model.log_factor(of_moduli, p);
+  EXPECT_NEAR(with_damping(2.0), alone, tolerance(1e-9));
+  EXPECT_GT(std::abs(with_damping(-2.0) - alone), 0.05) << "nothing holds it where it grows";
+}
+
 /// Two hundred frames share the curvature; their gradients scatter as it says, but in runs of ten that err together.
 TEST(Evidence, FramesThatErrTogetherCountLess) {
   const LinearModel model;
