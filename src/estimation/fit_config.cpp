@@ -353,8 +353,7 @@ std::string parameter_key_help() {
          "each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
          "  NAME.estimate=BOOL   estimate it, or keep the start value\n"
-         "  NAME.prior_std=X     width of the prior: of the logarithm for moduli and density, for dampings of "
-         "asinh(value over what is usual);\n"
+         "  NAME.prior_std=X     width of the prior: of the logarithm for moduli, dampings and density;\n"
          "                       it lies about VALUE where both are given";
 }
 
@@ -504,8 +503,7 @@ void change_parameter(Parameter& parameter, const FitOptions::Override& change, 
                         parameter.transform == Transform::PlanePosition ? "planes to start where the capture has them"
                                                                         : std::to_string(numbers) + " numbers",
                         ""});
-    if ((parameter.transform == Transform::Logarithm || parameter.transform == Transform::InverseSinh) &&
-        !((*change.start)[0] > 0.0))
+    if (parameter.transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
       throw InputError({{}, "the start of " + parameter.name + " is not positive", "a number above 0", ""});
     theta.segment(parameter.at.first, numbers) = *change.start;
     if (parameter.transform == Transform::Direction) parameter.origin = *change.start;

@@ -48,20 +48,6 @@ ParameterSet young_and_poisson() {
   return {layout, list, theta};
 }
 
-TEST(UnmodelledStd, IsAShareOfADampingOrOfWhatIsUsualWhereItIsLess) {
-  ParameterLayout layout;
-  Parameter damping;
-  damping.name = "stiffness_damping", damping.unit = "s", damping.estimated = true;
-  damping.transform = Transform::InverseSinh, damping.scale = 0.004;
-  damping.at = layout.add({"stiffness_damping", "s", 1, Role::Damping});
-  for (const double value : {1e-4, 4e-3, 0.2}) {
-    const VectorX theta = VectorX::Constant(1, value);
-    const ParameterSet set(layout, {damping}, theta);
-    const VectorX p = set.to_unconstrained(theta), floor = unmodelled_std(set, theta, true);
-    EXPECT_NEAR(set.jacobian(p)(0, 0) * floor[0], 0.16 * std::hypot(value, 0.004), 1e-12) << value;
-  }
-}
-
 TEST(StudentsT, HasTheQuantilesOfItsTables) {
   EXPECT_NEAR(t_quantile_90(2.0), 2.9200, 1e-4);
   EXPECT_NEAR(t_quantile_90(2.5), 2.5582, 0.025);
