@@ -126,7 +126,7 @@ def two_zones():
     worst = max(abs(e) for r in together for e in r["errors"])
     text += "\n" + table(["target", "here", ""], [["both moduli within 2 %", f"{percent(worst, False)} at worst, together", judged(worst <= 0.02)]])
     text += (f"\nIn turns takes {sum(r['evaluations'] for r in turns) / sum(r['evaluations'] for r in together):.1f} times the evaluations and {sum(r['seconds'] for r in turns) / sum(r['seconds'] for r in together):.1f} times the time: "
-             "with the shape held, the derivatives do not see that a softer bar has to be free of load higher up. Derivatives through the equilibrium are the default.\n")
+             "with the shape held, the derivatives do not see that a softer bar has to be free of load higher up, and it ends at the most iterations allowed. Derivatives through the equilibrium are the default.\n")
     own = {r["scheme"]: r for r in c["runs"] if by_modes(r)}
     if "together" in own and len(own) > 1:
         simplex = next(r for name, r in own.items() if name != "together")
