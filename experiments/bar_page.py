@@ -170,23 +170,29 @@ def dinosaur():
     figures = results("dinosaur")
     if not figures:
         return "Not run yet.\n"
-    r = figures["runs"]["clean-7"]
+    runs = figures["runs"]
+    rows = [(label, runs[name]) for name, label in (("clean-7", "one swing"), ("whole-7", "all frames"), ("noise-7", "all frames, noise of 1 %")) if name in runs]
     places = ["head", "tail", "left hand", "right hand", "left foot", "right foot", "belly"]
-    text = table(["", "Wang 2015", "here"], [
-        ["nodes / tetrahedra", "4867 / 16270", f"{r['nodes']} / {r['elements']}"],
-        ["frames that are compared", "523", r["settings"]["horizon"]],
-        ["worst E", "5 %", small(r["errors"]["worst_modulus"])],
-        ["beta", "60 %", small(r["errors"]["stiffness_damping"])],
-        ["time", "", f"{r['wall_seconds']:.0f} s, 2 shared cores ({r['processor_seconds']:.0f} s of processor)"],
-        ["forward / adjoint step", "", f"{r['costs']['ms_per_forward_step']:.0f} / {r['costs']['ms_per_adjoint_step']:.0f} ms"]])
-    text += "\n" + table(["", "truth", "found", "error"], [[place, f"{p['truth']:g}", f"{p['value']:.5g}", small(p["relative_error"])]
-                                                       for place, p in zip(places + ["alpha [1/s]", "beta [s]"], r["parameters"])])
+    first = rows[0][1]
+    text = table(["", "Wang 2015", *(f"here, {label}" for label, _ in rows)], [
+        ["nodes / tetrahedra", "4867 / 16270", *(f"{r['nodes']} / {r['elements']}" for _, r in rows)],
+        ["frames that are compared", "523", *(str(r["settings"]["horizon"]).split(",")[-1] for _, r in rows)],
+        ["worst E", "5 %", *(small(r["errors"]["worst_modulus"]) for _, r in rows)],
+        ["alpha", "", *(small(r["errors"]["mass_damping"]) for _, r in rows)],
+        ["beta", "60 %", *(small(r["errors"]["stiffness_damping"]) for _, r in rows)],
+        ["evaluations", "", *(r["evaluations"] for _, r in rows)],
+        ["time on 2 shared cores", "3 h, 8 cores", *(f"{r['wall_seconds']:.0f} s ({r['processor_seconds']:.0f} s of processor)" for _, r in rows)],
+        ["forward / adjoint step", "", *(f"{r['costs']['ms_per_forward_step']:.0f} / {r['costs']['ms_per_adjoint_step']:.0f} ms" for _, r in rows)],
+        ["why it ended", "", *(r["reason"] for _, r in rows)]])
+    text += "\n" + table(["", "truth", *(f"error, {label}" for label, _ in rows)],
+                         [[place, f"{first['parameters'][i]['truth']:g}", *(small(r["parameters"][i]["relative_error"]) for _, r in rows)]
+                          for i, place in enumerate(places + ["alpha [1/s]", "beta [s]"])])
     text += "\n" + table(["target", "here", ""], [
-        ["every E within 3 %", unsigned(abs(r["errors"]["worst_modulus"])), judged(abs(r["errors"]["worst_modulus"]) < 0.03)],
-        ["at most 30 min", f"{r['wall_seconds'] / 60:.1f} min", judged(r["wall_seconds"] <= 1800)]])
-    text += ("\nIt began at ten times the truth's mean modulus and dampings, since no vibration was seen well enough" if r["start"]["by"] == "off" else "\nIt began at what the modes' frequencies give") + ". "
-    text += ("Made of rounded limbs, meshed, held at the feet and pushed. Also an inverse crime: model and truth are one, and there is no noise. "
-             f"It {'converged' if r['converged'] else 'did not converge'} after {r['evaluations']} evaluations.\n")
+        [f"every E within 3 %, {label}", unsigned(abs(r["errors"]["worst_modulus"])), judged(abs(r["errors"]["worst_modulus"]) < 0.03)] for label, r in rows] + [
+        ["one swing in at most 30 min", f"{first['wall_seconds'] / 60:.1f} min", judged(first["wall_seconds"] <= 1800)]])
+    begun = "ten times the truth's mean modulus and dampings, since no vibration was seen well enough" if first["start"]["by"] == "off" else "what the modes' frequencies give"
+    text += (f"\nThe fit of one swing began at {begun}. Made of rounded limbs, meshed, held at the feet and pushed. Model and truth are one, an inverse crime. "
+             "Fits of all frames compare the first 16, then 60, then all.\n")
     cores = figures["machine"]
     return text + f"\nMeasured on {cores['cores']} cores ({cores['processor']}), shared with other work" + (
-        f": load {r['load_at_start']:.1f} at the start" if "load_at_start" in r else "") + ".\n"
+        f": load {first['load_at_start']:.1f} at the start" if "load_at_start" in first else "") + ".\n"

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/error.hpp"
+#include "estimation/bounded_step.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_plan.hpp"
 #include "estimation/recordings.hpp"
@@ -18,6 +19,13 @@ namespace {
 
 constexpr std::array numbers = {1, 2, 3, 4, 6, 8, 12, 16};
 constexpr double impossible = -std::numeric_limits<double>::infinity();
+/// Of the cost, by more control points: what a mesh lacks is no noise, and many points make evidence of little.
+constexpr double least_gain = 0.03;
+
+/// Whether a field that was fitted is kept beside the best one before.
+bool is_worth_it(const TriedField& tried, double best_cost) {
+  return tried.estimated && tried.log_bayes_factor > strong_evidence && tried.cost < (1.0 - least_gain) * best_cost;
+}
 
 std::string text_of(double value, const char* format) {
   char text[32];
@@ -106,7 +114,14 @@ std::optional<PassState> FieldChoice::beginning_of(int count) {
     begin = with_field(count, promised);
   } catch (const InputError&) {  // the mesh has no room for so many points
   }
-  if (promised.log_bayes_factor > strong_evidence) return begin;
+  const bool is_promising =
+      promised.log_bayes_factor > strong_evidence && promised.cost < (1.0 - 0.5 * least_gain) * best().cost;
+  // Where one modulus does not explain what was seen, dampings stand where they make up for it: one step from there
+  // tells nothing.
+  const bool may_lead_elsewhere =
+      choice_.tried.size() == 1 && begin.begin && !estimate_of(*choice_.state)->is_explained;
+  if (is_promising || may_lead_elsewhere) return begin;
+  promised.cost = std::numeric_limits<double>::infinity();
   choice_.tried.push_back(promised);
   return std::nullopt;
 }
@@ -133,7 +148,11 @@ PassState FieldChoice::with_field(int count, TriedField& promised) {
   const VectorX p = parameters.to_unconstrained(theta);
   const CostEvaluation e = objective.linearise(p);
   forward_steps_ += e.steps;
-  if (e.succeeded) promised.log_bayes_factor = log_bayes_factor(e, objective.parameters(), p, moduli);
+  if (e.succeeded) {
+    promised.log_bayes_factor = log_bayes_factor(e, objective.parameters(), p, moduli);
+    const VectorX step = step_within_bounds(objective.parameters(), p, e.gradient, e.gauss_newton).step;
+    promised.cost = e.cost + step.dot(e.gradient + 0.5 * e.gauss_newton * step);
+  }
   // Dampings and, above all, Poisson's ratio made up for what the coarser field lacks: a stage earlier, and the
   // latter where it began.
   const bool is_corrected = estimate_of(*choice_.state)->id.kind == StageKind::Corrected;
@@ -156,7 +175,7 @@ void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {
                                               carried_over(body, field_of(body, best().control_points), body.modulus));
   }
   if (count_ == 1) tried.log_bayes_factor = 0.0;
-  if (count_ == 1 || tried.log_bayes_factor > strong_evidence) {
+  if (count_ == 1 || is_worth_it(tried, best().cost)) {
     choice_.best = int(choice_.tried.size());
     choice_.state = std::move(reached);
   }
@@ -197,17 +216,18 @@ FitOutcome FieldChoice::with_history(FitOutcome outcome) {
 std::string explained(const std::vector<TriedField>& tried) {
   std::string evidence;
   int best = 1;
+  double best_cost = tried.front().cost;
   for (std::size_t i = 1; i < tried.size(); ++i) {
     const TriedField& t = tried[i];
     const bool is_possible = std::isfinite(t.log_bayes_factor);
     evidence += std::string(i == 1 ? "" : ",") + " of " + points(t.control_points) + " over " + std::to_string(best) +
                 ": " + (is_possible ? text_of(t.log_bayes_factor, "%+.1f") : "cannot be simulated");
     if (is_possible && !t.estimated) evidence += " (promised by one step)";
-    if (t.estimated && t.log_bayes_factor > strong_evidence) best = t.control_points;
+    if (is_worth_it(t, best_cost)) best = t.control_points, best_cost = t.cost;
   }
   return "Young's modulus was given " + points(best) +
          ", as many as the recordings support. Logarithm of the evidence" + evidence + ". More points need more than " +
-         text_of(strong_evidence, "%.0f") + ".";
+         text_of(strong_evidence, "%.0f") + ", and " + text_of(100.0 * least_gain, "%.0f") + " % off the cost.";
 }
 
 MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusField& to) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/dense.hpp"
+#include "estimation/bounded_step.hpp"
 
 namespace pliant {
 
@@ -34,19 +35,6 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
   return log_bayes_factor(evaluation, parameters, p, contrasts, own * covariance * own.transpose());
 }
 
-namespace {
-
-/// Whether a number of p lies on a bound beyond which the cost would fall.
-bool is_held_by_bound(const ParameterSet& parameters, const VectorX& p, const VectorX& gradient, Eigen::Index i) {
-  constexpr double step = 1e-6;
-  if (gradient[i] == 0.0) return false;
-  VectorX further = p;
-  further[i] -= std::copysign(step, gradient[i]);
-  return std::abs(parameters.clamp(further)[i] - p[i]) < 0.5 * step;
-}
-
-}  // namespace
-
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& contrasts, const MatrixX& prior) {
   // The field's prior belongs to the hypotheses, not to the estimate; a trace of it stays for where nothing is seen.
@@ -58,22 +46,25 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
     H(rows, rows) -= (1.0 - trace) * precision;
     g(rows) -= (1.0 - trace) * precision * p(rows);
   }
-  // What a bound holds cannot make up for what a field would change.
-  for (Eigen::Index i = 0; i < g.size(); ++i) {
-    if (!is_held_by_bound(parameters, p, evaluation.gradient, i)) continue;
+  // What a bound holds cannot make up for what a field would change; what only lies on one may leave it with the field.
+  auto [step, held] = step_within_bounds(parameters, p, g, H);
+  const VectorX d = contrasts * (p + step);
+  const double fall = -step.dot(g + 0.5 * H * step);
+  std::erase_if(held, [&](Eigen::Index i) { return !contrasts.col(i).isZero(0.0); });
+  for (const Eigen::Index i : held) {
     H.row(i).setZero(), H.col(i).setZero();
-    H(i, i) = 1.0, g[i] = 0.0;
+    H(i, i) = 1.0;
   }
   const VectorX scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // pulls and dampings differ by 1e10
-  const MatrixX inverse = scale.asDiagonal() *
-                          solve_symmetric(MatrixX(scale.asDiagonal() * H * scale.asDiagonal()),
-                                          MatrixX(MatrixX::Identity(H.rows(), H.cols()))) *
-                          scale.asDiagonal();
+  MatrixX inverse = scale.asDiagonal() *
+                    solve_symmetric(MatrixX(scale.asDiagonal() * H * scale.asDiagonal()),
+                                    MatrixX(MatrixX::Identity(H.rows(), H.cols()))) *
+                    scale.asDiagonal();
+  for (const Eigen::Index i : held) inverse(i, i) = 0.0;
   const MatrixX by_gradient = contrasts * inverse;
-  const VectorX d = contrasts * p - by_gradient * g;
 
-  const double explained = 0.5 * evaluation.independent_observations();  // the cost of residuals that are noise
-  const double left = std::max(evaluation.cost - 0.5 * g.dot(inverse * g), 0.0) / evaluation.cost;  // after the step
+  const double explained = 0.5 * evaluation.independent_observations();         // the cost of residuals that are noise
+  const double left = std::max(evaluation.cost - fall, 0.0) / evaluation.cost;  // after the step
   const double noise = std::max(1.0, left * evaluation.cost / explained);
   VectorX mean = VectorX::Zero(g.size());
   for (const FrameFit& frame : evaluation.frames) mean += frame.gradient / double(evaluation.frames.size());

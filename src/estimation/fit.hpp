@@ -73,7 +73,8 @@ struct FitOptions {
   double scan_std = 0.01;  ///< by how much, times the object's size, (0, 0.2]
   /// Of Young's modulus, where the capture names no regions; >= 1, 1: homogeneous; `automatic`: as many as the
   /// recordings support.
-  /// `unsaid`: automatic in a fit of points that is made beside the tracked motion's, else 1.
+  /// `unsaid`: automatic where points of the surface of an object that is held and swings are fitted, and in a fit of
+  /// points that is made beside the tracked motion's; else 1.
   int control_points = unsaid;
   static constexpr int automatic = 0, unsaid = -1;
   int controls() const { return control_points < 1 ? 1 : control_points; }  ///< where there is no choice to make

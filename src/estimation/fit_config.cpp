@@ -138,10 +138,12 @@ Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*membe
 }
 
 Entry control_points_entry() {
-  Entry entry = integer_entry(
-      "control_points", "1..500, auto: as many as the recordings support, or default: auto with tracking=both, else 1",
-      "number of control points of the field of Young's modulus, where the capture names no regions",
-      &FitOptions::control_points);
+  Entry entry =
+      integer_entry("control_points",
+                    "1..500, auto: as many as the recordings support, or default: auto where an object that is held "
+                    "swings before depth cameras, and with tracking=both; else 1",
+                    "number of control points of the field of Young's modulus, where the capture names no regions",
+                    &FitOptions::control_points);
   entry.key.type = "whole number or auto";
   entry.key.standard = "default";
   entry.write = [](const FitOptions& o) {
@@ -353,7 +355,8 @@ std::string parameter_key_help() {
          "each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
          "  NAME.estimate=BOOL   estimate it, or keep the start value\n"
-         "  NAME.prior_std=X     width of the prior: of the logarithm for moduli, dampings and density;\n"
+         "  NAME.prior_std=X     width of the prior: of the logarithm for moduli and density, for dampings of "
+         "asinh(value over what is usual);\n"
          "                       it lies about VALUE where both are given";
 }
 
@@ -503,7 +506,8 @@ void change_parameter(Parameter& parameter, const FitOptions::Override& change, 
                         parameter.transform == Transform::PlanePosition ? "planes to start where the capture has them"
                                                                         : std::to_string(numbers) + " numbers",
                         ""});
-    if (parameter.transform == Transform::Logarithm && !((*change.start)[0] > 0.0))
+    if ((parameter.transform == Transform::Logarithm || parameter.transform == Transform::InverseSinh) &&
+        !((*change.start)[0] > 0.0))
       throw InputError({{}, "the start of " + parameter.name + " is not positive", "a number above 0", ""});
     theta.segment(parameter.at.first, numbers) = *change.start;
     if (parameter.transform == Transform::Direction) parameter.origin = *change.start;

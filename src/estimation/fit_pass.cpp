@@ -1,5 +1,7 @@
 #include "estimation/fit_pass.hpp"
 
+#include <algorithm>
+
 #include "estimation/explained_span.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/fit_run.hpp"
@@ -60,9 +62,29 @@ bool OnePass::take(FitOutcome outcome, PassState) {
   return false;
 }
 
+namespace {
+
+/// Whether how many moduli the object needs is asked without being told to. Where it is held, and bends and swings, it
+/// shows where it is how stiff. Under impacts errors of the contact would be taken for that, and a motion that was
+/// tracked bends where the tracker bent it.
+bool shows_where_it_is_stiff(const RecordedCapture& r) {
+  const Scene& scene = r.capture.scene;
+  return !r.followed && !scene.fixed.empty() && scene.planes.empty() && !scene.timing.is_static &&
+         r.capture.markers.empty() && (!r.capture.clouds.empty() || !r.capture.depth.empty());
+}
+
+bool looks_for_fields(const std::vector<RecordedCapture>& recordings, const FitOptions& options) {
+  if (!named_moduli(recordings.front().capture.scene).empty()) return false;
+  if (options.control_points != FitOptions::unsaid) return options.control_points == FitOptions::automatic;
+  return !options.parameters.contains("youngs_modulus") && !options.law_of_motion() && options.scan_points == 0 &&
+         std::ranges::all_of(recordings, shows_where_it_is_stiff);
+}
+
+}  // namespace
+
 std::unique_ptr<PassPlanner> planner_of_points(std::vector<RecordedCapture> recordings, const FitOptions& options,
                                                FitState resume) {
-  if (options.control_points == FitOptions::automatic && named_moduli(recordings.front().capture.scene).empty())
+  if (looks_for_fields(recordings, options))
     return std::make_unique<FieldChoice>(std::move(recordings), options, std::move(resume));
   FitOptions given = options;
   if (given.control_points == FitOptions::automatic) given.control_points = 1;  // the capture names the field

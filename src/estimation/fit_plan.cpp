@@ -480,6 +480,7 @@ VectorX FitPlan::drawn_start(int index, const Records& done) const {
     const Parameter& parameter = *of[std::size_t(i)];
     if (i > 0 && of[std::size_t(i) - 1] != &parameter) first = i;
     p[i] = parameter.prior_mean[i - first] + parameter.prior_std * normal();
+    if (parameter.transform == Transform::InverseSinh) p[i] = std::abs(p[i]);
     const bool is_last = i - first == parameter.dimension() - 1;
     if (is_last && parameter.prior_shape.size() > 0) {
       auto drawn_at = p.segment(first, parameter.dimension());

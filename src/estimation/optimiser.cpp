@@ -6,10 +6,10 @@
 #include <cmath>
 #include <exception>
 #include <limits>
-#include <numeric>
 #include <vector>
 
-#include "base/dense.hpp"
+#include "estimation/bounded_step.hpp"
+
 #ifdef PLIANT_WITH_NLOPT
 #include <nlopt.hpp>
 #endif
@@ -82,7 +82,8 @@ class Run {
     summary.reason = reason;
     return true;
   }
-  VectorX clamp(const VectorX& p) const { return objective_.parameters().clamp(p); }
+  const ParameterSet& parameters() const { return objective_.parameters(); }
+  VectorX clamp(const VectorX& p) const { return parameters().clamp(p); }
 
   OptimiserSummary summary;
 
@@ -91,31 +92,6 @@ class Run {
   const OptimiserOptions& options_;
   const std::function<bool(const Iteration&)>& on_iteration_;
 };
-
-/// The least of g.s + s.H s / 2 within the bounds: -H^-1 g where it lies inside. A number that would cross its bound
-/// goes there, and the others go where they then would: by an active set that only grows. What pushes itself across
-/// goes first: another may be pushed by that alone.
-VectorX step_within_bounds(const Run& run, const MatrixX& H) {
-  const VectorX &p = run.summary.p, &g = run.summary.evaluation.gradient;
-  std::vector<Eigen::Index> free(std::size_t(p.size())), fixed;
-  std::iota(free.begin(), free.end(), 0);
-  VectorX step = VectorX::Zero(p.size());
-  while (!free.empty()) {
-    const VectorX pull = g(free) + H(free, fixed) * step(fixed);
-    step(free) = -solve_symmetric(MatrixX(H(free, free)), pull);
-    const VectorX moved = run.clamp(p + step) - p;
-    const auto is_cut = [&](Eigen::Index i) { return std::abs(moved[i]) < (1.0 - 1e-9) * std::abs(step[i]); };
-    const auto pushes_itself = [&](Eigen::Index i) { return is_cut(i) && g[i] * step[i] < 0.0; };
-    const bool any_itself = std::ranges::any_of(free, pushes_itself);
-    const auto kept = std::stable_partition(free.begin(), free.end(),
-                                            [&](Eigen::Index i) { return any_itself ? pushes_itself(i) : is_cut(i); });
-    if (kept == free.begin()) return step;
-    for (auto i = free.begin(); i != kept; ++i) step[*i] = moved[*i];
-    fixed.insert(fixed.end(), free.begin(), kept);
-    free.erase(free.begin(), kept);
-  }
-  return step;
-}
 
 /// A step of Levenberg and Marquardt, and what it promises.
 struct DampedStep {
@@ -133,7 +109,7 @@ DampedStep damped_step(const Run& run, const OptimiserOptions& options, double d
   const auto step_with = [&](double by) {
     MatrixX damped = H;
     damped.diagonal() += by * H.diagonal().cwiseMax(floor);
-    return step_within_bounds(run, damped);
+    return step_within_bounds(run.parameters(), p, g, damped).step;
   };
   VectorX step = step_with(damping);
   if (options.damps_long_steps)

@@ -157,10 +157,14 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     p.push_back(scalar(layout, modulus, Transform::Logarithm, 1e-2 * stress, 1e8 * stress, std::log(theta[modulus]),
                        std::numeric_limits<double>::infinity(), true));
   p.push_back(scalar(layout, m.poissons_ratio, Transform::LogitHalf, 0.02, 0.495, std::log(0.35 / 0.15), 0.5, true));
-  p.push_back(scalar(layout, m.mass_damping, Transform::Logarithm, 1e-4 / time, 20.0 / time,
-                     std::log(theta[m.mass_damping]), 1.5, !capture.scene.timing.is_static));
-  p.push_back(scalar(layout, m.stiffness_damping, Transform::Logarithm, 1e-5 * time, 2.0 * time,
-                     std::log(theta[m.stiffness_damping]), 1.5, !capture.scene.timing.is_static));
+  // Either damping may be as good as none. In a logarithm its derivatives would vanish there: a fit that came near zero
+  // would stay, and the other one seem known where only their sum is.
+  const auto damping = [&](const ParameterHandle& at, double least, double most) {
+    return scalar(layout, at, Transform::InverseSinh, least, most, std::asinh(1.0), 1.5,
+                  !capture.scene.timing.is_static, theta[at]);
+  };
+  p.push_back(damping(m.mass_damping, 1e-4 / time, 20.0 / time));
+  p.push_back(damping(m.stiffness_damping, 1e-5 * time, 2.0 * time));
   p.push_back(scalar(layout, m.density, Transform::Logarithm, 0.1, 3e4, std::log(density), 0.5,
                      !capture.scene.object.mass && !capture.scene.object.density && has_known_forces(capture)));
   if (capture.scene.world.gravity) {  // its length is known better than how the world's axes stand

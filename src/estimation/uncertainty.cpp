@@ -14,7 +14,8 @@ constexpr double normal_90 = 1.6448536269514722;
 constexpr double freedom_of_alternative = 4.0;  // how well a declared alternative's size is known
 constexpr double freedom_of_floor = 20.0;
 
-/// Its deviations by name and whether the object meets obstacles: of ln E, nu, ln of the dampings.
+/// Its deviations by name and whether the object meets obstacles: of ln E, nu, and of the dampings' unconstrained
+/// numbers, a share of their values, or of what is usual where they are less than that.
 struct Unmodelled {
   const char* name;
   double in_flight_and_contact, at_rest_or_swinging;

@@ -10,13 +10,13 @@ namespace pliant {
 namespace {
 
 /// Limits of the root mean square residual over the noise.
-struct Limits {
+struct ResidualLimits {
   double overall;
   double for_a_while;  // over a tenth of the frames and three at least
 };
-constexpr Limits far_above_noise{1.6, 2.2};
+constexpr ResidualLimits far_above_noise{1.6, 2.2};
 // Of a part of a recording that is chosen for being explained: what is between was seen to put moduli off by a third.
-constexpr Limits above_noise{1.4, 1.7};
+constexpr ResidualLimits above_noise{1.4, 1.7};
 constexpr double least_matched = 0.85;    // of the points
 constexpr double poorly_known = 0.25;     // deviation of ln E
 constexpr double beyond_tolerance = 0.3;  // of the model's part in ln E
@@ -35,7 +35,7 @@ double residual_over_noise(const CostEvaluation& evaluation) {
   return noise > 0.0 ? std::sqrt(squares / noise) : 0.0;
 }
 
-void look_at_residuals(const CostEvaluation& evaluation, const Limits& limits, Verdict& verdict) {
+void look_at_residuals(const CostEvaluation& evaluation, const ResidualLimits& limits, Verdict& verdict) {
   const double ratio = residual_over_noise(evaluation);
   if (ratio == 0.0) return;
   const auto unexplained = [&](std::string reason) {
@@ -55,18 +55,29 @@ void look_at_residuals(const CostEvaluation& evaluation, const Limits& limits, V
                             evaluation.frames[std::size_t(worst - over_time.begin())].frame, *worst));
 }
 
+/// Of control points the mean of ln E counts: a field has places that hardly bend, and what is stated there says so.
 void look_at_moduli(const Uncertainty& uncertainty, const ParameterSet& parameters, Verdict& verdict) {
-  const std::vector<const Parameter*> of = parameters.coordinate_parameters();
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    if (!is_modulus(*of[i])) continue;
-    const double std = uncertainty.std[Eigen::Index(i)];
-    if (!(std > poorly_known)) continue;
+  const auto look_at = [&](const std::string& name, double std, double std_model) {
+    if (!(std > poorly_known)) return;
     if (verdict.kind == Verdict::Kind::Explained) verdict.kind = Verdict::Kind::Undetermined;
-    const bool is_model = uncertainty.std_model[Eigen::Index(i)] > beyond_tolerance;
-    verdict.reasons.push_back(fmt::format(
-        "{} is known to {:.0f} % only{}.", of[i]->name == "youngs_modulus" ? "Young's modulus" : of[i]->name,
-        100.0 * std, is_model ? ": other models of the same object differ by as much" : ""));
+    verdict.reasons.push_back(
+        fmt::format("{} is known to {:.0f} % only{}.", name, 100.0 * std,
+                    std_model > beyond_tolerance ? ": other models of the same object differ by as much" : ""));
+  };
+  const std::vector<Eigen::Index> field = parameters.joint_coordinates();
+  const std::vector<const Parameter*> of = parameters.coordinate_parameters();
+  double std_model = 0.0;
+  for (Eigen::Index i = 0; i < Eigen::Index(of.size()); ++i) {
+    if (!is_modulus(*of[std::size_t(i)])) continue;
+    if (std::ranges::count(field, i) > 0)
+      std_model += uncertainty.std_model[i] / double(field.size());
+    else
+      look_at(of[std::size_t(i)]->name == "youngs_modulus" ? "Young's modulus" : of[std::size_t(i)]->name,
+              uncertainty.std[i], uncertainty.std_model[i]);
   }
+  if (field.empty()) return;
+  const double variance = uncertainty.covariance(field, field).sum();
+  look_at("The mean of Young's modulus", std::sqrt(variance) / double(field.size()), std_model);
 }
 
 }  // namespace

@@ -133,6 +133,9 @@ VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
       case Transform::Logarithm:
         p[at] = std::log(theta[i]);
         break;
+      case Transform::InverseSinh:
+        p[at] = std::asinh(theta[i] / q.scale);
+        break;
       case Transform::LogitHalf:
         p[at] = logit_half(theta[i]);
         break;
@@ -167,6 +170,9 @@ VectorX ParameterSet::to_theta(const VectorX& p) const {
       case Transform::Logarithm:
         theta[i] = std::exp(p[at]);
         break;
+      case Transform::InverseSinh:
+        theta[i] = q.scale * std::sinh(p[at]);
+        break;
       case Transform::LogitHalf:
         theta[i] = logistic_half(p[at]);
         break;
@@ -200,6 +206,9 @@ MatrixX ParameterSet::jacobian(const VectorX& p) const {
     switch (q.transform) {
       case Transform::Logarithm:
         J(i, at) = std::exp(p[at]);
+        break;
+      case Transform::InverseSinh:
+        J(i, at) = q.scale * std::cosh(p[at]);
         break;
       case Transform::LogitHalf: {
         const double nu = logistic_half(p[at]);
@@ -239,6 +248,8 @@ VectorX ParameterSet::clamp(const VectorX& p) const {
   for_each_estimated([&](const Parameter& q, int at) {
     if (q.transform == Transform::Logarithm)
       out[at] = std::clamp(p[at], std::log(std::max(q.lower, 1e-300)), std::log(q.upper));
+    else if (q.transform == Transform::InverseSinh)
+      out[at] = std::clamp(p[at], std::asinh(q.lower / q.scale), std::asinh(q.upper / q.scale));
     else if (q.transform == Transform::LogitHalf)
       out[at] = std::clamp(p[at], logit_half(std::max(q.lower, 1e-4)), logit_half(std::min(q.upper, 0.4999)));
     else if (q.transform == Transform::Shift)

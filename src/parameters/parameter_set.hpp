@@ -11,6 +11,7 @@ namespace pliant {
 /// How a physical value becomes unconstrained numbers of order one.
 enum class Transform {
   Logarithm,      ///< positive scalars: p = ln(value)
+  InverseSinh,    ///< scalars from 0 on: p = asinh(value / scale), linear below the scale and logarithmic beyond
   LogitHalf,      ///< Poisson's ratio in (0, 1/2): p = ln(nu / (1/2 - nu))
   Shift,          ///< a scalar of any sign: p = value / scale
   Vector,         ///< three numbers: p = value / scale
@@ -24,7 +25,8 @@ struct Parameter {
   std::string unit;
   Transform transform = Transform::Logarithm;
   ParameterHandle at;  ///< its numbers; a plane's point, followed by its normal
-  double scale = 1.0;  ///< [unit] of an unconstrained step of one, for vectors and planes
+  double scale =
+      1.0;  ///< [unit] of an unconstrained step of one: of vectors, planes, shifts, and near 0 of `InverseSinh`
   double lower = 0.0;  ///< bounds of a scalar's value
   double upper = std::numeric_limits<double>::infinity();
   bool estimated = false;

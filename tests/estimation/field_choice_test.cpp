@@ -8,8 +8,10 @@
 
 #include "base/dense.hpp"
 #include "elasticity/element_moduli.hpp"
+#include "estimation/bounded_step.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
+#include "estimation/fit_pass.hpp"
 #include "geometry/primitives.hpp"
 #include "input_errors.hpp"
 #include "support/bodies.hpp"
@@ -124,32 +126,74 @@ TEST(Evidence, ResidualsLargerThanTheNoiseCountLess) {
   EXPECT_NEAR(large, model.log_factor(model.at(p), p), tolerance(1e-3));
 }
 
-/// A damping of zero, of which less would make up for what the moduli lack.
-TEST(Evidence, WhatABoundHoldsMakesUpForNothing) {
-  const LinearModel model;
-  const VectorX p = Eigen::Vector2d(-0.5, 1.0);
-  const CostEvaluation of_moduli = model.at(p);
-  const MotionLayout layout({.moduli = 2});
-  std::vector<Parameter> list = model.parameters.parameters();
-  list.push_back({"mass_damping", "1/s", Transform::Shift, layout.mass_damping, 0.3, 0.0, 1e2, true});
-  ParameterSet parameters(layout.layout(), list, VectorX::Ones(layout.size()));
-  parameters.set_joint_prior({"youngs_modulus@1", "youngs_modulus@2"}, model.parameters.joint_precision());
-  const auto with_damping = [&](double slope) {
-    CostEvaluation e = of_moduli;
+/// A damping of zero beside the moduli.
+struct WithDamping {
+  /// @param slope     of the cost over the damping
+  /// @param coupling  of the damping and the moduli
+  CostEvaluation evaluation(double slope, const Eigen::Vector3d& coupling) const {
+    CostEvaluation e = model.at(p.head(2));
     e.gauss_newton.conservativeResizeLike(MatrixX::Zero(3, 3));
-    e.gauss_newton.row(2) << -1.0, 1.5, 4.0;
-    e.gauss_newton.col(2) << -1.0, 1.5, 4.0;
+    e.gauss_newton.row(2) = coupling, e.gauss_newton.col(2) = coupling;
     for (VectorX* gradient : {&e.gradient, &e.frames[0].gradient}) {
       gradient->conservativeResize(3);
       (*gradient)[2] = slope;
     }
-    VectorX at(3);
-    at << p, 0.0;
-    return log_bayes_factor(e, parameters, at, MatrixX::Ones(2, 1));
-  };
-  const double alone = model.log_factor(of_moduli, p);
-  EXPECT_NEAR(with_damping(2.0), alone, tolerance(1e-9));
-  EXPECT_GT(std::abs(with_damping(-2.0) - alone), 0.05) << "nothing holds it where it grows";
+    return e;
+  }
+  ParameterSet parameters() const {
+    const MotionLayout layout({.moduli = 2});
+    std::vector<Parameter> list = model.parameters.parameters();
+    list.push_back({"mass_damping", "1/s", Transform::Shift, layout.mass_damping, 0.3, 0.0, 1e2, true});
+    ParameterSet set(layout.layout(), list, VectorX::Ones(layout.size()));
+    set.set_joint_prior({"youngs_modulus@1", "youngs_modulus@2"}, model.parameters.joint_precision());
+    return set;
+  }
+  double log_factor(double slope, const Eigen::Vector3d& coupling) const {
+    return log_bayes_factor(evaluation(slope, coupling), parameters(), p, MatrixX::Ones(2, 1));
+  }
+  LinearModel model;
+  VectorX p = Eigen::Vector3d(-0.5, 1.0, 0.0);
+};
+
+/// Less of it would make up for what the moduli lack.
+TEST(Evidence, WhatABoundHoldsMakesUpForNothing) {
+  const WithDamping with;
+  const Eigen::Vector3d coupling(-1.0, 1.5, 4.0);
+  const double alone = with.model.log_factor(with.model.at(with.p.head(2)), with.p.head(2));
+  EXPECT_NEAR(with.log_factor(20.0, coupling), alone, tolerance(1e-9));
+  EXPECT_GT(std::abs(with.log_factor(-2.0, coupling) - alone), 0.05) << "nothing holds it where it grows";
+}
+
+/// By itself it would shrink beyond its bound; with the moduli that the field is free to have it grows.
+TEST(Evidence, WhatLiesOnABoundMayLeaveItWithTheField) {
+  const WithDamping with;
+  const Eigen::Vector3d coupling(-1.0, 1.5, 4.0);
+  constexpr double slope = 0.5;
+  const CostEvaluation e = with.evaluation(slope, coupling);
+  const BoundedStep bounded = step_within_bounds(with.parameters(), with.p, e.gradient, e.gauss_newton);
+  EXPECT_TRUE(bounded.held.empty());
+  EXPECT_GT(bounded.step[2], 0.1);
+  const VectorX inner = -solve_symmetric(e.gauss_newton, e.gradient);
+  EXPECT_LT((bounded.step - inner).norm(), tolerance(1e-12) * inner.norm());
+  const double alone = with.model.log_factor(with.model.at(with.p.head(2)), with.p.head(2));
+  EXPECT_GT(std::abs(with.log_factor(slope, coupling) - alone), 0.05);
+}
+
+/// Against the least of all points on a grid.
+TEST(BoundedStep, IsTheLeastWithinTheBounds) {
+  const WithDamping with;
+  const ParameterSet parameters = with.parameters();
+  for (const double slope : {-3.0, 0.5, 6.0, 20.0}) {
+    const CostEvaluation e = with.evaluation(slope, {-1.0, 1.5, 4.0});
+    const auto model = [&](const VectorX& s) { return e.gradient.dot(s) + 0.5 * s.dot(e.gauss_newton * s); };
+    const BoundedStep bounded = step_within_bounds(parameters, with.p, e.gradient, e.gauss_newton);
+    EXPECT_EQ(parameters.clamp(with.p + bounded.step), with.p + bounded.step);
+    const double least = model(bounded.step);
+    constexpr double h = 0.05;
+    for (double a = -3.0; a <= 3.0; a += h)
+      for (double b = -3.0; b <= 3.0; b += h)
+        for (double c = 0.0; c <= 3.0; c += h) ASSERT_GE(model(Eigen::Vector3d(a, b, c)), least - 1e-12) << slope;
+  }
 }
 
 /// Two hundred frames share the curvature; their gradients scatter as it says, but in runs of ten that err together.
@@ -254,6 +298,43 @@ TEST(FieldChoice, ABarOfTwoZonesNeedsMore) {
   const FitOutcome same = fit({sagging_bar(soft)}, told);
   for (int k = 0; k < count; ++k)
     EXPECT_NEAR(std::log(modulus(outcome, k) / modulus(same, k)), 0.0, 3e-2) << "within the optimiser's tolerance";
+}
+
+/// Of an object that is held and swings, seen by its surface, without being asked to; not of followed points, nor where
+/// a plane is met, nor where one modulus is named.
+TEST(FieldChoice, IsTheDefaultWhereAHeldObjectSwings) {
+  FitOptions options = quick();
+  options.control_points = FitOptions::unsaid;
+  const auto looks = [](RecordedCapture recording, const FitOptions& o) {
+    return dynamic_cast<FieldChoice*>(planner_of_points({std::move(recording)}, o, {}).get()) != nullptr;
+  };
+  RecordedCapture bar = sagging_bar(soft);
+  EXPECT_FALSE(looks(bar, options)) << "it hangs at rest";
+  bar.capture.scene.timing.is_static = false;
+  bar.capture.scene.timing.times = {0.0, 0.1};
+  EXPECT_TRUE(looks(bar, options));
+  FitOptions named = options;
+  named.parameters["youngs_modulus"].start = VectorX::Constant(1, stiff);
+  EXPECT_FALSE(looks(bar, named));
+  FitOptions one = options;
+  one.control_points = 1;
+  EXPECT_FALSE(looks(bar, one));
+  RecordedCapture other = bar;
+  other.capture.scene.planes.emplace_back();
+  EXPECT_FALSE(looks(other, options));
+  other = bar;
+  other.followed.emplace();
+  EXPECT_FALSE(looks(other, options));
+  other = bar;
+  other.capture.scene.fixed.clear();
+  EXPECT_FALSE(looks(other, options));
+}
+
+TEST(FieldChoice, KeepsNoFieldThatTakesLittleOffTheCost) {
+  const TriedField one{1, true, 1000.0, 0.0}, little{2, true, 980.0, 20.0}, much{2, true, 900.0, 20.0};
+  EXPECT_THAT(explained({one, little}), ::testing::HasSubstr("was given 1 control point,"));
+  EXPECT_THAT(explained({one, much}), ::testing::HasSubstr("was given 2 control points,"));
+  EXPECT_THAT(explained({one, {2, true, 900.0, 2.0}}), ::testing::HasSubstr("was given 1 control point,"));
 }
 
 TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {

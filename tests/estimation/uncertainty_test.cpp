@@ -48,6 +48,20 @@ ParameterSet young_and_poisson() {
   return {layout, list, theta};
 }
 
+TEST(UnmodelledStd, IsAShareOfADampingOrOfWhatIsUsualWhereItIsLess) {
+  ParameterLayout layout;
+  Parameter damping;
+  damping.name = "stiffness_damping", damping.unit = "s", damping.estimated = true;
+  damping.transform = Transform::InverseSinh, damping.scale = 0.004;
+  damping.at = layout.add({"stiffness_damping", "s", 1, Role::Damping});
+  for (const double value : {1e-4, 4e-3, 0.2}) {
+    const VectorX theta = VectorX::Constant(1, value);
+    const ParameterSet set(layout, {damping}, theta);
+    const VectorX p = set.to_unconstrained(theta), floor = unmodelled_std(set, theta, true);
+    EXPECT_NEAR(set.jacobian(p)(0, 0) * floor[0], 0.16 * std::hypot(value, 0.004), 1e-12) << value;
+  }
+}
+
 TEST(StudentsT, HasTheQuantilesOfItsTables) {
   EXPECT_NEAR(t_quantile_90(2.0), 2.9200, 1e-4);
   EXPECT_NEAR(t_quantile_90(2.5), 2.5582, 0.025);
@@ -255,6 +269,28 @@ TEST(Verdicts, SayThatAModulusIsNotDetermined) {
   EXPECT_NE(v.reasons[0].find("other models"), std::string::npos) << v.reasons[0];
   const Uncertainty poisson = uncertainty_of(e, {{"mesh", Eigen::Vector2d(0.0, 0.9)}}, {});
   EXPECT_EQ(name_of(verdict_of(e, poisson, young_and_poisson()).kind), "explained") << "Poisson's ratio is no modulus";
+}
+
+/// Two control points, of which one is where nothing bends; or neither is known but for their ratio.
+TEST(Verdicts, JudgeAFieldByItsMean) {
+  const MotionLayout layout({.moduli = 2});
+  std::vector<Parameter> list;
+  for (const ParameterHandle& modulus : layout.youngs_moduli) {
+    list.push_back({"youngs_modulus@" + std::to_string(list.size() + 1), "Pa", Transform::Logarithm, modulus});
+    list.back().estimated = true;
+  }
+  ParameterSet field(layout.layout(), list, VectorX::Constant(layout.size(), 1e4));
+  const CostEvaluation e = measured(curvature());
+  const auto verdict = [&](const Eigen::Vector2d& shift) {
+    return verdict_of(e, uncertainty_of(e, {{"mesh", shift}}, {}), field);
+  };
+  EXPECT_EQ(name_of(verdict({0.4, 0.0}).kind), "undetermined") << "two materials of regions";
+  field.set_joint_prior({"youngs_modulus@1", "youngs_modulus@2"}, MatrixX::Identity(2, 2));
+  EXPECT_EQ(name_of(verdict({0.4, 0.0}).kind), "explained");
+  const Verdict unknown = verdict({0.4, 0.4});
+  EXPECT_EQ(name_of(unknown.kind), "undetermined");
+  ASSERT_EQ(unknown.reasons.size(), 1u);
+  EXPECT_NE(unknown.reasons[0].find("The mean of Young's modulus"), std::string::npos) << unknown.reasons[0];
 }
 
 }  // namespace

@@ -50,6 +50,21 @@ TEST(ParameterSet, JacobianMatchesCentralDifferences) {
   }
 }
 
+TEST(ParameterSet, AnInverseHyperbolicSineIsLinearNearZeroAndALogarithmFarBeyondItsScale) {
+  const Parameter damping{"mass_damping", "1/s", Transform::InverseSinh, layout.mass_damping, 0.3, 0.0, 1e4, true};
+  VectorX theta = VectorX::Zero(layout.size());
+  const ParameterSet set(layout.layout(), {damping}, theta);
+  const auto slope = [&](double value) {
+    theta[layout.mass_damping] = value;
+    return set.jacobian(set.to_unconstrained(theta))(layout.mass_damping.first, 0);
+  };
+  EXPECT_NEAR(slope(0.0), 0.3, tolerance(1e-12)) << "a logarithm's would be zero";
+  EXPECT_NEAR(slope(0.003), 0.3, 1e-4);
+  EXPECT_NEAR(slope(300.0), 300.0, 1e-3);
+  EXPECT_EQ(set.to_theta(set.clamp(VectorX::Constant(1, -2.0)))[layout.mass_damping], 0.0);
+  EXPECT_NEAR(set.to_theta(set.clamp(VectorX::Constant(1, 50.0)))[layout.mass_damping], 1e4, tolerance(1e-6));
+}
+
 TEST(ParameterSet, WhatIsNotEstimatedStays) {
   ParameterSet set = all_estimated();
   set.set_estimated("gravity", false);

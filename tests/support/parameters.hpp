@@ -28,8 +28,8 @@ inline ParameterSet torus_parameters(const MotionLayout& layout, const VectorX& 
   std::vector<Parameter> list = {
       {"youngs_modulus", "Pa", Transform::Logarithm, layout.youngs_moduli[0], 1.0, 1.0, 1e7},
       {"poissons_ratio", "1", Transform::LogitHalf, layout.poissons_ratio, 1.0, 0.02, 0.495},
-      {"mass_damping", "1/s", Transform::Logarithm, layout.mass_damping, 1.0, 1e-4, 1e3},
-      {"stiffness_damping", "s", Transform::Logarithm, layout.stiffness_damping, 1.0, 1e-6, 1.0},
+      {"mass_damping", "1/s", Transform::InverseSinh, layout.mass_damping, 0.3, 1e-4, 1e3},
+      {"stiffness_damping", "s", Transform::InverseSinh, layout.stiffness_damping, 0.004, 1e-6, 1.0},
       {"density", "kg/m^3", Transform::Logarithm, layout.density, 1.0, 1.0, 1e4},
       {"gravity", "m/s^2", Transform::Vector, layout.gravity, 2.0},
       {"linear_velocity", "m/s", Transform::Vector, layout.linear_velocity, 0.5},

@@ -1,0 +1,65 @@
+"""The section of docs/experiments.md about a plant that is scanned as it sags. Standard library only."""
+from page import judged, machine, percent, results, table, with_truth
+
+FIT_NAMES = {"no-choice": "no choice", "auto": "as many control points as the evidence supports", "placed": "control points placed at joints and leaves",
+             "together": "tracking and estimation together, and the points by themselves", "loop-auto": "tracking and estimation in turns, control points by evidence"}
+GOAL_SECONDS = 600
+
+
+def fit_name(f, name):
+    more = [f"{key}={value}" for key, value in f["choices"].items()]
+    return FIT_NAMES.get(name, name) + (f" (`{'`, `'.join(more)}`)" if more else "")
+
+
+def verified(checks):
+    """What the simulator's own checks give."""
+    sums = [["end load on a cantilever: way of its tip", percent(checks["tip_deflection"]["off"]), "beam theory with shear"],
+            ["first frequency of bending", percent(checks["first_frequency"]["off"]), "beam theory"],
+            ["the same, of a swing in steps of 1/360 s", percent(checks["swing"]["off"]), "the linear problem"],
+            ["decay of that swing", percent(checks["decay"]["off"]), "alpha / 2 + beta omega^2 / 2"],
+            [f"energy lost in a swing about a sag of {percent(checks['large_sag_of_length'], False)} of the length", percent(checks["energy"]["off"]), "what the dampings take"]]
+    return table(["check of the simulator", "off by", "against"], sums)
+
+
+def zone_offs(f):
+    return [z["mean"] / z["truth"] - 1 for z in f["zones"]]
+
+
+def plant():
+    figures = results("plant")
+    if not figures:
+        return "Not run yet.\n"
+    r, fits = figures["recording"], figures["fits"]
+    tips = ", ".join(f"{name} {1e3 * t['sags_by']:.0f} mm" for name, t in r["tips"].items())
+    late = max(t["moves_in_seconds"]["7"] for t in r["tips"].values())
+    text = (f"![The plant free of load, as it sags and pulled aside; true and fitted moduli](images/plant.png)\n\nThe twin has {r['mesh']['tetrahedra']} quadratic tetrahedra and {r['mesh']['nodes']} nodes; its surface, "
+            f"{r['mesh']['surface_vertices']} vertices. Tips sag by: {tips}. A dead load moves the stem by 60 mm; after 7 s the leaves still swing by {1e3 * late:.0f} mm. "
+            f"Each frame has {r['points_a_frame'][0]} to {r['points_a_frame'][2]} points. Of the energy that is lost in the recording, {percent(abs(r['energy_J']['not_accounted_share']), False)} is not what the dampings take.\n\n")
+    text += verified(figures["checks"])
+    if not fits:
+        return text + "\nNot fitted yet.\n"
+    text += "\nZones are judged by the mean over the fit's elements, weighted by volume, against the true mean over the same zone [MPa]; Vertices of the load-free surface are compared with the true ones, one by one, over the plant's height.\n\n".replace("; Vertices", "; vertices")
+    names = [z["name"] for z in figures["zones"]]
+    rows = []
+    for name, f in fits.items():
+        rows.append([fit_name(f, name), f["commit"][:7]] + [f"{1e-6 * z['mean']:.2f} ({1e-6 * z['truth']:.2f}), {percent(off)}" for z, off in zip(f["zones"], zone_offs(f))] +
+                    [f"{percent(f['load_free_rms'], False)} / {percent(f['load_free_greatest'], False)}", percent(f["sag_error"], False)])
+    text += table(["fit", "program", *names, "load-free shape off, rms / greatest", "sag off"], rows)
+    text += "\n" + table(["fit", "control points", "elements", "nu (truth)", "mass damping [1/s] (truth)", "stiffness damping [ms] (truth)", "surface rms [mm]", "verdict", "made from", "time [s]", "threads", "converged"],
+                         [[fit_name(f, name), len(f["field"]) or max(1, len(f["moduli"])), f["elements"], with_truth(f["parameters"]["poisson_ratio"]), with_truth(f["parameters"]["mass_damping"]),
+                           with_truth(f["parameters"]["stiffness_damping"], 1e3), f"{1e3 * f['surface_rms']:.2f}", f["verdict"], f["tracking"]["kept"] if f["tracking"] else "points", f"{f['wall_seconds']:.0f}", f["threads"] or "all",
+                           "yes" if f["converged"] else "no, interrupted" if f["exit_code"] == 130 else "no"] for name, f in fits.items()])
+    for name, f in fits.items():
+        if f.get("tried"):
+            text += f"\nNumbers of control points tried ({FIT_NAMES.get(name, name)}): " + ", ".join(
+                f"{t['control_points']}" + (f" (logarithm of its Bayes factor {t['log_bayes_factor']:.0f}" + ("" if t["estimated"] else ", predicted") + ")" if t.get("log_bayes_factor") is not None else "") for t in f["tried"]) + ".\n"
+    for name in ("no-choice", "auto", "placed"):
+        f = fits.get(name)
+        if not f:
+            continue
+        worst = max(zip(zone_offs(f), names), key=lambda z: abs(z[0]))
+        text += f"\n{fit_name(f, name)[:1].upper()}{fit_name(f, name)[1:]}:\n\n" + table(["target", "here", ""], [
+            ["zones within 15 %", f"{percent(worst[0])} at most, {worst[1]}", judged(abs(worst[0]) <= 0.15)],
+            ["load-free shape to 1 % of the size", f"{percent(f['load_free_greatest'], False)} at most", judged(f["load_free_greatest"] <= 0.01)],
+            ["10 minutes on two cores", f"{f['wall_seconds']:.0f} s" + (f" on {f['threads']}" if f["threads"] else ""), judged(f["wall_seconds"] <= GOAL_SECONDS)]])
+    return text + f"\nMeasured on {machine(figures)}.\n"
