@@ -70,11 +70,11 @@ std::optional<Pass> FieldChoice::next() {
   is_last_ = true;
   count_ = best().control_points;
   if (is_cut_) {
-    Pass look = pass_of(count_, *choice_.state, 1, 1.0, 1.0);
+    Pass look = pass_of(count_, kept().state, 1, 1.0, 1.0);
     look.is_saved = false;
     return look;
   }
-  const PassState from = resumed_ == count_ ? left_ : *choice_.state;  // the former where this one was interrupted
+  const PassState from = resumed_ == count_ ? left_ : kept().state;  // the former where this one was interrupted
   choice_.under_way = count_;
   return pass_of(count_, from, options_.refine, done_before(int(choice_.tried.size())), 1.0);
 }
@@ -82,6 +82,10 @@ std::optional<Pass> FieldChoice::next() {
 bool FieldChoice::take(FitOutcome outcome, PassState reached) {
   histories_.emplace_back(count_, outcome.history);
   forward_steps_ += outcome.forward_steps;
+  if (is_last_ && !is_cut_ && !outlasts_other_models(outcome)) {
+    is_last_ = false, choice_.under_way = 0, resumed_ = 0;
+    return true;
+  }
   if (is_last_) {
     outcome_ = with_history(std::move(outcome));
     if (is_cut_) outcome_->interrupted = true, outcome_->converged = false, outcome_->reason = "interrupted";
@@ -100,7 +104,7 @@ bool FieldChoice::take(FitOutcome outcome, PassState reached) {
 /// Two numbers in a row were not worth it, or points would be closer than elements.
 bool FieldChoice::is_decided() const {
   const std::size_t done = choice_.tried.size();
-  return done > 0 && (done == numbers.size() || int(done) - choice_.best > 2 || numbers[done] > options_.cells);
+  return done > 0 && (done == numbers.size() || int(done) - kept().tried > 2 || numbers[done] > options_.cells);
 }
 
 std::optional<PassState> FieldChoice::beginning_of(int count) {
@@ -118,8 +122,7 @@ std::optional<PassState> FieldChoice::beginning_of(int count) {
       promised.log_bayes_factor > strong_evidence && promised.cost < (1.0 - 0.5 * least_gain) * best().cost;
   // Where one modulus does not explain what was seen, dampings stand where they make up for it: one step from there
   // tells nothing.
-  const bool may_lead_elsewhere =
-      choice_.tried.size() == 1 && begin.begin && !estimate_of(*choice_.state)->is_explained;
+  const bool may_lead_elsewhere = choice_.tried.size() == 1 && begin.begin && !estimate_of(kept().state)->is_explained;
   if (is_promising || may_lead_elsewhere) return begin;
   promised.cost = std::numeric_limits<double>::infinity();
   choice_.tried.push_back(promised);
@@ -134,7 +137,7 @@ PassState FieldChoice::with_field(int count, TriedField& promised) {
   const MatrixX moduli = carried_over(body, field_of(body, best().control_points), body.modulus);
   const JointLayout before = layout_of(best().control_points), after = layout_of(count);
   const auto change = [&](VectorX& theta) { theta = changed(before, theta, after, moduli); };
-  PassState begin = begun_from(*choice_.state);
+  PassState begin = begun_from(kept().state);
   begin.controls = count;
   for (StageRecord& r : begin.done) change(r.from), change(r.theta);
   VectorX& theta = begin.begin->theta;
@@ -155,7 +158,7 @@ PassState FieldChoice::with_field(int count, TriedField& promised) {
   }
   // Dampings and, above all, Poisson's ratio made up for what the coarser field lacks: a stage earlier, and the
   // latter where it began.
-  const bool is_corrected = estimate_of(*choice_.state)->id.kind == StageKind::Corrected;
+  const bool is_corrected = estimate_of(kept().state)->id.kind == StageKind::Corrected;
   begin.begin->stage = std::max(0, begin.begin->stage - (is_corrected ? 2 : 1));
   if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated)
     theta[nu->at] = recordings.parameters().reference()[nu->at];
@@ -176,11 +179,24 @@ void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {
   }
   if (count_ == 1) tried.log_bayes_factor = 0.0;
   if (count_ == 1 || is_worth_it(tried, best().cost)) {
-    choice_.best = int(choice_.tried.size());
-    choice_.state = std::move(reached);
+    choice_.kept.push_back({int(choice_.tried.size()), std::move(reached)});
   }
   choice_.tried.push_back(tried);
   choice_.under_way = 0;
+}
+
+bool FieldChoice::outlasts_other_models(const FitOutcome& outcome) {
+  const MatrixX& covariance = outcome.uncertainty.covariance;
+  if (choice_.kept.size() < 2 || covariance.size() == 0 || outcome.interrupted) return true;
+  const Body& body = *outcome.recordings.front().discretisation.body;
+  const int before = choice_.tried[std::size_t(choice_.kept.end()[-2].tried)].control_points;
+  const MatrixX carried = carried_over(body, field_of(body, before), body.modulus);
+  TriedField& tried = choice_.tried[std::size_t(kept().tried)];
+  tried.log_bayes_factor =
+      log_bayes_factor(outcome.parameters, outcome.parameters.to_unconstrained(outcome.theta), covariance, carried);
+  if (tried.log_bayes_factor > strong_evidence) return true;
+  choice_.kept.pop_back();
+  return false;
 }
 
 Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const {
@@ -227,7 +243,8 @@ std::string explained(const std::vector<TriedField>& tried) {
   }
   return "Young's modulus was given " + points(best) +
          ", as many as the recordings support. Logarithm of the evidence" + evidence + ". More points need more than " +
-         text_of(strong_evidence, "%.0f") + ", and " + text_of(100.0 * least_gain, "%.0f") + " % off the cost.";
+         text_of(strong_evidence, "%.0f") + ", and " + text_of(100.0 * least_gain, "%.0f") +
+         " % off the cost; of the last field that was kept, what other models of the object leave open counts too.";
 }
 
 MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusField& to) {

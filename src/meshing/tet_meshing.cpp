@@ -21,8 +21,10 @@
 #include <CGAL/Side_of_triangle_mesh.h>
 #include <CGAL/make_mesh_3.h>
 
+#include <algorithm>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "meshing/part_boundary.hpp"
 #include "meshing/sharp_edges.hpp"
@@ -163,15 +165,59 @@ std::vector<Vector3> vertex_of_each_shell(const TriangleMesh& surface) {
   return vertices;
 }
 
+/// A length that is shorter about some places.
+class LocalLength {
+ public:
+  explicit LocalLength(double everywhere) : everywhere_(everywhere) {}
+
+  bool is_even() const { return places_.empty(); }
+  double at(const Vector3& p) const {
+    double length = everywhere_;
+    for (const Place& place : places_)
+      length = std::min(length, place.length + growth * std::max(0.0, (p - place.at).norm() - place.radius));
+    return length;
+  }
+  void shorten(const Vector3& at, double radius, double to) { places_.push_back({at, radius, to}); }
+
+ private:
+  struct Place {
+    Vector3 at;
+    double radius, length;
+  };
+  static constexpr double growth = 0.3;  // a unit of distance
+  double everywhere_;
+  std::vector<Place> places_;
+};
+
+/// Lengths of edges, and how far faces may lie from the surface that is meshed [m].
+struct LocalSizes {
+  explicit LocalSizes(double cell_size) : edges(cell_size), gaps(facet_tolerance * cell_size) {}
+
+  LocalLength edges, gaps;
+};
+
 /// Refines, takes over the cells inside and makes the worst of them better. Slivers are perturbed, not exuded: CGAL's
 /// exudation depends on addresses.
 template <class Domain>
-TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options) {
+TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options, const LocalSizes& sizes) {
+  using Triangulation = typename CGAL::Mesh_triangulation_3<Domain>::type;
+  using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
   const double h = options.cell_size;
-  const CGAL::Mesh_criteria_3<typename CGAL::Mesh_triangulation_3<Domain>::type> criteria(
-      parameters::edge_size = h, parameters::facet_angle = 25.0, parameters::facet_size = 0.6 * h,
-      parameters::facet_distance = facet_tolerance * h, parameters::cell_radius_edge_ratio = 2.0,
-      parameters::cell_size = 0.75 * h);
+  const auto share = [](double of, const LocalLength& length) {
+    return [of, &length](const typename Triangulation::Bare_point& p, int,
+                         const typename Triangulation::Vertex::Index&) -> typename Triangulation::FT {
+      return of * length.at({p.x(), p.y(), p.z()});
+    };
+  };
+  const bool is_even = sizes.edges.is_even() && sizes.gaps.is_even();
+  const Criteria criteria =
+      is_even ? Criteria(parameters::edge_size = h, parameters::facet_angle = 25.0, parameters::facet_size = 0.6 * h,
+                         parameters::facet_distance = facet_tolerance * h, parameters::cell_radius_edge_ratio = 2.0,
+                         parameters::cell_size = 0.75 * h)
+              : Criteria(parameters::edge_size = share(1.0, sizes.edges), parameters::facet_angle = 25.0,
+                         parameters::facet_size = share(0.6, sizes.edges),
+                         parameters::facet_distance = share(1.0, sizes.gaps), parameters::cell_radius_edge_ratio = 2.0,
+                         parameters::cell_size = share(0.75, sizes.edges));
   CGAL::Mesh_error_code error = CGAL::CGAL_MESH_3_NO_ERROR;
   const std::size_t most_vertices = std::size_t(most_tets / 5.0);
   const auto complex = CGAL::make_mesh_3<Complex<Domain>>(
@@ -201,6 +247,87 @@ TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options) {
   return make_tet_mesh(std::move(nodes), std::move(tets));
 }
 
+/// Where a scan sticks out of a mesh by more than its faces may lie off, and by how much, farthest first [m].
+std::vector<std::pair<double, Vector3>> lost_places(const TriangleMesh& surface, const TetMesh& mesh,
+                                                    const LocalSizes& sizes) {
+  std::vector<std::pair<double, Vector3>> lost;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vector3& p = surface.vertices[std::size_t(a)];
+    const TetPoint in = mesh.locate(p);
+    if (in.barycentric.minCoeff() >= 0.0) continue;
+    const Barycentric inside = in.barycentric.cwiseMax(0.0) / in.barycentric.cwiseMax(0.0).sum();
+    Vector3 nearest = Vector3::Zero();
+    for (int k = 0; k < 4; ++k)
+      nearest += inside[k] * mesh.nodes.row(mesh.tets[std::size_t(in.tet)][std::size_t(k)]).transpose();
+    const double off = (p - nearest).norm();
+    if (off > 3.0 * facet_tolerance * sizes.edges.at(p)) lost.emplace_back(off, p);
+  }
+  std::ranges::sort(lost, [](const auto& a, const auto& b) { return a.first > b.first; });
+  return lost;
+}
+
+/// How thick a solid is behind each triangle, along its normal [m], with the triangle's middle.
+std::vector<std::pair<double, Vector3>> thicknesses(const TriangleMesh& surface, const ScanTree& scan) {
+  const double longest = bounding_box(surface).extent().norm();
+  std::vector<std::pair<double, Vector3>> through;
+  std::vector<ScanTree::Intersection_and_primitive_id<Kernel::Segment_3>::Type> hits;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vector3 &p = surface.vertices[std::size_t(a)], &q = surface.vertices[std::size_t(b)],
+                  &r = surface.vertices[std::size_t(c)];
+    const Vector3 cross = (q - p).cross(r - p), middle = (p + q + r) / 3.0;
+    if (!(cross.norm() > 0.0)) continue;
+    const Vector3 inwards = -cross.normalized(), start = middle + 1e-6 * longest * inwards;
+    hits.clear();
+    scan.all_intersections(Kernel::Segment_3(cgal(start), cgal(middle + longest * inwards)), std::back_inserter(hits));
+    double nearest = longest;
+    for (const auto& hit : hits)
+      if (const auto* at = boost::get<Kernel::Point_3>(&hit.first))
+        nearest = std::min(nearest, (Vector3(at->x(), at->y(), at->z()) - middle).norm());
+    through.emplace_back(nearest, middle);
+  }
+  return through;
+}
+
+/// Edges of three times the thickness where that is less than what is asked for, at the least a third of it: what is
+/// thin bends, and the mesher does not find a leaf that is much thinner than elements are wide. Faces lie closer to a
+/// stalk than its thickness: chords would take away from how stiff it is.
+LocalSizes sizes_of_thin_parts(const TriangleMesh& surface, const Polyhedron& scan, double cell_size) {
+  constexpr double slenderness = 3.0, least = 1.0 / 3.0, gap = 0.12, enough = 0.8;
+  const ScanTree tree(faces(scan).begin(), faces(scan).end(), scan);
+  std::vector<std::pair<double, Vector3>> through = thicknesses(surface, tree);
+  std::ranges::sort(through, [](const auto& a, const auto& b) { return a.first < b.first; });
+  LocalSizes sizes(cell_size);
+  for (const auto& [thickness, place] : through) {
+    const double size = std::max(slenderness * thickness, least * cell_size);
+    if (size < enough * sizes.edges.at(place)) sizes.edges.shorten(place, 2.0 * size, size);
+    const double from = std::max(thickness, least * cell_size / slenderness);
+    if (gap * from < enough * sizes.gaps.at(place)) sizes.gaps.shorten(place, from, gap * from);
+  }
+  return sizes;
+}
+
+/// A mesh whose elements are smaller where larger ones would miss parts of the scan.
+template <class Domain>
+TetMesh mesh_of_all_parts(const Domain& domain, const TriangleMesh& surface, const Polyhedron& scan,
+                          const TetMeshOptions& options) {
+  constexpr int most_rounds = 4;
+  constexpr double shorter = 0.6;
+  LocalSizes sizes = sizes_of_thin_parts(surface, scan, options.cell_size);
+  TetMesh mesh = mesh_of(domain, options, sizes);
+  for (int round = 0; round < most_rounds; ++round) {
+    std::vector<std::pair<Vector3, double>> places;
+    for (const auto& [off, place] : lost_places(surface, mesh, sizes)) {
+      const double size = shorter * sizes.edges.at(place);
+      const auto is_near = [&](const auto& other) { return (other.first - place).norm() < size; };
+      if (std::ranges::none_of(places, is_near)) places.emplace_back(place, size);
+    }
+    if (places.empty()) break;
+    for (const auto& [place, size] : places) sizes.edges.shorten(place, 2.0 * size, size);
+    mesh = mesh_of(domain, options, sizes);
+  }
+  return mesh;
+}
+
 TetMesh conforming(const TriangleMesh& surface, const Polyhedron& scan, const TetMeshOptions& options) {
   if (processing::does_self_intersect(scan))
     refuse("the surface intersects itself", "a surface without intersections",
@@ -215,7 +342,7 @@ TetMesh conforming(const TriangleMesh& surface, const Polyhedron& scan, const Te
   domain.add_features(lines.begin(), lines.end());
   if (shells.size() > 1)  // the mesher might find only one of them by itself
     for (const Vector3& vertex : shells) domain.add_corner(cgal(vertex));
-  TetMesh mesh = mesh_of(domain, options);
+  TetMesh mesh = mesh_of_all_parts(domain, surface, scan, options);
   for (const Vector3& vertex : shells) {
     double nearest = std::numeric_limits<double>::max();
     for (const SurfacePoint& p : mesh.surface) nearest = std::min(nearest, (p.position - vertex).norm());
@@ -249,7 +376,7 @@ TetMesh enclosing(const TriangleMesh& surface, const Polyhedron& scan, const Tet
     const double error = 0.01 * gap / radius;
     const GapDomain domain =
         GapDomain::create_implicit_mesh_domain(beyond_gap, bound, parameters::relative_error_bound = error);
-    TetMesh mesh = mesh_of(domain, options);
+    TetMesh mesh = mesh_of(domain, options, LocalSizes(options.cell_size));
     if (encloses(mesh, tree, shells)) return mesh;
   }
   refuse("tetrahedra of " + text_of(options.cell_size) + " m do not enclose the surface", "", "choose smaller cells");

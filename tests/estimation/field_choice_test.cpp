@@ -116,6 +116,22 @@ TEST(Evidence, IsTheIntegralOfLikelihoodTimesPrior) {
     EXPECT_NEAR(model.log_factor(model.at(p), p), std::log(field / homogeneous), tolerance(1e-3));
 }
 
+/// The same where the estimate's covariance is told: another model of the object that moves the ratio adds to it.
+TEST(Evidence, WhatOtherModelsLeaveOpenCountsToo) {
+  const LinearModel model;
+  const VectorX p = model.design.colPivHouseholderQr().solve(model.seen);
+  const MatrixX noise = inverse(MatrixX(model.design.transpose() * model.design));
+  const auto factor = [&](const MatrixX& covariance) {
+    return log_bayes_factor(model.parameters, p, covariance, MatrixX::Ones(2, 1));
+  };
+  EXPECT_NEAR(factor(noise), model.log_factor(model.at(p), p), tolerance(1e-3)) << "unit noise, no scatter of frames";
+  const MatrixX small = 0.01 * noise;
+  ASSERT_GT(factor(small), strong_evidence);
+  const Eigen::Vector2d ratio(0.8, -0.8), both(0.8, 0.8);
+  EXPECT_LT(factor(small + ratio * ratio.transpose()), 0.0);
+  EXPECT_NEAR(factor(small + both * both.transpose()), factor(small), tolerance(1e-9)) << "a common factor is free";
+}
+
 TEST(Evidence, ResidualsLargerThanTheNoiseCountLess) {
   LinearModel model;
   const VectorX p = model.design.colPivHouseholderQr().solve(model.seen);
