@@ -11,8 +11,7 @@ namespace pliant {
 /// fitted first; then fields of 2, 3, 4, 6, 8, ... points, each from the best one so far and only where one step of
 /// Gauss and Newton promises enough. A field of more points is kept where there is strong evidence of what it has
 /// beyond the best one before (`log_bayes_factor` above `strong_evidence`); two numbers in a row without it end the
-/// search, and the best one is repeated where the options ask for that. Where the estimate is tried under other models,
-/// a field must have that evidence against what they leave open, too, or the one before it is taken.
+/// search, and the best one is repeated where the options ask for that.
 class FieldChoice : public PassPlanner {
  public:
   /// @param resume  the state of an interrupted choice goes on with the field that was under way
@@ -25,8 +24,7 @@ class FieldChoice : public PassPlanner {
   FitOutcome outcome() override { return std::move(*outcome_); }
 
  private:
-  const FitState::FieldChoice::Kept& kept() const { return choice_.kept.back(); }
-  const TriedField& best() const { return choice_.tried[std::size_t(kept().tried)]; }
+  const TriedField& best() const { return choice_.tried[std::size_t(choice_.best)]; }
   bool is_decided() const;
   /// Where a fit with so many points begins; nothing where one step promises too little.
   std::optional<PassState> beginning_of(int count);
@@ -34,8 +32,6 @@ class FieldChoice : public PassPlanner {
   PassState with_field(int count, TriedField& promised);
   Pass pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const;
   void judge(const FitOutcome& outcome, PassState reached);
-  /// Whether the best field stands where what other models of the object leave open counts too; it is dropped if not.
-  bool outlasts_other_models(const FitOutcome& outcome);
   /// With all that was done on the way.
   FitOutcome with_history(FitOutcome outcome);
   JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }

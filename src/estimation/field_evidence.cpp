@@ -24,44 +24,15 @@ MatrixX field_precision(const std::vector<Vector3>& points, double length, doubl
   return ratios.transpose() * solve_symmetric(covariance, ratios);
 }
 
-namespace {
-
-/// What a field has beyond another one that it can take the form of, in rows, and its prior covariance.
-struct Contrasts {
-  MatrixX rows, prior;
-
-  Contrasts(const ParameterSet& parameters, const MatrixX& carried) {
-    const std::vector<Eigen::Index> joint = parameters.joint_coordinates();
-    if (Eigen::Index(joint.size()) != carried.rows() || carried.rows() <= carried.cols()) return;
-    const MatrixX own = orthogonal_complement(carried);
-    rows = MatrixX::Zero(own.rows(), parameters.dimension());
-    rows(Eigen::all, joint) = own;
-    prior = own * pseudo_inverse(parameters.joint_precision()) * own.transpose();
-  }
-  bool are_none() const { return rows.size() == 0; }
-};
-
-/// Of d from N(0, V + prior) against N(0, V).
-double log_bayes_factor(const VectorX& d, const MatrixX& V, const MatrixX& prior) {
-  const MatrixX both = V + prior;
-  return 0.5 *
-         (d.dot(solve_symmetric(V, d)) - d.dot(solve_symmetric(both, d)) + log_determinant(V) - log_determinant(both));
-}
-
-}  // namespace
-
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& carried) {
-  const Contrasts contrasts(parameters, carried);
-  return contrasts.are_none() ? 0.0 : log_bayes_factor(evaluation, parameters, p, contrasts.rows, contrasts.prior);
-}
-
-double log_bayes_factor(const ParameterSet& parameters, const VectorX& p, const MatrixX& covariance,
-                        const MatrixX& carried) {
-  const Contrasts contrasts(parameters, carried);
-  if (contrasts.are_none()) return 0.0;
-  return log_bayes_factor(VectorX(contrasts.rows * p), contrasts.rows * covariance * contrasts.rows.transpose(),
-                          contrasts.prior);
+  const std::vector<Eigen::Index> rows = parameters.joint_coordinates();
+  if (Eigen::Index(rows.size()) != carried.rows() || carried.rows() <= carried.cols()) return 0.0;
+  const MatrixX own = orthogonal_complement(carried);
+  MatrixX contrasts = MatrixX::Zero(own.rows(), p.size());
+  contrasts(Eigen::all, rows) = own;
+  const MatrixX covariance = pseudo_inverse(parameters.joint_precision());  // of contrasts
+  return log_bayes_factor(evaluation, parameters, p, contrasts, own * covariance * own.transpose());
 }
 
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
@@ -99,7 +70,9 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
   for (const FrameFit& frame : evaluation.frames) mean += frame.gradient / double(evaluation.frames.size());
   const MatrixX V = noise * by_gradient * contrasts.transpose() +
                     left * by_gradient * gradient_scatter(evaluation, mean) * by_gradient.transpose();
-  return log_bayes_factor(d, V, prior);
+  const MatrixX both = V + prior;
+  return 0.5 *
+         (d.dot(solve_symmetric(V, d)) - d.dot(solve_symmetric(both, d)) + log_determinant(V) - log_determinant(both));
 }
 
 MatrixX gradient_scatter(const CostEvaluation& evaluation, const VectorX& mean) {

@@ -29,12 +29,6 @@ MatrixX field_precision(const std::vector<Vector3>& points, double length, doubl
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& carried);
 
-/// The same of an estimate whose covariance V is known, with what other models leave open.
-/// @param p           the estimate, with the finer field
-/// @param covariance  of p
-double log_bayes_factor(const ParameterSet& parameters, const VectorX& p, const MatrixX& covariance,
-                        const MatrixX& carried);
-
 /// The same about any contrasts of p: the coarser hypothesis is that they vanish, under the finer one they are
 /// N(0, P). The parameters' joint prior counts as part of the hypotheses, their own priors do not.
 /// @param contrasts  rows x dimension of p

@@ -173,13 +173,10 @@ struct FitState {
   PassState pass;  ///< that was under way
   /// Where the number of control points is chosen: the pass is the fit with one of them.
   struct FieldChoice {
-    struct Kept {
-      int tried = 0;    ///< which of those
-      PassState state;  ///< of its fit, with its estimate
-    };
-    std::vector<TriedField> tried;  ///< that are done
-    std::vector<Kept> kept;         ///< of those tried, each better than the one before it
-    int under_way = 0;              ///< control points of the fit that was under way; 0: none
+    std::vector<TriedField> tried;   ///< that are done
+    int best = 0;                    ///< of those tried
+    std::optional<PassState> state;  ///< of the best one's fit, with its estimate
+    int under_way = 0;               ///< control points of the fit that was under way; 0: none
   };
   std::optional<FieldChoice> field;
   /// Where the object is tracked.

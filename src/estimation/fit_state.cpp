@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/18";
+constexpr const char* format = "fit-state/17";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -46,17 +46,17 @@ std::vector<TriedField> to_tried(const Json& json) {
 }
 
 Json from_field(const FitState::FieldChoice& field) {
-  Json json = {{"tried", from_tried(field.tried)}, {"kept", Json::array()}, {"under_way", field.under_way}};
-  for (const FitState::FieldChoice::Kept& k : field.kept)
-    json["kept"].push_back({{"tried", k.tried}, {"state", from_pass(k.state)}});
+  Json json = {{"tried", from_tried(field.tried)}, {"best", field.best}, {"under_way", field.under_way}};
+  if (field.state) json["state"] = from_pass(*field.state);
   return json;
 }
 
 FitState::FieldChoice to_field(const Json& json) {
   FitState::FieldChoice field;
+  field.best = json.at("best").get<int>();
   field.under_way = json.at("under_way").get<int>();
   field.tried = to_tried(json.at("tried"));
-  for (const Json& k : json.at("kept")) field.kept.push_back({k.at("tried").get<int>(), to_pass(k.at("state"))});
+  if (json.contains("state")) field.state = to_pass(json["state"]);
   return field;
 }
 

@@ -76,8 +76,7 @@ class TrackingLoop : public PassPlanner {
     inner_.reset();
     for (const FitEvent& event : whole.history) history_.emplace_back(controls_of(whole), event);
     forward_steps_ += whole.forward_steps;
-    end_part(std::move(whole),
-             stands.field && !stands.field->kept.empty() ? stands.field->kept.back().state : std::move(reached));
+    end_part(std::move(whole), stands.field && stands.field->state ? *stands.field->state : std::move(reached));
     return !is_over;
   }
 
