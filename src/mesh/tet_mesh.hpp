@@ -70,8 +70,8 @@ struct TetMeshOptions {
   std::vector<std::function<bool(const Vector3&)>> parts = {};  ///< of space, whose boundaries the faces follow
 };
 
-/// Fills a closed surface with elements, by CGAL's Mesh_3 (Delaunay refinement, slivers removed). Conforming elements are
-/// smaller than asked for where the scan would stick out of them by more than 0.3 of their size: in thin leaves and
+/// Fills a closed surface with elements, by CGAL's Mesh_3 (Delaunay refinement, slivers removed). Conforming elements
+/// are smaller than asked for where the scan would stick out of them by more than 0.3 of their size: in thin leaves and
 /// stalks. The same input gives the same mesh.
 TetMesh make_tet_mesh(const TriangleMesh& surface, const TetMeshOptions& options);
 
