@@ -12,7 +12,8 @@ BoundedStep step_within_bounds(const ParameterSet& parameters, const VectorX& p,
   std::vector<Eigen::Index> free(std::size_t(p.size()));
   std::iota(free.begin(), free.end(), 0);
   BoundedStep bounded{VectorX::Zero(p.size()), {}};
-  auto& [step, held] = bounded;
+  VectorX& step = bounded.step;
+  std::vector<Eigen::Index>& held = bounded.held;
   const VectorX scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();  // pulls and dampings differ by 1e10
   const MatrixX scaled = scale.asDiagonal() * H * scale.asDiagonal();
   while (!free.empty()) {

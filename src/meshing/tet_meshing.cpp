@@ -316,7 +316,8 @@ TetMesh mesh_of_all_parts(const Domain& domain, const TriangleMesh& surface, con
   TetMesh mesh = mesh_of(domain, options, sizes);
   for (int round = 0; round < most_rounds; ++round) {
     std::vector<std::pair<Vector3, double>> places;
-    for (const auto& [off, place] : lost_places(surface, mesh, sizes)) {
+    for (const auto& lost : lost_places(surface, mesh, sizes)) {
+      const Vector3& place = lost.second;
       const double size = shorter * sizes.edges.at(place);
       const auto is_near = [&](const auto& other) { return (other.first - place).norm() < size; };
       if (std::ranges::none_of(places, is_near)) places.emplace_back(place, size);

@@ -24,11 +24,13 @@ VectorX volume_of_nodes(const Body& body) {
 /// Greatest displacement for each column of forces of a body of unit Young's modulus, by linear elasticity from rest.
 VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const std::vector<int>& held,
                                const std::vector<Points>& forces) {
-  const MotionLayout layout({.moduli = body->modulus.controls});
+  auto even = std::make_shared<Body>(*body);
+  even->modulus = {1, {}, std::vector<double>(body->modulus.relative.size(), 1.0)};
+  const MotionLayout layout;
   VectorX theta = layout.zero();
   layout.set_moduli(theta, 1.0);
   theta[layout.poissons_ratio] = 0.3;
-  const LinearStatics statics(body, held, layout, theta);
+  const LinearStatics statics(even, held, layout, theta);
   if (!statics.is_held())
     throw InputError({{},
                       "nothing holds the object while it is pulled",
@@ -65,11 +67,18 @@ Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, co
     for (int d = 0; d < 3; ++d) strength_(k, d) = points.size / greatest[3 * k + d];
   pulls_ = Points::Zero(n, 3);
   moduli_at_.setOnes(body->modulus.controls);
+  const ModulusField& field = body->modulus;
+  const Eigen::Map<const VectorX> element_volume(body->element_volume.data(),
+                                                 Eigen::Index(body->element_volume.size()));
+  const Eigen::Map<const VectorX> relative(field.relative.data(), Eigen::Index(field.relative.size()));
+  const VectorX part = element_volume / element_volume.sum();
+  share_ = field.controls == 1 ? VectorX::Ones(1) : VectorX(field.weights.transpose() * part);
+  log_relative_ = part.dot(relative.array().log().matrix());
 }
 
 void Pull::set_parameters(const VectorX& parameters) {
   moduli_at_ = material_.moduli(parameters);
-  mean_ = std::exp(moduli_at_.array().log().mean());
+  mean_ = std::exp(log_relative_ + share_.dot(moduli_at_.array().log().matrix()));
   for (Eigen::Index k = 0; k < count(); ++k)
     pulls_.row(k) = strength_.row(k).cwiseProduct(pull_blocks_[std::size_t(k)].vector(parameters).transpose());
 }
@@ -80,10 +89,7 @@ void Pull::add_force(const Points&, Points& force) {
 
 void Pull::add_force_tangent(const Points&, const Points&, const Points&, const VectorX& d_theta, Points& force) {
   if (!is_active_) return;
-  double d_log_mean = 0.0;
-  const VectorX d_moduli = material_.moduli(d_theta);
-  for (Eigen::Index k = 0; k < moduli_at_.size(); ++k)
-    d_log_mean += d_moduli[k] / (double(moduli_at_.size()) * moduli_at_[k]);
+  const double d_log_mean = share_.dot(material_.moduli(d_theta).cwiseQuotient(moduli_at_));
   Points change = d_log_mean * pulls_;
   for (Eigen::Index k = 0; k < count(); ++k)
     change.row(k) += strength_.row(k).cwiseProduct(pull_blocks_[std::size_t(k)].vector(d_theta).transpose());
@@ -95,7 +101,7 @@ void Pull::add_force_adjoint(const Points&, const Points& w, Points&, Points&, V
   const Points bar = mean_ * (spread_.transpose() * w);
   const double log_mean_bar = bar.cwiseProduct(pulls_).sum();
   for (Eigen::Index k = 0; k < moduli_at_.size(); ++k)
-    theta_bar[material_.youngs_moduli[std::size_t(k)]] += log_mean_bar / (double(moduli_at_.size()) * moduli_at_[k]);
+    theta_bar[material_.youngs_moduli[std::size_t(k)]] += log_mean_bar * share_[k] / moduli_at_[k];
   for (Eigen::Index k = 0; k < count(); ++k)
     theta_bar.segment<3>(pull_blocks_[std::size_t(k)]) += bar.row(k).cwiseProduct(strength_.row(k)).transpose();
 }

@@ -23,8 +23,9 @@ std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const st
 /// What holds an object in the pose from which it is released: forces spread smoothly about a few points,
 ///   f_n = E_0 sum_k w_k(X_n) V_n c_k / s_k,
 /// with w_k a Gaussian about point k, V_n the node's volume, and s_k (of each axis) such that a unit c_k would move the
-/// object by its size, by linear elasticity from rest. E_0 is the geometric mean of the control moduli, so that the
-/// pose hardly depends on how stiff the object is thought to be.
+/// object by its size, by linear elasticity from rest of an even one. E_0 is the geometric mean of Young's modulus over
+/// the volume, so that the pose hardly depends on how stiff the object is thought to be, nor on what its field is told
+/// by.
 class Pull : public DeadLoad {
  public:
   /// @param points  see `far_points`
@@ -48,11 +49,13 @@ class Pull : public DeadLoad {
   std::vector<ParameterHandle> pull_blocks_;
   MaterialBlocks material_;
   bool is_active_ = true;
-  MatrixX spread_;     // n x k: w_k(X_n) V_n [m^3]
-  Points strength_;    // k x 3: 1 / s_k [1/m]
-  Points pulls_;       // k x 3: c_k / s_k
-  VectorX moduli_at_;  // [Pa]
-  double mean_ = 0.0;  // of the moduli
+  MatrixX spread_;             // n x k: w_k(X_n) V_n [m^3]
+  Points strength_;            // k x 3: 1 / s_k [1/m]
+  Points pulls_;               // k x 3: c_k / s_k
+  VectorX moduli_at_;          // [Pa]
+  VectorX share_;              // of each control modulus in the mean over the volume of ln E
+  double log_relative_ = 0.0;  // of the elements' own factors in it
+  double mean_ = 0.0;          // exp of that mean [Pa]
 };
 
 }  // namespace pliant

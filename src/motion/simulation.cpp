@@ -280,10 +280,6 @@ bool Simulation::settle(Points& x, RolloutSummary& summary) {
 bool Simulation::find_equilibrium(const VectorX& parameters, State& state, RolloutSummary& summary) {
   constexpr double largest_turn = 0.4;  // [rad] of a held region, a step of the load
   constexpr int most_iterations = 400;
-  if (last_equilibrium_.rows() > 0 && !options_.is_static) {  // that of parameters that may be near
-    state = {last_equilibrium_, Points::Zero(rest_.rows(), 3)};
-    if (settle(state.x, summary)) return last_equilibrium_ = state.x, true;
-  }
   double turn = 0.0;
   for (const Hold& hold : options_.holds) turn = std::max(turn, Eigen::AngleAxisd(hold.rotation).angle());
   state = {shape_ ? shape_->scan() : body_->scanned_positions(), Points::Zero(rest_.rows(), 3)};
@@ -306,7 +302,6 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
                       " % of the load: the material may be too soft to hold the object up";
     return false;
   }
-  last_equilibrium_ = state.x;
   return true;
 }
 

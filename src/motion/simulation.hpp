@@ -134,7 +134,8 @@ class Simulation {
   bool start_adjoint(const State& start, const State& bar, VectorX& theta_bar);
   Points velocities(const VectorX& theta) const;
   /// The equilibrium of static scenes and of pulled objects: at once where Newton's method gets there from rest, else
-  /// by steps of the load, gravity, pulls and the holds' displacement together, as large as it follows.
+  /// by steps of the load, gravity, pulls and the holds' displacement together, as large as it follows. Never from an
+  /// equilibrium that was found before: where there are several, which one it is must depend on the parameters alone.
   bool find_equilibrium(const VectorX& theta, State& state, RolloutSummary& summary);
   /// To the equilibrium under the parameters at hand, with the matrix of its derivatives. False where there is none.
   [[nodiscard]] bool settle(Points& x, RolloutSummary& summary);
@@ -167,8 +168,7 @@ class Simulation {
   Statics statics_;                   // of the stepper's forces
   std::unique_ptr<RestShape> shape_;  // where theta says where the body is stress-free
   bool shape_is_held_ = false;
-  Points reference_bar_;     // likewise, of the reverse sweep
-  Points last_equilibrium_;  // that was found, to begin with when the next is looked for; empty: none
+  Points reference_bar_;  // likewise, of the reverse sweep
   std::vector<StepPlan> plan_;
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;
