@@ -227,3 +227,19 @@ def pyplot():
         print("matplotlib is not installed: no picture")
         return None
     return matplotlib.pyplot
+
+
+def at_rest(program, fit):
+    """Nodes of a fit's load-free volume, and how far each moves as the model comes to rest under gravity: coordinates one after the other [m]."""
+    moving = ("[timing]", "frame_rate", "frame_count", "start_frame", "substeps", "released", "pulls")
+    still = [line for line in (fit / "model.toml").read_text().splitlines() if not line.startswith(moving)]
+    folder = fit / "at-rest"
+    folder.mkdir(exist_ok=True)
+    (folder / "model.toml").write_text("\n".join(still) + "\n")
+    for name in ("surface.ply", "model.vtu"):
+        if not (folder / name).exists():
+            (folder / name).symlink_to((fit / name).resolve())
+    run(program, "simulate", folder / "model.toml", "--out", folder)
+    frame = read_vtu(sorted((folder / "frames").glob("*.vtu"))[-1])
+    there, moved = frame["points"], frame["displacement [m]"]
+    return [tuple(there[3 * n + d] - moved[3 * n + d] for d in range(3)) for n in range(len(there) // 3)], moved

@@ -36,19 +36,7 @@ def rms(values):
 
 def sagged(program, fit, places):
     """Where vertices of a fit's load-free surface come to rest under gravity: as the nearest nodes of its volume do."""
-    text = (fit / "model.toml").read_text().splitlines()
-    moving = ("[timing]", "frame_rate", "frame_count", "start_frame", "substeps", "released", "pulls")
-    still = [line for line in text if not line.startswith(moving)]
-    folder = fit / "at-rest"
-    folder.mkdir(exist_ok=True)
-    (folder / "model.toml").write_text("\n".join(still) + "\n")
-    for name in ("surface.ply", "model.vtu"):
-        if not (folder / name).exists():
-            (folder / name).symlink_to((fit / name).resolve())
-    common.run(program, "simulate", folder / "model.toml", "--out", folder)
-    frame = common.read_vtu(sorted((folder / "frames").glob("*.vtu"))[-1])
-    there, moved = frame["points"], frame["displacement [m]"]
-    nodes = [tuple(there[3 * n + d] - moved[3 * n + d] for d in range(3)) for n in range(len(there) // 3)]
+    nodes, moved = common.at_rest(program, fit)
     out = []
     for p in places:
         n = min(range(len(nodes)), key=lambda k: (nodes[k][0] - p[0])**2 + (nodes[k][1] - p[1])**2 + (nodes[k][2] - p[2])**2)

@@ -117,20 +117,10 @@ def zones_of(model, zones, truth):
 
 def sagged(program, fit, places):
     """Where places of a fit's load-free surface come to rest under gravity: as the nearest nodes of its volume do."""
-    text = (fit / "model.toml").read_text().splitlines()
-    moving = ("[timing]", "frame_rate", "frame_count", "start_frame", "substeps", "released", "pulls")
-    folder = fit / "at-rest"
-    folder.mkdir(exist_ok=True)
-    (folder / "model.toml").write_text("\n".join(line for line in text if not line.startswith(moving)) + "\n")
-    for name in ("surface.ply", "model.vtu"):
-        if not (folder / name).exists():
-            (folder / name).symlink_to((fit / name).resolve())
-    common.run(program, "simulate", folder / "model.toml", "--out", folder)
-    frame = common.read_vtu(sorted((folder / "frames").glob("*.vtu"))[-1])
-    there, moved = frame["points"], frame["displacement [m]"]
+    places_at_rest, moved = common.at_rest(program, fit)
     nodes = Nearest(0.008)
-    for n in range(len(there) // 3):
-        nodes.add(tuple(there[3 * n + d] - moved[3 * n + d] for d in range(3)), n)
+    for n, place in enumerate(places_at_rest):
+        nodes.add(place, n)
     return [tuple(p[d] + moved[3 * nodes.at(p) + d] for d in range(3)) for p in places]
 
 
