@@ -192,6 +192,50 @@ TEST(Releases, TheUnitOfAPullIsTheObjectsSize) {
   }
 }
 
+/// The field of moduli in the words of a fit, by two control points, and in those of its model, by element and one
+/// modulus: the pulls hold the object in the same pose.
+TEST(Releases, ThePoseDoesNotDependOnHowTheFieldIsTold) {
+  Released by_points(bar(ElementKind::Hexahedron), Integrator::Lagged);
+  auto body = std::make_shared<Body>(*by_points.body);
+  const Eigen::Index elements = body->element_count();
+  const VectorX share = VectorX::LinSpaced(elements, 0.0, 1.0).array().square();  // the mean is not at the middle
+  body->modulus.controls = 2;
+  body->modulus.weights.resize(elements, 2);
+  body->modulus.weights << 1.0 - share.array(), share;
+  by_points.body = body;
+  by_points.set_blocks({.moduli = 2, .pulls = test::released::pulls});
+  constexpr double stiff = 6e5, soft = 1.5e5;
+  by_points.theta[by_points.layout.youngs_moduli[0]] = stiff;
+  by_points.theta[by_points.layout.youngs_moduli[1]] = soft;
+  by_points.set_pulls({0.01, 0.1, 0.05}, {0.0, -0.03, 0.02});
+
+  Released by_element(bar(ElementKind::Hexahedron), Integrator::Lagged);
+  auto told = std::make_shared<Body>(*by_element.body);
+  for (Eigen::Index e = 0; e < elements; ++e)
+    told->modulus.relative[std::size_t(e)] = std::pow(soft / stiff, share[e]) * stiff / 1e5;
+  by_element.body = told;
+  by_element.layout.set_moduli(by_element.theta, 1e5);
+
+  const VectorX pose = by_points.positions_at(by_points.theta, 0);
+  ASSERT_GT((pose - flat(by_points.body->nodes)).cwiseAbs().maxCoeff(), 0.02) << "a pull worth holding";
+  EXPECT_LT((pose - by_element.positions_at(by_element.theta, 0)).cwiseAbs().maxCoeff(), tolerance(1e-9));
+}
+
+TEST(Releases, TheStartDoesNotDependOnWhatWasSimulatedBefore) {
+  const Released scene(bar(ElementKind::Hexahedron), Integrator::Lagged);
+  Released elsewhere = scene;
+  elsewhere.set_pulls({0.01, -0.6, -0.3}, Vector3::Zero());
+  Simulation simulation(scene.body, scene.options);
+  const auto start = [&](const VectorX& theta) {
+    VectorX x;
+    simulation.run(theta, [&](int, const State& state, auto) { return x = flat(state.x), false; });
+    return x;
+  };
+  const VectorX first = start(scene.theta), other = start(elsewhere.theta);
+  ASSERT_GT((first - other).cwiseAbs().maxCoeff(), 0.02);
+  EXPECT_EQ(start(scene.theta), first);
+}
+
 TEST(Releases, AFreeObjectCannotBePulled) {
   Released scene(bar(ElementKind::Tetrahedron), Integrator::Newton);
   scene.options.holds.clear();
