@@ -448,7 +448,7 @@ SECTIONS = [
      "fitted with no choice of ours, and in other ways beside. The truth is read for judging only.", sagging_leaf),
     ("A plant that is scanned as it sags", "plant",
      "Wang et al. 2015, section 7 and table 4: a stem and three thick leaves, of five moduli, held in a pot, scanned sagging, pulled aside and let go; three depth sensors fused to clouds, 250 frames at 30 Hz. Made by a simulator of its own "
-     "(`twin.py`: quadratic tetrahedra, a compressible neo-Hookean law, BDF2 in steps of 1/360 s). Load-free shape, moduli, Poisson's ratio and both dampings are unknown. The truth is read for judging only.", plant),
+     "(`simulator.py`: quadratic tetrahedra, a compressible neo-Hookean law, BDF2 in steps of 1/360 s). Load-free shape, moduli, Poisson's ratio and both dampings are unknown. The truth is read for judging only.", plant),
     ("A bar of two stiffnesses that sags", "two-zone-sag",
      "Wang et al. 2015, figures 6 and 9 with the reference shape unknown: moduli and load-free shape together, with derivatives through the equilibrium, beside a splitting: three iterations of Levenberg-Marquardt "
      "with the shape held, then the shape anew, and so on; and beside the paper's own algorithm.", two_zones),

@@ -2,8 +2,8 @@
 """A plant that is scanned as it sags, pulled aside and let go: a stem and three leaves of five moduli, three depth sensors fused to
 clouds, 250 frames at 30 Hz (Wang et al. 2015, section 7). Neither its load-free shape nor its material is known.
 
-twin.py makes the recording by other physics (other elements, another material law, another integrator); it needs numpy, scipy and
-gmsh, in the interpreter that --python names. Fitted with no choice of ours, with tracking and estimation together, with as many
+twin.py makes the recording by other physics (simulator.py: other elements, another material law, another integrator); it needs numpy,
+scipy and gmsh, in the interpreter that --python names. Fitted with no choice of ours, with tracking and estimation together, with as many
 control points as the evidence supports, and with control points that a user placed at the joints and on the leaves.
 truth.json and the true shapes are read for judging only. Standard library only, but for twin.py."""
 import csv
@@ -40,7 +40,7 @@ def make_recording(python, work):
     """Recording of the twin, and the figures of its checks."""
     folder, checks = work / "recording", work / "verify.json"
     if not checks.exists():
-        subprocess.run([python, HERE / "twin.py", "--verify", checks], check=True)
+        subprocess.run([python, HERE / "simulator_checks.py", checks], check=True)
     if not (folder / "truth.json").exists():
         subprocess.run([python, HERE / "twin.py", "--out", folder], check=True)
     return folder, common.read(checks)

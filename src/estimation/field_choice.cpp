@@ -117,7 +117,7 @@ std::optional<PassState> FieldChoice::beginning_of(int count) {
     begin = with_field(count, promised);
   } catch (const InputError&) {  // the mesh has no room for so many points
   }
-  const bool is_promising = promised.log_bayes_factor > strong_evidence &&
+  const bool is_promising = promised.log_bayes_factor > 0.0 &&
                             promised.cost < (1.0 - step_share * least_gain(best().control_points)) * best().cost;
   // Where one modulus does not explain what was seen, dampings stand where they make up for it: one step from there
   // tells nothing.
