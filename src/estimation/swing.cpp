@@ -80,6 +80,24 @@ Path simulated_path(Simulation& simulation, const VectorX& theta) {
   return path;
 }
 
+/// A modulus and the square of the angular frequency that it gives.
+struct Swung {
+  double modulus = 0.0, squared = 0.0;  // [Pa], [1/s^2]
+};
+
+/// By what the modulus is to be multiplied. Without weight the square goes with it; what stands is slowed down and what
+/// hangs sped up by its weight, and a second simulation shows by how much: the square is a straight line of the
+/// modulus.
+double factor_to(double observed, const Swung& now, const std::optional<Swung>& before) {
+  constexpr double most = 10.0;
+  if (before) {
+    const double slope = (now.squared - before->squared) / (now.modulus - before->modulus);
+    const double factor = 1.0 + (observed - now.squared) / (slope * now.modulus);
+    if (slope > 0.0 && factor > 1.0 / most && factor < most) return factor;
+  }
+  return observed / now.squared;
+}
+
 }  // namespace
 
 std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters,
@@ -91,20 +109,23 @@ std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters
   if (!observed) return std::nullopt;
   constexpr int most_rounds = 6;
   constexpr double near_enough = 1.05;
+  const ParameterHandle modulus = simulation.options().blocks.youngs_moduli.front();
+  std::optional<Swung> before;
   for (int round = 0; round < most_rounds; ++round) {
     const Path moves = simulated_path(simulation, parameters);
     const auto simulated = swing_of(moves, direction);
     // Too slow or too fast to show in these frames: try a body that is stiffer, then one that is softer. One that
-    // cannot hold itself up has to be stiffer.
+    // cannot hold itself up has to be stiffer. Where one that swung went before, the step from it was too long.
     const bool fails = moves.points.size() < path.points.size();
-    const double ratio = simulated && !fails ? std::pow(*observed / *simulated, 2)
-                         : fails             ? 3.0
-                         : round == 0        ? 10.0
-                                             : 0.1;
+    double ratio = before ? std::sqrt(before->modulus / parameters[modulus]) : fails ? 3.0 : round == 0 ? 10.0 : 0.1;
+    if (simulated && !fails) {
+      const Swung now{parameters[modulus], *simulated * *simulated};
+      ratio = factor_to(*observed * *observed, now, before);
+      before = now;
+    }
     simulation.options().blocks.scale_moduli(parameters, ratio);
     if (simulated && !fails && std::abs(std::log(ratio)) < std::log(near_enough))
-      return SwingStart{parameters[simulation.options().blocks.youngs_moduli.front()],
-                        *observed / (2.0 * std::numbers::pi)};
+      return SwingStart{parameters[modulus], *observed / (2.0 * std::numbers::pi)};
   }
   return std::nullopt;
 }

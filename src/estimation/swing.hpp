@@ -14,8 +14,9 @@ struct SwingStart {
 
 /// The warm start of `modal_start` for points that nobody followed, and its second look at those of bodies that sag or
 /// hang, which their weight slows down or speeds up: the middle of each frame's points swings, and so
-/// does that of the simulated surface; frequencies go with the square root of the modulus. Two or three simulations
-/// take in what modes about rest leave out: far swings, sag, and how the body is held.
+/// does that of the simulated surface. Squares of frequencies are straight lines of the modulus, through the origin
+/// where nothing weighs; a few simulations take in what modes about rest leave out: far swings, sag, and how the body
+/// is held.
 /// @param theta  where the simulation begins; moduli within a factor of a few hundred of the truth
 /// Nothing where no oscillation is beyond doubt, in what was seen or in the simulation.
 std::optional<SwingStart> swing_start(Simulation& simulation, VectorX theta,
