@@ -160,14 +160,14 @@ def meshes(program, recording, work, truth):
     return {"youngs_modulus": REST_MODULUS, "rows": rows}
 
 
-def judged_fit(program, recording, captures, name, work, zones, truth, threads):
+def judged_fit(program, recording, captures, name, work, zones, truth, threads, limit):
     capture, choices = FITS[name]
     refusal = work / name / "refused.json"
     if refusal.exists():
         return common.read(refusal)
     begin = time.monotonic()
     try:
-        figures = common.fit(program, captures[capture], work / name, choices, threads)
+        figures = common.fit(program, captures[capture], work / name, choices, threads, limit)
     except SystemExit as told:  # the program says why
         version = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.strip()
         refused = {"choices": choices, "capture": capture, "threads": threads, "refused": str(told).strip().splitlines()[-1], "wall_seconds": round(time.monotonic() - begin, 1), "version": version}
@@ -256,7 +256,7 @@ def picture(recording, fits, work, cells):
 
 def main():
     arguments = common.arguments(__doc__, gather={"action": "store_true", "help": "no new fits: gather those that are in --work; a refusal (refused.json) is not tried again"},
-                                 threads={"type": int, "help": "most threads of a fit"}, only={"help": "run or gather only this fit, with those that are done"},
+                                 threads={"type": int, "help": "most threads of a fit"}, limit={"type": float, "help": "seconds after which a fit is asked to stop with the best that it has"}, only={"help": "run or gather only this fit, with those that are done"},
                                  python={"default": sys.executable, "help": "interpreter with numpy, scipy and gmsh, for twin.py"})
     recording, checks = make_recording(arguments.python, arguments.work)
     truth = common.read(recording / "truth.json")
@@ -267,7 +267,7 @@ def main():
         is_done = any((arguments.work / name / file).exists() for file in ("figures.json", "refused.json"))
         if not is_done and (arguments.gather or (arguments.only and name != arguments.only)):
             continue
-        f = fits[name] = judged_fit(arguments.program, recording, captures, name, arguments.work, zones, truth, arguments.threads)
+        f = fits[name] = judged_fit(arguments.program, recording, captures, name, arguments.work, zones, truth, arguments.threads, arguments.limit)
         if "refused" in f:
             print(f"{name}: refused after {f['wall_seconds']} s: {f['refused']}", flush=True)
             continue
