@@ -110,20 +110,17 @@ std::optional<PassState> FieldChoice::beginning_of(int count) {
     resumed_ = 0;
     return left_;
   }
-  constexpr double step_share = 0.3;  // of the gain, that one step shows where dampings and others made up for it
   TriedField promised{count, false, std::numeric_limits<double>::infinity(), impossible};
   PassState begin;
   try {
     begin = with_field(count, promised);
   } catch (const InputError&) {  // the mesh has no room for so many points
   }
-  const bool is_promising = promised.log_bayes_factor > 0.0 &&
-                            promised.cost < (1.0 - step_share * least_gain(best().control_points)) * best().cost;
   // Where one modulus does not explain what was seen, dampings stand where they make up for it: one step from there
   // tells nothing.
   const bool may_lead_elsewhere =
       choice_.tried.size() == 1 && begin.begin && !estimate_of(*choice_.state)->is_explained;
-  if (is_promising || may_lead_elsewhere) return begin;
+  if (is_worth_a_fit(promised, best()) || may_lead_elsewhere) return begin;
   promised.cost = std::numeric_limits<double>::infinity();
   choice_.tried.push_back(promised);
   return std::nullopt;
@@ -214,6 +211,15 @@ FitOutcome FieldChoice::with_history(FitOutcome outcome) {
   }
   outcome.notes.insert(outcome.notes.begin(), explained(choice_.tried));
   return outcome;
+}
+
+bool is_worth_a_fit(const TriedField& promised, const TriedField& best) {
+  constexpr double share = 0.3;  // of the gain, that one step shows where dampings and others made up for it
+  // From moduli that vary one step tells less than there is: Poisson's ratio stands where it makes up for what they
+  // lack.
+  const double least_evidence = best.control_points == 1 ? strong_evidence : 0.0;
+  return promised.log_bayes_factor > least_evidence &&
+         promised.cost < (1.0 - share * least_gain(best.control_points)) * best.cost;
 }
 
 std::string explained(const std::vector<TriedField>& tried) {

@@ -9,9 +9,9 @@ namespace pliant {
 
 /// Plans a fit with as many control points of Young's modulus as the recordings support. The homogeneous object is
 /// fitted first; then fields of 2, 3, 4, 6, 8, ... points, each from the best one so far and only where one step of
-/// Gauss and Newton promises enough. A field of more points is kept where there is strong evidence of what it has
-/// beyond the best one before (`log_bayes_factor` above `strong_evidence`); two numbers in a row without it end the
-/// search, and the best one is repeated where the options ask for that.
+/// Gauss and Newton promises enough (`is_worth_a_fit`). A field of more points is kept where there is strong evidence
+/// of what it has beyond the best one before (`log_bayes_factor` above `strong_evidence`); two numbers in a row without
+/// it end the search, and the best one is repeated where the options ask for that.
 class FieldChoice : public PassPlanner {
  public:
   /// @param resume  the state of an interrupted choice goes on with the field that was under way
@@ -52,6 +52,10 @@ class FieldChoice : public PassPlanner {
 
 /// ln of the Bayes factor B above which evidence is called strong: 2 ln B > 6 (Kass and Raftery 1995).
 inline constexpr double strong_evidence = 3.0;
+
+/// Whether a field of which one step of Gauss and Newton promises so much is fitted. Beside an even object it must
+/// promise strong evidence, beside a field any, and a part of what a field must take off the cost.
+bool is_worth_a_fit(const TriedField& promised, const TriedField& best);
 
 /// How many control points were chosen, and by what evidence, in a sentence.
 /// @param tried  as a choice tried them, the homogeneous object first

@@ -341,6 +341,17 @@ TEST(FieldChoice, KeepsNoFieldThatTakesLittleOffTheCost) {
   EXPECT_THAT(chosen({one, much, {4, true, 790.0, 9.0}}), ::testing::HasSubstr("was given 2 control points,"));
 }
 
+/// Beside one modulus a step must promise strong evidence and 3 % off the cost; beside a field any evidence and 0.9 %.
+TEST(FieldChoice, FitsWhatOneStepPromises) {
+  const TriedField one{1, true, 1000.0, 0.0}, two{2, true, 1000.0, 20.0};
+  EXPECT_TRUE(is_worth_a_fit({2, false, 960.0, 4.0}, one));
+  EXPECT_FALSE(is_worth_a_fit({2, false, 960.0, 2.9}, one));
+  EXPECT_FALSE(is_worth_a_fit({2, false, 980.0, 4.0}, one));
+  EXPECT_TRUE(is_worth_a_fit({3, false, 980.0, 0.1}, two));
+  EXPECT_FALSE(is_worth_a_fit({3, false, 980.0, -0.1}, two));
+  EXPECT_FALSE(is_worth_a_fit({3, false, 995.0, 4.0}, two));
+}
+
 TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {
   const Vector3 aside(0.0, 0.0, -9.81);
   const FitOutcome outcome = fit({sagging_bar(soft), sagging_bar(soft, aside, 8)}, quick());
