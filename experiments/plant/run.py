@@ -185,7 +185,7 @@ def judged_fit(program, recording, captures, name, work, zones, truth, threads, 
             "tried": field.get("tried"), "zones": found, "mean_factor_off": off, "elements": elements, "surface_rms": common.number(result["error"]["surface_rms"], 4),
             "cost": common.number(result["cost"]["final"]), "verdict": result.get("verdict"), "reasons": result.get("reasons"),
             "tracking": tracking and {"kept": tracking.get("kept"), "why": tracking.get("why"), "rounds": len(tracking.get("rounds", []))},
-            "forward_steps": result["time"].get("forward_steps"), "converged": figures["exit_code"] == 0, "commit": result["software"]["commit"], **figures,
+            "forward_steps": result["time"].get("forward_steps"), "converged": figures["exit_code"] == 0, "commit": result["software"]["commit"], "limit": limit, **figures,
             **shape(program, work / name, recording)}
 
 

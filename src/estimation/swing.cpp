@@ -80,22 +80,21 @@ Path simulated_path(Simulation& simulation, const VectorX& theta) {
   return path;
 }
 
-/// A modulus and the square of the angular frequency that it gives.
-struct Swung {
-  double modulus = 0.0, squared = 0.0;  // [Pa], [1/s^2]
+struct TriedModulus {
+  double modulus = 0.0, frequency_squared = 0.0;  // [Pa], angular [1/s^2]
 };
 
 /// By what the modulus is to be multiplied. Without weight the square goes with it; what stands is slowed down and what
 /// hangs sped up by its weight, and a second simulation shows by how much: the square is a straight line of the
 /// modulus.
-double factor_to(double observed, const Swung& now, const std::optional<Swung>& before) {
+double factor_to(double frequency_squared, const TriedModulus& now, const std::optional<TriedModulus>& before) {
   constexpr double most = 10.0;
   if (before) {
-    const double slope = (now.squared - before->squared) / (now.modulus - before->modulus);
-    const double factor = 1.0 + (observed - now.squared) / (slope * now.modulus);
+    const double slope = (now.frequency_squared - before->frequency_squared) / (now.modulus - before->modulus);
+    const double factor = 1.0 + (frequency_squared - now.frequency_squared) / (slope * now.modulus);
     if (slope > 0.0 && factor > 1.0 / most && factor < most) return factor;
   }
-  return observed / now.squared;
+  return frequency_squared / now.frequency_squared;
 }
 
 }  // namespace
@@ -110,7 +109,7 @@ std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters
   constexpr int most_rounds = 6;
   constexpr double near_enough = 1.05;
   const ParameterHandle modulus = simulation.options().blocks.youngs_moduli.front();
-  std::optional<Swung> before;
+  std::optional<TriedModulus> before;
   for (int round = 0; round < most_rounds; ++round) {
     const Path moves = simulated_path(simulation, parameters);
     const auto simulated = swing_of(moves, direction);
@@ -119,7 +118,7 @@ std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters
     const bool fails = moves.points.size() < path.points.size();
     double ratio = before ? std::sqrt(before->modulus / parameters[modulus]) : fails ? 3.0 : round == 0 ? 10.0 : 0.1;
     if (simulated && !fails) {
-      const Swung now{parameters[modulus], *simulated * *simulated};
+      const TriedModulus now{parameters[modulus], *simulated * *simulated};
       ratio = factor_to(*observed * *observed, now, before);
       before = now;
     }

@@ -1,8 +1,6 @@
 // The modulus with which a body swings as fast as its surface was seen to.
 #include "estimation/swing.hpp"
 
-#include <numbers>
-
 #include "support/released.hpp"
 
 namespace pliant::swing_test {
