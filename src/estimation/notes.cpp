@@ -57,7 +57,7 @@ void say_what_is_assumed(FitOutcome& outcome) {
     if (!p.is_auxiliary && std::isfinite(p.prior_std) &&
         outcome.uncertainty.std_noise.segment(at, p.dimension()).maxCoeff() > 0.7 * p.prior_std)
       outcome.notes.push_back("The recording says little about " + spoken(p.name) +
-                              ": its value is close to what was assumed beforehand.");
+                              ": what was assumed beforehand weighs as much, or more.");
     at += p.dimension();
   }
 }
