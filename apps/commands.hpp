@@ -1,7 +1,5 @@
 #pragma once
 
-#include <stdexcept>
-
 /// Commands of the program, one file each. A command registers itself and stores its exit code when it runs.
 namespace pliant::apps {
 
@@ -25,11 +23,6 @@ void add_scan(CommandLine& line, int& exit_code);
 void add_calibrate(CommandLine& line, int& exit_code);
 void add_fuse(CommandLine& line, int& exit_code);
 void add_place(CommandLine& line, int& exit_code);
-
-/// Thrown where a command notices that the user pressed Ctrl-C.
-struct Interrupted : std::runtime_error {
-  Interrupted() : std::runtime_error("interrupted") {}
-};
 
 /// Whether Ctrl-C was pressed. Long commands ask between steps.
 bool is_interrupted();

@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, on_interrupt);
   try {
     return run(argc, argv);
-  } catch (const Interrupted&) {
+  } catch (const pliant::Interrupted&) {
     std::cerr << "pliant: interrupted\n";
     return WasInterrupted;
   } catch (const pliant::InputError& error) {

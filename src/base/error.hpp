@@ -39,4 +39,9 @@ class InputError : public std::runtime_error {
   std::vector<Problem> problems_;
 };
 
+/// Thrown where long work notices that it is to end: Ctrl-C was pressed.
+struct Interrupted : std::runtime_error {
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
 }  // namespace pliant

@@ -34,6 +34,9 @@ struct CostEvaluation {
   MatrixX gauss_newton;
   std::vector<FrameFit> frames;  ///< of all recordings, one after the other
   int steps = 0;
+  /// Nodes times steps, with what derivatives and equilibria take in steps: as great on every machine, however busy it
+  /// is.
+  double work = 0.0;
   double surface_rms() const;     ///< [m]; 0 where no surface was seen
   double surface_median() const;  ///< [m], likewise
   double track_rms() const;       ///< [m], of the followed points; 0 where there are none

@@ -46,9 +46,9 @@ struct FitOptions {
   double coarse_cells = 8.0;  ///< of the grid that finds the neighbourhood, [4, 64]
   double steps = 1.0;         ///< time steps per default step, (0, 16]
   int refine = 1;             ///< resolutions at which the estimate is made, 1..3
-  /// Minutes that the fit may take with repetitions on finer meshes, made as long as the mesh's part in the uncertainty
-  /// of a modulus is more than half of the noise's; 0: none. Where `refine` is 1, alternatives are
-  /// tried, and no tracking takes turns with the fit.
+  /// Minutes that the fit may take on two cores of a laptop, counted in steps, with repetitions on finer meshes, made
+  /// as long as the mesh's part in the uncertainty of a modulus is more than half of the noise's; 0: none. Where
+  /// `refine` is 1, alternatives are tried, and no tracking takes turns with the fit.
   double budget = 1.0;
   /// Part of each recording that is compared, from where it begins, (0, 1]; 0: all of it, or the part that the model
   /// explains where the object meets obstacles (`ExplainedSpan`).

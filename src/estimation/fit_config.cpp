@@ -167,10 +167,12 @@ const std::vector<Entry>& entries() {
       integer_entry("refine", "1..3",
                     "number of resolutions of mesh and time step for Richardson extrapolation; 1: no extrapolation",
                     &FitOptions::refine),
-      real_entry("budget", "minutes", "0 and more",
-                 "time within which the estimate is repeated on finer meshes, as long as the mesh's part in the "
-                 "uncertainty of a modulus is more than half of the noise's; 0: never",
-                 &FitOptions::budget),
+      real_entry(
+          "budget", "minutes", "0 and more",
+          "about how long the fit may take on two cores of a laptop, counted in steps, with repetitions on finer "
+          "meshes, made as long as the mesh's part in the uncertainty of a modulus is more than half of the "
+          "noise's; 0: never",
+          &FitOptions::budget),
       real_entry("span", "", "0..1",
                  "part of each recording that is compared, from where it begins; 0: all of it, or the part that the "
                  "model explains where the object meets obstacles",

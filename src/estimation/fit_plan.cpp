@@ -138,8 +138,6 @@ Stage FitPlan::last_look(const PassState& state) const {
   last.from = {state.begin ? state.begin->theta : best_start(state.done).first};
   for (const StageRecord& r : state.done)
     if (r.id.kind == StageKind::Pulls || r.id.kind == StageKind::Fine) last.from = {r.theta};
-  last.iterations = 1;
-  last.iterations_before = iterations_on_full_grid(state.done);
   return last;
 }
 

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 
 #include "base/error.hpp"
@@ -268,8 +269,9 @@ ParameterSet FitRun::parameters_of(const Stage& stage, const VectorX& theta) con
 }
 
 Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const {
-  return recordings_.objective(grid, parameters, stage.band,
-                               [&](const Recording& r) { return last_frame(stage.horizon, r); });
+  return recordings_.objective(
+      grid, parameters, stage.band, [&](const Recording& r) { return last_frame(stage.horizon, r); },
+      [this] { return !stages_are_over_ && is_interrupted(); });
 }
 
 OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, const OptimiserState& from) {
@@ -308,7 +310,7 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   is_cut = s.interrupted;
   StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
-  record.iterations = s.iterations;
+  record.iterations = s.iterations, record.work = s.work;
   record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
   if (s.succeeded) record.misfit = misfit_of(s.evaluation), record.is_explained = is_explained(s.evaluation);
   record.elements = grid(stage.grid).recording.front().body->element_count();
@@ -330,7 +332,7 @@ StageRecord FitRun::find_pulls(const Stage& stage, bool& is_cut) {
         minimise(objective, start_of(pulls), o, [&](const Iteration&) { return !is_interrupted(); });
     outcome_.forward_steps += s.steps;
     is_cut = is_cut || s.interrupted;
-    record.iterations += s.iterations;
+    record.iterations += s.iterations, record.work += s.work;
     if (!s.succeeded || !(s.evaluation.cost < record.cost)) continue;
     record.cost = s.evaluation.cost;
     record.theta = pulls.to_theta(s.p);
@@ -395,8 +397,10 @@ StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
     record.trials.emplace_back(trials.back()[plan_.facts().moduli.front()], infinite);
   }
   std::atomic<int> done = 0;
+  std::vector<double> work(trials.size(), 0.0);
   std::string why_not;  // of the stiffest
   const auto on_evaluated = [&](std::size_t i, const CostEvaluation& e) {
+    work[i] = e.work;
     if (e.succeeded) record.trials[i].second = e.cost;
     if (!e.succeeded && i + 1 == trials.size()) why_not = e.failure;
     FitEvent event{StageKind::Scan, stage.name, 0, int(i) + 1, e.cost, 0.0, e.surface_rms(), trials[i]};
@@ -409,6 +413,7 @@ StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
     evaluate_downwards(objective, points, on_evaluated);
   else
     (void)objective.evaluate(points, on_evaluated);
+  record.work = std::accumulate(work.begin(), work.end(), 0.0);
   is_cut = is_interrupted();
   if (!is_cut && best_of_scan(record.trials, 1).empty())
     throw InputError({{recordings_.front().capture.file},
@@ -439,6 +444,7 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
   with_all.set_reference(theta);
   Objective objective = objective_of(stage, with_all, grid(stage.grid));
   const CostEvaluation e = objective.linearise(with_all.to_unconstrained(theta));
+  record.work = e.work;
   if (!e.succeeded) return record;
   for (const NeededCorrection& needed : needed_corrections(e, with_all, possible, e.independent_observations())) {
     record.told += (record.told.empty() ? "" : " and ") + needed.correction.what;
@@ -458,7 +464,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
     return record;
   }
   if (alternative.given) {
-    record.shifts = shifts_of_given(stage, parameters);
+    record.shifts = shifts_of_given(stage, parameters, record.work);
     return record;
   }
   Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
@@ -470,7 +476,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
       minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
   is_cut = s.interrupted;
   record.cost = s.succeeded ? s.evaluation.cost : infinite;
-  record.iterations = s.iterations;
+  record.iterations = s.iterations, record.work = s.work;
   if (!s.succeeded) record.reason = s.reason;
   if (s.succeeded) {
     VectorX shift = s.p - p;
@@ -484,19 +490,21 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   return record;
 }
 
-std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const ParameterSet& estimated) {
+std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const ParameterSet& estimated, double& work) {
   const std::vector<GivenQuantity> given = given_quantities(estimated, recordings_.common_errors());
   const ParameterSet all = with_given(estimated, given);
   Objective objective = objective_of(stage, all, grid(stage.grid));
   const CostEvaluation e = objective.linearise(all.to_unconstrained(all.reference()));
+  work = e.work;
   return e.succeeded ? pliant::shifts_of_given(e, all, given) : std::vector<ModelShift>{};
 }
 
 /// Whether the mesh's part in the uncertainty of a modulus is more than half of the noise's, and the next finer mesh
 /// can be had within the budget: what was spent is in the records, what it takes follows from the last estimate's
-/// iterations.
+/// iterations. Both are counted, not timed: a machine that is busy, or slow, gives the same answer.
 StageRecord FitRun::look_at_resolution(const Stage& stage) {
-  constexpr double tolerated = 0.5, growth = 3.5;  // of the noise's; power of the ratio of edges, of time
+  constexpr double tolerated = 0.5, growth = 3.5;  // of the noise's; power of the ratio of edges, of work
+  constexpr double work_of_a_minute = 4e7;         // of a laptop's two cores
   constexpr int iterations = 4;                    // from an estimate that is near, with the first linearisation
   const VectorX& theta = stage.from.front();
   StageRecord record{stage.id, stage.name, theta, theta};
@@ -519,15 +527,15 @@ StageRecord FitRun::look_at_resolution(const Stage& stage) {
   }
   if (share <= tolerated * statistical) return record;
   double spent = 0.0;
-  for (const StageRecord& r : state_.done) spent += r.seconds;
-  const double predicted = at.seconds / (at.iterations + 1) * iterations * std::pow(Refinement::mesh_ratio, growth);
-  record.converged = spent + predicted <= 60.0 * options_.budget;
+  for (const StageRecord& r : state_.done) spent += r.work / work_of_a_minute;
+  const double predicted =
+      at.work / work_of_a_minute / (at.iterations + 1) * iterations * std::pow(Refinement::mesh_ratio, growth);
+  record.converged = spent + predicted <= options_.budget;
   if (!record.converged)
     record.told = fmt::format(
         "The mesh contributes {:.1f} % to the uncertainty of Young's modulus, noise {:.1f} %: a finer one would narrow "
         "it and takes about {:.0f} minutes in all, --budget {:.0f}.",
-        100.0 * share, 100.0 * statistical, std::ceil((spent + predicted) / 60.0),
-        std::ceil(1.2 * (spent + predicted) / 60.0));
+        100.0 * share, 100.0 * statistical, std::ceil(spent + predicted), std::ceil(1.2 * (spent + predicted)));
   return record;
 }
 
@@ -554,13 +562,29 @@ std::optional<VectorX> FitRun::mesh_shift(const std::vector<StageRecord>& done, 
 
 FitOutcome FitRun::run() {
   execute();
+  stages_are_over_ = true;
   PassState end = reached();
-  if (interrupted_ && !plan_.estimate(end.done)) {
-    bool is_cut = false;
-    end.done.push_back(minimise_stage(plan_.last_look(end), is_cut));
-  }
+  if (interrupted_ && !plan_.estimate(end.done)) end.done.push_back(last_look(end));
   finish(end.done);
   return std::move(outcome_);
+}
+
+StageRecord FitRun::last_look(const PassState& at) {
+  const Stage stage = plan_.last_look(at);
+  VectorX theta = stage.from.front();
+  for (const StageChain& chain : plan_.next(state_))
+    if (const StageUnderWay* left = state_.under_way ? &*state_.under_way : nullptr;
+        left && left->id == chain.front().id && left->optimiser.p.size() > 0)
+      theta = parameters_of(chain.front(), left->from).to_theta(left->optimiser.p);
+  StageRecord record{stage.id, stage.name, theta, theta};
+  record.reason = "interrupted";
+  const ParameterSet parameters = parameters_of(stage, theta);
+  CostEvaluation e = objective_of(stage, parameters, grid(stage.grid)).evaluate(parameters.to_unconstrained(theta));
+  record.succeeded = e.succeeded;
+  record.cost = e.succeeded ? e.cost : infinite;
+  record.elements = grid(stage.grid).recording.front().body->element_count();
+  ended_.push_back({stage.id, std::move(e), true});
+  return record;
 }
 
 void FitRun::finish(const std::vector<StageRecord>& done) {
@@ -595,7 +619,9 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
     outcome_.recordings.push_back({d, outcome_.theta, outcome_.evaluation.of_recording(int(r)),
                                    Simulation(d.body, d.simulation).rest_body(outcome_.theta)});
   }
-  if (outcome_.evaluation.succeeded && parameters.dimension() > 0) add_uncertainty(outcome_, shifts_in(done), floor());
+  const bool has_derivatives = outcome_.evaluation.gauss_newton.rows() == parameters.dimension();
+  if (outcome_.evaluation.succeeded && has_derivatives && parameters.dimension() > 0)
+    add_uncertainty(outcome_, shifts_in(done), floor());
   if (outcome_.evaluation.succeeded && !interrupted_) time_steps(narrow, parameters);
   if (const StageRecord* swing = find_record(done, {StageKind::Swing}); swing && !swing->told.empty())
     outcome_.notes.push_back(swing->told);
@@ -604,11 +630,11 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   add_notes(outcome_, captures);
 }
 
-/// With derivatives; that of the optimiser where it ran here.
+/// With derivatives, but for a last look; that of the optimiser where it ran here.
 CostEvaluation FitRun::evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters) {
   const auto ended = std::ranges::find(ended_, record.id, &Ended::id);
-  const bool is_whole =
-      ended != ended_.end() && (!record.succeeded || ended->evaluation.gauss_newton.rows() == parameters.dimension());
+  const bool is_whole = ended != ended_.end() && (!record.succeeded || ended->is_last_look ||
+                                                  ended->evaluation.gauss_newton.rows() == parameters.dimension());
   if (is_whole) return std::move(ended->evaluation);
   return objective_of(narrow, parameters, grid(narrow.grid)).linearise(parameters.to_unconstrained(record.theta));
 }

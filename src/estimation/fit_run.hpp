@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <optional>
@@ -23,6 +24,8 @@ class FitRun : StageLoop {
   FitOutcome run();
 
  private:
+  /// Where an interrupted fit stands that has no estimate yet: one simulation, without derivatives.
+  StageRecord last_look(const PassState& at);
   std::vector<StageChain> next() override;
   StageRecord run_stage(const Stage& stage, bool& is_cut) override;
   StageRecord minimise_stage(const Stage& stage, bool& is_cut);
@@ -33,7 +36,7 @@ class FitRun : StageLoop {
   StageRecord look_at_resolution(const Stage& stage);
   std::optional<VectorX> mesh_shift(const std::vector<StageRecord>& done, const VectorX& own) const;
   StageRecord try_alternative(const Stage& stage, bool& is_cut);
-  std::vector<ModelShift> shifts_of_given(const Stage& stage, const ParameterSet& estimated);
+  std::vector<ModelShift> shifts_of_given(const Stage& stage, const ParameterSet& estimated, double& work);
 
   /// One minimisation, told as iterations of the stage; from any thread.
   OptimiserSummary optimise(Objective& objective, const Stage& stage, const OptimiserState& from);
@@ -71,6 +74,7 @@ class FitRun : StageLoop {
   struct Ended {
     StageId id;
     CostEvaluation evaluation;
+    bool is_last_look = false;
   };
 
   Recordings recordings_;
@@ -80,6 +84,7 @@ class FitRun : StageLoop {
   std::map<int, std::string> not_made_;      // why, by the alternative's number
   FitPlan plan_;
   std::vector<Ended> ended_;  // in this run
+  std::atomic<bool> stages_are_over_ = false;
 };
 
 }  // namespace pliant

@@ -111,7 +111,7 @@ struct StageRecord {
   bool converged = false;
   std::string reason = {};  ///< why it ended
   int elements = 0;         ///< of the first recording's body
-  double seconds = 0.0;     ///< that it took, of those since the fit was last resumed
+  double work = 0.0;        ///< that it took since the fit was last resumed: see `CostEvaluation::work`
   /// Of a scan: Young's moduli and costs; infinite where it cannot be simulated.
   std::vector<std::pair<double, double>> trials = {};
   std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction

@@ -194,7 +194,7 @@ Json from_record(const StageRecord& r) {
                {"converged", r.converged},
                {"reason", r.reason},
                {"elements", r.elements},
-               {"seconds", r.seconds},
+               {"work", r.work},
                {"corrected", r.corrected},
                {"told", r.told},
                {"trials", Json::array()}};
@@ -216,7 +216,7 @@ StageRecord to_record(const Json& json) {
   r.succeeded = json.at("succeeded").get<bool>(), r.converged = json.at("converged").get<bool>();
   r.reason = json.at("reason").get<std::string>();
   r.elements = json.at("elements").get<int>();
-  r.seconds = json.at("seconds").get<double>();
+  r.work = json.at("work").get<double>();
   r.corrected = json.at("corrected").get<std::vector<std::string>>();
   r.told = json.at("told").get<std::string>();
   for (const Json& t : json.at("trials")) r.trials.emplace_back(t.at(0).get<double>(), to_cost(t.at(1)));

@@ -115,7 +115,7 @@ const ObservedGrip& GripTrial::test() const { return scene_->tests->grips[std::s
 bool GripTrial::compare(const VectorX& theta, CostEvaluation& result, Points& off, double& pull) {
   const ObservedGrip& seen = test();
   body_.set_law(material_->law(theta));
-  result.steps = 1;
+  result.steps = 1, result.work = steps_of_an_equilibrium * scene_->body->node_count();
   if (!body_.solve()) return result.failure = seen.name + ": " + body_.failure(), false;
   FrameFit fit;
   fit.recording = number_;

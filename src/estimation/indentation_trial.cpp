@@ -79,7 +79,7 @@ CostEvaluation IndentationTrial::run(const VectorX& theta, const MatrixX& direct
   VectorX by_theta;
   for (std::size_t d = 0; d < curve.depths.size(); ++d) {
     if (!body_.solve(d)) return result.failure = test().name + ": " + body_.failure(), result;
-    ++result.steps;
+    ++result.steps, result.work += steps_of_an_equilibrium * scene_->body->node_count();
     const double r = (body_.force(d) - curve.forces[d]) / curve.stds[d];
     FrameFit fit;
     fit.recording = number_;

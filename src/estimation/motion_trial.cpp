@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/error.hpp"
 #include "base/instants.hpp"
 #include "base/parallel.hpp"
 
@@ -81,6 +82,13 @@ class MotionTrial::Comparison {
     return options;
   }
   int last_instant() const { return int(instants_.size()) - 1; }
+  void stop_if_interrupted() const {
+    if (motion_.options.interrupted && motion_.options.interrupted()) throw Interrupted();
+  }
+  double work_of(const RolloutSummary& summary, double with_derivatives) const {
+    const double steps = motion_.simulation.is_static ? steps_of_an_equilibrium : 1.0;
+    return motion_.body->node_count() * steps * summary.steps * with_derivatives;
+  }
   /// What was seen at an instant of the simulation; nothing where no sensor looked.
   const FrameObservations* seen_at(int instant) const {
     const std::vector<FrameObservations>& all = *motion_.observations;
@@ -253,6 +261,7 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
   const RolloutSummary summary =
       simulation_.run(theta, directions(Eigen::all, along), last_instant(),
                       [&](int instant, const State& state, std::span<const State> tangents) {
+                        stop_if_interrupted();
                         if (const FrameObservations* seen = seen_at(instant)) {
                           Tangents changes{directions.cols(), along, {}};
                           for (const State& t : tangents) changes.positions.push_back(t.x);
@@ -265,6 +274,7 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
                       });
   beside.wait();
   evaluation.steps = summary.steps;
+  evaluation.work = work_of(summary, 1.0 + steps_of_a_tangent * double(along.size()));
   if (!summary.succeeded) return evaluation.failure = summary.failure, evaluation;
   fits.resize(next);
   const Eigen::Index n = all_directions.cols();
@@ -324,6 +334,7 @@ CostEvaluation MotionTrial::Comparison::gradient(const VectorX& theta, VectorX& 
   const RolloutSummary summary = simulation_.run_adjoint(
       theta, last_instant(),
       [&](int instant, const State& state) {
+        stop_if_interrupted();
         if (const auto* seen = seen_at(instant)) evaluation.frames.push_back(fit_frame(*seen, state.x, {}));
         return true;
       },
@@ -332,6 +343,7 @@ CostEvaluation MotionTrial::Comparison::gradient(const VectorX& theta, VectorX& 
       },
       theta_bar);
   evaluation.steps = summary.steps;
+  evaluation.work = work_of(summary, 1.0 + steps_of_an_adjoint);
   if (!summary.succeeded) return evaluation.failure = summary.failure, evaluation;
   theta_bar += sensor_bar;
   for (const FrameFit& fit : evaluation.frames) evaluation.cost += fit.cost;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct ObjectiveOptions {
   int last_frame = 0;          ///< horizon, inclusive
   /// Neighbouring pixels err together: a frame counts as at most so many independent points.
   double independent_points = 50.0;
+  /// Asked at each frame whether the work is to end; may be empty.
+  std::function<bool()> interrupted = {};
 };
 
 /// What was observed of a body and how it is compared; either may be null where there is nothing of its kind.
@@ -46,6 +49,7 @@ struct ObservedMotion {
 /// A motion, or an equilibrium, compared with points on its surface and points of the object that were followed: the
 /// sum over frames and points of a robust loss of the pulled-back distance, or of the distance from where a followed
 /// point was seen, over its noise. The comparison of a frame is evaluated beside the simulation of the next.
+/// Runs throw Interrupted at the frame where `ObjectiveOptions::interrupted` says so.
 class MotionTrial : public Trial {
  public:
   /// @param number  what its frames call it (`FrameFit::recording`)

@@ -38,7 +38,7 @@ Objective::Objective(Mismatch mismatch, std::shared_ptr<const Body> body, Simula
 CostEvaluation Objective::sum(const VectorX& p, std::vector<CostEvaluation> parts, bool has_gradient,
                               bool has_matrix) const {
   CostEvaluation total;
-  for (const CostEvaluation& part : parts) total.steps += part.steps;
+  for (const CostEvaluation& part : parts) total.steps += part.steps, total.work += part.work;
   for (const CostEvaluation& part : parts)
     if (!part.succeeded) return total.failure = part.failure, total;
   MatrixX curvature;

@@ -43,13 +43,13 @@ class Run {
                        : by == Derivatives::Adjoint ? objective_.gradient(p)
                                                     : objective_.linearise(p);
     ++summary.evaluations;
-    summary.steps += e.steps;
+    summary.steps += e.steps, summary.work += e.work;
     return e;
   }
   /// Costs alone, side by side where that can be.
   std::vector<CostEvaluation> evaluate(const std::vector<VectorX>& points) {
     std::vector<CostEvaluation> all = objective_.evaluate(points);
-    for (const CostEvaluation& e : all) ++summary.evaluations, summary.steps += e.steps;
+    for (const CostEvaluation& e : all) ++summary.evaluations, summary.steps += e.steps, summary.work += e.work;
     return all;
   }
   bool begin(const OptimiserState& state, Derivatives by) {
@@ -480,7 +480,7 @@ OptimiserSummary minimise_staggered(Objective& objective, const OptimiserState& 
     OptimiserSummary s = minimise(objective, OptimiserState{done, all.p, {}}, turn, on_iteration);
     const double moved = (s.p - all.p).cwiseAbs().maxCoeff();
     s.start_cost = first ? s.start_cost : all.start_cost;
-    s.evaluations += all.evaluations, s.steps += all.steps;
+    s.evaluations += all.evaluations, s.steps += all.steps, s.work += all.work;
     const bool stands = s.iterations == done;
     done = s.iterations;
     all = std::move(s);

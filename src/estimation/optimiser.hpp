@@ -61,6 +61,7 @@ struct OptimiserSummary {
   double start_cost = 0.0;
   int iterations = 0, evaluations = 0;
   long long steps = 0;  ///< time steps simulated
+  double work = 0.0;    ///< see `CostEvaluation::work`
   bool converged = false, interrupted = false, succeeded = false;
   std::string reason = "not run";
 };

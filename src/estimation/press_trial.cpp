@@ -77,7 +77,7 @@ std::unique_ptr<Trial> PressTrial::anew() const {
 bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight) {
   const ObservedPress& seen = scene_->presses[std::size_t(press_)];
   body_.equilibrium().set_law(material_->law(theta));
-  result.steps = 1;
+  result.steps = 1, result.work = steps_of_an_equilibrium * scene_->body->node_count();
   is_placed_ = body_.solve().converged;
   if (!is_placed_) return result.failure = seen.name + ": " + body_.equilibrium().failure(), false;
   Points residuals = body_.points();

@@ -367,7 +367,8 @@ std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recor
 }
 
 Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters, double band,
-                                const std::function<int(const Recording&)>& last_frame) const {
+                                const std::function<int(const Recording&)>& last_frame,
+                                const std::function<bool()>& interrupted) const {
   std::vector<std::unique_ptr<Trial>> trials;
   // How the motion begins says nothing about what stands still.
   const std::vector<const Parameter*> estimated = parameters.coordinate_parameters();
@@ -380,6 +381,7 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
     ObjectiveOptions o;
     o.outlier_scale = band * r.size;
     o.last_frame = std::min(r.last_frame, last_frame(r));
+    o.interrupted = interrupted;
     options.push_back(o);
     trials.push_back(
         std::make_unique<MotionTrial>(ObservedMotion{d.mismatch, d.body, d.simulation, r.observations, o}, int(i)));

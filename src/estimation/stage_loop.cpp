@@ -1,7 +1,6 @@
 #include "estimation/stage_loop.hpp"
 
-#include <chrono>
-
+#include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "estimation/fit_plan.hpp"
 
@@ -26,9 +25,13 @@ void StageLoop::run_chain(const StageChain& chain) {
     if (stage.from.empty()) stage.from = {theta};
     stage.iterations_before = counted;
     bool is_cut = false;
-    const auto begin = std::chrono::steady_clock::now();
-    StageRecord record = run_stage(stage, is_cut);
-    record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    StageRecord record;
+    try {
+      record = run_stage(stage, is_cut);
+    } catch (const Interrupted&) {  // in the midst of a simulation: the state has where the optimiser stood
+      interrupted_ = true;
+      return;
+    }
     if (is_cut) {
       const std::lock_guard lock(mutex_);
       interrupted_ = true;

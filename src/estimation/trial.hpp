@@ -6,6 +6,9 @@
 
 namespace pliant {
 
+/// What takes about as long as how many time steps of the same body: for `CostEvaluation::work`.
+constexpr double steps_of_a_tangent = 0.35, steps_of_an_adjoint = 1.0, steps_of_an_equilibrium = 40.0;
+
 /// Something that is simulated and compared with what was measured of it: a motion seen by sensors, a body at rest
 /// under a load, a press with known force, a stress-strain curve. It reads its parameters from the vector that all
 /// trials of an objective share, by handles of its own. One instance for one thread.

@@ -75,7 +75,7 @@ std::string trust_sentence(const ParameterResult& p) {
   const auto* value = std::get_if<double>(&p.value);
   if (!p.estimated || !value) return "";
   if (!p.std || !std::isfinite(std::get<double>(*p.std)))
-    return fmt::format("{} could not be given an uncertainty: the recording may hardly depend on it.",
+    return fmt::format("{} has no uncertainty: the fit did not come to its end, or the recording hardly depends on it.",
                        spoken_name(p.name));
   const double relative = std::get<double>(*p.std) / std::abs(*value);
   if (relative < 0.3) return "";

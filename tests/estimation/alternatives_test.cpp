@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 #include "estimation/fit.hpp"
 #include "support/interruption.hpp"
@@ -78,6 +80,19 @@ TEST(Budget, ThatIsTooSmallIsSaid) {
   const FitOutcome outcome = fit({bar}, options);
   EXPECT_EQ(outcome.refinement.estimates.size(), 0u);
   EXPECT_THAT(outcome.notes, ::testing::Contains(::testing::HasSubstr("--budget")));
+}
+
+TEST(Budget, IsCountedNotTimed) {
+  const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  FitOptions options = one_hexahedron();
+  options.budget = 0.05;  // 3 s
+  const FitOutcome quick = fit({bar}, options);
+  FitMonitor slow;
+  slow.on_event = [](const FitEvent&) { std::this_thread::sleep_for(std::chrono::milliseconds(200)); };
+  const FitOutcome on_a_busy_machine = fit({bar}, options, slow);
+  ASSERT_GE(quick.refinement.estimates.size(), 2u) << "there is room for a finer mesh";
+  EXPECT_EQ(on_a_busy_machine.theta, quick.theta);
+  EXPECT_EQ(on_a_busy_machine.refinement.estimates.size(), quick.refinement.estimates.size());
 }
 
 TEST(Budget, IsNotNeededWhereTheMeshHardlyMatters) {

@@ -514,7 +514,6 @@ TEST_F(Plans, LookOnceAtWhatWasReachedWhereTheyAreInterrupted) {
   has_moved();
   Stage look = FitPlan(facts).last_look(state);
   EXPECT_EQ(look.id, (StageId{StageKind::Fine, 0, 1}));
-  EXPECT_EQ(look.iterations, 1);
   EXPECT_EQ(look.band, facts.options.fine_band);
   state = {};
   has_followed();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "estimation/problem.hpp"
 #include "support/derivatives.hpp"
@@ -290,6 +291,43 @@ TEST(Objective, EvaluationsThatHaveNotBegunCanBeLeftOut) {
   ASSERT_EQ(some.size(), 3u);
   EXPECT_EQ(std::ranges::count(some, true, &CostEvaluation::succeeded), 1);
   EXPECT_EQ(std::ranges::count(some, "left out", &CostEvaluation::failure), 2);
+}
+
+TEST(Objective, EndsAtTheFrameWhereItIsInterrupted) {
+  const test::Recording recording = test::torus_recording(cell_size, 6, 1, 1e-3);
+  ParameterSet parameters = recording.parameters;
+  parameters.set_estimated("youngs_modulus", true);
+  int asked = 0;
+  ObjectiveOptions options;
+  options.outlier_scale = 0.03, options.last_frame = 5;
+  options.interrupted = [&] { return ++asked == 3; };
+  Objective objective({recording.constraints, nullptr}, recording.scene.body, recording.scene.options,
+                      recording.observations, parameters, options);
+  const VectorX p = parameters.to_unconstrained(recording.truth);
+  EXPECT_THROW((void)objective.evaluate(p), Interrupted);
+  EXPECT_EQ(asked, 3);
+  asked = 0;
+  EXPECT_THROW((void)objective.linearise(p), Interrupted);
+  EXPECT_EQ(asked, 3);
+  asked = 0;
+  EXPECT_THROW((void)objective.gradient(p), Interrupted);
+  EXPECT_EQ(asked, 3);
+  asked = 3;  // it does not come again
+  EXPECT_TRUE(objective.linearise(p).succeeded) << "what was broken off leaves no trace";
+}
+
+/// Work is counted: twice the same is the same, and derivatives and frames add to it.
+TEST(Objective, CountsItsWork) {
+  const test::Recording recording = test::torus_recording(cell_size, 4, 1, 1e-3);
+  ParameterSet parameters = recording.parameters;
+  parameters.set_estimated("youngs_modulus", true);
+  parameters.set_estimated("mass_damping", true);
+  Objective objective = recording.objective(parameters);
+  const VectorX p = parameters.to_unconstrained(recording.truth);
+  const CostEvaluation alone = objective.evaluate(p), tangents = objective.linearise(p);
+  EXPECT_EQ(alone.work, double(recording.scene.body->node_count()) * alone.steps);
+  EXPECT_NEAR(tangents.work, (1.0 + 2.0 * steps_of_a_tangent) * alone.work, 1e-9 * alone.work);
+  EXPECT_EQ(objective.evaluate(p).work, alone.work);
 }
 
 TEST(Objective, AFailedSimulationIsReportedNotThrown) {
