@@ -32,6 +32,19 @@ OptimiserState start_of(const ParameterSet& parameters) {
   return {0, parameters.to_unconstrained(parameters.reference()), {}};
 }
 
+constexpr double work_of_a_minute = 4e7;  // see `CostEvaluation::work`: of a laptop's two cores
+
+/// Of one simulation of all recordings, about.
+double work_of_a_look(const Grid& grid) {
+  double work = 0.0;
+  for (const Discretisation& d : grid.recording) {
+    const SimulationOptions& s = d.simulation;
+    const double steps = s.is_static ? steps_of_an_equilibrium : (s.times.back() - s.times.front()) / s.max_dt;
+    work += steps * d.body->node_count();
+  }
+  return work;
+}
+
 int last_frame(const Horizon& horizon, const Recording& r) {
   switch (horizon.until) {
     case Horizon::Until::Start:
@@ -504,7 +517,6 @@ std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const Parame
 /// iterations. Both are counted, not timed: a machine that is busy, or slow, gives the same answer.
 StageRecord FitRun::look_at_resolution(const Stage& stage) {
   constexpr double tolerated = 0.5, growth = 3.5;  // of the noise's; power of the ratio of edges, of work
-  constexpr double work_of_a_minute = 4e7;         // of a laptop's two cores
   constexpr int iterations = 4;                    // from an estimate that is near, with the first linearisation
   const VectorX& theta = stage.from.front();
   StageRecord record{stage.id, stage.name, theta, theta};
@@ -578,6 +590,17 @@ StageRecord FitRun::last_look(const PassState& at) {
       theta = parameters_of(chain.front(), left->from).to_theta(left->optimiser.p);
   StageRecord record{stage.id, stage.name, theta, theta};
   record.reason = "interrupted";
+  constexpr double at_most = 0.25;  // minutes: who interrupts does not wait
+  if (work_of_a_look(grid(stage.grid)) > at_most * work_of_a_minute) {
+    record.cost = infinite;
+    record.reason = fmt::format(
+        "interrupted before the first estimate on the full mesh, where one simulation takes long; Young's modulus was "
+        "{} Pa so far, and --resume goes on from there",
+        in_three_digits(theta[plan_.facts().moduli.front()]));
+    ended_.push_back({stage.id, {}, true});
+    ended_.back().evaluation.failure = record.reason;
+    return record;
+  }
   const ParameterSet parameters = parameters_of(stage, theta);
   CostEvaluation e = objective_of(stage, parameters, grid(stage.grid)).evaluate(parameters.to_unconstrained(theta));
   record.succeeded = e.succeeded;
@@ -606,13 +629,15 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   outcome_.cells = at.cells;
   outcome_.interrupted = interrupted_;
   outcome_.converged = last.converged && !interrupted_;
-  outcome_.reason = interrupted_ ? "interrupted" : last.reason;
+  outcome_.reason = interrupted_ && last.succeeded ? "interrupted" : last.reason;
   outcome_.theta = last.theta;
   outcome_.parameters = recordings_.with_field_prior(parameters, at);
   outcome_.final_cost = last.cost;
   Stage narrow{last.id, last.name, plan_.spacing_of(last)};
   narrow.band = options_.fine_band;
-  outcome_.start_cost = objective_of(narrow, parameters_of(narrow, outcome_.start_theta), at).evaluate(VectorX(0)).cost;
+  if (last.succeeded || !interrupted_)
+    outcome_.start_cost =
+        objective_of(narrow, parameters_of(narrow, outcome_.start_theta), at).evaluate(VectorX(0)).cost;
   outcome_.evaluation = evaluation_of(last, narrow, parameters);
   for (std::size_t r = 0; r < recordings_.all().size(); ++r) {
     const Discretisation& d = at.recording[r];

@@ -24,7 +24,8 @@ class FitRun : StageLoop {
   FitOutcome run();
 
  private:
-  /// Where an interrupted fit stands that has no estimate yet: one simulation, without derivatives.
+  /// Where an interrupted fit stands that has no estimate yet: one simulation, without derivatives; not even that where
+  /// it would take long.
   StageRecord last_look(const PassState& at);
   std::vector<StageChain> next() override;
   StageRecord run_stage(const Stage& stage, bool& is_cut) override;
