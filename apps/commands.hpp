@@ -14,6 +14,7 @@ void add_live(CommandLine& line, int& exit_code);
 void add_simulate(CommandLine& line, int& exit_code);
 void add_track(CommandLine& line, int& exit_code);
 void add_evaluate(CommandLine& line, int& exit_code);
+void add_export(CommandLine& line, int& exit_code);
 void add_press(CommandLine& line, int& exit_code);
 void add_synth(CommandLine& line, int& exit_code);
 void add_rest(CommandLine& line, int& exit_code);

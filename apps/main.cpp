@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   add_live(line, exit_code);
   add_track(line, exit_code);
   add_evaluate(line, exit_code);
+  add_export(line, exit_code);
   add_press(line, exit_code);
   add_synth(line, exit_code);
   add_rest(line, exit_code);

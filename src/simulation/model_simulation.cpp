@@ -56,10 +56,40 @@ std::shared_ptr<const Body> body_of(const Model& model, const Scene& scene, cons
   return std::make_shared<Body>(std::move(body));
 }
 
+/// Eight straight elements in the place of each quadratic one, over the same nodes: one at each corner, and four about
+/// the shortest diagonal of what is left.
+TetMesh in_eight(const TetMesh& mesh) {
+  // By corners 0 to 3 and mid nodes 4 to 9 of the edges 01 02 03 12 13 23; a diagonal, and the ring about it.
+  constexpr std::array<std::array<int, 4>, 4> at_corners = {{{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}}};
+  constexpr std::array<std::array<int, 6>, 3> diagonals = {
+      {{4, 9, 5, 7, 8, 6}, {5, 8, 4, 6, 9, 7}, {6, 7, 4, 8, 9, 5}}};
+  std::vector<std::array<int, 4>> tets;
+  for (std::size_t e = 0; e < mesh.tets.size(); ++e) {
+    std::array<int, 10> nodes{};
+    std::ranges::copy(mesh.tets[e], nodes.begin());
+    std::ranges::copy(mesh.mid_nodes[e], nodes.begin() + 4);
+    const auto at = [&](int local) { return mesh.nodes.row(nodes[std::size_t(local)]); };
+    const auto add = [&](const std::array<int, 4>& local) {
+      std::array<int, 4> tet{};
+      for (std::size_t k = 0; k < 4; ++k) tet[k] = nodes[std::size_t(local[k])];
+      const Vector3 a = at(local[1]) - at(local[0]), b = at(local[2]) - at(local[0]), c = at(local[3]) - at(local[0]);
+      if (a.cross(b).dot(c) < 0.0) std::swap(tet[2], tet[3]);
+      tets.push_back(tet);
+    };
+    for (const auto& corner : at_corners) add(corner);
+    const auto shortest = std::ranges::min(
+        diagonals, {}, [&](const std::array<int, 6>& d) { return (at(d[0]) - at(d[1])).squaredNorm(); });
+    for (std::size_t k = 0; k < 4; ++k) add({shortest[0], shortest[1], shortest[2 + k], shortest[2 + (k + 1) % 4]});
+  }
+  return make_tet_mesh(mesh.nodes, std::move(tets));
+}
+
 }  // namespace
 
-std::shared_ptr<const Body> model_body(const Model& model) {
-  if (has_tetrahedra(model)) return body_of(model, model.scene, nullptr);
+namespace {
+
+/// Quadratic tetrahedra for a model of hexahedra.
+std::shared_ptr<const Body> as_tetrahedra(const Model& model) {
   const Scene& scene = model.scene;
   const auto distance = scene_distance(scene, Resolution{}.band);
   std::vector<Vector3> no_points;
@@ -83,6 +113,20 @@ std::shared_ptr<const Body> model_body(const Model& model) {
     body.modulus.relative[std::size_t(e)] = volume.youngs_modulus[std::size_t(nearest)] / model.youngs_modulus;
   }
   return std::make_shared<Body>(std::move(body));
+}
+
+}  // namespace
+
+std::shared_ptr<const Body> model_body(const Model& model, std::optional<ElementKind> kind) {
+  auto own = has_tetrahedra(model) ? body_of(model, model.scene, nullptr) : as_tetrahedra(model);
+  if (!kind || own->kind == *kind) return own;
+  const auto& mesh = std::get<TetMesh>(own->mesh);
+  const bool is_split = *kind == ElementKind::Tetrahedron;
+  Body other = make_body(is_split ? in_eight(mesh) : with_mid_nodes(mesh));
+  const std::size_t parts = is_split ? 8 : 1;
+  for (std::size_t e = 0; e < other.modulus.relative.size(); ++e)
+    other.modulus.relative[e] = own->modulus.relative[e / parts];
+  return std::make_shared<Body>(std::move(other));
 }
 
 ModelScene make_scene(const Model& model) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "geometry/signed_distance.hpp"
 #include "model/model.hpp"
@@ -30,6 +31,7 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
 
 /// The body of a model as tetrahedra, with each element's modulus: its own, or, where the model is of hexahedra,
 /// quadratic ones with about as many nodes along its longest axis, each with the modulus of the hexahedron about it.
-std::shared_ptr<const Body> model_body(const Model& model);
+/// @param kind  linear or quadratic; others than the above become eight linear ones each, or get mid nodes
+std::shared_ptr<const Body> model_body(const Model& model, std::optional<ElementKind> kind = std::nullopt);
 
 }  // namespace pliant

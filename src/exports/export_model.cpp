@@ -1,0 +1,212 @@
+#include "exports/export_model.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "base/error.hpp"
+#include "elasticity/modes.hpp"
+#include "motion/statics.hpp"
+#include "simulation/model_simulation.hpp"
+
+namespace pliant {
+
+namespace {
+
+constexpr int frequencies_told = 6;
+
+/// A scene that only elasticity and what is held act in.
+SimulationOptions elastic_alone(SimulationOptions options) {
+  options.is_static = true;
+  options.times = {0.0};
+  options.blocks.planes.clear(), options.blocks.pulls.clear(), options.blocks.strengths.clear();
+  options.further_forces.clear(), options.weights.clear(), options.loads.clear(), options.released_weights.clear();
+  options.law.reset(), options.law_layout.reset();
+  options.elastic_law = ElasticLaw::NeoHookean;
+  for (Hold& hold : options.holds) hold.rotation.setIdentity(), hold.translation.setZero();
+  return options;
+}
+
+/// Small motions about rest of a body that is held: forces to displacements.
+class Compliance {
+ public:
+  Compliance(const std::shared_ptr<const Body>& body, const SimulationOptions& options, const VectorX& theta)
+      : body_(body), terms_(scene_forces(body, options)), statics_(body, pointers(terms_)) {
+    for (const auto& term : terms_) term->set_parameters(theta);
+    statics_.hold(eliminated_nodes(*body, options));
+    is_ready_ = statics_.prepare_derivatives(body->nodes);
+  }
+  bool is_ready() const { return is_ready_; }
+  Points displacements(const Points& forces) { return statics_.response(forces); }
+
+  /// Subspace iteration (Bathe 1996, section 11.6) with masses of this density [kg/m^3].
+  std::vector<double> frequencies(double density, int count) {
+    constexpr int most_iterations = 60;
+    const int size = 2 * count;
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal;
+    std::vector<Points> x(std::size_t(size), Points(body_->node_count(), 3));
+    for (Points& shape : x)
+      for (Eigen::Index k = 0; k < shape.size(); ++k) shape.data()[k] = normal(random);
+    VectorX lambda = VectorX::Zero(size);
+    for (int i = 0; i < most_iterations; ++i) {
+      std::vector<Points> masses, moved, masses_moved;
+      for (const Points& shape : x) {
+        masses.push_back(mass_product(density, shape));
+        moved.push_back(displacements(masses.back()));
+        masses_moved.push_back(mass_product(density, moved.back()));
+      }
+      MatrixX K(size, size), M(size, size);
+      for (int a = 0; a < size; ++a)
+        for (int b = 0; b < size; ++b) {
+          K(a, b) = moved[std::size_t(a)].cwiseProduct(masses[std::size_t(b)]).sum();
+          M(a, b) = moved[std::size_t(a)].cwiseProduct(masses_moved[std::size_t(b)]).sum();
+        }
+      const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixX> small(0.5 * (K + K.transpose()),
+                                                                    0.5 * (M + M.transpose()));
+      for (int a = 0; a < size; ++a) {
+        x[std::size_t(a)].setZero();
+        for (int b = 0; b < size; ++b) x[std::size_t(a)] += small.eigenvectors()(b, a) * moved[std::size_t(b)];
+      }
+      const VectorX before = lambda;
+      lambda = small.eigenvalues();
+      if (((lambda - before).head(count).array().abs() < 1e-9 * lambda.head(count).array()).all()) break;
+    }
+    std::vector<double> hertz;
+    for (int k = 0; k < count; ++k) hertz.push_back(std::sqrt(lambda[k]) / (2.0 * M_PI));
+    return hertz;
+  }
+
+ private:
+  static std::vector<ForceTerm*> pointers(const std::vector<std::unique_ptr<ForceTerm>>& terms) {
+    std::vector<ForceTerm*> all;
+    for (const auto& term : terms) all.push_back(term.get());
+    return all;
+  }
+  Points mass_product(double density, const Points& x) const {
+    Points product = Points::Zero(x.rows(), 3);
+    body_->add_mass_product(density, x, product);
+    return product;
+  }
+
+  std::shared_ptr<const Body> body_;
+  std::vector<std::unique_ptr<ForceTerm>> terms_;
+  Statics statics_;
+  bool is_ready_ = false;
+};
+
+/// @param points  at rest [m], n x 3, of which the sag is told
+SmallMotions small_motions(const std::shared_ptr<const Body>& body, const SimulationOptions& options,
+                           const VectorX& theta, const Points& points) {
+  SmallMotions motions;
+  const double density = theta[options.blocks.density];
+  if (options.holds.empty()) {
+    constexpr int rigid = 6;
+    ModalAnalysis analysis(body, options.blocks, {});
+    const Modes modes = analysis.lowest(theta, rigid + frequencies_told);
+    if (!modes.converged) throw InputError({{}, "the model's vibrations were not found: " + modes.failure, "", ""});
+    for (int k = rigid; k < modes.count(); ++k) motions.frequencies.push_back(modes.frequency(k));
+    return motions;
+  }
+  Compliance compliance(body, options, theta);
+  if (!compliance.is_ready())
+    throw InputError({{}, "the model's stiffness cannot be factorised", "regions that hold the whole object", ""});
+  motions.frequencies = compliance.frequencies(density, frequencies_told);
+  const Points gravity = theta.segment<3>(options.blocks.gravity).transpose().replicate(body->node_count(), 1);
+  Points weight = Points::Zero(body->node_count(), 3);
+  body->add_mass_product(density, gravity, weight);
+  std::vector<Vector3> places;
+  for (Eigen::Index n = 0; n < points.rows(); ++n) places.push_back(points.row(n).transpose());
+  const Points moved = Embedding(*body, places).positions(compliance.displacements(weight));
+  motions.sag = std::sqrt(moved.rowwise().squaredNorm().maxCoeff());
+  return motions;
+}
+
+/// Highest frequency of K with lumped masses, by power iteration [rad/s].
+double stiffest_of(const std::shared_ptr<const Body>& body, const SimulationOptions& options, const VectorX& theta,
+                   const std::vector<double>& masses) {
+  constexpr int iterations = 100;
+  const auto elasticity = scene_elasticity(body, options);
+  elasticity->set_parameters(theta);
+  elasticity->linearise(body->nodes);
+  BlockMatrix K(body->pattern);
+  elasticity->add_matrix(1.0, K);
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  VectorX x(3 * body->node_count()), y(x.size());
+  for (double& value : x) value = normal(random);
+  double lambda = 0.0;
+  for (int i = 0; i < iterations; ++i) {
+    y.setZero();
+    K.multiply(x, y);
+    for (Eigen::Index k = 0; k < y.size(); ++k) y[k] /= masses[std::size_t(k / 3)];
+    lambda = y.norm() / x.norm();
+    x = y.normalized();
+  }
+  return std::sqrt(lambda);
+}
+
+}  // namespace
+
+std::vector<double> ExportModel::lumped_masses() const {
+  std::vector<double> masses(std::size_t(body->node_count()), 0.0);
+  for (int e = 0; e < body->element_count(); ++e)
+    for (const int node : body->element(e))
+      masses[std::size_t(node)] += density * body->element_volume[std::size_t(e)] / body->nodes_per_element();
+  return masses;
+}
+
+ExportModel export_model(const Model& model, ElementKind kind) {
+  const ModelScene scene = make_scene(model);
+  const SimulationOptions options = elastic_alone(scene.simulation);
+  ExportModel out;
+  out.name = model.name;
+  out.body = model_body(model, kind);
+  out.poissons_ratio = model.poissons_ratio;
+  out.density = scene.theta[options.blocks.density];
+  out.mass_damping = model.mass_damping, out.stiffness_damping = model.stiffness_damping;
+  out.gravity = scene.theta.segment<3>(options.blocks.gravity);
+  out.held = eliminated_nodes(*out.body, options);
+  out.model = small_motions(scene.body, options, scene.theta, out.body->nodes);
+  out.exported = small_motions(out.body, options, scene.theta, out.body->nodes);
+  // The same elements need no identification, but for rounding.
+  if (scene.body->kind != kind || scene.body->node_count() != out.body->node_count())
+    out.identified = std::pow(out.model.frequencies.front() / out.exported.frequencies.front(), 2);
+  for (double& hertz : out.exported.frequencies) hertz *= std::sqrt(out.identified);
+  out.exported.sag /= out.identified;
+  for (const double relative : out.body->modulus.relative)
+    out.moduli.push_back(out.identified * relative * model.youngs_modulus);
+  if (kind == ElementKind::Tetrahedron)
+    out.stiffest = std::sqrt(out.identified) * stiffest_of(out.body, options, scene.theta, out.lumped_masses());
+  if (model.law)
+    out.notes.push_back("The model's law (" + model.law->name + ") is told by its moduli of small strains.");
+  if (!model.scene.planes.empty()) out.notes.push_back("Planes that the object meets are left out.");
+  if (!model.scene.weights.empty()) out.notes.push_back("Weights that hang from the object are left out.");
+  if (model.is_rayleigh || model.stiffness_damping == 0.0) return out;
+  out.notes.push_back("Stiffness damping is that of small motions, on which both of its laws agree.");
+  return out;
+}
+
+ModulusGroups grouped_moduli(const std::vector<double>& moduli, int most) {
+  ModulusGroups groups;
+  std::map<double, int> different;
+  for (const double modulus : moduli) different.try_emplace(modulus, 0);
+  if (int(different.size()) <= most) {
+    for (auto& [modulus, number] : different) number = int(groups.moduli.size()), groups.moduli.push_back(modulus);
+    for (const double modulus : moduli) groups.group.push_back(different.at(modulus));
+    return groups;
+  }
+  const double low = std::log(different.begin()->first), step = (std::log(different.rbegin()->first) - low) / most;
+  std::map<int, int> numbers;
+  for (const double modulus : moduli) {
+    const int at = std::min(most - 1, int((std::log(modulus) - low) / step));
+    const auto [entry, is_new] = numbers.try_emplace(at, int(groups.moduli.size()));
+    if (is_new) groups.moduli.push_back(std::exp(low + (at + 0.5) * step));
+    groups.group.push_back(entry->second);
+  }
+  return groups;
+}
+
+}  // namespace pliant

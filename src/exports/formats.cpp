@@ -1,0 +1,52 @@
+#include "exports/formats.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+
+namespace pliant {
+
+const std::vector<ExportFormat>& export_formats() {
+  static const std::vector<ExportFormat> all = {
+      {"calculix", "CalculiX and Abaqus", true, write_calculix},
+      {"gmsh", "Gmsh and what reads its meshes", true, write_gmsh},
+      {"mujoco", "MuJoCo", false, write_mujoco},
+      {"newton", "Newton and Warp", false, write_newton},
+      {"usd", "what reads USD, such as Isaac Sim and Newton", false, write_usd},
+  };
+  return all;
+}
+
+const ExportFormat& export_format(const std::string& name) {
+  const auto it = std::ranges::find(export_formats(), name, &ExportFormat::name);
+  if (it != export_formats().end()) return *it;
+  std::string names;
+  for (const ExportFormat& f : export_formats()) names += (names.empty() ? "" : ", ") + f.name;
+  throw InputError({{}, "no format `" + name + "`", names, ""});
+}
+
+std::vector<std::string> write_export(const ExportModel& model, const ExportFormat& format,
+                                      const std::filesystem::path& folder) {
+  using Json = nlohmann::ordered_json;
+  std::vector<std::string> files = format.write(model, folder);
+  const auto motions = [](const SmallMotions& m) { return Json{{"frequencies", m.frequencies}, {"sag", m.sag}}; };
+  const Json json = {{"format", "export/1"},
+                     {"to", format.name},
+                     {"files", files},
+                     {"elements", model.body->element_count()},
+                     {"nodes", model.body->node_count()},
+                     {"quadratic", model.is_quadratic()},
+                     {"held_nodes", model.held.size()},
+                     {"mass", model.density * model.body->volume()},
+                     {"moduli_were_multiplied_by", model.identified},
+                     {"model", motions(model.model)},
+                     {"exported", motions(model.exported)},
+                     {"notes", model.notes}};
+  write_file(folder / "export.json", json.dump(2) + "\n");
+  files.push_back("export.json");
+  return files;
+}
+
+}  // namespace pliant

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "exports/export_model.hpp"
+
+namespace pliant {
+
+/// A format that models are written in.
+struct ExportFormat {
+  std::string name;      ///< as `--to` takes it
+  std::string program;   ///< that reads it
+  bool takes_quadratic;  ///< elements; else linear ones alone
+  /// Writes the files, FOLDER/NAME.EXTENSION and what stands beside it, and returns their names.
+  std::vector<std::string> (*write)(const ExportModel& model, const std::filesystem::path& folder);
+};
+
+const std::vector<ExportFormat>& export_formats();
+
+/// By its name. Throws InputError with those that there are.
+const ExportFormat& export_format(const std::string& name);
+
+/// Writes a model in a format, and `export.json`: elements, what moduli were multiplied by, frequencies and sag of the
+/// model and of what was written, so that the other program can be checked (docs/exports.md).
+/// @param kind  of elements; those that the format takes
+/// Returns the names of the files. Throws InputError where a file cannot be written.
+std::vector<std::string> write_export(const ExportModel& model, const ExportFormat& format,
+                                      const std::filesystem::path& folder);
+
+// The formats, each in a file of its own.
+std::vector<std::string> write_calculix(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_gmsh(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_mujoco(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_newton(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_usd(const ExportModel& model, const std::filesystem::path& folder);
+
+}  // namespace pliant

@@ -1,0 +1,153 @@
+#include "exports/export_model.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "elasticity/modes.hpp"
+#include "simulation/model_simulation.hpp"
+#include "support/models.hpp"
+
+namespace pliant::export_model_test {
+namespace {
+
+constexpr double length = 0.2;
+
+/// A slender bar of quadratic tetrahedra of two moduli, held at its low end.
+Model bar(bool is_quadratic = true) {
+  Model model = test::block(true);
+  model.scene.fixed = {{RegionHalfSpace{{-0.0999, 0, 0}, {-1, 0, 0}}, std::nullopt}};
+  model.scene.planes.clear();
+  model.scene.object.surface = make_box(Vector3(length, 0.02, 0.02), 0.01);
+  const auto body = test::tet_body({length, 0.02, 0.02}, {10, 2, 2}, is_quadratic, 0.0);
+  model.volume.nodes = body->nodes;
+  model.volume.kind = is_quadratic ? VtuCell::QuadraticTetrahedron : VtuCell::Tetrahedron;
+  model.volume.connectivity = body->connectivity;
+  for (int e = 0; e < body->element_count(); ++e) model.volume.youngs_modulus.push_back(e % 2 ? 2e5 : 2.5e5);
+  model.youngs_modulus = 2.2e5;
+  return model;
+}
+
+TEST(ExportModel, OfTheSameElementsIsTheModel) {
+  const Model model = bar();
+  const ExportModel exported = export_model(model, ElementKind::QuadraticTetrahedron);
+  EXPECT_EQ(exported.identified, 1.0);
+  ASSERT_EQ(exported.moduli.size(), model.volume.youngs_modulus.size());
+  for (std::size_t e = 0; e < exported.moduli.size(); ++e)
+    EXPECT_NEAR(exported.moduli[e], model.volume.youngs_modulus[e], 1e-9 * exported.moduli[e]);
+  EXPECT_EQ(exported.exported.frequencies, exported.model.frequencies);
+  EXPECT_EQ(exported.exported.sag, exported.model.sag);
+  EXPECT_EQ(exported.density, 500.0);
+  EXPECT_EQ(exported.gravity, Vector3(0.0, -9.81, 0.0));
+  EXPECT_FALSE(exported.held.empty());
+}
+
+/// Subspace iteration beside Lanczos's method.
+TEST(ExportModel, FrequenciesAreThoseOfModalAnalysis) {
+  const Model model = bar();
+  const ExportModel exported = export_model(model, ElementKind::QuadraticTetrahedron);
+  const ModelScene scene = make_scene(model);
+  const Modes modes = pliant::modes(scene.body, scene.simulation.blocks, scene.theta, exported.held, 6);
+  ASSERT_TRUE(modes.converged);
+  ASSERT_EQ(exported.model.frequencies.size(), 6u);
+  for (int k = 0; k < 6; ++k)
+    EXPECT_NEAR(exported.model.frequencies[std::size_t(k)], modes.frequency(k), 1e-6 * modes.frequency(k)) << k;
+}
+
+/// An even cantilever: f = 1.8751^2 / (2 pi L^2) sqrt(E I / (rho A)), sag rho A g L^4 / (8 E I).
+TEST(ExportModel, KnowsHowABeamVibratesAndSags) {
+  Model model = bar();
+  std::ranges::fill(model.volume.youngs_modulus, 2.2e5);
+  const ExportModel exported = export_model(model, ElementKind::QuadraticTetrahedron);
+  const double b = 0.02, bending = 2.2e5 * std::pow(b, 4) / 12.0, mass = 500.0 * b * b;
+  const double hertz = std::pow(1.8751 / length, 2) / (2.0 * std::numbers::pi) * std::sqrt(bending / mass);
+  EXPECT_NEAR(exported.model.frequencies[0], hertz, 0.02 * hertz);
+  EXPECT_NEAR(exported.model.frequencies[1], exported.model.frequencies[0], 0.01 * hertz) << "either way";
+  const double sag = mass * 9.81 * std::pow(length, 4) / (8.0 * bending);
+  EXPECT_NEAR(exported.model.sag, sag, 0.03 * sag);
+}
+
+TEST(ExportModel, SplitsQuadraticElementsInEightOfTheSameModulus) {
+  const Model model = bar();
+  const ExportModel exported = export_model(model, ElementKind::Tetrahedron);
+  const std::size_t count = model.volume.youngs_modulus.size();
+  ASSERT_EQ(exported.moduli.size(), 8 * count);
+  EXPECT_EQ(exported.body->node_count(), int(model.volume.nodes.rows()));
+  EXPECT_NEAR(exported.body->volume(), length * 4e-4, 1e-9);
+  for (std::size_t e = 0; e < exported.moduli.size(); ++e)
+    EXPECT_NEAR(exported.moduli[e], exported.identified * model.volume.youngs_modulus[e / 8],
+                1e-6 * exported.moduli[e]);
+  EXPECT_LT(exported.identified, 1.0) << "linear elements are stiffer";
+  EXPECT_GT(exported.identified, 0.5);
+  EXPECT_NEAR(exported.exported.frequencies[0], exported.model.frequencies[0], 1e-6 * exported.model.frequencies[0]);
+}
+
+TEST(ExportModel, GivesLinearElementsMidNodes) {
+  const Model model = bar(false);
+  const ExportModel exported = export_model(model, ElementKind::QuadraticTetrahedron);
+  EXPECT_EQ(exported.moduli.size(), model.volume.youngs_modulus.size());
+  EXPECT_TRUE(exported.is_quadratic());
+  EXPECT_GT(exported.identified, 1.0) << "the model's own elements were stiffer than its modulus";
+}
+
+TEST(ExportModel, OfHexahedraVibratesAsFast) {
+  const Model model = test::block(true);
+  for (const ElementKind kind : {ElementKind::Tetrahedron, ElementKind::QuadraticTetrahedron}) {
+    const ExportModel exported = export_model(model, kind);
+    EXPECT_EQ(exported.body->kind, kind);
+    EXPECT_NEAR(exported.exported.frequencies[0], exported.model.frequencies[0], 1e-6 * exported.model.frequencies[0]);
+    if (kind == ElementKind::QuadraticTetrahedron) {
+      EXPECT_NEAR(exported.identified, 1.0, 0.1);
+      EXPECT_NEAR(exported.exported.sag, exported.model.sag, 0.05 * exported.model.sag);
+      EXPECT_NEAR(exported.exported.frequencies[1], exported.model.frequencies[1],
+                  0.02 * exported.model.frequencies[1]);
+    } else {
+      EXPECT_LT(exported.identified, 0.9) << "linear elements lock";
+    }
+    EXPECT_THAT(exported.notes, ::testing::Contains(::testing::HasSubstr("Planes")));
+  }
+}
+
+TEST(ExportModel, OfAFreeObjectHasNoRigidFrequencyAndNoSag) {
+  const ExportModel exported = export_model(test::block(false), ElementKind::Tetrahedron);
+  EXPECT_TRUE(exported.held.empty());
+  EXPECT_EQ(exported.model.sag, 0.0);
+  ASSERT_EQ(exported.model.frequencies.size(), 6u);
+  EXPECT_GT(exported.model.frequencies[0], 1.0);
+  EXPECT_NEAR(exported.exported.frequencies[0], exported.model.frequencies[0], 1e-6 * exported.model.frequencies[0]);
+}
+
+TEST(ExportModel, SaysThatALawIsToldByItsModuli) {
+  const ExportModel exported = export_model(test::pressed_block(), ElementKind::Tetrahedron);
+  EXPECT_THAT(exported.notes, ::testing::Contains(::testing::HasSubstr("ogden")));
+}
+
+/// The highest frequency of linear elements with lumped masses bounds what explicit steps may be: sqrt(3) c / h for a
+/// regular lattice is a lower bound here.
+TEST(ExportModel, KnowsItsHighestFrequency) {
+  const ExportModel exported = export_model(bar(), ElementKind::Tetrahedron);
+  const double nu = 0.3, E = 2e5 * exported.identified;
+  const double speed = std::sqrt(E * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)) / 500.0), edge = 0.01;
+  EXPECT_GT(exported.stiffest, speed / edge);
+  EXPECT_LT(exported.stiffest, 20.0 * speed / edge);
+}
+
+TEST(GroupedModuli, AreThemselvesWhereTheyAreFew) {
+  const ModulusGroups groups = grouped_moduli({3.0, 1.0, 3.0, 2.0}, 8);
+  EXPECT_EQ(groups.moduli, (std::vector<double>{1.0, 2.0, 3.0}));
+  EXPECT_EQ(groups.group, (std::vector<int>{2, 0, 2, 1}));
+}
+
+TEST(GroupedModuli, AreStepsOfTheLogarithmWhereTheyAreMany) {
+  std::vector<double> moduli;
+  for (int i = 0; i < 1000; ++i) moduli.push_back(std::pow(10.0, 3.0 * i / 999.0));
+  const ModulusGroups groups = grouped_moduli(moduli, 50);
+  ASSERT_LE(groups.moduli.size(), 50u);
+  const double half_a_step = 0.5 * std::log(1e3) / 50;
+  for (std::size_t i = 0; i < moduli.size(); ++i)
+    EXPECT_LT(std::abs(std::log(groups.moduli[std::size_t(groups.group[i])] / moduli[i])), 1.001 * half_a_step);
+}
+
+}  // namespace
+}  // namespace pliant::export_model_test

@@ -1,0 +1,173 @@
+// What is written is read again: by readers that are ours for other purposes, or by the format's own words.
+#include "exports/formats.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <pugixml.hpp>
+#include <sstream>
+
+#include "base/error.hpp"
+#include "geometry/volume_mesh.hpp"
+#include "support/models.hpp"
+
+namespace pliant::export_formats_test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+int count(const std::string& text, const std::string& word) {
+  int found = 0;
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) ++found;
+  return found;
+}
+
+class Formats : public ::testing::Test {
+ protected:
+  Formats() : folder(fs::temp_directory_path() / ("pliant.exports." + std::to_string(::getpid()))) {
+    fs::create_directories(folder);
+  }
+  ~Formats() override { fs::remove_all(folder); }
+
+  /// Held, of two moduli in halves.
+  static ExportModel exported(ElementKind kind) {
+    ExportModel model = export_model(test::block(true), kind);
+    for (int e = 0; e < model.body->element_count(); ++e)
+      if (model.body->nodes(model.body->element(e)[0], 0) > 0.0) model.moduli[std::size_t(e)] *= 2.0;
+    return model;
+  }
+
+  fs::path folder;
+};
+
+TEST_F(Formats, AreFoundByName) {
+  for (const ExportFormat& format : export_formats()) EXPECT_EQ(&export_format(format.name), &format);
+  try {
+    (void)export_format("obj");
+    FAIL() << "there is no such format";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), ::testing::AllOf(::testing::HasSubstr("obj"), ::testing::HasSubstr("calculix")));
+  }
+}
+
+TEST_F(Formats, SayWhatWasWritten) {
+  for (const ExportFormat& format : export_formats()) {
+    const ExportModel model =
+        exported(format.takes_quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron);
+    const fs::path own = folder / format.name;
+    fs::create_directories(own);
+    for (const std::string& file : write_export(model, format, own)) EXPECT_TRUE(fs::exists(own / file)) << file;
+    const auto json = nlohmann::json::parse(text_of(own / "export.json"));
+    EXPECT_EQ(json["to"], format.name);
+    EXPECT_EQ(json["elements"], model.body->element_count());
+    EXPECT_NEAR(json["mass"], 0.25, 0.01);
+    EXPECT_EQ(json["exported"]["frequencies"].size(), 6u);
+  }
+}
+
+TEST_F(Formats, OfGmshIsReadAgain) {
+  for (const ElementKind kind : {ElementKind::Tetrahedron, ElementKind::QuadraticTetrahedron}) {
+    const ExportModel model = exported(kind);
+    write_gmsh(model, folder);
+    const VolumeMesh read = read_volume_mesh(folder / "mesh.msh");
+    const TetMesh mesh = make_tet_mesh(read.nodes, read.tets, read.mid_nodes);
+    const auto& own = std::get<TetMesh>(model.body->mesh);
+    EXPECT_EQ(mesh.tets, own.tets);
+    EXPECT_EQ(mesh.mid_nodes, own.mid_nodes) << "each on the edge that it was on";
+    EXPECT_LT((mesh.nodes - own.nodes).cwiseAbs().maxCoeff(), 1e-8);
+    EXPECT_EQ(count(text_of(folder / "mesh.msh"), "$ElementData"), 2);
+  }
+}
+
+TEST_F(Formats, OfNewtonHaveItsConstants) {
+  const ExportModel model = exported(ElementKind::Tetrahedron);
+  write_newton(model, folder);
+  const VtuGrid grid = read_vtu(folder / "model.vtu");
+  ASSERT_EQ(grid.cell_count(), model.body->element_count());
+  const double nu = model.poissons_ratio;
+  for (int e = 0; e < grid.cell_count(); ++e) {
+    const double E = model.moduli[std::size_t(e)], mu = E / (2.0 * (1.0 + nu));
+    const double k_mu = grid.find_cell_data("k_mu")->values[std::size_t(e)];
+    const double k_lambda = grid.find_cell_data("k_lambda")->values[std::size_t(e)];
+    EXPECT_NEAR(k_mu, mu, 1e-9 * mu);
+    // Small strains: lambda = k_lambda - k_mu gives back Young's modulus.
+    const double lambda = k_lambda - k_mu;
+    EXPECT_NEAR(mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu), E, 1e-9 * E);
+    EXPECT_NEAR(grid.find_cell_data("k_damp")->values[std::size_t(e)], 0.5 * 2e-3 * mu, 1e-9 * mu);
+  }
+  const std::vector<double>& held = grid.find_point_data("held")->values;
+  EXPECT_EQ(std::ranges::count(held, 1.0), std::ptrdiff_t(model.held.size()));
+  EXPECT_EQ(held[std::size_t(model.held.front())], 1.0);
+}
+
+TEST_F(Formats, OfMujocoCarryMassesAndShareBodies) {
+  const ExportModel model = exported(ElementKind::Tetrahedron);
+  write_mujoco(model, folder);
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_file((folder / "model.xml").c_str()));
+  const pugi::xml_node scene = document.child("mujoco");
+  double mass = 0.0;
+  int bodies = 0;
+  for (const pugi::xml_node& body : scene.child("worldbody").children("body"))
+    ++bodies, mass += body.child("inertial").attribute("mass").as_double();
+  EXPECT_EQ(bodies, model.body->node_count() - int(model.held.size()));
+  const std::vector<double> masses = model.lumped_masses();
+  double all = 0.0, held = 0.0;
+  for (const double m : masses) all += m;
+  for (const int node : model.held) held += masses[std::size_t(node)];
+  EXPECT_NEAR(all, model.density * model.body->volume(), 1e-9 * all);
+  EXPECT_NEAR(mass, all - held, 1e-6 * all);
+  int elements = 0, flexes = 0;
+  for (const pugi::xml_node& flex : scene.child("deformable").children("flex")) {
+    ++flexes;
+    std::istringstream list(flex.attribute("element").as_string()), names(flex.attribute("body").as_string());
+    int numbers = 0, greatest = -1, vertices = 0;
+    for (int n = 0; list >> n; ++numbers) greatest = std::max(greatest, n);
+    for (std::string name; names >> name;) ++vertices;
+    EXPECT_EQ(greatest + 1, vertices);
+    elements += numbers / 4;
+  }
+  EXPECT_EQ(flexes, 2) << "one a modulus";
+  EXPECT_EQ(elements, model.body->element_count());
+}
+
+TEST_F(Formats, OfCalculixNameEveryPartAndWhatIsHeld) {
+  const ExportModel model = exported(ElementKind::QuadraticTetrahedron);
+  const std::vector<std::string> files = write_calculix(model, folder);
+  EXPECT_THAT(files, ::testing::Contains("sag.inp"));
+  const std::string deck = text_of(folder / "mesh.inp");
+  EXPECT_EQ(count(deck, "*ELEMENT, TYPE=C3D10"), 2);
+  EXPECT_EQ(count(deck, "*MATERIAL"), 2);
+  EXPECT_EQ(count(deck, "*BOUNDARY"), 1);
+  EXPECT_THAT(text_of(folder / "sag.inp"), ::testing::HasSubstr("GRAV, 9.81, 0, -1, 0"));
+}
+
+TEST_F(Formats, OfCalculixHaveNoSagWhereNothingIsHeld) {
+  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron);
+  EXPECT_THAT(write_calculix(model, folder), ::testing::Not(::testing::Contains("sag.inp")));
+  EXPECT_THAT(text_of(folder / "mesh.inp"), ::testing::Not(::testing::HasSubstr("*BOUNDARY")));
+}
+
+TEST_F(Formats, OfUsdHoldTheMeshAndItsMaterial) {
+  const ExportModel model = exported(ElementKind::Tetrahedron);
+  write_usd(model, folder);
+  const std::string stage = text_of(folder / "model.usda");
+  EXPECT_EQ(stage.rfind("#usda 1.0", 0), 0u);
+  EXPECT_EQ(count(stage, "def TetMesh"), 1);
+  const std::size_t begin = stage.find("int4[] tetVertexIndices"), end = stage.find('\n', begin);
+  EXPECT_EQ(count(stage.substr(begin, end - begin), "("), model.body->element_count());
+  EXPECT_THAT(stage, ::testing::HasSubstr("physics:poissonsRatio = 0.3"));
+}
+
+}  // namespace
+}  // namespace pliant::export_formats_test
