@@ -23,6 +23,7 @@ from stress_fields_page import stress_fields
 from touched_page import organ_probing, skin, slab_pokes
 from tracking_page import swinging
 from photo_chain_page import photo_chain
+from exports_page import exports
 from plant_page import plant
 from twins_page import plans, twins
 import weiss_page
@@ -453,6 +454,8 @@ SECTIONS = [
     ("A slab that is poked all over", "slab-poke-map",
      "Real: a soft slab on a table, scanned from above by a depth camera and poked along its normals at 90 places.", slab_pokes),
     ("Skin between two pads", "skin-dic", "Real: points on healthy skin followed by a camera while one pad is pulled, and the pad's force.", skin),
+    ("Models in other simulators", "exports",
+     "Models that were fitted to recordings of the battery with no choice of ours, exported and run by other programs (docs/exports.md).", exports),
     ("Memory of long recordings", "memory", "A torus that bounces for ten seconds, with about 2,400 nodes; long steps and few iterations.", memory),
 ]
 

@@ -5,7 +5,8 @@
 namespace pliant {
 
 /// Newton's vertex block descent has a stable neo-Hookean energy, in which k_lambda plays lambda + mu of small strains,
-/// and a damping that acts on its shear part alone.
+/// and a damping that acts on its shear part alone. Which nodes are held stands in `export.json`: its reader takes no
+/// arrays of nodes that it does not know.
 std::vector<std::string> write_newton(const ExportModel& model, const std::filesystem::path& folder) {
   const Body& body = *model.body;
   VtuGrid grid;
@@ -22,9 +23,6 @@ std::vector<std::string> write_newton(const ExportModel& model, const std::files
     density.values.push_back(model.density);
   }
   grid.cell_data = {std::move(mu), std::move(lambda), std::move(damp), std::move(density)};
-  VtuArray held{"held", 1, std::vector<double>(std::size_t(body.node_count()), 0.0)};
-  for (const int node : model.held) held.values[std::size_t(node)] = 1.0;
-  grid.point_data = {std::move(held)};
   write_vtu(folder / "model.vtu", grid);
   return {"model.vtu"};
 }

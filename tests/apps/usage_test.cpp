@@ -29,7 +29,7 @@ TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
   for (const char* word :
-       {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "press", "130"})
+       {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "press", "export", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -45,7 +45,7 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
 
 INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp,
                          testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track",
-                                         "markers", "press"),
+                                         "markers", "press", "export"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {
@@ -72,6 +72,7 @@ TEST(Usage, AMissingFileIsNamed) {
                                                     {"track", missing, "--out", out},
                                                     {"simulate", missing + "/model.toml", "--out", out},
                                                     {"evaluate", missing + "/model.toml", missing},
+                                                    {"export", missing + "/model.toml", "--to", "gmsh", "--out", out},
                                                     {"synth", missing + "/scene.toml", "--out", out}}) {
     const ProgramRun run = run_pliant(arguments);
     EXPECT_EQ(run.exit_code, bad_input) << arguments[0];
@@ -92,6 +93,7 @@ TEST(Usage, ALinkThatPointsAtItselfIsBadInput) {
                                                     {"simulate", loop, "--out", out},
                                                     {"evaluate", loop, loop},
                                                     {"mesh", loop},
+                                                    {"export", loop, "--to", "usd", "--out", out},
                                                     {"synth", loop, "--out", out},
                                                     {"synth", scene, "--out", loop}}) {
     const ProgramRun run = run_pliant(arguments);

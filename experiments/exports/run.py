@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+"""Exported models in the programs that they were written for: sag and first frequency there beside pliant's own.
+
+    python3 -m venv exports && exports/bin/pip install -r experiments/exports/requirements.txt
+    apt-get install calculix-ccx
+    exports/bin/python experiments/exports/run.py build/release/apps/pliant MODELS [--work DIR]
+
+MODELS are folders with a model.toml each. What is not installed is left out, by name. Gravity is a hundredth of the
+model's where a program knows large strains alone, and its sag a hundred times what is seen: small motions are compared."""
+import argparse
+import math
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+import common
+
+SMALL = 0.01  # of gravity
+
+
+def exported(program, model, out, to):
+    out.mkdir(parents=True, exist_ok=True)
+    common.run(program, "export", model / "model.toml", "--to", to, "--out", out)
+    return common.read(out / "export.json")
+
+
+def period_and_mean(times, values):
+    """Of a swing about its mean from rest: the first return, and the mean over it."""
+    top = max(range(len(values)), key=lambda i: values[i] if times[i] < times[-1] else -1)
+    rising = [i for i in range(1, len(values) - 1) if values[i] >= values[i - 1] and values[i] > values[i + 1]]
+    first = rising[0] if rising else top
+    return 2 * times[first], 0.5 * values[first]
+
+
+def calculix(folder, about):
+    if not shutil.which("ccx"):
+        return None
+    for deck in ("frequencies", *(["sag"] if about["exported"]["sag"] > 0 else [])):
+        subprocess.run(["ccx", deck], cwd=folder, stdout=subprocess.DEVNULL, check=True)
+    hertz = [float(line.split()[3]) for line in (folder / "frequencies.dat").read_text().splitlines()
+             if re.match(r"\s+\d+\s+\S+E\S+\s+\S+E\S+\s+\S+E\S+\s+\S+E\S+\s*$", line)]
+    hertz = [f for f in hertz if f > 1e-2 * about["exported"]["frequencies"][0]]  # without rigid motions
+    sag = 0.0
+    if (folder / "sag.dat").exists():
+        for line in (folder / "sag.dat").read_text().splitlines():
+            words = line.split()
+            if len(words) == 4 and words[0].isdigit():
+                sag = max(sag, math.sqrt(sum(float(w) ** 2 for w in words[1:])))
+    version = subprocess.run(["ccx", "-v"], capture_output=True, text=True, check=False).stdout.split()
+    return {"version": version[-1] if version else "", "frequencies": hertz[:6], "sag": sag}
+
+
+def mujoco(folder, about):
+    try:
+        import mujoco as mj
+        import numpy as np
+    except ImportError:
+        return None
+    model = mj.MjModel.from_xml_path(str(folder / "model.xml"))
+    data = mj.MjData(model)
+    result = {"version": mj.__version__, "timestep": model.opt.timestep}
+    if about["exported"]["sag"] == 0:
+        return result  # falls: nothing to compare
+    model.opt.gravity[:] = SMALL * model.opt.gravity
+    mj.mj_forward(model, data)
+    rest = data.xpos.copy()
+    times, moved = [0.0], [0.0]
+    begin = time.monotonic()
+    while data.time < 1.2 / about["exported"]["frequencies"][0]:
+        mj.mj_step(model, data)
+        times.append(data.time)
+        moved.append(float(np.linalg.norm(data.xpos - rest, axis=1).max()))
+    period, mean = period_and_mean(times, moved)
+    return {**result, "frequencies": [1 / period], "sag": mean / SMALL, "ms_per_step": 1e3 * (time.monotonic() - begin) / len(times)}
+
+
+def newton(folder, about):
+    """Vertex block descent on the processor: from rest under little gravity, half a period is where it is farthest."""
+    try:
+        import newton as nt
+        import numpy as np
+        import warp as wp
+    except ImportError:
+        return None
+    wp.config.quiet = True
+    result = {"version": nt.__version__}
+    mesh = nt.TetMesh.create_from_file(str(folder / "model.vtu"))
+    builder = nt.ModelBuilder(gravity=[SMALL * g for g in about["gravity"]])
+    builder.add_soft_mesh(pos=wp.vec3(0, 0, 0), rot=wp.quat_identity(), scale=1.0, vel=wp.vec3(0, 0, 0), mesh=mesh)
+    if not about["held_nodes"]:
+        return result
+    for i in about["held_nodes"]:
+        builder.particle_mass[i] = 0.0
+        builder.particle_flags[i] = int(builder.particle_flags[i]) & ~int(nt.ParticleFlags.ACTIVE)
+    builder.color()
+    model = builder.finalize(device="cpu")
+    sweeps, hertz = 50, about["exported"]["frequencies"][0]
+    dt = 1.0 / (hertz * 120)
+    solver = nt.solvers.SolverVBD(model, iterations=sweeps)
+    now, then, control, contacts = model.state(), model.state(), model.control(), None
+    rest = now.particle_q.numpy().copy()
+    times, moved = [0.0], [0.0]
+    begin = time.monotonic()
+    while times[-1] < 0.8 / hertz and time.monotonic() - begin < 300:
+        now.clear_forces()
+        solver.step(now, then, control, contacts, dt)
+        now, then = then, now
+        times.append(times[-1] + dt)
+        moved.append(float(np.linalg.norm(now.particle_q.numpy() - rest, axis=1).max()))
+    period, mean = period_and_mean(times, moved)
+    return {**result, "sweeps": sweeps, "steps_a_period": 120, "frequencies": [1 / period], "sag": mean / SMALL,
+            "ms_per_step": 1e3 * (time.monotonic() - begin) / len(times)}
+
+
+def gmsh(folder, about):
+    try:
+        import meshio
+    except ImportError:
+        return None
+    mesh = meshio.read(folder / "mesh.msh")
+    kind = "tetra10" if about["quadratic"] else "tetra"
+    return {"version": f"meshio {meshio.__version__}", "nodes": len(mesh.points), "held": int((mesh.point_data["held"] > 0).sum()), "elements": len(mesh.cells_dict[kind])}
+
+
+def usd(folder, about):
+    try:
+        from pxr import Usd, UsdGeom
+    except ImportError:
+        return None
+    stage = Usd.Stage.Open(str(folder / "model.usda"))
+    mesh = UsdGeom.TetMesh(stage.GetDefaultPrim())
+    return {"version": ".".join(str(n) for n in Usd.GetVersion()), "nodes": len(mesh.GetPointsAttr().Get()),
+            "elements": len(mesh.GetTetVertexIndicesAttr().Get()), "inverted": len(UsdGeom.TetMesh.FindInvertedElements(mesh))}
+
+
+PROGRAMS = {"calculix": calculix, "mujoco": mujoco, "newton": newton, "gmsh": gmsh, "usd": usd}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("models", type=pathlib.Path, nargs="+")
+    parser.add_argument("--work", type=pathlib.Path, default=common.ROOT / "out/exports")
+    parser.add_argument("--only", nargs="*", default=list(PROGRAMS))
+    arguments = parser.parse_args()
+    file = HERE / "results.json"
+    models = common.read(file).get("models", {}) if file.exists() else {}
+    for model in arguments.models:
+        for to in arguments.only:
+            folder = arguments.work / model.name / to
+            about = exported(arguments.program.resolve(), model, folder, to)
+            seen = PROGRAMS[to](folder, about)
+            if seen is None:
+                print(f"{to}: not installed, left out")
+                continue
+            models.setdefault(model.name, {})[to] = {**{k: about[k] for k in ("elements", "nodes", "quadratic", "moduli_were_multiplied_by", "model", "exported")}, "seen": seen}
+            print(model.name, to, seen, "pliant:", about["exported"], flush=True)
+            common.write_results(__file__, {"small": SMALL, "models": models})
+
+
+if __name__ == "__main__":
+    main()
