@@ -25,8 +25,27 @@ std::string in_hertz(const std::vector<double>& frequencies) {
   return text + " Hz";
 }
 
+void say_files(const std::vector<std::string>& files, const std::string& folder) {
+  std::cout << "written:";
+  for (const std::string& file : files) std::cout << " " << file;
+  std::cout << " in " << folder << "\n";
+}
+
+/// The surface as the model moves.
+void run_surface(const Arguments& arguments, const ExportFormat& format) {
+  const Model model = load_model(arguments.model);
+  make_folder(arguments.out);
+  const std::vector<std::string> files = format.write_surface(model, arguments.out, [](int done, int total) {
+    show_progress("simulated", done, total);
+    return !is_interrupted();
+  });
+  stop_if_interrupted();
+  say_files(files, arguments.out);
+}
+
 void run(const Arguments& arguments) {
   const ExportFormat& format = export_format(arguments.to);
+  if (format.write_surface) return run_surface(arguments, format);
   const bool is_quadratic = format.takes_quadratic && !arguments.linear;
   const Model model = load_model(arguments.model);
   const ExportModel exported =
@@ -45,15 +64,16 @@ void run(const Arguments& arguments) {
     std::cout << fmt::format("sag of small motions: {:.4g} mm, of the model {:.4g} mm\n", 1e3 * exported.exported.sag,
                              1e3 * exported.model.sag);
   for (const std::string& note : exported.notes) std::cout << "note: " << note << "\n";
-  std::cout << "written:";
-  for (const std::string& file : files) std::cout << " " << file;
-  std::cout << " in " << arguments.out << "\n";
+  say_files(files, arguments.out);
 }
 
 std::string footer() {
   std::string text = "Formats:\n";
   for (const ExportFormat& f : export_formats())
-    text += fmt::format("  {:<10} {}{}\n", f.name, f.program, f.takes_quadratic ? "" : "; linear tetrahedra");
+    text += fmt::format("  {:<10} {}{}\n", f.name, f.program,
+                        f.write_surface     ? ": the surface as it moves"
+                        : f.takes_quadratic ? ""
+                                            : "; linear tetrahedra");
   return text +
          "\nExamples:\n  pliant export fit/model.toml --to mujoco --out bear\n"
          "  pliant export fit/model.toml --to calculix --out bear && cd bear && ccx frequencies\n"

@@ -11,6 +11,7 @@ namespace pliant {
 const std::vector<ExportFormat>& export_formats() {
   static const std::vector<ExportFormat> all = {
       {"calculix", "CalculiX and Abaqus", true, write_calculix},
+      {"gltf", "Blender, browsers and game engines", false, nullptr, write_gltf},
       {"gmsh", "Gmsh and what reads its meshes", true, write_gmsh},
       {"mujoco", "MuJoCo", false, write_mujoco},
       {"newton", "Newton and Warp", false, write_newton},

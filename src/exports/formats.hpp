@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -8,13 +9,20 @@
 
 namespace pliant {
 
-/// A format that models are written in.
+/// Frames done and their total; false stops.
+using ExportProgress = std::function<bool(int done, int total)>;
+
+/// A format that models are written in: their elements, or the surface as it moves.
 struct ExportFormat {
   std::string name;      ///< as `--to` takes it
   std::string program;   ///< that reads it
   bool takes_quadratic;  ///< elements; else linear ones alone
-  /// Writes the files, FOLDER/NAME.EXTENSION and what stands beside it, and returns their names.
+  /// Writes elements into a folder and returns the files' names; null: the format is one of surfaces.
   std::vector<std::string> (*write)(const ExportModel& model, const std::filesystem::path& folder);
+  /// Simulates the model as its recording was and writes its surface in every frame. Throws std::runtime_error where it
+  /// cannot be simulated.
+  std::vector<std::string> (*write_surface)(const Model& model, const std::filesystem::path& folder,
+                                            const ExportProgress& progress) = nullptr;
 };
 
 const std::vector<ExportFormat>& export_formats();
@@ -31,6 +39,8 @@ std::vector<std::string> write_export(const ExportModel& model, const ExportForm
 
 // The formats, each in a file of its own.
 std::vector<std::string> write_calculix(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_gltf(const Model& model, const std::filesystem::path& folder,
+                                    const ExportProgress& progress);
 std::vector<std::string> write_gmsh(const ExportModel& model, const std::filesystem::path& folder);
 std::vector<std::string> write_mujoco(const ExportModel& model, const std::filesystem::path& folder);
 std::vector<std::string> write_newton(const ExportModel& model, const std::filesystem::path& folder);

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <pugixml.hpp>
@@ -62,6 +64,7 @@ TEST_F(Formats, AreFoundByName) {
 
 TEST_F(Formats, SayWhatWasWritten) {
   for (const ExportFormat& format : export_formats()) {
+    if (!format.write) continue;  // of surfaces
     const ExportModel model =
         exported(format.takes_quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron);
     const fs::path own = folder / format.name;
@@ -155,6 +158,65 @@ TEST_F(Formats, OfCalculixHaveNoSagWhereNothingIsHeld) {
   const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron);
   EXPECT_THAT(write_calculix(model, folder), ::testing::Not(::testing::Contains("sag.inp")));
   EXPECT_THAT(text_of(folder / "mesh.inp"), ::testing::Not(::testing::HasSubstr("*BOUNDARY")));
+}
+
+/// Accessors are followed as a reader of the standard follows them.
+TEST_F(Formats, OfGltfHoldTheSurfaceInEveryFrame) {
+  Model model = test::block(true);
+  model.scene.timing = evenly_timed(50.0, 5);
+  int told = 0;
+  const auto tell = [&](int done, int) {
+    told = done;
+    return true;
+  };
+  ASSERT_THAT(write_gltf(model, folder, tell), ::testing::ElementsAre("model.glb"));
+  EXPECT_EQ(told, 5);
+  const std::string file = text_of(folder / "model.glb");
+  const auto number = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, file.data() + at, sizeof value);
+    return std::size_t(value);
+  };
+  EXPECT_EQ(file.substr(0, 4), "glTF");
+  EXPECT_EQ(number(4), 2u);
+  EXPECT_EQ(number(8), file.size());
+  const std::size_t json_size = number(12), begin = 20 + json_size + 8;
+  EXPECT_EQ(number(20 + json_size), file.size() - begin);
+  const auto json = nlohmann::json::parse(file.substr(20, json_size));
+  const auto numbers = [&](int index) {
+    const auto& accessor = json["accessors"][std::size_t(index)];
+    const auto& view = json["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    std::vector<float> values(view["byteLength"].get<std::size_t>() / sizeof(float));
+    std::memcpy(values.data(), file.data() + begin + view["byteOffset"].get<std::size_t>(),
+                values.size() * sizeof(float));
+    return values;
+  };
+  const auto& primitive = json["meshes"][0]["primitives"][0];
+  ASSERT_EQ(primitive["targets"].size(), 4u) << "one a frame after the first";
+  const std::vector<float> first = numbers(primitive["attributes"]["POSITION"]),
+                           last = numbers(primitive["targets"][3]["POSITION"]);
+  ASSERT_EQ(first.size(), 3 * model.scene.object.surface->vertices.size());
+  ASSERT_EQ(last.size(), first.size());
+  float lowest = 0.0F, held = 0.0F;
+  for (std::size_t n = 0; n < first.size() / 3; ++n) {
+    lowest = std::min(lowest, last[3 * n + 1]);
+    if (first[3 * n] < -0.09F) held = std::max(held, std::abs(last[3 * n + 1]));
+  }
+  EXPECT_LT(lowest, -1e-3F) << "the free end falls";
+  EXPECT_LT(held, 1e-3F) << "the other is held";
+  const auto& sampler = json["animations"][0]["samplers"][0];
+  EXPECT_THAT(numbers(sampler["input"]), ::testing::ElementsAre(0.0F, 0.02F, 0.04F, 0.06F, 0.08F));
+  const std::vector<float> weights = numbers(sampler["output"]);
+  ASSERT_EQ(weights.size(), 20u);
+  for (std::size_t frame = 0; frame < 5; ++frame)
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(weights[4 * frame + k], k + 1 == frame ? 1.0F : 0.0F);
+}
+
+TEST_F(Formats, OfGltfOfAnObjectAtRestHaveNoMotion) {
+  (void)write_gltf(test::pressed_block(), folder, {});
+  const std::string file = text_of(folder / "model.glb");
+  EXPECT_EQ(count(file, "animations"), 0);
+  EXPECT_EQ(count(file, "targets"), 0);
 }
 
 TEST_F(Formats, OfUsdHoldTheMeshAndItsMaterial) {
