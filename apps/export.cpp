@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -9,14 +10,18 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "exports/formats.hpp"
+#include "exports/samples.hpp"
 
 namespace pliant::apps {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 struct Arguments {
   std::string model, to, out;
   bool linear = false;
+  int samples = 0;
 };
 
 std::string in_hertz(const std::vector<double>& frequencies) {
@@ -32,24 +37,52 @@ void say_files(const std::vector<std::string>& files, const std::string& folder)
 }
 
 /// The surface as the model moves.
-void run_surface(const Arguments& arguments, const ExportFormat& format) {
-  const Model model = load_model(arguments.model);
-  make_folder(arguments.out);
-  const std::vector<std::string> files = format.write_surface(model, arguments.out, [](int done, int total) {
+void write_moving(const Model& model, const ExportFormat& format, const std::string& folder) {
+  make_folder(folder);
+  const std::vector<std::string> files = format.write_surface(model, folder, [](int done, int total) {
     show_progress("simulated", done, total);
     return !is_interrupted();
   });
   stop_if_interrupted();
-  say_files(files, arguments.out);
+  say_files(files, folder);
+}
+
+ElementKind elements_for(const Arguments& arguments, const ExportFormat& format) {
+  return format.takes_quadratic && !arguments.linear ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron;
+}
+
+/// Materials drawn from what the fit left open, each in a folder of its own.
+void run_samples(const Arguments& arguments, const ExportFormat& format, const Model& model) {
+  const Result result = read_result(fs::path(arguments.model).parent_path() / "result.json");
+  const std::vector<MaterialSample> samples = posterior_samples(result, arguments.samples);
+  std::string table = "sample,youngs_modulus [Pa],poissons_ratio [1],mass_damping [1/s],stiffness_damping [s]\n";
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const MaterialSample& s = samples[i];
+    const std::string folder = (fs::path(arguments.out) / fmt::format("sample_{:04}", i + 1)).string();
+    const Model drawn = with_material(model, s);
+    if (format.write_surface) {
+      write_moving(drawn, format, folder);
+    } else {
+      make_folder(folder);
+      (void)write_export(export_model(drawn, elements_for(arguments, format)), format, folder);
+      show_progress("written", int(i) + 1, int(samples.size()));
+    }
+    table += fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g}\n", i + 1, s.youngs_modulus, s.poissons_ratio, s.mass_damping,
+                         s.stiffness_damping);
+    stop_if_interrupted();
+  }
+  write_file(fs::path(arguments.out) / "samples.csv", table);
+  std::cout << fmt::format("{} materials in {}: sample_0001 ..., and samples.csv\n", samples.size(), arguments.out);
 }
 
 void run(const Arguments& arguments) {
   const ExportFormat& format = export_format(arguments.to);
-  if (format.write_surface) return run_surface(arguments, format);
-  const bool is_quadratic = format.takes_quadratic && !arguments.linear;
   const Model model = load_model(arguments.model);
-  const ExportModel exported =
-      export_model(model, is_quadratic ? ElementKind::QuadraticTetrahedron : ElementKind::Tetrahedron);
+  if (arguments.samples > 0) return run_samples(arguments, format, model);
+  if (format.write_surface) return write_moving(model, format, arguments.out);
+  const ElementKind kind = elements_for(arguments, format);
+  const bool is_quadratic = kind == ElementKind::QuadraticTetrahedron;
+  const ExportModel exported = export_model(model, kind);
   make_folder(arguments.out);
   const std::vector<std::string> files = write_export(exported, format, arguments.out);
   std::cout << fmt::format("{} {} tetrahedra, {} nodes, {} of them held\n", exported.body->element_count(),
@@ -76,6 +109,7 @@ std::string footer() {
                                             : "; linear tetrahedra");
   return text +
          "\nExamples:\n  pliant export fit/model.toml --to mujoco --out bear\n"
+         "  pliant export fit/model.toml --to newton --samples 100 --out bears     for domain randomisation\n"
          "  pliant export fit/model.toml --to calculix --out bear && cd bear && ccx frequencies\n"
          "What goes over in each format, and what does not: docs/exports.md.";
 }
@@ -89,6 +123,12 @@ void add_export(CommandLine& line, int& exit_code) {
   command.option("--to", arguments->to, "format, see below").required().type_name("FORMAT");
   command.option("--out,-o", arguments->out, "folder for the files").required().type_name("DIR");
   command.flag("--linear", arguments->linear, "linear tetrahedra also where the format takes quadratic ones");
+  command
+      .option("--samples", arguments->samples,
+              "so many materials drawn from what the fit left open (result.json beside the model), each in a folder of "
+              "its own")
+      .positive()
+      .type_name("N");
   command.footer(footer());
   command.callback([arguments, &exit_code] {
     run(*arguments);
