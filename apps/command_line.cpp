@@ -15,7 +15,14 @@ Option& Option::one_value_a_use() { return option_->allow_extra_args(false), *th
 Option& Option::show_default() { return option_->capture_default_str(), *this; }
 Option& Option::range(int least, int greatest) { return option_->check(CLI::Range(least, greatest)), *this; }
 Option& Option::range(double least, double greatest) { return option_->check(CLI::Range(least, greatest)), *this; }
-Option& Option::positive() { return option_->check(CLI::PositiveNumber), *this; }
+Option& Option::positive() {
+  const auto check = [](const std::string& text) {
+    double number = 0.0;
+    return CLI::detail::lexical_cast(text, number) && number > 0.0 ? std::string()
+                                                                   : "`" + text + "` is not a number above 0";
+  };
+  return option_->check(CLI::Validator(check, "POSITIVE")), *this;
+}
 Option& Option::not_negative() { return option_->check(CLI::NonNegativeNumber), *this; }
 Option& Option::one_of(std::initializer_list<const char*> words) {
   return option_->check(CLI::IsMember(std::vector<std::string>(words.begin(), words.end()))), *this;

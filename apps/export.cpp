@@ -55,11 +55,17 @@ ElementKind elements_for(const Arguments& arguments, const ExportFormat& format)
 void run_samples(const Arguments& arguments, const ExportFormat& format, const Model& model) {
   const Result result = read_result(fs::path(arguments.model).parent_path() / "result.json");
   const std::vector<MaterialSample> samples = posterior_samples(result, arguments.samples);
+  make_folder(arguments.out);
   std::string table = "sample,youngs_modulus [Pa],poissons_ratio [1],mass_damping [1/s],stiffness_damping [s]\n";
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const MaterialSample& s = samples[i];
+    table += fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g}\n", i + 1, s.youngs_modulus, s.poissons_ratio, s.mass_damping,
+                         s.stiffness_damping);
+  }
+  write_file(fs::path(arguments.out) / "samples.csv", table);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
     const std::string folder = (fs::path(arguments.out) / fmt::format("sample_{:04}", i + 1)).string();
-    const Model drawn = with_material(model, s);
+    const Model drawn = with_material(model, samples[i]);
     if (format.write_surface) {
       write_moving(drawn, format, folder);
     } else {
@@ -67,11 +73,8 @@ void run_samples(const Arguments& arguments, const ExportFormat& format, const M
       (void)write_export(export_model(drawn, elements_for(arguments, format)), format, folder);
       show_progress("written", int(i) + 1, int(samples.size()));
     }
-    table += fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g}\n", i + 1, s.youngs_modulus, s.poissons_ratio, s.mass_damping,
-                         s.stiffness_damping);
     stop_if_interrupted();
   }
-  write_file(fs::path(arguments.out) / "samples.csv", table);
   std::cout << fmt::format("{} materials in {}: sample_0001 ..., and samples.csv\n", samples.size(), arguments.out);
 }
 

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <numeric>
-#include <tuple>
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
@@ -32,19 +30,6 @@ OptimiserState start_of(const ParameterSet& parameters) {
   return {0, parameters.to_unconstrained(parameters.reference()), {}};
 }
 
-constexpr double work_of_a_minute = 4e7;  // see `CostEvaluation::work`: of a laptop's two cores
-
-/// Of one simulation of all recordings, about.
-double work_of_a_look(const Grid& grid) {
-  double work = 0.0;
-  for (const Discretisation& d : grid.recording) {
-    const SimulationOptions& s = d.simulation;
-    const double steps = s.is_static ? steps_of_an_equilibrium : (s.times.back() - s.times.front()) / s.max_dt;
-    work += steps * d.body->node_count();
-  }
-  return work;
-}
-
 int last_frame(const Horizon& horizon, const Recording& r) {
   switch (horizon.until) {
     case Horizon::Until::Start:
@@ -57,9 +42,7 @@ int last_frame(const Horizon& horizon, const Recording& r) {
   return horizon.part < 1.0 ? r.horizon(horizon.part) : r.last_frame;
 }
 
-constexpr const char* cause_mesh = "mesh";
-constexpr double most_cells = 64.0;    // along the object's longest axis
-constexpr double largest_shift = 1.0;  // of an unconstrained coordinate, by a few steps
+constexpr double most_cells = 64.0;  // along the object's longest axis
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
 constexpr int few_iterations = 2, many_iterations = 5;
@@ -70,10 +53,6 @@ constexpr int trials_after_rejection = 3;  // costs alone are a third of the wor
 constexpr double size_of_finer_mesh = 1.8, size_of_coarser_mesh = 0.8, size_of_longer_step = 0.6;
 // Of what a law that is linear in the strain changes, the share by which another law at large strain may differ.
 constexpr double size_of_small_strain = 0.5;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 }  // namespace
 
@@ -568,183 +547,6 @@ std::optional<VectorX> FitRun::mesh_shift(const std::vector<StageRecord>& done, 
       return a.size * (r.shifts.front().shift - own);
   }
   return std::nullopt;
-}
-
-// What came out -------------------------------------------------------------------------------------------------------
-
-FitOutcome FitRun::run() {
-  execute();
-  stages_are_over_ = true;
-  PassState end = reached();
-  if (interrupted_ && !plan_.estimate(end.done)) end.done.push_back(last_look(end));
-  finish(end.done);
-  return std::move(outcome_);
-}
-
-StageRecord FitRun::last_look(const PassState& at) {
-  const Stage stage = plan_.last_look(at);
-  VectorX theta = stage.from.front();
-  for (const StageChain& chain : plan_.next(state_))
-    if (const StageUnderWay* left = state_.under_way ? &*state_.under_way : nullptr;
-        left && left->id == chain.front().id && left->optimiser.p.size() > 0)
-      theta = parameters_of(chain.front(), left->from).to_theta(left->optimiser.p);
-  StageRecord record{stage.id, stage.name, theta, theta};
-  record.reason = "interrupted";
-  constexpr double at_most = 0.25;  // minutes: who interrupts does not wait
-  if (work_of_a_look(grid(stage.grid)) > at_most * work_of_a_minute) {
-    record.cost = infinite;
-    record.reason = fmt::format(
-        "interrupted before the first estimate on the full mesh, where one simulation takes long; Young's modulus was "
-        "{} Pa so far, and --resume goes on from there",
-        in_three_digits(theta[plan_.facts().moduli.front()]));
-    ended_.push_back({stage.id, {}, true});
-    ended_.back().evaluation.failure = record.reason;
-    return record;
-  }
-  const ParameterSet parameters = parameters_of(stage, theta);
-  CostEvaluation e = objective_of(stage, parameters, grid(stage.grid)).evaluate(parameters.to_unconstrained(theta));
-  record.succeeded = e.succeeded;
-  record.cost = e.succeeded ? e.cost : infinite;
-  record.elements = grid(stage.grid).recording.front().body->element_count();
-  ended_.push_back({stage.id, std::move(e), true});
-  return record;
-}
-
-void FitRun::finish(const std::vector<StageRecord>& done) {
-  // Starts run side by side; their history is told in an order that does not depend on who was faster.
-  std::ranges::stable_sort(outcome_.history, {},
-                           [](const FitEvent& e) { return std::tuple(e.kind, e.start, e.iteration); });
-  const StageRecord* first = plan_.estimate(done);
-  if (first) say_corrections(done, *first);
-  for (const StageRecord& r : done)
-    if (r.id.kind == StageKind::Resolution && !r.told.empty()) outcome_.notes.push_back(r.told);
-  const auto failed =
-      std::ranges::find_if(done, [](const StageRecord& r) { return is_on_full_grid(r.id.kind) && !r.succeeded; });
-  const StageRecord& last = first ? refined(done, *first) : *failed;
-  const Grid& at = grid(plan_.spacing_of(last));
-  ParameterSet parameters = plan_.estimated(done);
-  parameters.set_reference(last.theta);
-  outcome_.starts = plan_.starts(done);
-  outcome_.start_theta = plan_.start_theta(done);
-  outcome_.cells = at.cells;
-  outcome_.interrupted = interrupted_;
-  outcome_.converged = last.converged && !interrupted_;
-  outcome_.reason = interrupted_ && last.succeeded ? "interrupted" : last.reason;
-  outcome_.theta = last.theta;
-  outcome_.parameters = recordings_.with_field_prior(parameters, at);
-  outcome_.final_cost = last.cost;
-  Stage narrow{last.id, last.name, plan_.spacing_of(last)};
-  narrow.band = options_.fine_band;
-  if (last.succeeded || !interrupted_)
-    outcome_.start_cost =
-        objective_of(narrow, parameters_of(narrow, outcome_.start_theta), at).evaluate(VectorX(0)).cost;
-  outcome_.evaluation = evaluation_of(last, narrow, parameters);
-  for (std::size_t r = 0; r < recordings_.all().size(); ++r) {
-    const Discretisation& d = at.recording[r];
-    outcome_.recordings.push_back({d, outcome_.theta, outcome_.evaluation.of_recording(int(r)),
-                                   Simulation(d.body, d.simulation).rest_body(outcome_.theta)});
-  }
-  const bool has_derivatives = outcome_.evaluation.gauss_newton.rows() == parameters.dimension();
-  if (outcome_.evaluation.succeeded && has_derivatives && parameters.dimension() > 0)
-    add_uncertainty(outcome_, shifts_in(done), floor());
-  if (outcome_.evaluation.succeeded && !interrupted_) time_steps(narrow, parameters);
-  if (const StageRecord* swing = find_record(done, {StageKind::Swing}); swing && !swing->told.empty())
-    outcome_.notes.push_back(swing->told);
-  std::vector<const Capture*> captures;
-  for (const Recording& r : recordings_.all()) captures.push_back(&r.capture);
-  add_notes(outcome_, captures);
-}
-
-/// With derivatives, but for a last look; that of the optimiser where it ran here.
-CostEvaluation FitRun::evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters) {
-  const auto ended = std::ranges::find(ended_, record.id, &Ended::id);
-  const bool is_whole = ended != ended_.end() && (!record.succeeded || ended->is_last_look ||
-                                                  ended->evaluation.gauss_newton.rows() == parameters.dimension());
-  if (is_whole) return std::move(ended->evaluation);
-  return objective_of(narrow, parameters, grid(narrow.grid)).linearise(parameters.to_unconstrained(record.theta));
-}
-
-void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate) {
-  const StageRecord* test = find_record(done, {StageKind::Test});
-  if (!test || test->corrected.empty()) return;
-  outcome_.notes.push_back(
-      "The residuals showed that " + test->told +
-      " needed correction, which was estimated along with the "
-      "material: the cost fell from " +
-      in_three_digits(test->cost) + " to " + in_three_digits(estimate.cost) + ". Without it Young's modulus was " +
-      in_three_digits(test->theta[plan_.facts().moduli.front()]) + " Pa; correct = false leaves it so.");
-}
-
-/// Of the alternatives that could be tried, less that of the model that each stands beside: the fit's own, whose
-/// gradient is not quite zero, or the first of them.
-std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) {
-  const VectorX own = gauss_newton_shift(outcome_.evaluation, largest_shift);
-  std::vector<ModelShift> shifts;
-  std::vector<StageRecord> tried;  // side by side: told in an order that does not depend on who was faster
-  std::ranges::copy_if(done, std::back_inserter(tried),
-                       [](const StageRecord& r) { return r.id.kind == StageKind::Alternative; });
-  std::ranges::sort(tried, {}, [](const StageRecord& r) { return r.id.number; });
-  const auto first = std::ranges::find(tried, 0, [](const StageRecord& r) { return r.id.number; });
-  for (const StageRecord& r : tried) {
-    const Alternative& a = plan_.facts().alternatives[std::size_t(r.id.number)];
-    const bool has_first = first != tried.end() && !first->shifts.empty();
-    if (a.beside_the_first && !has_first) continue;
-    const VectorX& reference = a.beside_the_first ? first->shifts.front().shift : own;
-    if (!r.reason.empty())
-      outcome_.notes.push_back("How much the estimate depends on the " + r.name + " could not be seen: " + r.reason +
-                               ".");
-    for (const ModelShift& s : r.shifts) {
-      if (s.shift.size() != own.size() || reference.size() != own.size()) continue;
-      if (s.cause == cause_mesh && plan_.facts().repeats_by_need && !plan_.repetitions(done).empty()) {
-        shifts.push_back({s.cause, *mesh_shift(done, own)});
-        continue;
-      }
-      shifts.push_back({s.cause, a.given ? s.shift : VectorX(a.size * (s.shift - reference))});
-    }
-  }
-  return shifts;
-}
-
-VectorX FitRun::floor() const {
-  const bool meets = std::ranges::any_of(recordings_.all(), [](const Recording& r) {
-    return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static;
-  });
-  return options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, meets) : VectorX();
-}
-
-/// The estimate on the finest mesh; that at all resolutions goes into the outcome.
-const StageRecord& FitRun::refined(const std::vector<StageRecord>& done, const StageRecord& first) {
-  std::vector<const StageRecord*> all = {&first};
-  for (const StageRecord& r : done) {
-    if (r.id.kind != StageKind::Finer) continue;
-    if (r.succeeded)
-      all.push_back(&r);
-    else
-      outcome_.notes.push_back("The estimate could not be repeated at " + r.name + ": " + r.reason + ".");
-  }
-  if (all.size() == 1 && (options_.refine <= 1 || interrupted_)) return first;
-  std::vector<RefinedEstimate> estimates;
-  for (const StageRecord* r : all) {
-    const Spacing spacing = plan_.spacing_of(*r);
-    estimates.push_back({spacing.cells, spacing.steps, r->elements, r->theta, r->cost, r->converged, r->reason});
-  }
-  outcome_.refinement = extrapolate(std::move(estimates), plan_.estimated(done));
-  return *all[std::size_t(outcome_.refinement.finest)];
-}
-
-void FitRun::time_steps(const Stage& narrow, const ParameterSet& parameters) {
-  Objective objective =
-      recordings_.objective(grid(narrow.grid), parameters, narrow.band, [](const Recording&) { return 20; });
-  const VectorX p = parameters.to_unconstrained(parameters.reference());
-  auto begin = std::chrono::steady_clock::now();
-  const CostEvaluation forward = objective.evaluate(p);
-  const double forward_seconds = seconds_since(begin);
-  begin = std::chrono::steady_clock::now();
-  const CostEvaluation both = objective.gradient(p);
-  const double both_seconds = seconds_since(begin);
-  if (forward.steps == 0 || both.steps == 0) return;
-  outcome_.ms_per_forward_step = 1000.0 * forward_seconds / forward.steps;
-  outcome_.ms_per_adjoint_step = 1000.0 * std::max(0.0, both_seconds - forward_seconds) / both.steps;
 }
 
 }  // namespace pliant

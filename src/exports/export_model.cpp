@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include "base/error.hpp"
@@ -75,7 +76,7 @@ class Compliance {
       if (((lambda - before).head(count).array().abs() < 1e-9 * lambda.head(count).array()).all()) break;
     }
     std::vector<double> hertz;
-    for (int k = 0; k < count; ++k) hertz.push_back(std::sqrt(lambda[k]) / (2.0 * M_PI));
+    for (int k = 0; k < count; ++k) hertz.push_back(std::sqrt(lambda[k]) / (2.0 * std::numbers::pi));
     return hertz;
   }
 
@@ -184,8 +185,8 @@ ExportModel export_model(const Model& model, ElementKind kind) {
     out.notes.push_back("The model's law (" + model.law->name + ") is told by its moduli of small strains.");
   if (!model.scene.planes.empty()) out.notes.push_back("Planes that the object meets are left out.");
   if (!model.scene.weights.empty()) out.notes.push_back("Weights that hang from the object are left out.");
-  if (model.is_rayleigh || model.stiffness_damping == 0.0) return out;
-  out.notes.push_back("Stiffness damping is that of small motions, on which both of its laws agree.");
+  if (!model.is_rayleigh && model.stiffness_damping > 0.0)
+    out.notes.push_back("Stiffness damping is that of small motions, on which both of its laws agree.");
   return out;
 }
 

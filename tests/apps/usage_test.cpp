@@ -59,6 +59,8 @@ TEST(Usage, MistakesOnTheCommandLineAreBadInput) {
   EXPECT_EQ(run_pliant({"fti"}).exit_code, bad_input);
   EXPECT_EQ(run_pliant({"fit"}).exit_code, bad_input);
   EXPECT_EQ(run_pliant({"fit", "somewhere", "--out", "x", "--threads", "0"}).exit_code, bad_input);
+  EXPECT_THAT(run_pliant({"fit", "somewhere", "--out", "x", "--threads", "0"}).err,
+              HasSubstr("`0` is not a number above 0"));
   const ProgramRun run = run_pliant({"check", "--no-such-option", "x"});
   EXPECT_EQ(run.exit_code, bad_input);
   EXPECT_THAT(run.err, HasSubstr("--no-such-option"));

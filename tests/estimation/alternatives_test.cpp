@@ -13,15 +13,6 @@
 namespace pliant::alternatives_test {
 namespace {
 
-FitOptions quick() {
-  FitOptions options;
-  options.budget = 0.0;
-  options.cells = options.coarse_cells = 8.0;
-  options.parameters["poissons_ratio"].estimated = false;
-  options.starts = 1;
-  return options;
-}
-
 const UncertaintyShare* share(const FitOutcome& outcome, const std::string& cause) {
   const auto it = std::ranges::find(outcome.uncertainty.budget, cause, &UncertaintyShare::cause);
   return it == outcome.uncertainty.budget.end() ? nullptr : &*it;
@@ -29,7 +20,7 @@ const UncertaintyShare* share(const FitOutcome& outcome, const std::string& caus
 
 TEST(Alternatives, WidenWhatTheNoiseLeavesOpen) {
   const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
-  FitOptions options = quick();
+  FitOptions options = test::quick_fit_of_bar();
   const FitOutcome with = fit({bar}, options);
   options.alternatives = false;
   const FitOutcome without = fit({bar}, options);
@@ -50,7 +41,7 @@ TEST(Alternatives, WidenWhatTheNoiseLeavesOpen) {
 
 /// A hexahedron high: the bar is far too stiff for its mesh, and the noise is small beside that.
 FitOptions one_hexahedron() {
-  FitOptions options = quick();
+  FitOptions options = test::quick_fit_of_bar();
   options.element = ElementKind::Hexahedron;
   return options;
 }
@@ -107,16 +98,16 @@ TEST(Budget, IsNotNeededWhereTheMeshHardlyMatters) {
 
 TEST(Alternatives, GoOnAfterAnInterruption) {
   const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
-  const FitOutcome undisturbed = fit({bar}, quick());
+  const FitOutcome undisturbed = fit({bar}, test::quick_fit_of_bar());
   const auto has_tried_one = [](const FitState& state) {
     return std::ranges::any_of(state.pass.done,
                                [](const StageRecord& r) { return r.id.kind == StageKind::Alternative; });
   };
   test::Interruption interruption(has_tried_one);
-  const FitOutcome interrupted = fit({bar}, quick(), interruption.monitor());
+  const FitOutcome interrupted = fit({bar}, test::quick_fit_of_bar(), interruption.monitor());
   ASSERT_TRUE(interruption.came());
   EXPECT_TRUE(interrupted.interrupted);
-  const FitOutcome resumed = fit({bar}, quick(), {}, interruption.left());
+  const FitOutcome resumed = fit({bar}, test::quick_fit_of_bar(), {}, interruption.left());
   EXPECT_EQ(resumed.theta, undisturbed.theta);
   ASSERT_EQ(resumed.uncertainty.budget.size(), undisturbed.uncertainty.budget.size());
   for (std::size_t i = 0; i < resumed.uncertainty.budget.size(); ++i) {

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
 
 #include "estimation/fit.hpp"
@@ -13,42 +12,20 @@
 namespace pliant::interruption_test {
 namespace {
 
-FitOptions quick() {
-  FitOptions options;
-  options.budget = 0.0;
-  options.cells = options.coarse_cells = 8.0;
-  options.parameters["poissons_ratio"].estimated = false;
-  options.starts = 1;
-  return options;
-}
-
-/// A fit that is asked to end from the given question on, and what it leaves to go on from.
-struct Asked {
-  explicit Asked(int at_most) : most(at_most) {}
-  FitMonitor monitor() {
-    FitMonitor m = watch.monitor();
-    m.interrupted = [this] { return asked++ >= most; };
-    return m;
-  }
-  int most;
-  std::atomic<int> asked = 0;
-  test::Interruption watch;
-};
-
 TEST(Interruption, AnywhereLeavesWhatLeadsToTheSameEnd) {
   const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
-  Asked never(1 << 20);
-  const FitOutcome undisturbed = fit({bar}, quick(), never.monitor());
+  test::Interruption never;
+  const FitOutcome undisturbed = fit({bar}, test::quick_fit_of_bar(), never.monitor());
   ASSERT_FALSE(undisturbed.interrupted);
-  const int all = never.asked;
+  const int all = never.asked();
   ASSERT_GT(all, 20);
   for (const double part : {0.05, 0.3, 0.5, 0.7, 0.9}) {
-    Asked asked(int(part * all));
-    const FitOutcome interrupted = fit({bar}, quick(), asked.monitor());
+    test::Interruption interruption(int(part * all));
+    const FitOutcome interrupted = fit({bar}, test::quick_fit_of_bar(), interruption.monitor());
     EXPECT_TRUE(interrupted.interrupted) << part;
     EXPECT_EQ(interrupted.reason, "interrupted") << part;
-    EXPECT_LE(asked.asked, asked.most + 4) << part << ": it goes on with nothing";
-    const FitOutcome resumed = fit({bar}, quick(), {}, asked.watch.left());
+    EXPECT_LE(interruption.asked(), int(part * all) + 4) << part << ": it goes on with nothing";
+    const FitOutcome resumed = fit({bar}, test::quick_fit_of_bar(), {}, interruption.left());
     EXPECT_EQ(resumed.theta, undisturbed.theta) << part;
     EXPECT_TRUE(resumed.converged) << part;
     ASSERT_EQ(resumed.uncertainty.std.size(), undisturbed.uncertainty.std.size()) << part;
@@ -59,7 +36,7 @@ TEST(Interruption, AnywhereLeavesWhatLeadsToTheSameEnd) {
 TEST(Interruption, BeforeAnEstimateTellsWhatFitsBestSoFar) {
   const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
   test::Interruption at_full_grid("fine");
-  const FitOutcome interrupted = fit({bar}, quick(), at_full_grid.monitor());
+  const FitOutcome interrupted = fit({bar}, test::quick_fit_of_bar(), at_full_grid.monitor());
   ASSERT_TRUE(at_full_grid.came());
   EXPECT_TRUE(interrupted.interrupted);
   ASSERT_TRUE(interrupted.evaluation.succeeded);

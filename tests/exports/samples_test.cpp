@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/error.hpp"
 #include "support/models.hpp"
@@ -61,7 +62,7 @@ TEST(PosteriorSamples, AreCorrelatedAsTheResultSays) {
       double(std::ranges::count_if(
           samples, [](const MaterialSample& s) { return (s.youngs_modulus < 2e5) == (s.poissons_ratio < 0.4); })) /
       20000.0;
-  EXPECT_NEAR(together, 0.5 + std::asin(-0.8 * 0.999) / M_PI, 0.015);
+  EXPECT_NEAR(together, 0.5 + std::asin(-0.8 * 0.999) / std::numbers::pi, 0.015);
 }
 
 TEST(PosteriorSamples, AreTheSameForASeed) {

@@ -22,6 +22,9 @@ class Interruption {
   /// As soon as such a state is saved.
   explicit Interruption(std::function<bool(const FitState&)> state) : state_(std::move(state)) {}
 
+  /// At the given question whether it came, and ever after.
+  explicit Interruption(int question) : question_(question) {}
+
   FitMonitor monitor() {
     FitMonitor monitor;
     monitor.on_event = [this](const FitEvent& event) {
@@ -31,10 +34,14 @@ class Interruption {
       left_ = state;
       if (state_ && state_(state)) came_ = true;
     };
-    monitor.interrupted = [this] { return came_.load(); };
+    monitor.interrupted = [this] {
+      if (asked_++ == question_) came_ = true;
+      return came_.load();
+    };
     return monitor;
   }
   bool came() const { return came_; }
+  int asked() const { return asked_; }  ///< questions so far
   /// As it is read back from a file.
   FitState left() const {
     const auto file = std::filesystem::temp_directory_path() / ("pliant.state." + std::to_string(::getpid()) + ".json");
@@ -47,6 +54,8 @@ class Interruption {
  private:
   std::string stage_;
   std::function<bool(const FitState&)> state_;
+  int question_ = -1;
+  std::atomic<int> asked_ = 0;
   std::atomic<bool> came_ = false;
   FitState left_;
 };

@@ -9,6 +9,16 @@ namespace pliant::test {
 
 inline constexpr double stiffness_of_bar = 2e5;  ///< [Pa], of the half that is held
 
+/// Few elements, one start, no finer mesh.
+inline FitOptions quick_fit_of_bar() {
+  FitOptions options;
+  options.budget = 0.0;
+  options.cells = options.coarse_cells = 8.0;
+  options.parameters["poissons_ratio"].estimated = false;
+  options.starts = 1;
+  return options;
+}
+
 /// A bar along x, clamped at its low end, that sags to rest, seen as points with noise; beyond its middle its modulus
 /// may be another. Made by the same elements and law as it is fitted with, on a finer mesh: an inverse crime in part.
 inline RecordedCapture sagging_bar(double beyond, const Vector3& gravity = {0.0, -9.81, 0.0}, unsigned seed = 7) {
