@@ -1,7 +1,7 @@
 """The section of docs/experiments.md about exported models in other programs. Standard library only."""
 from page import machine, percent, results, table
 
-WORDS = {"calculix": "CalculiX", "mujoco": "MuJoCo", "newton": "Newton, vertex block descent", "gmsh": "Gmsh's file, by meshio", "usd": "USD"}
+WORDS = {"calculix": "CalculiX", "mujoco": "MuJoCo", "newton": "Newton, vertex block descent", "gmsh": "Gmsh's file, by", "usd": "USD"}
 
 
 def off(seen, own):
