@@ -54,11 +54,11 @@ ElementKind elements_for(const Arguments& arguments, const ExportFormat& format)
 /// Materials drawn from what the fit left open, each in a folder of its own.
 void run_samples(const Arguments& arguments, const ExportFormat& format, const Model& model) {
   const Result result = read_result(fs::path(arguments.model).parent_path() / "result.json");
-  const std::vector<MaterialSample> samples = posterior_samples(result, arguments.samples);
+  const std::vector<DrawnMaterial> samples = posterior_samples(result, arguments.samples);
   make_folder(arguments.out);
   std::string table = "sample,youngs_modulus [Pa],poissons_ratio [1],mass_damping [1/s],stiffness_damping [s]\n";
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const MaterialSample& s = samples[i];
+    const DrawnMaterial& s = samples[i];
     table += fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g}\n", i + 1, s.youngs_modulus, s.poissons_ratio, s.mass_damping,
                          s.stiffness_damping);
   }

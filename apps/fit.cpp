@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -14,13 +13,10 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
-#include "estimation/fit_state.hpp"
-#include "estimation/press_scene.hpp"
 #include "gradient_check.hpp"
-#include "output/fit_output.hpp"
+#include "output/fit_job.hpp"
 #include "output/press_output.hpp"
 #include "report/report.hpp"
-#include "scan/scan_pose.hpp"
 #include "speech.hpp"
 
 namespace pliant::apps {
@@ -28,7 +24,6 @@ namespace pliant::apps {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 struct Arguments {
   std::vector<std::string> captures;
@@ -39,18 +34,16 @@ struct Arguments {
   bool resume = false, check_gradient = false;
 };
 
-/// Lines for people on stderr, kept for log.txt.
-class Log {
+/// Lines for people on stderr.
+class Screen {
  public:
   void line(const std::string& text) {
     clear_live();
     std::fprintf(stderr, "%s\n", text.c_str());
-    text_ += text + "\n";
   }
   /// Replaces the last live line on a terminal; elsewhere an ordinary line.
   void live(const std::string& text) {
     if (!terminal_) return line(text);
-    text_ += text + "\n";
     std::fprintf(stderr, "\r\033[K%s", text.c_str());
     std::fflush(stderr);
     is_live_ = true;
@@ -59,62 +52,10 @@ class Log {
     if (is_live_) std::fprintf(stderr, "\n");
     is_live_ = false;
   }
-  const std::string& text() const { return text_; }
 
  private:
   bool terminal_ = ::isatty(STDERR_FILENO) != 0, is_live_ = false;
-  std::string text_;
 };
-
-std::string with_prefix(double value, const char* unit) {
-  char text[48];
-  const double size = std::abs(value);
-  const bool pascal = std::string(unit) == "Pa", second = std::string(unit) == "s";
-  if (pascal && size >= 1e6)
-    std::snprintf(text, sizeof text, "%.4g MPa", value * 1e-6);
-  else if (pascal && size >= 1e4)
-    std::snprintf(text, sizeof text, "%.4g kPa", value * 1e-3);
-  else if (second && size < 0.1)
-    std::snprintf(text, sizeof text, "%.3g ms", value * 1e3);
-  else
-    std::snprintf(text, sizeof text, "%.4g%s%s", value, *unit && std::string(unit) != "1" ? " " : "",
-                  std::string(unit) == "1" ? "" : unit);
-  return text;
-}
-
-/// Poisson's ratio and dampings, where the event's parameters have them.
-std::string describe_others(const FitEvent& event) {
-  const auto value = [&](const char* name) { return event.theta[event.layout->at(name)]; };
-  const auto has = [&](const char* name) { return event.layout && event.layout->contains(name); };
-  std::string text;
-  if (has("poissons_ratio")) text += "  nu " + with_prefix(value("poissons_ratio"), "1");
-  if (has("mass_damping") && has("stiffness_damping"))
-    text +=
-        "  damping " + with_prefix(value("mass_damping"), "1/s") + ", " + with_prefix(value("stiffness_damping"), "s");
-  return text;
-}
-
-std::string describe(const FitEvent& event, double seconds) {
-  const double rms = event.surface_rms > 0.0 ? event.surface_rms : event.marker_rms;
-  char head[160];
-  if (event.kind == StageKind::Sample)
-    std::snprintf(head, sizeof head, "%-18s %2d iterations  rms %6.2f mm", event.stage.c_str(), event.iteration,
-                  1e3 * rms);
-  else if (event.kind == StageKind::Law)
-    std::snprintf(head, sizeof head, "%-18s iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
-                  event.iteration, event.cost, 1e3 * rms);
-  else
-    std::snprintf(head, sizeof head, "%-15s start %d  iteration %2d  cost %10.4g  rms %6.2f mm", event.stage.c_str(),
-                  event.start + 1, event.iteration, event.cost, 1e3 * rms);
-  std::string text = head + ("  E " + with_prefix(event.youngs_modulus, "Pa")) + describe_others(event);
-  if (event.fraction_done > 0.02) {
-    char left[40];
-    std::snprintf(left, sizeof left, "  about %.0f s left",
-                  seconds * (1.0 - event.fraction_done) / event.fraction_done);
-    text += left;
-  }
-  return text;
-}
 
 FitOptions read_options(const Arguments& arguments) {
   FitOptions options;
@@ -183,100 +124,45 @@ void print_result(const Result& result, const FitOutcome& outcome, const fs::pat
   std::cout << "\n";
 }
 
-/// Where the fit in the output folder begins: where an interrupted one was, or anew.
-FitState begun(const Arguments& arguments, const FitOptions& options, const std::string& key, Log& log) {
-  const fs::path out = arguments.out, state_file = out / "state.json";
-  FitState state;
-  if (arguments.resume) {
-    if (!is_file(state_file))
-      throw InputError({{state_file},
-                        "there is no interrupted fit to resume",
-                        "the state that an interrupted fit leaves",
-                        "leave out --resume"});
-    state = read_fit_state(state_file, key);
-    log.line("resuming the fit in " + out.string());
-  } else {
-    remove_file(state_file);
-  }
-  write_file(out / "fit.toml", to_toml(options));
-  return state;
-}
-
-int ended_without_result(const std::string& reason, bool interrupted, const fs::path& out, Log& log) {
-  log.line("the fit ended without a result: " + reason);
-  write_file(out / "log.txt", log.text());
-  return interrupted ? WasInterrupted : NotConverged;
-}
-
-/// Says how to go on with an interrupted fit, or drops its state.
-int ended(bool converged, bool interrupted, const std::string& words, const fs::path& out) {
-  if (interrupted) {
-    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out.string()
+/// Says how to go on with an interrupted fit.
+int ended(const FitJobOutcome& done, const std::string& words, const std::string& out) {
+  if (!done.result) return done.outcome.interrupted ? WasInterrupted : NotConverged;
+  if (done.outcome.interrupted) {
+    std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out
               << " --resume\n";
     return WasInterrupted;
   }
-  remove_file(out / "state.json");
-  return converged ? Fine : NotConverged;
+  return done.outcome.converged ? Fine : NotConverged;
 }
 
 int run(const Arguments& arguments) {
-  const auto begin = Clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  const FitOptions options = read_options(arguments);
-  std::vector<RecordedCapture> recordings;
-  std::optional<RecordedCapture> held_out;
-  std::string words, fingerprint;
-  for (const std::string& path : arguments.captures) {
-    recordings.push_back({read_capture(path), {}});
-    words += (words.empty() ? "" : " ") + path;
-    fingerprint += recordings.back().capture.sha256 + "\n";
-  }
-  if (!arguments.held_out.empty()) held_out = RecordedCapture{read_capture(arguments.held_out), {}};
-  const fs::path out = arguments.out;
-  make_folder(out);
-
+  FitJob job;
+  job.options = read_options(arguments);
+  job.captures.assign(arguments.captures.begin(), arguments.captures.end());
+  if (!arguments.held_out.empty()) job.held_out = arguments.held_out;
+  job.out = arguments.out, job.resume = arguments.resume;
+  job.version = PLIANT_VERSION, job.commit = PLIANT_COMMIT;
+  JobRecordings recordings = read_recordings(job);
   std::optional<ThreadLimit> threads;
   if (arguments.threads > 0) threads.emplace(arguments.threads);
-
-  Log log;
-  log.line("pliant " PLIANT_VERSION " fit " + words);
-  if (arguments.check_gradient) return run_gradient_check(std::move(recordings), options, out);
-  ObserveOptions observe_options;
-  observe_options.max_points_per_frame = options.points_per_frame;
-  const auto read = [&](RecordedCapture& recording) {
-    if (is_of_static_tests(recording.capture)) return;
-    std::optional<ScanPose> pose;
-    recording.observed = observe_placed(
-        recording.capture, observe_options, [](int done, int total) { show_progress("read", done, total); }, &pose);
-    if (pose)
-      log.line(formatted("the scan was placed: %.2f mm rms, outlines overlap by %.0f %%", 1e3 * pose->rms,
-                         100.0 * pose->overlap));
-    if (pose && pose->runner_up > 0.0 && pose->runner_up < 1.3)
-      log.line("note: another pose of the scan fits nearly as well; `pliant place` draws the one that was taken");
-    stop_if_interrupted();
+  if (arguments.check_gradient) {
+    make_folder(job.out);
+    return run_gradient_check(std::move(recordings.recordings), job.options, job.out);
+  }
+  Screen screen;
+  FitWatch watch;
+  watch.on_line = [&](const std::string& line) { screen.line(line); };
+  watch.on_event = [&](const FitEvent&, const std::string& line) { screen.live(line); };
+  watch.progress = [&](const char* what, int count, int total) {
+    screen.clear_live();
+    show_progress(what, count, total);
   };
-  for (RecordedCapture& recording : recordings) read(recording);
-  if (held_out) read(*held_out);
-
-  const std::string key = fingerprint + to_toml(options);
-  const fs::path state_file = out / "state.json";
-  FitState state = begun(arguments, options, key, log);
-
-  FitMonitor monitor;
-  monitor.on_event = [&](const FitEvent& event) { log.live(describe(event, seconds())); };
-  monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
-  monitor.interrupted = [] { return is_interrupted(); };
-  const FitOutcome outcome = fit(recordings, options, monitor, std::move(state), std::move(held_out));
-  log.clear_live();
-  if (outcome.interrupted && !is_file(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
-  if (!outcome.evaluation.succeeded) return ended_without_result(outcome.reason, outcome.interrupted, out, log);
-  const RunFacts facts{PLIANT_VERSION, PLIANT_COMMIT, words, seconds()};
-  const Result result = make_result(recordings, outcome, facts);
-  write_fit_output(out, recordings, outcome, result, facts, show_progress);
-  log.line(outcome.reason);
-  write_file(out / "log.txt", log.text());
-  print_result(result, outcome, out, seconds());
-  return ended(outcome.converged, outcome.interrupted, words, out);
+  watch.interrupted = [] { return is_interrupted(); };
+  const std::string words = recordings.words;
+  const FitJobOutcome done = run_fit_job(job, std::move(recordings), watch);
+  screen.clear_live();
+  if (done.result) print_result(*done.result, done.outcome, job.out, done.seconds);
+  return ended(done, words, arguments.out);
 }
 
 std::string key_help() {

@@ -10,6 +10,9 @@ endif()
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(pliant_options INTERFACE -Wno-subobject-linkage) # takes the sources of a batch for headers
 endif()
+if(PLIANT_WITH_PYTHON) # the modules become parts of a shared library; programs alike, for one set of precompiled headers
+  target_compile_options(pliant_options INTERFACE -fPIC -fno-semantic-interposition)
+endif()
 if(PLIANT_WARNINGS_AS_ERRORS)
   target_compile_options(pliant_options INTERFACE -Werror)
 endif()

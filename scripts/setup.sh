@@ -1,12 +1,15 @@
 #!/usr/bin/env bash
-# Installs the Debian packages of scripts/debian-packages.txt that are missing. Quick when all are there.
+# Installs the Debian packages of scripts/debian-packages.txt that are missing, and with `tests` those of
+# scripts/debian-packages-tests.txt. Quick when all are there.
 set -euo pipefail
 
-list="$(dirname "${BASH_SOURCE[0]}")/debian-packages.txt"
-mapfile -t wanted < <(sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "$list")
+folder="$(dirname "${BASH_SOURCE[0]}")"
+lists=("$folder/debian-packages.txt")
+[[ "${1:-}" == tests ]] && lists+=("$folder/debian-packages-tests.txt")
+mapfile -t wanted < <(sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "${lists[@]}")
 
 if ! command -v dpkg-query > /dev/null; then
-  echo "setup: this is no Debian; install the counterparts of $list by hand" >&2
+  echo "setup: this is no Debian; install the counterparts of ${lists[*]} by hand" >&2
   exit 0
 fi
 

@@ -63,7 +63,7 @@ MatrixX correlations_of(const Result& result) {
 
 }  // namespace
 
-std::vector<MaterialSample> posterior_samples(const Result& result, int count, unsigned seed) {
+std::vector<DrawnMaterial> posterior_samples(const Result& result, int count, unsigned seed) {
   std::array<Quantiles, names.size()> quantiles;
   for (std::size_t k = 0; k < names.size(); ++k) quantiles[k] = quantiles_of(result, k);
   if (!quantiles[0].varies)
@@ -78,7 +78,7 @@ std::vector<MaterialSample> posterior_samples(const Result& result, int count, u
     throw InputError({{}, "the result's correlations contradict each other", "those that `pliant fit` wrote", ""});
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  std::vector<MaterialSample> samples;
+  std::vector<DrawnMaterial> samples;
   for (int i = 0; i < count; ++i) {
     VectorX z(correlations.rows());
     for (double& value : z) value = normal(random);
@@ -89,7 +89,7 @@ std::vector<MaterialSample> posterior_samples(const Result& result, int count, u
   return samples;
 }
 
-Model with_material(Model model, const MaterialSample& sample) {
+Model with_material(Model model, const DrawnMaterial& sample) {
   const double ratio = sample.youngs_modulus / model.youngs_modulus;
   model.youngs_modulus = sample.youngs_modulus;
   for (double& modulus : model.volume.youngs_modulus) modulus *= ratio;

@@ -114,8 +114,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     stepper_.carry(hung.points(), hung.masses());
   }
   element_edge_ = std::cbrt(body_->volume() / std::max(1, body_->element_count()));
-  if (options_.start.rows() > 0 && (options_.start.rows() != rest_.rows() || starts_held() || options_.is_static))
-    throw std::invalid_argument("a start that is given has a row for each node, and no equilibrium is looked for");
+  check_start();
   prepare_holds();
   if (options_.scan_sags || !options_.shape.points.empty()) {
     const std::vector<int> held = held_nodes(*body_, options_.holds);
@@ -139,6 +138,39 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   }
 }
 
+void Simulation::check_start() const {
+  for (const Points* given : {&options_.start, &options_.start_velocities})
+    if (given->rows() > 0 && (given->rows() != rest_.rows() || starts_held() || options_.is_static))
+      throw std::invalid_argument("a start that is given has a row for each node, and no equilibrium is looked for");
+}
+
+void Simulation::set_start(Points positions, Points velocities) {
+  options_.start.swap(positions), options_.start_velocities.swap(velocities);
+  try {
+    check_start();
+  } catch (const std::invalid_argument&) {
+    options_.start.swap(positions), options_.start_velocities.swap(velocities);
+    throw;
+  }
+}
+
+void Simulation::check_reference() const {
+  const bool has_derivatives = body_->kind != ElementKind::Hexahedron && !options_.law && !options_.law_layout &&
+                               options_.elastic_law == ElasticLaw::Corotated &&
+                               (options_.stiffness_damping == StiffnessDamping::Rayleigh || options_.is_static);
+  if (!has_derivatives || shape_)
+    throw std::invalid_argument(
+        "a stress-free shape that is set wants tetrahedra, the corotated law and Rayleigh's damping, and parameters "
+        "that "
+        "do not say it");
+}
+
+void Simulation::set_reference(Points reference) {
+  check_reference();
+  reference_body_ = std::make_shared<Body>(with_reference(*body_, std::move(reference)));
+  elasticity_->set_reference(reference_body_);
+}
+
 bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summary) {
   if (shape_ && !shape_is_held_) {
     summary.failure = shape_->find(parameters);
@@ -153,7 +185,7 @@ bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summa
 
 std::shared_ptr<const Body> Simulation::rest_body(const VectorX& parameters) {
   if (follows_shape() && !shape_->find(parameters).empty()) return body_;
-  return shape_ ? shape_->body() : body_;
+  return shape_ ? shape_->body() : reference_body_ ? reference_body_ : body_;
 }
 
 std::string Simulation::hold_shape(const VectorX& parameters) {
@@ -189,6 +221,7 @@ void Simulation::hold_start(bool held) {
 
 bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& summary) {
   state = {options_.start.rows() > 0 ? options_.start : rest_, velocities(parameters)};
+  if (options_.start_velocities.rows() > 0) state.v += options_.start_velocities;
   if (!starts_held()) return true;
   hold_start(true);
   RolloutSummary search;
@@ -213,7 +246,7 @@ std::vector<State> Simulation::start_tangents(const State& start, const MatrixX&
   return tangents;
 }
 
-bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& theta_bar) {
+bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& theta_bar, Points* reference_bar) {
   theta_bar.segment<3>(options_.blocks.linear_velocity) += bar.v.colwise().sum().transpose();
   for (Eigen::Index n = 0; n < bar.v.rows(); ++n) {
     const Vector3 lever = lever_.row(n), v_bar = bar.v.row(n);
@@ -222,7 +255,7 @@ bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& th
   if (starts_held()) {
     hold_start(true);
     const bool ready = statics_.prepare_derivatives(start.x);
-    if (ready) statics_.adjoint(start.x, bar.x, theta_bar, follows_shape() ? &reference_bar_ : nullptr);
+    if (ready) statics_.adjoint(start.x, bar.x, theta_bar, reference_bar);
     hold_start(false);
     if (!ready) return false;
   }
@@ -403,12 +436,19 @@ std::size_t Simulation::segment_length(std::size_t steps) const {
 RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame,
                                        const std::function<bool(int, const State&)>& cost,
                                        const std::function<void(int, const State&, Points&)>& cotangent,
-                                       VectorX& theta_bar) {
+                                       VectorX& theta_bar, NodeCotangents* nodes) {
   RolloutSummary summary;
+  const bool by_reference = nodes && nodes->with_reference;
+  if (by_reference && !reference_body_) set_reference(body_->reference_positions());
   if (!set_parameters(parameters, summary)) return summary;
   theta_bar.setZero(parameters.size());
   reference_bar_ = Points::Zero(rest_.rows(), 3);
-  Points* const reference_bar = follows_shape() ? &reference_bar_ : nullptr;
+  Points* const reference_bar = follows_shape() || by_reference ? &reference_bar_ : nullptr;
+  const auto keep = [&](const Points& start, const Points& velocities) {
+    if (!nodes) return;
+    nodes->start = start, nodes->start_velocities = velocities;
+    nodes->reference = by_reference ? reference_bar_ : Points();
+  };
   if (options_.is_static) {
     State state;
     if (!find_equilibrium(parameters, state, summary)) return summary;
@@ -419,7 +459,8 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       cotangent(frame, state, x_bar);
     }
     statics_.adjoint(state.x, x_bar, theta_bar, reference_bar);
-    if (reference_bar) {
+    keep(Points::Zero(rest_.rows(), 3), Points::Zero(rest_.rows(), 3));
+    if (follows_shape()) {
       if (!shape_->prepare_derivatives()) return summary.failure = "the load-free shape has no derivatives", summary;
       shape_->adjoint(Points::Zero(rest_.rows(), 3), reference_bar_, theta_bar);
     }
@@ -482,8 +523,9 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
     segment.pop_back();
   }
   cotangent(0, state, bar.x);
-  if (!start_adjoint(released, bar, theta_bar))
+  if (!start_adjoint(released, bar, theta_bar, reference_bar))
     return summary.failure = "a matrix of the start's derivatives cannot be factorised", summary;
+  keep(starts_held() ? Points::Zero(rest_.rows(), 3) : bar.x, bar.v);
   summary.succeeded = true;
   return summary;
 }

@@ -53,6 +53,8 @@ struct SimulationOptions {
   /// Where nodes are at the start, n x 3 [m]: what led them there lets go then. Empty: where they rest, or where the
   /// equilibrium of what holds the object until then has them. The same for every parameter vector.
   Points start;
+  /// Velocities of the nodes at the start, n x 3 [m/s], beside those of the parameter vector. Empty: none.
+  Points start_velocities;
   bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
   /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then.
@@ -68,6 +70,16 @@ struct RolloutSummary {
   bool succeeded = false;
   int steps = 0, frames = 0, solver_iterations = 0;
   std::string failure;  ///< why it stopped, in words
+};
+
+/// Derivatives of a scalar cost by the nodes, n x 3 each.
+struct NodeCotangents {
+  Points start;             ///< by where nodes are at the start [1/m]; of an object that is held until then, zero
+  Points start_velocities;  ///< by their velocities there [s/m]
+  /// By where nodes are stress-free [1/m], their mass and all else staying as they are, the start included. Empty
+  /// unless it is asked for.
+  Points reference;
+  bool with_reference = false;  ///< asks for it
 };
 
 /// Runs one body through a scene's frames, or to its equilibrium, with tangents or adjoint. Not for concurrent use;
@@ -102,8 +114,19 @@ class Simulation {
   /// @param theta_bar out: derivative of the summed cost by theta
   /// Keeps states within the memory budget, and beyond it the first state of each of about sqrt(steps) segments, which
   /// are run again when the sweep reaches them.
+  /// @param nodes     out, where given: derivatives by the nodes. Throws std::invalid_argument as `set_reference` does
+  ///                  where they are asked for by the reference
   RolloutSummary run_adjoint(const VectorX& theta, int last_frame, const std::function<bool(int, const State&)>& cost,
-                             const std::function<void(int, const State&, Points&)>& cotangent, VectorX& theta_bar);
+                             const std::function<void(int, const State&, Points&)>& cotangent, VectorX& theta_bar,
+                             NodeCotangents* nodes = nullptr);
+  /// From now on motions start there, with these velocities beside those of theta: n x 3 each, or empty for where nodes
+  /// rest, and for none. Throws std::invalid_argument as the constructor does for `SimulationOptions::start`.
+  void set_start(Points positions, Points velocities);
+  /// From now on the body is stress-free where its nodes are there [m], n x 3; it still starts where it was scanned,
+  /// and mass, surface and the unit of pulls stay those of the body as it was given. Throws std::invalid_argument where
+  /// the elements are not tetrahedra with the corotated law and Rayleigh's damping, where the parameters say where the
+  /// body is stress-free, and where an element has no positive volume.
+  void set_reference(Points reference);
   /// Bytes of states that the last reverse sweep held at its most.
   std::size_t peak_state_bytes() const { return peak_state_bytes_; }
 
@@ -117,6 +140,8 @@ class Simulation {
   /// Whether the motion starts from an equilibrium, under forces that end there.
   bool starts_held() const { return pull_ || let_go_ || options_.starts_settled; }
   void hold_start(bool held);
+  void check_start() const;
+  void check_reference() const;
   /// Where and how fast the object is when it is let go; for a held one also the derivatives' matrix. False where
   /// there is no such equilibrium: the summary says so.
   bool start(const VectorX& theta, State& state, RolloutSummary& summary);
@@ -130,8 +155,8 @@ class Simulation {
   bool shape_tangents(const MatrixX& directions, ShapeChange& change, RolloutSummary& summary);
   /// Tangents of the start that was found last.
   std::vector<State> start_tangents(const State& start, const MatrixX& directions, const ShapeChange& shape);
-  /// Adds to theta_bar. Any steps may have been taken since the start was found.
-  bool start_adjoint(const State& start, const State& bar, VectorX& theta_bar);
+  /// Adds to theta_bar and, where given, reference_bar. Any steps may have been taken since the start was found.
+  bool start_adjoint(const State& start, const State& bar, VectorX& theta_bar, Points* reference_bar);
   Points velocities(const VectorX& theta) const;
   /// The equilibrium of static scenes and of pulled objects: at once where Newton's method gets there from rest, else
   /// by steps of the load, gravity, pulls and the holds' displacement together, as large as it follows. Never from an
@@ -168,7 +193,8 @@ class Simulation {
   Statics statics_;                   // of the stepper's forces
   std::unique_ptr<RestShape> shape_;  // where theta says where the body is stress-free
   bool shape_is_held_ = false;
-  Points reference_bar_;  // likewise, of the reverse sweep
+  std::shared_ptr<const Body> reference_body_;  // where it is stress-free, if that was set
+  Points reference_bar_;                        // likewise, of the reverse sweep
   std::vector<StepPlan> plan_;
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;

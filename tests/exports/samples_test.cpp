@@ -29,17 +29,17 @@ Result result() {
 
 /// Part of the draws below a number.
 template <class Of>
-double below(const std::vector<MaterialSample>& samples, double number, const Of& of) {
-  return double(std::ranges::count_if(samples, [&](const MaterialSample& s) { return of(s) < number; })) /
+double below(const std::vector<DrawnMaterial>& samples, double number, const Of& of) {
+  return double(std::ranges::count_if(samples, [&](const DrawnMaterial& s) { return of(s) < number; })) /
          double(samples.size());
 }
 
 TEST(PosteriorSamples, HaveTheStatedIntervals) {
-  const std::vector<MaterialSample> samples = posterior_samples(result(), 20000);
+  const std::vector<DrawnMaterial> samples = posterior_samples(result(), 20000);
   ASSERT_EQ(samples.size(), 20000u);
-  const auto E = [](const MaterialSample& s) { return s.youngs_modulus; };
-  const auto nu = [](const MaterialSample& s) { return s.poissons_ratio; };
-  const auto mass = [](const MaterialSample& s) { return s.mass_damping; };
+  const auto E = [](const DrawnMaterial& s) { return s.youngs_modulus; };
+  const auto nu = [](const DrawnMaterial& s) { return s.poissons_ratio; };
+  const auto mass = [](const DrawnMaterial& s) { return s.mass_damping; };
   constexpr double scatter = 0.01;  // five deviations of a share of 20,000
   EXPECT_NEAR(below(samples, 1.8e5, E), 0.05, scatter);
   EXPECT_NEAR(below(samples, 2e5, E), 0.5, 2 * scatter);
@@ -48,7 +48,7 @@ TEST(PosteriorSamples, HaveTheStatedIntervals) {
   EXPECT_NEAR(below(samples, 0.48, nu), 0.95, scatter);
   EXPECT_NEAR(below(samples, 0.0005, mass), 0.05, scatter);
   EXPECT_NEAR(below(samples, 0.9, mass), 0.95, scatter);
-  for (const MaterialSample& s : samples) {
+  for (const DrawnMaterial& s : samples) {
     EXPECT_LT(s.poissons_ratio, 0.5);
     EXPECT_GT(s.mass_damping, 0.0);
     EXPECT_EQ(s.stiffness_damping, 2e-3) << "it was given";
@@ -56,11 +56,11 @@ TEST(PosteriorSamples, HaveTheStatedIntervals) {
 }
 
 TEST(PosteriorSamples, AreCorrelatedAsTheResultSays) {
-  const std::vector<MaterialSample> samples = posterior_samples(result(), 20000);
+  const std::vector<DrawnMaterial> samples = posterior_samples(result(), 20000);
   // Of ranks: both above or both below their medians, 1/2 + asin(rho) / pi of the draws (Sheppard 1899).
   const double together =
       double(std::ranges::count_if(
-          samples, [](const MaterialSample& s) { return (s.youngs_modulus < 2e5) == (s.poissons_ratio < 0.4); })) /
+          samples, [](const DrawnMaterial& s) { return (s.youngs_modulus < 2e5) == (s.poissons_ratio < 0.4); })) /
       20000.0;
   EXPECT_NEAR(together, 0.5 + std::asin(-0.8 * 0.999) / std::numbers::pi, 0.015);
 }

@@ -1,0 +1,89 @@
+#include "program.hpp"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+
+#include "base/error.hpp"
+#include "command_line.hpp"
+#include "commands.hpp"
+
+namespace pliant::apps {
+
+namespace {
+
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+// The first Ctrl-C asks the command to stop where its files are whole, the second stops at once.
+void on_interrupt(int) {
+  if (interrupted.exchange(true)) ::_exit(WasInterrupted);
+}
+
+constexpr const char* footer = R"(Examples:
+  pliant check recordings/bear              what was recorded, and what can be estimated from it
+  pliant check recordings/bear --out look   the same, with pictures and point clouds in the folder look
+
+A capture is a folder with a file capture.toml in it (docs/formats.md).
+Exit codes: 0 fine, 2 bad usage or input, 3 not converged, 130 interrupted.)";
+
+int run(int argc, char** argv) {
+  CommandLine line("pliant turns a recording of a soft object into an elastic model.", "pliant " PLIANT_VERSION,
+                   footer);
+  int exit_code = Fine;
+  add_check(line, exit_code);
+  add_calibrate(line, exit_code);
+  add_fuse(line, exit_code);
+  add_scan(line, exit_code);
+  add_place(line, exit_code);
+  add_markers(line, exit_code);
+  add_fit(line, exit_code);
+  add_simulate(line, exit_code);
+  add_live(line, exit_code);
+  add_track(line, exit_code);
+  add_evaluate(line, exit_code);
+  add_export(line, exit_code);
+  add_press(line, exit_code);
+  add_synth(line, exit_code);
+  add_rest(line, exit_code);
+  add_mesh(line, exit_code);
+  if (!line.run(argc, argv)) return BadInput;
+  return exit_code;
+}
+
+}  // namespace
+
+bool is_interrupted() { return interrupted; }
+
+void stop_if_interrupted() {
+  if (interrupted) throw Interrupted();
+}
+
+void show_progress(const char* what, int done, int total) {
+  static const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
+  if (!is_terminal) return;
+  std::fprintf(stderr, "\r%s %d/%d%s", what, done, total, done == total ? "\n" : "");
+  std::fflush(stderr);
+}
+
+int run_program(int argc, char** argv) {
+  std::signal(SIGINT, on_interrupt);
+  try {
+    return run(argc, argv);
+  } catch (const Interrupted&) {
+    std::cerr << "pliant: interrupted\n";
+    return WasInterrupted;
+  } catch (const InputError& error) {
+    std::cerr << error.what() << '\n';
+    return BadInput;
+  } catch (const std::exception& error) {
+    std::cerr << "pliant: " << error.what() << '\n';
+    return 1;
+  }
+}
+
+}  // namespace pliant::apps

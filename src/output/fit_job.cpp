@@ -1,0 +1,154 @@
+#include "output/fit_job.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+#include "estimation/fit_config.hpp"
+#include "estimation/fit_state.hpp"
+#include "estimation/press_scene.hpp"
+#include "output/fit_output.hpp"
+#include "scan/scan_pose.hpp"
+
+namespace pliant {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Poisson's ratio and dampings, where the event's parameters have them.
+std::string describe_others(const FitEvent& event) {
+  const auto value = [&](const char* name) { return event.theta[event.layout->at(name)]; };
+  const auto has = [&](const char* name) { return event.layout && event.layout->contains(name); };
+  std::string text;
+  if (has("poissons_ratio")) text += "  nu " + with_prefix(value("poissons_ratio"), "1");
+  if (has("mass_damping") && has("stiffness_damping"))
+    text +=
+        "  damping " + with_prefix(value("mass_damping"), "1/s") + ", " + with_prefix(value("stiffness_damping"), "s");
+  return text;
+}
+
+std::string describe(const FitEvent& event, double seconds) {
+  const double rms = 1e3 * (event.surface_rms > 0.0 ? event.surface_rms : event.marker_rms);
+  std::string text;
+  if (event.kind == StageKind::Sample)
+    text = fmt::format("{:<18} {:2} iterations  rms {:6.2f} mm", event.stage, event.iteration, rms);
+  else if (event.kind == StageKind::Law)
+    text = fmt::format("{:<18} iteration {:2}  cost {:10.4g}  rms {:6.2f} mm", event.stage, event.iteration, event.cost,
+                       rms);
+  else
+    text = fmt::format("{:<15} start {}  iteration {:2}  cost {:10.4g}  rms {:6.2f} mm", event.stage, event.start + 1,
+                       event.iteration, event.cost, rms);
+  text += "  E " + with_prefix(event.youngs_modulus, "Pa") + describe_others(event);
+  if (event.fraction_done > 0.02)
+    text += fmt::format("  about {:.0f} s left", seconds * (1.0 - event.fraction_done) / event.fraction_done);
+  return text;
+}
+
+/// Reads what the sensors saw, with the scan placed first where its pose is unknown.
+void observe_recording(RecordedCapture& recording, const FitOptions& options, const FitWatch& watch,
+                       const std::function<void(const std::string&)>& say) {
+  if (is_of_static_tests(recording.capture)) return;
+  ObserveOptions observe_options;
+  observe_options.max_points_per_frame = options.points_per_frame;
+  std::optional<ScanPose> pose;
+  recording.observed = observe_placed(
+      recording.capture, observe_options,
+      [&](int done, int total) {
+        if (watch.progress) watch.progress("read", done, total);
+      },
+      &pose);
+  if (pose)
+    say(fmt::format("the scan was placed: {:.2f} mm rms, outlines overlap by {:.0f} %", 1e3 * pose->rms,
+                    100.0 * pose->overlap));
+  if (pose && pose->runner_up > 0.0 && pose->runner_up < 1.3)
+    say("note: another pose of the scan fits nearly as well; `pliant place` draws the one that was taken");
+  if (watch.interrupted && watch.interrupted()) throw Interrupted();
+}
+
+}  // namespace
+
+std::string with_prefix(double value, const std::string& unit) {
+  const double size = std::abs(value);
+  if (unit == "Pa" && size >= 1e6) return fmt::format("{:.4g} MPa", value * 1e-6);
+  if (unit == "Pa" && size >= 1e4) return fmt::format("{:.4g} kPa", value * 1e-3);
+  if (unit == "s" && size < 0.1) return fmt::format("{:.3g} ms", value * 1e3);
+  return fmt::format("{:.4g}{}{}", value, unit.empty() || unit == "1" ? "" : " ", unit == "1" ? "" : unit);
+}
+
+JobRecordings read_recordings(const FitJob& job) {
+  JobRecordings read;
+  for (const fs::path& path : job.captures) {
+    read.recordings.push_back({read_capture(path), {}});
+    read.words += (read.words.empty() ? "" : " ") + path.string();
+    read.fingerprint += read.recordings.back().capture.sha256 + "\n";
+  }
+  if (job.held_out) read.held_out = RecordedCapture{read_capture(*job.held_out), {}};
+  return read;
+}
+
+FitJobOutcome run_fit_job(const FitJob& job, const FitWatch& watch) {
+  return run_fit_job(job, read_recordings(job), watch);
+}
+
+FitJobOutcome run_fit_job(const FitJob& job, JobRecordings all, const FitWatch& watch) {
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  const fs::path state_file = job.out / "state.json";
+  const std::string key = all.fingerprint + to_toml(job.options);
+  make_folder(job.out);
+
+  std::string log;
+  const auto say = [&](const std::string& line) {
+    log += line + "\n";
+    if (watch.on_line) watch.on_line(line);
+  };
+  say("pliant " + job.version + " fit " + all.words);
+  for (RecordedCapture& recording : all.recordings) observe_recording(recording, job.options, watch, say);
+  if (all.held_out) observe_recording(*all.held_out, job.options, watch, say);
+
+  FitState state;
+  if (job.resume) {
+    if (!is_file(state_file))
+      throw InputError({{state_file},
+                        "there is no interrupted fit to resume",
+                        "the state that an interrupted fit leaves",
+                        "begin the fit anew, without resuming"});
+    state = read_fit_state(state_file, key);
+    say("resuming the fit in " + job.out.string());
+  } else {
+    remove_file(state_file);
+  }
+  write_file(job.out / "fit.toml", to_toml(job.options));
+
+  FitMonitor monitor;
+  monitor.on_event = [&](const FitEvent& event) {
+    const std::string line = describe(event, seconds());
+    log += line + "\n";
+    if (watch.on_event) watch.on_event(event, line);
+  };
+  monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
+  monitor.interrupted = watch.interrupted;
+  FitJobOutcome done;
+  done.outcome = fit(all.recordings, job.options, monitor, std::move(state), std::move(all.held_out));
+  const FitOutcome& outcome = done.outcome;
+  if (outcome.interrupted && !is_file(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
+  if (!outcome.evaluation.succeeded) {
+    say("the fit ended without a result: " + outcome.reason);
+  } else {
+    const RunFacts facts{job.version, job.commit, all.words, seconds()};
+    done.result = make_result(all.recordings, outcome, facts);
+    write_fit_output(job.out, all.recordings, outcome, *done.result, facts, watch.progress);
+    say(outcome.reason);
+    if (!outcome.interrupted) remove_file(state_file);
+  }
+  write_file(job.out / "log.txt", log);
+  done.seconds = seconds();
+  return done;
+}
+
+}  // namespace pliant
