@@ -7,6 +7,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 import pliant
 from conftest import QUICK, RING
 
@@ -23,6 +25,18 @@ def test_it_is_the_program(program):
     assert checked.returncode == 0 and "ring" in checked.stdout
     wrong = run("check", "nowhere")
     assert wrong.returncode == 2 and "nowhere" in wrong.stderr
+
+
+def test_commands_are_run_from_python(tmp_path):
+    scene = RING.parent / "synthetic-ring/scene.toml"
+    text = scene.read_text().replace("frame_count = 48", "frame_count = 20").replace("width = 320", "width = 80").replace("height = 240", "height = 60")
+    (tmp_path / "scene.toml").write_text(text)
+    pliant.synth(tmp_path / "scene.toml", tmp_path / "made")
+    assert pliant.Capture(tmp_path / "made").frame_count == 20
+    planned = pliant.plan(tmp_path / "scene.toml")["youngs_modulus"]
+    assert planned.interval_90[0] < 4000 < planned.interval_90[1] and planned.largest_cause
+    with pytest.raises(pliant.InputError, match="nowhere"):
+        pliant.command("check", "nowhere")
 
 
 def test_ctrl_c_ends_a_fit_of_a_script_with_its_state(tmp_path):
