@@ -179,6 +179,7 @@ class Motion:
 
         :param cotangent: frames x nodes x 3, the scalar's derivative by positions; fewer frames end the motion sooner
         :param with_reference: also by where the nodes are stress-free; left out: where `reference` is given
+
         The other arguments are those of `run`.
         """
         if with_reference is None:
