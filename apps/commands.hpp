@@ -19,6 +19,7 @@ void add_press(CommandLine& line, int& exit_code);
 void add_synth(CommandLine& line, int& exit_code);
 void add_rest(CommandLine& line, int& exit_code);
 void add_mesh(CommandLine& line, int& exit_code);
+void add_new(CommandLine& line, int& exit_code);
 void add_markers(CommandLine& line, int& exit_code);
 void add_scan(CommandLine& line, int& exit_code);
 void add_calibrate(CommandLine& line, int& exit_code);

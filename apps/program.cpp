@@ -31,10 +31,26 @@ constexpr const char* footer = R"(Examples:
 A capture is a folder with a file capture.toml in it (docs/formats.md).
 Exit codes: 0 fine, 2 bad usage or input, 3 not converged, 130 interrupted.)";
 
+constexpr const char* first_steps =
+    R"(pliant turns a recording of a soft object into an elastic model. Three commands do most of it:
+
+  pliant check RECORDING                      what was recorded, and what can be estimated from it
+  pliant fit RECORDING --out DIR              stiffness and damping with intervals, and the model: DIR/report.html
+  pliant live DIR/model.toml --out PAGE.html  a page in which the model can be pulled, poked and thrown
+
+A recording is a folder with a capture.toml in it: `pliant new FOLDER` writes one for what lies there.
+`pliant --help` lists all commands, `pliant COMMAND --help` explains one.
+)";
+
 int run(int argc, char** argv) {
+  if (argc < 2) {
+    std::cout << first_steps;
+    return Fine;
+  }
   CommandLine line("pliant turns a recording of a soft object into an elastic model.", "pliant " PLIANT_VERSION,
                    footer);
   int exit_code = Fine;
+  add_new(line, exit_code);
   add_check(line, exit_code);
   add_calibrate(line, exit_code);
   add_fuse(line, exit_code);

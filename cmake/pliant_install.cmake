@@ -11,7 +11,12 @@ set_target_properties(pliant_library PROPERTIES EXPORT_NAME pliant)
 
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pliant)
 if(TARGET pliant)
-  install(TARGETS pliant RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS pliant RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples/oracle-bounce-a ${PROJECT_SOURCE_DIR}/examples/situations ${PROJECT_SOURCE_DIR}/examples/synthetic-ring
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/pliant/examples COMPONENT program PATTERN "*.py" EXCLUDE PATTERN "__pycache__" EXCLUDE)
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs COMPONENT program FILES_MATCHING PATTERN "*.md")
+  include(pliant_package)
 endif()
 install(TARGETS pliant_library ${module_targets} EXPORT pliantTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pliant FILES_MATCHING PATTERN "*.hpp")

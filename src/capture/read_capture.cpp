@@ -4,6 +4,7 @@
 #include "base/sha256.hpp"
 #include "capture/capture.hpp"
 #include "capture/capture_rules.hpp"
+#include "capture/folder_survey.hpp"
 #include "scene/inner_body.hpp"
 #include "scene/scene_toml.hpp"
 
@@ -263,9 +264,14 @@ class Reader {
 
 fs::path toml_file(const fs::path& path) {
   const fs::path file = is_folder(path) ? path / "capture.toml" : path;
-  if (!is_file(file))
-    throw InputError(Problem{
-        {file}, "the file " + why_no_file(file), "a folder with a capture.toml in it", "name the recording's folder"});
+  if (!is_file(file)) {
+    const bool is_recorded = is_folder(path) && survey_folder(path, false).has_frames();
+    throw InputError(Problem{{file},
+                             "the file " + why_no_file(file),
+                             "a folder with a capture.toml in it",
+                             is_recorded ? "`pliant new " + path.string() + "` writes one for what lies there"
+                                         : "name the recording's folder"});
+  }
   return file;
 }
 
