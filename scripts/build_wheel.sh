@@ -14,5 +14,5 @@ command -v ccache > /dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
 export CMAKE_BUILD_PARALLEL_LEVEL="${PLIANT_JOBS:-2}"
 "$work/environment/bin/pip" wheel "$root" --no-deps --wheel-dir "$work/wheel"
 mkdir -p "$out"
-PATH="$work/environment/bin:$PATH" "$work/environment/bin/auditwheel" repair --plat "linux_$(uname -m)" --wheel-dir "$out" "$work"/wheel/*.whl
+PATH="$work/environment/bin:$PATH" "$work/environment/bin/auditwheel" repair --plat auto --wheel-dir "$out" "$work"/wheel/*.whl
 ls "$out"/*.whl

@@ -21,7 +21,8 @@ from importlib import import_module
 release = import_module("run")
 
 SETS = {"release": "oracle-release", "zones": "oracle-release-zones"}
-WAYS = {"automatic": {}, "tracked motion": {"tracking": "loop"}, "points": {"tracking": "off"}}
+WAYS = {"automatic": {}, "tracked motion": {"tracking": "loop"}, "tracked motion, control points by evidence": {"tracking": "loop", "control_points": "auto"},
+        "points": {"tracking": "off"}}
 WRONG = {"true material": 1.0, "ten times too soft": 0.1, "ten times too hard": 10.0}
 
 
@@ -89,7 +90,7 @@ def main():
             continue
         truth = common.read(folder / "truth.json")["parameters"]
         for way, choices in WAYS.items():
-            figures = fit(arguments.program, folder, arguments.work / f"{name}-{way.replace(' ', '-')}", choices, truth)
+            figures = fit(arguments.program, folder, arguments.work / f"{name}-{way.replace(',', '').replace(' ', '-')}", choices, truth)
             results["fits"][f"{name}, {way}"] = figures
             print(name, way, figures.get("error"), figures.get("zones"), figures["wall_seconds"], "s", flush=True)
             common.write_results(__file__, results)
