@@ -118,13 +118,15 @@ void take_world(Draft& draft) {
       to_world.rotation = Eigen::Quaterniond::FromTwoVectors(up, Vector3::UnitY()).toRotationMatrix();
       if (floor) to_world.translation = Vector3::UnitY() * floor->height(Vector3::Zero());
       camera.camera.camera_to_world = to_world;
-      for (Plane& plane : capture.scene.planes)
-        plane.point = Vector3::Zero(), plane.normal = to_world.rotation * plane.normal;
+      for (Plane& plane : capture.scene.planes) {
+        plane.point = Vector3::Zero();
+        plane.normal = draft.facts.up ? Vector3(to_world.rotation * plane.normal) : Vector3(0.0, 1.0, 0.0);
+      }
       up = Vector3::UnitY();
     }
   }
   capture.scene.world.up = up.normalized();
-  capture.scene.world.gravity = -gravity * up.normalized();
+  capture.scene.world.gravity = Vector3::Zero() - gravity * up.normalized();  // no negative zeros
 }
 
 void take_surface(Draft& draft) {
