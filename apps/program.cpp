@@ -58,6 +58,7 @@ int run(int argc, char** argv) {
   add_place(line, exit_code);
   add_markers(line, exit_code);
   add_fit(line, exit_code);
+  add_batch(line, exit_code);
   add_simulate(line, exit_code);
   add_live(line, exit_code);
   add_track(line, exit_code);

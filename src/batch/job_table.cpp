@@ -1,0 +1,149 @@
+#include "batch/job_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "base/error.hpp"
+#include "base/files.hpp"
+#include "model/result.hpp"
+
+namespace pliant {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Row {
+  const BatchJob* job;
+  std::optional<BatchStatus> status;
+  std::optional<Result> result;
+};
+
+std::optional<Result> result_of(const fs::path& folder) {
+  if (!is_file(folder / "result.json")) return std::nullopt;
+  try {
+    return read_result(folder / "result.json");
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+std::string state_of(const Row& row) { return row.status ? name_of(row.status->state) : "not run"; }
+
+/// A number of a parameter; empty: none.
+std::string number(const std::optional<ParameterValue>& value) {
+  const double* scalar = value ? std::get_if<double>(&*value) : nullptr;
+  return scalar ? fmt::format("{:.9g}", *scalar) : "";
+}
+
+std::string quoted(std::string text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, "\"");
+  return "\"" + text + "\"";
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  return out;
+}
+
+/// Where a parameter stands in the table: the material first.
+int rank_of(const std::string& name) {
+  constexpr std::array<const char*, 4> first = {"youngs_modulus", "poissons_ratio", "mass_damping",
+                                                "stiffness_damping"};
+  for (std::size_t k = 0; k < first.size(); ++k)
+    if (name.starts_with(first[k])) return int(k);
+  return int(first.size());
+}
+
+/// Scalars that any job estimated, in a fixed order, each with its unit.
+std::vector<std::pair<std::string, std::string>> columns_of(const std::vector<Row>& rows) {
+  std::set<std::pair<std::string, std::string>> columns;
+  for (const Row& row : rows)
+    if (row.result)
+      for (const ParameterResult& p : row.result->parameters)
+        if (p.estimated && std::holds_alternative<double>(p.value)) columns.emplace(p.name, p.unit);
+  std::vector<std::pair<std::string, std::string>> sorted(columns.begin(), columns.end());
+  std::ranges::stable_sort(sorted, {}, [](const auto& column) { return rank_of(column.first); });
+  return sorted;
+}
+
+std::string csv(const std::vector<Row>& rows) {
+  const auto columns = columns_of(rows);
+  std::string text = "recording,folder,state,reason,verdict,surface_rms [m]";
+  for (const auto& [name, unit] : columns)
+    text += fmt::format(",{0} [{1}],{0} std [{1}],{0} 5 % [{1}],{0} 95 % [{1}]", name, unit);
+  text += "\n";
+  for (const Row& row : rows) {
+    text += quoted(row.job->capture.filename().string()) + "," + row.job->name + "," + state_of(row) + "," +
+            quoted(row.status ? row.status->reason : "");
+    text += "," + (row.result ? row.result->verdict : "") + ",";
+    if (row.result && row.result->error.surface_rms) text += fmt::format("{:.6g}", *row.result->error.surface_rms);
+    for (const auto& [name, unit] : columns) {
+      const ParameterResult* p = row.result ? row.result->find(name) : nullptr;
+      text += "," + (p ? number(p->value) : "") + "," + (p ? number(p->std) : "");
+      text += p && p->interval_90 ? fmt::format(",{:.9g},{:.9g}", p->interval_90->first, p->interval_90->second) : ",,";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string told(const ParameterResult* p) {
+  const double* value = p ? std::get_if<double>(&p->value) : nullptr;
+  if (!value) return "";
+  std::string text = fmt::format("{:.4g}", *value);
+  if (p->interval_90)
+    text += fmt::format("<br><small class=interval>{:.3g} .. {:.3g}</small>", p->interval_90->first,
+                        p->interval_90->second);
+  return text;
+}
+
+std::string page(const std::vector<Row>& rows, const BatchSummary& summary) {
+  const auto columns = columns_of(rows);
+  std::string text =
+      "<!doctype html><meta charset=utf-8><title>pliant batch</title><style>"
+      "body{font:15px system-ui,sans-serif;margin:2em;max-width:100%}table{border-collapse:collapse}"
+      "th,td{padding:.3em .8em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}"
+      "small{color:#666}.interval{white-space:nowrap}.failed,.timed{color:#a00}</style>";
+  text += fmt::format("<h1>{} recordings</h1><p>{} ended, {} of them converged. 90 % intervals beside the values.</p>",
+                      summary.jobs, summary.ended, summary.converged);
+  text += "<table><tr><th>recording<th>state<th>verdict";
+  for (const auto& [name, unit] : columns) text += "<th>" + escaped(name) + (unit == "1" ? "" : " [" + unit + "]");
+  for (const Row& row : rows) {
+    const std::string name = escaped(row.job->capture.filename().string()), state = state_of(row);
+    const bool has_report = row.result.has_value();
+    text += "\n<tr><td>" + (has_report ? "<a href=\"" + row.job->name + "/report.html\">" + name + "</a>" : name);
+    text += "<td class=\"" + state.substr(0, state.find(' ')) + "\">" + state;
+    if (row.status && !row.status->reason.empty()) text += "<br><small>" + escaped(row.status->reason) + "</small>";
+    text += "<td>" + (row.result ? row.result->verdict : "");
+    for (const auto& [parameter, unit] : columns)
+      text += "<td>" + told(row.result ? row.result->find(parameter) : nullptr);
+  }
+  return text + "\n</table>\n";
+}
+
+}  // namespace
+
+BatchSummary write_batch_table(const fs::path& batch, const std::vector<BatchJob>& jobs) {
+  std::vector<Row> rows;
+  BatchSummary summary;
+  for (const BatchJob& job : jobs) {
+    Row row{&job, read_status(batch, job), {}};
+    if (row.status) row.result = result_of(batch / job.name);
+    ++summary.jobs;
+    summary.ended += row.status.has_value() ? 1 : 0;
+    summary.converged += row.status && row.status->state == BatchStatus::State::Converged ? 1 : 0;
+    rows.push_back(std::move(row));
+  }
+  std::ranges::sort(rows, {}, [](const Row& row) { return std::pair(row.job->capture.filename(), row.job->key); });
+  write_file(batch / "results.csv", csv(rows));
+  write_file(batch / "results.html", page(rows, summary));
+  return summary;
+}
+
+}  // namespace pliant
