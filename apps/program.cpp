@@ -35,6 +35,7 @@ int run(int argc, char** argv) {
   CommandLine line("pliant turns a recording of a soft object into an elastic model.", "pliant " PLIANT_VERSION,
                    footer);
   int exit_code = Fine;
+  add_import(line, exit_code);
   add_check(line, exit_code);
   add_calibrate(line, exit_code);
   add_fuse(line, exit_code);

@@ -1,0 +1,32 @@
+#include "imports/formats.hpp"
+
+#include <algorithm>
+
+#include "base/files.hpp"
+
+namespace pliant {
+
+const std::vector<ImportFormat>& import_formats() {
+  static const std::vector<ImportFormat> all = {
+      {"tum", "TUM RGB-D: depth.txt and depth/*.png", is_tum_folder, read_tum_folder},
+      {"redwood", "Open3D and Redwood: depth/*.png beside colour images", is_redwood_folder, read_redwood_folder},
+      {"images", "a folder of 16-bit PNG or PGM images and a JSON file of the camera", is_image_folder,
+       read_image_folder},
+  };
+  return all;
+}
+
+const ImportFormat& import_format(const std::string& name, const std::filesystem::path& source) {
+  if (!is_file(source) && !is_folder(source))
+    refuse(source, "the source " + why_no_file(source), "a file or folder of a recording");
+  std::string names;
+  for (const ImportFormat& format : import_formats()) {
+    if (name.empty() ? format.recognises(source) : format.name == name) return format;
+    names += (names.empty() ? "" : ", ") + format.name;
+  }
+  if (!name.empty()) refuse({}, "no format `" + name + "`", names);
+  refuse(source, "a source of no format that is known", "one of " + names,
+         "say which with --from; docs/imports.md tells what each holds");
+}
+
+}  // namespace pliant

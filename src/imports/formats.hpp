@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "imports/recording.hpp"
+
+namespace pliant {
+
+/// A format that `pliant import` reads: see docs/imports.md for what each holds.
+struct ImportFormat {
+  std::string name;  ///< after `--from`
+  std::string what;  ///< the program or sensor, in words
+  /// Whether a file or folder looks like this format; never throws.
+  bool (*recognises)(const std::filesystem::path& source);
+  /// Reads what is needed to describe the recording; images are read later. Throws InputError for what cannot be used.
+  Recording (*read)(const std::filesystem::path& source, const ImportOptions& options);
+};
+
+/// All formats, the more particular ones first.
+const std::vector<ImportFormat>& import_formats();
+
+/// The format of a source: by name, or, with an empty name, the first that recognises it.
+/// Throws InputError for a source that is not there, a name that is none, and where no format recognises the source.
+const ImportFormat& import_format(const std::string& name, const std::filesystem::path& source);
+
+/// @name Readers and recognisers of the formats
+/// @{
+bool is_image_folder(const std::filesystem::path& source);
+Recording read_image_folder(const std::filesystem::path& source, const ImportOptions& options);
+bool is_redwood_folder(const std::filesystem::path& source);
+Recording read_redwood_folder(const std::filesystem::path& source, const ImportOptions& options);
+bool is_tum_folder(const std::filesystem::path& source);
+Recording read_tum_folder(const std::filesystem::path& source, const ImportOptions& options);
+/// @}
+
+}  // namespace pliant
