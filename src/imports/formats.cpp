@@ -8,6 +8,10 @@ namespace pliant {
 
 const std::vector<ImportFormat>& import_formats() {
   static const std::vector<ImportFormat> all = {
+#ifdef PLIANT_WITH_BAGS
+      {"bag", "ROS 1 bags, also of the RealSense viewer", is_ros1_bag, read_ros1_bag},
+      {"db3", "ROS 2 bags in SQLite, also of the RealSense viewer", is_ros2_bag, read_ros2_bag},
+#endif
       {"tum", "TUM RGB-D: depth.txt and depth/*.png", is_tum_folder, read_tum_folder},
       {"redwood", "Open3D and Redwood: depth/*.png beside colour images", is_redwood_folder, read_redwood_folder},
       {"images", "a folder of 16-bit PNG or PGM images and a JSON file of the camera", is_image_folder,

@@ -32,6 +32,10 @@ bool is_redwood_folder(const std::filesystem::path& source);
 Recording read_redwood_folder(const std::filesystem::path& source, const ImportOptions& options);
 bool is_tum_folder(const std::filesystem::path& source);
 Recording read_tum_folder(const std::filesystem::path& source, const ImportOptions& options);
+bool is_ros1_bag(const std::filesystem::path& source);
+Recording read_ros1_bag(const std::filesystem::path& source, const ImportOptions& options);
+bool is_ros2_bag(const std::filesystem::path& source);
+Recording read_ros2_bag(const std::filesystem::path& source, const ImportOptions& options);
 /// @}
 
 }  // namespace pliant

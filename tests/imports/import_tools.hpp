@@ -16,10 +16,10 @@ inline std::filesystem::path import_data(std::string_view name) {
   return std::filesystem::path(PLIANT_SOURCE_DIR) / "tests/imports/data" / name;
 }
 
-/// The picture of all readers' tests: depth [mm] grows by 1 along a row, 16 along a column and 100 a frame, and pixel
+/// The picture of all readers' tests: depth [mm] is no plane and grows by 100 a frame, and pixel
 /// (0, 0) has no reading.
 inline std::uint16_t ramp(int u, int v, int frame) {
-  return u == 0 && v == 0 ? std::uint16_t(0) : std::uint16_t(600 + u + 16 * v + 100 * frame);
+  return u == 0 && v == 0 ? std::uint16_t(0) : std::uint16_t(600 + u + 2 * v + u * v / 6 + 100 * frame);
 }
 
 inline Image<std::uint16_t> ramp_image(int width, int height, int frame) {

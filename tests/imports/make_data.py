@@ -1,0 +1,101 @@
+"""Writes tests/imports/data with the formats' own libraries: see data/README.md for versions and the command.
+
+All depth images show the same picture: 600 + u + 2 v + floor(u v / 6) + 100 frame millimetres, and no reading at pixel (0, 0)."""
+import pathlib
+import shutil
+import sys
+
+import numpy as np
+
+DATA = pathlib.Path(__file__).resolve().parent / "data"
+WIDTH, HEIGHT, FRAMES = 24, 18, 4
+FX, FY, CX, CY = 30.0, 31.0, 11.5, 8.5
+
+
+def ramp(frame):
+    v, u = np.mgrid[0:HEIGHT, 0:WIDTH]
+    depth = (600 + u + 2 * v + u * v // 6 + 100 * frame).astype(np.uint16)
+    depth[0, 0] = 0
+    return depth
+
+
+def bags():
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    def messages(store, encoding, is_ros2, scale=1):
+        t = store.types
+        Header, Time = t["std_msgs/msg/Header"], t["builtin_interfaces/msg/Time"]
+
+        def header(frame):
+            stamp = Time(sec=1000 + frame, nanosec=250000000)
+            return Header(stamp=stamp, frame_id="optical") if is_ros2 else Header(seq=frame, stamp=stamp, frame_id="optical")
+
+        K = np.array([FX, 0, CX, 0, FY, CY, 0, 0, 1.0])
+        P = np.array([FX, 0, CX, 0, 0, FY, CY, 0, 0, 0, 1.0, 0])
+        D = np.array([0.1, -0.02, 0.001, 0.002, 0.0])
+        roi = t["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+        names = dict(d=D, k=K, r=np.eye(3).ravel(), p=P) if is_ros2 else dict(D=D, K=K, R=np.eye(3).ravel(), P=P)
+        info = t["sensor_msgs/msg/CameraInfo"](header=header(0), height=HEIGHT, width=WIDTH, distortion_model="plumb_bob",
+                                               binning_x=0, binning_y=0, roi=roi, **names)
+        images = []
+        for frame in range(FRAMES):
+            depth = ramp(frame)
+            if encoding == "32FC1":
+                pixels = np.where(depth > 0, depth / 1000.0, np.nan).astype(np.float32)
+            elif encoding == "rgb8":
+                pixels = np.repeat((depth // 8).astype(np.uint8)[:, :, None], 3, axis=2)
+            else:
+                pixels = (depth * scale).astype(np.uint16)
+            data = np.frombuffer(pixels.tobytes(), np.uint8)
+            images.append(t["sensor_msgs/msg/Image"](header=header(frame), height=HEIGHT, width=WIDTH, encoding=encoding,
+                                                     is_bigendian=0, step=len(data) // HEIGHT, data=data))
+        return info, images
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    IMAGE, INFO, FLOAT = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo", "std_msgs/msg/Float32"
+
+    def bag(name, encoding, topics, compression=None, unit=None, scale=1):
+        path = DATA / name
+        path.unlink(missing_ok=True)
+        info, images = messages(store, encoding, False, scale)
+        writer = Writer1(path)
+        if compression:
+            writer.set_compression(compression)
+        with writer:
+            image_topic = writer.add_connection(topics[0], IMAGE, typestore=store)
+            info_topic = writer.add_connection(topics[1], INFO, typestore=store)
+            writer.write(info_topic, 10**9, store.serialize_ros1(info, INFO))
+            if unit:
+                option = writer.add_connection(unit[0], FLOAT, typestore=store)
+                writer.write(option, 10**9, store.serialize_ros1(store.types[FLOAT](data=unit[1]), FLOAT))
+            for frame, image in enumerate(images):
+                writer.write(image_topic, 10**9 * (2 + frame), store.serialize_ros1(image, IMAGE))
+
+    raw = "/camera/depth/image_raw", "/camera/depth/camera_info"
+    bag("plain.bag", "16UC1", raw)
+    bag("bz2.bag", "16UC1", raw, Writer1.CompressionFormat.BZ2)
+    bag("lz4.bag", "16UC1", raw, Writer1.CompressionFormat.LZ4)
+    bag("metres.bag", "32FC1", ("/camera/depth/image_rect", "/camera/depth/camera_info"), Writer1.CompressionFormat.BZ2)
+    bag("colours.bag", "rgb8", raw, Writer1.CompressionFormat.BZ2)
+    sdk = "/device_0/sensor_0/Depth_0/image/data", "/device_0/sensor_0/Depth_0/info/camera_info"
+    bag("viewer.bag", "mono16", sdk, Writer1.CompressionFormat.LZ4, ("/device_0/sensor_0/option/Depth Units/value", 0.0001), 10)
+    bag("no_unit.bag", "mono16", sdk, Writer1.CompressionFormat.LZ4)
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    folder = DATA / "humble"
+    shutil.rmtree(folder, ignore_errors=True)
+    info, images = messages(store, "16UC1", True)
+    with Writer2(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        image_topic = writer.add_connection(raw[0], IMAGE, typestore=store)
+        info_topic = writer.add_connection(raw[1], INFO, typestore=store)
+        writer.write(info_topic, 10**9, store.serialize_cdr(info, INFO))
+        for frame, image in enumerate(images):
+            writer.write(image_topic, 10**9 * (2 + frame), store.serialize_cdr(image, IMAGE))
+
+
+if __name__ == "__main__":
+    DATA.mkdir(exist_ok=True)
+    for name in sys.argv[1:]:
+        globals()[name]()
