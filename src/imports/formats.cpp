@@ -12,6 +12,8 @@ const std::vector<ImportFormat>& import_formats() {
       {"bag", "ROS 1 bags, also of the RealSense viewer", is_ros1_bag, read_ros1_bag},
       {"db3", "ROS 2 bags in SQLite, also of the RealSense viewer", is_ros2_bag, read_ros2_bag},
 #endif
+      {"r3d", "Record3D on iPhone and iPad", is_record3d, read_record3d},
+      {"stray", "Stray Scanner on iPhone and iPad", is_stray_scanner, read_stray_scanner},
       {"tum", "TUM RGB-D: depth.txt and depth/*.png", is_tum_folder, read_tum_folder},
       {"redwood", "Open3D and Redwood: depth/*.png beside colour images", is_redwood_folder, read_redwood_folder},
       {"images", "a folder of 16-bit PNG or PGM images and a JSON file of the camera", is_image_folder,

@@ -36,6 +36,10 @@ bool is_ros1_bag(const std::filesystem::path& source);
 Recording read_ros1_bag(const std::filesystem::path& source, const ImportOptions& options);
 bool is_ros2_bag(const std::filesystem::path& source);
 Recording read_ros2_bag(const std::filesystem::path& source, const ImportOptions& options);
+bool is_record3d(const std::filesystem::path& source);
+Recording read_record3d(const std::filesystem::path& source, const ImportOptions& options);
+bool is_stray_scanner(const std::filesystem::path& source);
+Recording read_stray_scanner(const std::filesystem::path& source, const ImportOptions& options);
 /// @}
 
 }  // namespace pliant

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/files.hpp"
+#include "capture/camera_poses.hpp"
 #include "capture/curves.hpp"
 #include "capture/markers.hpp"
 #include "geometry/mesh_io.hpp"
@@ -152,9 +153,12 @@ void write_depth(const fs::path& out, const Recording& recording, const CaptureF
                           : matched_images(stream, first, frames, recording.name, camera.time_offset, result.notes);
     if (!stream.poses.empty()) {
       camera.camera.camera_to_world = stream.poses[std::size_t(images.front())];
-      if (!stands(stream.poses, images))
-        refuse(recording.name, "camera \"" + stream.name + "\" moves while it records", "a camera that stands",
-               "put the sensor on a tripod, or take the images of a moment with --first and --last");
+      if (!stands(stream.poses, images)) {
+        for (const int image : images) camera.moved.push_back(stream.poses[std::size_t(image)]);
+        camera.poses = out / camera.name / "poses.csv";
+        make_folder(out / camera.name);
+        write_camera_poses(*camera.poses, camera.moved);
+      }
     }
     write_images(out / camera.name, stream, images, [&] {
       if (progress) progress(++done, total);

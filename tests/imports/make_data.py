@@ -95,6 +95,39 @@ def bags():
             writer.write(image_topic, 10**9 * (2 + frame), store.serialize_cdr(image, IMAGE))
 
 
+def record3d():
+    """A .r3d of Record3D's layout, compressed by Apple's own LZFSE; 96 x 72 pixels, so that blocks are not LZVN's."""
+    import hashlib
+    import json
+    import zipfile
+
+    import liblzfse
+
+    width, height, frames = 96, 72, 3
+    v, u = np.mgrid[0:height, 0:width]
+    poses = [[0, 0, 0, 1, 0.1 * k, 0.0, 0.0] for k in range(frames)]
+    metadata = {"w": 4 * width, "h": 4 * height, "dw": width, "dh": height, "fps": 60,
+                "K": [400.0, 0, 0, 0, 404.0, 0, 191.5, 143.5, 1], "poses": poses,
+                "frameTimestamps": [10.0, 10.1, 10.25]}
+    with zipfile.ZipFile(DATA / "phone.r3d", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("metadata", json.dumps(metadata), zipfile.ZIP_STORED)
+        for frame in range(frames):
+            metres = ((600 + u + 2 * v + u * v // 6 + 100 * frame) / 1000).astype(np.float32)
+            metres[0, 0] = np.nan
+            sure = np.full((height, width), 2, np.uint8)
+            sure[5, 7] = 0
+            archive.writestr(f"rgbd/{frame}.depth", liblzfse.compress(metres.tobytes()), zipfile.ZIP_STORED)
+            archive.writestr(f"rgbd/{frame}.conf", liblzfse.compress(sure.tobytes()))
+    sums = []
+    rng = np.random.default_rng(3)
+    noise = rng.integers(0, 256, 5000, np.uint8).tobytes()
+    text = b"soft objects sag, swing and bounce; " * 40
+    for name, data in (("stored", noise), ("lzvn", text), ("mixed", noise[:900] * 30 + text * 50 + noise)):
+        (DATA / f"{name}.lzfse").write_bytes(liblzfse.compress(data))
+        sums.append(f"{name} {hashlib.sha256(data).hexdigest()}\n")
+    (DATA / "lzfse_sha256.txt").write_text("".join(sums))
+
+
 if __name__ == "__main__":
     DATA.mkdir(exist_ok=True)
     for name in sys.argv[1:]:
