@@ -21,6 +21,7 @@ struct Arguments {
   double mass = 0.0, density = 0.0, rate = 0.0, depth_scale = 0.0, length = 0.0, area = 0.0, ball = 0.0, punch = 0.0,
          force_std = 0.0;
   int first = 0, last = -1, every = 1;
+  bool compression = false;
 };
 
 std::optional<double> given(double value) { return value > 0.0 ? std::optional(value) : std::nullopt; }
@@ -40,6 +41,7 @@ CaptureFacts facts_of(const Arguments& arguments) {
   if (facts.up && !(facts.up->norm() > 0.0)) refuse({}, "--up is zero", "the direction away from the ground");
   facts.first = arguments.first, facts.every = arguments.every;
   if (arguments.last >= 0) facts.last = arguments.last;
+  facts.is_compression = arguments.compression;
   facts.length = given(arguments.length), facts.area = given(arguments.area);
   if (arguments.ball > 0.0 && arguments.punch > 0.0) refuse({}, "both --ball and --punch", "one of the two");
   if (arguments.ball > 0.0) facts.probe = IndenterShape::Ball;
@@ -139,6 +141,7 @@ void add_import(CommandLine& line, int& exit_code) {
   command.option("--every", arguments->every, "takes every N-th image").range(1, 1000000).type_name("N");
   command.option("--length", arguments->length, "of a specimen between the grips of a testing machine [m]").positive();
   command.option("--area", arguments->area, "cross section of the specimen at rest [m^2]").positive();
+  command.flag("--compression", arguments->compression, "positive extensions and forces of the machine compress");
   command.option("--ball", arguments->ball, "radius of a ball that a machine presses into the object [m]").positive();
   command.option("--punch", arguments->punch, "radius of a flat-ended punch [m]").positive();
   command.option("--contact", arguments->contact, "point of the surface that the probe touches first [m]")

@@ -14,6 +14,12 @@ const std::vector<ImportFormat>& import_formats() {
 #endif
       {"r3d", "Record3D on iPhone and iPad", is_record3d, read_record3d},
       {"stray", "Stray Scanner on iPhone and iPad", is_stray_scanner, read_stray_scanner},
+      {"mkv", "Azure Kinect and Orbbec, by the program ffmpeg", is_matroska, read_matroska},
+      {"weiss", "SparseSurfaceConstraints: config.json and cam0/depth0.png", is_weiss_folder, read_weiss_folder},
+      {"c3d", "markers of motion capture, C3D", is_c3d, read_c3d_markers},
+      {"markers", "markers as CSV: frame,id,x,y,z, or columns NAME_x, NAME_y, NAME_z", is_marker_csv, read_marker_csv},
+      {"machine", "testing machines (Instron and others) as CSV: extension and load, or strain and stress",
+       is_machine_csv, read_machine_csv},
       {"tum", "TUM RGB-D: depth.txt and depth/*.png", is_tum_folder, read_tum_folder},
       {"redwood", "Open3D and Redwood: depth/*.png beside colour images", is_redwood_folder, read_redwood_folder},
       {"images", "a folder of 16-bit PNG or PGM images and a JSON file of the camera", is_image_folder,

@@ -40,6 +40,16 @@ bool is_record3d(const std::filesystem::path& source);
 Recording read_record3d(const std::filesystem::path& source, const ImportOptions& options);
 bool is_stray_scanner(const std::filesystem::path& source);
 Recording read_stray_scanner(const std::filesystem::path& source, const ImportOptions& options);
+bool is_c3d(const std::filesystem::path& source);
+Recording read_c3d_markers(const std::filesystem::path& source, const ImportOptions& options);
+bool is_marker_csv(const std::filesystem::path& source);
+Recording read_marker_csv(const std::filesystem::path& source, const ImportOptions& options);
+bool is_machine_csv(const std::filesystem::path& source);
+Recording read_machine_csv(const std::filesystem::path& source, const ImportOptions& options);
+bool is_matroska(const std::filesystem::path& source);
+Recording read_matroska(const std::filesystem::path& source, const ImportOptions& options);
+bool is_weiss_folder(const std::filesystem::path& source);
+Recording read_weiss_folder(const std::filesystem::path& source, const ImportOptions& options);
 /// @}
 
 }  // namespace pliant

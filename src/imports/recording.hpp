@@ -34,11 +34,11 @@ struct DepthStream {
   std::function<Image<std::uint16_t>(int i)> read;
 };
 
-/// Stress and strain of a specimen in a testing machine, or force over depth of an indenter.
+/// What a testing machine measured, in the order of time: extensions with forces, strains with stresses, or both pairs.
 struct MachineTest {
   std::string name;
-  std::vector<double> extensions;  ///< [m], of the crosshead from where the force begins
-  std::vector<double> forces;      ///< [N], as many; positive: pulled, negative: pushed
+  std::vector<double> extensions, forces;  ///< [m] of the crosshead, [N]; as many; negative: compressed
+  std::vector<double> strains, stresses;   ///< [-] of the length, [Pa] of the area at rest; as many; negative likewise
 };
 
 /// A recording of another program.

@@ -24,6 +24,7 @@ constexpr double still_shift = 2e-3;       // [m] a camera that moves no farther
 constexpr double still_turn = 0.2;         // [degrees]
 constexpr double exact_clock = 1e-4;       // [s] offsets below are none
 constexpr int curve_points = 100;          // of a curve of a testing machine
+constexpr double usual_force_std = 0.01;   // of the greatest force
 
 std::string written(const char* format, auto... values) {
   char text[256];
@@ -251,21 +252,22 @@ void write_markers(const fs::path& out, const Recording& recording, const Captur
 struct LoadingCurve {
   std::vector<double> extensions, forces;
 };
-LoadingCurve loading_of(const MachineTest& test, const std::string& name) {
+LoadingCurve loading_of(const std::vector<double>& extensions, const std::vector<double>& forces,
+                        const std::string& name) {
   std::size_t end = 0;
-  for (std::size_t i = 0; i < test.extensions.size(); ++i)
-    if (std::abs(test.extensions[i]) > std::abs(test.extensions[end])) end = i;
-  const double reach = test.extensions.empty() ? 0.0 : std::abs(test.extensions[end]);
+  for (std::size_t i = 0; i < extensions.size(); ++i)
+    if (std::abs(extensions[i]) > std::abs(extensions[end])) end = i;
+  const double reach = extensions.empty() ? 0.0 : std::abs(extensions[end]);
   if (!(reach > 0.0)) refuse(name, "an extension that is zero throughout", "a test that moves the crosshead");
   LoadingCurve curve;
-  const double sign = test.extensions[end] < 0 ? -1.0 : 1.0;
+  const double sign = extensions[end] < 0 ? -1.0 : 1.0;
   for (int k = 0; k < curve_points; ++k) {
     const double low = reach * k / curve_points, high = reach * (k + 1) / curve_points;
     double extension = 0.0, force = 0.0;
     int inside = 0;
     for (std::size_t i = 0; i <= end; ++i)
-      if (const double e = sign * test.extensions[i]; e > low && e <= high)
-        extension += test.extensions[i], force += test.forces[i], ++inside;
+      if (const double e = sign * extensions[i]; e > low && e <= high)
+        extension += extensions[i], force += forces[i], ++inside;
     if (inside == 0) continue;
     curve.extensions.push_back(extension / inside);
     curve.forces.push_back(force / inside);
@@ -273,54 +275,79 @@ LoadingCurve loading_of(const MachineTest& test, const std::string& name) {
   return curve;
 }
 
-void write_test(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result) {
-  const MachineTest& test = *recording.test;
-  const LoadingCurve loading = loading_of(test, recording.name);
+double greatest_of(const std::vector<double>& values, const std::string& name) {
   double greatest = 0.0;
-  for (const double force : loading.forces) greatest = std::max(greatest, std::abs(force));
-  const double std = facts.force_std.value_or(0.01 * greatest);
-  if (!(std > 0.0)) refuse(recording.name, "a force that is zero throughout", "a measured force");
-  if (!facts.force_std)
-    result.notes.push_back(
-        "the force's standard deviation is taken as a hundredth of the greatest force (--force-std)");
-  const std::size_t count = loading.forces.size();
-  if (facts.probe) {
-    if (!facts.contact || !facts.surface)
-      refuse(recording.name, "an indenter without a place", "--surface and --contact X,Y,Z",
-             "say which point of the scan it touches first");
-    Indentation indentation;
-    indentation.name = test.name;
-    indentation.probe = *facts.probe;
-    indentation.radius = facts.probe_radius;
-    indentation.contact = *facts.contact;
-    indentation.direction = -facts.up.value_or(Vector3::UnitY()).normalized();
-    indentation.curve = out / "curve.csv";
-    ForceCurve curve;
-    for (std::size_t i = 0; i < count; ++i) {
-      curve.depths.push_back(std::abs(loading.extensions[i]));
-      curve.forces.push_back(std::abs(loading.forces[i]));
-      curve.stds.push_back(std);
-    }
-    write_force_curve(indentation.curve, curve);
-    result.capture.indentations.push_back(indentation);
-    return;
+  for (const double value : values) greatest = std::max(greatest, std::abs(value));
+  if (!(greatest > 0.0)) refuse(name, "a force that is zero throughout", "a measured force");
+  return greatest;
+}
+
+void write_indentation(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+                       ImportedCapture& result) {
+  const MachineTest& test = *recording.test;
+  if (!facts.contact || !facts.surface)
+    refuse(recording.name, "an indenter without a place", "--surface and --contact X,Y,Z",
+           "say which point of the scan it touches first");
+  if (test.extensions.empty())
+    refuse(recording.name, "no column of an extension and a force", "both", "export them too");
+  const LoadingCurve loading = loading_of(test.extensions, test.forces, recording.name);
+  const double greatest = greatest_of(loading.forces, recording.name);
+  Indentation indentation;
+  indentation.name = test.name;
+  indentation.probe = *facts.probe;
+  indentation.radius = facts.probe_radius;
+  indentation.contact = *facts.contact;
+  indentation.direction = -facts.up.value_or(Vector3::UnitY()).normalized();
+  indentation.curve = out / "curve.csv";
+  ForceCurve curve;
+  for (std::size_t i = 0; i < loading.forces.size(); ++i) {
+    curve.depths.push_back(std::abs(loading.extensions[i]));
+    curve.forces.push_back(std::abs(loading.forces[i]));
+    curve.stds.push_back(facts.force_std.value_or(usual_force_std * greatest));
   }
-  if (!facts.length || !facts.area)
+  write_force_curve(indentation.curve, curve);
+  result.capture.indentations.push_back(indentation);
+  result.notes.push_back("depths count from the machine's zero: it must be where the probe touches the object");
+}
+
+void write_material_curve(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+                          ImportedCapture& result) {
+  const MachineTest& test = *recording.test;
+  const bool has_size = facts.length && facts.area;
+  const bool takes_forces = !test.extensions.empty() && has_size;
+  if (!takes_forces && test.strains.empty())
     refuse(recording.name, "a specimen of unknown size", "its length between the grips and its cross section",
            "give --length METRES and --area SQUARE_METRES at rest; of an indenter --ball or --punch RADIUS");
+  const double length = takes_forces ? *facts.length : 1.0, area = takes_forces ? *facts.area : 1.0;
+  const LoadingCurve loading = takes_forces ? loading_of(test.extensions, test.forces, recording.name)
+                                            : loading_of(test.strains, test.stresses, recording.name);
+  const double greatest = greatest_of(loading.forces, recording.name);
+  const double std = takes_forces && facts.force_std ? *facts.force_std / area : usual_force_std * greatest / area;
+  const double sign = facts.is_compression ? -1.0 : 1.0;
   MaterialCurve material;
   material.name = test.name;
   material.curve = out / "curve.csv";
   StressCurve curve;
-  for (std::size_t i = 0; i < count; ++i) {
-    curve.stretches.push_back(1.0 + loading.extensions[i] / *facts.length);
-    curve.stresses.push_back(loading.forces[i] / *facts.area);
-    curve.stds.push_back(std / *facts.area);
+  for (std::size_t i = 0; i < loading.forces.size(); ++i) {
+    curve.stretches.push_back(1.0 + sign * loading.extensions[i] / length);
+    curve.stresses.push_back(sign * loading.forces[i] / area);
+    curve.stds.push_back(std);
   }
   if (curve.stretches.back() <= 0.0)
     refuse(recording.name, "a specimen that is compressed by more than its length", "--length in metres");
   write_stress_curve(material.curve, curve);
   result.capture.material_curves.push_back(material);
+}
+
+void write_test(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result) {
+  if (facts.probe)
+    write_indentation(out, recording, facts, result);
+  else
+    write_material_curve(out, recording, facts, result);
+  if (!facts.force_std)
+    result.notes.push_back(
+        "the force's standard deviation is taken as a hundredth of the greatest force (--force-std)");
+  result.notes.push_back("taken is the first loading, up to the greatest extension");
 }
 
 }  // namespace

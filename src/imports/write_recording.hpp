@@ -21,7 +21,8 @@ struct CaptureFacts {
 
   /// @name Of a test in a machine
   /// @{
-  std::optional<double> length, area;  ///< [m], [m^2] of the specimen at rest: a stress-strain curve
+  std::optional<double> length, area;  ///< [m], [m^2] of the specimen at rest, for a stress-strain curve of forces
+  bool is_compression = false;         ///< extensions and forces are positive where the specimen is compressed
   std::optional<IndenterShape> probe;  ///< an indenter: a force-depth curve
   double probe_radius = 0.0;           ///< [m]
   std::optional<Vector3> contact;      ///< [m] point of the surface that the indenter touches first

@@ -28,8 +28,8 @@ TEST(Usage, VersionIsOneLineOnStdout) {
 TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
-  for (const char* word :
-       {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "press", "export", "130"})
+  for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "press",
+                           "export", "import", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -45,7 +45,7 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
 
 INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp,
                          testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track",
-                                         "markers", "press", "export"),
+                                         "markers", "press", "export", "import"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {

@@ -41,7 +41,8 @@ TEST_P(Bags, BecomeACaptureWithPixelsTimesCameraAndLens) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Compressions, Bags,
-                         ::testing::Values("plain.bag", "bz2.bag", "lz4.bag", "humble", "humble/humble.db3"));
+                         ::testing::Values("plain.bag", "bz2.bag", "lz4.bag", "compressed.bag", "humble",
+                                           "humble/humble.db3"));
 
 TEST(Bag, TakesPartsAndFormatsByTheirContent) {
   EXPECT_EQ(import_format("", import_data("plain.bag")).name, "bag");

@@ -31,7 +31,7 @@ inline Image<std::uint16_t> ramp_image(int width, int height, int frame) {
 
 /// Checks that a camera of a capture saw `ramp` in each frame, from image `first` on.
 inline void expect_ramp(const Capture& capture, int images, int first = 0, std::size_t index = 0,
-                        float tolerance = 1e-6f) {
+                        float tolerance = 5e-6f) {
   ASSERT_GT(capture.depth.size(), index);
   const DepthCamera& camera = capture.depth[index];
   ASSERT_EQ(capture.frame_count(), images);

@@ -3,7 +3,9 @@
 All depth images show the same picture: 600 + u + 2 v + floor(u v / 6) + 100 frame millimetres, and no reading at pixel (0, 0)."""
 import pathlib
 import shutil
+import struct
 import sys
+import zlib
 
 import numpy as np
 
@@ -17,6 +19,16 @@ def ramp(frame):
     depth = (600 + u + 2 * v + u * v // 6 + 100 * frame).astype(np.uint16)
     depth[0, 0] = 0
     return depth
+
+
+def png16(pixels):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    height, width = pixels.shape
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in pixels)
+    header = struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
 def bags():
@@ -73,7 +85,23 @@ def bags():
             for frame, image in enumerate(images):
                 writer.write(image_topic, 10**9 * (2 + frame), store.serialize_ros1(image, IMAGE))
 
+    def compressed_bag(name):
+        """compressedDepth as image_transport writes it: twelve bytes of configuration before a PNG."""
+        COMPRESSED = "sensor_msgs/msg/CompressedImage"
+        path = DATA / name
+        path.unlink(missing_ok=True)
+        info, images = messages(store, "16UC1", False)
+        with Writer1(path) as writer:
+            image_topic = writer.add_connection("/camera/depth/image_raw/compressedDepth", COMPRESSED, typestore=store)
+            info_topic = writer.add_connection("/camera/depth/camera_info", INFO, typestore=store)
+            writer.write(info_topic, 10**9, store.serialize_ros1(info, INFO))
+            for frame, image in enumerate(images):
+                data = np.frombuffer(bytes(12) + png16(ramp(frame)), np.uint8)
+                message = store.types[COMPRESSED](header=image.header, format="16UC1; compressedDepth png", data=data)
+                writer.write(image_topic, 10**9 * (2 + frame), store.serialize_ros1(message, COMPRESSED))
+
     raw = "/camera/depth/image_raw", "/camera/depth/camera_info"
+    compressed_bag("compressed.bag")
     bag("plain.bag", "16UC1", raw)
     bag("bz2.bag", "16UC1", raw, Writer1.CompressionFormat.BZ2)
     bag("lz4.bag", "16UC1", raw, Writer1.CompressionFormat.LZ4)
@@ -126,6 +154,33 @@ def record3d():
         (DATA / f"{name}.lzfse").write_bytes(liblzfse.compress(data))
         sums.append(f"{name} {hashlib.sha256(data).hexdigest()}\n")
     (DATA / "lzfse_sha256.txt").write_text("".join(sums))
+
+
+def markers():
+    """Three markers in five frames at 200 Hz, millimetres; the second is not seen in frame 3."""
+    import c3d
+    import ezc3d
+
+    frames = np.arange(5)[:, None]
+    xyz = np.array([[[10.0, 20.0, 30.0], [-40.0, 50.0, 60.0], [70.0, -80.0, 90.5]]]) + frames[:, :, None] * [1.0, 2.0, 0.5]
+    xyz[3, 1] = np.nan
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["RATE"]["value"] = [200.0]
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    file["parameters"]["POINT"]["LABELS"]["value"] = ["tip", "side", "base"]
+    points = np.ones((4, 3, 5))
+    points[:3] = xyz.transpose(2, 1, 0)
+    file["data"]["points"] = points
+    file.write(str(DATA / "ezc3d.c3d"))
+    writer = c3d.Writer(point_rate=200.0, point_units="mm ")
+    writer.set_point_labels(["tip ", "side", "base"])
+    for frame in range(5):
+        row = np.zeros((3, 5), np.float32)
+        row[:, :3] = np.nan_to_num(xyz[frame])
+        row[np.isnan(xyz[frame]).any(axis=1), 3] = -1
+        writer.add_frames([(row, np.array([[]]))])
+    with open(DATA / "py_c3d.c3d", "wb") as out:
+        writer.write(out)
 
 
 if __name__ == "__main__":
