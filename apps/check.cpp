@@ -103,6 +103,8 @@ void describe_sensors(const Capture& capture) {
     if (camera.time_offset != 0.0)
       say("", formatted("\"%s\" takes its images %.2f ms after their frames", camera.name.c_str(),
                         1e3 * camera.time_offset));
+  for (const DepthCamera& camera : capture.depth)
+    if (!camera.moved.empty()) say("", formatted("\"%s\" moves: a pose for each image", camera.name.c_str()));
   for (const CloudSequence& cloud : capture.clouds) say("clouds", cloud.points.pattern);
   const auto is_test = [](const auto& item) { return item.role == "test"; };
   if (!capture.presses.empty())
@@ -278,7 +280,8 @@ void write_sorted_pictures(const Capture& capture, const Arguments& arguments) {
     const PixelSorter sorter(capture, camera, {});
     for (const int frame : chosen_frames(capture, camera, arguments.pictures)) {
       const DepthImage depth = read_depth(capture, camera, frame);
-      const auto kinds = sorter.sort(depth, read_object_mask(capture, camera, frame));
+      const PinholeCamera lens = camera.at(frame);
+      const auto kinds = sorter.sort(depth, read_object_mask(capture, camera, frame), &lens);
       write_png(fs::path(arguments.out) / (frame_name(camera.name, frame) + ".png"), picture(depth, kinds));
     }
   }
@@ -339,7 +342,7 @@ void compare_with_masks(const Capture& capture, const Arguments& arguments, Json
     for (const int frame : chosen_frames(capture, camera, arguments.pictures)) {
       stop_if_interrupted();
       const DepthImage depth = read_depth(capture, camera, frame);
-      const Segmentation scene = segment(depth, camera.camera, DepthNoise(camera, 1.0));
+      const Segmentation scene = segment(depth, camera.at(frame), DepthNoise(camera, 1.0));
       const auto mask = read_mask(capture.folder / pattern(frame));
       if (mask.width != depth.width || mask.height != depth.height)
         throw InputError(Problem{
@@ -355,7 +358,7 @@ void write_scenes(const Capture& capture, const Arguments& arguments) {
   for (const DepthCamera& camera : capture.depth)
     for (const int frame : chosen_frames(capture, camera, arguments.pictures)) {
       const DepthImage depth = read_depth(capture, camera, frame);
-      write_scene(camera, frame, depth, segment(depth, camera.camera, DepthNoise(camera, 1.0)), arguments);
+      write_scene(camera, frame, depth, segment(depth, camera.at(frame), DepthNoise(camera, 1.0)), arguments);
     }
 }
 

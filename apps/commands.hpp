@@ -11,6 +11,7 @@ enum ExitCode : int { Fine = 0, BadInput = 2, NotConverged = 3, WasInterrupted =
 void add_batch(CommandLine& line, int& exit_code);
 void add_check(CommandLine& line, int& exit_code);
 void add_fit(CommandLine& line, int& exit_code);
+void add_import(CommandLine& line, int& exit_code);
 void add_live(CommandLine& line, int& exit_code);
 void add_simulate(CommandLine& line, int& exit_code);
 void add_track(CommandLine& line, int& exit_code);

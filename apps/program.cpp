@@ -51,6 +51,7 @@ int run(int argc, char** argv) {
                    footer);
   int exit_code = Fine;
   add_new(line, exit_code);
+  add_import(line, exit_code);
   add_check(line, exit_code);
   add_calibrate(line, exit_code);
   add_fuse(line, exit_code);

@@ -38,6 +38,19 @@ bool has_time_offsets(const Capture& capture) {
          std::ranges::any_of(capture.depth, [](const DepthCamera& camera) { return camera.time_offset != 0.0; });
 }
 
+bool has_moving_cameras(const Capture& capture) {
+  return std::ranges::any_of(capture.depth, [](const DepthCamera& camera) { return !camera.moved.empty(); });
+}
+
+void require_standing_cameras(const Capture& capture, const std::string& what) {
+  for (const DepthCamera& camera : capture.depth)
+    if (!camera.moved.empty())
+      throw InputError(Problem{{capture.file},
+                               "camera \"" + camera.name + "\" moves while it records",
+                               "a camera that stands, for " + what,
+                               "put the sensor on a tripod; fits take cameras that move"});
+}
+
 Capture as_seen_from(Capture capture, const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
   const fs::path there = (fs::absolute(folder) / "").lexically_normal().parent_path();

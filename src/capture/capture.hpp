@@ -33,8 +33,17 @@ struct DepthCamera {
   std::optional<FramePattern> masks;
   std::optional<std::filesystem::path> background;  ///< absolute
   int every = 1;
-  std::optional<double> noise = {};  ///< standard deviation of a reading [m]
-  double time_offset = 0.0;          ///< [s] its images are taken that much later than their frames
+  std::optional<double> noise = {};                 ///< standard deviation of a reading [m]
+  double time_offset = 0.0;                         ///< [s] its images are taken that much later than their frames
+  std::optional<std::filesystem::path> poses = {};  ///< absolute; CSV of where a camera that moves was at each image
+  std::vector<RigidMotion> moved = {};              ///< camera to world at each frame; empty: the camera stands
+
+  /// The camera as it stood when it took a frame's image; of one that moves `camera` is that of the first.
+  PinholeCamera at(int frame) const {
+    PinholeCamera result = camera;
+    if (!moved.empty()) result.camera_to_world = moved[std::size_t(frame)];
+    return result;
+  }
   bool operator==(const DepthCamera&) const = default;
 };
 
@@ -162,6 +171,13 @@ struct Capture {
 
 /// Whether a depth camera takes its images at other times than the frames', of an object in motion.
 bool has_time_offsets(const Capture& capture);
+
+/// Whether a depth camera moves while it records.
+bool has_moving_cameras(const Capture& capture);
+
+/// Throws InputError where a depth camera moves, for what needs cameras that stand.
+/// @param what  that needs them, such as "pliant scan"
+void require_standing_cameras(const Capture& capture, const std::string& what);
 
 /// The same recording described from another folder: its patterns lead there from `folder`.
 Capture as_seen_from(Capture capture, const std::filesystem::path& folder);

@@ -47,6 +47,7 @@ void check_camera_names(RuleContext&);
 void check_intrinsics(RuleContext&);
 void check_lenses(RuleContext&);
 void check_time_offsets(RuleContext&);
+void check_moving_cameras(RuleContext&);
 void check_every(RuleContext&);
 void check_noise(RuleContext&);
 void check_has_observations(RuleContext&);

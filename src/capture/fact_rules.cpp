@@ -316,6 +316,21 @@ void check_time_offsets(RuleContext& context) {
   }
 }
 
+void check_moving_cameras(RuleContext& context) {
+  const Capture& capture = context.capture;
+  for (std::size_t i = 0; i < capture.depth.size(); ++i) {
+    const DepthCamera& camera = capture.depth[i];
+    if (!camera.poses || !context.toml.is_sound(item("depth", i))) continue;
+    if (camera.background)
+      context.toml.complain(item("depth", i, "background"), "a `background` of a camera that moves",
+                            "`masks`, or neither", "the scene behind the object is another in each image");
+    for (std::size_t k = 0; k < capture.loads.size(); ++k)
+      if (capture.loads[k].images.contains(camera.name))
+        context.toml.complain(item("load", k, "images"), "an image of camera \"" + camera.name + "\", which moves",
+                              "a camera that stands", "give the load a `cloud` in world coordinates");
+  }
+}
+
 void check_every(RuleContext& context) {
   const auto check = [&](int every, const std::string& key) {
     if (every < 1 || (context.capture.frame_count() > 0 && every > context.capture.frame_count()))

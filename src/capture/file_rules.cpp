@@ -133,11 +133,11 @@ bool is_near(const std::vector<Sphere>& places, const Vector3& point) {
 int pixels_near(const Capture& capture, const DepthCamera& camera, int frame, const std::vector<Sphere>& places) {
   const DepthImage depth = read_depth(capture, camera, frame);
   const auto mask = read_object_mask(capture, camera, frame);
+  const PinholeCamera lens = camera.at(frame);
   int count = 0;
   for (int v = 0; v < depth.height; ++v)
     for (int u = 0; u < depth.width; ++u)
-      if (depth(u, v) > 0 && (!mask || (*mask)(u, v)) && is_near(places, camera.camera.unproject(u, v, depth(u, v))))
-        ++count;
+      if (depth(u, v) > 0 && (!mask || (*mask)(u, v)) && is_near(places, lens.unproject(u, v, depth(u, v)))) ++count;
   return count;
 }
 
@@ -159,6 +159,7 @@ std::vector<Rule> make_rules() {
           check_intrinsics,
           check_lenses,
           check_time_offsets,
+          check_moving_cameras,
           check_every,
           check_noise,
           check_has_observations,
@@ -406,16 +407,19 @@ void check_cameras_see_object(RuleContext& context) {
     const DepthCamera& camera = capture.depth[i];
     if (!context.toml.is_sound(item("depth", i))) continue;
     const std::string key = item("depth", i, "camera_to_world");
-    const auto sees = [&](const Sphere& sphere) { return may_see(camera.camera, sphere); };
+    const int last = (capture.frame_count() - 1) / camera.every * camera.every;
+    const int first = first_free_frame(capture, camera.every);
+    const int middle = (first + last) / 2 / camera.every * camera.every;
+    const auto sees = [&](const Sphere& sphere) {
+      return may_see(camera.at(first), sphere) || may_see(camera.at(middle), sphere) ||
+             may_see(camera.at(last), sphere);
+    };
     const std::string advice = "the pose maps camera (x right, y down, z forward) to world coordinates, in metres";
     if (std::ranges::none_of(places, sees)) {
       context.toml.complain(key, "camera \"" + camera.name + "\" looks past the rest surface", "the object in its view",
                             advice);
       continue;
     }
-    const int last = (capture.frame_count() - 1) / camera.every * camera.every;
-    const int first = first_free_frame(capture, camera.every);
-    const int middle = (first + last) / 2 / camera.every * camera.every;
     int seen = 0;
     try {
       for (const int frame : {first, middle, last}) seen = std::max(seen, pixels_near(capture, camera, frame, places));

@@ -43,7 +43,7 @@ void append_camera(DepthPoints& all, const Capture& capture, const DepthCamera& 
   for (int i = 0, frame = 0; i < most_frames && frame < capture.frame_count(); ++i, frame += camera.every) {
     const auto mask = read_object_mask(capture, camera, frame);
     const auto is_scene = [&](int pixel) { return !mask || mask->pixels[std::size_t(pixel)] == 0; };
-    append_near(all, points_of(read_depth(capture, camera, frame), camera.camera, noise, is_scene), guess);
+    append_near(all, points_of(read_depth(capture, camera, frame), camera.at(frame), noise, is_scene), guess);
   }
 }
 

@@ -226,8 +226,9 @@ ImageHeader read_image_header(const fs::path& path) {
   return header_of(std::string_view(bytes, std::size_t(stream.gcount())), path);
 }
 
-Image<std::uint16_t> read_depth_image(const fs::path& path) {
-  const std::string content = read_file(path);
+Image<std::uint16_t> read_depth_image(const fs::path& path) { return decode_depth_image(read_file(path), path); }
+
+Image<std::uint16_t> decode_depth_image(const std::string& content, const fs::path& path) {
   ImageHeader header = header_of(content, path);
   if (header.bits != 16 || header.channels != 1)
     fail(path, "a " + describe(header) + " image", "16-bit grey", "write depth without colour mapping");

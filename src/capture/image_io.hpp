@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "base/error.hpp"
@@ -39,6 +40,9 @@ ImageHeader read_image_header(const std::filesystem::path& path);
 
 /// Reads a 16-bit grey image, PNG or PGM (P5), raw units. Throws InputError for any other kind or a damaged file.
 Image<std::uint16_t> read_depth_image(const std::filesystem::path& path);
+
+/// The same of a file's bytes; `source` stands for the file in complaints.
+Image<std::uint16_t> decode_depth_image(const std::string& content, const std::filesystem::path& source);
 
 /// Reads a mask, PNG or PGM with at most 8 bits a channel: 255 where it shows the object, else 0.
 /// With an alpha channel alpha decides, else any channel that is not zero. Throws InputError for a damaged file.

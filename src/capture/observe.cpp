@@ -18,9 +18,8 @@ namespace pliant {
 
 namespace {
 
-void append_pixels(ObservedFrame& frame, const PixelSorter& sorter, const DepthCamera& camera, int index,
+void append_pixels(ObservedFrame& frame, const PixelSorter& sorter, const PinholeCamera& lens, int index,
                    const DepthImage& depth, const Image<PixelKind>& kinds) {
-  const PinholeCamera& lens = camera.camera;
   for (int v = 0; v < depth.height; ++v)
     for (int u = 0; u < depth.width; ++u) {
       if (kinds(u, v) != PixelKind::Object) continue;
@@ -43,7 +42,8 @@ void append_camera(ObservedFrame& frame, const Capture& capture, const PixelSort
   const DepthCamera& camera = capture.depth[std::size_t(index)];
   const DepthImage depth = read_depth(capture, camera, frame.frame);
   const auto mask = read_object_mask(capture, camera, frame.frame);
-  append_pixels(frame, sorter, camera, index, depth, sorter.sort(depth, mask));
+  const PinholeCamera lens = camera.at(frame.frame);
+  append_pixels(frame, sorter, lens, index, depth, sorter.sort(depth, mask, &lens));
 }
 
 void append_points(ObservedFrame& frame, const std::vector<Vector3>& points, std::optional<double> noise) {
@@ -124,7 +124,7 @@ ObservedLoad observe_load(const Capture& capture, const Load& load, const Observ
     const DepthImage depth = read_depth(camera, image->second);
     std::optional<Image<std::uint8_t>> mask;
     if (mask_file != load.masks.end()) mask = read_object_mask(camera, mask_file->second);
-    append_pixels(observed.seen, sorter, camera, int(c), depth, sorter.sort(depth, mask));
+    append_pixels(observed.seen, sorter, camera.camera, int(c), depth, sorter.sort(depth, mask));
   }
   if (load.cloud) {
     const CloudSorter sorter(capture, nullptr, options);

@@ -35,14 +35,16 @@ void PixelSorter::find_undeclared_planes(const Capture& capture, const DepthCame
   }
 }
 
-Image<PixelKind> PixelSorter::sort(const DepthImage& depth, const std::optional<Image<std::uint8_t>>& mask) const {
+Image<PixelKind> PixelSorter::sort(const DepthImage& depth, const std::optional<Image<std::uint8_t>>& mask,
+                                   const PinholeCamera* seen_by) const {
+  const PinholeCamera& camera = seen_by ? *seen_by : camera_;
   Image<PixelKind> kinds(depth.width, depth.height, PixelKind::NoReading);
   const Image<std::uint8_t>* own_mask = mask ? &*mask : nullptr;
   for (int v = 0; v < depth.height; ++v)
     for (int u = 0; u < depth.width; ++u) {
       const float z = depth(u, v);
       if (!(z > 0)) continue;
-      const Vector3 point = camera_.unproject(u, v, z);
+      const Vector3 point = camera.unproject(u, v, z);
       kinds(u, v) = space_.is_on_plane(point, noise_.axial(z))   ? PixelKind::OnPlane
                     : !may_show_object(z, u, v, point, own_mask) ? PixelKind::Elsewhere
                     : is_at_edge(depth, own_mask, u, v)          ? PixelKind::AtEdge

@@ -27,7 +27,9 @@ class PixelSorter {
   /// Throws InputError where the background or the first image cannot be decoded.
   PixelSorter(const Capture& capture, const DepthCamera& camera, const ObserveOptions& options);
 
-  Image<PixelKind> sort(const DepthImage& depth, const std::optional<Image<std::uint8_t>>& mask) const;
+  /// @param seen_by  the camera as it stood then, where it moves; null: as it stood in the first frame
+  Image<PixelKind> sort(const DepthImage& depth, const std::optional<Image<std::uint8_t>>& mask,
+                        const PinholeCamera* seen_by = nullptr) const;
 
   const DepthNoise& noise() const { return noise_; }
   double jump(double depth) const { return edge_jump_ > 0 ? edge_jump_ : noise_.jump(depth); }

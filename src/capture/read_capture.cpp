@@ -2,6 +2,7 @@
 
 #include "base/files.hpp"
 #include "base/sha256.hpp"
+#include "capture/camera_poses.hpp"
 #include "capture/capture.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/folder_survey.hpp"
@@ -116,7 +117,11 @@ class Reader {
     camera.fy = block.required<double>("fy", "the focal length in pixels").value_or(0);
     camera.cx = block.required<double>("cx", "the principal point in pixels").value_or(0);
     camera.cy = block.required<double>("cy", "the principal point in pixels").value_or(0);
-    if (const auto pose = block.required<RigidMotion>("camera_to_world")) camera.camera_to_world = *pose;
+    depth.every = block.optional<int>("every").value_or(1);
+    if (block.has("poses"))
+      read_poses(block, depth);
+    else if (const auto pose = block.required<RigidMotion>("camera_to_world"))
+      camera.camera_to_world = *pose;
     camera.lens = read_lens(block);
     depth.images = required_pattern(block, "images");
     depth.depth_scale = block.required<double>("depth_scale", "1000 for millimetres").value_or(1000.0);
@@ -124,10 +129,25 @@ class Reader {
       context_.reject(block.key_of("depth_scale"), "a depth_scale of 0 or less", "raw units per metre");
     depth.masks = optional_pattern(block, "masks");
     depth.background = optional_path(block, "background");
-    depth.every = block.optional<int>("every").value_or(1);
     depth.noise = block.optional<double>("noise");
     depth.time_offset = block.optional<double>("time_offset").value_or(0.0);
     return depth;
+  }
+
+  /// Where a camera that moves was at each frame.
+  void read_poses(TomlTable& block, DepthCamera& depth) {
+    depth.poses = optional_path(block, "poses");
+    const std::string key = block.key_of("poses");
+    if (block.has("camera_to_world"))
+      context_.reject(key, "both `poses` and `camera_to_world`", "one of the two",
+                      "a camera that stands has `camera_to_world`");
+    if (!depth.poses || capture_.frame_count() == 0) return;
+    try {
+      depth.moved = read_camera_poses(*depth.poses, capture_.frame_count(), depth.every);
+      depth.camera.camera_to_world = depth.moved.front();
+    } catch (const InputError& error) {
+      context_.reject(key, error.problems());
+    }
   }
 
   CloudSequence read_cloud(TomlTable& block) {

@@ -62,8 +62,11 @@ class Writer {
     for (const auto& [key, value] : {std::pair{"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}})
       out_ << key << " = " << toml_text(value) << "\n";
     if (!c.lens.coefficients().empty()) out_ << "distortion = " << toml_text(c.lens.coefficients()) << "\n";
-    out_ << "camera_to_world = " << toml_text(c.camera_to_world) << "\nimages = " << toml_text(depth.images.pattern)
-         << "\n";
+    if (depth.poses)
+      write_file_key("poses", depth.poses);
+    else
+      out_ << "camera_to_world = " << toml_text(c.camera_to_world) << "\n";
+    out_ << "images = " << toml_text(depth.images.pattern) << "\n";
     if (depth.masks) out_ << "masks = " << toml_text(depth.masks->pattern) << "\n";
     write_file_key("background", depth.background);
     out_ << "depth_scale = " << toml_text(depth.depth_scale) << "\n";

@@ -492,6 +492,7 @@ class BallCalibration {
 
 std::vector<SensorCalibration> calibrate_by_ball(const Capture& capture, double radius,
                                                  const CalibrationOptions& options) {
+  require_standing_cameras(capture, "calibration");
   return BallCalibration(capture, radius, options).run();
 }
 

@@ -249,6 +249,7 @@ LensDistortion changed_lens(const LensDistortion& lens, const Vector2& change) {
 }
 
 std::vector<SensorCalibration> calibrate_by_object(const Capture& capture, const CalibrationOptions& options) {
+  require_standing_cameras(capture, "calibration");
   return ObjectCalibration(capture, options).run();
 }
 

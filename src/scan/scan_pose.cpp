@@ -130,12 +130,13 @@ class PoseSearch {
   void add_look(const Capture& capture, const ObservedFrame& seen, int c) {
     const DepthCamera& depth = capture.depth[std::size_t(c)];
     if (seen.frame % std::max(1, depth.every) != 0) return;
+    const PinholeCamera lens = depth.at(seen.frame);
     const int width = depth.camera.width, height = depth.camera.height;
     std::vector<float> object(std::size_t(width) * std::size_t(height), 0.0f);
     int left = width, right = 0, top = height, bottom = 0;
     for (std::size_t i = 0; i < seen.points.size(); ++i) {
       if (seen.camera[i] != c || seen.pixel[i] < 0) continue;
-      object[std::size_t(seen.pixel[i])] = float(depth.camera.project(seen.points[i]).z());
+      object[std::size_t(seen.pixel[i])] = float(lens.project(seen.points[i]).z());
       const int u = seen.pixel[i] % width, v = seen.pixel[i] / width;
       left = std::min(left, u), right = std::max(right, u), top = std::min(top, v), bottom = std::max(bottom, v);
     }
@@ -144,7 +145,7 @@ class PoseSearch {
     const int step = std::max(1, std::max(right - left, bottom - top) / across);
     const DepthImage raw = read_depth(capture, depth, seen.frame);
     Look look;
-    look.camera = depth.camera;
+    look.camera = lens;
     look.camera.width = (width - 1) / step + 1, look.camera.height = (height - 1) / step + 1;
     look.camera.fx /= step, look.camera.fy /= step, look.camera.cx /= step, look.camera.cy /= step;
     for (int v = 0; v < look.camera.height; ++v)

@@ -267,6 +267,7 @@ ScanViews read_scan_views(const Capture& capture, const ScanChoice& choice) {
   if (capture.depth.empty() || capture.frame_count() == 0)
     fail(capture, "the capture has no depth camera", "[[depth]] images of the object at rest",
          "of a thin sheet that is seen as clouds, state its --thickness");
+  require_standing_cameras(capture, "a scan of its images");
   std::vector<Average> averages;
   std::vector<Segmentation> scenes;
   for (const DepthCamera& camera : capture.depth) {

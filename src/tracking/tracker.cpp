@@ -454,6 +454,7 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
                       "a held region is moved from rest (displaced_to)",
                       "regions held where they are at rest",
                       "tracking does not follow clamps that move; leave displaced_to out"});
+  require_standing_cameras(capture, "tracking (--set tracking=off fits the points themselves)");
   if (has_time_offsets(capture))
     throw InputError({{capture.file},
                       "a depth camera with a `time_offset`",

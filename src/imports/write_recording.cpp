@@ -1,0 +1,374 @@
+#include "imports/write_recording.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "base/files.hpp"
+#include "capture/camera_poses.hpp"
+#include "capture/curves.hpp"
+#include "capture/markers.hpp"
+#include "geometry/mesh_io.hpp"
+
+namespace pliant {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double standard_gravity = 9.81;  // [m/s^2]
+constexpr double still_shift = 2e-3;       // [m] a camera that moves no farther, and turns no farther, stands
+constexpr double still_turn = 0.2;         // [degrees]
+constexpr double exact_clock = 1e-4;       // [s] offsets below are none
+constexpr int curve_points = 100;          // of a curve of a testing machine
+constexpr double usual_force_std = 0.01;   // of the greatest force
+
+std::string written(const char* format, auto... values) {
+  char text[256];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+// Which images become frames, and when they were taken.
+struct Frames {
+  std::vector<int> images;    // of the first sensor
+  std::vector<double> times;  // [s] from the first; as many
+  double rate = 0.0;          // [Hz] of even frames; 0: times say all
+};
+
+Frames chosen_frames(const DepthStream& stream, const CaptureFacts& facts, const std::string& name,
+                     std::vector<std::string>& notes) {
+  const int last = facts.last.value_or(stream.image_count - 1);
+  if (facts.first < 0 || facts.every < 1 || last >= stream.image_count || facts.first > last)
+    refuse(name, "images " + std::to_string(facts.first) + " to " + std::to_string(last) + " are asked for",
+           "images from 0 to " + std::to_string(stream.image_count - 1), "correct --first, --last and --every");
+  Frames frames;
+  int late = 0;
+  for (int i = facts.first; i <= last; i += facts.every) {
+    if (!stream.times.empty()) {
+      const double time = stream.times[std::size_t(i)] - stream.times[std::size_t(facts.first)];
+      if (!std::isfinite(time)) refuse(name, "a time that is not finite", "seconds");
+      if (!frames.times.empty() && !(time > frames.times.back())) {
+        ++late;
+        continue;
+      }
+      frames.times.push_back(time);
+    } else {
+      frames.times.push_back(double(frames.images.size()) * facts.every / stream.frame_rate);
+    }
+    frames.images.push_back(i);
+  }
+  if (late > 0)
+    notes.push_back(written("%d images are left out: their time is not after that of the image before", late));
+  if (stream.times.empty()) frames.rate = stream.frame_rate / facts.every;
+  return frames;
+}
+
+// Images of another sensor for the same frames: the nearest in time, and how much later they are.
+std::vector<int> matched_images(const DepthStream& stream, const DepthStream& first, const Frames& frames,
+                                const std::string& name, double& offset, std::vector<std::string>& notes) {
+  offset = 0.0;
+  if (stream.times.empty() || first.times.empty()) {
+    if (stream.image_count != first.image_count)
+      refuse(name,
+             "sensors with " + std::to_string(first.image_count) + " and " + std::to_string(stream.image_count) +
+                 " images, and no times",
+             "as many images of each", "import one sensor by name");
+    return frames.images;
+  }
+  std::vector<int> images;
+  std::vector<double> delays;
+  for (const int frame : frames.images) {
+    const double time = first.times[std::size_t(frame)];
+    const auto nearest = std::ranges::min_element(
+        stream.times, [&](double a, double b) { return std::abs(a - time) < std::abs(b - time); });
+    images.push_back(int(nearest - stream.times.begin()));
+    delays.push_back(*nearest - time);
+  }
+  std::vector<double> sorted = delays;
+  std::ranges::sort(sorted);
+  const double median = sorted[sorted.size() / 2];
+  if (std::abs(median) > 1.0)
+    refuse(name, written("sensor \"%s\" is %.3f s beside \"%s\"", stream.name.c_str(), median, first.name.c_str()),
+           "sensors that recorded at the same time", "import them one by one");
+  if (std::abs(median) > exact_clock) offset = median;
+  double spread = 0.0;
+  for (const double delay : delays) spread = std::max(spread, std::abs(delay - offset));
+  if (spread > 1e-3)
+    notes.push_back(written("images of \"%s\" are up to %.1f ms beside the time that the capture gives them",
+                            stream.name.c_str(), 1e3 * spread));
+  return images;
+}
+
+bool stands(const std::vector<RigidMotion>& poses, const std::vector<int>& images) {
+  const RigidMotion& first = poses[std::size_t(images.front())];
+  return std::ranges::all_of(images, [&](int i) {
+    const RigidMotion& pose = poses[std::size_t(i)];
+    const double turn = Eigen::AngleAxisd(Matrix3(pose.rotation * first.rotation.transpose())).angle();
+    return (pose.translation - first.translation).norm() <= still_shift &&
+           turn * 180.0 / std::numbers::pi <= still_turn;
+  });
+}
+
+std::string folder_name(std::string name) {
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-') c = '_';
+  return name.empty() ? "camera" : name;
+}
+
+void write_images(const fs::path& folder, const DepthStream& stream, const std::vector<int>& images,
+                  const std::function<void()>& written_one) {
+  make_folder(folder);
+  for (std::size_t k = 0; k < images.size(); ++k) {
+    const Image<std::uint16_t> image = stream.read(images[k]);
+    if (image.width != stream.camera.width || image.height != stream.camera.height)
+      refuse(folder, written("image %d has %d x %d pixels", images[k], image.width, image.height),
+             written("%d x %d, the camera's size", stream.camera.width, stream.camera.height));
+    write_png(folder / written("%06zu.png", k), image);
+    written_one();
+  }
+}
+
+void write_depth(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result,
+                 const std::function<void(int, int)>& progress) {
+  const DepthStream& first = recording.depth.front();
+  if (first.times.empty() && !(first.frame_rate > 0.0))
+    refuse(recording.name, "images without times", "times, or a frame rate", "give --rate, frames a second");
+  const Frames frames = chosen_frames(first, facts, recording.name, result.notes);
+  Capture& capture = result.capture;
+  capture.scene.timing.times = frames.times;
+  capture.scene.timing.frame_rate = frames.rate;
+  const int total = int(frames.images.size() * recording.depth.size());
+  int done = 0;
+  for (const DepthStream& stream : recording.depth) {
+    DepthCamera camera;
+    camera.name = folder_name(stream.name);
+    camera.camera = stream.camera;
+    camera.depth_scale = stream.depth_scale;
+    camera.images = {camera.name + "/%06d.png"};
+    const std::vector<int> images =
+        &stream == &first ? frames.images
+                          : matched_images(stream, first, frames, recording.name, camera.time_offset, result.notes);
+    if (!stream.poses.empty()) {
+      camera.camera.camera_to_world = stream.poses[std::size_t(images.front())];
+      if (!stands(stream.poses, images)) {
+        for (const int image : images) camera.moved.push_back(stream.poses[std::size_t(image)]);
+        camera.poses = out / camera.name / "poses.csv";
+        make_folder(out / camera.name);
+        write_camera_poses(*camera.poses, camera.moved);
+      }
+    }
+    write_images(out / camera.name, stream, images, [&] {
+      if (progress) progress(++done, total);
+    });
+    capture.depth.push_back(std::move(camera));
+  }
+}
+
+void write_facts(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result,
+                 std::string& comment) {
+  Scene& scene = result.capture.scene;
+  if (facts.mass && facts.density)
+    refuse(recording.name, "both a mass and a density", "one of the two", "keep what was measured");
+  scene.object.mass = facts.mass, scene.object.density = facts.density;
+  if (facts.surface) {
+    scene.object.surface = read_mesh(*facts.surface);
+    scene.object.file = out / ("rest" + facts.surface->extension().string());
+    write_file(scene.object.file, read_file(*facts.surface));
+  } else if (!recording.test) {
+    comment += "\n# Still to say: `surface`, the object at rest in world coordinates (`pliant scan` makes one)";
+  }
+  if (!facts.mass && !facts.density && !recording.test)
+    comment += "\n# Still to say: `mass` [kg] or `density` [kg/m^3]";
+  if (facts.up) {
+    scene.world.up = facts.up->normalized();
+    scene.world.gravity = -standard_gravity * scene.world.up;
+  } else if (recording.gravity) {
+    scene.world.gravity = *recording.gravity;
+    scene.world.up = -recording.gravity->normalized();
+  } else if (!recording.test) {
+    scene.world.up = -Vector3::UnitY();
+    comment += "\n# A guess: `up`, for a camera that was held level; give `gravity` where it is known";
+    result.notes.push_back("nobody said which way is up: taken is the top of the image (--up X,Y,Z says otherwise)");
+  }
+  if (!recording.test)
+    comment +=
+        "\n# Still to say: `start_frame`, the first frame in which the object moves freely, and what it may touch"
+        " ([[plane]]) or is held by ([[fixed]])";
+}
+
+void write_markers(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+                   ImportedCapture& result) {
+  const C3dTrajectories& all = *recording.markers;
+  if (!all.frame_rate)
+    refuse(recording.name, "markers without a frame rate", "a frame rate", "give --rate, frames a second");
+  const int count = int(all.frames.size()), last = facts.last.value_or(count - 1);
+  if (facts.first < 0 || facts.every < 1 || last >= count || facts.first > last)
+    refuse(recording.name, written("frames %d to %d are asked for, and the file has %d", facts.first, last, count),
+           "frames that there are", "correct --first, --last and --every");
+  std::vector<std::string> ids;
+  std::vector<Eigen::Index> rows;
+  int hidden = 0;
+  const Points& start = all.frames[std::size_t(facts.first)];
+  for (Eigen::Index i = 0; i < start.rows(); ++i) {
+    if (!start.row(i).allFinite()) {
+      ++hidden;
+      continue;
+    }
+    std::string id = all.labels[std::size_t(i)];
+    for (char& c : id)
+      if (c == ',' || c == '"' || c == '\n' || c == '\r') c = '_';
+    if (id.empty()) id = "marker" + std::to_string(i + 1);
+    while (std::ranges::find(ids, id) != ids.end()) id += "_" + std::to_string(i + 1);
+    ids.push_back(id);
+    rows.push_back(i);
+  }
+  if (ids.empty())
+    refuse(recording.name, written("no marker is seen in frame %d", facts.first), "markers at rest",
+           "begin with --first where all are seen and the object is at rest");
+  if (hidden > 0)
+    result.notes.push_back(
+        written("%d markers are left out: they are not seen in frame %d, which gives their places at "
+                "rest",
+                hidden, facts.first));
+  const auto chosen = [&](const Points& frame) {
+    Points points(Eigen::Index(rows.size()), 3);
+    for (std::size_t k = 0; k < rows.size(); ++k) points.row(Eigen::Index(k)) = frame.row(rows[k]);
+    return points;
+  };
+  std::vector<Points> frames;
+  for (int i = facts.first; i <= last; i += facts.every) frames.push_back(chosen(all.frames[std::size_t(i)]));
+  result.capture.scene.timing = evenly_timed(*all.frame_rate / facts.every, int(frames.size()));
+  const MarkerTrack track{out / "markers_rest.csv", out / "markers.csv"};
+  write_marker_positions(track.rest, {ids, chosen(start)});
+  write_marker_track(track.track, ids, frames);
+  result.capture.markers.push_back(track);
+}
+
+// The first loading: from the first row to the greatest extension of either sign, averaged to a curve that grows.
+struct LoadingCurve {
+  std::vector<double> extensions, forces;
+};
+LoadingCurve loading_of(const std::vector<double>& extensions, const std::vector<double>& forces,
+                        const std::string& name) {
+  std::size_t end = 0;
+  for (std::size_t i = 0; i < extensions.size(); ++i)
+    if (std::abs(extensions[i]) > std::abs(extensions[end])) end = i;
+  const double reach = extensions.empty() ? 0.0 : std::abs(extensions[end]);
+  if (!(reach > 0.0)) refuse(name, "an extension that is zero throughout", "a test that moves the crosshead");
+  LoadingCurve curve;
+  const double sign = extensions[end] < 0 ? -1.0 : 1.0;
+  for (int k = 0; k < curve_points; ++k) {
+    const double low = reach * k / curve_points, high = reach * (k + 1) / curve_points;
+    double extension = 0.0, force = 0.0;
+    int inside = 0;
+    for (std::size_t i = 0; i <= end; ++i)
+      if (const double e = sign * extensions[i]; e > low && e <= high)
+        extension += extensions[i], force += forces[i], ++inside;
+    if (inside == 0) continue;
+    curve.extensions.push_back(extension / inside);
+    curve.forces.push_back(force / inside);
+  }
+  return curve;
+}
+
+double greatest_of(const std::vector<double>& values, const std::string& name) {
+  double greatest = 0.0;
+  for (const double value : values) greatest = std::max(greatest, std::abs(value));
+  if (!(greatest > 0.0)) refuse(name, "a force that is zero throughout", "a measured force");
+  return greatest;
+}
+
+void write_indentation(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+                       ImportedCapture& result) {
+  const MachineTest& test = *recording.test;
+  if (!facts.contact || !facts.surface)
+    refuse(recording.name, "an indenter without a place", "--surface and --contact X,Y,Z",
+           "say which point of the scan it touches first");
+  if (test.extensions.empty())
+    refuse(recording.name, "no column of an extension and a force", "both", "export them too");
+  const LoadingCurve loading = loading_of(test.extensions, test.forces, recording.name);
+  const double greatest = greatest_of(loading.forces, recording.name);
+  Indentation indentation;
+  indentation.name = test.name;
+  indentation.probe = *facts.probe;
+  indentation.radius = facts.probe_radius;
+  indentation.contact = *facts.contact;
+  indentation.direction = -facts.up.value_or(Vector3::UnitY()).normalized();
+  indentation.curve = out / "curve.csv";
+  ForceCurve curve;
+  for (std::size_t i = 0; i < loading.forces.size(); ++i) {
+    curve.depths.push_back(std::abs(loading.extensions[i]));
+    curve.forces.push_back(std::abs(loading.forces[i]));
+    curve.stds.push_back(facts.force_std.value_or(usual_force_std * greatest));
+  }
+  write_force_curve(indentation.curve, curve);
+  result.capture.indentations.push_back(indentation);
+  result.notes.push_back("depths count from the machine's zero: it must be where the probe touches the object");
+}
+
+void write_material_curve(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+                          ImportedCapture& result) {
+  const MachineTest& test = *recording.test;
+  const bool has_size = facts.length && facts.area;
+  const bool takes_forces = !test.extensions.empty() && has_size;
+  if (!takes_forces && test.strains.empty())
+    refuse(recording.name, "a specimen of unknown size", "its length between the grips and its cross section",
+           "give --length METRES and --area SQUARE_METRES at rest; of an indenter --ball or --punch RADIUS");
+  const double length = takes_forces ? *facts.length : 1.0, area = takes_forces ? *facts.area : 1.0;
+  const LoadingCurve loading = takes_forces ? loading_of(test.extensions, test.forces, recording.name)
+                                            : loading_of(test.strains, test.stresses, recording.name);
+  const double greatest = greatest_of(loading.forces, recording.name);
+  const double std = takes_forces && facts.force_std ? *facts.force_std / area : usual_force_std * greatest / area;
+  const double sign = facts.is_compression ? -1.0 : 1.0;
+  MaterialCurve material;
+  material.name = test.name;
+  material.curve = out / "curve.csv";
+  StressCurve curve;
+  for (std::size_t i = 0; i < loading.forces.size(); ++i) {
+    curve.stretches.push_back(1.0 + sign * loading.extensions[i] / length);
+    curve.stresses.push_back(sign * loading.forces[i] / area);
+    curve.stds.push_back(std);
+  }
+  if (curve.stretches.back() <= 0.0)
+    refuse(recording.name, "a specimen that is compressed by more than its length", "--length in metres");
+  write_stress_curve(material.curve, curve);
+  result.capture.material_curves.push_back(material);
+}
+
+void write_test(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result) {
+  if (facts.probe)
+    write_indentation(out, recording, facts, result);
+  else
+    write_material_curve(out, recording, facts, result);
+  if (!facts.force_std)
+    result.notes.push_back(
+        "the force's standard deviation is taken as a hundredth of the greatest force (--force-std)");
+  result.notes.push_back("taken is the first loading, up to the greatest extension");
+}
+
+}  // namespace
+
+ImportedCapture write_recording(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+                                const std::function<void(int, int)>& progress) {
+  const fs::path folder = (fs::absolute(out) / "").lexically_normal().parent_path();
+  if (is_file(folder / "capture.toml"))
+    refuse(folder / "capture.toml", "a capture that is there already", "a folder without one",
+           "choose another folder, or remove the old capture first");
+  ImportedCapture result;
+  result.notes = recording.notes;
+  result.capture.name = recording.name;
+  std::string comment = "made by pliant import";
+  make_folder(folder);
+  write_facts(folder, recording, facts, result, comment);
+  if (!recording.depth.empty()) write_depth(folder, recording, facts, result, progress);
+  if (recording.markers) write_markers(folder, recording, facts, result);
+  if (recording.test) write_test(folder, recording, facts, result);
+  write_capture(folder, result.capture, comment);
+  return result;
+}
+
+}  // namespace pliant
