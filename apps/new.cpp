@@ -13,7 +13,7 @@
 #include "capture/new_capture.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "speech.hpp"
+#include "imports/camera_json.hpp"
 
 namespace pliant::apps {
 
@@ -45,6 +45,18 @@ NewCaptureFacts facts_of(const Arguments& arguments) {
   if (arguments.up.size() == 3) facts.up = Vector3(arguments.up[0], arguments.up[1], arguments.up[2]).normalized();
   if (arguments.start_frame >= 0) facts.start_frame = arguments.start_frame;
   return facts;
+}
+
+/// What a camera's file in the folder says (docs/imports.md), where the user says nothing.
+void take_camera_file(const fs::path& folder, NewCaptureFacts& facts) {
+  if (!has_camera_json(folder)) return;
+  const CameraFile file = camera_of_folder(folder, {});
+  if (!facts.fx && !facts.field_of_view_deg) {
+    facts.fx = file.camera.fx, facts.fy = file.camera.fy;
+    facts.cx = file.camera.cx, facts.cy = file.camera.cy;
+  }
+  if (!facts.depth_scale) facts.depth_scale = file.depth_scale;
+  if (!facts.frame_rate) facts.frame_rate = file.frame_rate;
 }
 
 /// Asks for a number above 0 until there is one; nothing at the end of the input.
@@ -102,6 +114,7 @@ void run(const Arguments& arguments) {
     throw InputError({{}, "both --mass and --density", "one of the two", "keep what was measured"});
   const FolderSurvey survey = survey_folder(folder);
   NewCaptureFacts facts = facts_of(arguments);
+  take_camera_file(folder, facts);
   NewCapture made = new_capture(folder, survey, facts);
   if (!made.missing.empty() && ::isatty(STDIN_FILENO) != 0) {
     ask(made, facts);

@@ -97,6 +97,19 @@ TEST_F(New, NamesAllThatItMustBeToldAtOnce) {
   EXPECT_FALSE(fs::exists(folder.path() / "capture.toml"));
 }
 
+TEST_F(New, TakesTheCameraFromItsFile) {
+  record("%06d.png", 0, 3);
+  folder.write(
+      "camera.json",
+      R"({"width": 160, "height": 120, "fx": 151, "fy": 152, "cx": 80, "cy": 60, "fps": 15, "depth_scale": 1000})");
+  const ProgramRun run = run_pliant({"new", folder.path().string(), "--mass", "0.3"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Capture capture = read_capture(folder.path());
+  EXPECT_EQ(capture.depth[0].camera.fx, 151.0);
+  EXPECT_EQ(capture.depth[0].camera.cy, 60.0);
+  EXPECT_EQ(capture.scene.timing.frame_rate, 15.0);
+}
+
 TEST_F(New, TakesTheSurfaceAndMasks) {
   record("depth/%03d.png", 0, 3);
   for (int k = 0; k < 3; ++k) {
