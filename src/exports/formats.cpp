@@ -52,6 +52,7 @@ std::vector<std::string> write_export(const ExportModel& model, const ExportForm
                      {"stiffness_damping", model.stiffness_damping},
                      {"gravity", {model.gravity.x(), model.gravity.y(), model.gravity.z()}},
                      {"moduli_were_multiplied_by", model.identified},
+                     {"steps_below", model.stiffest > 0.0 ? 2.0 / model.stiffest : 0.0},
                      {"model", motions(model.model)},
                      {"exported", motions(model.exported)},
                      {"notes", model.notes}};

@@ -46,7 +46,7 @@ class Formats : public ::testing::Test {
 
   /// Held, of two moduli in halves.
   static ExportModel exported(ElementKind kind) {
-    ExportModel model = export_model(test::block(true), kind);
+    ExportModel model = export_model(test::block(true), kind, 6.0);
     for (int e = 0; e < model.body->element_count(); ++e)
       if (model.body->nodes(model.body->element(e)[0], 0) > 0.0) model.moduli[std::size_t(e)] *= 2.0;
     return model;
@@ -165,7 +165,7 @@ TEST_F(Formats, OfCalculixNameEveryPartAndWhatIsHeld) {
 }
 
 TEST_F(Formats, OfCalculixHaveNoSagWhereNothingIsHeld) {
-  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron);
+  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron, 6.0);
   EXPECT_THAT(write_calculix(model, folder), ::testing::Not(::testing::Contains("sag.inp")));
   EXPECT_THAT(text_of(folder / "mesh.inp"), ::testing::Not(::testing::HasSubstr("*BOUNDARY")));
 }
@@ -316,7 +316,7 @@ TEST_F(Formats, OfFebioAreReadAgain) {
 }
 
 TEST_F(Formats, OfFebioHaveNoSagWhereNothingIsHeld) {
-  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron);
+  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron, 6.0);
   EXPECT_THAT(write_febio(model, folder), ::testing::ElementsAre("motion.feb"));
   EXPECT_EQ(count(text_of(folder / "motion.feb"), "NodeSet"), 0);
 }
