@@ -1,7 +1,8 @@
 """The section of docs/experiments.md about exported models in other programs. Standard library only."""
 from page import machine, percent, results, table
 
-WORDS = {"calculix": "CalculiX", "mujoco": "MuJoCo", "newton": "Newton, vertex block descent", "gmsh": "Gmsh's file, by", "usd": "USD"}
+WORDS = {"calculix": "CalculiX", "mujoco": "MuJoCo", "newton": "Newton, vertex block descent", "gmsh": "Gmsh's file, by", "usd": "USD", "febio": "FEBio,",
+         "sofa": "SOFA,", "ply": "frames as PLY, by", "obj": "frames as OBJ, by", "vtu": "frames as VTU, by"}
 
 
 def off(seen, own):
@@ -15,11 +16,13 @@ def exports():
     rows, read = [], []
     for name, formats in figures["models"].items():
         for to, f in formats.items():
-            seen, own, model = f["seen"], f["exported"], f["model"]
+            seen = f["seen"]
             if "frequencies" not in seen:
-                read.append([name, f"{WORDS[to]} {seen['version']}", f"{seen['nodes']} of {f['nodes']}", f"{seen['elements']} of {f['elements']}",
-                             "; ".join(f"{seen[k]} {k}" for k in ("held", "inverted") if k in seen)])
+                of = [f"{seen[k]} of {f[k]}" if k in f else f"{seen[k]}" for k in ("nodes", "elements")]
+                read.append([name, f"{WORDS[to]} {seen['version']}", *of,
+                             "; ".join(f"{seen[k]} {k}" for k in ("held", "inverted", "materials", "moduli", "frames", "mm moved at most") if k in seen)])
                 continue
+            own, model = f["exported"], f["model"]
             pairs = list(zip(seen["frequencies"], own["frequencies"]))
             rows.append([name, f"{WORDS[to]} {seen['version']}", f"{f['elements']} {'quadratic' if f['quadratic'] else 'linear'}", f"{f['moduli_were_multiplied_by']:.3g}",
                          f"{model['frequencies'][0]:.4g}", f"{seen['frequencies'][0]:.4g} ({off(*pairs[0])})",

@@ -42,7 +42,7 @@ struct ExportModel {
 /// ratio of the squared first frequencies of the model's own elements and of the new ones, which is exact, since
 /// squared frequencies are proportional to the modulus. Linear elements that the model does not have itself lock: flat
 /// ones are mended (flat_elements.hpp), Poisson's ratio is lowered while that brings the further frequencies closer,
-/// and meshes are laid ever finer until six frequencies agree within 2 %, or there would be more than 12,000 nodes. A
+/// and meshes are laid ever finer until six frequencies agree within 2 %, or there would be more than 8,000 nodes. A
 /// note says what is left.
 /// @param kind   linear or quadratic tetrahedra
 /// @param cells  along the object's longest axis, of a mesh laid anew (`model_body`); the model's own where left out

@@ -146,7 +146,7 @@ TEST(ExportModel, OfLinearElementsIsFineEnough) {
   EXPECT_THAT(coarse.notes, ::testing::Contains(::testing::HasSubstr("off the model's")));
   EXPECT_LT(off(chosen), 0.02);
   EXPECT_THAT(chosen.notes, ::testing::Not(::testing::Contains(::testing::HasSubstr("off the model's"))));
-  EXPECT_LE(chosen.body->node_count(), 12000);
+  EXPECT_LE(chosen.body->node_count(), 8000);
   EXPECT_LT(coarse.identified, chosen.identified);
   EXPECT_LT(chosen.identified, 1.0) << "linear elements are stiffer";
   expect_frequencies_of_what_is_written(chosen);
