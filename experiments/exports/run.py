@@ -23,14 +23,14 @@ import common
 
 SMALL = 0.01  # of gravity
 SMALL_SINGLE = 0.05  # where positions have single precision, which shorter ways drown in
-NEWTON_CELLS = 32  # on a processor its steps are slow
+CELLS = {"mujoco": 32, "newton": 32}  # their steps are slow on a processor; others have the mesh that the program chooses
 BATTERY = ("hang-03", "release-06", "release-02")
 
 
 def exported(program, model, out, to):
     """The files of a format, and what `export.json` tells; nothing where the format has no elements."""
     out.mkdir(parents=True, exist_ok=True)
-    common.run(program, "export", model / "model.toml", "--to", to, "--out", out, *(["--cells", NEWTON_CELLS] if to == "newton" else []))
+    common.run(program, "export", model / "model.toml", "--to", to, "--out", out, *(["--cells", CELLS[to]] if to in CELLS else []))
     return common.read(out / "export.json") if (out / "export.json").exists() else {}
 
 

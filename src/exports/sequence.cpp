@@ -38,16 +38,51 @@ std::vector<std::string> write_frames(const MovingSurface& moving, const fs::pat
   return files;
 }
 
+/// Runs in Blender 4 and 5: one object, a shape key a frame.
+constexpr const char* blender_script =
+    R"(# blender --python blender.py: the frames beside this file as shape keys of one object
+import csv
+import pathlib
+
+import bpy
+
+folder = pathlib.Path(__file__).resolve().parent
+with open(folder / "frames.csv", newline="") as file:
+    rows = list(csv.DictReader(file))
+load = bpy.ops.wm.obj_import if rows[0]["file"].endswith(".obj") else bpy.ops.wm.ply_import
+rate = bpy.context.scene.render.fps / bpy.context.scene.render.fps_base
+moving = None
+for k, row in enumerate(rows):
+    load(filepath=str(folder / row["file"]))
+    frame = bpy.context.object
+    if moving is None:
+        moving = frame
+        moving.shape_key_add(name="rest")
+        continue
+    key = moving.shape_key_add(name=row["frame"])
+    for corner, vertex in zip(key.data, frame.data.vertices):
+        corner.co = vertex.co
+    now, before, after = (1 + rate * float(r["time [s]"]) for r in (row, rows[k - 1], rows[min(k + 1, len(rows) - 1)]))
+    for at, value in ((before, 0.0), (after, 0.0), (now, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=at)
+    bpy.data.objects.remove(frame)
+)";
+
 std::vector<std::string> write_meshes(const Model& model, const fs::path& folder, const ExportProgress& progress,
                                       const char* ending) {
   const MovingSurface moving = moving_surface(model, progress);
   TriangleMesh mesh;
   mesh.triangles = moving.triangles;
-  return write_frames(moving, folder, ending, [&](const fs::path& file, std::size_t frame) {
+  std::vector<std::string> files = write_frames(moving, folder, ending, [&](const fs::path& file, std::size_t frame) {
     mesh.vertices.clear();
     for (const auto& vertex : moving.frames[frame].rowwise()) mesh.vertices.push_back(vertex.transpose());
     write_mesh(file, mesh);
   });
+  if (files.empty()) return files;
+  write_file(folder / "blender.py", blender_script);
+  files.push_back("blender.py");
+  return files;
 }
 
 }  // namespace

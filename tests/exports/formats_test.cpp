@@ -386,6 +386,7 @@ TEST_F(Formats, OfSequencesAreReadAgain) {
     EXPECT_FALSE(fs::exists(name(5))) << "frames of another motion are gone";
     for (const std::string& file : files) EXPECT_TRUE(fs::exists(own / file)) << file;
     EXPECT_EQ(std::ranges::count_if(files, [](const std::string& f) { return f.starts_with("frames/"); }), 5);
+    EXPECT_EQ(std::ranges::count(files, "blender.py"), std::string(ending) == "vtu" ? 0 : 1);
     EXPECT_THAT(text_of(own / "frames.csv"), ::testing::EndsWith(std::string("4,0.08,frames/000004.") + ending + "\n"));
     TriangleMesh first, last;
     for (auto [mesh, frame] : {std::pair{&first, 0}, {&last, 4}}) {
