@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/error.hpp"
@@ -21,7 +22,9 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::string model, to, out;
   bool linear = false;
-  int samples = 0;
+  int samples = 0, cells = 0;
+
+  std::optional<double> mesh_cells() const { return cells > 0 ? std::optional<double>(cells) : std::nullopt; }
 };
 
 std::string in_hertz(const std::vector<double>& frequencies) {
@@ -70,7 +73,7 @@ void run_samples(const Arguments& arguments, const ExportFormat& format, const M
       write_moving(drawn, format, folder);
     } else {
       make_folder(folder);
-      (void)write_export(export_model(drawn, elements_for(arguments, format)), format, folder);
+      (void)write_export(export_model(drawn, elements_for(arguments, format), arguments.mesh_cells()), format, folder);
       show_progress("written", int(i) + 1, int(samples.size()));
     }
     stop_if_interrupted();
@@ -85,7 +88,7 @@ void run(const Arguments& arguments) {
   if (format.write_surface) return write_moving(model, format, arguments.out);
   const ElementKind kind = elements_for(arguments, format);
   const bool is_quadratic = kind == ElementKind::QuadraticTetrahedron;
-  const ExportModel exported = export_model(model, kind);
+  const ExportModel exported = export_model(model, kind, arguments.mesh_cells());
   make_folder(arguments.out);
   const std::vector<std::string> files = write_export(exported, format, arguments.out);
   std::cout << fmt::format("{} {} tetrahedra, {} nodes, {} of them held\n", exported.body->element_count(),
@@ -126,6 +129,11 @@ void add_export(CommandLine& line, int& exit_code) {
   command.option("--to", arguments->to, "format, see below").required().type_name("FORMAT");
   command.option("--out,-o", arguments->out, "folder for the files").required().type_name("DIR");
   command.flag("--linear", arguments->linear, "linear tetrahedra also where the format takes quadratic ones");
+  command
+      .option("--cells", arguments->cells,
+              "elements along the longest axis of a mesh laid anew over the surface; the model's own where left out")
+      .positive()
+      .type_name("N");
   command
       .option("--samples", arguments->samples,
               "so many materials drawn from what the fit left open (result.json beside the model), each in a folder of "

@@ -11,11 +11,16 @@ namespace pliant {
 const std::vector<ExportFormat>& export_formats() {
   static const std::vector<ExportFormat> all = {
       {"calculix", "CalculiX and Abaqus", true, write_calculix},
+      {"febio", "FEBio", true, write_febio},
       {"gltf", "Blender, browsers and game engines", false, nullptr, write_gltf},
       {"gmsh", "Gmsh and what reads its meshes", true, write_gmsh},
       {"mujoco", "MuJoCo", false, write_mujoco},
       {"newton", "Newton and Warp", false, write_newton},
+      {"obj", "Blender and what reads OBJ", false, nullptr, write_obj_frames},
+      {"ply", "Blender and what reads PLY", false, nullptr, write_ply_frames},
+      {"sofa", "SOFA", false, write_sofa},
       {"usd", "what reads USD, such as Isaac Sim and Newton", false, write_usd},
+      {"vtu", "ParaView and what reads VTK's files", false, nullptr, write_vtu_frames},
   };
   return all;
 }
@@ -47,6 +52,7 @@ std::vector<std::string> write_export(const ExportModel& model, const ExportForm
                      {"stiffness_damping", model.stiffness_damping},
                      {"gravity", {model.gravity.x(), model.gravity.y(), model.gravity.z()}},
                      {"moduli_were_multiplied_by", model.identified},
+                     {"steps_below", model.stiffest > 0.0 ? 2.0 / model.stiffest : 0.0},
                      {"model", motions(model.model)},
                      {"exported", motions(model.exported)},
                      {"notes", model.notes}};

@@ -19,8 +19,8 @@ struct ExportFormat {
   bool takes_quadratic;  ///< elements; else linear ones alone
   /// Writes elements into a folder and returns the files' names; null: the format is one of surfaces.
   std::vector<std::string> (*write)(const ExportModel& model, const std::filesystem::path& folder);
-  /// Simulates the model as its recording was and writes its surface in every frame. Throws std::runtime_error where it
-  /// cannot be simulated.
+  /// Simulates the model as its recording was and writes its surface in every frame; returns the files' names. Writes
+  /// nothing and returns none where `progress` stopped it. Throws std::runtime_error where it cannot be simulated.
   std::vector<std::string> (*write_surface)(const Model& model, const std::filesystem::path& folder,
                                             const ExportProgress& progress) = nullptr;
 };
@@ -39,11 +39,19 @@ std::vector<std::string> write_export(const ExportModel& model, const ExportForm
 
 // The formats, each in a file of its own.
 std::vector<std::string> write_calculix(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_febio(const ExportModel& model, const std::filesystem::path& folder);
 std::vector<std::string> write_gltf(const Model& model, const std::filesystem::path& folder,
                                     const ExportProgress& progress);
 std::vector<std::string> write_gmsh(const ExportModel& model, const std::filesystem::path& folder);
 std::vector<std::string> write_mujoco(const ExportModel& model, const std::filesystem::path& folder);
 std::vector<std::string> write_newton(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_obj_frames(const Model& model, const std::filesystem::path& folder,
+                                          const ExportProgress& progress);
+std::vector<std::string> write_ply_frames(const Model& model, const std::filesystem::path& folder,
+                                          const ExportProgress& progress);
+std::vector<std::string> write_sofa(const ExportModel& model, const std::filesystem::path& folder);
 std::vector<std::string> write_usd(const ExportModel& model, const std::filesystem::path& folder);
+std::vector<std::string> write_vtu_frames(const Model& model, const std::filesystem::path& folder,
+                                          const ExportProgress& progress);
 
 }  // namespace pliant

@@ -9,7 +9,7 @@
 
 #include "base/files.hpp"
 #include "exports/formats.hpp"
-#include "simulation/model_simulation.hpp"
+#include "exports/moving_surface.hpp"
 
 namespace pliant {
 
@@ -68,36 +68,7 @@ std::vector<float> floats(const Points& points) {
   return numbers;
 }
 
-/// The surface of a model as it moves.
-struct MovingSurface {
-  std::vector<std::array<int, 3>> triangles;
-  std::vector<Points> frames;  ///< of the vertices [m]
-  std::vector<float> times;    ///< [s]
-};
-
-MovingSurface moving_surface(const Model& model, const ExportProgress& progress) {
-  const ModelScene scene = make_scene(model);
-  MovingSurface moving;
-  std::vector<Vector3> vertices;
-  if (model.scene.object.surface) {
-    vertices = model.scene.object.surface->vertices;
-    moving.triangles = model.scene.object.surface->triangles;
-  } else {
-    const auto& mesh = std::get<TetMesh>(scene.body->mesh);
-    for (Eigen::Index n = 0; n < mesh.nodes.rows(); ++n) vertices.push_back(mesh.nodes.row(n).transpose());
-    moving.triangles = mesh.boundary;
-  }
-  const Embedding surface(*scene.body, vertices);
-  const int count = int(scene.simulation.times.size());
-  Simulation simulation(scene.body, scene.simulation);
-  const RolloutSummary summary = simulation.run(scene.theta, [&](int frame, const State& state, auto) {
-    moving.frames.push_back(surface.positions(state.x));
-    moving.times.push_back(float(scene.simulation.times[std::size_t(frame)] - scene.simulation.times.front()));
-    return !progress || progress(frame + 1, count);
-  });
-  if (!summary.succeeded) throw std::runtime_error("the model cannot be simulated: " + summary.failure);
-  return moving;
-}
+std::vector<float> floats(const std::vector<double>& values) { return {values.begin(), values.end()}; }
 
 /// Frames are morph targets of the first one; each is shown alone at its time, and blended into the next between.
 Json scene_of(const std::string& name, const MovingSurface& moving, Buffer& buffer) {
@@ -129,7 +100,7 @@ Json scene_of(const std::string& name, const MovingSurface& moving, Buffer& buff
   if (targets > 0) {
     std::vector<float> weights(moving.frames.size() * targets, 0.0F);
     for (std::size_t k = 1; k <= targets; ++k) weights[k * targets + k - 1] = 1.0F;
-    const int times = buffer.add(moving.times, "SCALAR", float_numbers, 0, true);
+    const int times = buffer.add(floats(moving.times), "SCALAR", float_numbers, 0, true);
     const int values = buffer.add(weights, "SCALAR", float_numbers, 0, false);
     scene["animations"] =
         Json::array({{{"name", "motion"},
@@ -151,6 +122,7 @@ std::vector<std::string> write_gltf(const Model& model, const std::filesystem::p
                                     const ExportProgress& progress) {
   constexpr std::size_t magic = 0x46546C67, version = 2, json_chunk = 0x4E4F534A, binary_chunk = 0x004E4942;
   const MovingSurface moving = moving_surface(model, progress);
+  if (moving.frames.empty()) return {};
   Buffer buffer;
   Json scene = scene_of(model.name, moving, buffer);
   std::string bytes(buffer.bytes().begin(), buffer.bytes().end());

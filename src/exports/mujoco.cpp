@@ -59,7 +59,7 @@ void write_scene(const ExportModel& model, std::ostream& out) {
       "  <!-- Metres, kilograms, seconds. A body a vertex, with its own mass; mass damping has no counterpart. The "
       "integrator takes the flexes' forces implicitly (MuJoCo 4); explicit ones need steps below {:.2g} s, and shorter "
       "ones where there is damping. -->\n"
-      "  <option timestep=\"0.002\" gravity=\"{:.9g} {:.9g} {:.9g}\" integrator=\"discrete\"/>\n"
+      "  <option timestep=\"0.002\" gravity=\"{:.9g} {:.9g} {:.9g}\" integrator=\"discrete\" iterations=\"1000\"/>\n"
       "  <size memory=\"1G\"/>\n  <worldbody>\n",
       plain(model.name), 2.0 / model.stiffest, model.gravity.x(), model.gravity.y(), model.gravity.z());
   for (int n = 0; n < body.node_count(); ++n) {

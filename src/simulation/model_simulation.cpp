@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 
 #include "base/error.hpp"
 #include "simulation/law_table.hpp"
@@ -84,27 +85,38 @@ TetMesh in_eight(const TetMesh& mesh) {
   return make_tet_mesh(mesh.nodes, std::move(tets));
 }
 
-}  // namespace
+/// Middles of a model's elements [m], one a row; none where there is no volume mesh.
+Points element_middles(const ModelVolume& volume) {
+  const auto points = std::size_t(corner_count(volume.kind));
+  Points middles = Points::Zero(Eigen::Index(volume.connectivity.size() / points), 3);
+  for (std::size_t i = 0; i < volume.connectivity.size(); ++i)
+    middles.row(Eigen::Index(i / points)) += volume.nodes.row(volume.connectivity[i]) / double(points);
+  return middles;
+}
 
-namespace {
-
-/// Quadratic tetrahedra for a model of hexahedra.
-std::shared_ptr<const Body> as_tetrahedra(const Model& model) {
-  const Scene& scene = model.scene;
+/// Tetrahedra laid anew over a model's surface, each with the modulus of the nearest of the model's elements.
+/// @param cells  along the object's longest axis
+std::shared_ptr<const Body> meshed_anew(const Model& model, ElementKind kind, double cells) {
+  Scene scene = model.scene;
+  if (!scene.object.surface)
+    throw InputError({{},
+                      "the model has no surface that could be meshed anew",
+                      "a model with a surface",
+                      "leave out the number of cells: its own elements are taken"});
+  scene.object.volume.reset();
   const auto distance = scene_distance(scene, Resolution{}.band);
   std::vector<Vector3> no_points;
   Resolution resolution;
-  resolution.element = ElementKind::QuadraticTetrahedron;
-  resolution.cells = 0.6 * object_size(scene) / model.cell_size;  // whose nodes lie about as close
+  resolution.element = kind;
+  resolution.cells = cells;
   Body body = *make_body_of(scene, *distance, resolution, no_points);
   const ModelVolume& volume = model.volume;
-  const std::size_t hexahedra = volume.connectivity.size() / 8;
+  const Points middles = element_middles(volume);
   body.modulus = {};
   body.modulus.relative.assign(std::size_t(body.element_count()), 1.0);
-  if (hexahedra == 0 || volume.youngs_modulus.size() != hexahedra) return std::make_shared<Body>(std::move(body));
-  Points middles = Points::Zero(Eigen::Index(hexahedra), 3);
-  for (std::size_t i = 0; i < volume.connectivity.size(); ++i)
-    middles.row(Eigen::Index(i / 8)) += 0.125 * volume.nodes.row(volume.connectivity[i]);
+  if (middles.rows() == 0 || volume.youngs_modulus.size() != std::size_t(middles.rows()) ||
+      std::ranges::adjacent_find(volume.youngs_modulus, std::not_equal_to<>()) == volume.youngs_modulus.end())
+    return std::make_shared<Body>(std::move(body));
   for (int e = 0; e < body.element_count(); ++e) {
     Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
     for (const int node : body.element(e)) middle += body.nodes.row(node) / double(body.element(e).size());
@@ -115,18 +127,28 @@ std::shared_ptr<const Body> as_tetrahedra(const Model& model) {
   return std::make_shared<Body>(std::move(body));
 }
 
-}  // namespace
-
-std::shared_ptr<const Body> model_body(const Model& model, std::optional<ElementKind> kind) {
-  auto own = has_tetrahedra(model) ? body_of(model, model.scene, nullptr) : as_tetrahedra(model);
-  if (!kind || own->kind == *kind) return own;
+/// Tetrahedra of a model as those of another order.
+std::shared_ptr<const Body> of_kind(std::shared_ptr<const Body> own, ElementKind kind) {
+  if (own->kind == kind) return own;
   const auto& mesh = std::get<TetMesh>(own->mesh);
-  const bool is_split = *kind == ElementKind::Tetrahedron;
+  const bool is_split = kind == ElementKind::Tetrahedron;
   Body other = make_body(is_split ? in_eight(mesh) : with_mid_nodes(mesh));
   const std::size_t parts = is_split ? 8 : 1;
   for (std::size_t e = 0; e < other.modulus.relative.size(); ++e)
     other.modulus.relative[e] = own->modulus.relative[e / parts];
   return std::make_shared<Body>(std::move(other));
+}
+
+}  // namespace
+
+std::shared_ptr<const Body> model_body(const Model& model, std::optional<ElementKind> kind,
+                                       std::optional<double> cells) {
+  const double own_cells = object_size(model.scene) / model.cell_size;
+  if (cells) return meshed_anew(model, kind.value_or(ElementKind::QuadraticTetrahedron), *cells);
+  // Quadratic tetrahedra whose nodes lie about as close as those of hexahedra.
+  auto own = has_tetrahedra(model) ? body_of(model, model.scene, nullptr)
+                                   : meshed_anew(model, ElementKind::QuadraticTetrahedron, 0.6 * own_cells);
+  return kind ? of_kind(std::move(own), *kind) : own;
 }
 
 ModelScene make_scene(const Model& model) {

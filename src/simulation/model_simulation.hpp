@@ -31,7 +31,10 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
 
 /// The body of a model as tetrahedra, with each element's modulus: its own, or, where the model is of hexahedra,
 /// quadratic ones with about as many nodes along its longest axis, each with the modulus of the hexahedron about it.
-/// @param kind  linear or quadratic; others than the above become eight linear ones each, or get mid nodes
-std::shared_ptr<const Body> model_body(const Model& model, std::optional<ElementKind> kind = std::nullopt);
+/// @param kind   linear or quadratic; others than the above become eight linear ones each, or get mid nodes
+/// @param cells  along the object's longest axis: tetrahedra laid anew over its surface, each with the modulus of the
+///               nearest of the model's elements. Throws InputError where the model has no surface then.
+std::shared_ptr<const Body> model_body(const Model& model, std::optional<ElementKind> kind = std::nullopt,
+                                       std::optional<double> cells = std::nullopt);
 
 }  // namespace pliant

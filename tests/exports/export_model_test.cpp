@@ -93,18 +93,74 @@ TEST(ExportModel, KnowsHowABeamVibratesAndSags) {
   EXPECT_NEAR(exported.model.sag, sag, 0.03 * sag);
 }
 
-TEST(ExportModel, SplitsQuadraticElementsInEightOfTheSameModulus) {
+TEST(ModelBody, SplitsQuadraticElementsInEightOfTheSameModulus) {
   const Model model = bar();
-  const ExportModel exported = export_model(model, ElementKind::Tetrahedron);
+  const auto body = model_body(model, ElementKind::Tetrahedron);
   const std::size_t count = model.volume.youngs_modulus.size();
-  ASSERT_EQ(exported.moduli.size(), 8 * count);
-  EXPECT_EQ(exported.body->node_count(), int(model.volume.nodes.rows()));
-  EXPECT_NEAR(exported.body->volume(), length * 4e-4, 1e-9);
-  for (std::size_t e = 0; e < exported.moduli.size(); ++e)
-    EXPECT_NEAR(exported.moduli[e], exported.identified * model.volume.youngs_modulus[e / 8],
-                1e-6 * exported.moduli[e]);
-  EXPECT_LT(exported.identified, 1.0) << "linear elements are stiffer";
-  EXPECT_GT(exported.identified, 0.5);
+  ASSERT_EQ(body->modulus.relative.size(), 8 * count);
+  EXPECT_EQ(body->node_count(), int(model.volume.nodes.rows()));
+  EXPECT_NEAR(body->volume(), length * 4e-4, 1e-9);
+  for (std::size_t e = 0; e < 8 * count; ++e)
+    EXPECT_NEAR(body->modulus.relative[e], model.volume.youngs_modulus[e / 8] / model.youngs_modulus, 1e-9);
+}
+
+/// Two halves of different stiffness: a mesh laid anew has the modulus of the half that an element lies in.
+TEST(ModelBody, LaidAnewHasTheModuliOfTheNearestElements) {
+  Model model = bar();
+  for (std::size_t e = 0; e < model.volume.youngs_modulus.size(); ++e) {
+    double middle = 0.0;
+    for (std::size_t k = 0; k < 4; ++k) middle += 0.25 * model.volume.nodes(model.volume.connectivity[10 * e + k], 0);
+    model.volume.youngs_modulus[e] = middle < 0.0 ? 1e5 : 4e5;
+  }
+  for (const ElementKind kind : {ElementKind::Tetrahedron, ElementKind::QuadraticTetrahedron}) {
+    const auto body = model_body(model, kind, 20.0);
+    EXPECT_EQ(body->kind, kind);
+    EXPECT_NEAR(body->volume(), length * 4e-4, 1e-3 * length * 4e-4);
+    int low = 0, high = 0;
+    for (int e = 0; e < body->element_count(); ++e) {
+      double middle = 0.0;
+      for (const int node : body->element(e)) middle += body->nodes(node, 0) / double(body->element(e).size());
+      if (std::abs(middle) < 0.01) continue;  // within half an element of the halves' border
+      const double modulus = body->modulus.relative[std::size_t(e)] * model.youngs_modulus;
+      EXPECT_NEAR(modulus, middle < 0.0 ? 1e5 : 4e5, 1.0) << middle;
+      ++(middle < 0.0 ? low : high);
+    }
+    EXPECT_GT(low, 20);
+    EXPECT_GT(high, 20);
+  }
+}
+
+/// Linear elements lock: frequencies of coarse ones are off, and the mesh that is chosen is not.
+TEST(ExportModel, OfLinearElementsIsFineEnough) {
+  Model model = bar();
+  std::ranges::fill(model.volume.youngs_modulus, 2.2e5);
+  const auto off = [](const ExportModel& exported) {
+    double most = 0.0;
+    for (std::size_t k = 0; k < 6; ++k)
+      most = std::max(most, std::abs(exported.exported.frequencies[k] / exported.model.frequencies[k] - 1.0));
+    return most;
+  };
+  const ExportModel coarse = export_model(model, ElementKind::Tetrahedron, 10.0);
+  const ExportModel chosen = export_model(model, ElementKind::Tetrahedron);
+  EXPECT_GT(off(coarse), 0.03);
+  EXPECT_THAT(coarse.notes, ::testing::Contains(::testing::HasSubstr("off the model's")));
+  EXPECT_LT(off(chosen), 0.02);
+  EXPECT_THAT(chosen.notes, ::testing::Not(::testing::Contains(::testing::HasSubstr("off the model's"))));
+  EXPECT_LE(chosen.body->node_count(), 8000);
+  EXPECT_LT(coarse.identified, chosen.identified);
+  EXPECT_LT(chosen.identified, 1.0) << "linear elements are stiffer";
+  expect_frequencies_of_what_is_written(chosen);
+}
+
+/// Nearly incompressible material: Poisson's ratio gives way, and frequencies come closer than with the model's.
+TEST(ExportModel, OfLinearElementsLowersPoissonsRatioWhereTheyLock) {
+  Model model = bar();
+  std::ranges::fill(model.volume.youngs_modulus, 2.2e5);
+  model.poissons_ratio = 0.495;
+  const ExportModel exported = export_model(model, ElementKind::Tetrahedron, 16.0);
+  EXPECT_LT(exported.poissons_ratio, 0.49);
+  EXPECT_GE(exported.poissons_ratio, 0.3);
+  EXPECT_THAT(exported.notes, ::testing::Contains(::testing::HasSubstr("Poisson's ratio")));
   expect_frequencies_of_what_is_written(exported);
 }
 
@@ -119,7 +175,7 @@ TEST(ExportModel, GivesLinearElementsMidNodes) {
 TEST(ExportModel, OfHexahedraVibratesAsFast) {
   const Model model = test::block(true);
   for (const ElementKind kind : {ElementKind::Tetrahedron, ElementKind::QuadraticTetrahedron}) {
-    const ExportModel exported = export_model(model, kind);
+    const ExportModel exported = export_model(model, kind, 6.0);
     EXPECT_EQ(exported.body->kind, kind);
     expect_frequencies_of_what_is_written(exported);
     if (kind == ElementKind::QuadraticTetrahedron) {
@@ -135,7 +191,7 @@ TEST(ExportModel, OfHexahedraVibratesAsFast) {
 }
 
 TEST(ExportModel, OfAFreeObjectHasNoRigidFrequencyAndNoSag) {
-  const ExportModel exported = export_model(test::block(false), ElementKind::Tetrahedron);
+  const ExportModel exported = export_model(test::block(false), ElementKind::Tetrahedron, 6.0);
   EXPECT_TRUE(exported.held.empty());
   EXPECT_EQ(exported.model.sag, 0.0);
   ASSERT_EQ(exported.model.frequencies.size(), 6u);
@@ -151,7 +207,7 @@ TEST(ExportModel, SaysThatALawIsToldByItsModuli) {
 /// The highest frequency of linear elements with lumped masses bounds what explicit steps may be: sqrt(3) c / h for a
 /// regular lattice is a lower bound here.
 TEST(ExportModel, KnowsItsHighestFrequency) {
-  const ExportModel exported = export_model(bar(), ElementKind::Tetrahedron);
+  const ExportModel exported = export_model(bar(), ElementKind::Tetrahedron, 20.0);
   const double nu = 0.3, E = 2e5 * exported.identified;
   const double speed = std::sqrt(E * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)) / 500.0), edge = 0.01;
   EXPECT_GT(exported.stiffest, speed / edge);

@@ -8,12 +8,15 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <pugixml.hpp>
 #include <sstream>
 
 #include "base/error.hpp"
+#include "geometry/mesh_io.hpp"
 #include "geometry/volume_mesh.hpp"
+#include "model/vtu.hpp"
 #include "support/models.hpp"
 
 namespace pliant::export_formats_test {
@@ -43,9 +46,16 @@ class Formats : public ::testing::Test {
 
   /// Held, of two moduli in halves.
   static ExportModel exported(ElementKind kind) {
-    ExportModel model = export_model(test::block(true), kind);
+    ExportModel model = export_model(test::block(true), kind, 6.0);
     for (int e = 0; e < model.body->element_count(); ++e)
       if (model.body->nodes(model.body->element(e)[0], 0) > 0.0) model.moduli[std::size_t(e)] *= 2.0;
+    return model;
+  }
+
+  /// Of five frames, from rest: the end that is not held falls.
+  static Model moving_bar() {
+    Model model = test::block(true);
+    model.scene.timing = evenly_timed(50.0, 5);
     return model;
   }
 
@@ -55,10 +65,10 @@ class Formats : public ::testing::Test {
 TEST_F(Formats, AreFoundByName) {
   for (const ExportFormat& format : export_formats()) EXPECT_EQ(&export_format(format.name), &format);
   try {
-    (void)export_format("obj");
+    (void)export_format("blend");
     FAIL() << "there is no such format";
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), ::testing::AllOf(::testing::HasSubstr("obj"), ::testing::HasSubstr("calculix")));
+    EXPECT_THAT(error.what(), ::testing::AllOf(::testing::HasSubstr("blend"), ::testing::HasSubstr("calculix")));
   }
 }
 
@@ -110,6 +120,10 @@ TEST_F(Formats, OfNewtonHaveItsConstants) {
     EXPECT_NEAR(grid.find_cell_data("k_damp")->values[std::size_t(e)], 0.5 * 2e-3 * mu, 1e-9 * mu);
   }
   EXPECT_TRUE(grid.point_data.empty()) << "Newton refuses arrays that it does not know";
+  const std::string scene = text_of(folder / "scene.py");
+  const double step = std::stod(scene.substr(scene.find("STEP = ") + 7));
+  EXPECT_NEAR(step, std::max(6.0 / model.stiffest, 3e-4), 0.01 * step);
+  EXPECT_EQ(count(scene, "{{") + count(scene, "}}"), 0) << "braces are those of Python";
 }
 
 TEST_F(Formats, OfMujocoCarryMassesAndShareBodies) {
@@ -155,15 +169,14 @@ TEST_F(Formats, OfCalculixNameEveryPartAndWhatIsHeld) {
 }
 
 TEST_F(Formats, OfCalculixHaveNoSagWhereNothingIsHeld) {
-  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron);
+  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron, 6.0);
   EXPECT_THAT(write_calculix(model, folder), ::testing::Not(::testing::Contains("sag.inp")));
   EXPECT_THAT(text_of(folder / "mesh.inp"), ::testing::Not(::testing::HasSubstr("*BOUNDARY")));
 }
 
 /// Accessors are followed as a reader of the standard follows them.
 TEST_F(Formats, OfGltfHoldTheSurfaceInEveryFrame) {
-  Model model = test::block(true);
-  model.scene.timing = evenly_timed(50.0, 5);
+  const Model model = moving_bar();
   int told = 0;
   const auto tell = [&](int done, int) {
     told = done;
@@ -217,6 +230,193 @@ TEST_F(Formats, OfGltfOfAnObjectAtRestHaveNoMotion) {
   const std::string file = text_of(folder / "model.glb");
   EXPECT_EQ(count(file, "animations"), 0);
   EXPECT_EQ(count(file, "targets"), 0);
+}
+
+/// Numbers between blanks and commas.
+std::vector<double> numbers_of(std::string text) {
+  std::ranges::replace(text, ',', ' ');
+  std::istringstream in(text);
+  std::vector<double> numbers;
+  for (double x = 0.0; in >> x;) numbers.push_back(x);
+  return numbers;
+}
+
+/// Node numbers of the middle of edges 12, 23, 31, 14, 24, 34: FEBio's order.
+constexpr int febio_edges[6][2] = {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}};
+
+TEST_F(Formats, OfFebioAreReadAgain) {
+  for (const ElementKind kind : {ElementKind::Tetrahedron, ElementKind::QuadraticTetrahedron}) {
+    const ExportModel model = exported(kind);
+    EXPECT_THAT(write_febio(model, folder), ::testing::ElementsAre("motion.feb", "sag.feb"));
+    for (const char* file : {"sag.feb", "motion.feb"}) {
+      pugi::xml_document document;
+      ASSERT_TRUE(document.load_file((folder / file).c_str())) << file;
+      const pugi::xml_node root = document.child("febio_spec");
+      EXPECT_STREQ(root.attribute("version").as_string(), "4.0");
+      Points nodes(model.body->node_count(), 3);
+      int count = 0;
+      for (const pugi::xml_node& node : root.child("Mesh").child("Nodes").children("node")) {
+        const std::vector<double> x = numbers_of(node.text().as_string());
+        ASSERT_EQ(x.size(), 3u);
+        ASSERT_EQ(node.attribute("id").as_int(), ++count) << "numbers follow one another";
+        nodes.row(count - 1) << x[0], x[1], x[2];
+      }
+      ASSERT_EQ(count, model.body->node_count());
+      EXPECT_LT((nodes - model.body->nodes).cwiseAbs().maxCoeff(), 1e-8);
+      std::map<std::string, std::string> material_of;
+      for (const pugi::xml_node& domain : root.child("MeshDomains").children("SolidDomain"))
+        material_of[domain.attribute("name").as_string()] = domain.attribute("mat").as_string();
+      double volume = 0.0;
+      int elements = 0;
+      for (const pugi::xml_node& part : root.child("Mesh").children("Elements")) {
+        const pugi::xml_node material =
+            root.child("Material")
+                .find_child_by_attribute("name", material_of.at(part.attribute("name").as_string()).c_str());
+        const bool is_mixture = std::string(material.attribute("type").as_string()) == "solid mixture";
+        EXPECT_EQ(is_mixture, std::string(file) == "motion.feb") << "viscosity only where it moves";
+        const pugi::xml_node elastic = is_mixture ? material.child("solid") : material;
+        EXPECT_STREQ(elastic.attribute("type").as_string(), "neo-Hookean");
+        const double E = elastic.child("E").text().as_double(), nu = elastic.child("v").text().as_double();
+        EXPECT_EQ(nu, model.poissons_ratio);
+        EXPECT_EQ(elastic.child("density").text().as_double(), model.density);
+        if (is_mixture) {
+          const pugi::xml_node viscous = elastic.next_sibling("solid");
+          EXPECT_STREQ(viscous.attribute("type").as_string(), "Newtonian viscous solid");
+          const double bulk = 2e-3 * E / (3.0 - 6.0 * nu), shear = 2e-3 * E / (2.0 + 2.0 * nu);
+          EXPECT_NEAR(viscous.child("kappa").text().as_double(), bulk, 1e-6 * bulk);
+          EXPECT_NEAR(viscous.child("mu").text().as_double(), shear, 1e-6 * shear);
+        }
+        for (const pugi::xml_node& element : part.children("elem")) {
+          std::vector<double> corners = numbers_of(element.text().as_string());
+          for (double& corner : corners) corner -= 1.0;
+          ASSERT_EQ(corners.size(), kind == ElementKind::Tetrahedron ? 4u : 10u);
+          const std::size_t number = element.attribute("id").as_uint() - 1;
+          EXPECT_NEAR(E, model.moduli[number], 1e-6 * E) << number;
+          const auto at = [&](std::size_t k) -> Vector3 { return nodes.row(Eigen::Index(corners[k])).transpose(); };
+          volume += (at(1) - at(0)).cross(at(2) - at(0)).dot(at(3) - at(0)) / 6.0;
+          for (std::size_t k = 4; k < corners.size(); ++k) {
+            const auto& [a, b] = febio_edges[k - 4];
+            const Vector3 middle = 0.5 * (at(std::size_t(a)) + at(std::size_t(b)));
+            EXPECT_LT((at(k) - middle).norm(), 1e-6) << "the middle of its edge";
+          }
+          ++elements;
+        }
+      }
+      EXPECT_EQ(elements, model.body->element_count());
+      EXPECT_NEAR(volume, model.body->volume(), 1e-6 * volume) << "no element is inverted";
+      std::vector<int> held;
+      for (const double node : numbers_of(root.child("Mesh").child("NodeSet").text().as_string()))
+        held.push_back(int(node) - 1);
+      EXPECT_EQ(held, model.held);
+      const pugi::xml_node fixed = root.child("Boundary").child("bc");
+      EXPECT_STREQ(fixed.attribute("node_set").as_string(), "held");
+      for (const char* dof : {"x_dof", "y_dof", "z_dof"}) EXPECT_EQ(fixed.child(dof).text().as_int(), 1);
+      const pugi::xml_node gravity = root.child("Loads").child("body_load");
+      EXPECT_EQ(gravity.child("y").text().as_double(), 9.81) << "FEBio's loads push the other way";
+      EXPECT_STREQ(root.child("Control").child_value("analysis"),
+                   std::string(file) == "sag.feb" ? "STATIC" : "DYNAMIC");
+    }
+  }
+}
+
+TEST_F(Formats, OfFebioHaveNoSagWhereNothingIsHeld) {
+  const ExportModel model = export_model(test::block(false), ElementKind::QuadraticTetrahedron, 6.0);
+  EXPECT_THAT(write_febio(model, folder), ::testing::ElementsAre("motion.feb"));
+  EXPECT_EQ(count(text_of(folder / "motion.feb"), "NodeSet"), 0);
+}
+
+TEST_F(Formats, OfSofaAreReadAgain) {
+  const ExportModel model = exported(ElementKind::Tetrahedron);
+  write_sofa(model, folder);
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_file((folder / "model.scn").c_str()));
+  const pugi::xml_node root = document.child("Node"), object = root.child("Node");
+  EXPECT_EQ(numbers_of(root.attribute("gravity").as_string()), (std::vector<double>{0.0, -9.81, 0.0}));
+  EXPECT_NEAR(root.attribute("dt").as_double() * 100.0 * model.exported.frequencies[0], 1.0, 1e-5);
+  const pugi::xml_node solver = object.child("EulerImplicitSolver");
+  EXPECT_EQ(solver.attribute("rayleighStiffness").as_double(), model.stiffness_damping);
+  EXPECT_EQ(solver.attribute("rayleighMass").as_double(), model.mass_damping);
+  const pugi::xml_node topology = object.child("TetrahedronSetTopologyContainer");
+  const std::vector<double> x = numbers_of(topology.attribute("position").as_string()),
+                            corners = numbers_of(topology.attribute("tetrahedra").as_string()),
+                            moduli = numbers_of(
+                                object.child("TetrahedronFEMForceField").attribute("youngModulus").as_string());
+  ASSERT_EQ(x.size(), std::size_t(3 * model.body->node_count()));
+  for (int n = 0; n < model.body->node_count(); ++n)
+    for (int d = 0; d < 3; ++d) EXPECT_NEAR(x[std::size_t(3 * n + d)], model.body->nodes(n, d), 1e-8);
+  ASSERT_EQ(corners.size(), std::size_t(4 * model.body->element_count()));
+  ASSERT_EQ(moduli.size(), model.moduli.size());
+  for (int e = 0; e < model.body->element_count(); ++e) {
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(int(corners[std::size_t(4 * e) + k]), model.body->element(e)[k]);
+    EXPECT_NEAR(moduli[std::size_t(e)], model.moduli[std::size_t(e)], 1e-6 * moduli[std::size_t(e)]);
+  }
+  EXPECT_EQ(object.child("MeshMatrixMass").attribute("massDensity").as_double(), model.density);
+  std::vector<int> held;
+  for (const double node : numbers_of(object.child("FixedProjectiveConstraint").attribute("indices").as_string()))
+    held.push_back(int(node));
+  EXPECT_EQ(held, model.held);
+}
+
+/// The free end of a bar that falls, and the held one, out of vertices of the last frame.
+void expect_that_the_free_end_falls(const TriangleMesh& first, const TriangleMesh& last) {
+  ASSERT_EQ(first.vertices.size(), last.vertices.size());
+  EXPECT_EQ(first.triangles, last.triangles);
+  double lowest = 0.0, held = 0.0;
+  for (std::size_t n = 0; n < first.vertices.size(); ++n) {
+    const double fallen = last.vertices[n].y() - first.vertices[n].y();
+    lowest = std::min(lowest, fallen);
+    if (first.vertices[n].x() < -0.09) held = std::max(held, std::abs(fallen));
+  }
+  EXPECT_LT(lowest, -1e-3);
+  EXPECT_LT(held, 1e-3);
+}
+
+TEST_F(Formats, OfSequencesAreReadAgain) {
+  const Model model = moving_bar();
+  for (const char* ending : {"ply", "obj", "vtu"}) {
+    const fs::path own = folder / ending;
+    const auto name = [&](int frame) { return own / "frames" / ("00000" + std::to_string(frame) + "." + ending); };
+    fs::create_directories(own / "frames");
+    std::ofstream(name(5)) << "of a longer motion";
+    int told = 0;
+    const std::vector<std::string> files = export_format(ending).write_surface(model, own, [&](int done, int total) {
+      EXPECT_EQ(done, ++told);
+      return total == 5;
+    });
+    EXPECT_FALSE(fs::exists(name(5))) << "frames of another motion are gone";
+    for (const std::string& file : files) EXPECT_TRUE(fs::exists(own / file)) << file;
+    EXPECT_EQ(std::ranges::count_if(files, [](const std::string& f) { return f.starts_with("frames/"); }), 5);
+    EXPECT_EQ(std::ranges::count(files, "blender.py"), std::string(ending) == "vtu" ? 0 : 1);
+    EXPECT_THAT(text_of(own / "frames.csv"), ::testing::EndsWith(std::string("4,0.08,frames/000004.") + ending + "\n"));
+    TriangleMesh first, last;
+    for (auto [mesh, frame] : {std::pair{&first, 0}, {&last, 4}}) {
+      if (std::string(ending) != "vtu") {
+        *mesh = read_mesh(name(frame));
+        continue;
+      }
+      const VtuGrid grid = read_vtu(name(frame));
+      ASSERT_EQ(grid.kind, VtuCell::Triangle);
+      for (const auto& point : grid.points.rowwise()) mesh->vertices.push_back(point.transpose());
+      for (std::size_t i = 0; i + 2 < grid.connectivity.size(); i += 3)
+        mesh->triangles.push_back({grid.connectivity[i], grid.connectivity[i + 1], grid.connectivity[i + 2]});
+      ASSERT_NE(grid.find_point_data("displacement [m]"), nullptr);
+    }
+    EXPECT_EQ(first.triangles, model.scene.object.surface->triangles);
+    expect_that_the_free_end_falls(first, last);
+  }
+  const std::vector<PvdEntry> entries = read_pvd(folder / "vtu" / "motion.pvd");
+  ASSERT_EQ(entries.size(), 5u);
+  EXPECT_NEAR(entries[3].time, 0.06, 1e-9);
+}
+
+TEST_F(Formats, OfSurfacesWriteNothingWhereTheyAreStopped) {
+  for (const ExportFormat& format : export_formats()) {
+    if (!format.write_surface) continue;
+    const fs::path own = folder / format.name;
+    fs::create_directories(own);
+    EXPECT_TRUE(format.write_surface(moving_bar(), own, [](int done, int) { return done < 3; }).empty());
+    EXPECT_TRUE(fs::is_empty(own)) << format.name;
+  }
 }
 
 TEST_F(Formats, OfUsdHoldTheMeshAndItsMaterial) {
