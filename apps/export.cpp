@@ -83,6 +83,11 @@ void run_samples(const Arguments& arguments, const ExportFormat& format, const M
 
 void run(const Arguments& arguments) {
   const ExportFormat& format = export_format(arguments.to);
+  if (format.write_surface && (arguments.cells > 0 || arguments.linear))
+    throw InputError({{},
+                      "`--cells` and `--linear` with the format `" + format.name + "`, which has no elements",
+                      "a format of elements",
+                      "leave them out: the surface is that of the recording"});
   const Model model = load_model(arguments.model);
   if (arguments.samples > 0) return run_samples(arguments, format, model);
   if (format.write_surface) return write_moving(model, format, arguments.out);
@@ -131,7 +136,7 @@ void add_export(CommandLine& line, int& exit_code) {
   command.flag("--linear", arguments->linear, "linear tetrahedra also where the format takes quadratic ones");
   command
       .option("--cells", arguments->cells,
-              "elements along the longest axis of a mesh laid anew over the surface; the model's own where left out")
+              "elements along the longest axis of a mesh laid anew, 2 to 300; found where left out: docs/exports.md")
       .positive()
       .type_name("N");
   command

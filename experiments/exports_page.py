@@ -36,7 +36,7 @@ def exports():
                    "sag of the model [mm]", "in the program (off what was exported)", "step [ms]"], rows)
     if read:
         text += "\nFiles that were read, and what was found:\n\n" + table(["model", "read by", "nodes", "elements", ""], read)
-    text += ("\nCalculiX solves the linear problems that pliant told: they agree. MuJoCo and Newton swing from rest under a hundredth and a twentieth of gravity; half of the first maximum is told as the sag, which damping makes too "
+    text += ("\nCalculiX solves the linear problems that pliant told: they agree. MuJoCo and Newton swing from rest under a hundredth of gravity and under what makes 25 mm of sag; half of the first maximum is told as the sag, which damping makes too "
              "small, and half a period is told by when it comes, which is between two periods where two first frequencies lie close, as those of release-02 do. Both were run over coarser meshes (`--cells 32`) than the "
              "program would choose, since their steps are slow on a processor: hence their columns of what the mesh leaves. Newton runs by the scene that is exported, without damping. FEBio and SOFA are in no package "
              "registry: their files were read and counted, not run.\n")

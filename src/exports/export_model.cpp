@@ -22,7 +22,8 @@ namespace {
 
 constexpr int frequencies_told = 6;
 constexpr double close_frequencies = 0.02;  // relative
-constexpr int most_export_nodes = 8000;     // of a mesh that nobody asked for
+constexpr double fewest_cells = 2.0, most_cells = 300.0;
+constexpr int most_export_nodes = 8000;  // of a mesh that nobody asked for
 
 /// A scene that only elasticity and what is held act in.
 SimulationOptions elastic_alone(SimulationOptions options) {
@@ -266,6 +267,11 @@ Candidate chosen_mesh(const Comparison& comparison, ElementKind kind, std::optio
 }  // namespace
 
 ExportModel export_model(const Model& model, ElementKind kind, std::optional<double> cells) {
+  if (cells && !(*cells >= fewest_cells && *cells <= most_cells))
+    throw InputError({{},
+                      fmt::format("a mesh of {:.6g} elements along the longest axis", *cells),
+                      fmt::format("{:g} to {:g}", fewest_cells, most_cells),
+                      "leave the number out: a mesh that is fine enough is found"});
   const ModelScene scene = make_scene(model);
   const SimulationOptions options = elastic_alone(scene.simulation);
   const Comparison comparison{model, scene, options,

@@ -46,7 +46,9 @@ struct ExportModel {
 /// note says what is left.
 /// @param kind   linear or quadratic tetrahedra
 /// @param cells  along the object's longest axis, of a mesh laid anew (`model_body`); the model's own where left out
-/// Throws InputError where the model cannot be simulated, or no node of the new elements is held.
+///               2 to 300
+/// Throws InputError where the model cannot be simulated, no node of the new elements is held, or `cells` is beyond its
+/// range.
 ExportModel export_model(const Model& model, ElementKind kind, std::optional<double> cells = std::nullopt);
 
 /// Elements by modulus: whole groups where there are no more different ones than `most`, else steps of the logarithm.

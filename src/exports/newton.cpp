@@ -14,7 +14,7 @@ namespace {
 /// Settings under which Newton 1.8 was measured to converge (docs/exports.md): so many stable steps of explicit
 /// integration are one of its, but none so short that single precision loses gravity.
 constexpr int sweeps = 10;
-constexpr double stable_steps = 3.0, shortest_step = 3e-4;  // [s]
+constexpr double stable_steps = 3.0, shortest_step = 1e-4;  // [s]
 
 double newton_step(const ExportModel& model) { return std::max(stable_steps * 2.0 / model.stiffest, shortest_step); }
 

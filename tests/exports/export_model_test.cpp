@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "base/error.hpp"
 #include "elasticity/modes.hpp"
 #include "simulation/model_simulation.hpp"
 #include "support/models.hpp"
@@ -197,6 +198,18 @@ TEST(ExportModel, OfAFreeObjectHasNoRigidFrequencyAndNoSag) {
   ASSERT_EQ(exported.model.frequencies.size(), 6u);
   EXPECT_GT(exported.model.frequencies[0], 1.0);
   expect_frequencies_of_what_is_written(exported);
+}
+
+TEST(ExportModel, RefusesMeshesThatNobodyCanMean) {
+  for (const double cells : {0.0, 1.0, 1e4, std::nan("")}) {
+    try {
+      (void)export_model(bar(), ElementKind::Tetrahedron, cells);
+      FAIL() << cells;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(),
+                  ::testing::AllOf(::testing::HasSubstr("longest axis"), ::testing::HasSubstr("2 to 300")));
+    }
+  }
 }
 
 TEST(ExportModel, SaysThatALawIsToldByItsModuli) {

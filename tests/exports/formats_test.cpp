@@ -122,7 +122,7 @@ TEST_F(Formats, OfNewtonHaveItsConstants) {
   EXPECT_TRUE(grid.point_data.empty()) << "Newton refuses arrays that it does not know";
   const std::string scene = text_of(folder / "scene.py");
   const double step = std::stod(scene.substr(scene.find("STEP = ") + 7));
-  EXPECT_NEAR(step, std::max(6.0 / model.stiffest, 3e-4), 0.01 * step);
+  EXPECT_NEAR(step, std::max(6.0 / model.stiffest, 1e-4), 0.01 * step);
   EXPECT_EQ(count(scene, "{{") + count(scene, "}}"), 0) << "braces are those of Python";
 }
 
