@@ -24,8 +24,11 @@ py::dict small_motions(const SmallMotions& motions) {
   return out;
 }
 
-py::dict export_to(const Model& model, const std::string& to, const fs::path& out, bool linear) {
+py::dict export_to(const Model& model, const std::string& to, const fs::path& out, bool linear,
+                   std::optional<double> cells) {
   const ExportFormat& format = export_format(to);
+  if (format.write_surface && (linear || cells))
+    throw py::value_error("linear, cells: the format " + to + " has no elements");
   Interruption interruption;
   py::dict told;
   std::vector<std::string> files;
@@ -41,7 +44,8 @@ py::dict export_to(const Model& model, const std::string& to, const fs::path& ou
     {
       const py::gil_scoped_release unlocked;
       exported = export_model(model, format.takes_quadratic && !linear ? ElementKind::QuadraticTetrahedron
-                                                                       : ElementKind::Tetrahedron);
+                                                                       : ElementKind::Tetrahedron,
+                              cells);
       make_folder(out);
       files = write_export(exported, format, out);
     }

@@ -106,6 +106,10 @@ def test_a_model_is_exported(ring_fit, tmp_path):
     told = ring_fit[0].model.export("calculix", tmp_path)
     assert all((tmp_path / file).exists() for file in told["files"])
     assert told["model"]["frequencies"][0] == pytest.approx(told["exported"]["frequencies"][0], rel=1e-6)
+    coarse = ring_fit[0].model.export("mujoco", tmp_path / "coarse", cells=8)
+    assert coarse["exported"]["frequencies"][0] == pytest.approx(coarse["model"]["frequencies"][0], rel=1e-6)
+    with pytest.raises(ValueError, match="no elements"):
+        ring_fit[0].model.export("gltf", tmp_path / "surface", cells=8)
     with pytest.raises(pliant.InputError, match="blender"):
         ring_fit[0].model.export("blender", tmp_path)
 
