@@ -72,7 +72,10 @@ TEST(Bag, ReadsTheUnitThatTheViewerStates) {
               HasSubstr("--depth-scale"));
   ImportOptions options;
   options.depth_scale = 1000.0;
-  expect_ramp(imported(import_data("no_unit.bag"), folder / "said", "", options), 4);
+  options.camera = folder.write("c.json", R"({"width":24,"height":18,"fx":40,"fy":41,"cx":12,"cy":9})");
+  const Capture said = imported(import_data("no_unit.bag"), folder / "said", "", options);
+  expect_ramp(said, 4);
+  EXPECT_EQ(said.depth.front().camera.fy, 41.0);
 }
 
 TEST(Bag, RefusesColoursOtherTopicsAndDamage) {
