@@ -186,7 +186,7 @@ void write_facts(const fs::path& out, const Recording& recording, const CaptureF
     scene.object.file = out / ("rest" + facts.surface->extension().string());
     write_file(scene.object.file, read_file(*facts.surface));
   } else if (!recording.test) {
-    comment += "\n# Still to say: `surface`, the object at rest in world coordinates (`pliant scan` makes one)";
+    comment += "\n# Still to say: `surface`, the object at rest in world coordinates";
   }
   if (!facts.mass && !facts.density && !recording.test)
     comment += "\n# Still to say: `mass` [kg] or `density` [kg/m^3]";
