@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -72,6 +73,7 @@ void describe(const Capture& capture) {
         formatted("\"%s\", %d x %d pixels, fx %.2f, fy %.2f, cx %.2f, cy %.2f, %g units a metre", camera.name.c_str(),
                   lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy, camera.depth_scale));
     if (lens.lens.bends()) say("", formatted("a lens that bends: %zu coefficients", lens.lens.coefficients().size()));
+    if (!camera.moved.empty()) say("", "it moves: a pose for each image");
     if (camera.time_offset != 0.0) say("", formatted("its images are %.2f ms late", 1e3 * camera.time_offset));
   }
   for (const Indentation& test : capture.indentations) say("indentation", test.curve.filename().string());

@@ -1,5 +1,6 @@
 #include "imports/camera_json.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -75,8 +76,8 @@ void read_pose(const CameraJson& value, const fs::path& file, PinholeCamera& cam
   if (m.size() != 16)
     refuse(file, "`camera_to_world` has " + std::to_string(m.size()) + " numbers", "16: 4 x 4, row by row");
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) camera.camera_to_world.rotation(i, j) = m[std::size_t(4 * i + j)];
-    camera.camera_to_world.translation[i] = m[std::size_t(4 * i + 3)];
+    for (int j = 0; j < 3; ++j) camera.camera_to_world.rotation(i, j) = m[4 * std::size_t(i) + std::size_t(j)];
+    camera.camera_to_world.translation[i] = m[4 * std::size_t(i) + 3];
   }
   const Matrix3& r = camera.camera_to_world.rotation;
   constexpr double orthogonal = 1e-4;

@@ -1,6 +1,8 @@
 // Record3D's .r3d: a zip archive with `metadata` (JSON) and rgbd/N.depth, float32 metres row by row in LZFSE, with
 // rgbd/N.conf, one byte a pixel (0 low, 1, 2 high), likewise. K is of the colour image (w x h) and written column by
 // column; `poses` are x, y, z, w of a quaternion and the shift, from ARKit's camera axes to a world whose y points up.
+#include <algorithm>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "base/files.hpp"

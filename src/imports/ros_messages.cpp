@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "imports/binary_cursor.hpp"
+#include "imports/camera_json.hpp"
 #include "imports/image_sequence.hpp"
 
 namespace pliant {
@@ -242,7 +243,7 @@ DepthStream stream_of_topic(const RosBag& bag, const RosTopic& topic, const Impo
     refuse(place, "compressedDepth of 32FC1", "16UC1, or images that are not compressed",
            "republish it with image_transport as raw");
   DepthStream stream;
-  stream.camera = camera_of_info(bag, topic.name);
+  stream.camera = options.camera ? read_camera_json(*options.camera).camera : camera_of_info(bag, topic.name);
   if (encoding == "32FC1")
     stream.depth_scale = units_of_metres;
   else if (options.depth_scale)

@@ -168,6 +168,13 @@ void write_depth(const fs::path& out, const Recording& recording, const CaptureF
   }
 }
 
+// Where the top of the first image points, in world coordinates.
+Vector3 picture_top(const Recording& recording) {
+  if (recording.depth.empty()) return Vector3::UnitY();
+  const DepthStream& first = recording.depth.front();
+  return -(first.poses.empty() ? first.camera.camera_to_world : first.poses.front()).rotation.col(1).normalized();
+}
+
 void write_facts(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result,
                  std::string& comment) {
   Scene& scene = result.capture.scene;
@@ -179,7 +186,7 @@ void write_facts(const fs::path& out, const Recording& recording, const CaptureF
     scene.object.file = out / ("rest" + facts.surface->extension().string());
     write_file(scene.object.file, read_file(*facts.surface));
   } else if (!recording.test) {
-    comment += "\n# Still to say: `surface`, the object at rest in world coordinates (`pliant scan` makes one)";
+    comment += "\n# Still to say: `surface`, the object at rest in world coordinates";
   }
   if (!facts.mass && !facts.density && !recording.test)
     comment += "\n# Still to say: `mass` [kg] or `density` [kg/m^3]";
@@ -190,9 +197,10 @@ void write_facts(const fs::path& out, const Recording& recording, const CaptureF
     scene.world.gravity = *recording.gravity;
     scene.world.up = -recording.gravity->normalized();
   } else if (!recording.test) {
-    scene.world.up = -Vector3::UnitY();
-    comment += "\n# A guess: `up`, for a camera that was held level; give `gravity` where it is known";
-    result.notes.push_back("nobody said which way is up: taken is the top of the image (--up X,Y,Z says otherwise)");
+    scene.world.up = picture_top(recording);
+    const std::string guess = recording.depth.empty() ? "y" : "the top of the first image";
+    comment += "\n# A guess: `up` is " + guess + "; give `gravity` where it is known";
+    result.notes.push_back("nobody said which way is up: taken is " + guess + " (--up X,Y,Z says otherwise)");
   }
   if (!recording.test)
     comment +=

@@ -261,6 +261,11 @@ Capture with_calibration(Capture capture, const std::vector<SensorCalibration>& 
                         "no depth camera \"" + sensor.name + "\"",
                         "the cameras that were calibrated, under the same names",
                         "name them alike in both recordings"});
+    if (!at->moved.empty())
+      throw InputError({{capture.file},
+                        "camera \"" + sensor.name + "\" moves while it records",
+                        "a camera that stands, whose pose can be replaced",
+                        "leave --apply out"});
     at->camera.camera_to_world = sensor.camera_to_world;
     at->camera.lens = sensor.lens;
     at->time_offset = sensor.time_offset;

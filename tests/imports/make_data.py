@@ -45,7 +45,7 @@ def bags():
             return Header(stamp=stamp, frame_id="optical") if is_ros2 else Header(seq=frame, stamp=stamp, frame_id="optical")
 
         K = np.array([FX, 0, CX, 0, FY, CY, 0, 0, 1.0])
-        P = np.array([FX, 0, CX, 0, 0, FY, CY, 0, 0, 0, 1.0, 0])
+        P = np.array([FX + 1, 0, CX + 2, 0, 0, FY + 3, CY + 4, 0, 0, 0, 1.0, 0])  # of rectified images
         D = np.array([0.1, -0.02, 0.001, 0.002, 0.0])
         roi = t["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
         names = dict(d=D, k=K, r=np.eye(3).ravel(), p=P) if is_ros2 else dict(D=D, K=K, R=np.eye(3).ravel(), P=P)

@@ -41,6 +41,7 @@ TEST(WriteRecording, GivesEachSensorsNearestImageAndItsOffset) {
       {stream("left", {10.0, 10.1, 10.2, 10.3}), stream("right/up", {9.804, 9.904, 10.004, 10.104, 10.204, 10.304})});
   const ImportedCapture written = write_recording(folder / "out", recording, {});
   EXPECT_EQ(written.notes.size(), 1u);  // up
+  EXPECT_EQ(written.capture.scene.world.up, -Vector3::UnitY());
   const Capture capture = read_capture(folder / "out");
   expect_ramp(capture, 4, 0, 0);
   expect_ramp(capture, 4, 2, 1);
