@@ -47,11 +47,12 @@ std::vector<fs::path> matches(const fs::path& pattern) {
 /// What was recorded, as far as it can be told without reading all of it.
 std::string fingerprint(const fs::path& capture) {
   std::vector<std::string> lines;
-  std::error_code error;
-  for (const auto& entry : fs::recursive_directory_iterator(capture, error))
-    if (entry.is_regular_file())
-      lines.push_back(fs::relative(entry.path(), capture).generic_string() + " " +
-                      std::to_string(entry.file_size(error)) + "\n");
+  std::error_code error, of_this;
+  auto entry = fs::recursive_directory_iterator(capture, error);
+  for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error))
+    if (entry->is_regular_file(of_this))
+      lines.push_back(entry->path().lexically_relative(capture).generic_string() + " " +
+                      std::to_string(entry->file_size(of_this)) + "\n");
   std::ranges::sort(lines);
   std::string text = is_file(capture / "capture.toml") ? read_file(capture / "capture.toml") : "";
   for (const std::string& line : lines) text += line;

@@ -101,11 +101,13 @@ FolderSurvey survey_folder(const fs::path& folder, bool with_surfaces) {
     throw InputError({{folder}, "it " + why_no_file(folder), "a folder with what was recorded", ""});
   std::map<NumberedName, Group> images, meshes;
   std::vector<fs::path> single;
-  auto entries = fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied);
-  for (auto entry = fs::begin(entries); entry != fs::end(entries); ++entry) {
+  std::error_code error;  // links that lead nowhere, and folders that may not be read, are passed over
+  auto entry = fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied, error);
+  for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
     if (entry.depth() >= 2) entry.disable_recursion_pending();
-    if (!entry->is_regular_file()) continue;
-    const fs::path relative = fs::relative(entry->path(), folder);
+    std::error_code of_this;
+    if (!entry->is_regular_file(of_this)) continue;
+    const fs::path relative = entry->path().lexically_relative(folder);
     const std::string kind = lower(relative.extension().string());
     const bool is_image = kind == ".png" || kind == ".pgm", is_cloud = kind == ".ply" || kind == ".pcd";
     const auto file = numbered(relative);
