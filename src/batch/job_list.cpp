@@ -116,8 +116,8 @@ std::vector<BatchJob> batch_jobs(const std::vector<fs::path>& captures, const Fi
     jobs.push_back(std::move(job));
   }
   std::ranges::sort(jobs, {}, [](const BatchJob& job) { return std::tie(job.key, job.capture); });
-  const auto same = std::ranges::unique(jobs, {}, &BatchJob::key);  // copies of one recording are one job
-  jobs.erase(same.begin(), same.end());
+  const auto is_same = [](const BatchJob& a, const BatchJob& b) { return a.key == b.key; };
+  jobs.erase(std::unique(jobs.begin(), jobs.end(), is_same), jobs.end());  // copies of one recording are one job
   return jobs;
 }
 

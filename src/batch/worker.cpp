@@ -24,8 +24,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 using JobEnd = BatchStatus::State;
 
-constexpr int converged = 0, bad_input = 2, not_converged = 3, was_interrupted = 130;  // exit codes of a fit
-constexpr std::chrono::seconds patience{120};  // for a fit that was asked to end
+constexpr int converged = 0, not_converged = 3, was_interrupted = 130;  // exit codes of a fit
+constexpr std::chrono::seconds patience{120};                           // for a fit that was asked to end
 constexpr std::chrono::milliseconds between_looks{50};
 
 /// A fit that runs.
