@@ -17,7 +17,7 @@ Frames Motion::run(const VectorX& theta, const RunState& state, int count, const
   const std::lock_guard turn(turn_);
   prepare(state);
   Frames frames;
-  const auto numbers = std::size_t(3 * body().node_count());
+  const auto numbers = 3 * std::size_t(body().node_count());
   frames.positions.resize(std::size_t(count) * numbers);
   frames.velocities.resize(std::size_t(count) * numbers);
   const RolloutSummary summary =
@@ -40,7 +40,7 @@ Gradient Motion::gradient(const VectorX& theta, const RunState& state, const dou
   Gradient gradient;
   gradient.nodes.with_reference = with_reference;
   has_reference_ = has_reference_ || with_reference;
-  const auto numbers = Eigen::Index(3 * body().node_count());
+  const auto numbers = 3 * Eigen::Index(body().node_count());
   const RolloutSummary summary = simulation_.run_adjoint(
       theta, count - 1, [&](int, const State&) { return !stopped(); },
       [&](int frame, const State&, Points& bar) {
