@@ -17,6 +17,17 @@ constexpr double redwood_scale = 1000.0;  // Open3D's depth images, and those of
 
 fs::path images_folder(const fs::path& source) { return is_folder(source / "depth") ? source / "depth" : source; }
 
+// Depth images of a folder: of 16 bits and one channel, where it has any; pictures and masks may lie beside them.
+std::vector<fs::path> depth_files(const fs::path& folder) {
+  const std::vector<fs::path> all = image_files(folder);
+  std::vector<fs::path> deep;
+  for (const fs::path& file : all) {
+    const ImageHeader header = read_image_header(file);
+    if (header.bits == 16 && header.channels == 1) deep.push_back(file);
+  }
+  return deep.empty() ? all : deep;  // none: the first one is refused by what it is
+}
+
 // Files of Redwood's sensor are named FRAME-MICROSECONDS.png: the second number of each, where all have two.
 std::vector<double> times_in_names(const std::vector<fs::path>& files) {
   std::vector<double> times;
@@ -73,7 +84,7 @@ Recording read_images(const fs::path& source, const ImportOptions& options, std:
   if (!is_folder(source)) refuse(source, "a file", "a folder with depth images");
   const CameraFile camera = camera_of_folder(source, options);
   const fs::path folder = images_folder(source);
-  const std::vector<fs::path> files = image_files(folder);
+  const std::vector<fs::path> files = depth_files(folder);
   if (files.empty()) refuse(folder, "no depth image", "16-bit PNG or PGM files, in this folder or in `depth`");
   (void)read_raw_depth(files.front(), camera.camera);
   const std::optional<double> scale = options.depth_scale  ? options.depth_scale

@@ -173,6 +173,19 @@ TEST(TumFolder, ReadsTimesImagesScaleAndPoses) {
   EXPECT_THAT(complaint_of([&] { (void)read_tum_folder(folder / "in", {}); }), HasSubstr("13x"));
 }
 
+TEST(ImageFolder, PicturesBesideDepthAreLeftAlone) {
+  const TemporaryFolder folder;
+  write_ramps(folder, "depth_%d.png", 3);
+  for (int i = 0; i < 3; ++i)
+    write_png(folder / FramePattern{"color_%d.png"}(i).string(), Image<Rgb>(24, 18, Rgb{9, 8, 7}));
+  folder.write("camera.json", plain_camera);
+  ImportOptions options;
+  options.depth_scale = 1000.0;
+  const Recording recording = read_image_folder(folder.path(), options);
+  ASSERT_EQ(recording.depth.front().image_count, 3);
+  EXPECT_EQ(recording.depth.front().read(2).pixels, ramp_image(24, 18, 2).pixels);
+}
+
 TEST(ImageFolder, ReadsImagesOfARealSensor) {
   const std::filesystem::path room = shared_data() / "sensor-reader-samples/room_rgbd";
   if (!is_folder(room)) GTEST_SKIP() << "no folder " << room;
