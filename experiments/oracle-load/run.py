@@ -60,8 +60,8 @@ def with_material(model, out, values, finer=1.0):
     """The model's scene with another material, on a grid that is so much finer."""
     out.mkdir(parents=True, exist_ok=True)
     text = re.sub(r"volume_mesh = .*\n", "", model.read_text())  # the elements' own moduli
-    for key in ("youngs_modulus", "poisson_ratio", "density", "mass"):
-        text, changes = re.subn(rf"(?m)^{key} *= *\S+", f"{key} = {values[key]['value']}", text)
+    for key, name in (("youngs_modulus", "youngs_modulus"), ("poissons_ratio", "poisson_ratio"), ("density", "density"), ("mass", "mass")):
+        text, changes = re.subn(rf"(?m)^{key} *= *\S+", f"{key} = {values[name]['value']}", text)
         assert changes == 1, key
     text = re.sub(r"(?m)^cell_size *= *(\S+)", lambda m: f"cell_size = {float(m[1]) / finer}", text)
     (out / "model.toml").write_text(text)
