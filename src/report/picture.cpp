@@ -49,6 +49,18 @@ std::array<double, 4> spread_numbers(uint32_t pixel, uint32_t ray) {
   return numbers;
 }
 
+// Cosine and sine of a part of the full turn, [0, 1), to a few degrees: directions of rays that are spread anyway.
+std::array<double, 2> turned(double part) {
+  constexpr std::size_t count = 128;
+  static const std::array<std::array<double, 2>, count> table = [] {
+    std::array<std::array<double, 2>, count> all;
+    for (std::size_t k = 0; k < count; ++k)
+      all[k] = {std::cos(2.0 * pi * (double(k) + 0.5) / count), std::sin(2.0 * pi * (double(k) + 0.5) / count)};
+    return all;
+  }();
+  return table[std::min(count - 1, std::size_t(part * count))];
+}
+
 // A value of 1, 2 or 5 times a power of ten that is not below `value`.
 double round_up_nicely(double value) {
   const double decade = std::pow(10.0, std::floor(std::log10(value)));
@@ -71,6 +83,7 @@ class Painter {
       box_.extend(mesh.vertices.back());
     }
     mesh.triangles = scene.triangles;
+    for (const Rgb& c : scene.colours) colours_.push_back(from_srgb(c[0], c[1], c[2]));
     normals_ = vertex_normals(mesh);
     rays_.add(mesh);
     if (scene.about) box_ = *scene.about;
@@ -83,13 +96,38 @@ class Painter {
     key_ = (1.1 * up_ - 0.55 * r.col(0) - 0.45 * r.col(2)).normalized();
   }
 
+  /// What a pixel's middle shows.
+  struct Look {
+    int what = 0;                // 0: sky, 1: the object, 2 and on: the planes
+    bool is_even = true;         // nothing changes quickly there: no shadow, no grid line
+    std::array<long, 2> cell{};  // of the grid
+    Colour colour = Colour::Zero();
+    bool is_as_even_as(const Look& other) const {
+      return is_even && other.is_even && what == other.what && cell == other.cell;
+    }
+  };
+  Look look(int u, int v) const {
+    const View seen = view(u, v);
+    Look look;
+    look.colour = colour(seen, v, uint32_t(v) * 65536u + uint32_t(u), 0);
+    if (seen.object) return look.what = 1, look.is_even = false, look;
+    if (!seen.plane || fade(seen.point, *seen.plane) <= 0.0) return look;
+    look.what = 2 + int(seen.plane - scene_.planes.data());
+    look.is_even = !on_grid_line(seen.point, *seen.plane) && is_far_from_shadow(seen.point, floor_reach());
+    const auto axes = grid_axes(*seen.plane);
+    for (std::size_t k = 0; k < 2; ++k)
+      look.cell[k] = std::lround(std::floor(axes[k].dot(seen.point - seen.plane->point) / grid_));
+    return look;
+  }
+
+  /// Of as many rays as the options ask for.
   Colour pixel(int u, int v) const {
     Colour sum = Colour::Zero();
     const int n = options_.samples;
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i)
-        sum += sample(u + (i + 0.5) / n - 0.5, v + (j + 0.5) / n - 0.5, uint32_t(v) * 65536u + uint32_t(u),
-                      uint32_t(j * n + i));
+        sum += colour(view(u + (i + 0.5) / n - 0.5, v + (j + 0.5) / n - 0.5), v + (j + 0.5) / n - 0.5,
+                      uint32_t(v) * 65536u + uint32_t(u), uint32_t(j * n + i));
     return sum / double(n * n);
   }
 
@@ -136,21 +174,38 @@ class Painter {
     return nearest;
   }
 
-  Colour sample(double u, double v, uint32_t pixel, uint32_t index) const {
+  /// What a ray meets first: the object, a plane, or neither.
+  struct View {
+    Vector3 direction, point;
+    std::optional<RayHit> object;
+    const Plane* plane = nullptr;
+  };
+  View view(double u, double v) const {
     const Vector3 eye = camera_.camera_to_world.translation;
-    const Vector3 direction = (camera_.unproject(u, v, 1.0) - eye).normalized();
-    const auto hit = rays_.cast(eye, direction);
-    const auto ground = floor(eye, direction);
+    View view;
+    view.direction = (camera_.unproject(u, v, 1.0) - eye).normalized();
+    const auto hit = rays_.cast(eye, view.direction);
+    const auto ground = floor(eye, view.direction);
+    if (hit && (!ground || hit->distance < ground->distance + 1e-6 * size_)) {
+      view.object = hit;
+      view.point = eye + hit->distance * view.direction;
+    } else if (ground) {
+      view.plane = ground->plane;
+      view.point = eye + ground->distance * view.direction;
+    }
+    return view;
+  }
+
+  Colour colour(const View& view, double v, uint32_t pixel, uint32_t index) const {
+    if (view.object) return object_colour(view.point, *view.object, view.direction, pixel, index);
     const Colour sky = background(v);
-    if (hit && (!ground || hit->distance < ground->distance + 1e-6 * size_))
-      return object_colour(eye + hit->distance * direction, *hit, direction, pixel, index);
-    if (ground) return floor_colour(eye + ground->distance * direction, *ground->plane, sky, pixel, index);
-    return sky;
+    return view.plane ? floor_colour(view.point, *view.plane, sky, pixel, index) : sky;
   }
 
   Colour background(double v) const {
+    static const Colour above = from_srgb(238, 242, 246), below = from_srgb(250, 250, 249);
     const double t = std::clamp(v / std::max(1, camera_.height - 1), 0.0, 1.0);
-    return (1.0 - t) * from_srgb(238, 242, 246) + t * from_srgb(250, 250, 249);
+    return (1.0 - t) * above + t * below;
   }
 
   // Part of the sky above a surface that is not covered by the object, cosine weighted, and the part of the broad key
@@ -167,11 +222,12 @@ class Painter {
     const int n = options_.light_rays;
     for (int k = 0; k < n; ++k) {
       const auto [r1, r2, r3, r4] = spread_numbers(pixel, index * uint32_t(n) + uint32_t(k));
-      const double radius = std::sqrt(r1), angle = 2.0 * pi * r2;
-      const Vector3 to_sky = radius * std::cos(angle) * a + radius * std::sin(angle) * b + std::sqrt(1.0 - r1) * normal;
+      const double radius = std::sqrt(r1), spread = key_spread * std::sqrt(r3);
+      const auto [cosine, sine] = turned(r2);
+      const Vector3 to_sky = radius * (cosine * a + sine * b) + std::sqrt(1.0 - r1) * normal;
       open += !rays_.is_blocked(start, to_sky, 0.0, reach);
-      const double spread = key_spread * std::sqrt(r3), turn = 2.0 * pi * r4;
-      const Vector3 to_key = key_ + spread * (std::cos(turn) * ka + std::sin(turn) * kb);
+      const auto [key_cosine, key_sine] = turned(r4);
+      const Vector3 to_key = key_ + spread * (key_cosine * ka + key_sine * kb);
       lit += normal.dot(to_key) > 0.0 && !rays_.is_blocked(start, to_key, 0.0, 1e3 * size_);
     }
     return {double(open) / n, double(lit) / n};
@@ -193,12 +249,12 @@ class Painter {
   }
 
   Colour albedo(const RayHit& hit) const {
-    if (scene_.colours.empty()) return from_srgb(176, 182, 190);
+    static const Colour grey = from_srgb(176, 182, 190);
+    if (scene_.colours.empty()) return grey;
     Colour sum = Colour::Zero();
     const double share[] = {1.0 - hit.u - hit.v, hit.u, hit.v};
     for (std::size_t k = 0; k < 3; ++k) {
-      const Rgb& c = scene_.colours[std::size_t(scene_.triangles[hit.triangle][k])];
-      sum += share[k] * from_srgb(c[0], c[1], c[2]);
+      sum += share[k] * colours_[std::size_t(scene_.triangles[hit.triangle][k])];
     }
     return sum;
   }
@@ -209,7 +265,8 @@ class Painter {
     if (face.dot(direction) > 0.0) normal = -normal, face = -face;
     const Light light_here = light(point, face, 0.6 * size_, pixel, index);
     const double height = 0.5 + 0.5 * normal.dot(up_);
-    const Colour sky = from_srgb(222, 232, 245), ground = from_srgb(196, 184, 172), key = from_srgb(255, 246, 232);
+    static const Colour sky = from_srgb(222, 232, 245), ground = from_srgb(196, 184, 172),
+                        key = from_srgb(255, 246, 232);
     const Colour ambient = (0.35 + 0.65 * light_here.sky) * ((1.0 - height) * ground + height * sky);
     const double facing = std::max(0.0, normal.dot(key_));
     const Vector3 half = (key_ - direction).normalized();
@@ -221,25 +278,39 @@ class Painter {
 
   Colour floor_colour(const Vector3& point, const Plane& plane, const Colour& sky, uint32_t pixel,
                       uint32_t index) const {
+    static const Colour plain = from_srgb(243, 242, 239);
+    const double f = fade(point, plane);
+    if (f <= 0.0) return sky;
+    const Light light_here = light(point, plane.normal, floor_reach(), pixel, index);
+    const double shade = (0.45 + 0.55 * light_here.sky) * (0.72 + 0.28 * light_here.key);
+    const double line = on_grid_line(point, plane) ? 0.80 : 1.0;
+    const double soft = f * f * (3.0 - 2.0 * f);
+    return soft * shade * line * plain + (1.0 - soft) * sky;
+  }
+
+  double floor_reach() const { return 0.8 * size_; }
+
+  /// One near the object, zero far away, where the floor is not drawn.
+  double fade(const Vector3& point, const Plane& plane) const {
     const Vector3 from_centre = point - centre_;
     const Vector3 within = from_centre - plane.normal.dot(from_centre) * plane.normal;
-    const double fade = std::clamp(1.6 - within.norm() / (1.3 * size_), 0.0, 1.0);
-    if (fade <= 0.0) return sky;
-    const Light light_here = light(point, plane.normal, 0.8 * size_, pixel, index);
-    const double shade = (0.45 + 0.55 * light_here.sky) * (0.72 + 0.28 * light_here.key);
-    Colour floor = from_srgb(243, 242, 239) * (on_grid_line(within + centre_, plane) ? 0.80 : 1.0);
-    const double soft = fade * fade * (3.0 - 2.0 * fade);
-    return soft * shade * floor + (1.0 - soft) * sky;
+    return std::clamp(1.6 - within.norm() / (1.3 * size_), 0.0, 1.0);
+  }
+
+  /// Directions of the grid, which follow the world's axes where the plane allows it.
+  static std::array<Vector3, 2> grid_axes(const Plane& plane) {
+    Eigen::Index least;
+    plane.normal.cwiseAbs().minCoeff(&least);
+    const Vector3 b = plane.normal.cross(Vector3::Unit(least)).normalized();
+    return {b.cross(plane.normal), b};
   }
 
   bool on_grid_line(const Vector3& point, const Plane& plane) const {
-    // grid directions follow the world's axes where the plane allows it
-    Eigen::Index least;
-    plane.normal.cwiseAbs().minCoeff(&least);
-    const Vector3 b = plane.normal.cross(Vector3::Unit(least)).normalized(), a = b.cross(plane.normal);
     const double half_width = 0.006 * grid_;
-    for (const Vector3& axis : {a, b})
-      if (std::abs(std::remainder(axis.dot(point - plane.point), grid_)) < half_width) return true;
+    for (const Vector3& axis : grid_axes(plane)) {
+      const double lines = axis.dot(point - plane.point) / grid_;
+      if (std::abs(lines - std::floor(lines + 0.5)) * grid_ < half_width) return true;
+    }
     return false;
   }
 
@@ -250,6 +321,7 @@ class Painter {
   Box box_;
   double size_ = 1.0, grid_ = 0.1;
   std::vector<Vector3> normals_;
+  std::vector<Colour> colours_;  // of the vertices, if they have any
   RayScene rays_;
 };
 
@@ -320,8 +392,21 @@ Picture draw(const PictureScene& scene, const PinholeCamera& camera, const Pictu
   check(scene, options);
   const Painter painter(scene, camera, options);
   std::vector<Colour> canvas(size_t(camera.width) * camera.height);
+  std::vector<Painter::Look> looks(canvas.size());
+  const auto at = [&](int u, int v) { return size_t(v) * size_t(camera.width) + size_t(u); };
   parallel_for(0, camera.height, [&](int v) {
-    for (int u = 0; u < camera.width; ++u) canvas[size_t(v) * camera.width + u] = painter.pixel(u, v);
+    for (int u = 0; u < camera.width; ++u) looks[at(u, v)] = painter.look(u, v);
+  });
+  // Where a pixel and all around it show the same plain thing, one ray tells what many would.
+  const auto is_even = [&](int u, int v) {
+    for (int y = std::max(0, v - 1); y <= std::min(camera.height - 1, v + 1); ++y)
+      for (int x = std::max(0, u - 1); x <= std::min(camera.width - 1, u + 1); ++x)
+        if (!looks[at(x, y)].is_as_even_as(looks[at(u, v)])) return false;
+    return true;
+  };
+  parallel_for(0, camera.height, [&](int v) {
+    for (int u = 0; u < camera.width; ++u)
+      canvas[at(u, v)] = is_even(u, v) ? looks[at(u, v)].colour : painter.pixel(u, v);
   });
   const std::vector<Painter::Disc> discs = painter.discs();
   const double radius = options.disc_radius > 0.0 ? options.disc_radius : automatic_radius(camera, discs);
