@@ -26,6 +26,7 @@ class CorotatedElasticity : public Elasticity {
   void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
+  void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
   void set_reference(std::shared_ptr<const Body> body) override;
   void linearise_reference(const Points& z) override;
@@ -69,6 +70,10 @@ class CorotatedElasticity : public Elasticity {
     Vector unrotated, displacement, stress;  // q = R^T z, d = q - X, K d
   };
   const std::vector<Strained>& strained(const Points& z);
+  /// Adds to P the changes of the mean strain's stress, lane by lane.
+  /// @param first  direction of the first lane
+  void add_mean_stress(int element, const Matrix3& H, const MeanStrainCorrection& mean, const MatrixLanes& dF,
+                       const MatrixLanes& dz, const ForceChanges& changes, Eigen::Index first, MatrixLanes& P) const;
 
   std::shared_ptr<const Body> body_;
   MaterialBlocks material_;
@@ -285,28 +290,99 @@ void CorotatedElasticity<N>::add_lag_matrix(const Points& z, double scale, Block
 template <int N>
 void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
                                                const VectorX& d_theta, Points& force) {
-  modulus_.set_change(d_theta);
-  const double d_nu = d_theta[material_.poissons_ratio];
+  const Points *lag = &d_lag, *at = &d_z;
+  add_force_tangents(z, {{&lag, 1}, {&at, 1}, d_theta}, {&force, 1});
+}
+
+template <int N>
+void CorotatedElasticity<N>::add_mean_stress(int e, const Matrix3& H, const MeanStrainCorrection& mean,
+                                             const MatrixLanes& dF, const MatrixLanes& dz, const ForceChanges& changes,
+                                             Eigen::Index first, MatrixLanes& P) const {
+  const Eigen::Index count = std::min<Eigen::Index>(4, changes.theta.cols() - first);
+  for (Eigen::Index l = 0; l < count; ++l) {
+    Matrix3 own, ahead;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const auto k = std::size_t(3 * i + j);
+        own(i, j) = dF[k][l], ahead(i, j) = dz[k][l] - dF[k][l];
+      }
+    Matrix3 dP = mean.tangent(H, own, ahead) + modulus_.log_change(e, first + l) * mean.stress(H);
+    const double d_nu = changes.theta(Eigen::Index(material_.poissons_ratio), first + l);
+    if (d_nu != 0.0) dP += d_nu * mean.by_poissons_ratio(H);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) P[std::size_t(3 * i + j)][l] = dP(i, j);
+  }
+}
+
+/// Four directions at a time, side by side in the lanes of wide registers.
+template <int N>
+void CorotatedElasticity<N>::add_force_tangents(const Points& z, const ForceChanges& changes,
+                                                std::span<Points> forces) {
+  modulus_.set_changes(changes.theta);
+  const auto d_nus = changes.theta.row(Eigen::Index(material_.poissons_ratio));
+  const bool changes_nu = (d_nus.array() != 0.0).any();
   const std::vector<Strained>& all = strained(z);
+  ElementLanes<N> lag, dd, dy, f;
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
-    const Matrix3 dF = mean_gradient(e, d_lag);
-    const Vector3 w = rotation_rate(polar_[e], dF);
+    const auto g = gradients(e);
+    const Matrix3 &R = polar_[e].R, &rate = polar_[e].rate_inverse;
+    const double E = modulus_[e];
     const auto& [q, d, y] = all[std::size_t(e)];
-    Vector dd = unrotated(e, d_z);
-    for (int a = 0; a < N; ++a) node(dd, a) -= w.cross(Vector3(node(q, a)));
-    Vector dy = stiffness_.times(e, dd);
-    dy += modulus_.log_change(e) * y;
-    if (d_nu != 0.0) dy += d_nu * stiffness_.derivative_times(e, d);
-    const Matrix3 R = modulus_[e] * polar_[e].R;
-    for (int a = 0; a < N; ++a)
-      force.row(nodes[a]).noalias() -= (R * (w.cross(Vector3(node(y, a))) + node(dy, a))).transpose();
-    if (!is_corrected()) continue;
-    const MeanStrainCorrection mean = correction(e);
-    const Matrix3 H = ahead(e, z);
-    Matrix3 dP = mean.tangent(H, dF, mean_gradient(e, d_z) - dF) + modulus_.log_change(e) * mean.stress(H);
-    if (d_nu != 0.0) dP += d_nu * mean.by_poissons_ratio(H);
-    subtract_stress(e, modulus_[e], dP, force);
+    Vector by_nu = Vector::Zero();
+    if (changes_nu) by_nu = stiffness_.derivative_times(e, d);
+    std::optional<MeanStrainCorrection> mean;
+    if (is_corrected()) mean.emplace(correction(e));
+    const Matrix3 H = mean ? ahead(e, z) : Matrix3::Zero();
+    for (std::size_t first = 0; first < forces.size(); first += 4) {
+      const std::size_t used = std::min<std::size_t>(4, forces.size() - first);
+      Wide<double> d_log{}, d_nu{};
+      for (std::size_t l = 0; l < used; ++l) {
+        d_log[l] = modulus_.log_change(e, Eigen::Index(first + l));
+        d_nu[l] = d_nus[Eigen::Index(first + l)];
+      }
+      gather_lanes<N>(nodes, changes.lag.subspan(first, used), false, lag);
+      gather_lanes<N>(nodes, changes.z.subspan(first, used), true, f);
+      const MatrixLanes dF = mean_gradient_lanes<N>(g, lag);
+      // w = rate vee(R^T dF - dF^T R)
+      MatrixLanes A;
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j) {
+          const auto c = Eigen::Index(i);
+          A[3 * i + j] = R(0, c) * dF[j] + R(1, c) * dF[3 + j] + R(2, c) * dF[6 + j];
+        }
+      const Wide<double> skew[3] = {A[7] - A[5], A[2] - A[6], A[3] - A[1]};
+      Wide<double> w[3];
+      for (int i = 0; i < 3; ++i) w[i] = rate(i, 0) * skew[0] + rate(i, 1) * skew[1] + rate(i, 2) * skew[2];
+      // dd = R^T dz - w x q
+      for (std::size_t a = 0; a < N; ++a) {
+        const double* qa = q.data() + 3 * a;
+        const Wide<double>* za = f.data() + 3 * a;
+        for (int i = 0; i < 3; ++i) dd[3 * a + std::size_t(i)] = R(0, i) * za[0] + R(1, i) * za[1] + R(2, i) * za[2];
+        dd[3 * a] -= w[1] * qa[2] - w[2] * qa[1];
+        dd[3 * a + 1] -= w[2] * qa[0] - w[0] * qa[2];
+        dd[3 * a + 2] -= w[0] * qa[1] - w[1] * qa[0];
+      }
+      MatrixLanes P{};
+      if (mean) add_mean_stress(e, H, *mean, dF, mean_gradient_lanes<N>(g, f), changes, Eigen::Index(first), P);
+      stiffness_.times(e, dd, dy);
+      // -df = E (R (w x y + dy) + V P g)
+      const double volume = mean ? this->volume(e) : 0.0;
+      for (std::size_t a = 0; a < N; ++a) {
+        const double *ya = y.data() + 3 * a, *na = by_nu.data() + 3 * a;
+        const auto row = Eigen::Index(a);
+        const Wide<double> local[3] = {w[1] * ya[2] - w[2] * ya[1] + dy[3 * a] + d_log * ya[0] + d_nu * na[0],
+                                       w[2] * ya[0] - w[0] * ya[2] + dy[3 * a + 1] + d_log * ya[1] + d_nu * na[1],
+                                       w[0] * ya[1] - w[1] * ya[0] + dy[3 * a + 2] + d_log * ya[2] + d_nu * na[2]};
+        for (std::size_t i = 0; i < 3; ++i) {
+          const auto r = Eigen::Index(i);
+          f[3 * a + i] = E * (R(r, 0) * local[0] + R(r, 1) * local[1] + R(r, 2) * local[2]);
+          if (mean)
+            f[3 * a + i] += (E * volume) * (P[3 * i] * g(row, 0) + P[3 * i + 1] * g(row, 1) + P[3 * i + 2] * g(row, 2));
+        }
+      }
+      subtract_lanes<N>(nodes, f, forces.subspan(first, used));
+    }
   }
 }
 

@@ -24,12 +24,15 @@ void ElementModuli::set_parameters(const VectorX& parameters) {
     values_ = relative.array() * (field.weights * controls_.array().log().matrix()).array().exp();
 }
 
-void ElementModuli::set_change(const VectorX& d_theta) {
+void ElementModuli::set_changes(const Eigen::Ref<const MatrixX>& d_theta) {
   const int m = body_->modulus.controls;
-  VectorX d_log(m);
-  for (int k = 0; k < m; ++k) d_log[k] = d_theta[blocks_[std::size_t(k)]] / controls_[k];
-  uniform_change_ = d_log[0];
-  if (m > 1) log_change_.noalias() = body_->modulus.weights * d_log;
+  controls_change_.resize(m, d_theta.cols());
+  for (int k = 0; k < m; ++k)
+    controls_change_.row(k) = d_theta.row(Eigen::Index(blocks_[std::size_t(k)])) / controls_[k];
+  if (is_homogeneous())
+    log_changes_ = controls_change_;
+  else
+    log_changes_.noalias() = body_->modulus.weights * controls_change_;
 }
 
 void ElementModuli::end_adjoint(VectorX& theta_bar) const {

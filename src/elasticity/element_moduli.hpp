@@ -14,9 +14,12 @@ class ElementModuli {
   void set_parameters(const VectorX& theta);
   double operator[](int element) const { return values_[std::size_t(element)]; }  ///< [Pa]
 
-  /// Sets the change of every element's ln E for a change of theta.
-  void set_change(const VectorX& d_theta);
-  double log_change(int element) const { return is_homogeneous() ? uniform_change_ : log_change_[element]; }
+  /// Sets the change of every element's ln E for changes of theta, one a column.
+  void set_changes(const Eigen::Ref<const MatrixX>& d_theta);
+  /// Along one of them.
+  double log_change(int element, Eigen::Index direction = 0) const {
+    return log_changes_(is_homogeneous() ? 0 : element, direction);
+  }
 
   /// Collects cotangents of ln E_e ...
   void begin_adjoint() { log_bar_.setZero(is_homogeneous() ? 1 : body_->element_count()); }
@@ -29,8 +32,8 @@ class ElementModuli {
 
   std::shared_ptr<const Body> body_;
   std::vector<ParameterHandle> blocks_;  // of the control moduli
-  VectorX controls_, values_, log_change_, log_bar_;
-  double uniform_change_ = 0.0;
+  VectorX controls_, values_, log_bar_;
+  MatrixX controls_change_, log_changes_;  // of ln E: controls, and elements or the one of all, x directions
 };
 
 /// Young's modulus over a body and how sure it is, to first order in the deviations.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "solvers/block_matrix.hpp"
 
@@ -13,6 +14,13 @@ struct StepContext {
   const Points* start_velocity = nullptr;  ///< velocities there [m/s]
   double time = 0.0;                       ///< of the step's start [s]
   double dt = 0.0;                         ///< length of the step [s]
+};
+
+/// Changes of the lag point p, of z and of theta along several directions: all that tangents of one step or equilibrium
+/// go along. They refer to what their maker keeps alive.
+struct ForceChanges {
+  std::span<const Points*const> lag, z;  ///< n x 3 each [m], as many as there are directions
+  Eigen::Ref<const MatrixX> theta;       ///< one direction a column
 };
 
 /// A force of the scene, made affine about a lag point p for one linearly implicit step:
@@ -63,6 +71,16 @@ class ForceTerm {
   /// force += df for changes of p, z and theta
   virtual void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                                  Points& force) = 0;
+  /// The same along several directions at once, each into its own force: elements whose stiffness is large read it once
+  /// for all.
+  /// @param forces  n x 3 each [N], as many as directions
+  virtual void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) {
+    VectorX direction;
+    for (std::size_t c = 0; c < forces.size(); ++c) {
+      direction = changes.theta.col(Eigen::Index(c));
+      add_force_tangent(z, *changes.lag[c], *changes.z[c], direction, forces[c]);
+    }
+  }
   /// Adds the cotangents of p, z and theta for the cotangent `w` of f.
   virtual void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar,
                                  VectorX& theta_bar) = 0;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "elasticity/body.hpp"
@@ -22,6 +24,46 @@ auto node(const Eigen::MatrixBase<Derived>& v, int a) {
 }
 
 }  // namespace element_vector
+
+/// Four element vectors side by side, one a lane: what several directions share is read once for them.
+template <int N>
+using ElementLanes = std::array<Wide<double>, 3 * N>;
+
+/// Four 3 x 3 matrices side by side, entry (i, j) in [3 i + j].
+using MatrixLanes = std::array<Wide<double>, 9>;
+
+/// Rows of up to four fields at an element's nodes, less those of its first node where `relative` is set.
+template <int N>
+void gather_lanes(const int* nodes, std::span<const Points* const> fields, bool relative, ElementLanes<N>& lanes) {
+  const double* rows[4];
+  for (std::size_t l = 0; l < 4; ++l) rows[l] = fields[l < fields.size() ? l : 0]->data();
+  const auto row = [&](int a, int i) {
+    const std::size_t k = 3 * std::size_t(nodes[a]) + std::size_t(i);
+    return Wide<double>{rows[0][k], rows[1][k], rows[2][k], rows[3][k]};
+  };
+  for (int i = 0; i < 3; ++i) {
+    const Wide<double> first = relative ? row(0, i) : Wide<double>{};
+    for (int a = 0; a < N; ++a) lanes[std::size_t(3 * a + i)] = row(a, i) - first;
+  }
+}
+
+/// Subtracts each lane from its field's rows at the element's nodes.
+template <int N>
+void subtract_lanes(const int* nodes, const ElementLanes<N>& lanes, std::span<Points> fields) {
+  for (std::size_t l = 0; l < fields.size(); ++l)
+    for (int a = 0; a < N; ++a)
+      for (int i = 0; i < 3; ++i) fields[l](nodes[a], i) -= lanes[std::size_t(3 * a + i)][l];
+}
+
+/// Mean gradients of four fields over an element: sum_a x_a g_a^T.
+template <int N, class Gradients>
+MatrixLanes mean_gradient_lanes(const Gradients& g, const ElementLanes<N>& x) {
+  MatrixLanes F{};
+  for (int a = 0; a < N; ++a)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) F[std::size_t(3 * i + j)] += x[std::size_t(3 * a + i)] * g(a, j);
+  return F;
+}
 
 /// Mean over an element of N nodes of the gradient of a field that its nodes carry.
 template <int N>
@@ -54,6 +96,17 @@ class LocalStiffness {
 
   /// K d, 3 N [m^2].
   Vector times(int element, const Vector& d) const { return of(element).K.lazyProduct(d); }
+  /// K d of four vectors: K, which may have to come from beyond the cache, is read once for them.
+  void times(int element, const ElementLanes<N>& d, ElementLanes<N>& y) const {
+    constexpr std::size_t size = 3 * N, rows = 6;
+    const double* K = of(element).K.data();  // symmetric
+    for (std::size_t i = 0; i < size; i += rows) {
+      Wide<double> sum[rows] = {};
+      for (std::size_t k = 0; k < size; ++k)
+        for (std::size_t j = 0; j < rows; ++j) sum[j] += K[size * (i + j) + k] * d[k];
+      for (std::size_t j = 0; j < rows; ++j) y[i + j] = sum[j];
+    }
+  }
   /// (dK / d nu) d.
   Vector derivative_times(int element, const Vector& d) const { return of(element).dK.lazyProduct(d); }
   [[nodiscard]] ReverseProducts<N> reverse(int element, const Vector& q, const Vector& d, const Vector& c) const {
@@ -140,6 +193,21 @@ class LocalStiffness<4> {
   void set_poissons_ratio(double poissons_ratio) { lame_ = unit_lame(poissons_ratio); }
 
   Vector times(int element, const Vector& d) const { return times(element, d, lame_.lambda, lame_.mu); }
+  void times(int element, const ElementLanes<4>& d, ElementLanes<4>& y) const {
+    const double volume = body_->element_volume[std::size_t(element)];
+    const double lambda = volume * lame_.lambda, mu = volume * lame_.mu;
+    const auto g = gradients(element);
+    const MatrixLanes H = mean_gradient_lanes<4>(g.transpose(), d);
+    MatrixLanes T;
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) T[3 * i + j] = mu * (H[3 * i + j] + H[3 * j + i]);
+    for (std::size_t i = 0; i < 3; ++i) T[4 * i] += lambda * (H[0] + H[4] + H[8]);
+    for (std::size_t a = 0; a < 4; ++a)
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto column = Eigen::Index(a);
+        y[3 * a + i] = T[3 * i] * g(0, column) + T[3 * i + 1] * g(1, column) + T[3 * i + 2] * g(2, column);
+      }
+  }
   Vector derivative_times(int element, const Vector& d) const { return times(element, d, lame_.d_lambda, lame_.d_mu); }
   /// With Q, H and C, the gradients of q, d and c, and stresses T of d and P of c: turn_i = V eps_ijl (Q P + C T)_jl.
   [[nodiscard]] ReverseProducts<4> reverse(int element, const Vector& q, const Vector& d, const Vector& c) const {

@@ -170,7 +170,7 @@ void FixedRegions::add_matrix(double scale, BlockMatrix& matrix) {
 
 void FixedRegions::add_force_tangent(const Points& z, const Points&, const Points& d_z, const VectorX& d_theta,
                                      Points& force) {
-  modulus_.set_change(d_theta);
+  modulus_.set_changes(d_theta);
   for (const HeldCell& held : cells_) {
     const auto cell = body_->element(held.cell);
     const Vector24 u = displacement(held, z);

@@ -25,9 +25,8 @@ Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<F
     throw std::invalid_argument("the contact's weight must lie in (0.5, 1]");
   if (!(options_.rotation_prediction >= 0.0 && options_.rotation_prediction <= 1.0))
     throw std::invalid_argument("the prediction of rotations must lie in [0, 1]");
-  for (Points* p : {&force_, &d_blended_, &d_force_, &w_, &mass_part_, &residual_, &inertia_, &no_change_})
-    p->setZero(body_->node_count(), 3);
-  for (auto* points : {&lag_, &d_lag_, &lag_bar_})
+  for (Points* p : {&force_, &w_, &mass_part_, &residual_, &inertia_, &no_change_}) p->setZero(body_->node_count(), 3);
+  for (auto* points : {&lag_, &lag_bar_})
     for (Points& p : *points) p.setZero(body_->node_count(), 3);
   for (auto* points : {&points_at_, &bar_at_})
     for (Points& p : *points) p.setZero(body_->node_count(), 3);
@@ -259,32 +258,50 @@ void Stepper::prepare_reference_derivatives(const State& start, const Points& de
   for (auto& term : terms_) term->linearise_reference(points_at_[std::size_t(term->at())]);
 }
 
-void Stepper::find_change_of_force(const State& start, const Points& delta, const VectorX& d_theta, const State& change,
-                                   const Points* d_reference) {
+void Stepper::find_changes_of_force(const State& start, const Points& delta, const MatrixX& d_theta,
+                                    std::span<const State> changes, std::span<const Points> d_reference) {
   const Scheme s = scheme();
   const double dt = options_.dt, t = options_.newmark_theta;
-  const double d_beta = is_rayleigh() ? d_theta[stiffness_damping_block_] : 0.0;
-  d_blended_ = change.x + d_beta / dt * delta;
-  for (const auto lag : all_lags) d_lag_[std::size_t(lag)] = change.x + s.prediction[std::size_t(lag)] * change.v;
-  d_force_.setZero();
-  if (d_reference && d_reference->isZero(0.0)) d_reference = nullptr;  // pulls and dampings leave it where it is
-  for (auto& term : terms_) {
-    const bool blended = term->at() == ForceTerm::At::Blended;
-    const Points& d_z = term->sees_way_alone() ? no_change_ : blended ? d_blended_ : change.x;
-    term->add_force_tangent(points_at_[std::size_t(term->at())], d_lag_[std::size_t(term->lag())], d_z, d_theta,
-                            d_force_);
-    if (d_reference) term->add_reference_tangent(*d_reference, d_force_);
-    if (term->sees_start() && !term->sees_way_alone())
-      term->add_start_tangent(points_at_[std::size_t(term->at())], change.x, change.v, d_force_);
+  const std::size_t count = changes.size();
+  for (auto* points : {&d_blended_, &d_lag_[0], &d_lag_[1], &d_force_})
+    if (points->size() < count) points->resize(count, Points(delta.rows(), 3));
+  for (std::size_t c = 0; c < count; ++c) {
+    const State& change = changes[c];
+    const double d_beta = is_rayleigh() ? d_theta(Eigen::Index(stiffness_damping_block_), Eigen::Index(c)) : 0.0;
+    d_blended_[c] = change.x + d_beta / dt * delta;
+    for (const auto lag : all_lags) d_lag_[std::size_t(lag)][c] = change.x + s.prediction[std::size_t(lag)] * change.v;
+    d_force_[c].setZero();
   }
-  d_force_ *= dt;
-  mass_part_ = density_ / t * change.v;
-  mass_part_ += d_theta[density_block_] / t * start.v;
-  mass_part_ -=
-      (d_theta[density_block_] * (1.0 / (t * dt) + mass_damping_) + density_ * d_theta[mass_damping_block_]) * delta;
-  body_->add_mass_product(1.0, mass_part_, d_force_);
-  add_carried(1.0 / t, change.v, d_force_);
-  clear_held(d_force_);
+  const std::span<Points> forces(d_force_.data(), count);
+  const auto keep = [&](std::vector<const Points*>& all, const auto& at) {
+    all.resize(count);
+    for (std::size_t c = 0; c < count; ++c) all[c] = at(c);
+  };
+  for (auto& term : terms_) {
+    const bool blended = term->at() == ForceTerm::At::Blended, way_alone = term->sees_way_alone();
+    const std::vector<Points>& lag = d_lag_[std::size_t(term->lag())];
+    keep(lag_changes_, [&](std::size_t c) { return &lag[c]; });
+    keep(z_changes_, [&](std::size_t c) { return way_alone ? &no_change_ : blended ? &d_blended_[c] : &changes[c].x; });
+    const Points& z = points_at_[std::size_t(term->at())];
+    term->add_force_tangents(z, {lag_changes_, z_changes_, d_theta}, forces);
+    for (std::size_t c = 0; c < d_reference.size(); ++c)  // pulls and dampings leave it where it is
+      if (!d_reference[c].isZero(0.0)) term->add_reference_tangent(d_reference[c], d_force_[c]);
+    if (!term->sees_start() || way_alone) continue;
+    for (std::size_t c = 0; c < count; ++c) term->add_start_tangent(z, changes[c].x, changes[c].v, d_force_[c]);
+  }
+  for (std::size_t c = 0; c < count; ++c) {
+    Points& force = d_force_[c];
+    const Points& v = changes[c].v;
+    const double d_density = d_theta(Eigen::Index(density_block_), Eigen::Index(c)),
+                 d_damping = d_theta(Eigen::Index(mass_damping_block_), Eigen::Index(c));
+    force *= dt;
+    mass_part_ = density_ / t * v;
+    mass_part_ += d_density / t * start.v;
+    mass_part_ -= (d_density * (1.0 / (t * dt) + mass_damping_) + density_ * d_damping) * delta;
+    body_->add_mass_product(1.0, mass_part_, force);
+    add_carried(1.0 / t, v, force);
+    clear_held(force);
+  }
 }
 
 void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d_theta, std::span<State> changes,
@@ -293,17 +310,15 @@ void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d
   set_points_at(scheme(), start.x, delta);
   tangent_forces_.resize(delta.size(), d_theta.cols());
   tangent_solutions_.resize(delta.size(), d_theta.cols());
+  find_changes_of_force(start, delta, d_theta, changes, d_reference);
   for (Eigen::Index c = 0; c < d_theta.cols(); ++c) {
-    const State& change = changes[std::size_t(c)];
-    direction_ = d_theta.col(c);
-    find_change_of_force(start, delta, direction_, change,
-                         d_reference.empty() ? nullptr : &d_reference[std::size_t(c)]);
+    const Points& force = d_force_[std::size_t(c)];
     if (is_newton()) {
-      solve_derivative(d_force_, w_, GeneralSolver::Side::Plain);
+      solve_derivative(force, w_, GeneralSolver::Side::Plain);
       tangent_solutions_.col(c) = flat(w_);
     } else {
-      tangent_forces_.col(c) = flat(d_force_);
-      tangent_solutions_.col(c) = flat(change.v) * dt;
+      tangent_forces_.col(c) = flat(force);
+      tangent_solutions_.col(c) = flat(changes[std::size_t(c)].v) * dt;
     }
   }
   if (!is_newton()) solver_->solve_columns(tangent_forces_, tangent_solutions_);

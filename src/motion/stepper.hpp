@@ -138,9 +138,9 @@ class Stepper : private NewtonProblem {
 
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
   void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
-  /// `d_force_`: change of the step's right-hand side, Delta staying as it is.
-  void find_change_of_force(const State& start, const Points& delta, const VectorX& d_theta, const State& change,
-                            const Points* d_reference);
+  /// `d_force_`: changes of the step's right-hand side along several directions, Delta staying as it is.
+  void find_changes_of_force(const State& start, const Points& delta, const MatrixX& d_theta,
+                             std::span<const State> changes, std::span<const Points> d_reference);
   bool is_newton() const { return options_.integrator == Integrator::Newton; }
   bool is_rayleigh() const { return options_.stiffness_damping == StiffnessDamping::Rayleigh; }
   GeneralSolver& general();
@@ -161,10 +161,13 @@ class Stepper : private NewtonProblem {
   double rounding_ = 0.0;  // residual that rounded positions alone leave, about the exact matrix at hand
   std::unique_ptr<LinearSolver> solver_;
   std::unique_ptr<GeneralSolver> general_;
-  std::array<Points, 3> points_at_, bar_at_;     // by ForceTerm::At
-  std::array<Points, 2> lag_, d_lag_, lag_bar_;  // by ForceTerm::Lag
-  Points force_, d_blended_, d_force_, w_, mass_part_, residual_, inertia_, delta_, no_change_;
-  VectorX solution_, right_, direction_;
+  std::array<Points, 3> points_at_, bar_at_;  // by ForceTerm::At
+  std::array<Points, 2> lag_, lag_bar_;       // by ForceTerm::Lag
+  Points force_, w_, mass_part_, residual_, inertia_, delta_, no_change_;
+  std::array<std::vector<Points>, 2> d_lag_;  // by ForceTerm::Lag; of each direction, as the two below
+  std::vector<Points> d_blended_, d_force_;
+  std::vector<const Points*> lag_changes_, z_changes_;  // of one term
+  VectorX solution_, right_;
   MatrixX tangent_forces_, tangent_solutions_;  // one direction a column
   std::array<VectorX, 2> adjoint_solution_;     // of the last adjoint steps with these parameters: guesses of the next
   int adjoint_solutions_ = 0;

@@ -210,6 +210,28 @@ TEST_P(ForceTerms, TangentByLagPoint) {
   EXPECT_GT(best_relative_error(along, 1.001 * flat(df), 0.1), 1e-4) << "a wrong derivative would pass";
 }
 
+TEST_P(ForceTerms, TangentsAlongSeveralDirectionsAreThoseAlongEach) {
+  constexpr int count = 6;  // a register of four, and some of another
+  std::vector<Points> lags, ways, forces;
+  std::vector<const Points*> of_lag, of_z;
+  MatrixX d_theta = MatrixX::Zero(theta.size(), count);
+  for (int c = 0; c < count; ++c) {
+    lags.push_back(any(0.1 * c, 0.7 * c - 1.0)), ways.push_back(any(0.2 + 0.1 * c, 1.3 - 0.4 * c));
+    for (Eigen::Index i = 0; i < theta.size(); ++i)
+      d_theta(i, c) = c == 2 ? 0.0 : theta[i] * std::sin(double(i + 3 * c));
+  }
+  for (int c = 0; c < count; ++c) of_lag.push_back(&lags[std::size_t(c)]), of_z.push_back(&ways[std::size_t(c)]);
+  forces.assign(count, any(0.3, 0.2));  // added to what is there
+  term->set_parameters(theta);
+  linearise(lag);
+  term->add_force_tangents(z, {of_lag, of_z, d_theta}, forces);
+  for (int c = 0; c < count; ++c) {
+    const auto k = std::size_t(c);
+    const Points alone = tangent(lags[k], ways[k], d_theta.col(c));
+    EXPECT_LE((forces[k] - any(0.3, 0.2) - alone).norm(), 1e-12 * (alone.norm() + any(0.3, 0.2).norm())) << c;
+  }
+}
+
 TEST_P(ForceTerms, TangentByPosition) {
   const Points df = tangent(none(), d_z, VectorX::Zero(theta.size()));
   const Points difference = force(lag, z + d_z, theta) - force(lag, z, theta);
