@@ -31,7 +31,7 @@ struct Arguments {
   std::vector<std::string> settings;
   int threads = 0, refine = 0;
   std::string budget;
-  bool resume = false, check_gradient = false;
+  bool resume = false, profile = false, check_gradient = false;
 };
 
 /// Lines for people on stderr.
@@ -124,6 +124,20 @@ void print_result(const Result& result, const FitOutcome& outcome, const fs::pat
   std::cout << "\n";
 }
 
+/// Where the time went, by activity and by stage.
+void print_profile(const TimeResult& time) {
+  double all = 0.0;
+  for (const ActivityTime& a : time.activities) all += a.seconds;
+  std::printf("Where threads were busy, %.1f s in all:\n", all);
+  for (const ActivityTime& a : time.activities)
+    std::printf("  %-18s %9.2f s %5.1f %%  %10lld times\n", a.name.c_str(), a.seconds, 100.0 * a.seconds / all,
+                a.count);
+  std::printf("Stages, of wall time; those of several starts run side by side:\n");
+  for (const StageTime& s : time.stages)
+    std::printf("  %-18s %9.2f s  start %d, %3d iterations, %6d elements\n", s.name.c_str(), s.seconds, s.start + 1,
+                s.iterations, s.elements);
+}
+
 /// Says how to go on with an interrupted fit.
 int ended(const FitJobOutcome& done, const std::string& words, const std::string& out) {
   if (!done.result) return done.outcome.interrupted ? WasInterrupted : NotConverged;
@@ -140,7 +154,7 @@ int run(const Arguments& arguments) {
   job.options = read_options(arguments);
   job.captures.assign(arguments.captures.begin(), arguments.captures.end());
   if (!arguments.held_out.empty()) job.held_out = arguments.held_out;
-  job.out = arguments.out, job.resume = arguments.resume;
+  job.out = arguments.out, job.resume = arguments.resume, job.profile = arguments.profile;
   job.version = PLIANT_VERSION, job.commit = PLIANT_COMMIT;
   JobRecordings recordings = read_recordings(job);
   std::optional<ThreadLimit> threads;
@@ -162,6 +176,7 @@ int run(const Arguments& arguments) {
   const FitJobOutcome done = run_fit_job(job, std::move(recordings), watch);
   screen.clear_live();
   if (done.result) print_result(*done.result, done.outcome, job.out, done.seconds);
+  if (done.result && job.profile) print_profile(done.result->time);
   return ended(done, words, arguments.out);
 }
 
@@ -214,6 +229,7 @@ void add_fit(CommandLine& line, int& exit_code) {
       .type_name("MINUTES");
   command.option("--threads", arguments->threads, "most threads to use; all processors where left out").positive();
   command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
+  command.flag("--profile", arguments->profile, "tell where the time went, also in result.json");
   command.flag("--check-gradient", arguments->check_gradient,
                "instead of fitting compare the objective's gradient at the start by tangents, by the adjoint and by "
                "central differences; fails where they disagree");

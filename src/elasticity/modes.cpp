@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "base/error.hpp"
+#include "base/profile.hpp"
 
 namespace pliant {
 
@@ -175,6 +176,7 @@ bool ModalAnalysis::extend(const VectorX& parameters, int count, Modes& modes) {
 }
 
 Modes ModalAnalysis::lowest(const VectorX& parameters, int count) {
+  const Timed timed(Activity::Vibrations);
   const int unknowns = 3 * int(free_.size());
   if (count < 1 || 2 * count > unknowns)
     throw InputError({{},

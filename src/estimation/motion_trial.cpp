@@ -7,6 +7,7 @@
 #include "base/error.hpp"
 #include "base/instants.hpp"
 #include "base/parallel.hpp"
+#include "base/profile.hpp"
 
 namespace pliant {
 
@@ -222,6 +223,7 @@ void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Po
 
 FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const Points& positions,
                                             const Tangents& tangents) const {
+  const Timed timed(Activity::Mismatch);
   FrameFit fit;
   fit.recording = number_;
   fit.frame = seen.frame;
@@ -292,6 +294,7 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
 
 void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar,
                                              VectorX& theta_bar) const {
+  const Timed timed(Activity::Mismatch);
   const RobustLoss loss{motion_.options.outlier_scale};
   if (!seen.points.empty()) {
     const SurfaceConstraints& surface = *motion_.mismatch.surface;

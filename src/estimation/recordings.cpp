@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.hpp"
+#include "base/profile.hpp"
 #include "capture/find_plane.hpp"
 #include "capture/markers.hpp"
 #include "capture/pixel_scatter.hpp"
@@ -326,6 +327,7 @@ std::vector<CommonError> Recordings::common_errors() const {
 }
 
 Grid Recordings::grid(double cells, double steps, const ModelChange& change) const {
+  const Timed timed(Activity::Meshing);
   SimulationOptions settings;
   settings.newmark_theta = options_.newmark_theta;
   settings.solver.kind = options_.solver;

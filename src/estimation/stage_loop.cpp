@@ -2,6 +2,7 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
+#include "base/profile.hpp"
 #include "estimation/fit_plan.hpp"
 
 namespace pliant {
@@ -15,6 +16,7 @@ void StageLoop::execute() {
 }
 
 void StageLoop::run_chain(const StageChain& chain) {
+  using Clock = std::chrono::steady_clock;
   VectorX theta;
   int counted = chain.front().iterations_before;
   for (Stage stage : chain) {
@@ -26,6 +28,7 @@ void StageLoop::run_chain(const StageChain& chain) {
     stage.iterations_before = counted;
     bool is_cut = false;
     StageRecord record;
+    const auto begin = Clock::now();
     try {
       record = run_stage(stage, is_cut);
     } catch (const Interrupted&) {  // in the midst of a simulation: the state has where the optimiser stood
@@ -38,6 +41,9 @@ void StageLoop::run_chain(const StageChain& chain) {
       partial_.push_back(std::move(record));
       return;
     }
+    if (Profile* profile = Profile::current())
+      profile->add({stage.name, stage.id.start, record.iterations, record.elements, record.work,
+                    std::chrono::duration<double>(Clock::now() - begin).count()});
     theta = record.theta, counted += counted_iterations(record);
     const bool ends = !record.succeeded && stage.id.kind != StageKind::Motion;
     keep(std::move(record));

@@ -90,17 +90,29 @@ Json resolution_json(const ResolutionResult& resolution) {
           {"reason", resolution.reason}};
 }
 
-Json time_json(const TimeResult& time) {
-  return {{"wall_seconds", number(time.wall_seconds)},
-          {"forward_steps", time.forward_steps},
-          {"ms_per_forward_step", number(time.ms_per_forward_step)},
-          {"ms_per_adjoint_step", number(time.ms_per_adjoint_step)}};
-}
-
 template <class Items, class Write>
 Json list(const Items& items, const Write& write) {
   Json json = Json::array();
   for (const auto& item : items) json.push_back(write(item));
+  return json;
+}
+
+Json activity_json(const ActivityTime& activity) {
+  return {{"name", activity.name}, {"count", activity.count}, {"seconds", number(activity.seconds)}};
+}
+
+Json stage_json(const StageTime& stage) {
+  return {{"name", stage.name},         {"start", stage.start},       {"iterations", stage.iterations},
+          {"elements", stage.elements}, {"work", number(stage.work)}, {"seconds", number(stage.seconds)}};
+}
+
+Json time_json(const TimeResult& time) {
+  Json json = {{"wall_seconds", number(time.wall_seconds)},
+               {"forward_steps", time.forward_steps},
+               {"ms_per_forward_step", number(time.ms_per_forward_step)},
+               {"ms_per_adjoint_step", number(time.ms_per_adjoint_step)}};
+  if (!time.activities.empty()) json["activities"] = list(time.activities, activity_json);
+  if (!time.stages.empty()) json["stages"] = list(time.stages, stage_json);
   return json;
 }
 
@@ -359,9 +371,22 @@ TrackingResult read_tracking(const Member& member) {
 }
 
 TimeResult read_time(const Member& member) {
-  return {optional_number(member, "wall_seconds").value_or(NAN),
-          member.has("forward_steps") ? member["forward_steps"].count() : 0,
-          optional_number(member, "ms_per_forward_step"), optional_number(member, "ms_per_adjoint_step")};
+  TimeResult time{optional_number(member, "wall_seconds").value_or(NAN),
+                  member.has("forward_steps") ? member["forward_steps"].count() : 0,
+                  optional_number(member, "ms_per_forward_step"),
+                  optional_number(member, "ms_per_adjoint_step"),
+                  {},
+                  {}};
+  if (member.has("activities"))
+    member["activities"].each_item([&](const Member& m) {
+      time.activities.push_back({m["name"].string(), m["count"].count(), m["seconds"].number()});
+    });
+  if (member.has("stages"))
+    member["stages"].each_item([&](const Member& m) {
+      time.stages.push_back({m["name"].string(), int(m["start"].count()), int(m["iterations"].count()),
+                             int(m["elements"].count()), m["work"].number(), m["seconds"].number()});
+    });
+  return time;
 }
 
 Json parse(const fs::path& path) {

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/profile.hpp"
 #include "base/types.hpp"
 
 namespace pliant {
@@ -153,6 +154,8 @@ struct TimeResult {
   double wall_seconds = 0.0;
   long long forward_steps = 0;
   std::optional<double> ms_per_forward_step, ms_per_adjoint_step;
+  std::vector<ActivityTime> activities = {};  ///< where the time went, and
+  std::vector<StageTime> stages = {};         ///< when: of a fit that was profiled
 };
 
 struct Result {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "base/profile.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/continuation.hpp"
 #include "motion/statics.hpp"
@@ -278,6 +279,7 @@ Placement Equilibrium::rest() const {
 }
 
 SolveSummary Equilibrium::solve(Placement& placement) {
+  const Timed timed(Activity::Equilibria);
   const SolveSummary summary = solver_->solve(placement);
   if (summary.converged) solver_->energies_ = solver_->energies(solver_->joined(placement));
   return summary;

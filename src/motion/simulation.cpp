@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
+#include "base/profile.hpp"
 #include "elasticity/viscous_forces.hpp"
 #include "motion/body_forces.hpp"
 #include "motion/continuation.hpp"
@@ -173,6 +174,7 @@ void Simulation::set_reference(Points reference) {
 
 bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summary) {
   if (shape_ && !shape_is_held_) {
+    const Timed timed(Activity::LoadFree);
     summary.failure = shape_->find(parameters);
     if (!summary.failure.empty()) return false;
     elasticity_->set_reference(shape_->body());
@@ -197,6 +199,7 @@ std::string Simulation::hold_shape(const VectorX& parameters) {
 
 bool Simulation::shape_tangents(const MatrixX& directions, ShapeChange& change, RolloutSummary& summary) {
   if (!follows_shape() || directions.cols() == 0) return true;
+  const Timed timed(Activity::LoadFree, 0);
   if (!shape_->prepare_derivatives()) {
     summary.failure = "the matrix of the load-free shape's derivatives cannot be factorised";
     return false;
@@ -234,6 +237,7 @@ bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& 
 }
 
 std::vector<State> Simulation::start_tangents(const State& start, const MatrixX& directions, const ShapeChange& shape) {
+  const Timed timed(Activity::Equilibria, 0);
   std::vector<State> tangents;
   hold_start(true);
   for (Eigen::Index c = 0; c < directions.cols(); ++c) {
@@ -247,6 +251,7 @@ std::vector<State> Simulation::start_tangents(const State& start, const MatrixX&
 }
 
 bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& theta_bar, Points* reference_bar) {
+  const Timed timed(Activity::Equilibria, 0);
   theta_bar.segment<3>(options_.blocks.linear_velocity) += bar.v.colwise().sum().transpose();
   for (Eigen::Index n = 0; n < bar.v.rows(); ++n) {
     const Vector3 lever = lever_.row(n), v_bar = bar.v.row(n);
@@ -304,6 +309,7 @@ void Simulation::move_holds(double from, double to, Points& positions) {
 }
 
 bool Simulation::settle(Points& x, RolloutSummary& summary) {
+  const Timed timed(Activity::Equilibria);
   const SolveSummary solved = statics_.solve(x);
   summary.solver_iterations += solved.iterations;
   ++summary.steps;
@@ -339,6 +345,7 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
 }
 
 bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary& summary) {
+  const Timed timed(Activity::Steps);
   stepper_.set_time(plan.time);
   stepper_.set_time_step(plan.dt);
   if (!stepper_.prepare(state)) {
@@ -398,6 +405,7 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   std::vector<State> tangents;
   if (options_.is_static) {
     if (!find_equilibrium(parameters, state, summary)) return summary;
+    const Timed timed(Activity::Equilibria, 0);
     for (Eigen::Index c = 0; c < directions.cols(); ++c)
       tangents.push_back(
           {statics_.tangent(state.x, directions.col(c), shape.of(std::size_t(c))), Points::Zero(rest_.rows(), 3)});
@@ -414,10 +422,8 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   steps_ = plan_;
   for (std::size_t s = 0; s < steps_.size() && summary.frames <= last_frame; ++s) {
     if (!take_step(s, state, summary)) return summary;
-    if (!tangents.empty() && options_.integrator == Integrator::Newton && !stepper_.prepare_derivatives(state, delta_))
+    if (!step_tangents(state, directions, tangents, shape))
       return summary.failure = "a matrix of the tangents cannot be factorised", summary;
-    if (!shape.reference.empty()) stepper_.prepare_reference_derivatives(state, delta_);
-    if (!tangents.empty()) stepper_.tangents(state, delta_, directions, tangents, shape.reference);
     stepper_.advance(delta_, state);
     const int frame = steps_[s].frame_after;
     if (frame < 0) continue;
@@ -426,6 +432,16 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   }
   summary.succeeded = true;
   return summary;
+}
+
+bool Simulation::step_tangents(const State& state, const MatrixX& directions, std::vector<State>& tangents,
+                               const ShapeChange& shape) {
+  if (tangents.empty()) return true;
+  const Timed timed(Activity::Tangents, directions.cols());
+  if (options_.integrator == Integrator::Newton && !stepper_.prepare_derivatives(state, delta_)) return false;
+  if (!shape.reference.empty()) stepper_.prepare_reference_derivatives(state, delta_);
+  stepper_.tangents(state, delta_, directions, tangents, shape.reference);
+  return true;
 }
 
 std::size_t Simulation::segment_length(std::size_t steps) const {
@@ -458,6 +474,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       if (!cost(frame, state)) return summary.failure = "the cost failed", summary;
       cotangent(frame, state, x_bar);
     }
+    const Timed timed(Activity::Equilibria, 0);
     statics_.adjoint(state.x, x_bar, theta_bar, reference_bar);
     keep(Points::Zero(rest_.rows(), 3), Points::Zero(rest_.rows(), 3));
     if (follows_shape()) {
@@ -510,6 +527,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       }
       if (s + 1 == steps) state = replay;
     }
+    const Timed timed(Activity::AdjointSteps);
     const State& start = segment.back();
     if (steps_[s].frame_after >= 0) cotangent(steps_[s].frame_after, state, bar.x);
     stepper_.set_time(steps_[s].time);

@@ -169,6 +169,9 @@ class Simulation {
   void move_holds(double from, double to, Points& positions);
   void prepare_holds();
   bool forward_step(const StepPlan& plan, State& state, RolloutSummary& summary);
+  /// Carries the tangents over the step that was solved last. False where its matrix cannot be factorised.
+  bool step_tangents(const State& state, const MatrixX& directions, std::vector<State>& tangents,
+                     const ShapeChange& shape);
   /// The step i of `steps_`, in halves where it cannot be taken as a whole: they stand in its place then. Sets the
   /// step's way, not its end.
   bool take_step(std::size_t i, State& state, RolloutSummary& summary);

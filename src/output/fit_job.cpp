@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "base/profile.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
 #include "estimation/press_scene.hpp"
@@ -52,6 +53,7 @@ std::string describe(const FitEvent& event, double seconds) {
 void observe_recording(RecordedCapture& recording, const FitOptions& options, const FitWatch& watch,
                        const std::function<void(const std::string&)>& say) {
   if (is_of_static_tests(recording.capture)) return;
+  const Timed timed(Activity::Reading);
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
   std::optional<ScanPose> pose;
@@ -97,6 +99,9 @@ FitJobOutcome run_fit_job(const FitJob& job, const FitWatch& watch) {
 FitJobOutcome run_fit_job(const FitJob& job, JobRecordings all, const FitWatch& watch) {
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
+  Profile profile;
+  std::optional<Profile::Recording> recording_profile;
+  if (job.profile) recording_profile.emplace(profile);
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const fs::path state_file = job.out / "state.json";
   const std::string key = all.fingerprint + to_toml(job.options);
@@ -142,7 +147,14 @@ FitJobOutcome run_fit_job(const FitJob& job, JobRecordings all, const FitWatch& 
   } else {
     const RunFacts facts{job.version, job.commit, all.words, seconds()};
     done.result = make_result(all.recordings, outcome, facts);
-    write_fit_output(job.out, all.recordings, outcome, *done.result, facts, watch.progress);
+    {
+      const Timed timed(Activity::Pictures);
+      write_fit_output(job.out, all.recordings, outcome, *done.result, facts, watch.progress);
+    }
+    if (job.profile) {
+      done.result->time.activities = profile.activities(), done.result->time.stages = profile.stages();
+      write_result(job.out / "result.json", *done.result);
+    }
     say(outcome.reason);
     if (!outcome.interrupted) remove_file(state_file);
   }

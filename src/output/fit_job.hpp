@@ -18,6 +18,7 @@ struct FitJob {
   std::filesystem::path out;                      ///< folder for the result
   FitOptions options;
   bool resume = false;          ///< go on with the interrupted fit in the folder
+  bool profile = false;         ///< where the time went stands in the result
   std::string version, commit;  ///< of the program, for the result
 };
 

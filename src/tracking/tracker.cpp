@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "base/error.hpp"
+#include "base/profile.hpp"
 #include "elasticity/modes.hpp"
 #include "tracking/neighbours.hpp"
 
@@ -333,6 +334,7 @@ bool Tracker::maximise(double dt, bool at_rest, const TrackView& view, double di
 }
 
 TrackedFrame Tracker::look(double dt, bool at_rest, const TrackView& view) {
+  const Timed timed(Activity::Tracking);
   constexpr double forever = 1e3;  // [s], a step that leaves no inertia
   constexpr std::size_t fewest = 10;
   TrackedFrame frame;

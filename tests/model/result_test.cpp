@@ -37,7 +37,7 @@ Result full_result() {
                 {{9e4, 1.8e5, 1e-3, 2e-3, 0.9, false}, {1.8e5, 1.7e5, {}, {}, 0.1, true}},
                 HeldOutFramesResult{17, 484.0, 2.4e-3},
                 HeldOutFramesResult{17, {}, {}}};
-  r.time = {41.0, 9600, 2.1, std::nullopt};
+  r.time = {41.0, 9600, 2.1, std::nullopt, {{"steps", 9600, 20.0}}, {{"fine", 1, 4, 434, 2e6, 11.5}}};
   r.notes = {"The floor was taken as known."};
   return r;
 }
