@@ -397,28 +397,54 @@ std::string FitPlan::why_given_up(int index, const Records& done) const {
   return {};
 }
 
-/// Of two in one place, that with the lower cost is followed, or that which was followed already.
-std::optional<int> FitPlan::joined(int index, const Records& done) const {
-  // Of unconstrained numbers, logarithms of moduli and dampings among them, and of costs: two that have not converged
-  // quite are in one valley all the same.
-  constexpr double same_place = 0.4, same_cost = 0.02;
-  const StageRecord* first = first_of_start(index, done);
-  if (!first || !first->succeeded || end_of_start(index, done)) return std::nullopt;
-  const VectorX p = facts_.parameters.to_unconstrained(first->theta);
+/// Whether a fit at theta is in the valley of another one: near it, and not much above.
+bool FitPlan::is_in_valley(const VectorX& theta, double cost, const StageRecord& of) const {
+  // Of unconstrained numbers, logarithms of moduli and dampings among them, and of costs. Swings that fall out of step
+  // make valleys beside each other.
+  constexpr double same_place = 0.4, same_cost = 2.0, same_cost_of_swings = 1.02;
+  const VectorX way = facts_.parameters.to_unconstrained(theta) - facts_.parameters.to_unconstrained(of.theta);
+  // What it meets and how sensors err is told too weakly to tell valleys apart.
+  const std::vector<const Parameter*> parameters = facts_.parameters.coordinate_parameters();
+  double farthest = 0.0;
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    if (parameters[i]->role != Role::Obstacle && parameters[i]->role != Role::Sensor)
+      farthest = std::max(farthest, std::abs(way[Eigen::Index(i)]));
+  return farthest <= same_place &&
+         std::max(cost, of.cost) <= (facts_.swings ? same_cost_of_swings : same_cost) * std::min(cost, of.cost);
+}
+
+std::optional<int> FitPlan::joined_on_the_way(const Stage& stage, const VectorX& theta, double cost,
+                                              const Records& done) const {
+  if (stage.id.kind != StageKind::Coarse || stage.horizon.part < 1.0) return std::nullopt;
   for (int i = 0; i < facts_.options.most_starts; ++i) {
-    const StageRecord* r = first_of_start(i, done);
-    if (i == index || !r || !r->succeeded) continue;
-    const bool is_better = r->cost < first->cost || (r->cost == first->cost && i < index);
-    const bool is_there = (facts_.parameters.to_unconstrained(r->theta) - p).cwiseAbs().maxCoeff() <= same_place &&
-                          std::abs(r->cost - first->cost) <= same_cost * std::min(r->cost, first->cost);
-    if (is_there && (is_better || end_of_start(i, done))) return i;
+    const StageRecord* end = i == stage.id.start ? nullptr : end_of_start(i, done);
+    if (end && end->succeeded && !end->joined && cost >= end->cost && is_in_valley(theta, cost, *end)) return i;
   }
   return std::nullopt;
 }
 
-/// All over the first frames; then those that are not given up. A single one is followed at once.
+/// Of two in one place, that with the lower cost is followed, or that which was followed already.
+std::optional<int> FitPlan::joined(int index, const Records& done) const {
+  if (const StageRecord* end = end_of_start(index, done)) return end->joined;
+  const StageRecord* first = first_of_start(index, done);
+  if (!first || !first->succeeded) return std::nullopt;
+  for (int i = 0; i < facts_.options.most_starts; ++i) {
+    const StageRecord* r = first_of_start(i, done);
+    if (i == index || !r || !r->succeeded) continue;
+    const bool is_better = r->cost < first->cost || (r->cost == first->cost && i < index);
+    if ((is_better || end_of_start(i, done)) && is_in_valley(first->theta, first->cost, *r)) return i;
+  }
+  return std::nullopt;
+}
+
+/// All over the first frames; then the best of them to its end, and those that are not given up, which stop where they
+/// come into the valley of one that was followed. A single one is followed at once.
 std::vector<StageChain> FitPlan::starts_left(const Records& done) const {
   std::vector<StageChain> first, rest;
+  const auto cost_of_first = [&](const StageChain& chain) {
+    const StageRecord* r = first_of_start(chain.front().id.start, done);
+    return r ? r->cost : infinite;
+  };
   const int count = start_count(done);
   for (int i = 0; i < count; ++i) {
     StageChain chain = left_of(start(i, done), done);
@@ -430,7 +456,11 @@ std::vector<StageChain> FitPlan::starts_left(const Records& done) const {
       rest.push_back(std::move(chain));
     }
   }
-  return first.empty() ? rest : first;
+  if (!first.empty()) return first;
+  bool has_ended = false;
+  for (int i = 0; i < count; ++i) has_ended = has_ended || end_of_start(i, done);
+  if (has_ended || rest.size() < 2) return rest;
+  return {*std::ranges::min_element(rest, {}, cost_of_first)};
 }
 
 int FitPlan::start_count(const Records& done) const {
@@ -535,9 +565,9 @@ std::vector<FitStart> FitPlan::starts(const Records& done) const {
     if (!end_of_start(i, done)) {  // costs over the first frames are not those over all
       one.cost = infinite;
       if (const std::string why = why_given_up(i, done); !why.empty()) one.reason = why;
-      if (const auto same = joined(i, done))
-        if (const StageRecord* r = end_of_start(*same, done); r && r->succeeded) one.cost = r->cost;
     }
+    if (const auto same = joined(i, done))
+      if (const StageRecord* r = end_of_start(*same, done); r && r->succeeded) one.cost = r->cost, one.final = r->theta;
     all.push_back(std::move(one));
   }
   return all;

@@ -41,6 +41,10 @@ class FitPlan {
 
   /// Where the estimate begins: all its moduli at the first start.
   VectorX start_theta(const std::vector<StageRecord>& done) const;
+  /// Of a start's stage over all frames: the start that was followed to its end, into whose valley it has come.
+  /// @param theta, cost  where it stands
+  std::optional<int> joined_on_the_way(const Stage& stage, const VectorX& theta, double cost,
+                                       const std::vector<StageRecord>& done) const;
   /// The starts that were followed.
   std::vector<FitStart> starts(const std::vector<StageRecord>& done) const;
   /// The parameters that are estimated at last, with the corrections that were found to be needed.
@@ -87,6 +91,7 @@ class FitPlan {
   std::string why_given_up(int index, const Records& done) const;
   /// Another start that leads to the same place over the first frames and is followed in its stead.
   std::optional<int> joined(int index, const Records& done) const;
+  bool is_in_valley(const VectorX& theta, double cost, const StageRecord& of) const;
   std::vector<StageChain> starts_left(const Records& done) const;
   /// A start beyond those of the scan or the swing: the modulus log-uniform about those; what shapes the law, dampings,
   /// gravity, and how obstacles stand, are hard and rub, drawn from their priors where they are estimated. The same for

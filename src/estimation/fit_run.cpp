@@ -183,6 +183,7 @@ std::vector<Alternative> FitRun::alternatives() const {
 
 std::vector<StageChain> FitRun::next() {
   std::vector<StageChain> chains = plan_.next(state_);
+  ended_before_ = state_.done;  // what stages beside each other may know of others
   const bool at_alternatives = !chains.empty() && chains.front().front().alternative;
   if (at_alternatives && !grids_of_fit_) grids_of_fit_ = grids_.size();
   if (!at_alternatives && grids_of_fit_) {  // those of alternatives are not used again
@@ -266,7 +267,8 @@ Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameter
       [this] { return !stages_are_over_ && is_interrupted(); });
 }
 
-OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, const OptimiserState& from) {
+OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, const OptimiserState& from,
+                                  std::optional<int>& joined) {
   OptimiserOptions o;
   o.kind = options_.optimiser;
   o.max_iterations = stage.iterations;
@@ -283,7 +285,8 @@ OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, cons
     const double part = std::min(1.0, double(iterations) / stage.iterations);
     event.fraction_done = stage.done_from + (stage.done_to - stage.done_from) * part;
     tell(std::move(event));
-    return !is_interrupted();
+    joined = plan_.joined_on_the_way(stage, objective.parameters().to_theta(i.p), i.cost, ended_before_);
+    return !joined && !is_interrupted();
   });
   const std::lock_guard lock(mutex_);
   outcome_.forward_steps += s.steps;
@@ -298,10 +301,12 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   Stage own = stage;
   own.from = {from};
   const OptimiserState begin = left && left->optimiser.p.size() > 0 ? left->optimiser : start_of(parameters);
-  OptimiserSummary s = optimise(objective, own, begin);
-  is_cut = s.interrupted;
+  std::optional<int> joined;
+  OptimiserSummary s = optimise(objective, own, begin, joined);
+  is_cut = s.interrupted && !joined;
   StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
+  if (joined) record.joined = joined, record.reason = "came into the valley of start " + std::to_string(*joined + 1);
   record.iterations = s.iterations, record.work = s.work;
   record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
   if (s.succeeded) record.misfit = misfit_of(s.evaluation), record.is_explained = is_explained(s.evaluation);

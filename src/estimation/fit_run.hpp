@@ -44,7 +44,9 @@ class FitRun : StageLoop {
   std::vector<ModelShift> shifts_of_given(const Stage& stage, const ParameterSet& estimated, double& work);
 
   /// One minimisation, told as iterations of the stage; from any thread.
-  OptimiserSummary optimise(Objective& objective, const Stage& stage, const OptimiserState& from);
+  /// @param joined  out: of a start that was stopped in another one's valley, which
+  OptimiserSummary optimise(Objective& objective, const Stage& stage, const OptimiserState& from,
+                            std::optional<int>& joined);
   ParameterSet parameters_of(const Stage& stage, const VectorX& theta) const;
   Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const;
   const Grid& grid(const Spacing& spacing, const ModelChange& change = {});
@@ -88,7 +90,8 @@ class FitRun : StageLoop {
   std::optional<std::size_t> grids_of_fit_;  // how many there were before the alternatives'
   std::map<int, std::string> not_made_;      // why, by the alternative's number
   FitPlan plan_;
-  std::vector<Ended> ended_;  // in this run
+  std::vector<Ended> ended_;               // in this run
+  std::vector<StageRecord> ended_before_;  // the chains that run side by side
   std::atomic<bool> stages_are_over_ = false;
 };
 

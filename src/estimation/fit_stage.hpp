@@ -109,9 +109,10 @@ struct StageRecord {
   bool succeeded = false;
   /// Of a search for a swing: one was found; of a look at the resolution: the next finer mesh is made.
   bool converged = false;
-  std::string reason = {};  ///< why it ended
-  int elements = 0;         ///< of the first recording's body
-  double work = 0.0;        ///< that it took since the fit was last resumed: see `CostEvaluation::work`
+  std::string reason = {};         ///< why it ended
+  int elements = 0;                ///< of the first recording's body
+  double work = 0.0;               ///< that it took since the fit was last resumed: see `CostEvaluation::work`
+  std::optional<int> joined = {};  ///< of a start: the one in whose valley it was stopped
   /// Of a scan: Young's moduli and costs; infinite where it cannot be simulated.
   std::vector<std::pair<double, double>> trials = {};
   std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction

@@ -200,6 +200,7 @@ Json from_record(const StageRecord& r) {
                {"trials", Json::array()}};
   for (const auto& [modulus, cost] : r.trials) json["trials"].push_back({modulus, from_cost(cost)});
   for (const ModelShift& s : r.shifts) json["shifts"].push_back({s.cause, from_vector(s.shift)});
+  if (r.joined) json["joined"] = *r.joined;
   if (r.law) json["law"] = from_finding(*r.law);
   return json;
 }
@@ -222,6 +223,7 @@ StageRecord to_record(const Json& json) {
   for (const Json& t : json.at("trials")) r.trials.emplace_back(t.at(0).get<double>(), to_cost(t.at(1)));
   if (json.contains("shifts"))
     for (const Json& s : json["shifts"]) r.shifts.push_back({s.at(0).get<std::string>(), to_vector(s.at(1))});
+  if (json.contains("joined")) r.joined = json["joined"].get<int>();
   if (json.contains("law")) r.law = to_finding(json["law"]);
   return r;
 }

@@ -237,7 +237,7 @@ TEST_F(Plans, BeginWhereTheUserSays) {
   EXPECT_EQ(start.from.front(), facts.parameters.reference());
 }
 
-TEST_F(Plans, FollowTheValleysOfAScanSideBySide) {
+TEST_F(Plans, FollowTheBestValleyOfAScanBeforeTheOthers) {
   has_scanned();
   const auto chains = next();
   ASSERT_EQ(chains.size(), 2u);
@@ -252,15 +252,46 @@ TEST_F(Plans, FollowTheValleysOfAScanSideBySide) {
   ASSERT_EQ(next().size(), 1u) << "the others before any goes on";
   EXPECT_EQ(next()[0][0].id, (StageId{StageKind::Coarse, 1, 0}));
   has_done(record({StageKind::Coarse, 1, 0}, 3.5, 4.1e4));
+  EXPECT_EQ(only(next()).id, (StageId{StageKind::Coarse, 0, 1})) << "the best over the first frames";
+  has_done(record({StageKind::Coarse, 0, 1}, 2.6, 420.0));
   const auto on = next();
-  ASSERT_EQ(on.size(), 2u);
-  for (const StageChain& chain : on) {
-    ASSERT_EQ(chain.size(), 1u);
-    EXPECT_THAT(chain[0].free, UnorderedElementsAre("youngs_modulus", "linear_velocity"));
-    EXPECT_EQ(chain[0].horizon.part, 1.0);
-  }
-  EXPECT_EQ(on[1].front().from.front(), theta(4.1e4));
+  EXPECT_EQ(only(on).id, (StageId{StageKind::Coarse, 1, 1}));
+  ASSERT_EQ(on[0].size(), 1u);
+  EXPECT_THAT(only(on).free, UnorderedElementsAre("youngs_modulus", "linear_velocity"));
+  EXPECT_EQ(only(on).horizon.part, 1.0);
+  EXPECT_EQ(only(on).from.front(), theta(4.1e4));
   EXPECT_EQ(FitPlan(facts).start_theta(state.done), theta(4e2));
+}
+
+TEST_F(Plans, StopAStartInTheValleyOfOneThatHasEnded) {
+  has_scanned();
+  has_done(record({StageKind::Coarse, 0, 0}, 2.5, 410.0));
+  has_done(record({StageKind::Coarse, 1, 0}, 3.5, 4.1e4));
+  has_done(record({StageKind::Coarse, 0, 1}, 2.6, 420.0));
+  const FitPlan plan(facts);
+  const Stage stage = only(next());
+  ASSERT_EQ(stage.id, (StageId{StageKind::Coarse, 1, 1}));
+  EXPECT_EQ(plan.joined_on_the_way(stage, theta(500.0), 3.5, state.done), std::optional(0));
+  EXPECT_FALSE(plan.joined_on_the_way(stage, theta(500.0), 2.5, state.done)) << "it is the better one";
+  EXPECT_FALSE(plan.joined_on_the_way(stage, theta(500.0), 6.0, state.done)) << "far above";
+  EXPECT_FALSE(plan.joined_on_the_way(stage, theta(900.0), 3.5, state.done)) << "elsewhere";
+  Stage first = stage;
+  first.horizon.part = 0.6;
+  EXPECT_FALSE(plan.joined_on_the_way(first, theta(500.0), 3.5, state.done)) << "of fewer frames";
+  VectorX thrown = theta(500.0);
+  thrown[facts.parameters.find("range_error@front")->at] = 5.0;
+  EXPECT_EQ(plan.joined_on_the_way(stage, thrown, 3.5, state.done), std::optional(0)) << "sensors tell no valleys";
+  facts.swings = true;
+  EXPECT_FALSE(FitPlan(facts).joined_on_the_way(stage, theta(500.0), 3.5, state.done)) << "swings may be out of step";
+  facts.swings = false;
+  StageRecord stopped = record({StageKind::Coarse, 1, 1}, 3.4, 550.0);
+  stopped.joined = 0, stopped.reason = "came into the valley of start 1";
+  has_done(stopped);
+  EXPECT_EQ(only(next()).id.kind, StageKind::Fine);
+  const std::vector<FitStart> starts = plan.starts(state.done);
+  EXPECT_EQ(starts[1].cost, 2.6) << "that of the one it joined";
+  EXPECT_EQ(starts[1].final, theta(420.0));
+  EXPECT_THAT(starts[1].reason, testing::HasSubstr("start 1"));
 }
 
 TEST_F(Plans, GiveUpAStartThatLeadsNowhere) {
@@ -291,7 +322,9 @@ TEST_F(Plans, FollowOneOfTwoStartsThatLeadToTheSamePlace) {
   has_scanned();
   has_done(record({StageKind::Coarse, 0, 0}, 2.02, 5e3));
   has_done(record({StageKind::Coarse, 1, 0}, 2.0, 1.1e4));
-  EXPECT_EQ(next().size(), 2u);
+  EXPECT_EQ(only(next()).id, (StageId{StageKind::Coarse, 1, 1}));
+  has_done(record({StageKind::Coarse, 1, 1}, 4.0, 1e4));
+  EXPECT_EQ(only(next()).id, (StageId{StageKind::Coarse, 0, 1}));
 }
 
 TEST_F(Plans, LeaveOutTheWideBandWhereTheBestStartExplainsWhatWasSeen) {
