@@ -6,6 +6,7 @@
 #include <array>
 #include <set>
 
+#include "base/csv.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "model/result.hpp"
@@ -37,12 +38,6 @@ std::string state_of(const Row& row) { return row.status ? name_of(row.status->s
 std::string number(const std::optional<ParameterValue>& value) {
   const double* scalar = value ? std::get_if<double>(&*value) : nullptr;
   return scalar ? fmt::format("{:.9g}", *scalar) : "";
-}
-
-std::string quoted(std::string text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, "\"");
-  return "\"" + text + "\"";
 }
 
 std::string escaped(const std::string& text) {
@@ -79,8 +74,8 @@ std::string csv(const std::vector<Row>& rows) {
     text += fmt::format(",{0} [{1}],{0} std [{1}],{0} 5 % [{1}],{0} 95 % [{1}]", name, unit);
   text += "\n";
   for (const Row& row : rows) {
-    text += quoted(row.job->capture.filename().string()) + "," + row.job->name + "," + state_of(row) + "," +
-            quoted(row.status ? row.status->reason : "");
+    text += csv_cell(row.job->capture.filename().string()) + "," + row.job->name + "," + state_of(row) + "," +
+            csv_cell(row.status ? row.status->reason : "");
     text += "," + (row.result ? row.result->verdict : "") + ",";
     if (row.result && row.result->error.surface_rms) text += fmt::format("{:.6g}", *row.result->error.surface_rms);
     for (const auto& [name, unit] : columns) {
