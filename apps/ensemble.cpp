@@ -1,3 +1,5 @@
+#include "ensemble/ensemble.hpp"
+
 #include <fmt/format.h>
 
 #include <chrono>
@@ -14,7 +16,6 @@
 #include "base/parallel.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "ensemble/ensemble.hpp"
 #include "ensemble/gather.hpp"
 #include "jobs/shards.hpp"
 
@@ -148,12 +149,14 @@ int run_dry(const Arguments& arguments, const Ensemble& ensemble, double setup_s
                            chunks_of(arguments.out).string());
   if (!first) return Fine;
   const double begin = processor_seconds();
-  (void)ensemble.scene->simulate(plan.materials[std::size_t(plan.chunks[*first].first)], [] { return is_interrupted(); });
+  (void)ensemble.scene->simulate(plan.materials[std::size_t(plan.chunks[*first].first)],
+                                 [] { return is_interrupted(); });
   const double seconds = processor_seconds() - begin, all = seconds * open + setup_seconds * open_chunks;
-  std::cout << fmt::format("a member takes {:.2g} s of a core here (member {} was simulated), a chunk {:.2g} s beside "
-                           "them:\npredicted: {} of core time, {} by {} workers of one core each\n",
-                           seconds, plan.chunks[*first].first + 1, setup_seconds, spoken_time(all),
-                           spoken_time(all / workers_of(arguments)), workers_of(arguments));
+  std::cout << fmt::format(
+      "a member takes {:.2g} s of a core here (member {} was simulated), a chunk {:.2g} s beside "
+      "them:\npredicted: {} of core time, {} by {} workers of one core each\n",
+      seconds, plan.chunks[*first].first + 1, setup_seconds, spoken_time(all), spoken_time(all / workers_of(arguments)),
+      workers_of(arguments));
   return Fine;
 }
 
@@ -202,10 +205,11 @@ int run(const Arguments& arguments) {
     std::cout << "others are with other processes, or in other parts: run the same again to go on or to gather\n";
     return NotConverged;
   }
-  const bool is_gathered = gather_ensemble(arguments.out, ensemble.model, *ensemble.scene, plan, [](int done, int total) {
-    show_progress("frames gathered", done, total);
-    return !is_interrupted();
-  });
+  const bool is_gathered =
+      gather_ensemble(arguments.out, ensemble.model, *ensemble.scene, plan, [](int done, int total) {
+        show_progress("frames gathered", done, total);
+        return !is_interrupted();
+      });
   std::cout << (is_gathered ? "look at " + (fs::path(arguments.out) / "ensemble.html").string()
                             : std::string("another process gathers what they say"))
             << "\n";
@@ -234,9 +238,7 @@ void add_ensemble(CommandLine& line, int& exit_code) {
   auto arguments = std::make_shared<Arguments>();
   Command command = line.add_command("ensemble", "Simulate many members of a fitted model: quantiles of what it does");
   command.option("model", arguments->model, "a fit's folder, or its model.toml").required().type_name("MODEL");
-  command
-      .option("--members", arguments->members,
-              "how many; 1000 where left out, or all rows of the CSV file")
+  command.option("--members", arguments->members, "how many; 1000 where left out, or all rows of the CSV file")
       .positive()
       .type_name("N");
   command.option("--from", arguments->from, "where their materials come from: posterior, prior or a CSV file")

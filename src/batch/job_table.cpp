@@ -122,23 +122,41 @@ std::string page(const std::vector<Row>& rows, const BatchSummary& summary) {
   return text + "\n</table>\n";
 }
 
-}  // namespace
-
-BatchSummary write_batch_table(const fs::path& batch, const std::vector<BatchJob>& jobs) {
+std::vector<Row> rows_of(const fs::path& batch, const std::vector<BatchJob>& jobs) {
   std::vector<Row> rows;
-  BatchSummary summary;
   for (const BatchJob& job : jobs) {
     Row row{&job, read_status(batch, job), {}};
     if (row.status) row.result = result_of(batch / job.name);
-    ++summary.jobs;
-    summary.ended += row.status.has_value() ? 1 : 0;
-    summary.converged += row.status && row.status->state == BatchStatus::State::Converged ? 1 : 0;
     rows.push_back(std::move(row));
   }
   std::ranges::sort(rows, {}, [](const Row& row) { return std::pair(row.job->capture.filename(), row.job->key); });
-  write_file(batch / "results.csv", csv(rows));
-  write_file(batch / "results.html", page(rows, summary));
+  return rows;
+}
+
+BatchSummary summary_of(const std::vector<Row>& rows) {
+  BatchSummary summary;
+  for (const Row& row : rows) {
+    ++summary.jobs;
+    summary.ended += row.status.has_value() ? 1 : 0;
+    summary.converged += row.status && row.status->state == BatchStatus::State::Converged ? 1 : 0;
+  }
   return summary;
+}
+
+}  // namespace
+
+BatchSummary write_batch_table(const fs::path& batch, const std::vector<BatchJob>& jobs) {
+  const auto ended = [&] {
+    return std::ranges::count_if(jobs, [&](const BatchJob& job) { return read_status(batch, job).has_value(); });
+  };
+  while (true) {
+    const std::vector<Row> rows = rows_of(batch, jobs);
+    const BatchSummary summary = summary_of(rows);
+    write_file(batch / "results.csv", csv(rows));
+    write_file(batch / "results.html", page(rows, summary));
+    // Another process may have ended a job and written its table meanwhile, in whose place this one now stands.
+    if (ended() == summary.ended) return summary;
+  }
 }
 
 }  // namespace pliant

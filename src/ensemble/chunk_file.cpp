@@ -34,9 +34,9 @@ constexpr std::size_t head_bytes = 1024;
 
 /// A line of JSON, filled up with spaces.
 std::string head_of(const EnsembleChunk& chunk, const RecordShape& shape) {
-  const Json json = {{"format", "ensemble-chunk/1"},       {"key", chunk.key},       {"first", chunk.first + 1},
-                     {"members", chunk.members},           {"record", shape.bytes()}, {"outputs", shape.outputs},
-                     {"series", shape.series},             {"frames", shape.frames},  {"points", shape.points}};
+  const Json json = {{"format", "ensemble-chunk/1"}, {"key", chunk.key},        {"first", chunk.first + 1},
+                     {"members", chunk.members},     {"record", shape.bytes()}, {"outputs", shape.outputs},
+                     {"series", shape.series},       {"frames", shape.frames},  {"points", shape.points}};
   std::string head = json.dump();
   head.resize(head_bytes - 1, ' ');
   return head + "\n";

@@ -42,8 +42,7 @@ std::string common_key(const Model& model, const fs::path& file, const EnsembleQ
                  question.keeps_surface ? "surface" : ""});
 }
 
-EnsembleChunk chunk_of(const std::vector<DrawnMaterial>& materials, int first, int members,
-                       const std::string& common) {
+EnsembleChunk chunk_of(const std::vector<DrawnMaterial>& materials, int first, int members, const std::string& common) {
   EnsembleChunk chunk{first, members, {}, {}};
   std::string numbers;
   for (int i = first; i < first + members; ++i) {

@@ -16,13 +16,13 @@ namespace pliant {
 /// Members of an ensemble, what is told of them, and the chunks that they are simulated in. Whoever makes a plan of the
 /// same model, materials and question has the same one.
 struct EnsemblePlan {
-  std::string model;                         ///< its name
-  std::string source;                        ///< of the materials, in words
-  std::vector<DrawnMaterial> materials;      ///< one a member
-  std::vector<EnsembleQuantity> outputs;     ///< see `EnsembleScene`, here and below
-  std::vector<std::string> points;           ///< ids of those that were asked for
-  int vertices = 0;                          ///< of the surface, where their paths are kept
-  std::vector<double> times;                 ///< [s]
+  std::string model;                      ///< its name
+  std::string source;                     ///< of the materials, in words
+  std::vector<DrawnMaterial> materials;   ///< one a member
+  std::vector<EnsembleQuantity> outputs;  ///< see `EnsembleScene`, here and below
+  std::vector<std::string> points;        ///< ids of those that were asked for
+  int vertices = 0;                       ///< of the surface, where their paths are kept
+  std::vector<double> times;              ///< [s]
   RecordShape shape;
   std::vector<EnsembleChunk> chunks;
   std::string key;  ///< SHA-256 of all of it: 64 digits

@@ -24,7 +24,10 @@ using Json = nlohmann::ordered_json;
 constexpr int surfaces_drawn = 4;
 
 Json description(const EnsemblePlan& plan) {
-  Json json = {{"format", "ensemble/1"}, {"key", plan.key}, {"model", plan.model}, {"from", plan.source},
+  Json json = {{"format", "ensemble/1"},
+               {"key", plan.key},
+               {"model", plan.model},
+               {"from", plan.source},
                {"members", plan.members()}};
   const auto told = [](const std::vector<EnsembleQuantity>& quantities) {
     Json list = Json::array();
@@ -35,7 +38,8 @@ Json description(const EnsemblePlan& plan) {
   json["times"] = plan.times;
   json["vertices"] = plan.vertices, json["points"] = plan.points;
   for (const EnsembleChunk& chunk : plan.chunks)
-    json["chunks"].push_back({{"file", "chunks/" + chunk.name}, {"first", chunk.first + 1}, {"members", chunk.members}});
+    json["chunks"].push_back(
+        {{"file", "chunks/" + chunk.name}, {"first", chunk.first + 1}, {"members", chunk.members}});
   return json;
 }
 
@@ -130,7 +134,8 @@ bool gather_ensemble(const fs::path& ensemble, const Model& model, const Ensembl
   const MemberRecords members = read_members(ensemble, plan);
   const std::vector<EnsembleColumn> columns = columns_of(plan, members);
   EnsemblePage page{plan, model, scene.surface(), members, columns, bands_of_series(plan, members), {}, {}};
-  for (const char* file : {"ensemble.json", "points.csv", "surface.pvd"}) remove_file(ensemble / file);  // of another one
+  for (const char* file : {"ensemble.json", "points.csv", "surface.pvd"})
+    remove_file(ensemble / file);  // of another one
   write_file(ensemble / "members.csv", members_csv(plan, members));
   write_file(ensemble / "quantiles.csv", quantiles_csv(columns));
   write_file(ensemble / "frames.csv", frames_csv(plan, members));

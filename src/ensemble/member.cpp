@@ -15,11 +15,18 @@ namespace {
 constexpr double far_away = 0.1;  // of a point from the object's box, times the object's size
 
 /// What is told of every member, before what is told of points: the order of `Telling::outputs`.
-const std::vector<EnsembleQuantity> common_outputs = {
-    {"first_frequency", "Hz"}, {"greatest_displacement", "m"}, {"greatest_displacement_time", "s"},
-    {"furthest_x", "m"},       {"furthest_y", "m"},            {"furthest_z", "m"},
-    {"end_displacement", "m"}, {"lowest_x", "m"},              {"lowest_y", "m"},
-    {"lowest_z", "m"},         {"lowest_time", "s"},           {"peak_strain", "1"}};
+const std::vector<EnsembleQuantity> common_outputs = {{"first_frequency", "Hz"},
+                                                      {"greatest_displacement", "m"},
+                                                      {"greatest_displacement_time", "s"},
+                                                      {"furthest_x", "m"},
+                                                      {"furthest_y", "m"},
+                                                      {"furthest_z", "m"},
+                                                      {"end_displacement", "m"},
+                                                      {"lowest_x", "m"},
+                                                      {"lowest_y", "m"},
+                                                      {"lowest_z", "m"},
+                                                      {"lowest_time", "s"},
+                                                      {"peak_strain", "1"}};
 
 Points rest_of(const Embedding& points, const Body& body) { return points.positions(body.reference_positions()); }
 
@@ -70,9 +77,8 @@ class EnsembleScene::Telling {
   /// The numbers of all frames together, after the first frequency.
   void finish(double first_frequency) {
     std::vector<double>& out = record_.outputs;
-    out = {first_frequency, displacement_, displacement_time_, furthest_.x(),      furthest_.y(),
-           furthest_.z(),   last_displacement_, lowest_.x(),   lowest_.y(), lowest_.z(),
-           lowest_time_,    strain_};
+    out = {first_frequency,    displacement_, displacement_time_, furthest_.x(), furthest_.y(), furthest_.z(),
+           last_displacement_, lowest_.x(),   lowest_.y(),        lowest_.z(),   lowest_time_,  strain_};
     for (Eigen::Index i = 0; i < points_.rows(); ++i) {
       for (Eigen::Index k = 0; k < 3; ++k) out.push_back(points_(i, k));
       out.push_back(point_displacements_[std::size_t(i)]);

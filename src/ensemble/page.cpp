@@ -61,7 +61,6 @@ std::string band_plot(const EnsembleBand& band, const std::vector<double>& times
   for (const auto& frame : band.frames) all.insert(all.end(), frame.begin(), frame.end());
   const SpokenUnit unit = told_unit(all, band.quantity);
   std::array<Series, 2> series;
-  series[0].label = "90 % of the members", series[1].label = "half of them, and the median";
   for (std::size_t k = 0; k < series.size(); ++k) {
     series[k].colour = 0;
     for (std::size_t f = 0; f < band.frames.size(); ++f) {
@@ -87,7 +86,7 @@ std::string band_plots(const std::vector<EnsembleBand>& bands, const std::vector
 std::string over_time(const EnsemblePage& page) {
   const std::string all = band_plots(page.bands, page.plan.times);
   if (all.empty()) return "";
-  return "<p>In every frame: the median, and where half and nine tenths of the members lie.</p>\n" + all;
+  return "<p>The median of each frame, and where half and nine tenths of the members lie.</p>\n" + all;
 }
 
 std::string points_over_time(const EnsemblePage& page) {
@@ -203,12 +202,13 @@ std::string ensemble_html(const EnsemblePage& page) {
   html += section("Distributions", distributions(page.columns));
   html += section("What it depends on", drivers(page));
   html += section("Members that failed", failures(page.members));
-  html += section("Files",
-                  "<p>One row a member: <code>members.csv</code>. Quantiles: <code>quantiles.csv</code>, in every frame "
-                  "<code>frames.csv</code>" +
-                      std::string(page.plan.points.empty() ? "" : ", of the points <code>points.csv</code>") +
-                      (page.plan.vertices > 0 ? "; of the surface <code>surface.pvd</code>, which opens in ParaView" : "") +
-                      ".</p>\n");
+  html +=
+      section("Files",
+              "<p>One row a member: <code>members.csv</code>. Quantiles: <code>quantiles.csv</code>, in every frame "
+              "<code>frames.csv</code>" +
+                  std::string(page.plan.points.empty() ? "" : ", of the points <code>points.csv</code>") +
+                  (page.plan.vertices > 0 ? "; of the surface <code>surface.pvd</code>, which opens in ParaView" : "") +
+                  ".</p>\n");
   return html + "</main></body></html>\n";
 }
 

@@ -31,9 +31,9 @@ struct EnsemblePage {
   const TriangleMesh& surface;
   const MemberRecords& members;
   const std::vector<EnsembleColumn>& columns;
-  std::vector<EnsembleBand> bands;         ///< of numbers in every frame
-  std::vector<EnsembleBand> point_bands;   ///< of the points' coordinates, in the same way
-  std::vector<EnsembleSurface> surfaces;   ///< in some frames
+  std::vector<EnsembleBand> bands;        ///< of numbers in every frame
+  std::vector<EnsembleBand> point_bands;  ///< of the points' coordinates, in the same way
+  std::vector<EnsembleSurface> surfaces;  ///< in some frames
 };
 
 /// One self-contained page: quantiles of all quantities, their course over time, what drives them, how far apart the

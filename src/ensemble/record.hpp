@@ -29,9 +29,9 @@ struct RecordShape {
 struct MemberRecord {
   enum class State : std::int32_t { Open = 0, Simulated = 1, Failed = 2 };
   State state = State::Open;
-  std::string reason;           ///< why it failed, in words
-  std::vector<double> outputs;  ///< as many as the shape says; not a number where there is none, as of failed ones
-  std::vector<float> series;    ///< frames x series
+  std::string reason;            ///< why it failed, in words
+  std::vector<double> outputs;   ///< as many as the shape says; not a number where there is none, as of failed ones
+  std::vector<float> series;     ///< frames x series
   std::vector<float> positions;  ///< [m], frames x points x 3
 };
 

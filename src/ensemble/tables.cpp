@@ -25,7 +25,8 @@ std::string column_name(const EnsembleQuantity& q) { return q.name + " [" + q.un
 /// Heads of columns of the quantiles of a quantity.
 std::string quantile_heads(const EnsembleQuantity& q) {
   std::string text;
-  for (std::size_t k = 0; k < told_shares.size(); ++k) text += fmt::format(",{} {} [{}]", q.name, share_name(k), q.unit);
+  for (std::size_t k = 0; k < told_shares.size(); ++k)
+    text += fmt::format(",{} {} [{}]", q.name, share_name(k), q.unit);
   return text;
 }
 
@@ -119,7 +120,8 @@ PositionQuantiles position_quantiles(const fs::path& ensemble, const EnsemblePla
   for (Points& quantile : found) quantile.resize(points, 3);
   if (points == 0) return found;
   const int at_once = int(std::clamp<std::size_t>(most_bytes / (3 * sizeof(float) * members), 1, std::size_t(points)));
-  std::vector<float> of_member(3 * std::size_t(at_once)), all(of_member.size() * members);  // all: coordinates x members
+  std::vector<float> of_member(3 * std::size_t(at_once)),
+      all(of_member.size() * members);  // all: coordinates x members
   for (int first = 0; first < points; first += at_once) {
     const int count = std::min(at_once, points - first);
     const std::size_t coordinates = 3 * std::size_t(count);

@@ -163,8 +163,9 @@ ExportModel export_model(const Model& model, ElementKind kind, std::optional<dou
                       "leave the number out: a mesh that is fine enough is found"});
   const ModelScene scene = make_scene(model);
   const SimulationOptions options = elastic_alone(scene.simulation);
-  const Comparison comparison{model, scene, options,
-                              small_motions(scene.body, options, scene.theta, scene.body->nodes, frequencies_told).frequencies};
+  const Comparison comparison{
+      model, scene, options,
+      small_motions(scene.body, options, scene.theta, scene.body->nodes, frequencies_told).frequencies};
   const Candidate chosen = chosen_mesh(comparison, kind, cells);
   ExportModel out;
   out.name = model.name;

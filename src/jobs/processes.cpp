@@ -44,8 +44,7 @@ pid_t start(const Job& job, int threads) {
   arguments.push_back(nullptr);
   const std::string said = job.messages().string();
   int told[2];  // closed when the program is started; carries the error where it is not
-  if (::pipe2(told, O_CLOEXEC) != 0)
-    throw InputError({{words.front()}, "it cannot be started", "a pipe", ""});
+  if (::pipe2(told, O_CLOEXEC) != 0) throw InputError({{words.front()}, "it cannot be started", "a pipe", ""});
   const pid_t parent = ::getpid(), process = ::fork();
   if (process == 0) {
     // Only what may be called between fork and exec. A group of its own: Ctrl-C in the terminal reaches the program

@@ -42,9 +42,9 @@ Json parameter_json(const ParameterResult& parameter) {
   if (parameter.extrapolated) json["extrapolated"] = value_json(*parameter.extrapolated);
   if (parameter.start) json["start"] = value_json(*parameter.start);
   if (parameter.prior)
-    json["prior"] = {{"median", number(parameter.prior->median)},
-                     {"interval_90",
-                      {number(parameter.prior->interval_90.first), number(parameter.prior->interval_90.second)}}};
+    json["prior"] = {
+        {"median", number(parameter.prior->median)},
+        {"interval_90", {number(parameter.prior->interval_90.first), number(parameter.prior->interval_90.second)}}};
   json["estimated"] = parameter.estimated;
   return json;
 }

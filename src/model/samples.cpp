@@ -165,9 +165,9 @@ Columns columns_in(const std::filesystem::path& path, const std::vector<std::str
   const std::size_t before = problems.size();
   for (std::size_t i = 0; i < header.size(); ++i) {
     const std::string name = bare(header[i]);
-    const std::string meant = known.contains(name)                         ? name
+    const std::string meant = known.contains(name)                  ? name
                               : name.find(' ') == std::string::npos ? nearest_name(name, known)
-                                                                           : std::string();
+                                                                    : std::string();
     if (meant.empty()) continue;
     const auto k = std::size_t(std::ranges::find(names, meant) - names.begin());
     if (header[i] != material_columns[k])

@@ -11,7 +11,7 @@ namespace pliant {
 /// How a body vibrates and sags, for small motions about rest.
 struct SmallMotions {
   std::vector<double> frequencies;  ///< [Hz], lowest first; of a free object without the six rigid motions
-  double sag = 0.0;  ///< [m] of the point that moves most under gravity, linear; 0: nothing is held
+  double sag = 0.0;                 ///< [m] of the point that moves most under gravity, linear; 0: nothing is held
 };
 
 /// A scene that only elasticity and what is held act in.

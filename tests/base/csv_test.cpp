@@ -76,7 +76,8 @@ TEST(Csv, TakesColumnsThatItsReaderChooses) {
   read_csv(path, header, problems, [&](CsvRow& row) { cells = {row.raw(0), row.raw(1), row.raw(2)}; });
   EXPECT_THAT(names, ElementsAre("what", "\"how, much\"", "n"));
   EXPECT_THAT(cells, ElementsAre("\"a, \"\"b\"\"\"", "2", "3"));
-  read_csv(path, [](const auto&) { return false; }, problems, [&](CsvRow&) { FAIL() << "it was refused"; });
+  read_csv(
+      path, [](const auto&) { return false; }, problems, [&](CsvRow&) { FAIL() << "it was refused"; });
 }
 
 TEST(Csv, CellsWithCommasAreQuoted) {

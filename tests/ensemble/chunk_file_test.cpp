@@ -13,8 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::TemporaryFolder;
-using testing::ElementsAre;
 using testing::Each;
+using testing::ElementsAre;
 using testing::IsNan;
 
 const RecordShape shape{2, 3, 2, 3};

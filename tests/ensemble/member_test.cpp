@@ -87,10 +87,10 @@ TEST(EnsembleMember, TellsFrequencyAndStrainOfItsOwn) {
   // Squared frequencies are proportional to the modulus.
   EXPECT_NEAR(output(scene, b, "first_frequency") / output(scene, a, "first_frequency"), 2.0, 1e-6);
   const ModelScene alone = make_scene(with_material(test::block(true), soft));
-  EXPECT_NEAR(output(scene, a, "first_frequency"),
-              small_motions(alone.body, elastic_alone(alone.simulation), alone.theta, alone.body->nodes, 3)
-                  .frequencies.front(),
-              1e-6 * output(scene, a, "first_frequency"));
+  EXPECT_NEAR(
+      output(scene, a, "first_frequency"),
+      small_motions(alone.body, elastic_alone(alone.simulation), alone.theta, alone.body->nodes, 3).frequencies.front(),
+      1e-6 * output(scene, a, "first_frequency"));
   EXPECT_GT(output(scene, a, "peak_strain"), 1e-4);
   EXPECT_LT(output(scene, b, "peak_strain"), output(scene, a, "peak_strain"));
 }

@@ -133,7 +133,9 @@ TEST(WithMaterial, ScalesAllModuli) {
 struct ReadTable {
   explicit ReadTable(const std::string& content) {
     const test::TemporaryFolder folder;
-    said = test::complaint_of([&] { materials = read_materials(folder.write("m.csv", content), {1e5, 0.3, 0.5, 2e-3}); });
+    said = test::complaint_of([&] {
+      materials = read_materials(folder.write("m.csv", content), {1e5, 0.3, 0.5, 2e-3});
+    });
   }
   std::vector<DrawnMaterial> materials;
   std::string said;
