@@ -210,9 +210,11 @@ int run(const Arguments& arguments) {
         show_progress("frames gathered", done, total);
         return !is_interrupted();
       });
-  std::cout << (is_gathered ? "look at " + (fs::path(arguments.out) / "ensemble.html").string()
-                            : std::string("another process gathers what they say"))
-            << "\n";
+  if (!is_gathered) {
+    std::cout << "another process gathers what they say: run the same again to see whether it came to its end\n";
+    return NotConverged;
+  }
+  std::cout << "look at " << (fs::path(arguments.out) / "ensemble.html").string() << "\n";
   return failed == 0 ? Fine : NotConverged;
 }
 
@@ -230,7 +232,7 @@ Examples:
 Members are simulated as the model's recording was. The folder gets members.csv, quantiles.csv, frames.csv, points.csv,
 surface.pvd and ensemble.html once all members ended (docs/ensemble.md). Processes that share the folder share the work; what is
 there is not simulated again, more members of the same model go on from it. One that fails stops no other. Exit code 3: some
-failed, or are not ended yet.)";
+failed, or are not ended or gathered yet.)";
 
 }  // namespace
 

@@ -74,6 +74,14 @@ class EnsembleProgram : public testing::Test {
       if (entry.is_regular_file()) all[entry.path().lexically_relative(out).generic_string()] = read_file(entry.path());
     return all;
   }
+  /// Of all files of chunks in the folder `out`, also of those that are being made.
+  std::uintmax_t chunk_bytes() const {
+    std::uintmax_t bytes = 0;
+    std::error_code gone;
+    for (const auto& entry : fs::directory_iterator(folder / "out/chunks", gone))
+      if (const auto size = entry.file_size(gone); !gone) bytes += size;
+    return bytes;
+  }
   TemporaryFolder folder;
 };
 
@@ -126,8 +134,9 @@ TEST_F(EnsembleProgram, GoesOnWhereItWasInterruptedOrKilled) {
       ::execv(arguments[0], arguments.data());
       ::_exit(127);
     }
-    const auto begun = [&] { return fs::exists(folder / "out/chunks") && !fs::is_empty(folder / "out/chunks"); };
-    for (int k = 0; k < 600 && !begun(); ++k) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const std::uintmax_t enough = chunk_bytes() + (signal == SIGINT ? 3000 : 1000);  // a record more has 1,072
+    for (int k = 0; k < 1500 && chunk_bytes() < enough; ++k) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    EXPECT_GE(chunk_bytes(), enough);
     ::kill(child, signal);
     int status = 0;
     ::waitpid(child, &status, 0);
