@@ -56,7 +56,7 @@ EnsembleChunk chunk_of(const std::vector<DrawnMaterial>& materials, int first, i
 
 class ChunkJob : public Job {
  public:
-  ChunkJob(fs::path ensemble, EnsembleChunk chunk, RecordShape shape,
+  ChunkJob(const fs::path& ensemble, EnsembleChunk chunk, RecordShape shape,
            std::function<std::vector<std::string>(int)> words, std::function<void()> on_end)
       : folder_(chunks_of(ensemble)),
         chunk_(std::move(chunk)),
@@ -140,8 +140,10 @@ void simulate_chunk(const fs::path& ensemble, const EnsembleScene& scene, const 
   if (is_whole(folder, members, plan.shape)) return;
   make_folder(folder);
   ChunkWriter file(folder, members, plan.shape);
-  while (file.done() < members.members)
-    file.add(scene.simulate(plan.materials[std::size_t(members.first + file.done())], interrupted));
+  while (file.done() < members.members) {
+    const std::size_t next = std::size_t(members.first) + std::size_t(file.done());
+    file.add(scene.simulate(plan.materials[next], interrupted));
+  }
   file.finish();
 }
 
