@@ -29,13 +29,6 @@ BodyFields body_fields(const Body& body, Elasticity& elasticity, const Points& p
   return fields;
 }
 
-std::vector<double> greatest_strains(const Body& body, Elasticity& elasticity, const Points& positions) {
-  elasticity.linearise(positions);
-  std::vector<double> strains;
-  for (int e = 0; e < body.element_count(); ++e) strains.push_back(greatest_strain(elasticity.rotation(e).S));
-  return strains;
-}
-
 std::vector<double> averages_at(const Body& body, const Embedding& points, std::span<const double> of_elements) {
   std::vector<double> of_node(std::size_t(body.node_count()), 0.0), volume(of_node.size(), 0.0);
   for (int e = 0; e < body.element_count(); ++e) {

@@ -26,9 +26,6 @@ struct BodyFields {
 /// Never throws for what it finds: stress and tangent modulus are not a number where the law knows no such deformation.
 BodyFields body_fields(const Body& body, Elasticity& elasticity, const Points& positions);
 
-/// The greatest strain of each element alone (`greatest_strain`) [-]; otherwise as `body_fields`.
-std::vector<double> greatest_strains(const Body& body, Elasticity& elasticity, const Points& positions);
-
 /// A number of each element as a smooth one at points: the mean of the elements about a node, by volume, then the mean
 /// of the nodes about a point, by the magnitude of their weights there.
 /// @param of_elements  one an element, in any unit. Never throws.

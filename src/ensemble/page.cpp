@@ -194,10 +194,11 @@ std::string ensemble_html(const EnsemblePage& page) {
   html += fmt::format("<p class=\"sub\">An ensemble of {} members with materials drawn from {}; {}</p>\n",
                       page.members.size(), escape_html(page.plan.source),
                       failed == 0 ? "all were simulated" : fmt::format("{} of them could not be simulated", failed));
-  html += section("What comes out", quantile_table(page.columns) +
-                                        "<p class=\"given\">Below each value lies that share of the members. Furthest and lowest: "
-                                        "where the vertex of the surface is then that moves most, or comes lowest. "
-                                        "Coordinates of points are those of the last frame.</p>\n");
+  html += section("What comes out",
+                  quantile_table(page.columns) +
+                      "<p class=\"given\">Below each value lies that share of the members. Furthest and lowest: "
+                      "where the vertex of the surface is then that moves most, or comes lowest. "
+                      "Coordinates of points are those of the last frame.</p>\n");
   html += section("Over time", over_time(page));
   html += section("Points over time", points_over_time(page));
   html += section("The surface", surfaces(page));
