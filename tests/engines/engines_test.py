@@ -64,9 +64,14 @@ def must(words, **more):
         sys.exit(f"exit code {done.returncode} of {words}")
 
 
+def python_with(module):
+    """A Python that has a module: this one, or that of Debian's packages; nothing where neither has."""
+    return next((p for p in [sys.executable, "/usr/bin/python3"]
+                 if pathlib.Path(p).exists() and subprocess.run([p, "-c", f"import {module}"], capture_output=True).returncode == 0), None)
+
+
 def dask(script, program, out, command, folder):
-    python = next((p for p in [sys.executable, "/usr/bin/python3"]
-                   if subprocess.run([p, "-c", "import dask.distributed"], capture_output=True).returncode == 0), None)
+    python = python_with("dask.distributed")
     if not python:
         skip("no Python here has dask.distributed: apt-get install python3-distributed")
     must([python, script / "dask_parts.py", "--parts", PARTS, "--workers", 2, "--pliant", program, "--", *command, "--out", out], cwd=folder)
