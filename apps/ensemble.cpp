@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
+#include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <iostream>

@@ -122,7 +122,7 @@ class EnsembleScene::Telling {
 };
 
 EnsembleScene::EnsembleScene(const Model& model, EnsembleQuestion question, const std::filesystem::path& points_file)
-    : model_name_(model.name), question_(std::move(question)), up_(model.scene.world.up), outputs_(common_outputs) {
+    : question_(std::move(question)), up_(model.scene.world.up), outputs_(common_outputs) {
   if (model.law)
     throw InputError({{},
                       "the model has a material law of its own (`" + model.law->name + "`)",

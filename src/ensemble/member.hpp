@@ -54,7 +54,6 @@ class EnsembleScene {
   class Telling;
   double first_frequency(const VectorX& theta) const;
 
-  std::string model_name_;
   EnsembleQuestion question_;
   ModelScene scene_;
   SimulationOptions elastic_;
