@@ -175,7 +175,7 @@ def slurm(script, program, out, command, folder):
     if os.geteuid() != 0:
         skip("a cluster of one's own needs root")
     os.environ["PATH"] += ":/usr/sbin"
-    cluster = Slurm(pathlib.Path(tempfile.mkdtemp(prefix="pliant-slurm-", dir="/tmp")))
+    cluster = Slurm(pathlib.Path(tempfile.mkdtemp(prefix="pliant-slurm-")))
     cluster.start()
     try:
         said = subprocess.run(["sbatch", "--wait", "--parsable", f"--array=1-{PARTS}", "--cpus-per-task=1", f"--output={folder}/slurm-%a.txt",
