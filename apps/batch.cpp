@@ -11,6 +11,8 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
+#include "jobs/processes.hpp"
+#include "jobs/shards.hpp"
 
 namespace pliant::apps {
 
@@ -25,16 +27,6 @@ struct Arguments {
   bool dry_run = false;
 };
 
-/// "3/50": the third of fifty parts.
-std::pair<int, int> part_of(const std::string& shard) {
-  if (shard.empty()) return {1, 1};
-  int part = 0, parts = 0, end = 0;
-  if (std::sscanf(shard.c_str(), "%d/%d%n", &part, &parts, &end) != 2 || std::size_t(end) != shard.size() || part < 1 ||
-      part > parts)
-    throw InputError({{}, "--shard " + shard, "PART/PARTS, such as 3/50", ""});
-  return {part, parts};
-}
-
 /// "90", "90s", "30m", "2h".
 std::optional<std::chrono::seconds> duration_of(const std::string& text) {
   if (text.empty()) return std::nullopt;
@@ -46,13 +38,6 @@ std::optional<std::chrono::seconds> duration_of(const std::string& text) {
   if (read < 1 || std::size_t(end) != text.size() || !(number * seconds >= 1.0))
     throw InputError({{}, "--timeout " + text, "a time such as 90s, 30m or 2h", ""});
   return std::chrono::seconds(std::int64_t(number * seconds));
-}
-
-/// Words that start this program again.
-std::vector<std::string> own_program() {
-  const fs::path self = fs::read_symlink("/proc/self/exe");
-  if (self.filename().string().starts_with("python")) return {self.string(), "-m", "pliant"};
-  return {self.string()};
 }
 
 void say_jobs(const fs::path& batch, const std::vector<BatchJob>& jobs) {
@@ -69,10 +54,10 @@ int run(const Arguments& arguments) {
   for (const std::string& assignment : arguments.settings) set_fit_option(choices, assignment);
   if (const std::string wrong = choices.validate(); !wrong.empty())
     throw InputError({{arguments.config}, wrong, "", "see `pliant fit --help`"});
-  const auto [part, parts] = part_of(arguments.shard);
+  const Shard shard = shard_named(arguments.shard);
   const std::vector<BatchJob> jobs =
       batch_jobs(captures_of(arguments.captures), choices, PLIANT_VERSION " " PLIANT_COMMIT);
-  const std::vector<BatchJob> own = shard_of(jobs, part, parts);
+  const std::vector<BatchJob> own = shard_of(jobs, shard);
   if (arguments.dry_run) {
     say_jobs(arguments.out, own);
     return Fine;

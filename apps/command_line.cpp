@@ -13,6 +13,7 @@ Option& Option::expected(int count) { return option_->expected(count), *this; }
 Option& Option::delimiter(char separator) { return option_->delimiter(separator), *this; }
 Option& Option::one_value_a_use() { return option_->allow_extra_args(false), *this; }
 Option& Option::show_default() { return option_->capture_default_str(), *this; }
+Option& Option::hidden() { return option_->group(""), *this; }
 Option& Option::range(int least, int greatest) { return option_->check(CLI::Range(least, greatest)), *this; }
 Option& Option::range(double least, double greatest) { return option_->check(CLI::Range(least, greatest)), *this; }
 Option& Option::positive() {

@@ -30,6 +30,8 @@ class Option {
   Option& one_value_a_use();
   /// The help shows the value that the variable has now.
   Option& show_default();
+  /// The help does not name it.
+  Option& hidden();
   /// @name Values that are allowed; others are bad usage
   /// @{
   Option& range(int least, int greatest);

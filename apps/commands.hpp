@@ -9,6 +9,7 @@ class CommandLine;
 enum ExitCode : int { Fine = 0, BadInput = 2, NotConverged = 3, WasInterrupted = 130 };
 
 void add_batch(CommandLine& line, int& exit_code);
+void add_ensemble(CommandLine& line, int& exit_code);
 void add_check(CommandLine& line, int& exit_code);
 void add_fit(CommandLine& line, int& exit_code);
 void add_import(CommandLine& line, int& exit_code);

@@ -11,7 +11,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "exports/formats.hpp"
-#include "exports/samples.hpp"
+#include "model/samples.hpp"
 
 namespace pliant::apps {
 
@@ -56,14 +56,16 @@ ElementKind elements_for(const Arguments& arguments, const ExportFormat& format)
 
 /// Materials drawn from what the fit left open, each in a folder of its own.
 void run_samples(const Arguments& arguments, const ExportFormat& format, const Model& model) {
-  const Result result = read_result(fs::path(arguments.model).parent_path() / "result.json");
-  const std::vector<DrawnMaterial> samples = posterior_samples(result, arguments.samples);
+  const fs::path file = fs::path(arguments.model).parent_path() / "result.json";
+  const std::vector<DrawnMaterial> samples = posterior_samples(read_result(file), arguments.samples, 1, file);
   make_folder(arguments.out);
-  std::string table = "sample,youngs_modulus [Pa],poissons_ratio [1],mass_damping [1/s],stiffness_damping [s]\n";
+  std::string table = "sample";
+  for (const std::string& column : material_columns) table += "," + column;
+  table += "\n";
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const DrawnMaterial& s = samples[i];
-    table += fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g}\n", i + 1, s.youngs_modulus, s.poissons_ratio, s.mass_damping,
-                         s.stiffness_damping);
+    table += std::to_string(i + 1);
+    for (const double number : numbers_of(samples[i])) table += fmt::format(",{:.9g}", number);
+    table += "\n";
   }
   write_file(fs::path(arguments.out) / "samples.csv", table);
   for (std::size_t i = 0; i < samples.size(); ++i) {

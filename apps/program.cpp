@@ -61,6 +61,7 @@ int run(int argc, char** argv) {
   add_fit(line, exit_code);
   add_batch(line, exit_code);
   add_simulate(line, exit_code);
+  add_ensemble(line, exit_code);
   add_live(line, exit_code);
   add_track(line, exit_code);
   add_evaluate(line, exit_code);

@@ -6,7 +6,7 @@
 #include "base/files.hpp"
 #include "bindings.hpp"
 #include "exports/formats.hpp"
-#include "exports/samples.hpp"
+#include "model/samples.hpp"
 #include "interruption.hpp"
 #include "output/situation_output.hpp"
 #include "simulation/model_simulation.hpp"

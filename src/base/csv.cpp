@@ -24,11 +24,23 @@ std::optional<double> parsed(std::string_view text) {
   return value;
 }
 
+// Where the cell that begins here ends: at a comma that stands in no quotes.
+std::size_t end_of_cell(std::string_view line, std::size_t at) {
+  const std::size_t begin = line.find_first_not_of(blank, at);
+  if (begin == std::string_view::npos || line[begin] != '"') return std::min(line.find(',', at), line.size());
+  bool is_quoted = false;
+  for (std::size_t i = begin; i < line.size(); ++i) {
+    if (line[i] == '"') is_quoted = !is_quoted;
+    if (line[i] == ',' && !is_quoted) return i;
+  }
+  return line.size();
+}
+
 // Calls `cell` with each cell's text, without spaces around it, and where it begins in the line.
 template <class Cell>
 void split(std::string_view line, const Cell& cell) {
   for (std::size_t at = 0; at <= line.size();) {
-    const std::size_t end = std::min(line.find(',', at), line.size());
+    const std::size_t end = end_of_cell(line, at);
     std::string_view text = line.substr(at, end - at);
     const std::size_t begin = std::min(text.find_first_not_of(blank), text.size());
     text.remove_prefix(begin);
@@ -38,10 +50,16 @@ void split(std::string_view line, const Cell& cell) {
   }
 }
 
-std::vector<std::string_view> names_in(std::string_view header) {
-  std::vector<std::string_view> names;
-  split(header, [&](std::string_view text, int) { names.push_back(text); });
+std::vector<std::string> names_in(std::string_view header) {
+  std::vector<std::string> names;
+  split(header, [&](std::string_view text, int) { names.emplace_back(text); });
   return names;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) text += (i > 0 ? "," : "") + names[i];
+  return text;
 }
 
 }  // namespace
@@ -75,8 +93,21 @@ std::optional<int> CsvRow::index(std::size_t column) {
 
 void read_csv(const fs::path& path, std::string_view header, std::vector<Problem>& problems,
               const std::function<void(CsvRow&)>& row) {
+  const auto is_that = [&](const std::vector<std::string>& names) {
+    if (names == names_in(header)) return true;
+    problems.push_back({{path, 1, 1},
+                        "the header " + in_quotes(joined(names)),
+                        in_quotes(header),
+                        "name the columns so, in this order"});
+    return false;
+  };
+  read_csv(path, is_that, problems, row);
+}
+
+void read_csv(const fs::path& path, const std::function<bool(const std::vector<std::string>&)>& header,
+              std::vector<Problem>& problems, const std::function<void(CsvRow&)>& row) {
   const std::string content = read_file(path);
-  const std::vector<std::string_view> names = names_in(header);
+  std::vector<std::string> names;
   CsvRow current;
   bool has_rows = false;
   current.path_ = &path;
@@ -86,12 +117,9 @@ void read_csv(const fs::path& path, std::string_view header, std::vector<Problem
     const std::string_view line = std::string_view(content).substr(at, end - at);
     at = end + 1;
     if (++current.line_ == 1) {
-      if (names_in(line) == names) continue;
-      problems.push_back({{path, 1, 1},
-                          "the header " + in_quotes(line.substr(0, line.find_last_not_of(blank) + 1)),
-                          in_quotes(header),
-                          "name the columns so, in this order"});
-      return;
+      names = names_in(line);
+      if (!header(names)) return;
+      continue;
     }
     if (line.find_first_not_of(blank) == std::string_view::npos) continue;
     has_rows = true;
@@ -102,13 +130,19 @@ void read_csv(const fs::path& path, std::string_view header, std::vector<Problem
     else
       problems.push_back({{path, current.line_, 1},
                           std::to_string(current.cells_.size()) + " cells",
-                          std::to_string(names.size()) + " cells: " + std::string(header),
+                          std::to_string(names.size()) + " cells: " + joined(names),
                           "separate cells by commas, write decimals with a point"});
   }
   if (current.line_ == 0)
-    problems.push_back({{path}, "the file is empty", "a CSV file with the header " + in_quotes(header), ""});
+    problems.push_back({{path}, "the file is empty", "a CSV file with a header", ""});
   else if (!has_rows)
     problems.push_back({{path}, "no row below the header", "one row at least", ""});
+}
+
+std::string csv_cell(std::string text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, "\"");
+  return "\"" + text + "\"";
 }
 
 }  // namespace pliant

@@ -21,13 +21,15 @@ class CsvRow {
   std::optional<double> number(std::size_t column);
   /// A whole number from 0.
   std::optional<int> index(std::size_t column);
+  /// The cell as it stands there, without spaces around it.
+  std::string raw(std::size_t column) const { return std::string(cells_[column].text); }
 
   int line() const { return line_; }
   void complain(std::size_t column, std::string found, std::string expected, std::string advice = "");
 
  private:
-  friend void read_csv(const std::filesystem::path&, std::string_view, std::vector<Problem>&,
-                       const std::function<void(CsvRow&)>&);
+  friend void read_csv(const std::filesystem::path&, const std::function<bool(const std::vector<std::string>&)>&,
+                       std::vector<Problem>&, const std::function<void(CsvRow&)>&);
   struct Cell {
     std::string_view text;  // without spaces around it
     int column;             // in the line, from 1
@@ -45,5 +47,14 @@ class CsvRow {
 /// Throws InputError where the file cannot be read.
 void read_csv(const std::filesystem::path& path, std::string_view header, std::vector<Problem>& problems,
               const std::function<void(CsvRow&)>& row);
+
+/// The same for a file whose columns may be of several kinds. A cell that begins with a quote ends with one, and may
+/// have commas.
+/// @param header  called with the names of the columns; false, with a problem told, where they will not do
+void read_csv(const std::filesystem::path& path, const std::function<bool(const std::vector<std::string>&)>& header,
+              std::vector<Problem>& problems, const std::function<void(CsvRow&)>& row);
+
+/// A text as a cell: in quotes, doubled where it has some, if it has commas, quotes or ends of lines.
+std::string csv_cell(std::string text);
 
 }  // namespace pliant

@@ -121,13 +121,6 @@ std::vector<BatchJob> batch_jobs(const std::vector<fs::path>& captures, const Fi
   return jobs;
 }
 
-std::vector<BatchJob> shard_of(const std::vector<BatchJob>& jobs, int part, int parts) {
-  std::vector<BatchJob> own;
-  for (std::size_t k = 0; k < jobs.size(); ++k)
-    if (int(k % std::size_t(parts)) == part - 1) own.push_back(jobs[k]);
-  return own;
-}
-
 std::optional<BatchStatus> read_status(const fs::path& batch, const BatchJob& job) {
   const fs::path file = status_file(batch, job);
   if (!is_file(file)) return std::nullopt;

@@ -38,9 +38,6 @@ std::vector<std::filesystem::path> captures_of(const std::vector<std::string>& p
 std::vector<BatchJob> batch_jobs(const std::vector<std::filesystem::path>& captures, const FitOptions& options,
                                  const std::string& program);
 
-/// Those of one of several equal parts, 1 <= part <= parts.
-std::vector<BatchJob> shard_of(const std::vector<BatchJob>& jobs, int part, int parts);
-
 /// How a job ended, where it did: nothing where `job.json` is not there, is damaged or belongs to another key.
 std::optional<BatchStatus> read_status(const std::filesystem::path& batch, const BatchJob& job);
 /// Throws InputError where it cannot be written.

@@ -6,6 +6,7 @@
 #include <array>
 #include <set>
 
+#include "base/csv.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "model/result.hpp"
@@ -37,12 +38,6 @@ std::string state_of(const Row& row) { return row.status ? name_of(row.status->s
 std::string number(const std::optional<ParameterValue>& value) {
   const double* scalar = value ? std::get_if<double>(&*value) : nullptr;
   return scalar ? fmt::format("{:.9g}", *scalar) : "";
-}
-
-std::string quoted(std::string text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, "\"");
-  return "\"" + text + "\"";
 }
 
 std::string escaped(const std::string& text) {
@@ -79,8 +74,8 @@ std::string csv(const std::vector<Row>& rows) {
     text += fmt::format(",{0} [{1}],{0} std [{1}],{0} 5 % [{1}],{0} 95 % [{1}]", name, unit);
   text += "\n";
   for (const Row& row : rows) {
-    text += quoted(row.job->capture.filename().string()) + "," + row.job->name + "," + state_of(row) + "," +
-            quoted(row.status ? row.status->reason : "");
+    text += csv_cell(row.job->capture.filename().string()) + "," + row.job->name + "," + state_of(row) + "," +
+            csv_cell(row.status ? row.status->reason : "");
     text += "," + (row.result ? row.result->verdict : "") + ",";
     if (row.result && row.result->error.surface_rms) text += fmt::format("{:.6g}", *row.result->error.surface_rms);
     for (const auto& [name, unit] : columns) {
@@ -127,23 +122,41 @@ std::string page(const std::vector<Row>& rows, const BatchSummary& summary) {
   return text + "\n</table>\n";
 }
 
-}  // namespace
-
-BatchSummary write_batch_table(const fs::path& batch, const std::vector<BatchJob>& jobs) {
+std::vector<Row> rows_of(const fs::path& batch, const std::vector<BatchJob>& jobs) {
   std::vector<Row> rows;
-  BatchSummary summary;
   for (const BatchJob& job : jobs) {
     Row row{&job, read_status(batch, job), {}};
     if (row.status) row.result = result_of(batch / job.name);
-    ++summary.jobs;
-    summary.ended += row.status.has_value() ? 1 : 0;
-    summary.converged += row.status && row.status->state == BatchStatus::State::Converged ? 1 : 0;
     rows.push_back(std::move(row));
   }
   std::ranges::sort(rows, {}, [](const Row& row) { return std::pair(row.job->capture.filename(), row.job->key); });
-  write_file(batch / "results.csv", csv(rows));
-  write_file(batch / "results.html", page(rows, summary));
+  return rows;
+}
+
+BatchSummary summary_of(const std::vector<Row>& rows) {
+  BatchSummary summary;
+  for (const Row& row : rows) {
+    ++summary.jobs;
+    summary.ended += row.status.has_value() ? 1 : 0;
+    summary.converged += row.status && row.status->state == BatchStatus::State::Converged ? 1 : 0;
+  }
   return summary;
+}
+
+}  // namespace
+
+BatchSummary write_batch_table(const fs::path& batch, const std::vector<BatchJob>& jobs) {
+  const auto ended = [&] {
+    return std::ranges::count_if(jobs, [&](const BatchJob& job) { return read_status(batch, job).has_value(); });
+  };
+  while (true) {
+    const std::vector<Row> rows = rows_of(batch, jobs);
+    const BatchSummary summary = summary_of(rows);
+    write_file(batch / "results.csv", csv(rows));
+    write_file(batch / "results.html", page(rows, summary));
+    // Another process may have ended a job and written its table meanwhile, in whose place this one now stands.
+    if (ended() == summary.ended) return summary;
+  }
 }
 
 }  // namespace pliant

@@ -2,17 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <random>
 
 #include "base/error.hpp"
-#include "elasticity/modes.hpp"
 #include "exports/flat_elements.hpp"
-#include "motion/statics.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/scene_simulation.hpp"
 
@@ -24,113 +20,6 @@ constexpr int frequencies_told = 6;
 constexpr double close_frequencies = 0.02;  // relative
 constexpr double fewest_cells = 2.0, most_cells = 300.0;
 constexpr int most_export_nodes = 8000;  // of a mesh that nobody asked for
-
-/// A scene that only elasticity and what is held act in.
-SimulationOptions elastic_alone(SimulationOptions options) {
-  options.is_static = true;
-  options.times = {0.0};
-  options.blocks.planes.clear(), options.blocks.pulls.clear(), options.blocks.strengths.clear();
-  options.further_forces.clear(), options.weights.clear(), options.loads.clear(), options.released_weights.clear();
-  options.law.reset(), options.law_layout.reset();
-  options.elastic_law = ElasticLaw::NeoHookean;
-  for (Hold& hold : options.holds) hold.rotation.setIdentity(), hold.translation.setZero();
-  return options;
-}
-
-/// Small motions about rest of a body that is held: forces to displacements.
-class Compliance {
- public:
-  Compliance(const std::shared_ptr<const Body>& body, const SimulationOptions& options, const VectorX& theta)
-      : body_(body), terms_(scene_forces(body, options)), statics_(body, pointers(terms_)) {
-    for (const auto& term : terms_) term->set_parameters(theta);
-    statics_.hold(eliminated_nodes(*body, options));
-    is_ready_ = statics_.prepare_derivatives(body->nodes);
-  }
-  bool is_ready() const { return is_ready_; }
-  Points displacements(const Points& forces) { return statics_.response(forces); }
-
-  /// Subspace iteration (Bathe 1996, section 11.6) with masses of this density [kg/m^3].
-  std::vector<double> frequencies(double density, int count) {
-    constexpr int most_iterations = 60;
-    const int size = 2 * count;
-    std::mt19937 random(1);
-    std::normal_distribution<double> normal;
-    std::vector<Points> x(std::size_t(size), Points(body_->node_count(), 3));
-    for (Points& shape : x)
-      for (Eigen::Index k = 0; k < shape.size(); ++k) shape.data()[k] = normal(random);
-    VectorX lambda = VectorX::Zero(size);
-    for (int i = 0; i < most_iterations; ++i) {
-      std::vector<Points> masses, moved, masses_moved;
-      for (const Points& shape : x) {
-        masses.push_back(mass_product(density, shape));
-        moved.push_back(displacements(masses.back()));
-        masses_moved.push_back(mass_product(density, moved.back()));
-      }
-      MatrixX K(size, size), M(size, size);
-      for (int a = 0; a < size; ++a)
-        for (int b = 0; b < size; ++b) {
-          K(a, b) = moved[std::size_t(a)].cwiseProduct(masses[std::size_t(b)]).sum();
-          M(a, b) = moved[std::size_t(a)].cwiseProduct(masses_moved[std::size_t(b)]).sum();
-        }
-      const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixX> small(0.5 * (K + K.transpose()),
-                                                                    0.5 * (M + M.transpose()));
-      for (int a = 0; a < size; ++a) {
-        x[std::size_t(a)].setZero();
-        for (int b = 0; b < size; ++b) x[std::size_t(a)] += small.eigenvectors()(b, a) * moved[std::size_t(b)];
-      }
-      const VectorX before = lambda;
-      lambda = small.eigenvalues();
-      if (((lambda - before).head(count).array().abs() < 1e-9 * lambda.head(count).array()).all()) break;
-    }
-    std::vector<double> hertz;
-    for (int k = 0; k < count; ++k) hertz.push_back(std::sqrt(lambda[k]) / (2.0 * std::numbers::pi));
-    return hertz;
-  }
-
- private:
-  static std::vector<ForceTerm*> pointers(const std::vector<std::unique_ptr<ForceTerm>>& terms) {
-    std::vector<ForceTerm*> all;
-    for (const auto& term : terms) all.push_back(term.get());
-    return all;
-  }
-  Points mass_product(double density, const Points& x) const {
-    Points product = Points::Zero(x.rows(), 3);
-    body_->add_mass_product(density, x, product);
-    return product;
-  }
-
-  std::shared_ptr<const Body> body_;
-  std::vector<std::unique_ptr<ForceTerm>> terms_;
-  Statics statics_;
-  bool is_ready_ = false;
-};
-
-/// @param points  at rest [m], n x 3, of which the sag is told
-SmallMotions small_motions(const std::shared_ptr<const Body>& body, const SimulationOptions& options,
-                           const VectorX& theta, const Points& points) {
-  SmallMotions motions;
-  const double density = theta[options.blocks.density];
-  if (options.holds.empty()) {
-    constexpr int rigid = 6;
-    ModalAnalysis analysis(body, options.blocks, {});
-    const Modes modes = analysis.lowest(theta, rigid + frequencies_told);
-    if (!modes.converged) throw InputError({{}, "the model's vibrations were not found: " + modes.failure, "", ""});
-    for (int k = rigid; k < modes.count(); ++k) motions.frequencies.push_back(modes.frequency(k));
-    return motions;
-  }
-  Compliance compliance(body, options, theta);
-  if (!compliance.is_ready())
-    throw InputError({{}, "the model's stiffness cannot be factorised", "regions that hold the whole object", ""});
-  motions.frequencies = compliance.frequencies(density, frequencies_told);
-  const Points gravity = theta.segment<3>(options.blocks.gravity).transpose().replicate(body->node_count(), 1);
-  Points weight = Points::Zero(body->node_count(), 3);
-  body->add_mass_product(density, gravity, weight);
-  std::vector<Vector3> places;
-  for (Eigen::Index n = 0; n < points.rows(); ++n) places.push_back(points.row(n).transpose());
-  const Points moved = Embedding(*body, places).positions(compliance.displacements(weight));
-  motions.sag = std::sqrt(moved.rowwise().squaredNorm().maxCoeff());
-  return motions;
-}
 
 /// Highest frequency of K with lumped masses over the nodes that are not held, by power iteration [rad/s].
 double stiffest_of(const std::shared_ptr<const Body>& body, const SimulationOptions& options, const VectorX& theta,
@@ -207,7 +96,7 @@ struct Comparison {
     c.poissons_ratio = poissons_ratio;
     VectorX theta = scene.theta;
     theta[options.blocks.poissons_ratio] = poissons_ratio;
-    c.motions = small_motions(c.body, options, theta, c.body->nodes);
+    c.motions = small_motions(c.body, options, theta, c.body->nodes, frequencies_told);
     // The same elements need no identification, but for rounding.
     if (!is_of(c.body->kind) || scene.body->node_count() != c.body->node_count())
       c.identified = std::pow(frequencies.front() / c.motions.frequencies.front(), 2);
@@ -274,8 +163,9 @@ ExportModel export_model(const Model& model, ElementKind kind, std::optional<dou
                       "leave the number out: a mesh that is fine enough is found"});
   const ModelScene scene = make_scene(model);
   const SimulationOptions options = elastic_alone(scene.simulation);
-  const Comparison comparison{model, scene, options,
-                              small_motions(scene.body, options, scene.theta, scene.body->nodes).frequencies};
+  const Comparison comparison{
+      model, scene, options,
+      small_motions(scene.body, options, scene.theta, scene.body->nodes, frequencies_told).frequencies};
   const Candidate chosen = chosen_mesh(comparison, kind, cells);
   ExportModel out;
   out.name = model.name;
@@ -285,7 +175,7 @@ ExportModel export_model(const Model& model, ElementKind kind, std::optional<dou
   out.mass_damping = model.mass_damping, out.stiffness_damping = model.stiffness_damping;
   out.gravity = scene.theta.segment<3>(options.blocks.gravity);
   out.held = eliminated_nodes(*out.body, options);
-  out.model = small_motions(scene.body, options, scene.theta, out.body->nodes);
+  out.model = small_motions(scene.body, options, scene.theta, out.body->nodes, frequencies_told);
   out.exported = chosen.motions;
   out.identified = chosen.identified;
   for (double& hertz : out.exported.frequencies) hertz *= std::sqrt(out.identified);

@@ -7,14 +7,9 @@
 
 #include "elasticity/body.hpp"
 #include "model/model.hpp"
+#include "simulation/small_motions.hpp"
 
 namespace pliant {
-
-/// How a model vibrates and sags, for small motions, before and after its mesh was replaced.
-struct SmallMotions {
-  std::vector<double> frequencies;  ///< [Hz], lowest first; of a free object without the six rigid motions
-  double sag = 0.0;  ///< [m] of the exported node that moves most under gravity, linear; 0: nothing is held
-};
 
 /// A model as other programs take it: tetrahedra, each with a modulus for small strains, what is held, and gravity.
 struct ExportModel {

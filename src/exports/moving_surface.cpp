@@ -9,16 +9,9 @@ namespace pliant {
 MovingSurface moving_surface(const Model& model, const ExportProgress& progress) {
   const ModelScene scene = make_scene(model);
   MovingSurface moving;
-  std::vector<Vector3> vertices;
-  if (model.scene.object.surface) {
-    vertices = model.scene.object.surface->vertices;
-    moving.triangles = model.scene.object.surface->triangles;
-  } else {
-    const auto& mesh = std::get<TetMesh>(scene.body->mesh);
-    for (Eigen::Index n = 0; n < mesh.nodes.rows(); ++n) vertices.push_back(mesh.nodes.row(n).transpose());
-    moving.triangles = mesh.boundary;
-  }
-  const Embedding surface(*scene.body, vertices);
+  const TriangleMesh seen = surface_of(model, *scene.body);
+  moving.triangles = seen.triangles;
+  const Embedding surface(*scene.body, seen.vertices);
   const int count = int(scene.simulation.times.size());
   bool is_going_on = true;
   Simulation simulation(scene.body, scene.simulation);

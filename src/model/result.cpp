@@ -41,6 +41,10 @@ Json parameter_json(const ParameterResult& parameter) {
   if (parameter.step_error) json["step_error"] = value_json(*parameter.step_error);
   if (parameter.extrapolated) json["extrapolated"] = value_json(*parameter.extrapolated);
   if (parameter.start) json["start"] = value_json(*parameter.start);
+  if (parameter.prior)
+    json["prior"] = {
+        {"median", number(parameter.prior->median)},
+        {"interval_90", {number(parameter.prior->interval_90.first), number(parameter.prior->interval_90.second)}}};
   json["estimated"] = parameter.estimated;
   return json;
 }
@@ -256,6 +260,14 @@ std::optional<std::pair<double, double>> read_interval(const Member& member) {
   return std::pair(ends[0], ends[1]);
 }
 
+std::optional<PriorResult> read_prior(const Member& parameter) {
+  if (!parameter.has("prior")) return std::nullopt;
+  const Member prior = parameter["prior"];
+  const auto interval = read_interval(prior);
+  if (!interval) prior.fail("a `median` and an `interval_90`");
+  return PriorResult{prior["median"].number(), *interval};
+}
+
 ParameterResult read_parameter(const std::string& name, const Member& member) {
   return {name,
           member["value"].value(),
@@ -268,7 +280,8 @@ ParameterResult read_parameter(const std::string& name, const Member& member) {
           optional_value(member, "extrapolated"),
           optional_value(member, "std_noise"),
           optional_value(member, "std_model"),
-          read_interval(member)};
+          read_interval(member),
+          read_prior(member)};
 }
 
 ControlPoint read_control_point(const Member& member) {

@@ -24,6 +24,13 @@ struct PlaneValue {
 
 using ParameterValue = std::variant<double, Vector3, PlaneValue>;
 
+/// What was held likely of a scalar before the recording was seen.
+struct PriorResult {
+  double median = 0.0;
+  std::pair<double, double> interval_90;
+  bool operator==(const PriorResult&) const = default;
+};
+
 /// A parameter, estimated or given; `name` as in the format, with "@region" where it belongs to one.
 struct ParameterResult {
   std::string name;
@@ -38,6 +45,7 @@ struct ParameterResult {
   /// What `std` is made of, where models other than the fit's were tried, and the 90 % interval of a scalar.
   std::optional<ParameterValue> std_noise = {}, std_model = {};
   std::optional<std::pair<double, double>> interval_90 = {};
+  std::optional<PriorResult> prior = {};  ///< of an estimated scalar that has one, in its unit
 };
 
 /// A control point of a field of values.

@@ -306,6 +306,18 @@ void add_uncertainty_of(ParameterResult& r, const Parameter& p, const FitOutcome
   r.interval_90 = std::pair(within_bounds(low), within_bounds(high));
 }
 
+/// The prior of an estimated scalar whose unconstrained number is that at `at`; nothing where it has none.
+std::optional<PriorResult> prior_of(const Parameter& p, const FitOutcome& outcome, int at) {
+  if (!p.is_scalar() || p.is_auxiliary || !std::isfinite(p.prior_std)) return std::nullopt;
+  constexpr double of_90_percent = 1.6449;
+  const auto value = [&](double deviations) {
+    VectorX there = outcome.parameters.to_unconstrained(outcome.theta);
+    there[at] = p.prior_mean[0] + deviations * p.prior_std;
+    return outcome.parameters.to_theta(outcome.parameters.clamp(there))[p.at];
+  };
+  return PriorResult{value(0.0), {value(-of_90_percent), value(of_90_percent)}};
+}
+
 void add_verdict(Result& result, const FitOutcome& outcome, const MatrixX& jacobian) {
   if (outcome.uncertainty.std.size() == 0) return;
   if (!outcome.law) {  // the noise of presses is what their residuals say
@@ -343,6 +355,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
     if (p.estimated) {
       if (outcome.start_theta.size() > 0) r.start = value_of(p, outcome.start_theta);
       if (has_std) add_uncertainty_of(r, p, outcome, jacobian, at);
+      r.prior = prior_of(p, outcome, at);
       if (refinement.mesh_error.size() > 0) r.mesh_error = std_of(p, refinement.mesh_error, jacobian, at);
       if (refinement.step_error.size() > 0) r.step_error = std_of(p, refinement.step_error, jacobian, at);
       if (repeated) r.extrapolated = value_of(p, outcome.parameters.to_theta(refinement.extrapolated));

@@ -9,19 +9,14 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "base/base64.hpp"
 #include "base/files.hpp"
 #include "report/image.hpp"
-#include "report/page_style.hpp"
+#include "report/page.hpp"
 #include "report/plot.hpp"
 
 namespace pliant {
 
 namespace {
-
-std::string section(const std::string& title, const std::string& body) {
-  return body.empty() ? "" : "<section><h2>" + title + "</h2>\n" + body + "</section>\n";
-}
 
 std::optional<double> scalar(const std::optional<ParameterValue>& value) {
   if (!value || !std::holds_alternative<double>(*value)) return std::nullopt;
@@ -103,17 +98,6 @@ std::string words(const ReportData& data) {
 
 // ---- pictures
 
-std::string figures(const std::vector<ReportPicture>& pictures) {
-  if (pictures.empty()) return "";
-  std::string html = "<div class=\"pictures\">\n";
-  for (const ReportPicture& picture : pictures) {
-    const std::string caption = escape_html(picture.caption);
-    html += "<figure><img alt=\"" + caption + "\" src=\"data:image/png;base64," + encode_base64(picture.png) +
-            "\"><figcaption>" + caption + "</figcaption></figure>\n";
-  }
-  return html + "</div>\n";
-}
-
 std::string residual_scale(double range) {
   if (range <= 0.0) return "";
   std::string svg =
@@ -141,38 +125,6 @@ std::string pictures(const ReportData& data) {
 }
 
 // ---- plots
-
-std::string panel(const std::string& content) { return "<div class=\"panel\">" + content + "</div>\n"; }
-
-std::string field_plot(const ReportField& field) {
-  if (field.at.size() < 2) return "";
-  double most = 0.0;
-  for (const double v : field.greatest)
-    if (std::isfinite(v)) most = std::max(most, std::abs(v));
-  const auto [factor, unit] = spoken_unit(most, field.unit);
-  std::array<Series, 2> series;
-  series[0].label = "greatest of all elements", series[1].label = "mean by volume";
-  for (std::size_t i = 0; i < field.at.size(); ++i) {
-    for (Series& s : series) s.x.push_back(field.at[i]);
-    series[0].y.push_back(factor * field.greatest[i]);
-    series[1].y.push_back(factor * field.mean[i]);
-  }
-  PlotOptions options;
-  options.x_label = field.abscissa, options.y_label = unit.empty() ? field.name : field.name + " [" + unit + "]";
-  options.zero_y = true, options.height = 260;
-  return panel(plot_svg({series[0], series[1]}, options));
-}
-
-std::string fields_section(const std::vector<ReportField>& fields) {
-  std::string html;
-  int number = 0;
-  for (const ReportField& field : fields) {
-    html += "<h3>" + escape_html(field.name) + "</h3>\n<div class=\"scale\">" +
-            colour_bar_svg(field.scale, field.name, field.unit, fmt::format("field-{}", ++number)) + "</div>\n" +
-            figures(field.pictures) + field_plot(field);
-  }
-  return html;
-}
 
 std::string residual_plot(const std::vector<FrameResidual>& residuals) {
   if (residuals.empty()) return "";
@@ -267,11 +219,6 @@ std::string convergence(const ReportData& data) {
 
 // ---- tables
 
-std::string table(const std::string& head, const std::string& body) {
-  return "<div class=\"panel table\"><table><thead><tr>" + head + "</tr></thead><tbody>\n" + body +
-         "</tbody></table></div>\n";
-}
-
 std::string parameter_table(const Result& result) {
   std::string body;
   for (const ParameterResult& p : result.parameters)
@@ -311,14 +258,6 @@ std::string uncertainty_table(const Result& result) {
          "a "
          "few steps; what the capture gives moves within its tolerance.</p>\n" +
          "<p>" + escape_html(largest_share_sentence(result)) + "</p>\n";
-}
-
-// Readable on the diverging colours of both ends.
-std::string correlation_cell(double value) {
-  const Rgb colour = diverging_colour(value);
-  const char* ink = std::abs(value) > 0.7 ? "#fff" : "#222";
-  return fmt::format("<td class=\"cell\" style=\"background:{};color:{}\">{}{:.2f}</td>", css(colour), ink,
-                     value < 0 ? "−" : "", std::abs(value));
 }
 
 std::string correlation_table(const CorrelationTable& correlations) {
@@ -562,13 +501,6 @@ std::string footer(const Result& result) {
   if (result.time.ms_per_forward_step) text += ", " + readable(*result.time.ms_per_forward_step, 3) + " ms a step";
   if (!result.capture.sha256.empty()) text += "; recording " + result.capture.sha256.substr(0, 16);
   return "<footer>" + escape_html(text) + "</footer>\n";
-}
-
-std::string page_head(const std::string& title) {
-  return "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-         "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
-         "<meta name=\"color-scheme\" content=\"light dark\"><title>" +
-         title + "</title><style>" + page_style + "</style></head><body><main>\n";
 }
 
 }  // namespace

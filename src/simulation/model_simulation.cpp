@@ -151,6 +151,15 @@ std::shared_ptr<const Body> model_body(const Model& model, std::optional<Element
   return kind ? of_kind(std::move(own), *kind) : own;
 }
 
+TriangleMesh surface_of(const Model& model, const Body& body) {
+  if (model.scene.object.surface) return *model.scene.object.surface;
+  const auto& mesh = std::get<TetMesh>(body.mesh);
+  TriangleMesh surface;
+  for (Eigen::Index n = 0; n < mesh.nodes.rows(); ++n) surface.vertices.push_back(mesh.nodes.row(n).transpose());
+  surface.triangles = mesh.boundary;
+  return surface;
+}
+
 ModelScene make_scene(const Model& model) {
   Scene situation = model.scene;
   if (situation.timing.times.empty()) situation.timing.is_static = true, situation.timing.times = {0.0};

@@ -29,6 +29,11 @@ ModelScene make_scene(const Model& model);
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
                       const std::filesystem::path& file, bool has_wind = false);
 
+/// What is seen of a model: the object's surface, or, where it has none, the boundary of its tetrahedra over all of
+/// their nodes.
+/// @param body  of the model (`make_scene`)
+TriangleMesh surface_of(const Model& model, const Body& body);
+
 /// The body of a model as tetrahedra, with each element's modulus: its own, or, where the model is of hexahedra,
 /// quadratic ones with about as many nodes along its longest axis, each with the modulus of the hexahedron about it.
 /// @param kind   linear or quadratic; others than the above become eight linear ones each, or get mid nodes

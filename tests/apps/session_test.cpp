@@ -115,6 +115,11 @@ TEST_F(Session, ResultHoldsWhatTheFormatPromises) {
     EXPECT_EQ(p.contains("std") && p.contains("start"), p["estimated"].get<bool>()) << name;
   }
   EXPECT_GT(found["parameters"]["youngs_modulus"]["std"].get<double>(), 0.0);
+  EXPECT_FALSE(found["parameters"]["youngs_modulus"].contains("prior")) << "none was chosen";
+  const json& prior = found["parameters"]["poissons_ratio"]["prior"];
+  EXPECT_NEAR(prior["median"].get<double>(), 0.35, 1e-9);
+  EXPECT_LT(prior["interval_90"][0], 0.3);
+  EXPECT_GT(prior["interval_90"][1], 0.4);
   EXPECT_EQ(found["parameters"]["youngs_modulus"]["unit"], "Pa");
   EXPECT_EQ(found["error"]["points"], 100 * frames);
   EXPECT_GT(found["cost"]["start"].get<double>(), found["cost"]["final"].get<double>());

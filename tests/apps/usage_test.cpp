@@ -29,7 +29,7 @@ TEST(Usage, HelpNamesEveryCommandAndTheExitCodes) {
   const ProgramRun run = run_pliant({"--help"});
   EXPECT_EQ(run.exit_code, 0);
   for (const char* word : {"check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track", "markers", "press",
-                           "export", "import", "batch", "new", "130"})
+                           "export", "import", "batch", "ensemble", "new", "130"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
@@ -54,7 +54,7 @@ TEST_P(CommandHelp, IsGivenOnStdout) {
 
 INSTANTIATE_TEST_SUITE_P(Usage, CommandHelp,
                          testing::Values("check", "fit", "simulate", "evaluate", "synth", "mesh", "scan", "track",
-                                         "markers", "press", "export", "import", "batch"),
+                                         "markers", "press", "export", "import", "batch", "ensemble"),
                          [](const auto& choice) { return std::string(choice.param); });
 
 TEST(Usage, FitsHelpListsItsKeysAndParameters) {
@@ -83,6 +83,7 @@ TEST(Usage, AMissingFileIsNamed) {
                                                     {"simulate", missing + "/model.toml", "--out", out},
                                                     {"evaluate", missing + "/model.toml", missing},
                                                     {"export", missing + "/model.toml", "--to", "gmsh", "--out", out},
+                                                    {"ensemble", missing, "--out", out},
                                                     {"synth", missing + "/scene.toml", "--out", out}}) {
     const ProgramRun run = run_pliant(arguments);
     EXPECT_EQ(run.exit_code, bad_input) << arguments[0];

@@ -64,6 +64,27 @@ TEST(Csv, RefusesAnotherHeaderAndEmptyFiles) {
   EXPECT_THAT(Reading("name,count,length\n\n").said, ElementsAre(HasSubstr("no row below the header")));
 }
 
+TEST(Csv, TakesColumnsThatItsReaderChooses) {
+  const TemporaryFolder folder;
+  const auto path = folder.write("b.csv", "what, \"how, much\" ,n\n\"a, \"\"b\"\"\",2,3\n");
+  std::vector<std::string> names, cells;
+  std::vector<Problem> problems;
+  const auto header = [&](const std::vector<std::string>& there) {
+    names = there;
+    return true;
+  };
+  read_csv(path, header, problems, [&](CsvRow& row) { cells = {row.raw(0), row.raw(1), row.raw(2)}; });
+  EXPECT_THAT(names, ElementsAre("what", "\"how, much\"", "n"));
+  EXPECT_THAT(cells, ElementsAre("\"a, \"\"b\"\"\"", "2", "3"));
+  read_csv(
+      path, [](const auto&) { return false; }, problems, [&](CsvRow&) { FAIL() << "it was refused"; });
+}
+
+TEST(Csv, CellsWithCommasAreQuoted) {
+  EXPECT_EQ(csv_cell("plain text"), "plain text");
+  EXPECT_EQ(csv_cell("a, \"b\""), "\"a, \"\"b\"\"\"");
+}
+
 TEST(Csv, ThrowsWhereThereIsNoFile) {
   std::vector<Problem> problems;
   EXPECT_THAT(complaint_of([&] { read_csv("nowhere/a.csv", "x", problems, [](CsvRow&) {}); }),

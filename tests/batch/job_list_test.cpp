@@ -4,6 +4,7 @@
 
 #include "base/error.hpp"
 #include "batch/job_table.hpp"
+#include "jobs/shards.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant::job_list_test {
@@ -68,7 +69,7 @@ TEST_F(Jobs, ShardsShareThemOut) {
   const std::vector<BatchJob> all = jobs();
   std::vector<std::string> keys;
   for (int part = 1; part <= 2; ++part)
-    for (const BatchJob& job : shard_of(all, part, 2)) keys.push_back(job.key);
+    for (const BatchJob& job : shard_of(all, Shard{part, 2})) keys.push_back(job.key);
   EXPECT_THAT(keys, SizeIs(3));
   std::ranges::sort(keys);
   for (std::size_t k = 0; k < all.size(); ++k) EXPECT_EQ(keys[k], all[k].key);

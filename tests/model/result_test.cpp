@@ -140,6 +140,7 @@ TEST(Result, IntervalsVerdictAndBudgetComeBack) {
   Result result = full_result();
   result.parameters[0].interval_90 = std::pair(553.0, 629.0);
   result.parameters[0].std_noise = 9.0, result.parameters[0].std_model = 19.0;
+  result.parameters[0].prior = PriorResult{500.0, {200.0, 1250.0}};
   result.verdict = "unexplained", result.reasons = {"The distances are 3.0 times the noise."};
   result.uncertainty = {{"noise", {{"youngs_modulus", 9.0}}}, {"mesh", {{"youngs_modulus", std::nan("")}}}};
   write_result(folder / "result.json", result);
@@ -147,6 +148,8 @@ TEST(Result, IntervalsVerdictAndBudgetComeBack) {
   EXPECT_EQ(read.parameters[0].interval_90, result.parameters[0].interval_90);
   EXPECT_EQ(read.parameters[0].std_noise, result.parameters[0].std_noise);
   EXPECT_EQ(read.parameters[0].std_model, result.parameters[0].std_model);
+  EXPECT_EQ(read.parameters[0].prior, result.parameters[0].prior);
+  EXPECT_FALSE(read.parameters[1].prior);
   EXPECT_EQ(read.verdict, result.verdict);
   EXPECT_EQ(read.reasons, result.reasons);
   ASSERT_EQ(read.uncertainty.size(), 2u);
@@ -178,6 +181,7 @@ TEST(Result, ReaderNamesTheMemberThatIsWrong) {
   EXPECT_THAT(complaint("/parameters/youngs_modulus/value", nullptr), HasSubstr("parameters.youngs_modulus.value"));
   EXPECT_THAT(complaint("/parameters/gravity/value", {1, 2}), HasSubstr("three numbers"));
   EXPECT_THAT(complaint("/parameters/gravity/estimated", 1), HasSubstr("true or false"));
+  EXPECT_THAT(complaint("/parameters/youngs_modulus/prior", {{"median", 1.0}}), HasSubstr("an `interval_90`"));
   EXPECT_THAT(complaint("/identifiability/0/parameters", {"one"}), HasSubstr("two names"));
   EXPECT_THAT(complaint("/fields/youngs_modulus/control_points/1", {1, 2}), HasSubstr("control_points[1]"));
   EXPECT_THAT(complaint("/error/points", 1.5), HasSubstr("error.points"));

@@ -1,4 +1,4 @@
-#include "batch/claim.hpp"
+#include "jobs/claim.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
