@@ -81,8 +81,9 @@ def fit(program, folder, out, choices, truth):
 
 
 def main():
-    arguments = common.arguments(__doc__)
-    results = {"fits": {}, "tracks": {}, "loops": {}}
+    arguments = common.arguments(__doc__, only={"metavar": "NAME", "help": "of the fits, this one ('zones, points'); all else stays as it is stored"})
+    stored = HERE / "results.json"
+    results = common.read(stored) if arguments.only and stored.exists() else {"fits": {}, "tracks": {}, "loops": {}}
     for name, source in SETS.items():
         folder = common.shared_data() / source
         if not (folder / "capture.toml").exists():
@@ -90,11 +91,13 @@ def main():
             continue
         truth = common.read(folder / "truth.json")["parameters"]
         for way, choices in WAYS.items():
+            if arguments.only and arguments.only != f"{name}, {way}":
+                continue
             figures = fit(arguments.program, folder, arguments.work / f"{name}-{way.replace(',', '').replace(' ', '-')}", choices, truth)
             results["fits"][f"{name}, {way}"] = figures
             print(name, way, figures.get("error"), figures.get("zones"), figures["wall_seconds"], "s", flush=True)
             common.write_results(__file__, results)
-        if name == "zones":
+        if name == "zones" or arguments.only:
             continue
         true = truth["youngs_modulus"]["value"]
         for wrong, factor in WRONG.items():
