@@ -301,16 +301,14 @@ void CorotatedElasticity<N>::add_mean_stress(int e, const Matrix3& H, const Mean
   const Eigen::Index count = std::min<Eigen::Index>(4, changes.theta.cols() - first);
   for (Eigen::Index l = 0; l < count; ++l) {
     Matrix3 own, ahead;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        const auto k = std::size_t(3 * i + j);
-        own(i, j) = dF[k][l], ahead(i, j) = dz[k][l] - dF[k][l];
-      }
+    for (std::size_t k = 0; k < 9; ++k) {
+      const auto i = Eigen::Index(k / 3), j = Eigen::Index(k % 3);
+      own(i, j) = dF[k][l], ahead(i, j) = dz[k][l] - dF[k][l];
+    }
     Matrix3 dP = mean.tangent(H, own, ahead) + modulus_.log_change(e, first + l) * mean.stress(H);
     const double d_nu = changes.theta(Eigen::Index(material_.poissons_ratio), first + l);
     if (d_nu != 0.0) dP += d_nu * mean.by_poissons_ratio(H);
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) P[std::size_t(3 * i + j)][l] = dP(i, j);
+    for (std::size_t k = 0; k < 9; ++k) P[k][l] = dP(Eigen::Index(k / 3), Eigen::Index(k % 3));
   }
 }
 

@@ -37,13 +37,13 @@ template <int N>
 void gather_lanes(const int* nodes, std::span<const Points* const> fields, bool relative, ElementLanes<N>& lanes) {
   const double* rows[4];
   for (std::size_t l = 0; l < 4; ++l) rows[l] = fields[l < fields.size() ? l : 0]->data();
-  const auto row = [&](int a, int i) {
-    const std::size_t k = 3 * std::size_t(nodes[a]) + std::size_t(i);
+  const auto row = [&](std::size_t a, std::size_t i) {
+    const std::size_t k = 3 * std::size_t(nodes[a]) + i;
     return Wide<double>{rows[0][k], rows[1][k], rows[2][k], rows[3][k]};
   };
-  for (int i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3; ++i) {
     const Wide<double> first = relative ? row(0, i) : Wide<double>{};
-    for (int a = 0; a < N; ++a) lanes[std::size_t(3 * a + i)] = row(a, i) - first;
+    for (std::size_t a = 0; a < N; ++a) lanes[3 * a + i] = row(a, i) - first;
   }
 }
 
@@ -51,17 +51,19 @@ void gather_lanes(const int* nodes, std::span<const Points* const> fields, bool 
 template <int N>
 void subtract_lanes(const int* nodes, const ElementLanes<N>& lanes, std::span<Points> fields) {
   for (std::size_t l = 0; l < fields.size(); ++l)
-    for (int a = 0; a < N; ++a)
-      for (int i = 0; i < 3; ++i) fields[l](nodes[a], i) -= lanes[std::size_t(3 * a + i)][l];
+    for (std::size_t a = 0; a < N; ++a) {
+      double* row = fields[l].data() + 3 * std::size_t(nodes[a]);
+      for (std::size_t i = 0; i < 3; ++i) row[i] -= lanes[3 * a + i][l];
+    }
 }
 
 /// Mean gradients of four fields over an element: sum_a x_a g_a^T.
 template <int N, class Gradients>
 MatrixLanes mean_gradient_lanes(const Gradients& g, const ElementLanes<N>& x) {
   MatrixLanes F{};
-  for (int a = 0; a < N; ++a)
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) F[std::size_t(3 * i + j)] += x[std::size_t(3 * a + i)] * g(a, j);
+  for (std::size_t a = 0; a < N; ++a)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) F[3 * i + j] += x[3 * a + i] * g(Eigen::Index(a), Eigen::Index(j));
   return F;
 }
 
