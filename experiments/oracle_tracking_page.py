@@ -14,8 +14,8 @@ def clouds():
         E = fit["parameters"]["youngs_modulus"]
         judged_by = percent(fit["error"]) if "error" in fit else ", ".join(f"{z['mean'] / 1e3:.0f} kPa ({percent(z['mean'] / z['truth'] - 1)})" for z in fit["zones"])
         kept = fit["tracking"]["kept"] if fit.get("tracking") else "points"
-        rows.append([name, f"{E['value'] / 1e3:.0f} ± {E['std'] / 1e3:.0f}" if E.get("std") else f"{E['value'] / 1e3:.0f}", judged_by, kept, f"{1e3 * fit['surface_rms']:.2f}", f"{fit['wall_seconds']:.0f}", fit.get("commit", "")[:7]])
-    text += table(["recording, way", "E [kPa]", "against the truth; zones from above", "kept", "surface rms [mm]", "time [s]", "program"], rows)
+        rows.append([name, f"{E['value'] / 1e3:.0f} ± {E['std'] / 1e3:.0f}" if E.get("std") else f"{E['value'] / 1e3:.0f}", judged_by, kept, f"{1e3 * fit['surface_rms']:.2f}", f"{fit['wall_seconds']:.0f} / {fit['processor_seconds']:.0f}", fit.get("commit", "")[:7]])
+    text += table(["recording, way", "E [kPa]", "against the truth; zones from above", "kept", "surface rms [mm]", "time / of processor [s]", "program"], rows)
     for name, fit in figures["fits"].items():
         held = (fit.get("tracking") or {}).get("held_out_frames")
         if held:
