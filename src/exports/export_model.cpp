@@ -122,13 +122,14 @@ struct Comparison {
     return best;
   }
 
-  /// Finer meshes until all frequencies are close, one more would have too many nodes, or they come no closer: then the
-  /// model's own elements are too coarse to be met. The error falls with the square of the elements' size, which says
-  /// how much finer the next mesh is to be.
+  /// Finer meshes until all frequencies are close, one more would have too many nodes, or they come no closer twice:
+  /// then the model's own elements are too coarse to be met. The error falls with the square of the elements' size,
+  /// which says how much finer the next mesh is to be.
   Candidate fine_enough(ElementKind kind) const {
     constexpr double finest_step = 2.0, coarsest_step = 1.25, aim = 0.85 * close_frequencies;
     constexpr int most_meshes = 5;
     Candidate best = candidate(kind, std::nullopt), last = best;
+    int no_closer = 0;
     double cells = (kind == ElementKind::Tetrahedron ? 1.2 : 0.6) * object_size(model.scene) / model.cell_size;
     for (int k = 1; k < most_meshes && best.off > close_frequencies; ++k) {
       const double room = std::cbrt(double(most_export_nodes) / last.body->node_count());
@@ -138,7 +139,8 @@ struct Comparison {
       last = candidate(kind, cells *= finer);
       if (last.off < 0.9 * best.off) best = last;
       const bool is_no_closer = last.off > 0.5 * (1.0 + 1.0 / (finer * finer)) * before;
-      if (k > 1 && is_no_closer) break;  // the first was not laid anew
+      no_closer = k > 1 && is_no_closer ? no_closer + 1 : 0;  // the first was not laid anew
+      if (no_closer == 2) break;                              // one mesh may be worse than its size promises
     }
     return best;
   }
