@@ -14,7 +14,7 @@ namespace pliant {
 /// What a fit spends its time on. No two overlap: what runs within another is not counted for that one too.
 enum class Activity {
   Reading,       ///< images and clouds, to points with noise
-  Meshing,       ///< elements and signed distances of a scan, and the ready body
+  Meshing,       ///< a body of elements out of a scan, and what is compared with its surface
   LoadFree,      ///< stress-free shapes of scans that sag, and their derivatives
   Equilibria,    ///< of what is at rest, held or pressed, and their derivatives
   Steps,         ///< time steps
