@@ -149,9 +149,7 @@ LiveData live_data(const Model& model) {
   return data;
 }
 
-std::string live_page(const Model& model, const LiveRecording& recording, const std::vector<LiveSample>& samples) {
-  LiveData data = live_data(model);
-  data.samples = samples;
+std::string live_page(const Model& model, LiveData data, const LiveRecording& recording) {
   if (data.is_pressed) data.tests = recording.presses;
   std::string page(pliant_live_html());
   replace(page, "@NAME@", escaped(model.name));
@@ -162,6 +160,10 @@ std::string live_page(const Model& model, const LiveRecording& recording, const 
   replace(page, "@WORKER@", pliant_live_worker());
   replace(page, "@PAGE@", pliant_live_script());
   return page;
+}
+
+std::string live_page(const Model& model, const LiveRecording& recording) {
+  return live_page(model, live_data(model), recording);
 }
 
 }  // namespace pliant

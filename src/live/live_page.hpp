@@ -23,8 +23,9 @@ LiveData live_data(const Model& model);
 
 /// A page in which the object can be pulled, poked and blown at: one file that needs neither server nor network. It
 /// holds the simulation as WebAssembly, the object, and what was recorded of it.
-/// @param samples  of the posterior
-std::string live_page(const Model& model, const LiveRecording& recording = {},
-                      const std::vector<LiveSample>& samples = {});
+/// @param data  of the model, with samples of the posterior where there are any
+std::string live_page(const Model& model, LiveData data, const LiveRecording& recording);
+/// The same without samples.
+std::string live_page(const Model& model, const LiveRecording& recording = {});
 
 }  // namespace pliant

@@ -513,7 +513,9 @@ std::string write_live_page(const fs::path& folder, const RecordedCapture& recor
       recording.points.push_back(outcome.law->scene->presses[i].loaded);
     }
   const char* const name = "live.html";
-  write_file(folder / name, live_page(model, recording, posterior_samples(outcome, live_data(model))));
+  LiveData data = live_data(model);
+  data.samples = posterior_samples(outcome, data);
+  write_file(folder / name, live_page(model, std::move(data), recording));
   return name;
 }
 

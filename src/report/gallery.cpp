@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/parallel.hpp"
 #include "report/plot.hpp"
 
 namespace pliant {
@@ -68,11 +69,12 @@ std::vector<ReportPicture> draw_gallery(const Gallery& gallery, double range) {
   PictureOptions options;
   options.samples = gallery.samples;
   options.residual_range = range > 0.0 ? range : residual_range(all_residuals(gallery));
-  std::vector<ReportPicture> pictures;
-  for (const GalleryFrame& frame : gallery.frames) {
+  std::vector<ReportPicture> pictures(gallery.frames.size());
+  parallel_tasks(pictures.size(), [&](std::size_t i) {
+    const GalleryFrame& frame = gallery.frames[i];
     const PictureScene scene{frame.surface, gallery.triangles, gallery.planes, frame.points, frame.residuals};
-    pictures.push_back({encode_png(draw(scene, view, options)), caption(gallery, frame)});
-  }
+    pictures[i] = {encode_png(draw(scene, view, options)), caption(gallery, frame)};
+  });
   return pictures;
 }
 
@@ -89,14 +91,15 @@ ReportField draw_field(const Gallery& gallery, const std::vector<FieldState>& st
   field.scale = colour_scale(all, ends);
   const PinholeCamera view = view_of(gallery, box);
   PictureOptions options;
-  options.samples = gallery.samples;
-  options.even_light = 0.75;
-  for (const FieldState& state : states) {
+  options.samples = 2, options.light_rays = 1, options.even_light = 0.75;  // colours speak; light shows the shape alone
+  field.pictures.resize(states.size());
+  parallel_tasks(states.size(), [&](std::size_t i) {
+    const FieldState& state = states[i];
     PictureScene scene{state.surface, gallery.triangles, gallery.planes, {}, {}};
     for (const double v : state.values) scene.colours.push_back(field.scale.colour(v));
     scene.about = box;
-    field.pictures.push_back({encode_png(draw(scene, view, options)), state.caption});
-  }
+    field.pictures[i] = {encode_png(draw(scene, view, options)), state.caption};
+  });
   return field;
 }
 

@@ -40,9 +40,10 @@ int main(int argc, char** argv) {
   model.scene.initial.angular_velocity = Vector3(3.0, 0.0, 6.0);
   const LiveRecording recording{{0.0, 0.1, 0.2}, {}, {{Vector3(0, 0, 0)}, {Vector3(0.05, 0, 0)}, {}}};
   const LiveData data = live_data(model);
-  std::vector<LiveSample> samples(2, LiveSample{data.theta, {}});
-  live_blocks(data.planes).scale_moduli(samples[0].theta, 0.2);
-  const std::string page = live_page(model, recording, samples);
+  LiveData with_samples = data;
+  with_samples.samples.assign(2, LiveSample{data.theta, {}});
+  live_blocks(data.planes).scale_moduli(with_samples.samples[0].theta, 0.2);
+  const std::string page = live_page(model, with_samples, recording);
   write_file(folder / "free.html", page);
   LiveMotion object(data);
   object.start_as_recorded();
@@ -60,14 +61,14 @@ int main(int argc, char** argv) {
   presses.presses = {{{0.06, 0.025, 0.0}, 0.015, {0.0, -1.0, 0.0}}, {{0.06, 0.025, 0.0}, 0.015, {0.0, -2.0, 0.0}}};
   presses.points = {{Vector3(0.06, 0.02, 0.0)}, {Vector3(0.06, 0.015, 0.0)}};
   const Model pressed = test::pressed_block();
-  std::vector<LiveSample> laws;
+  LiveData with_laws = live_data(pressed);
   for (const double factor : {0.5, 2.0}) {
     Model other = pressed;
     for (std::vector<double>& row : other.law->rows) row[1] *= factor;
     const LiveData sample_data = live_data(other);
-    laws.push_back({sample_data.theta, sample_data.law});
+    with_laws.samples.push_back({sample_data.theta, sample_data.law});
   }
-  write_file(folder / "pressed.html", live_page(pressed, presses, laws));
+  write_file(folder / "pressed.html", live_page(pressed, with_laws, presses));
   Model one = test::block(false);
   one.cell_size = 0.5;
   write_file(folder / "one.html", live_page(one));
