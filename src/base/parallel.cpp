@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 #endif
 #include <utility>
@@ -22,6 +23,10 @@ void parallel_ranges(std::size_t first, std::size_t last, std::size_t grain,
 void parallel_tasks(std::size_t count, const std::function<void(std::size_t)>& body) {
   tbb::parallel_for(std::size_t(0), count, body, tbb::simple_partitioner());
 }
+
+int thread_count() { return int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)); }
+
+void run_isolated(const std::function<void()>& body) { tbb::this_task_arena::isolate(body); }
 
 struct TaskGroup::Tasks {
   tbb::task_group group;
@@ -57,6 +62,10 @@ void parallel_ranges(std::size_t first, std::size_t last, std::size_t,
 void parallel_tasks(std::size_t count, const std::function<void(std::size_t)>& body) {
   for (std::size_t i = 0; i < count; ++i) body(i);
 }
+
+int thread_count() { return 1; }
+
+void run_isolated(const std::function<void()>& body) { body(); }
 
 struct TaskGroup::Tasks {};
 

@@ -28,6 +28,13 @@ void parallel_for(Index first, Index last, const Body& body) {
 /// Calls body(i) once for each i of [0, count), each a task of its own: for few indices of much and uneven work.
 void parallel_tasks(std::size_t count, const std::function<void(std::size_t)>& body);
 
+/// Most threads that parallel loops use.
+int thread_count();
+
+/// Runs body. Where a thread waits within it for tasks, it takes up none but those that were begun within it: what it
+/// waits for is not held up by longer ones.
+void run_isolated(const std::function<void()>& body);
+
 /// Tasks that run beside the thread that starts them.
 class TaskGroup {
  public:

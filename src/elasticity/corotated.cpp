@@ -26,6 +26,7 @@ class CorotatedElasticity : public Elasticity {
   void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
+  void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) override;
   void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
   void set_reference(std::shared_ptr<const Body> body) override;
@@ -69,7 +70,6 @@ class CorotatedElasticity : public Elasticity {
   struct Strained {
     Vector unrotated, displacement, stress;  // q = R^T z, d = q - X, K d
   };
-  const std::vector<Strained>& strained(const Points& z);
   /// Adds to P the changes of the mean strain's stress, lane by lane.
   /// @param first  direction of the first lane
   void add_mean_stress(int element, const Matrix3& H, const MeanStrainCorrection& mean, const MatrixLanes& dF,
@@ -179,8 +179,9 @@ void CorotatedElasticity<N>::add_reference_adjoint(const Points& w, Points& refe
 }
 
 template <int N>
-auto CorotatedElasticity<N>::strained(const Points& z) -> const std::vector<Strained>& {
-  if (has_strained_ && strained_at_ == z) return strained_;
+void CorotatedElasticity<N>::prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) {
+  modulus_.set_changes(d_theta);
+  if (has_strained_ && strained_at_ == z) return;
   strained_.resize(polar_.size());
   for (int e = 0; e < count(); ++e) {
     Strained& own = strained_[std::size_t(e)];
@@ -190,7 +191,6 @@ auto CorotatedElasticity<N>::strained(const Points& z) -> const std::vector<Stra
   }
   strained_at_ = z;
   has_strained_ = true;
-  return strained_;
 }
 
 template <int N>
@@ -291,6 +291,7 @@ template <int N>
 void CorotatedElasticity<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
                                                const VectorX& d_theta, Points& force) {
   const Points *lag = &d_lag, *at = &d_z;
+  prepare_tangents(z, d_theta);
   add_force_tangents(z, {{&lag, 1}, {&at, 1}, d_theta}, {&force, 1});
 }
 
@@ -305,7 +306,7 @@ void CorotatedElasticity<N>::add_mean_stress(int e, const Matrix3& H, const Mean
       const auto i = Eigen::Index(k / 3), j = Eigen::Index(k % 3);
       own(i, j) = dF[k][l], ahead(i, j) = dz[k][l] - dF[k][l];
     }
-    Matrix3 dP = mean.tangent(H, own, ahead) + modulus_.log_change(e, first + l) * mean.stress(H);
+    Matrix3 dP = mean.tangent(H, own, ahead) + modulus_.log_change(e, changes.first + first + l) * mean.stress(H);
     const double d_nu = changes.theta(Eigen::Index(material_.poissons_ratio), first + l);
     if (d_nu != 0.0) dP += d_nu * mean.by_poissons_ratio(H);
     for (std::size_t k = 0; k < 9; ++k) P[k][l] = dP(Eigen::Index(k / 3), Eigen::Index(k % 3));
@@ -316,17 +317,15 @@ void CorotatedElasticity<N>::add_mean_stress(int e, const Matrix3& H, const Mean
 template <int N>
 void CorotatedElasticity<N>::add_force_tangents(const Points& z, const ForceChanges& changes,
                                                 std::span<Points> forces) {
-  modulus_.set_changes(changes.theta);
   const auto d_nus = changes.theta.row(Eigen::Index(material_.poissons_ratio));
   const bool changes_nu = (d_nus.array() != 0.0).any();
-  const std::vector<Strained>& all = strained(z);
   ElementLanes<N> lag, dd, dy, f;
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
     const auto g = gradients(e);
     const Matrix3 &R = polar_[e].R, &rate = polar_[e].rate_inverse;
     const double E = modulus_[e];
-    const auto& [q, d, y] = all[std::size_t(e)];
+    const auto& [q, d, y] = strained_[std::size_t(e)];
     Vector by_nu = Vector::Zero();
     if (changes_nu) by_nu = stiffness_.derivative_times(e, d);
     std::optional<MeanStrainCorrection> mean;
@@ -336,7 +335,7 @@ void CorotatedElasticity<N>::add_force_tangents(const Points& z, const ForceChan
       const std::size_t used = std::min<std::size_t>(4, forces.size() - first);
       Wide<double> d_log{}, d_nu{};
       for (std::size_t l = 0; l < used; ++l) {
-        d_log[l] = modulus_.log_change(e, Eigen::Index(first + l));
+        d_log[l] = modulus_.log_change(e, changes.first + Eigen::Index(first + l));
         d_nu[l] = d_nus[Eigen::Index(first + l)];
       }
       gather_lanes<N>(nodes, changes.lag.subspan(first, used), false, lag);

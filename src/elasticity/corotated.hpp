@@ -28,6 +28,8 @@ class Elasticity : public ForceTerm {
   /// Young's modulus of an element at its mean deformation at the lag point [Pa] (`tangent_modulus` of its law). Safe
   /// from several threads.
   virtual double tangent_modulus(int element) const = 0;
+  /// Rotations at the next lag point are looked for from where another elasticity of the body had them last.
+  void look_for_rotations_from(const Elasticity& other) { polar_ = other.polar_; }
   /// Of an element at the lag point.
   const Polar& rotation(int element) {
     find_rotations();

@@ -16,11 +16,12 @@ struct StepContext {
   double dt = 0.0;                         ///< length of the step [s]
 };
 
-/// Changes of the lag point p, of z and of theta along several directions: all that tangents of one step or equilibrium
-/// go along. They refer to what their maker keeps alive.
+/// Changes of the lag point p, of z and of theta along several directions, some of those that tangents of one step or
+/// equilibrium go along. They refer to what their maker keeps alive.
 struct ForceChanges {
   std::span<const Points*const> lag, z;  ///< n x 3 each [m], as many as there are directions
   Eigen::Ref<const MatrixX> theta;       ///< one direction a column
+  Eigen::Index first = 0;                ///< number of the first one among those that were made ready
 };
 
 /// A force of the scene, made affine about a lag point p for one linearly implicit step:
@@ -71,8 +72,12 @@ class ForceTerm {
   /// force += df for changes of p, z and theta
   virtual void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                                  Points& force) = 0;
-  /// The same along several directions at once, each into its own force: elements whose stiffness is large read it once
-  /// for all.
+  /// Makes ready for `add_force_tangents` at z.
+  /// @param d_theta  changes of theta along all directions, one a column
+  virtual void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) { (void)z, (void)d_theta; }
+  /// The same as `add_force_tangent` along several directions at once, each into its own force: elements whose
+  /// stiffness is large read it once for all. Once it was made ready, threads may call it side by side, each for
+  /// directions of its own, and `add_start_tangent` and `add_reference_tangent` with it.
   /// @param forces  n x 3 each [N], as many as directions
   virtual void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) {
     VectorX direction;

@@ -33,6 +33,7 @@ class ViscousForces : public ForceTerm {
   void add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) override;
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
+  void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) override;
   void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
   void add_start_tangent(const Points& z, const Points& d_start, const Points& d_start_velocity,
@@ -164,24 +165,30 @@ template <int N>
 void ViscousForces<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
                                          const VectorX& d_theta, Points& force) {
   const Points *lag = &d_lag, *at = &d_z;
+  prepare_tangents(z, d_theta);
   add_force_tangents(z, {{&lag, 1}, {&at, 1}, d_theta}, {&force, 1});
+}
+
+template <int N>
+void ViscousForces<N>::prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) {
+  if (!step_.start) return;
+  modulus_.set_changes(d_theta);
+  (void)strained(z);
 }
 
 /// Four directions at a time, side by side in the lanes of wide registers:
 ///   -df = E / dt (beta dF y + F (beta dy + d_beta y)),  dy = K (dF^T s + F^T dz) + d_nu (dK / d nu) u + d_lnE y.
 template <int N>
-void ViscousForces<N>::add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) {
+void ViscousForces<N>::add_force_tangents(const Points&, const ForceChanges& changes, std::span<Points> forces) {
   if (!step_.start) return;
-  modulus_.set_changes(changes.theta);
   const auto d_nus = changes.theta.row(Eigen::Index(material_.poissons_ratio));
   const bool changes_nu = (d_nus.array() != 0.0).any();
-  const std::vector<Strained>& all = strained(z);
   ElementLanes<N> lag, f, du, dy;
   for (int e = 0; e < count(); ++e) {
     const int* nodes = body_->connectivity.data() + std::size_t(e) * N;
     const Matrix3& F = gradients_[std::size_t(e)];
     const auto g = shape_gradients(e);
-    const auto& [s, u, y] = all[std::size_t(e)];
+    const auto& [s, u, y] = strained_[std::size_t(e)];
     Vector by_nu = Vector::Zero();
     if (changes_nu) by_nu = stiffness_.derivative_times(e, u);
     const double factor = modulus_[e] / step_.dt;
@@ -190,7 +197,7 @@ void ViscousForces<N>::add_force_tangents(const Points& z, const ForceChanges& c
       Wide<double> d_log{}, d_nu{}, d_damping{};
       for (std::size_t l = 0; l < used; ++l) {
         const auto c = Eigen::Index(first + l);
-        d_log[l] = modulus_.log_change(e, c), d_nu[l] = d_nus[c];
+        d_log[l] = modulus_.log_change(e, changes.first + c), d_nu[l] = d_nus[c];
         d_damping[l] = changes.theta(Eigen::Index(damping_block_), c);
       }
       gather_lanes<N>(nodes, changes.lag.subspan(first, used), false, lag);

@@ -168,16 +168,30 @@ void FixedRegions::add_matrix(double scale, BlockMatrix& matrix) {
   }
 }
 
-void FixedRegions::add_force_tangent(const Points& z, const Points&, const Points& d_z, const VectorX& d_theta,
+void FixedRegions::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                                      Points& force) {
+  const Points *lag = &d_lag, *at = &d_z;
+  prepare_tangents(z, d_theta);
+  add_force_tangents(z, {{&lag, 1}, {&at, 1}, d_theta}, {&force, 1});
+}
+
+void FixedRegions::prepare_tangents(const Points&, const Eigen::Ref<const MatrixX>& d_theta) {
   modulus_.set_changes(d_theta);
+}
+
+void FixedRegions::add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) {
   for (const HeldCell& held : cells_) {
     const auto cell = body_->element(held.cell);
-    const Vector24 u = displacement(held, z);
-    const Vector24 df =
-        -modulus_[held.cell] * (modulus_.log_change(held.cell) * (held.K * u) + held.K * rotated_back(held, d_z) +
-                                d_theta[poissons_ratio_] * (held.dK * u));
-    for (int a = 0; a < 8; ++a) force.row(cell[a]) += (holds_[held.hold].rotation * df.segment<3>(3 * a)).transpose();
+    const Vector24 u = displacement(held, z), Ku = held.K * u, by_nu = held.dK * u;
+    const double E = modulus_[held.cell];
+    for (std::size_t c = 0; c < forces.size(); ++c) {
+      const auto direction = Eigen::Index(c);
+      const double d_log = modulus_.log_change(held.cell, changes.first + direction),
+                   d_nu = changes.theta(Eigen::Index(poissons_ratio_), direction);
+      const Vector24 df = -E * (d_log * Ku + held.K * rotated_back(held, *changes.z[c]) + d_nu * by_nu);
+      for (int a = 0; a < 8; ++a)
+        forces[c].row(cell[a]) += (holds_[held.hold].rotation * df.segment<3>(3 * a)).transpose();
+    }
   }
 }
 

@@ -40,6 +40,8 @@ class FixedRegions : public ForceTerm {
   void add_matrix(double scale, BlockMatrix& matrix) override;
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
+  void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) override;
+  void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
 
   /// Moves the regions to where these hold them; they contain what they contained.

@@ -2,11 +2,15 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "base/profile.hpp"
 #include "elasticity/viscous_forces.hpp"
 #include "motion/body_forces.hpp"
@@ -98,22 +102,13 @@ SimulationOptions completed(SimulationOptions options) {
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(std::move(body)),
       options_(completed(std::move(options))),
-      stepper_(body_, make_terms(body_, options_, elasticity_, fixed_regions_, pull_, let_go_), options_.blocks,
-               {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
-                options_.rotation_prediction, options_.stiffness_damping, options_.solver, options_.integrator,
-                options_.newton}),
+      stepper_(make_stepper(forces_)),
       statics_(body_, stepper_.terms(), {.newton = options_.newton, .solver = options_.solver.kind}),
       rest_(body_->scanned_positions()) {
-  if (holds_strongly(*body_, options_)) {
-    stepper_.hold(eliminated_nodes(*body_, options_));
+  if (holds_strongly(*body_, options_))
     statics_.hold(eliminated_nodes(*body_, options_));
-  } else {
+  else
     statics_.anchor(held_nodes(*body_, options_.holds));
-  }
-  if (const std::vector<PointMass> weights = hung_weights(options_); !weights.empty()) {
-    const PointWeights hung(*body_, weights, options_.blocks.gravity);
-    stepper_.carry(hung.points(), hung.masses());
-  }
   element_edge_ = std::cbrt(body_->volume() / std::max(1, body_->element_count()));
   check_start();
   prepare_holds();
@@ -137,6 +132,34 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
           {options_.times[frame - 1] + (s - 1) * interval / steps, interval / steps, s == steps ? frame : -1});
     longest_step_ = std::max(longest_step_, interval / steps);
   }
+}
+
+Stepper Simulation::make_stepper(StepForces& forces) const {
+  Stepper stepper(body_,
+                  make_terms(body_, options_, forces.elasticity, forces.fixed_regions, forces.pull, forces.let_go),
+                  options_.blocks,
+                  {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
+                   options_.rotation_prediction, options_.stiffness_damping, options_.solver, options_.integrator,
+                   options_.newton});
+  if (holds_strongly(*body_, options_)) stepper.hold(eliminated_nodes(*body_, options_));
+  if (const std::vector<PointMass> weights = hung_weights(options_); !weights.empty()) {
+    const PointWeights hung(*body_, weights, options_.blocks.gravity);
+    stepper.carry(hung.points(), hung.masses());
+  }
+  return stepper;
+}
+
+void Simulation::prepare_second(const VectorX& parameters) {
+  if (!second_) {
+    StepForces forces;
+    Stepper stepper = make_stepper(forces);
+    second_ = std::make_unique<Second>(Second{forces, std::move(stepper), nullptr});
+    if (forces.fixed_regions) forces.fixed_regions->move_to(options_.holds);
+  }
+  const std::shared_ptr<const Body> reference = shape_ ? shape_->body() : reference_body_;
+  if (reference && reference != second_->reference) second_->forces.elasticity->set_reference(reference);
+  second_->reference = reference;
+  second_->stepper.set_parameters(parameters);
 }
 
 void Simulation::check_start() const {
@@ -169,7 +192,7 @@ void Simulation::check_reference() const {
 void Simulation::set_reference(Points reference) {
   check_reference();
   reference_body_ = std::make_shared<Body>(with_reference(*body_, std::move(reference)));
-  elasticity_->set_reference(reference_body_);
+  forces_.elasticity->set_reference(reference_body_);
 }
 
 bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summary) {
@@ -177,7 +200,7 @@ bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summa
     const Timed timed(Activity::LoadFree);
     summary.failure = shape_->find(parameters);
     if (!summary.failure.empty()) return false;
-    elasticity_->set_reference(shape_->body());
+    forces_.elasticity->set_reference(shape_->body());
     rest_ = shape_->scan();
     if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   }
@@ -218,8 +241,8 @@ Points Simulation::velocities(const VectorX& parameters) const {
 }
 
 void Simulation::hold_start(bool held) {
-  if (pull_) pull_->set_active(held);
-  if (let_go_) let_go_->set_active(held);
+  if (forces_.pull) forces_.pull->set_active(held);
+  if (forces_.let_go) forces_.let_go->set_active(held);
 }
 
 bool Simulation::start(const VectorX& parameters, State& state, RolloutSummary& summary) {
@@ -305,7 +328,7 @@ void Simulation::move_holds(double from, double to, Points& positions) {
     for (const int node : held_nodes(*body_, {there[h]}))
       positions.row(node) =
           (there[h].rotation * body_->scanned_positions().row(node).transpose() + there[h].translation).transpose();
-  if (fixed_regions_) fixed_regions_->move_to(there);
+  if (forces_.fixed_regions) forces_.fixed_regions->move_to(there);
 }
 
 bool Simulation::settle(Points& x, RolloutSummary& summary) {
@@ -344,17 +367,18 @@ bool Simulation::find_equilibrium(const VectorX& parameters, State& state, Rollo
   return true;
 }
 
-bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary& summary) {
+bool Simulation::forward_step(const StepPlan& plan, Stepper& stepper, const State& start, Points& delta,
+                              RolloutSummary& summary) {
   const Timed timed(Activity::Steps);
-  stepper_.set_time(plan.time);
-  stepper_.set_time_step(plan.dt);
-  if (!stepper_.prepare(state)) {
+  stepper.set_time(plan.time);
+  stepper.set_time_step(plan.dt);
+  if (!stepper.prepare(start)) {
     summary.failure =
         "the step's matrix is not positive definite or not finite at step " + std::to_string(summary.steps);
     return false;
   }
-  delta_ = plan.dt * state.v;
-  const SolveSummary solved = stepper_.solve(state, delta_);
+  delta = plan.dt * start.v;
+  const SolveSummary solved = stepper.solve(start, delta);
   summary.solver_iterations += solved.iterations;
   if (!solved.converged) {
     summary.failure = std::string(options_.integrator == Integrator::Newton ? "Newton's method" : "the linear solver") +
@@ -365,18 +389,19 @@ bool Simulation::forward_step(const StepPlan& plan, State& state, RolloutSummary
   return true;
 }
 
-double Simulation::surprise(const StepPlan& plan, const State& state) const {
+double Simulation::surprise(const StepPlan& plan, const State& start, const Points& delta) const {
   if (options_.integrator == Integrator::Newton) return 0.0;
-  return 0.5 * std::sqrt((delta_ - plan.dt * state.v).rowwise().squaredNorm().maxCoeff()) / element_edge_;
+  return 0.5 * std::sqrt((delta - plan.dt * start.v).rowwise().squaredNorm().maxCoeff()) / element_edge_;
 }
 
-bool Simulation::take_step(std::size_t i, State& state, RolloutSummary& summary) {
+bool Simulation::take_step(std::size_t i, Stepper& stepper, const State& start, Points& delta,
+                           RolloutSummary& summary) {
   constexpr double too_long = 0.1, explosion = 3.0;  // surprises
   const double shortest = std::ldexp(longest_step_, -options_.most_halvings);
   for (;;) {
     const StepPlan plan = steps_[i];
-    const bool is_taken = forward_step(plan, state, summary);
-    const double surprised = is_taken ? surprise(plan, state) : 0.0;
+    const bool is_taken = forward_step(plan, stepper, start, delta, summary);
+    const double surprised = is_taken ? surprise(plan, start, delta) : 0.0;
     if (is_taken && !(surprised > too_long)) return true;
     const double half = 0.5 * plan.dt;
     if (half < (1.0 - 1e-9) * shortest) {
@@ -390,6 +415,70 @@ bool Simulation::take_step(std::size_t i, State& state, RolloutSummary& summary)
     steps_[i] = {plan.time, half, -1};
     steps_.insert(steps_.begin() + std::ptrdiff_t(i) + 1, {plan.time + half, half, plan.frame_after});
   }
+}
+
+void Simulation::take_steps(const VectorX& parameters, const MatrixX& directions, const ShapeChange& shape,
+                            int last_frame, const OnFrame& on_frame, const State& start, std::vector<State>& tangents,
+                            RolloutSummary& summary) {
+  // Forces beyond a scene's own may remember the step before: one stepper takes all steps then.
+  const bool is_beside = !tangents.empty() && options_.further_forces.empty();
+  if (is_beside) prepare_second(parameters);
+  std::array<Stepper*, 2> steppers{&stepper_, is_beside ? &second_->stepper : &stepper_};
+  const std::array<Elasticity*, 2> forces{forces_.elasticity, is_beside ? second_->forces.elasticity : nullptr};
+  std::array<State, 2> starts{start, start};  // of a step and of the next one
+  std::array<Points, 2> deltas;
+  bool has_tangents = true;
+  std::array<std::function<void()>, 2> carry_tangents;
+  for (std::size_t k : {0, 1})
+    carry_tangents[k] = [&, k] {
+      has_tangents = step_tangents(*steppers[k], starts[k], deltas[k], directions, tangents, shape);
+    };
+  enum class Way { On, Stop, Failed };
+  std::optional<int> under_way;  // frame, -1: none, of the step whose tangents are carried along
+  TaskGroup beside;
+  const auto end_step = [&](const State& end) {
+    if (!under_way) return Way::On;
+    const int frame = *under_way;
+    under_way.reset();
+    beside.wait();
+    if (!has_tangents) {
+      summary.failure = "a matrix of the tangents cannot be factorised";
+      return Way::Failed;
+    }
+    if (frame < 0) return Way::On;
+    ++summary.frames;
+    return on_frame(frame, end, tangents) && frame < last_frame ? Way::On : Way::Stop;
+  };
+  steps_ = plan_;
+  for (std::size_t s = 0; s < steps_.size() && summary.frames <= last_frame; ++s) {
+    const std::size_t k = s % 2, next = 1 - k;
+    const bool is_needed = !under_way || *under_way < last_frame;
+    if (is_beside && s > 0) forces[k]->look_for_rotations_from(*forces[next]);  // bit for bit as one stepper would
+    const bool is_taken = is_needed && take_step(s, *steppers[k], starts[k], deltas[k], summary);
+    const std::string why_not = std::exchange(summary.failure, {});
+    if (const Way way = end_step(starts[k]); way != Way::On) {
+      if (is_taken) --summary.steps;  // in vain
+      summary.succeeded = way == Way::Stop;
+      return;
+    }
+    if (!is_taken) {
+      summary.failure = why_not;
+      return;
+    }
+    under_way = steps_[s].frame_after;
+    if (is_beside)
+      beside.run(std::cref(carry_tangents[k]));
+    else
+      carry_tangents[k]();
+    starts[next] = starts[k];
+    steppers[k]->advance(deltas[k], starts[next]);
+    if (is_beside) continue;
+    if (const Way way = end_step(starts[next]); way != Way::On) {
+      summary.succeeded = way == Way::Stop;
+      return;
+    }
+  }
+  summary.succeeded = end_step(starts[steps_.size() % 2]) != Way::Failed;
 }
 
 RolloutSummary Simulation::run(const VectorX& parameters, const OnFrame& on_frame) {
@@ -419,28 +508,17 @@ RolloutSummary Simulation::run(const VectorX& parameters, const MatrixX& directi
   tangents = start_tangents(state, directions, shape);
   summary.frames = 1;
   if (!on_frame(0, state, tangents)) return summary.succeeded = true, summary;
-  steps_ = plan_;
-  for (std::size_t s = 0; s < steps_.size() && summary.frames <= last_frame; ++s) {
-    if (!take_step(s, state, summary)) return summary;
-    if (!step_tangents(state, directions, tangents, shape))
-      return summary.failure = "a matrix of the tangents cannot be factorised", summary;
-    stepper_.advance(delta_, state);
-    const int frame = steps_[s].frame_after;
-    if (frame < 0) continue;
-    ++summary.frames;
-    if (!on_frame(frame, state, tangents)) break;
-  }
-  summary.succeeded = true;
+  run_isolated([&] { take_steps(parameters, directions, shape, last_frame, on_frame, state, tangents, summary); });
   return summary;
 }
 
-bool Simulation::step_tangents(const State& state, const MatrixX& directions, std::vector<State>& tangents,
-                               const ShapeChange& shape) {
+bool Simulation::step_tangents(Stepper& stepper, const State& start, const Points& delta, const MatrixX& directions,
+                               std::vector<State>& tangents, const ShapeChange& shape) {
   if (tangents.empty()) return true;
   const Timed timed(Activity::Tangents, directions.cols());
-  if (options_.integrator == Integrator::Newton && !stepper_.prepare_derivatives(state, delta_)) return false;
-  if (!shape.reference.empty()) stepper_.prepare_reference_derivatives(state, delta_);
-  stepper_.tangents(state, delta_, directions, tangents, shape.reference);
+  if (options_.integrator == Integrator::Newton && !stepper.prepare_derivatives(start, delta)) return false;
+  if (!shape.reference.empty()) stepper.prepare_reference_derivatives(start, delta);
+  stepper.tangents(start, delta, directions, tangents, shape.reference);
   return true;
 }
 
@@ -502,7 +580,7 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       segment.push_back(state);
     else if (s % length == 0)
       checkpoints.push_back(state);
-    if (!take_step(s, state, summary)) return summary;
+    if (!take_step(s, stepper_, state, delta_, summary)) return summary;
     stepper_.advance(delta_, state);
     const int frame = steps_[s].frame_after;
     if (frame < 0) continue;
@@ -522,7 +600,8 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
       RolloutSummary ignored;
       for (std::size_t r = first; r <= s; ++r) {
         segment.push_back(replay);
-        if (!forward_step(steps_[r], replay, ignored)) return summary.failure = ignored.failure, summary;
+        if (!forward_step(steps_[r], stepper_, replay, delta_, ignored))
+          return summary.failure = ignored.failure, summary;
         stepper_.advance(delta_, replay);
       }
       if (s + 1 == steps) state = replay;

@@ -138,7 +138,7 @@ class Simulation {
   /// False where the object cannot be stress-free anywhere: the summary says so.
   bool set_parameters(const VectorX& theta, RolloutSummary& summary);
   /// Whether the motion starts from an equilibrium, under forces that end there.
-  bool starts_held() const { return pull_ || let_go_ || options_.starts_settled; }
+  bool starts_held() const { return forces_.pull || forces_.let_go || options_.starts_settled; }
   void hold_start(bool held);
   void check_start() const;
   void check_reference() const;
@@ -168,31 +168,49 @@ class Simulation {
   /// node as the regions move, by inverse square distance from them.
   void move_holds(double from, double to, Points& positions);
   void prepare_holds();
-  bool forward_step(const StepPlan& plan, State& state, RolloutSummary& summary);
-  /// Carries the tangents over the step that was solved last. False where its matrix cannot be factorised.
-  bool step_tangents(const State& state, const MatrixX& directions, std::vector<State>& tangents,
-                     const ShapeChange& shape);
+  /// A stepper, and those of its forces that the simulation talks to.
+  struct StepForces {
+    Elasticity* elasticity = nullptr;
+    FixedRegions* fixed_regions = nullptr;  // if any, as the two below
+    Pull* pull = nullptr;
+    PointWeights* let_go = nullptr;
+  };
+  Stepper make_stepper(StepForces& forces) const;
+  /// Makes the second stepper ready for the parameters of the first one.
+  void prepare_second(const VectorX& theta);
+  /// Solves for a step's way `delta`.
+  bool forward_step(const StepPlan& plan, Stepper& stepper, const State& start, Points& delta, RolloutSummary& summary);
+  /// Carries the tangents over the step that a stepper solved last. False where its matrix cannot be factorised.
+  bool step_tangents(Stepper& stepper, const State& start, const Points& delta, const MatrixX& directions,
+                     std::vector<State>& tangents, const ShapeChange& shape);
   /// The step i of `steps_`, in halves where it cannot be taken as a whole: they stand in its place then. Sets the
   /// step's way, not its end.
-  bool take_step(std::size_t i, State& state, RolloutSummary& summary);
+  bool take_step(std::size_t i, Stepper& stepper, const State& start, Points& delta, RolloutSummary& summary);
   /// How far the middle of a lagged step lies from where its rotations, strains and contact were predicted, the
   /// farthest node, in edges of an element. A step is too long where that is no small part.
-  double surprise(const StepPlan& plan, const State& state) const;
+  double surprise(const StepPlan& plan, const State& start, const Points& delta) const;
+  /// All steps up to a frame. The tangents of a step go along beside the next step, which another stepper takes.
+  void take_steps(const VectorX& theta, const MatrixX& directions, const ShapeChange& shape, int last_frame,
+                  const OnFrame& on_frame, const State& start, std::vector<State>& tangents, RolloutSummary& summary);
   std::size_t state_bytes() const { return 2 * 3 * sizeof(double) * std::size_t(body_->node_count()); }
   std::size_t segment_length(std::size_t steps) const;
 
   std::shared_ptr<const Body> body_;
   SimulationOptions options_;
-  Elasticity* elasticity_ = nullptr;       // of the stepper's terms
-  FixedRegions* fixed_regions_ = nullptr;  // likewise, if any
-  Pull* pull_ = nullptr;                   // likewise
-  PointWeights* let_go_ = nullptr;         // likewise
-  double longest_step_ = 0.0;              // of the plan [s]
-  double element_edge_ = 0.0;              // of a cube as large as a mean element [m]
-  std::vector<StepPlan> steps_;            // of the run: the plan's, some in halves
-  std::vector<Vector3> hold_middle_;       // of each hold's nodes at rest
-  MatrixX hold_share_;                     // n x holds: how much each node moves with each; rows sum to one
+  double longest_step_ = 0.0;         // of the plan [s]
+  double element_edge_ = 0.0;         // of a cube as large as a mean element [m]
+  std::vector<StepPlan> steps_;       // of the run: the plan's, some in halves
+  std::vector<Vector3> hold_middle_;  // of each hold's nodes at rest
+  MatrixX hold_share_;                // n x holds: how much each node moves with each; rows sum to one
+  StepForces forces_;                 // of the stepper
   Stepper stepper_;
+  /// What takes every other step of a run with tangents.
+  struct Second {
+    StepForces forces;
+    Stepper stepper;
+    std::shared_ptr<const Body> reference;  // where its forces have the body stress-free, if that was set
+  };
+  std::unique_ptr<Second> second_;
   Statics statics_;                   // of the stepper's forces
   std::unique_ptr<RestShape> shape_;  // where theta says where the body is stress-free
   bool shape_is_held_ = false;

@@ -1,9 +1,13 @@
 #include "motion/stepper.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <utility>
+
+#include "base/parallel.hpp"
 
 namespace pliant {
 
@@ -258,47 +262,54 @@ void Stepper::prepare_reference_derivatives(const State& start, const Points& de
   for (auto& term : terms_) term->linearise_reference(points_at_[std::size_t(term->at())]);
 }
 
+namespace {
+constexpr std::size_t directions_together = 4;  // as many as wide registers take
+}
+
 void Stepper::find_changes_of_force(const State& start, const Points& delta, const MatrixX& d_theta,
-                                    std::span<const State> changes, std::span<const Points> d_reference) {
+                                    std::span<const State> changes, std::span<const Points> d_reference,
+                                    std::size_t first, std::size_t count) {
   const Scheme s = scheme();
   const double dt = options_.dt, t = options_.newmark_theta;
-  const std::size_t count = changes.size();
-  for (auto* points : {&d_blended_, &d_lag_[0], &d_lag_[1], &d_force_})
-    if (points->size() < count) points->resize(count, Points(delta.rows(), 3));
-  for (std::size_t c = 0; c < count; ++c) {
+  std::array<const Points*, directions_together> lag_changes{}, z_changes{};
+  const std::span<Points> forces(&d_force_[first], count);
+  for (std::size_t c = first; c < first + count; ++c) {
     const State& change = changes[c];
     const double d_beta = is_rayleigh() ? d_theta(Eigen::Index(stiffness_damping_block_), Eigen::Index(c)) : 0.0;
     d_blended_[c] = change.x + d_beta / dt * delta;
     for (const auto lag : all_lags) d_lag_[std::size_t(lag)][c] = change.x + s.prediction[std::size_t(lag)] * change.v;
     d_force_[c].setZero();
   }
-  const std::span<Points> forces(d_force_.data(), count);
-  const auto keep = [&](std::vector<const Points*>& all, const auto& at) {
-    all.resize(count);
-    for (std::size_t c = 0; c < count; ++c) all[c] = at(c);
-  };
   for (auto& term : terms_) {
     const bool blended = term->at() == ForceTerm::At::Blended, way_alone = term->sees_way_alone();
     const std::vector<Points>& lag = d_lag_[std::size_t(term->lag())];
-    keep(lag_changes_, [&](std::size_t c) { return &lag[c]; });
-    keep(z_changes_, [&](std::size_t c) { return way_alone ? &no_change_ : blended ? &d_blended_[c] : &changes[c].x; });
+    for (std::size_t l = 0; l < count; ++l) {
+      lag_changes[l] = &lag[first + l];
+      z_changes[l] = way_alone ? &no_change_ : blended ? &d_blended_[first + l] : &changes[first + l].x;
+    }
     const Points& z = points_at_[std::size_t(term->at())];
-    term->add_force_tangents(z, {lag_changes_, z_changes_, d_theta}, forces);
-    for (std::size_t c = 0; c < d_reference.size(); ++c)  // pulls and dampings leave it where it is
+    term->add_force_tangents(z,
+                             {{lag_changes.data(), count},
+                              {z_changes.data(), count},
+                              d_theta.middleCols(Eigen::Index(first), Eigen::Index(count)),
+                              Eigen::Index(first)},
+                             forces);
+    for (std::size_t c = first; c < first + count && !d_reference.empty(); ++c)  // pulls and dampings leave it be
       if (!d_reference[c].isZero(0.0)) term->add_reference_tangent(d_reference[c], d_force_[c]);
     if (!term->sees_start() || way_alone) continue;
-    for (std::size_t c = 0; c < count; ++c) term->add_start_tangent(z, changes[c].x, changes[c].v, d_force_[c]);
+    for (std::size_t c = first; c < first + count; ++c)
+      term->add_start_tangent(z, changes[c].x, changes[c].v, d_force_[c]);
   }
-  for (std::size_t c = 0; c < count; ++c) {
-    Points& force = d_force_[c];
+  for (std::size_t c = first; c < first + count; ++c) {
+    Points &force = d_force_[c], &mass_part = d_blended_[c];
     const Points& v = changes[c].v;
     const double d_density = d_theta(Eigen::Index(density_block_), Eigen::Index(c)),
                  d_damping = d_theta(Eigen::Index(mass_damping_block_), Eigen::Index(c));
     force *= dt;
-    mass_part_ = density_ / t * v;
-    mass_part_ += d_density / t * start.v;
-    mass_part_ -= (d_density * (1.0 / (t * dt) + mass_damping_) + density_ * d_damping) * delta;
-    body_->add_mass_product(1.0, mass_part_, force);
+    mass_part = density_ / t * v;
+    mass_part += d_density / t * start.v;
+    mass_part -= (d_density * (1.0 / (t * dt) + mass_damping_) + density_ * d_damping) * delta;
+    body_->add_mass_product(1.0, mass_part, force);
     add_carried(1.0 / t, v, force);
     clear_held(force);
   }
@@ -307,28 +318,47 @@ void Stepper::find_changes_of_force(const State& start, const Points& delta, con
 void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d_theta, std::span<State> changes,
                        std::span<const Points> d_reference) {
   const double dt = options_.dt, t = options_.newmark_theta;
+  const auto count = std::size_t(d_theta.cols());
   set_points_at(scheme(), start.x, delta);
   tangent_forces_.resize(delta.size(), d_theta.cols());
   tangent_solutions_.resize(delta.size(), d_theta.cols());
-  find_changes_of_force(start, delta, d_theta, changes, d_reference);
-  for (Eigen::Index c = 0; c < d_theta.cols(); ++c) {
-    const Points& force = d_force_[std::size_t(c)];
-    if (is_newton()) {
-      solve_derivative(force, w_, GeneralSolver::Side::Plain);
-      tangent_solutions_.col(c) = flat(w_);
-    } else {
-      tangent_forces_.col(c) = flat(force);
-      tangent_solutions_.col(c) = flat(changes[std::size_t(c)].v) * dt;
+  for (auto* points : {&d_blended_, &d_lag_[0], &d_lag_[1], &d_force_})
+    if (points->size() < count) points->resize(count, Points(delta.rows(), 3));
+  for (auto& term : terms_) term->prepare_tangents(points_at_[std::size_t(term->at())], d_theta);
+  const std::size_t parts = (count + directions_together - 1) / directions_together;
+  const auto beside = [&](const auto& of_direction_range) {
+    const auto part = [&](std::size_t i) {
+      const std::size_t first = i * directions_together;
+      of_direction_range(first, std::min(directions_together, count - first));
+    };
+    if (is_newton())  // material laws keep what they need of one direction
+      for (std::size_t i = 0; i < parts; ++i) part(i);
+    else
+      parallel_tasks(parts, std::cref(part));
+  };
+  beside([&](std::size_t first, std::size_t some) {
+    find_changes_of_force(start, delta, d_theta, changes, d_reference, first, some);
+    for (std::size_t c = first; c < first + some && !is_newton(); ++c) {
+      tangent_forces_.col(Eigen::Index(c)) = flat(d_force_[c]);
+      tangent_solutions_.col(Eigen::Index(c)) = flat(changes[c].v) * dt;
     }
+  });
+  if (is_newton()) {
+    for (std::size_t c = 0; c < count; ++c) {
+      solve_derivative(d_force_[c], w_, GeneralSolver::Side::Plain);
+      tangent_solutions_.col(Eigen::Index(c)) = flat(w_);
+    }
+  } else {
+    solver_->solve_columns(tangent_forces_, tangent_solutions_);
   }
-  if (!is_newton()) solver_->solve_columns(tangent_forces_, tangent_solutions_);
-  for (Eigen::Index c = 0; c < d_theta.cols(); ++c) {
-    State& change = changes[std::size_t(c)];
-    solution_ = tangent_solutions_.col(c);
-    w_ = as_points(std::as_const(solution_));
-    change.x += w_;
-    change.v = w_ / (t * dt) - (1.0 - t) / t * change.v;
-  }
+  beside([&](std::size_t first, std::size_t some) {
+    for (std::size_t c = first; c < first + some; ++c) {
+      State& change = changes[c];
+      const Eigen::Map<const Points> solved(&tangent_solutions_(0, Eigen::Index(c)), delta.rows(), 3);
+      change.x += solved;
+      change.v = solved / (t * dt) - (1.0 - t) / t * change.v;
+    }
+  });
 }
 
 void Stepper::adjoint(const State& start, const Points& delta, State& bar, VectorX& theta_bar, Points* reference_bar) {

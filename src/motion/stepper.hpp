@@ -92,6 +92,7 @@ class Stepper : private NewtonProblem {
   /// @param d_theta      one direction a column
   /// @param changes      one a direction; in: of the start, out: of the end
   /// @param d_reference  one a direction, or none
+  /// Directions go beside each other, four a thread.
   void tangents(const State& start, const Points& delta, const MatrixX& d_theta, std::span<State> changes,
                 std::span<const Points> d_reference = {});
   /// Cotangent of the start for one of the end, in place; theta_bar and, where given, reference_bar accumulate.
@@ -138,9 +139,10 @@ class Stepper : private NewtonProblem {
 
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
   void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
-  /// `d_force_`: changes of the step's right-hand side along several directions, Delta staying as it is.
+  /// `d_force_`: changes of the step's right-hand side along directions from `first` on, Delta staying as it is.
   void find_changes_of_force(const State& start, const Points& delta, const MatrixX& d_theta,
-                             std::span<const State> changes, std::span<const Points> d_reference);
+                             std::span<const State> changes, std::span<const Points> d_reference, std::size_t first,
+                             std::size_t count);
   bool is_newton() const { return options_.integrator == Integrator::Newton; }
   bool is_rayleigh() const { return options_.stiffness_damping == StiffnessDamping::Rayleigh; }
   GeneralSolver& general();
@@ -166,7 +168,6 @@ class Stepper : private NewtonProblem {
   Points force_, w_, mass_part_, residual_, inertia_, delta_, no_change_;
   std::array<std::vector<Points>, 2> d_lag_;  // by ForceTerm::Lag; of each direction, as the two below
   std::vector<Points> d_blended_, d_force_;
-  std::vector<const Points*> lag_changes_, z_changes_;  // of one term
   VectorX solution_, right_;
   MatrixX tangent_forces_, tangent_solutions_;  // one direction a column
   std::array<VectorX, 2> adjoint_solution_;     // of the last adjoint steps with these parameters: guesses of the next

@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
+#include "base/parallel.hpp"
 #include "solvers/wide.hpp"
 
 namespace pliant {
@@ -137,9 +139,10 @@ inline Wide<double> widen(Wide<float> w) { return __builtin_convertvector(w, Wid
 
 }  // namespace
 
-void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vector<double>& z) const {
-  lane_work_.resize(12 * std::size_t(rows_));
-  float* w = lane_work_.data();
+void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vector<double>& z,
+                                        std::vector<float>& work) const {
+  work.resize(12 * std::size_t(rows_));
+  float* w = work.data();
   for (int i = 0; i < rows_; ++i) {
     LaneSums<float> sum{};
     for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
@@ -173,6 +176,7 @@ void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vecto
 
 ConjugateGradients::ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
     : pattern_(std::move(pattern)), options_(options), preconditioner_(*pattern_) {
+  if (options_.column_tolerance <= 0.0) options_.column_tolerance = options_.tolerance;
   const std::size_t size = 4 * std::size_t(pattern_->rows);
   for (auto* v : {&x_, &r_, &z_, &p_, &ap_}) v->assign(size, 0.0);
 }
@@ -205,7 +209,9 @@ double ConjugateGradients::multiply(const std::vector<double>& p, std::vector<do
   return dot;
 }
 
-SolveSummary ConjugateGradients::solve(const VectorX& b, VectorX& x) {
+SolveSummary ConjugateGradients::solve(const VectorX& b, VectorX& x) { return solve(b, x, options_.tolerance); }
+
+SolveSummary ConjugateGradients::solve(const Eigen::Ref<const VectorX>& b, Eigen::Ref<VectorX> x, double tolerance) {
   const int n = pattern_->rows;
   const std::size_t size = 4 * std::size_t(n);
   for (int i = 0; i < n; ++i)
@@ -220,7 +226,7 @@ SolveSummary ConjugateGradients::solve(const VectorX& b, VectorX& x) {
       b_norm += bi * bi, r_norm += ri * ri;
     }
   SolveSummary summary;
-  const double target = options_.tolerance * options_.tolerance * b_norm;
+  const double target = tolerance * tolerance * b_norm;
   double rz = 0.0;
   for (;; ++summary.iterations) {
     summary.converged = r_norm <= target;
@@ -268,8 +274,8 @@ auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vecto
   return {dot[0], dot[1], dot[2], dot[3]};
 }
 
-SolveSummary ConjugateGradients::solve_lanes() {
-  auto& [b, x, r, z, p, ap] = lanes_;
+SolveSummary ConjugateGradients::solve_lanes(Lanes& own) const {
+  auto& [b, x, r, z, p, ap, work] = own;
   const std::size_t size = b.size();
   multiply_lanes(x, ap);
   Wide<double> b_norm{}, r_norm{};
@@ -279,7 +285,7 @@ SolveSummary ConjugateGradients::solve_lanes() {
     b_norm += bi * bi, r_norm += ri * ri;
   }
   SolveSummary summary;
-  const double squared = options_.tolerance * options_.tolerance;
+  const double squared = options_.column_tolerance * options_.column_tolerance;
   std::array<bool, lanes> goes_on{};
   Wide<double> rz{};
   for (;; ++summary.iterations) {
@@ -290,7 +296,7 @@ SolveSummary ConjugateGradients::solve_lanes() {
       any = any || goes_on[std::size_t(l)];
     }
     if (!any || summary.iterations >= options_.max_iterations) break;
-    preconditioner_.apply_to_lanes(r, z);
+    preconditioner_.apply_to_lanes(r, z, work);
     Wide<double> rz_new{}, alpha{}, beta{};
     for (std::size_t i = 0; i < size; i += lanes) rz_new += load_wide(&r[i]) * load_wide(&z[i]);
     for (int l = 0; l < lanes && summary.iterations > 0; ++l)
@@ -318,30 +324,36 @@ SolveSummary ConjugateGradients::solve_lanes() {
   return summary;
 }
 
-SolveSummary ConjugateGradients::solve_columns(const MatrixX& B, MatrixX& X) {
-  const std::size_t size = 4 * std::size_t(B.rows());
-  for (auto* v : {&lanes_.b, &lanes_.x, &lanes_.r, &lanes_.z, &lanes_.p, &lanes_.ap}) v->resize(size);
-  SolveSummary all{true, 0, 0.0};
-  for (Eigen::Index first = 0; first < B.cols(); first += lanes) {
-    const Eigen::Index count = std::min<Eigen::Index>(lanes, B.cols() - first);
-    SolveSummary one;
-    if (count == 1) {
-      right_ = B.col(first), solution_ = X.col(first);
-      one = solve(right_, solution_);
-      X.col(first) = solution_;
-    } else {
-      std::ranges::fill(lanes_.p, 0.0);
-      for (Eigen::Index i = 0; i < B.rows(); ++i)
-        for (Eigen::Index l = 0; l < lanes; ++l) {  // those that are not needed have nothing to solve
-          lanes_.b[std::size_t(lanes * i + l)] = l < count ? B(i, first + l) : 0.0;
-          lanes_.x[std::size_t(lanes * i + l)] = l < count ? X(i, first + l) : 0.0;
-        }
-      one = solve_lanes();
-      for (Eigen::Index i = 0; i < B.rows(); ++i)
-        for (Eigen::Index l = 0; l < count; ++l) X(i, first + l) = lanes_.x[std::size_t(lanes * i + l)];
+SolveSummary ConjugateGradients::solve_lanes(const Columns& B, Solutions X, Lanes& own) const {
+  const std::size_t size = lanes * std::size_t(B.rows());
+  for (auto* v : {&own.b, &own.x, &own.r, &own.z, &own.ap}) v->resize(size);
+  own.p.assign(size, 0.0);
+  for (Eigen::Index i = 0; i < B.rows(); ++i)
+    for (Eigen::Index l = 0; l < lanes; ++l) {
+      own.b[std::size_t(lanes * i + l)] = l < B.cols() ? B(i, l) : 0.0;
+      own.x[std::size_t(lanes * i + l)] = l < B.cols() ? X(i, l) : 0.0;
     }
+  const SolveSummary summary = solve_lanes(own);
+  for (Eigen::Index i = 0; i < B.rows(); ++i)
+    for (Eigen::Index l = 0; l < B.cols(); ++l) X(i, l) = own.x[std::size_t(lanes * i + l)];
+  return summary;
+}
+
+SolveSummary ConjugateGradients::solve_columns(const MatrixX& B, MatrixX& X) {
+  const std::size_t count = std::size_t((B.cols() + lanes - 1) / lanes);
+  if (lanes_.size() < count) lanes_.resize(count);
+  summaries_.assign(count, {});
+  const auto solve_some = [&](std::size_t i) {
+    const Eigen::Index first = Eigen::Index(i) * lanes, some = std::min<Eigen::Index>(lanes, B.cols() - first);
+    if (some == 1)  // at most one of them all: it has the memory of single systems for itself
+      summaries_[i] = solve(B.col(first), X.col(first), options_.column_tolerance);
+    else
+      summaries_[i] = solve_lanes(B.middleCols(first, some), X.middleCols(first, some), lanes_[i]);
+  };
+  parallel_tasks(count, std::cref(solve_some));
+  SolveSummary all{true, 0, 0.0};
+  for (const SolveSummary& one : summaries_)
     all = {all.converged && one.converged, all.iterations + one.iterations, std::max(all.residual, one.residual)};
-  }
   return all;
 }
 

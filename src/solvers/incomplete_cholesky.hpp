@@ -15,8 +15,9 @@ class IncompleteCholesky {
   [[nodiscard]] bool factorise(const BlockMatrix& matrix);
   /// z = (L L^T)^-1 r, vectors with four entries a node.
   void apply(const std::vector<double>& r, std::vector<double>& z) const;
-  /// The same for four vectors at once: number d of a node in vector l is entry 12 node + 4 d + l.
-  void apply_to_lanes(const std::vector<double>& r, std::vector<double>& z) const;
+  /// The same for four vectors at once: number d of a node in vector l is entry 12 node + 4 d + l. Several threads may
+  /// do so, each with memory of its own.
+  void apply_to_lanes(const std::vector<double>& r, std::vector<double>& z, std::vector<float>& work) const;
 
  private:
   [[nodiscard]] bool try_factorise(const BlockMatrix& matrix, double shift);
@@ -32,7 +33,7 @@ class IncompleteCholesky {
   std::vector<double> lower_;              // 9 a block, column by column
   std::vector<float> forward_, backward_;  // the same blocks, column by column and row by row
   std::vector<double> inverse_diagonal_;   // inverse of each row's lower triangular pivot, column by column
-  mutable std::vector<float> work_, lane_work_;
+  mutable std::vector<float> work_;
 };
 
 /// Conjugate gradients with that preconditioner.
@@ -41,7 +42,8 @@ class ConjugateGradients : public LinearSolver {
   ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options);
   [[nodiscard]] bool factorise(const BlockMatrix& matrix) override;
   SolveSummary solve(const VectorX& b, VectorX& x) override;
-  /// Four at a time, in the lanes of wide registers: the matrix is read once for them.
+  /// Four at a time, in the lanes of wide registers: the matrix is read once for them. Fours go beside each other, each
+  /// in a thread.
   SolveSummary solve_columns(const MatrixX& B, MatrixX& X) override;
   std::string name() const override { return "conjugate gradients, 3x3-block incomplete Cholesky"; }
   std::unique_ptr<LinearSolver> clone() const override;
@@ -51,20 +53,26 @@ class ConjugateGradients : public LinearSolver {
   /// What is at hand of four systems, entries as in `IncompleteCholesky::apply_to_lanes`.
   struct Lanes {
     std::vector<double> b, x, r, z, p, ap;
+    std::vector<float> work;  // of the preconditioner
   };
+  using Columns = Eigen::Ref<const MatrixX>;
+  using Solutions = Eigen::Ref<MatrixX>;
+  /// `b` and `x` as `solve` has them.
+  SolveSummary solve(const Eigen::Ref<const VectorX>& b, Eigen::Ref<VectorX> x, double tolerance);
   double multiply(const std::vector<double>& p, std::vector<double>& ap) const;
   /// ap = A p for four vectors; their products p . ap.
   std::array<double, lanes> multiply_lanes(const std::vector<double>& p, std::vector<double>& ap) const;
-  /// Of what stands in `lanes_`.
-  SolveSummary solve_lanes();
+  /// At most four columns; lanes that are left over have nothing to solve.
+  SolveSummary solve_lanes(const Columns& B, Solutions X, Lanes& own) const;
+  SolveSummary solve_lanes(Lanes& own) const;
 
   std::shared_ptr<const BlockPattern> pattern_;
   SolverOptions options_;
   IncompleteCholesky preconditioner_;
   const BlockMatrix* matrix_ = nullptr;
   std::vector<double> x_, r_, z_, p_, ap_;  // four entries a node
-  Lanes lanes_;                             // empty until needed
-  VectorX right_, solution_;                // of a column that is left alone
+  std::vector<Lanes> lanes_;                // of four columns each; none until needed
+  std::vector<SolveSummary> summaries_;     // likewise
 };
 
 }  // namespace pliant

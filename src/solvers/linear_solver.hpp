@@ -23,7 +23,8 @@ class LinearSolver {
   [[nodiscard]] virtual bool factorise(const BlockMatrix& matrix) = 0;
   /// @param x  in: a first guess; out: the solution, 3 n
   virtual SolveSummary solve(const VectorX& b, VectorX& x) = 0;
-  /// A X = B, column by column; all 3 n x p. Solvers may take columns together, which costs less than one by one.
+  /// A X = B, column by column; all 3 n x p. Solvers may take columns together, which costs less than one by one, and
+  /// some beside others, in several threads.
   /// @param X  in: first guesses; out: the solutions
   /// `converged` is true where all columns are; the residual is the largest.
   virtual SolveSummary solve_columns(const MatrixX& B, MatrixX& X);
@@ -44,8 +45,9 @@ SolverKind best_direct_kind();
 
 struct SolverOptions {
   SolverKind kind = SolverKind::Automatic;
-  double tolerance = 1e-8;   ///< relative residual of the iterative solver, (0, 1)
-  int max_iterations = 500;  ///< of the iterative solver, >= 1
+  double tolerance = 1e-8;        ///< relative residual of the iterative solver, (0, 1)
+  int max_iterations = 500;       ///< of the iterative solver, >= 1
+  double column_tolerance = 0.0;  ///< of `solve_columns`, as `tolerance` otherwise; 0: that
 };
 
 /// Throws std::invalid_argument where the kind was not built in.

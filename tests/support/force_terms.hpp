@@ -211,7 +211,7 @@ TEST_P(ForceTerms, TangentByLagPoint) {
 }
 
 TEST_P(ForceTerms, TangentsAlongSeveralDirectionsAreThoseAlongEach) {
-  constexpr int count = 6;  // a register of four, and some of another
+  constexpr int count = 6;  // a register of four, one of another, and one on its own
   std::vector<Points> lags, ways, forces;
   std::vector<const Points*> of_lag, of_z;
   MatrixX d_theta = MatrixX::Zero(theta.size(), count);
@@ -224,7 +224,15 @@ TEST_P(ForceTerms, TangentsAlongSeveralDirectionsAreThoseAlongEach) {
   forces.assign(count, any(0.3, 0.2));  // added to what is there
   term->set_parameters(theta);
   linearise(lag);
-  term->add_force_tangents(z, {of_lag, of_z, d_theta}, forces);
+  term->prepare_tangents(z, d_theta);
+  const std::span<const Points*const> all_lags = of_lag, all_ways = of_z;
+  const std::span<Points> all_forces = forces;
+  for (const auto& [first, some] : {std::pair<Eigen::Index, Eigen::Index>{5, 1}, {0, 5}}) {  // in any order
+    const auto from = std::size_t(first), number = std::size_t(some);
+    term->add_force_tangents(
+        z, {all_lags.subspan(from, number), all_ways.subspan(from, number), d_theta.middleCols(first, some), first},
+        all_forces.subspan(from, number));
+  }
   for (int c = 0; c < count; ++c) {
     const auto k = std::size_t(c);
     const Points alone = tangent(lags[k], ways[k], d_theta.col(c));
