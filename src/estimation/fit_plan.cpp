@@ -77,8 +77,10 @@ PassState begun_from(const PassState& state) {
   begun.begin = PassState::Beginning{estimate_of(state)->theta, 0};
   for (const StageRecord& r : state.done)
     if (r.id.kind == StageKind::Fine || r.id.kind == StageKind::Corrected) begun.begin->stage = r.id.number;
-  std::erase_if(begun.done,
-                [](const StageRecord& r) { return is_on_full_grid(r.id.kind) || r.id.kind == StageKind::Pulls; });
+  std::erase_if(begun.done, [](const StageRecord& r) {
+    return is_on_full_grid(r.id.kind) || r.id.kind == StageKind::Pulls || r.id.kind == StageKind::Alternative ||
+           r.id.kind == StageKind::Resolution;
+  });
   return begun;
 }
 
@@ -186,7 +188,7 @@ Stage FitPlan::scan(const VectorX& from) const {
   const FitOptions& options = facts_.options;
   Stage stage{{StageKind::Scan}, "scan", {options.coarse_cells, options.steps}};
   stage.band = options.wide_band;
-  if (facts_.swings) stage.horizon.part = growing_horizon(true).front();
+  stage.horizon.part = growing_horizon(facts_.swings).front();
   stage.from = {from};
   const double g = std::max(facts_.gravity.vector(from).norm(), 0.1);
   const double softest = facts_.softest > 0.0 ? facts_.softest : from[facts_.density] * g * facts_.size;
@@ -380,16 +382,23 @@ const StageRecord* FitPlan::end_of_start(int index, const Records& done) const {
 
 /// Starts are followed over the first frames, and on if one leads about as far down as the best one, elsewhere.
 std::string FitPlan::why_given_up(int index, const Records& done) const {
-  constexpr double hopeless = 4.0, hopeless_if_drawn = 2.0;  // times the least cost over the first frames
+  // Times the least cost over the first frames. Where the best start explains all that was seen, nothing else can
+  // explain it much better.
+  constexpr double hopeless = 4.0, hopeless_if_drawn = 2.0, hopeless_if_explained = 1.5;
   for (const StageRecord& r : done)
     if (r.id.kind == StageKind::Coarse && r.id.start == index && !r.succeeded) return r.reason;
   const StageRecord* first = first_of_start(index, done);
   if (!first) return {};
   const int given = int(start_moduli(done).size());
   double least = infinite;
-  for (int i = 0; i < given; ++i)
+  bool is_explained = false;
+  for (int i = 0; i < given; ++i) {
     if (const StageRecord* r = first_of_start(i, done); r && r->succeeded) least = std::min(least, r->cost);
-  if (first->cost > (index < given ? hopeless : hopeless_if_drawn) * least)
+    const StageRecord* end = i == index || facts_.swings ? nullptr : end_of_start(i, done);
+    is_explained = is_explained || (end && end->succeeded && end->misfit < good_misfit);
+  }
+  const double most = index >= given ? hopeless_if_drawn : is_explained ? hopeless_if_explained : hopeless;
+  if (!end_of_start(index, done) && first->cost > most * least)
     return "given up: over the first frames its cost was " + in_three_digits(first->cost / least) +
            " times that of the best start";
   if (const auto same = joined(index, done))

@@ -119,8 +119,11 @@ std::string starts_sentence(const Result& result) {
   for (const StartResult& s : result.starts) best = std::min(best, s.cost.value_or(HUGE_VAL));
   const auto same = std::count_if(result.starts.begin(), result.starts.end(),
                                   [&](const StartResult& s) { return s.cost.value_or(HUGE_VAL) <= 1.02 * best; });
-  return fmt::format("{} of {} starts ended at the same best cost{}.", same, result.starts.size(),
-                     same > 1 ? "" : ", so look at the other starts before trusting it");
+  const auto given_up = std::ranges::count_if(result.starts, [](const StartResult& s) { return !s.cost.has_value(); });
+  std::string words = fmt::format("{} of {} starts led to the best cost", same, result.starts.size());
+  if (given_up > 0) words += fmt::format(", {} were given up", given_up);
+  const bool is_alone = same == 1 && given_up + 1 < std::ssize(result.starts);
+  return words + (is_alone ? ", so look at the other starts before trusting it." : ".");
 }
 
 }  // namespace

@@ -515,7 +515,11 @@ TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
 TEST_F(Plans, BegunFromAnotherFitLookAgainAtTheLastStage) {
   has_estimated();
   has_done(record({StageKind::Test}, 1.5));
+  has_done(record({StageKind::Alternative, 0, 0}, 1.5));
+  has_done(record({StageKind::Resolution, 0, 0}, 0.0));
   state = begun_from(state);
+  for (const StageRecord& r : state.done)
+    EXPECT_TRUE(r.id.kind != StageKind::Alternative && r.id.kind != StageKind::Resolution) << "of the other fit";
   ASSERT_TRUE(state.begin);
   EXPECT_EQ(state.begin->theta, theta(430.0));
   state.begin->theta = theta(500.0);
