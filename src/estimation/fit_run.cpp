@@ -497,8 +497,9 @@ std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const Parame
 }
 
 /// Whether the mesh's part in the uncertainty of a modulus is more than half of the noise's, and the next finer mesh
-/// can be had within the budget: what was spent is in the records, what it takes follows from the last estimate's
-/// iterations. Both are counted, not timed: a machine that is busy, or slow, gives the same answer.
+/// can be had within the budget, or within half of it where other parts are larger: what was spent is in the records,
+/// what it takes follows from the last estimate's iterations. Both are counted, not timed: a machine that is busy, or
+/// slow, gives the same answer.
 StageRecord FitRun::look_at_resolution(const Stage& stage) {
   constexpr double tolerated = 0.5, growth = 3.5;  // of the noise's; power of the ratio of edges, of work
   constexpr int iterations = 4;                    // from an estimate that is near, with the first linearisation
@@ -512,26 +513,31 @@ StageRecord FitRun::look_at_resolution(const Stage& stage) {
   const CostEvaluation e =
       has_ended ? ended->evaluation
                 : objective_of(stage, parameters, grid(stage.grid)).linearise(parameters.to_unconstrained(theta));
-  const std::optional<VectorX> mesh = mesh_shift(state_.done, gauss_newton_shift(e, largest_shift));
+  const VectorX own = gauss_newton_shift(e, largest_shift);
+  const std::optional<VectorX> mesh = mesh_shift(state_.done, own);
   if (!e.succeeded || !mesh) return record;
+  const VectorX all =
+      uncertainty_of(e, shifts_in(state_.done, own), floor(parameters, theta), int(recordings_.all().size())).std;
   const VectorX noise = uncertainty_of(e, {}, {}).std;
   const std::vector<const Parameter*> of = parameters.coordinate_parameters();
-  double share = 0.0, statistical = 0.0;
+  double share = 0.0, statistical = 0.0, whole = 0.0;
   for (std::size_t i = 0; i < of.size(); ++i) {
     if (!is_modulus(*of[i]) || std::abs((*mesh)[Eigen::Index(i)]) <= share) continue;
-    share = std::abs((*mesh)[Eigen::Index(i)]), statistical = noise[Eigen::Index(i)];
+    share = std::abs((*mesh)[Eigen::Index(i)]), statistical = noise[Eigen::Index(i)], whole = all[Eigen::Index(i)];
   }
   if (share <= tolerated * statistical) return record;
   double spent = 0.0;
   for (const StageRecord& r : state_.done) spent += r.work / work_of_a_minute;
   const double predicted =
       at.work / work_of_a_minute / (at.iterations + 1) * iterations * std::pow(Refinement::mesh_ratio, growth);
-  record.converged = spent + predicted <= options_.budget;
+  const double price = share * share > 0.5 * whole * whole ? 1.0 : 2.0;
+  record.converged = price * (spent + predicted) <= options_.budget;
   if (!record.converged)
     record.told = fmt::format(
         "The mesh contributes {:.1f} % to the uncertainty of Young's modulus, noise {:.1f} %: a finer one would narrow "
         "it and takes about {:.0f} minutes in all, --budget {:.0f}.",
-        100.0 * share, 100.0 * statistical, std::ceil(spent + predicted), std::ceil(1.2 * (spent + predicted)));
+        100.0 * share, 100.0 * statistical, std::ceil(spent + predicted),
+        std::ceil(1.001 * price * (spent + predicted)));
   return record;
 }
 

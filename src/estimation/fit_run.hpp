@@ -73,8 +73,11 @@ class FitRun : StageLoop {
   void say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate);
   const StageRecord& refined(const std::vector<StageRecord>& done, const StageRecord& first);
   std::vector<Alternative> alternatives() const;
-  std::vector<ModelShift> shifts_in(const std::vector<StageRecord>& done);
-  VectorX floor() const;
+  /// By how much the estimate would move under each alternative that could be tried.
+  /// @param own  what is left of the way to the estimate's own minimum
+  std::vector<ModelShift> shifts_in(const std::vector<StageRecord>& done, const VectorX& own) const;
+  void say_untried(const std::vector<StageRecord>& done);
+  VectorX floor(const ParameterSet& parameters, const VectorX& theta) const;
   void time_steps(const Stage& narrow, const ParameterSet& parameters);
 
   /// What the optimiser found at the end of a stage on the full grid.

@@ -107,7 +107,9 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   }
   const bool has_derivatives = outcome_.evaluation.gauss_newton.rows() == parameters.dimension();
   if (outcome_.evaluation.succeeded && has_derivatives && parameters.dimension() > 0)
-    add_uncertainty(outcome_, shifts_in(done), floor());
+    add_uncertainty(outcome_, shifts_in(done, gauss_newton_shift(outcome_.evaluation, largest_shift)),
+                    floor(outcome_.parameters, outcome_.theta));
+  say_untried(done);
   if (outcome_.evaluation.succeeded && !interrupted_) time_steps(narrow, parameters);
   if (const StageRecord* swing = find_record(done, {StageKind::Swing}); swing && !swing->told.empty())
     outcome_.notes.push_back(swing->told);
@@ -138,8 +140,7 @@ void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRe
 
 /// Of the alternatives that could be tried, less that of the model that each stands beside: the fit's own, whose
 /// gradient is not quite zero, or the first of them.
-std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) {
-  const VectorX own = gauss_newton_shift(outcome_.evaluation, largest_shift);
+std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done, const VectorX& own) const {
   std::vector<ModelShift> shifts;
   std::vector<StageRecord> tried;  // side by side: told in an order that does not depend on who was faster
   std::ranges::copy_if(done, std::back_inserter(tried),
@@ -151,9 +152,6 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) 
     const bool has_first = first != tried.end() && !first->shifts.empty();
     if (a.beside_the_first && !has_first) continue;
     const VectorX& reference = a.beside_the_first ? first->shifts.front().shift : own;
-    if (!r.reason.empty())
-      outcome_.notes.push_back("How much the estimate depends on the " + r.name + " could not be seen: " + r.reason +
-                               ".");
     for (const ModelShift& s : r.shifts) {
       if (s.shift.size() != own.size() || reference.size() != own.size()) continue;
       if (s.cause == cause_mesh && plan_.facts().repeats_by_need && !plan_.repetitions(done).empty()) {
@@ -166,11 +164,20 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done) 
   return shifts;
 }
 
-VectorX FitRun::floor() const {
+void FitRun::say_untried(const std::vector<StageRecord>& done) {
+  std::vector<std::string> untried;
+  for (const StageRecord& r : done)
+    if (r.id.kind == StageKind::Alternative && !r.reason.empty())
+      untried.push_back("How much the estimate depends on the " + r.name + " could not be seen: " + r.reason + ".");
+  std::ranges::sort(untried);  // side by side: told in an order that does not depend on who was faster
+  outcome_.notes.insert(outcome_.notes.end(), untried.begin(), untried.end());
+}
+
+VectorX FitRun::floor(const ParameterSet& parameters, const VectorX& theta) const {
   const bool meets = std::ranges::any_of(recordings_.all(), [](const Recording& r) {
     return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static;
   });
-  return options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, meets) : VectorX();
+  return options_.alternatives ? unmodelled_std(parameters, theta, meets) : VectorX();
 }
 
 /// The estimate on the finest mesh; that at all resolutions goes into the outcome.
