@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 #endif
 #include <utility>
@@ -21,6 +22,10 @@ void parallel_ranges(std::size_t first, std::size_t last, std::size_t grain,
 
 void parallel_tasks(std::size_t count, const std::function<void(std::size_t)>& body) {
   tbb::parallel_for(std::size_t(0), count, body, tbb::simple_partitioner());
+}
+
+void parallel_parts(std::size_t count, const std::function<void(std::size_t)>& part) {
+  tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t(0), count, part); });
 }
 
 struct TaskGroup::Tasks {
@@ -56,6 +61,10 @@ void parallel_ranges(std::size_t first, std::size_t last, std::size_t,
 
 void parallel_tasks(std::size_t count, const std::function<void(std::size_t)>& body) {
   for (std::size_t i = 0; i < count; ++i) body(i);
+}
+
+void parallel_parts(std::size_t count, const std::function<void(std::size_t)>& part) {
+  for (std::size_t i = 0; i < count; ++i) part(i);
 }
 
 struct TaskGroup::Tasks {};
