@@ -2,12 +2,14 @@
 
 #include <array>
 
+#include "base/parallel.hpp"
 #include "solvers/linear_solver.hpp"
 
 namespace pliant {
 
 /// Incomplete Cholesky factor with 3 x 3 blocks and no fill, A ~ L L^T, in single precision: as a preconditioner it
-/// loses nothing and its sweeps move half the memory.
+/// loses nothing and its sweeps move half the memory. Of large bodies each part of the rows has a factor of its own,
+/// what couples the parts left out, so that several threads share the work; the parts depend on the rows alone.
 class IncompleteCholesky {
  public:
   explicit IncompleteCholesky(const BlockPattern& pattern);
@@ -19,12 +21,16 @@ class IncompleteCholesky {
   void apply_to_lanes(const std::vector<double>& r, std::vector<double>& z) const;
 
  private:
+  static constexpr std::size_t rows_of_a_part = 16384;
   [[nodiscard]] bool try_factorise(const BlockMatrix& matrix, double shift);
+  [[nodiscard]] bool factorise_rows(const BlockMatrix& matrix, double shift, int first, int last);
+  void sweep(const double* r, double* z, int first, int last) const;
 
   struct Product {
     int left, right;  // L_ik and L_jk, k < j < i
   };
   int rows_;
+  Parts parts_;
   std::vector<int> row_start_, column_;        // strictly lower blocks
   std::vector<int> source_, source_diagonal_;  // where they are in the matrix
   std::vector<int> product_start_;             // for each lower block, its products
@@ -46,6 +52,15 @@ class ConjugateGradients : public LinearSolver {
   std::string name() const override { return "conjugate gradients, 3x3-block incomplete Cholesky"; }
   std::unique_ptr<LinearSolver> clone() const override;
 
+ protected:
+  /// z = P^-1 r, four entries a node.
+  virtual void precondition(const std::vector<double>& r, std::vector<double>& z) { preconditioner_.apply(r, z); }
+
+  std::shared_ptr<const BlockPattern> pattern_;
+  SolverOptions options_;
+  IncompleteCholesky preconditioner_;
+  const BlockMatrix* matrix_ = nullptr;
+
  private:
   static constexpr int lanes = 4;
   /// What is at hand of four systems, entries as in `IncompleteCholesky::apply_to_lanes`.
@@ -58,10 +73,7 @@ class ConjugateGradients : public LinearSolver {
   /// Of what stands in `lanes_`.
   SolveSummary solve_lanes();
 
-  std::shared_ptr<const BlockPattern> pattern_;
-  SolverOptions options_;
-  IncompleteCholesky preconditioner_;
-  const BlockMatrix* matrix_ = nullptr;
+  Parts parts_;
   std::vector<double> x_, r_, z_, p_, ap_;  // four entries a node
   Lanes lanes_;                             // empty until needed
   VectorX right_, solution_;                // of a column that is left alone
