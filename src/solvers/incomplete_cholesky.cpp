@@ -35,7 +35,6 @@ IncompleteCholesky::IncompleteCholesky(const BlockPattern& pattern)
     source_diagonal_.push_back(pattern.diagonal[i]);
     row_start_.push_back(int(column_.size()));
   }
-  lower_.resize(9 * column_.size());
   forward_.resize(9 * column_.size() + 3);
   backward_.resize(9 * column_.size() + 3);
   inverse_diagonal_.resize(9 * std::size_t(rows_));
@@ -57,16 +56,19 @@ bool IncompleteCholesky::try_factorise(const BlockMatrix& matrix, double shift) 
 }
 
 bool IncompleteCholesky::factorise_rows(const BlockMatrix& matrix, double shift, int first, int last) {
+  const auto stored = [&](int l) -> Matrix3 {
+    return Eigen::Map<const Eigen::Matrix3f>(&forward_[9 * std::size_t(l)]).cast<double>();
+  };
   for (int i = first; i < last; ++i) {
     Matrix3 pivot = ConstBlock(matrix.block(source_diagonal_[i]));
     pivot.diagonal() *= 1.0 + shift;
     for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
       Matrix3 sum = ConstBlock(matrix.block(source_[l]));
       for (int p = product_start_[l]; p < product_start_[l + 1]; ++p)
-        sum.noalias() -= ConstBlock(&lower_[9 * std::size_t(products_[p].left)]) *
-                         ConstBlock(&lower_[9 * std::size_t(products_[p].right)]).transpose();
-      Block lower(&lower_[9 * std::size_t(l)]);
-      lower.noalias() = sum * ConstBlock(&inverse_diagonal_[9 * std::size_t(column_[l])]).transpose();
+        sum.noalias() -= stored(products_[p].left) * stored(products_[p].right).transpose();
+      const Matrix3 lower = sum * ConstBlock(&inverse_diagonal_[9 * std::size_t(column_[l])]).transpose();
+      Eigen::Map<Eigen::Matrix3f>{&forward_[9 * std::size_t(l)]} = lower.cast<float>();
+      Eigen::Map<Eigen::Matrix3f>{&backward_[9 * std::size_t(l)]} = lower.transpose().cast<float>();
       pivot.noalias() -= lower * lower.transpose();
     }
     const double scale = pivot.trace();
@@ -81,11 +83,6 @@ bool IncompleteCholesky::factorise_rows(const BlockMatrix& matrix, double shift,
     const double f = std::sqrt(l22);
     Block inverse(&inverse_diagonal_[9 * std::size_t(i)]);
     inverse << 1 / a, 0, 0, -b / (a * d), 1 / d, 0, (b * e - c * d) / (a * d * f), -e / (d * f), 1 / f;
-  }
-  for (std::size_t l = std::size_t(row_start_[first]); l < std::size_t(row_start_[last]); ++l) {
-    const ConstBlock block(&lower_[9 * l]);
-    Eigen::Map<Eigen::Matrix3f>{&forward_[9 * l]} = block.cast<float>();
-    Eigen::Map<Eigen::Matrix3f>{&backward_[9 * l]} = block.transpose().cast<float>();
   }
   return true;
 }

@@ -35,8 +35,7 @@ class IncompleteCholesky {
   std::vector<int> source_, source_diagonal_;  // where they are in the matrix
   std::vector<int> product_start_;             // for each lower block, its products
   std::vector<Product> products_;
-  std::vector<double> lower_;              // 9 a block, column by column
-  std::vector<float> forward_, backward_;  // the same blocks, column by column and row by row
+  std::vector<float> forward_, backward_;  // 9 a block, column by column and row by row
   std::vector<double> inverse_diagonal_;   // inverse of each row's lower triangular pivot, column by column
   mutable std::vector<float> work_, lane_work_;
 };
