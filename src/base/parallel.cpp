@@ -24,9 +24,11 @@ void parallel_tasks(std::size_t count, const std::function<void(std::size_t)>& b
   tbb::parallel_for(std::size_t(0), count, body, tbb::simple_partitioner());
 }
 
-int thread_count() { return int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)); }
-
 void run_isolated(const std::function<void()>& body) { tbb::this_task_arena::isolate(body); }
+
+void parallel_parts(std::size_t count, const std::function<void(std::size_t)>& part) {
+  run_isolated([&] { tbb::parallel_for(std::size_t(0), count, part); });
+}
 
 struct TaskGroup::Tasks {
   tbb::task_group group;
@@ -63,9 +65,11 @@ void parallel_tasks(std::size_t count, const std::function<void(std::size_t)>& b
   for (std::size_t i = 0; i < count; ++i) body(i);
 }
 
-int thread_count() { return 1; }
-
 void run_isolated(const std::function<void()>& body) { body(); }
+
+void parallel_parts(std::size_t count, const std::function<void(std::size_t)>& part) {
+  for (std::size_t i = 0; i < count; ++i) part(i);
+}
 
 struct TaskGroup::Tasks {};
 

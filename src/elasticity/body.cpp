@@ -46,15 +46,17 @@ template <int N, class Mass, class Gradients>
 void finish(Body& body, Mass&& mass, Gradients&& gradients) {
   body.modulus.relative.assign(std::size_t(body.element_count()), 1.0);
   body.pattern = std::make_shared<BlockPattern>(BlockPattern::from_elements(body.node_count(), body.connectivity, N));
+  body.blocks = std::make_shared<std::vector<int>>(element_blocks(body, *body.pattern));
+  body.loop = std::make_shared<ElementLoop>(body.nodes, body.connectivity, N);
   body.mass.assign(std::size_t(body.pattern->block_count()), 0.0);
   body.mean_gradient.resize(Eigen::Index(body.connectivity.size()), 3);
   for (int e = 0; e < body.element_count(); ++e) {
     Eigen::Matrix<double, N, N> M = mass(e);
     if (body.options.mass == MassKind::Lumped) M = lumped(M);
     body.element_volume.push_back(M.sum());
-    const auto nodes = body.element(e);
+    const int* blocks = body.blocks->data() + std::size_t(e) * (N * N);
     for (int a = 0; a < N; ++a)
-      for (int b = 0; b < N; ++b) body.mass[std::size_t(body.pattern->find(nodes[a], nodes[b]))] += M(a, b);
+      for (int b = 0; b < N; ++b) body.mass[std::size_t(blocks[N * a + b])] += M(a, b);
     body.mean_gradient.middleRows<N>(Eigen::Index(e) * N) = gradients(e);
   }
 }
@@ -100,12 +102,14 @@ Vector3 Body::centre_of_mass() const {
 }
 
 void Body::add_mass_product(double scale, const Points& x, Points& out) const {
-  for (int row = 0; row < pattern->rows; ++row) {
-    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-    for (int b = pattern->row_start[row]; b < pattern->row_start[row + 1]; ++b)
-      sum += mass[b] * x.row(pattern->column[b]);
-    out.row(row) += scale * sum;
-  }
+  for_parts(Parts(std::size_t(pattern->rows)), [&](std::size_t first, std::size_t last) {
+    for (int row = int(first); row < int(last); ++row) {
+      Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+      for (int b = pattern->row_start[row]; b < pattern->row_start[row + 1]; ++b)
+        sum += mass[b] * x.row(pattern->column[b]);
+      out.row(row) += scale * sum;
+    }
+  });
 }
 
 Body make_body(HexGrid grid, const BodyOptions& options) {
@@ -214,8 +218,6 @@ Points Embedding::positions(const Points& nodes) const {
   for (int p = 0; p < point_count(); ++p) out.row(p) = position(p, nodes).transpose();
   return out;
 }
-
-std::vector<int> element_blocks(const Body& body) { return element_blocks(body, *body.pattern); }
 
 std::vector<int> element_blocks(const Body& body, const BlockPattern& pattern) {
   std::vector<int> blocks;

@@ -5,6 +5,7 @@
 #include <variant>
 #include <vector>
 
+#include "elasticity/element_loop.hpp"
 #include "elasticity/hex_element.hpp"
 #include "mesh/hex_grid.hpp"
 #include "mesh/tet_mesh.hpp"
@@ -50,6 +51,8 @@ struct Body {
   ModulusField modulus;
 
   std::shared_ptr<const BlockPattern> pattern;
+  std::shared_ptr<const std::vector<int>> blocks;  ///< where an element's N x N blocks are in the pattern, N^2 each
+  std::shared_ptr<const ElementLoop> loop;         ///< over the elements, by several threads
   std::vector<double> mass;  ///< for unit density [m^3]: one number a block of the pattern, times the 3 x 3 identity
   Points mean_gradient;      ///< [1/m], of each element's nodes in turn: F_e = sum_a x_a g_a^T (Weiss 2020, eq. 30)
   std::vector<int> element_class;         ///< elements of one class share their stiffness; all full cells are class 0
@@ -150,9 +153,8 @@ class Embedding {
   std::vector<double> weights_;
 };
 
-/// Where block (a, b) of an element's N x N blocks goes in the matrix: N x N numbers an element.
-std::vector<int> element_blocks(const Body& body);
-/// The same in a matrix of another pattern that has the body's blocks among others.
+/// Where block (a, b) of an element's N x N blocks goes in a matrix of another pattern that has the body's blocks among
+/// others: N x N numbers an element, as `Body::blocks` has them for the body's own.
 std::vector<int> element_blocks(const Body& body, const BlockPattern& pattern);
 
 }  // namespace pliant

@@ -40,14 +40,13 @@ class CorotatedElasticity : public Elasticity {
  private:
   using Vector = Eigen::Matrix<double, 3 * N, 1>;
   const int* nodes_of(int element) const { return body_->connectivity.data() + std::size_t(element) * N; }
-  const int* blocks_of(int element) const { return blocks_.data() + std::size_t(element) * (N * N); }
+  const int* blocks_of(int element) const { return body_->blocks->data() + std::size_t(element) * (N * N); }
   Eigen::Matrix<double, N, 3> gradients(int element) const {
     return body_->mean_gradient.middleRows<N>(Eigen::Index(element) * N);
   }
   int count() const { return int(polar_.size()); }
   /// R^T z for the element's nodes, relative to the first.
   Vector unrotated(int element, const Points& z) const;
-  void take_reference();
   bool is_corrected() const { return law_ == ElasticLaw::NeoHookean; }
   /// Change of an element's mean deformation from the lag point to z.
   Matrix3 ahead(int element, const Points& z) const {
@@ -82,11 +81,9 @@ class CorotatedElasticity : public Elasticity {
   double poissons_ratio_ = -2.0;
   UnitLame lame_ = {};
   LocalStiffness<N> stiffness_;
-  std::vector<Matrix3> gradients_;  // of the lag point
-  std::vector<Vector> reference_;   // X of the element's nodes, relative to the first
-  std::vector<int> blocks_;
+  MeanGradients<N> gradients_;                     // of the lag point
+  RelativePositions<N> reference_;                 // X of the element's nodes, relative to the first
   std::unique_ptr<ReferenceForces> by_reference_;  // where the reference was set
-  Points lag_;                                     // likewise
   std::vector<Strained> strained_;
   Points strained_at_;
   bool has_strained_ = false;
@@ -100,18 +97,9 @@ CorotatedElasticity<N>::CorotatedElasticity(std::shared_ptr<const Body> body, co
       law_(law),
       modulus_(body_, material),
       stiffness_(body_),
-      blocks_(element_blocks(*body_)) {
+      gradients_(body_),
+      reference_(body_) {
   polar_.resize(std::size_t(body_->element_count()));
-  gradients_.resize(polar_.size());
-  reference_.resize(polar_.size());
-  take_reference();
-}
-
-template <int N>
-void CorotatedElasticity<N>::take_reference() {
-  for (int e = 0; e < count(); ++e)
-    for (int a = 0; a < N; ++a)
-      node(reference_[e], a) = (body_->nodes.row(nodes_of(e)[a]) - body_->nodes.row(nodes_of(e)[0])).transpose();
 }
 
 template <int N>
@@ -134,7 +122,7 @@ Matrix3 CorotatedElasticity<N>::cauchy_stress(int e) const {
   const Matrix3 linear = lame_.lambda * strain.trace() * Matrix3::Identity() + 2.0 * lame_.mu * strain;
   Matrix3 first = polar_[e].R * linear;
   if (is_corrected()) first += correction(e).stress();
-  const Matrix3& F = gradients_[std::size_t(e)];
+  const Matrix3 F = gradients_[std::size_t(e)];
   return modulus_[e] / F.determinant() * first * F.transpose();
 }
 
@@ -158,13 +146,14 @@ void CorotatedElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
   body_ = std::move(body);
   stiffness_ = LocalStiffness<N>(body_);
   poissons_ratio_ = -2.0;
-  take_reference();
+  gradients_ = MeanGradients<N>(body_);
+  reference_ = RelativePositions<N>(body_);
   if (!by_reference_) by_reference_ = ReferenceForces::make(body_, material_);
 }
 
 template <int N>
 void CorotatedElasticity<N>::linearise_reference(const Points& z) {
-  if (by_reference_ && !by_reference_->linearise(body_->reference_positions(), lag_, z))
+  if (by_reference_ && !by_reference_->linearise(body_->reference_positions(), gradients_.field(), z))
     throw std::logic_error("the reference has elements inside out");
 }
 
@@ -196,9 +185,16 @@ void CorotatedElasticity<N>::prepare_tangents(const Points& z, const Eigen::Ref<
 template <int N>
 void CorotatedElasticity<N>::linearise(const Points& lag) {
   has_strained_ = false;
-  for (int e = 0; e < count(); ++e) gradients_[e] = mean_gradient(e, lag);
-  if (by_reference_) lag_ = lag;
-  polar_decompositions(gradients_, polar_);
+  gradients_.set_field(lag);
+  constexpr std::size_t at_once = 64;
+  for_parts(Parts(polar_.size()), [&](std::size_t first, std::size_t last) {
+    std::array<Matrix3, at_once> F;
+    for (; first < last; first += at_once) {
+      const std::size_t own = std::min(at_once, last - first);
+      for (std::size_t i = 0; i < own; ++i) F[i] = gradients_[first + i];
+      polar_decompositions(std::span(F).first(own), std::span(polar_).subspan(first, own));
+    }
+  });
 }
 
 template <int N>
@@ -213,31 +209,35 @@ auto CorotatedElasticity<N>::unrotated(int e, const Points& z) const -> Vector {
 
 template <int N>
 void CorotatedElasticity<N>::add_force(const Points& z, Points& force) {
-  for (int e = 0; e < count(); ++e) {
+  body_->loop->each([&](int e) {
     const int* nodes = nodes_of(e);
     const Vector d = unrotated(e, z) - reference_[e];
     const Vector y = stiffness_.times(e, d);
     const Matrix3 R = modulus_[e] * polar_[e].R;
     for (int a = 0; a < N; ++a) force.row(nodes[a]).noalias() -= (R * node(y, a)).transpose();
     if (is_corrected()) subtract_stress(e, modulus_[e], correction(e).stress(ahead(e, z)), force);
-  }
+  });
 }
 
 template <int N>
 double CorotatedElasticity<N>::energy(const Points& z) const {
-  double sum = 0.0;
-  for (int e = 0; e < count(); ++e) {
-    const Vector d = unrotated(e, z) - reference_[e];
-    sum += 0.5 * modulus_[e] * d.dot(stiffness_.times(e, d));
-    if (is_corrected()) sum += modulus_[e] * volume(e) * correction(e).energy();
-  }
-  return sum;
+  return sum_parts(Parts(polar_.size()), [&](std::size_t first, std::size_t last) {
+    double sum = 0.0;
+    for (int e = int(first); e < int(last); ++e) {
+      const Vector d = unrotated(e, z) - reference_[e];
+      sum += 0.5 * modulus_[e] * d.dot(stiffness_.times(e, d));
+      if (is_corrected()) sum += modulus_[e] * volume(e) * correction(e).energy();
+    }
+    return sum;
+  });
 }
 
 template <int N>
 void CorotatedElasticity<N>::add_matrix(double scale, BlockMatrix& matrix) {
-  for (int e = 0; e < count(); ++e) stiffness_.add_rotated(e, polar_[e].R, scale * modulus_[e], blocks_of(e), matrix);
-  for (int e = 0; e < count() && is_corrected(); ++e) {
+  const ElementLoop& loop = *body_->loop;
+  loop.each([&](int e) { stiffness_.add_rotated(e, polar_[e].R, scale * modulus_[e], blocks_of(e), matrix); });
+  if (!is_corrected()) return;
+  loop.each([&](int e) {
     const MeanStrainCorrection mean = correction(e);
     const auto g = gradients(e);
     const Eigen::Matrix<double, N, 3> h = g * mean.cofactors().transpose();
@@ -250,7 +250,7 @@ void CorotatedElasticity<N>::add_matrix(double scale, BlockMatrix& matrix) {
         block.noalias() += (factor * mean.factor()) * h.row(a).transpose() * h.row(b);
         block.diagonal().array() += products(a, b);
       }
-  }
+  });
 }
 
 /// A change dp turns the element by w = sum_b W_b dp_b, W_b = (tr(S) I - S)^-1 [g_b]x R^T, and the force changes by

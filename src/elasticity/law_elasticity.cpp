@@ -161,7 +161,7 @@ class TetLawElasticity : public LawElasticity {
   std::vector<Point> points_;
   std::vector<double> given_volumes_;  // of the body as it was given
   double least_volume_ratio_ = 1.0;
-  std::vector<int> blocks_;  // N x N an element
+  std::shared_ptr<const std::vector<int>> blocks_;  // N x N an element
   Points lag_, reference_z_;
   double energy_ = 0.0;  // at the last `evaluate`; infinite where the law knows no such deformation
   bool has_rotations_ = false;
@@ -179,7 +179,7 @@ TetLawElasticity<N>::TetLawElasticity(std::shared_ptr<const Body> body, std::sha
   const int count = body_->element_count();
   points_.resize(std::size_t(count) * points);
   polar_.resize(std::size_t(count));
-  blocks_ = element_blocks(*body_, pattern ? *pattern : *body_->pattern);
+  blocks_ = pattern ? std::make_shared<std::vector<int>>(element_blocks(*body_, *pattern)) : body_->blocks;
   given_volumes_ = volumes(body_->nodes);
   take_reference(body_->nodes);
 }
@@ -281,7 +281,7 @@ void TetLawElasticity<N>::add_gradient(Points& gradient) const {
 template <int N>
 void TetLawElasticity<N>::add_point_stiffness(int e, const Point& point, const Matrix9& M, const Matrix3& left,
                                               const Matrix3& right, double scale, BlockMatrix& matrix) const {
-  const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+  const int* blocks = blocks_->data() + std::size_t(e) * (N * N);
   const Nodes g = point.gradient * right;
   const double factor = scale * point.volume;
   for (int b = 0; b < N; ++b) {
@@ -552,7 +552,7 @@ template <int N>
 void TetLawElasticity<N>::add_reference_matrix(double scale, BlockMatrix& matrix) {
   const std::vector<PointChange>& all = changes(reference_z_, false);
   for (int e = 0; e < body_->element_count(); ++e) {
-    const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+    const int* blocks = blocks_->data() + std::size_t(e) * (N * N);
     for (int q = 0; q < points; ++q) {
       const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];

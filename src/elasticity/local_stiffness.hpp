@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <vector>
@@ -76,6 +77,40 @@ Matrix3 mean_gradient(const Body& body, int element, const Points& field) {
   for (int a = 0; a < N; ++a) gradient.noalias() += field.row(nodes[a]).transpose() * g.row(a);
   return gradient;
 }
+
+/// Mean gradients of a field over a body's elements, computed where they are asked for: three numbers a node are kept
+/// in the place of nine an element, of which there may be six times as many.
+template <int N>
+class MeanGradients {
+ public:
+  /// Of the rest positions, to begin with.
+  explicit MeanGradients(std::shared_ptr<const Body> body) : body_(std::move(body)), field_(body_->nodes) {}
+  void set_field(const Points& field) { field_ = field; }
+  const Points& field() const { return field_; }
+  std::size_t size() const { return std::size_t(body_->element_count()); }
+  Matrix3 operator[](std::size_t element) const { return mean_gradient<N>(*body_, int(element), field_); }
+
+ private:
+  std::shared_ptr<const Body> body_;
+  Points field_;
+};
+
+/// Rest positions of an element's nodes relative to its first.
+template <int N>
+class RelativePositions {
+ public:
+  explicit RelativePositions(std::shared_ptr<const Body> body) : body_(std::move(body)) {}
+  Eigen::Matrix<double, 3 * N, 1> operator[](std::size_t element) const {
+    const int* nodes = body_->connectivity.data() + element * N;
+    Eigen::Matrix<double, 3 * N, 1> local;
+    for (int a = 0; a < N; ++a)
+      element_vector::node(local, a) = (body_->nodes.row(nodes[a]) - body_->nodes.row(nodes[0])).transpose();
+    return local;
+  }
+
+ private:
+  std::shared_ptr<const Body> body_;
+};
 
 /// What the reverse sweep needs of an element's force y = K d and its cotangent c, with d = q - X.
 template <int N>
@@ -254,7 +289,9 @@ class LocalStiffness<4> {
                            c2 = load_wide(block + 6) + by_lambda * h(2, b) + by_mu * h(2, a);
         store_wide(block, c0 + Wide<double>{diagonal, 0.0, 0.0, 0.0});
         store_wide(block + 3, c1 + Wide<double>{0.0, diagonal, 0.0, 0.0});
-        store_wide(block + 6, c2 + Wide<double>{0.0, 0.0, diagonal, 0.0});
+        // Of the last column three lanes: behind it is another block, to which another thread may add.
+        const Wide<double> last = c2 + Wide<double>{0.0, 0.0, diagonal, 0.0};
+        std::memcpy(block + 6, &last, 3 * sizeof(double));
       }
   }
 

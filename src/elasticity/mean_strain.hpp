@@ -22,7 +22,7 @@ enum class ElasticLaw {
 /// along is stable; where H is of second order in the step, so is its error.
 class MeanStrainCorrection {
  public:
-  /// F and the decomposition stay alive.
+  /// The decomposition stays alive.
   MeanStrainCorrection(const Matrix3& F, const Polar& polar, const UnitLame& lame);
 
   /// P at H = 0 [-].
@@ -53,7 +53,7 @@ class MeanStrainCorrection {
   }
   Matrix3 own_tangent(const Matrix3& dF) const;
 
-  const Matrix3* F_;
+  Matrix3 F_;
   const Polar* polar_;
   UnitLame lame_;
   double J_, q_, dq_;

@@ -61,16 +61,12 @@ class TetReferenceForces : public ReferenceForces {
   std::array<double, points> weights_;
   std::vector<double> given_volumes_;  // of each point
   std::vector<Element> elements_;
-  std::vector<int> blocks_;
   double least_volume_ratio_ = 1.0;
 };
 
 template <int N>
 TetReferenceForces<N>::TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material)
-    : body_(std::move(body)),
-      poissons_ratio_(material.poissons_ratio),
-      modulus_(body_, material),
-      blocks_(element_blocks(*body_)) {
+    : body_(std::move(body)), poissons_ratio_(material.poissons_ratio), modulus_(body_, material) {
   // Mid nodes move on their own: curved elements need the rule that integrates their gradients exactly.
   const auto rule = tet_quadrature(N == 4 ? 0 : 5);
   for (int q = 0; q < points; ++q) {
@@ -164,7 +160,7 @@ auto TetReferenceForces<N>::tangent(int e, const Nodes& d_reference) const -> By
 template <int N>
 void TetReferenceForces<N>::add_matrix(double scale, BlockMatrix& matrix) const {
   for (int e = 0; e < body_->element_count(); ++e) {
-    const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+    const int* blocks = body_->blocks->data() + std::size_t(e) * (N * N);
     for (int b = 0; b < N; ++b)
       for (int i = 0; i < 3; ++i) {
         Nodes unit = Nodes::Zero();

@@ -17,8 +17,7 @@ class ViscousForces : public ForceTerm {
         damping_block_(stiffness_damping),
         modulus_(body_, material),
         stiffness_(body_),
-        blocks_(element_blocks(*body_)),
-        gradients_(std::size_t(body_->element_count()), Matrix3::Identity()) {}
+        gradients_(body_) {}
 
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
@@ -47,7 +46,6 @@ class ViscousForces : public ForceTerm {
   int count() const { return int(gradients_.size()); }
   bool is_active() const { return step_.start && damping_ > 0.0; }
   double rate() const { return damping_ / step_.dt; }
-  Matrix3 gradient(int element, const Points& x) const { return mean_gradient<N>(*body_, element, x); }
   /// The element's nodes' numbers of some points.
   Vector gathered(int element, const Points& points) const {
     Vector local;
@@ -72,7 +70,6 @@ class ViscousForces : public ForceTerm {
   ElementModuli modulus_;
   double poissons_ratio_ = -2.0, damping_ = 0.0;
   LocalStiffness<N> stiffness_;
-  std::vector<int> blocks_;
   /// What both products need of each element, once for all directions of a step.
   struct Strained {
     Vector way, turned, stress;  // s = z - x0, u = F^T s, K u
@@ -90,7 +87,7 @@ class ViscousForces : public ForceTerm {
     has_strained_ = true;
     return strained_;
   }
-  std::vector<Matrix3> gradients_;  // of the lag point
+  MeanGradients<N> gradients_;  // of the lag point
   std::vector<Strained> strained_;
   Points strained_at_;
   bool has_strained_ = false;
@@ -113,24 +110,25 @@ template <int N>
 void ViscousForces<N>::linearise(const Points& lag) {
   has_strained_ = false;
   if (!is_active()) return;
-  for (int e = 0; e < count(); ++e) gradients_[std::size_t(e)] = gradient(e, lag);
+  gradients_.set_field(lag);
 }
 
 template <int N>
 void ViscousForces<N>::add_force(const Points& z, Points& force) {
   if (!is_active()) return;
-  for (int e = 0; e < count(); ++e) {
+  body_->loop->each([&](int e) {
     const Matrix3& F = gradients_[std::size_t(e)];
     scatter(e, -rate() * modulus_[e], F, stiffness_.times(e, turned(F, way(e, z))), force);
-  }
+  });
 }
 
 template <int N>
 void ViscousForces<N>::add_matrix(double scale, BlockMatrix& matrix) {
   if (!is_active()) return;
-  for (int e = 0; e < count(); ++e)
+  body_->loop->each([&](int e) {
     stiffness_.add_transformed(e, gradients_[std::size_t(e)], scale * rate() * modulus_[e],
-                               blocks_.data() + std::size_t(e) * (N * N), matrix);
+                               body_->blocks->data() + std::size_t(e) * (N * N), matrix);
+  });
 }
 
 /// A change dp changes F by dp_b g_b^T, and with s = z - x0, y = K F^T s the force by
@@ -144,7 +142,7 @@ void ViscousForces<N>::add_lag_matrix(const Points& z, double scale, BlockMatrix
     const Vector y = stiffness_.times(e, turned(F, s));
     const double factor = scale * rate() * modulus_[e];
     const auto g = shape_gradients(e);
-    const int* blocks = blocks_.data() + std::size_t(e) * (N * N);
+    const int* blocks = body_->blocks->data() + std::size_t(e) * (N * N);
     for (int b = 0; b < N; ++b) {
       const Vector3 g_b = g.row(b);
       for (int d = 0; d < 3; ++d) {

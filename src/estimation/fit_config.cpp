@@ -23,6 +23,7 @@ const std::vector<std::pair<std::string, OptimiserKind>> optimisers = {
     {"nelder_mead", OptimiserKind::NelderMead}};
 const std::vector<std::pair<std::string, SolverKind>> solvers = {{"automatic", SolverKind::Automatic},
                                                                  {"iterative", SolverKind::Iterative},
+                                                                 {"multigrid", SolverKind::Multigrid},
                                                                  {"cholmod", SolverKind::Cholmod},
                                                                  {"simplicial", SolverKind::Simplicial}};
 const std::vector<std::pair<std::string, StiffnessDamping>> dampings = {{"kelvin_voigt", StiffnessDamping::KelvinVoigt},

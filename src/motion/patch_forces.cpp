@@ -42,7 +42,7 @@ LedSprings::LedSprings(const Body& body, const Patch& patch, LedSpringsOptions o
     : options_(std::move(options)),
       points_(body, patch.rest),
       share_(patch.share),
-      blocks_(element_blocks(body)),
+      blocks_(body.blocks),
       rest_(patch.rest),
       anchor_(patch.rest),
       target_(patch.rest) {
@@ -121,7 +121,7 @@ void LedSprings::add_matrix(double scale, BlockMatrix& matrix) {
   const int n = points_.nodes_per_point();
   for (int i = 0; i < points_.point_count() && holds_; ++i) {
     const auto w = points_.weights(i);
-    const int* blocks = blocks_.data() + std::size_t(points_.element(i)) * std::size_t(n * n);
+    const int* blocks = blocks_->data() + std::size_t(points_.element(i)) * std::size_t(n * n);
     for (int a = 0; a < n; ++a)
       for (int b = 0; b < n; ++b) {
         double* block = matrix.block(blocks[n * a + b]);

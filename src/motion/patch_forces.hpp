@@ -69,7 +69,7 @@ class LedSprings : public ForceTerm {
   LedSpringsOptions options_;
   Embedding points_;
   std::vector<double> share_;
-  std::vector<int> blocks_;
+  std::shared_ptr<const std::vector<int>> blocks_;
   std::vector<Vector3> rest_, anchor_, target_;  // anchors: where points were when it took hold [m]
   double took_hold_ = infinite;                  // [s]; infinite: it did not yet
   bool holds_ = false;

@@ -8,11 +8,7 @@
 namespace pliant {
 
 RigidContact::RigidContact(const Body& body, const ContactSamples& samples)
-    : points_(body, samples.rest),
-      rest_(samples.rest),
-      bond_(samples.rest),
-      area_(samples.area),
-      blocks_(element_blocks(body)) {
+    : points_(body, samples.rest), rest_(samples.rest), bond_(samples.rest), area_(samples.area), blocks_(body.blocks) {
   active_.reserve(rest_.size());
 }
 
@@ -51,7 +47,7 @@ void RigidContact::set_friction(double coefficient, double speed) {
 
 void RigidContact::set_row(const Body& body, int row, const BlockPattern& pattern) {
   row_ = row;
-  blocks_ = element_blocks(body, pattern);
+  blocks_ = std::make_shared<std::vector<int>>(element_blocks(body, pattern));
   row_diagonal_ = pattern.diagonal[std::size_t(row)];
   links_.clear();
   for (int i = 0; i < points_.point_count(); ++i) {
@@ -138,7 +134,7 @@ void RigidContact::scatter(int point, const Vector3& vector, Points& out) const 
 void RigidContact::scatter_block(int point, const Matrix3& block, BlockMatrix& matrix) const {
   const auto w = points_.weights(point);
   const int n = points_.nodes_per_point();
-  const int* blocks = blocks_.data() + std::size_t(points_.element(point)) * std::size_t(n * n);
+  const int* blocks = blocks_->data() + std::size_t(points_.element(point)) * std::size_t(n * n);
   for (int a = 0; a < n; ++a)
     for (int b = 0; b < n; ++b)
       Eigen::Map<Matrix3>(matrix.block(blocks[n * a + b])) += w[std::size_t(a)] * w[std::size_t(b)] * block;

@@ -145,7 +145,7 @@ class RigidContact : public ForceTerm {
   std::vector<Vector3> rest_, bond_;  // of samples [m]: at rest; where a turned bond would have them
   std::vector<double> area_;
   std::vector<double> overlap_;  // of samples [m]: less than nothing where they touch at rest; empty: none does
-  std::vector<int> blocks_;      // where each element's blocks go in the matrix
+  std::shared_ptr<const std::vector<int>> blocks_;  // where each element's blocks go in the matrix
   std::shared_ptr<const RigidShape> shape_;
   std::optional<PlaneBlock> plane_;
   Penalty penalty_;

@@ -9,9 +9,7 @@ namespace pliant {
 
 RotationStrainStep::RotationStrainStep(std::shared_ptr<const Body> body, SolverKind kind)
     : body_(std::move(body)), laplacian_(body_->pattern), excess_(Points::Zero(body_->node_count(), 3)) {
-  SolverOptions options;
-  options.kind = kind == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct_kind();
-  solver_ = make_linear_solver(body_->pattern, options);
+  solver_ = make_linear_solver(body_->pattern, stiffness_solver(kind, *body_->pattern, 1e-10));
   constexpr double regularisation = 1e-8;  // of motions that the parts' gradients do not see
   const auto add = [&](int row, int column, double value) {
     double* block = laplacian_.block(body_->pattern->find(row, column));

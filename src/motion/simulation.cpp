@@ -295,19 +295,26 @@ bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& th
 
 void Simulation::prepare_holds() {
   const Points& X = body_->scanned_positions();
+  const double least = 1e-12 * std::pow(body_->size(), 2);
   hold_share_.setZero(X.rows(), Eigen::Index(options_.holds.size()));
+  bool any_moves = false;  // else no node's share is asked for
+  for (const Hold& hold : options_.holds)
+    any_moves = any_moves || hold.rotation != Matrix3::Identity() || hold.translation != Vector3::Zero();
   for (std::size_t h = 0; h < options_.holds.size(); ++h) {
     const std::vector<int> nodes = held_nodes(*body_, {options_.holds[h]});
     Vector3 middle = Vector3::Zero();
     for (const int node : nodes) middle += X.row(node).transpose() / double(nodes.size());
     hold_middle_.push_back(middle);
-    for (Eigen::Index n = 0; n < X.rows(); ++n) {
-      double nearest = nodes.empty() ? 1.0 : std::numeric_limits<double>::infinity();
-      for (const int node : nodes) nearest = std::min(nearest, (X.row(n) - X.row(node)).squaredNorm());
-      hold_share_(n, Eigen::Index(h)) = 1.0 / (nearest + 1e-12 * std::pow(body_->size(), 2));
-    }
+    if (!any_moves) continue;
+    for_parts(Parts(std::size_t(X.rows())), [&](std::size_t first, std::size_t last) {
+      for (auto n = Eigen::Index(first); n < Eigen::Index(last); ++n) {
+        double nearest = nodes.empty() ? 1.0 : std::numeric_limits<double>::infinity();
+        for (const int node : nodes) nearest = std::min(nearest, (X.row(n) - X.row(node)).squaredNorm());
+        hold_share_(n, Eigen::Index(h)) = 1.0 / (nearest + least);
+      }
+    });
   }
-  for (Eigen::Index n = 0; n < X.rows(); ++n)
+  for (Eigen::Index n = 0; n < X.rows() && any_moves; ++n)
     if (hold_share_.cols() > 0) hold_share_.row(n) /= hold_share_.row(n).sum();
 }
 

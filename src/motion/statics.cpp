@@ -13,8 +13,7 @@ Statics::Statics(std::shared_ptr<const Body> body, std::vector<ForceTerm*> terms
       terms_(std::move(terms)),
       options_(options),
       pattern_(pattern ? std::move(pattern) : body_->pattern),
-      newton_(options.newton),
-      matrix_(pattern_) {}
+      newton_(options.newton) {}
 
 void Statics::clear_held(Points& points) const {
   for (const int row : held_) points.row(row).setZero();
@@ -62,14 +61,22 @@ NewtonProblem::Residual Statics::residual() {
   return {residual_.norm(), std::max(std::sqrt(squares), options_.smallest_force)};
 }
 
+/// Motions need none of it: a matrix is most of the memory of a large body.
+void Statics::clear_matrix() {
+  if (!matrix_.shared_pattern())
+    matrix_ = BlockMatrix(pattern_);
+  else
+    matrix_.set_zero();
+}
+
 void Statics::assemble_exact() {
-  matrix_.set_zero();
+  clear_matrix();
   for (ForceTerm* term : terms_) term->add_tangent_stiffness(x_, 1.0, matrix_);
   constrain(matrix_);
 }
 
 void Statics::assemble_positive() {
-  matrix_.set_zero();
+  clear_matrix();
   for (ForceTerm* term : terms_) term->add_matrix(1.0, matrix_);
   constrain(matrix_);
 }
@@ -77,9 +84,15 @@ void Statics::assemble_positive() {
 bool Statics::solve_with_last_factor() {
   constexpr int most = 12;
   if (!options_.reuse_factor || !has_factor_) return false;
+  if (stiffness_solver(options_.solver, *pattern_, 1e-10).kind == SolverKind::Multigrid) return false;  // no factor
   assemble_exact();
   // Direct factorisations are kept when the matrix changes.
   return conjugate_gradients_.solve(matrix_, *factor_, right_, solution_, 1e-4, most).converged;
+}
+
+void Statics::prepare_factor() {
+  if (!factor_) factor_ = make_linear_solver(pattern_, stiffness_solver(options_.solver, *pattern_, 1e-10));
+  factor_->set_positions(x_.topRows(body_->node_count()));
 }
 
 bool Statics::factorise_lifted() {
@@ -108,6 +121,7 @@ bool Statics::factorise_general() {
   for (const int diagonal : pattern_->diagonal)
     for (int d = 0; d < 3; ++d) squares += std::pow(matrix_.block(diagonal)[4 * d], 2);
   rounding_ = std::sqrt(squares) * body_->size() * std::numeric_limits<double>::epsilon();
+  general_->set_positions(x_.topRows(body_->node_count()));
   if (!general_->factorise(matrix_, positive_)) return false;
   // Where the exact matrix is indefinite, Newton's step leads to whatever point has no force, or nowhere. The matrix
   // with lag points kept leads downhill.
@@ -119,7 +133,7 @@ std::string Statics::find_step(Points& step) {
   constexpr const char* singular = "the stiffness matrix is singular: insufficient Dirichlet constraints";
   right_ = -flat(residual_);
   if (has_energy_) {
-    if (!factor_) factor_ = make_linear_solver(pattern_, {best_direct_kind(), 1e-10, 1});
+    prepare_factor();
     if (!solve_with_last_factor()) {
       assemble_exact();
       has_factor_ = factor_->factorise(matrix_);
@@ -128,7 +142,13 @@ std::string Statics::find_step(Points& step) {
         has_factor_ = factor_->factorise(matrix_) || factorise_lifted();
       }
       if (!has_factor_) return singular;
-      factor_->solve(right_, solution_);
+      solution_.setZero(right_.size());
+      if (!factor_->solve(right_, solution_).converged) {  // an iteration has met a direction of negative stiffness
+        assemble_positive();
+        has_factor_ = factor_->factorise(matrix_) || factorise_lifted();
+        solution_.setZero(right_.size());
+        if (!has_factor_ || !factor_->solve(right_, solution_).converged) return singular;
+      }
     }
   } else {
     if (!factorise_general()) return singular;
@@ -175,13 +195,14 @@ bool Statics::prepare_derivatives(const Points& x) {
   if (const auto energy = linearise(x); energy && !std::isfinite(*energy)) return false;
   for (ForceTerm* term : terms_) term->linearise_reference(x_);
   if (!has_energy_) return factorise_general();
-  if (!factor_) factor_ = make_linear_solver(pattern_, {best_direct_kind(), 1e-10, 1});
+  prepare_factor();
   assemble_exact();
   return has_factor_ = factor_->factorise(matrix_);
 }
 
 void Statics::solve_derivative(const Points& b, GeneralSolver::Side side) {
   right_ = flat(b);
+  solution_.setZero(right_.size());
   if (has_energy_)
     factor_->solve(right_, solution_);
   else

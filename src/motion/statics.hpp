@@ -71,11 +71,13 @@ class Statics : private NewtonProblem {
 
   int rows() const { return pattern_->rows; }
   void clear_held(Points& points) const;
+  void clear_matrix();
   void assemble_exact();
   /// The same without negative parts.
   void assemble_positive();
   void constrain(BlockMatrix& matrix) const;
   [[nodiscard]] bool solve_with_last_factor();
+  void prepare_factor();
   /// Of the matrix at hand, its diagonal raised until it can be factorised: a rigid body that touches nothing yet can
   /// move freely.
   [[nodiscard]] bool factorise_lifted();

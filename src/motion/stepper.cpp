@@ -29,11 +29,7 @@ Stepper::Stepper(std::shared_ptr<const Body> body, std::vector<std::unique_ptr<F
     throw std::invalid_argument("the contact's weight must lie in (0.5, 1]");
   if (!(options_.rotation_prediction >= 0.0 && options_.rotation_prediction <= 1.0))
     throw std::invalid_argument("the prediction of rotations must lie in [0, 1]");
-  for (Points* p : {&force_, &w_, &mass_part_, &residual_, &inertia_, &no_change_}) p->setZero(body_->node_count(), 3);
-  for (auto* points : {&lag_, &lag_bar_})
-    for (Points& p : *points) p.setZero(body_->node_count(), 3);
-  for (auto* points : {&points_at_, &bar_at_})
-    for (Points& p : *points) p.setZero(body_->node_count(), 3);
+  for (Points* p : {&force_, &no_change_}) p->setZero(body_->node_count(), 3);
   solution_.setZero(3 * body_->node_count());
 }
 
@@ -144,12 +140,13 @@ bool Stepper::factorise(const Scheme& s) {
     term->add_matrix(s.dt * s.at[std::size_t(term->at())], matrix_);
   }
   for (const int node : held_) matrix_.constrain(node);
+  solver_->set_positions(lag_[std::size_t(ForceTerm::Lag::Rotation)]);
   return solver_->factorise(matrix_);
 }
 
 SolveSummary Stepper::solve(const State& start, Points& delta) {
   if (is_newton()) {
-    inertia_.setZero();
+    inertia_.setZero(body_->node_count(), 3);
     add_inertia(1.0 / options_.newmark_theta, start.v, inertia_);
     clear_held(delta);
     start_ = &start.x;
@@ -227,6 +224,7 @@ bool Stepper::factorise_exact(const Scheme& s) {
   for (const int diagonal : body_->pattern->diagonal)
     for (int d = 0; d < 3; ++d) squares += std::pow(exact_matrix_.block(diagonal)[4 * d], 2);
   rounding_ = std::sqrt(squares) * body_->size() * std::numeric_limits<double>::epsilon();
+  solver.set_positions(lag_[std::size_t(ForceTerm::Lag::Rotation)]);
   return solver.factorise(exact_matrix_, matrix_);
 }
 

@@ -60,7 +60,7 @@ Wind::Wind(const Body& body, const TriangleMesh& surface, const WindOptions& opt
       triangles_(surface.triangles),
       vertices_(body, surface.vertices),
       middles_(body, middles_of(surface)),
-      blocks_(element_blocks(body)),
+      blocks_(body.blocks),
       corners_(surface.vertices.size()) {
   faces_.reserve(triangles_.size());
 }
@@ -157,7 +157,7 @@ void Wind::add_matrix(double scale, BlockMatrix& matrix) {
     const Matrix3 block = rate * (-2.0 * options_.normal * f.across * across +
                                   options_.tangential * f.along * (Matrix3::Identity() - across));
     const auto w = middles_.weights(int(i));
-    const int* blocks = blocks_.data() + std::size_t(middles_.element(int(i))) * std::size_t(n * n);
+    const int* blocks = blocks_->data() + std::size_t(middles_.element(int(i))) * std::size_t(n * n);
     for (int a = 0; a < n; ++a)
       for (int b = 0; b < n; ++b)
         Eigen::Map<Matrix3>(matrix.block(blocks[n * a + b])) += w[std::size_t(a)] * w[std::size_t(b)] * block;

@@ -104,7 +104,7 @@ class Wind : public ForceTerm {
   ParameterHandle velocity_;
   std::vector<std::array<int, 3>> triangles_;
   Embedding vertices_, middles_;
-  std::vector<int> blocks_;
+  std::shared_ptr<const std::vector<int>> blocks_;
   Vector3 mean_ = Vector3::Zero();
   double dt_ = 0.0;                // of the step at hand [s]; 0: there is none
   Vector3 air_ = Vector3::Zero();  // velocity in it [m/s]

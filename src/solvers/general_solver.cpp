@@ -12,9 +12,8 @@ constexpr int most_iterations = 60;
 
 GeneralSolver::GeneralSolver(std::shared_ptr<const BlockPattern> pattern, SolverKind kind)
     : pattern_(std::move(pattern)), matrix_(pattern_), symmetric_(pattern_) {
-  SolverOptions options;
-  options.kind = kind == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct_kind();
-  factor_ = make_linear_solver(pattern_, options);
+  constexpr double inner_tolerance = 1e-6;
+  factor_ = make_linear_solver(pattern_, stiffness_solver(kind, *pattern_, inner_tolerance));
   for (int row = 0; row < pattern_->rows; ++row)
     for (int b = pattern_->row_start[row]; b < pattern_->row_start[row + 1]; ++b)
       transposed_block_.push_back(pattern_->find(pattern_->column[b], row));
@@ -63,6 +62,7 @@ SolveSummary GeneralSolver::solve(const VectorX& b, VectorX& x, double tolerance
   SolveSummary summary;
   int k = 0;
   while (k < most_iterations && std::abs(residual[k]) > tolerance * scale) {
+    guess_.setZero(n);
     factor_->solve(basis_.col(k), guess_);
     preconditioned_.col(k) = guess_;
     matrix_.multiply(guess_, product_);

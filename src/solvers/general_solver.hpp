@@ -6,12 +6,15 @@ namespace pliant {
 
 /// Solves A x = b and A^T x = b for a matrix that is nearly symmetric: exact stiffnesses with the rotations'
 /// derivative, whose pattern is symmetric though their numbers are not quite. GMRES without restarts, preconditioned by
-/// a factorisation of the symmetric part; where A is symmetric that is one back-substitution.
+/// a factorisation of the symmetric part; where A is symmetric that is one back-substitution. Of large bodies solves by
+/// multigrid stand in for the factorisation (`stiffness_solver`).
 class GeneralSolver {
  public:
-  /// @param kind  of the factorisation: a direct one; Automatic takes the best that is built in
+  /// @param kind  of the factorisation, as `stiffness_solver` reads it
   GeneralSolver(std::shared_ptr<const BlockPattern> pattern, SolverKind kind);
 
+  /// See `LinearSolver::set_positions`.
+  void set_positions(const Points& positions) { factor_->set_positions(positions); }
   /// Takes a copy of the matrix. Where its symmetric part is not positive definite, `substitute` (symmetric positive
   /// definite, same pattern) is factorised in its place as preconditioner. False where that fails, too.
   [[nodiscard]] bool factorise(const BlockMatrix& matrix, const BlockMatrix& substitute);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 
@@ -15,14 +16,16 @@ using Block = Eigen::Map<Matrix3>;
 using ConstBlock = Eigen::Map<const Matrix3>;
 }  // namespace
 
-IncompleteCholesky::IncompleteCholesky(const BlockPattern& pattern) : rows_(pattern.rows) {
+IncompleteCholesky::IncompleteCholesky(const BlockPattern& pattern)
+    : rows_(pattern.rows), parts_(std::size_t(rows_), rows_of_a_part) {
   row_start_.push_back(0);
   product_start_.push_back(0);
   std::vector<int> position(rows_, -1);  // of column k in the row at hand
   for (int i = 0; i < rows_; ++i) {
-    const int first = int(column_.size());
+    const int first = int(column_.size()), first_of_part = int(std::size_t(i) / parts_.size * parts_.size);
     for (int b = pattern.row_start[i]; b < pattern.diagonal[i]; ++b) {
       const int j = pattern.column[b];
+      if (j < first_of_part) continue;
       for (int l = row_start_[j]; l < row_start_[j + 1]; ++l)
         if (position[column_[l]] >= 0) products_.push_back({position[column_[l]], l});
       position[j] = int(column_.size());
@@ -34,7 +37,6 @@ IncompleteCholesky::IncompleteCholesky(const BlockPattern& pattern) : rows_(patt
     source_diagonal_.push_back(pattern.diagonal[i]);
     row_start_.push_back(int(column_.size()));
   }
-  lower_.resize(9 * column_.size());
   forward_.resize(9 * column_.size() + 3);
   backward_.resize(9 * column_.size() + 3);
   inverse_diagonal_.resize(9 * std::size_t(rows_));
@@ -48,16 +50,27 @@ bool IncompleteCholesky::factorise(const BlockMatrix& matrix) {
 }
 
 bool IncompleteCholesky::try_factorise(const BlockMatrix& matrix, double shift) {
-  for (int i = 0; i < rows_; ++i) {
+  std::atomic<bool> done = true;
+  for_parts(parts_, [&](std::size_t first, std::size_t last) {
+    if (!factorise_rows(matrix, shift, int(first), int(last))) done = false;
+  });
+  return done;
+}
+
+bool IncompleteCholesky::factorise_rows(const BlockMatrix& matrix, double shift, int first, int last) {
+  const auto stored = [&](int l) -> Matrix3 {
+    return Eigen::Map<const Eigen::Matrix3f>(&forward_[9 * std::size_t(l)]).cast<double>();
+  };
+  for (int i = first; i < last; ++i) {
     Matrix3 pivot = ConstBlock(matrix.block(source_diagonal_[i]));
     pivot.diagonal() *= 1.0 + shift;
     for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
       Matrix3 sum = ConstBlock(matrix.block(source_[l]));
       for (int p = product_start_[l]; p < product_start_[l + 1]; ++p)
-        sum.noalias() -= ConstBlock(&lower_[9 * std::size_t(products_[p].left)]) *
-                         ConstBlock(&lower_[9 * std::size_t(products_[p].right)]).transpose();
-      Block lower(&lower_[9 * std::size_t(l)]);
-      lower.noalias() = sum * ConstBlock(&inverse_diagonal_[9 * std::size_t(column_[l])]).transpose();
+        sum.noalias() -= stored(products_[p].left) * stored(products_[p].right).transpose();
+      const Matrix3 lower = sum * ConstBlock(&inverse_diagonal_[9 * std::size_t(column_[l])]).transpose();
+      Eigen::Map<Eigen::Matrix3f>{&forward_[9 * std::size_t(l)]} = lower.cast<float>();
+      Eigen::Map<Eigen::Matrix3f>{&backward_[9 * std::size_t(l)]} = lower.transpose().cast<float>();
       pivot.noalias() -= lower * lower.transpose();
     }
     const double scale = pivot.trace();
@@ -73,17 +86,16 @@ bool IncompleteCholesky::try_factorise(const BlockMatrix& matrix, double shift) 
     Block inverse(&inverse_diagonal_[9 * std::size_t(i)]);
     inverse << 1 / a, 0, 0, -b / (a * d), 1 / d, 0, (b * e - c * d) / (a * d * f), -e / (d * f), 1 / f;
   }
-  for (std::size_t l = 0; l < column_.size(); ++l) {
-    const ConstBlock block(&lower_[9 * l]);
-    Eigen::Map<Eigen::Matrix3f>{&forward_[9 * l]} = block.cast<float>();
-    Eigen::Map<Eigen::Matrix3f>{&backward_[9 * l]} = block.transpose().cast<float>();
-  }
   return true;
 }
 
 void IncompleteCholesky::apply(const std::vector<double>& r, std::vector<double>& z) const {
+  for_parts(parts_, [&](std::size_t first, std::size_t last) { sweep(r.data(), z.data(), int(first), int(last)); });
+}
+
+void IncompleteCholesky::sweep(const double* r, double* z, int first, int last) const {
   float* w = work_.data();
-  for (int i = 0; i < rows_; ++i) {
+  for (int i = first; i < last; ++i) {
     const double* ri = &r[4 * std::size_t(i)];
     Wide<float> sum = {float(ri[0]), float(ri[1]), float(ri[2]), 0.0f};
     for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
@@ -96,7 +108,7 @@ void IncompleteCholesky::apply(const std::vector<double>& r, std::vector<double>
     wi[1] = float(inv[1]) * sum[0] + float(inv[4]) * sum[1];
     wi[2] = float(inv[2]) * sum[0] + float(inv[5]) * sum[1] + float(inv[8]) * sum[2];
   }
-  for (int i = rows_ - 1; i >= 0; --i) {
+  for (int i = last - 1; i >= first; --i) {
     const double* inv = &inverse_diagonal_[9 * std::size_t(i)];
     float* wi = &w[4 * std::size_t(i)];
     const float x0 = float(inv[0]) * wi[0] + float(inv[1]) * wi[1] + float(inv[2]) * wi[2];
@@ -175,7 +187,7 @@ void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vecto
 }
 
 ConjugateGradients::ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
-    : pattern_(std::move(pattern)), options_(options), preconditioner_(*pattern_) {
+    : pattern_(std::move(pattern)), options_(options), preconditioner_(*pattern_), parts_(std::size_t(pattern_->rows)) {
   if (options_.column_tolerance <= 0.0) options_.column_tolerance = options_.tolerance;
   const std::size_t size = 4 * std::size_t(pattern_->rows);
   for (auto* v : {&x_, &r_, &z_, &p_, &ap_}) v->assign(size, 0.0);
@@ -194,26 +206,27 @@ bool ConjugateGradients::factorise(const BlockMatrix& matrix) {
 double ConjugateGradients::multiply(const std::vector<double>& p, std::vector<double>& ap) const {
   const BlockPattern& pattern = *pattern_;
   const int* column = pattern.column.data();
-  double dot = 0.0;
-  for (int row = 0; row < pattern.rows; ++row) {
-    Wide<double> sum{};
-    for (int b = pattern.row_start[row]; b < pattern.row_start[row + 1]; ++b) {
-      const double* v = &p[4 * std::size_t(column[b])];
-      sum += block_times(matrix_->block(b), v[0], v[1], v[2]);
+  return sum_parts(parts_, [&](std::size_t first, std::size_t last) {
+    double dot = 0.0;
+    for (std::size_t row = first; row < last; ++row) {
+      Wide<double> sum{};
+      for (int b = pattern.row_start[row]; b < pattern.row_start[row + 1]; ++b) {
+        const double* v = &p[4 * std::size_t(column[b])];
+        sum += block_times(matrix_->block(b), v[0], v[1], v[2]);
+      }
+      sum[3] = 0.0;
+      store_wide(&ap[4 * row], sum);
+      const double* pr = &p[4 * row];
+      dot += pr[0] * sum[0] + pr[1] * sum[1] + pr[2] * sum[2];
     }
-    sum[3] = 0.0;
-    store_wide(&ap[4 * std::size_t(row)], sum);
-    const double* pr = &p[4 * std::size_t(row)];
-    dot += pr[0] * sum[0] + pr[1] * sum[1] + pr[2] * sum[2];
-  }
-  return dot;
+    return dot;
+  });
 }
 
 SolveSummary ConjugateGradients::solve(const VectorX& b, VectorX& x) { return solve(b, x, options_.tolerance); }
 
 SolveSummary ConjugateGradients::solve(const Eigen::Ref<const VectorX>& b, Eigen::Ref<VectorX> x, double tolerance) {
   const int n = pattern_->rows;
-  const std::size_t size = 4 * std::size_t(n);
   for (int i = 0; i < n; ++i)
     for (int d = 0; d < 3; ++d) x_[4 * std::size_t(i) + d] = x[3 * Eigen::Index(i) + d];
   multiply(x_, ap_);
@@ -231,21 +244,29 @@ SolveSummary ConjugateGradients::solve(const Eigen::Ref<const VectorX>& b, Eigen
   for (;; ++summary.iterations) {
     summary.converged = r_norm <= target;
     if (summary.converged || summary.iterations >= options_.max_iterations || !std::isfinite(r_norm)) break;
-    preconditioner_.apply(r_, z_);
-    double rz_new = 0.0;
-    for (std::size_t i = 0; i < size; ++i) rz_new += r_[i] * z_[i];
+    precondition(r_, z_);
+    const double rz_new = sum_parts(parts_, [&](std::size_t first, std::size_t last) {
+      double sum = 0.0;
+      for (std::size_t i = 4 * first; i < 4 * last; ++i) sum += r_[i] * z_[i];
+      return sum;
+    });
     const double beta = summary.iterations == 0 ? 0.0 : rz_new / rz;
     rz = rz_new;
-    for (std::size_t i = 0; i < size; ++i) p_[i] = z_[i] + beta * p_[i];
+    for_parts(parts_, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = 4 * first; i < 4 * last; ++i) p_[i] = z_[i] + beta * p_[i];
+    });
     const double curvature = multiply(p_, ap_);
     if (!(curvature > 0.0)) break;
     const double alpha = rz / curvature;
-    r_norm = 0.0;
-    for (std::size_t i = 0; i < size; ++i) {
-      x_[i] += alpha * p_[i];
-      r_[i] -= alpha * ap_[i];
-      r_norm += r_[i] * r_[i];
-    }
+    r_norm = sum_parts(parts_, [&](std::size_t first, std::size_t last) {
+      double sum = 0.0;
+      for (std::size_t i = 4 * first; i < 4 * last; ++i) {
+        x_[i] += alpha * p_[i];
+        r_[i] -= alpha * ap_[i];
+        sum += r_[i] * r_[i];
+      }
+      return sum;
+    });
   }
   summary.residual = b_norm > 0.0 ? std::sqrt(r_norm / b_norm) : 0.0;
   for (int i = 0; i < n; ++i)

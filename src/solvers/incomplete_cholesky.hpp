@@ -2,12 +2,14 @@
 
 #include <array>
 
+#include "base/parallel.hpp"
 #include "solvers/linear_solver.hpp"
 
 namespace pliant {
 
 /// Incomplete Cholesky factor with 3 x 3 blocks and no fill, A ~ L L^T, in single precision: as a preconditioner it
-/// loses nothing and its sweeps move half the memory.
+/// loses nothing and its sweeps move half the memory. Of large bodies each part of the rows has a factor of its own,
+/// what couples the parts left out, so that several threads share the work; the parts depend on the rows alone.
 class IncompleteCholesky {
  public:
   explicit IncompleteCholesky(const BlockPattern& pattern);
@@ -20,18 +22,21 @@ class IncompleteCholesky {
   void apply_to_lanes(const std::vector<double>& r, std::vector<double>& z, std::vector<float>& work) const;
 
  private:
+  static constexpr std::size_t rows_of_a_part = 16384;
   [[nodiscard]] bool try_factorise(const BlockMatrix& matrix, double shift);
+  [[nodiscard]] bool factorise_rows(const BlockMatrix& matrix, double shift, int first, int last);
+  void sweep(const double* r, double* z, int first, int last) const;
 
   struct Product {
     int left, right;  // L_ik and L_jk, k < j < i
   };
   int rows_;
+  Parts parts_;
   std::vector<int> row_start_, column_;        // strictly lower blocks
   std::vector<int> source_, source_diagonal_;  // where they are in the matrix
   std::vector<int> product_start_;             // for each lower block, its products
   std::vector<Product> products_;
-  std::vector<double> lower_;              // 9 a block, column by column
-  std::vector<float> forward_, backward_;  // the same blocks, column by column and row by row
+  std::vector<float> forward_, backward_;  // 9 a block, column by column and row by row
   std::vector<double> inverse_diagonal_;   // inverse of each row's lower triangular pivot, column by column
   mutable std::vector<float> work_;
 };
@@ -47,6 +52,15 @@ class ConjugateGradients : public LinearSolver {
   SolveSummary solve_columns(const MatrixX& B, MatrixX& X) override;
   std::string name() const override { return "conjugate gradients, 3x3-block incomplete Cholesky"; }
   std::unique_ptr<LinearSolver> clone() const override;
+
+ protected:
+  /// z = P^-1 r, four entries a node.
+  virtual void precondition(const std::vector<double>& r, std::vector<double>& z) { preconditioner_.apply(r, z); }
+
+  std::shared_ptr<const BlockPattern> pattern_;
+  SolverOptions options_;
+  IncompleteCholesky preconditioner_;
+  const BlockMatrix* matrix_ = nullptr;
 
  private:
   static constexpr int lanes = 4;
@@ -66,10 +80,7 @@ class ConjugateGradients : public LinearSolver {
   SolveSummary solve_lanes(const Columns& B, Solutions X, Lanes& own) const;
   SolveSummary solve_lanes(Lanes& own) const;
 
-  std::shared_ptr<const BlockPattern> pattern_;
-  SolverOptions options_;
-  IncompleteCholesky preconditioner_;
-  const BlockMatrix* matrix_ = nullptr;
+  Parts parts_;
   std::vector<double> x_, r_, z_, p_, ap_;  // four entries a node
   std::vector<Lanes> lanes_;                // of four columns each; none until needed
   std::vector<SolveSummary> summaries_;     // likewise

@@ -7,10 +7,16 @@
 
 #include "solvers/cholmod_solver.hpp"
 #include "solvers/incomplete_cholesky.hpp"
+#include "solvers/multigrid_solver.hpp"
 
 namespace pliant {
 
 namespace {
+
+/// From so many block rows on multigrid is the other way than iterating.
+constexpr int rows_for_multigrid = 8192;
+/// From so many on a factor of a stiffness is too large: some ten kilobytes a node, and more the more there are.
+constexpr int rows_too_many_to_factorise = 32768;
 
 /// Eigen's simplicial Cholesky: the direct solver of builds without CHOLMOD.
 class SimplicialSolver : public LinearSolver {
@@ -45,56 +51,67 @@ class SimplicialSolver : public LinearSolver {
   bool analysed_ = false;
 };
 
-/// Iterates, until that has cost more than a factorisation several times in a row; from then on factorises. What counts
-/// are iterations, not time, so that every run takes the same way.
+/// Iterates, until that has cost more than another way several times in a row, which it goes from then on: a
+/// factorisation, of large bodies multigrid. What counts are iterations, not time, so that every run takes the same
+/// way.
 class AutomaticSolver : public LinearSolver {
  public:
   AutomaticSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
       : pattern_(std::move(pattern)), options_(options), iterative_(pattern_, options) {
-    // As measured (docs/performance.md): a factorisation costs about as much as so many iterations.
+    // As measured (docs/performance.md): another way costs about as much as so many iterations.
     const double by_kind = best_direct_kind() == SolverKind::Cholmod ? 4.0 : 12.0;
-    worth_a_factor_ = int(by_kind * std::sqrt(double(pattern_->rows)));
+    worth_another_ = is_large() ? multigrid_iterations : int(by_kind * std::sqrt(double(pattern_->rows)));
   }
 
+  void set_positions(const Points& positions) override {
+    if (other_)
+      other_->set_positions(positions);
+    else if (is_large())
+      positions_ = positions;
+  }
   [[nodiscard]] bool factorise(const BlockMatrix& matrix) override {
     matrix_ = &matrix;
-    if (direct_) return direct_->factorise(matrix);
+    if (other_) return other_->factorise(matrix);
     constexpr int often_enough = 3;
-    too_long_ = iterations_ > worth_a_factor_ ? too_long_ + 1 : 0;
+    too_long_ = iterations_ > worth_another_ ? too_long_ + 1 : 0;
     iterations_ = 0;
-    return too_long_ >= often_enough ? turn_direct() : iterative_.factorise(matrix);
+    return too_long_ >= often_enough ? turn() : iterative_.factorise(matrix);
   }
   SolveSummary solve(const VectorX& b, VectorX& x) override {
-    if (direct_) return direct_->solve(b, x);
+    if (other_) return other_->solve(b, x);
     const SolveSummary summary = iterative_.solve(b, x);
     iterations_ += summary.iterations;
-    if (summary.converged || !turn_direct()) return summary;
-    return direct_->solve(b, x);
+    if (summary.converged || !turn()) return summary;
+    return other_->solve(b, x);
   }
   SolveSummary solve_columns(const MatrixX& B, MatrixX& X) override {
-    if (direct_) return direct_->solve_columns(B, X);
+    if (other_) return other_->solve_columns(B, X);
     const SolveSummary summary = iterative_.solve_columns(B, X);
     iterations_ += summary.iterations;
-    if (summary.converged || !turn_direct()) return summary;
-    return direct_->solve_columns(B, X);
+    if (summary.converged || !turn()) return summary;
+    return other_->solve_columns(B, X);
   }
-  std::string name() const override { return direct_ ? direct_->name() : iterative_.name(); }
+  std::string name() const override { return other_ ? other_->name() : iterative_.name(); }
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<AutomaticSolver>(pattern_, options_); }
 
  private:
-  bool turn_direct() {
-    SolverOptions direct = options_;
-    direct.kind = best_direct_kind();
-    direct_ = make_linear_solver(pattern_, direct);
-    return direct_->factorise(*matrix_);
+  static constexpr int multigrid_iterations = 40;
+  bool is_large() const { return pattern_->rows >= rows_for_multigrid; }
+  bool turn() {
+    SolverOptions other = options_;
+    other.kind = is_large() ? SolverKind::Multigrid : best_direct_kind();
+    other_ = make_linear_solver(pattern_, other);
+    other_->set_positions(positions_);
+    return other_->factorise(*matrix_);
   }
 
   std::shared_ptr<const BlockPattern> pattern_;
   SolverOptions options_;
   ConjugateGradients iterative_;
-  std::unique_ptr<LinearSolver> direct_;
+  std::unique_ptr<LinearSolver> other_;
+  Points positions_;  // of large bodies
   const BlockMatrix* matrix_ = nullptr;
-  int worth_a_factor_, iterations_ = 0, too_long_ = 0;
+  int worth_another_, iterations_ = 0, too_long_ = 0;
 };
 
 }  // namespace
@@ -119,6 +136,16 @@ SolverKind best_direct_kind() {
 #endif
 }
 
+SolverOptions stiffness_solver(SolverKind asked, const BlockPattern& pattern, double tolerance) {
+  SolverOptions options;
+  options.kind = asked == SolverKind::Simplicial ? SolverKind::Simplicial : best_direct_kind();
+  if (asked == SolverKind::Multigrid || (asked == SolverKind::Automatic && pattern.rows > rows_too_many_to_factorise))
+    options.kind = SolverKind::Multigrid;
+  options.tolerance = tolerance;
+  options.max_iterations = 2000;
+  return options;
+}
+
 std::unique_ptr<LinearSolver> make_linear_solver(std::shared_ptr<const BlockPattern> pattern,
                                                  const SolverOptions& options) {
   switch (options.kind) {
@@ -126,6 +153,8 @@ std::unique_ptr<LinearSolver> make_linear_solver(std::shared_ptr<const BlockPatt
       return std::make_unique<AutomaticSolver>(std::move(pattern), options);
     case SolverKind::Iterative:
       return std::make_unique<ConjugateGradients>(std::move(pattern), options);
+    case SolverKind::Multigrid:
+      return std::make_unique<MultigridSolver>(std::move(pattern), options);
     case SolverKind::Simplicial:
       return std::make_unique<SimplicialSolver>(std::move(pattern));
     case SolverKind::Cholmod:

@@ -18,6 +18,9 @@ struct SolveSummary {
 class LinearSolver {
  public:
   virtual ~LinearSolver() = default;
+  /// Where the rows' nodes are [m], n x 3, for solvers that move parts of a body rigidly; to be said before `factorise`
+  /// where nodes have moved far. There may be fewer than rows.
+  virtual void set_positions(const Points& positions) { (void)positions; }
   /// Numerical factorisation (or preconditioner) of a matrix; it must stay alive and unchanged while solving.
   /// Returns false where the matrix is not positive definite.
   [[nodiscard]] virtual bool factorise(const BlockMatrix& matrix) = 0;
@@ -34,8 +37,10 @@ class LinearSolver {
 };
 
 enum class SolverKind {
-  Automatic,   ///< iterative, until that has cost more than factorisations several times in a row
+  Automatic,   ///< iterative, until that has cost more than factorisations (of large bodies multigrid) several times
+               ///< in a row
   Iterative,   ///< conjugate gradients with an incomplete Cholesky factor of 3 x 3 blocks
+  Multigrid,   ///< the same with rigid motions of aggregates on coarser and coarser levels: large or stiff bodies
   Cholmod,     ///< supernodal sparse Cholesky (needs PLIANT_WITH_CHOLMOD)
   Simplicial,  ///< Eigen's sparse Cholesky
 };
@@ -49,6 +54,11 @@ struct SolverOptions {
   int max_iterations = 500;       ///< of the iterative solver, >= 1
   double column_tolerance = 0.0;  ///< of `solve_columns`, as `tolerance` otherwise; 0: that
 };
+
+/// How equilibria solve with their stiffness, whose conditioning no mass helps: by a factorisation, and of bodies whose
+/// factor would be too large, or where that is asked for, by multigrid.
+/// @param tolerance  relative residual, where it iterates, (0, 1)
+SolverOptions stiffness_solver(SolverKind asked, const BlockPattern& pattern, double tolerance);
 
 /// Throws std::invalid_argument where the kind was not built in.
 std::unique_ptr<LinearSolver> make_linear_solver(std::shared_ptr<const BlockPattern> pattern,

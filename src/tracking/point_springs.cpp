@@ -5,8 +5,7 @@
 
 namespace pliant {
 
-PointSprings::PointSprings(const Body& body, Embedding points)
-    : points_(std::move(points)), blocks_(element_blocks(body)) {
+PointSprings::PointSprings(const Body& body, Embedding points) : points_(std::move(points)), blocks_(body.blocks) {
   clear();
 }
 
@@ -44,7 +43,7 @@ void PointSprings::add_matrix(double scale, BlockMatrix& matrix) {
     Matrix3 K;
     for (int d = 0; d < 3; ++d) K.col(d) = scale * force(i, Vector3::Unit(d));
     const auto weights = points_.weights(i);
-    const int* to = blocks_.data() + std::size_t(points_.element(i)) * count_of_nodes * count_of_nodes;
+    const int* to = blocks_->data() + std::size_t(points_.element(i)) * count_of_nodes * count_of_nodes;
     for (std::size_t a = 0; a < count_of_nodes; ++a)
       for (std::size_t b = 0; b < count_of_nodes; ++b)
         Eigen::Map<Matrix3>(matrix.block(to[a * count_of_nodes + b])) += weights[a] * weights[b] * K;

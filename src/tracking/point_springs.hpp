@@ -40,7 +40,7 @@ class PointSprings : public ForceTerm {
   Vector3 force(int i, const Vector3& stretch) const;
 
   Embedding points_;
-  std::vector<int> blocks_;  // where each element's blocks go in the matrix
+  std::shared_ptr<const std::vector<int>> blocks_;  // where each element's blocks go in the matrix
   VectorX stiffness_;
   Points targets_, normals_;
   double tangential_ = 1.0;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <stdexcept>
 #include <vector>
@@ -31,6 +32,57 @@ TEST(ParallelFor, CountsFromNegativeNumbers) {
   std::vector<int> seen(8, 0);
   parallel_for(-4, 4, [&](int i) { seen[std::size_t(i + 4)] = i; });
   EXPECT_EQ(seen, (std::vector<int>{-4, -3, -2, -1, 0, 1, 2, 3}));
+}
+
+TEST(Parts, AreTheWholeAndFollowFromTheCountAlone) {
+  for (const std::size_t count :
+       {std::size_t(0), std::size_t(1), Parts::least, Parts::least + 1, std::size_t(9'999'999)}) {
+    const Parts parts(count);
+    EXPECT_LE(parts.parts(), Parts::most);
+    EXPECT_EQ(parts.parts() == 1, count <= Parts::least);
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < parts.parts(); ++i) {
+      EXPECT_EQ(parts.begin(i), next);
+      next = parts.end(i);
+    }
+    EXPECT_EQ(next, count);
+  }
+  EXPECT_EQ(Parts(100, 10).parts(), 10u);
+}
+
+/// Numbers whose sum depends on the order in which they are added.
+TEST(SumParts, AreTheSameForAnyNumberOfThreads) {
+  const Parts parts(100'000);
+  ASSERT_GT(parts.parts(), 10u);
+  const auto sum = [&](int threads) {
+    const ThreadLimit limit(threads);
+    return sum_parts(parts, [](std::size_t first, std::size_t last) {
+      double own = 0.0;
+      for (std::size_t i = first; i < last; ++i) own += 1.0 / (1.0 + double(i * 7919 % 100'003));
+      return own;
+    });
+  };
+  const double alone = sum(1);
+  EXPECT_GT(alone, 1.0);
+  for (int repetition = 0; repetition < 20; ++repetition) {
+    EXPECT_EQ(sum(2), alone);
+    EXPECT_EQ(sum(4), alone);
+  }
+  std::vector<int> seen(100'000, 0);
+  for_parts(parts, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) ++seen[i];
+  });
+  EXPECT_EQ(std::ranges::count(seen, 1), 100'000);
+}
+
+/// A loop inside a long task: who waits for it does not begin another task.
+TEST(ParallelParts, RunInsideTasks) {
+  std::vector<double> sums(8);
+  parallel_tasks(sums.size(), [&](std::size_t task) {
+    sums[task] =
+        sum_parts(Parts(50'000), [&](std::size_t first, std::size_t last) { return double(task * (last - first)); });
+  });
+  for (std::size_t task = 0; task < sums.size(); ++task) EXPECT_EQ(sums[task], 50'000.0 * double(task));
 }
 
 TEST(ParallelRanges, AreTheWholeInPartsThatDoNotOverlap) {

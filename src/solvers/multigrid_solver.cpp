@@ -1,0 +1,23 @@
+#include "solvers/multigrid_solver.hpp"
+
+namespace pliant {
+
+MultigridSolver::MultigridSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
+    : ConjugateGradients(std::move(pattern), options), coarse_(pattern_) {}
+
+std::string MultigridSolver::name() const { return "conjugate gradients, multigrid by aggregation of rigid motions"; }
+
+std::unique_ptr<LinearSolver> MultigridSolver::clone() const {
+  return std::make_unique<MultigridSolver>(pattern_, options_);
+}
+
+bool MultigridSolver::factorise(const BlockMatrix& matrix) {
+  return ConjugateGradients::factorise(matrix) && coarse_.factorise(matrix);
+}
+
+void MultigridSolver::precondition(const std::vector<double>& r, std::vector<double>& z) {
+  ConjugateGradients::precondition(r, z);
+  coarse_.add_correction(r, z);
+}
+
+}  // namespace pliant
