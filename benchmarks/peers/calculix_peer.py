@@ -11,7 +11,6 @@ from measured import Clock, Outcome, Unreached
 if not shutil.which("ccx"):
     raise ImportError("ccx is not installed: apt-get install calculix-ccx")
 
-THREADS = (1, 2)
 METHODS = {"bar": {"alpha method": {"law": "saint_venant_kirchhoff", "consistent": True}}}
 EQUILIBRIA = {"large motions": {"law": "saint_venant_kirchhoff"}}
 STEPS = {"bar": (0.02, 0.01)}

@@ -10,7 +10,6 @@ wp.config.quiet = True
 import newton
 from measured import Clock, Outcome, stepped
 
-THREADS = (1,)
 RADIUS = 0.001  # [m] of the torus's particles in contact; the floor is as much lower
 VBD, EXPLICIT = "vertex block descent", "explicit"
 METHODS = {
@@ -18,7 +17,7 @@ METHODS = {
     "torus": {VBD: {"finest": {"step": 0.00015625, "sweeps": 10}}, EXPLICIT: {"finest": {"step": 0.000078125}}},
 }
 RUNS = {  # step [s], sweeps
-    ("bar", VBD): [(0.0025, 20), (0.00125, 10), (0.000625, 10), (0.0003125, 5)],
+    ("bar", VBD): [(0.0025, 20), (0.00125, 10), (0.000625, 5), (0.000625, 10), (0.0003125, 2), (0.0003125, 5)],
     ("bar", EXPLICIT): [(0.0005, 0), (0.00025, 0), (0.000125, 0)],
     ("torus", VBD): [(0.0025, 10), (0.00125, 10), (0.000625, 10), (0.0003125, 5)],
     ("torus", EXPLICIT): [(0.000625, 0), (0.0003125, 0)],

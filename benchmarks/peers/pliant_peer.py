@@ -5,7 +5,6 @@ import pliant
 from bodies import HELD
 from measured import Clock, Outcome
 
-THREADS = (1,)
 STEPS = {"bar": (0.02, 0.01, 0.005, 0.0025, 0.00125), "torus": (0.005, 0.0025, 0.00125, 0.000625)}
 METHODS = {
     "bar": {

@@ -22,7 +22,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 RESULTS = HERE / "results.json"
 PROGRAMS = {"pliant": (1,), "newton": (1,), "mujoco": (1,), "calculix": (1, 2), "torch_fem": (1, 2)}  # and the cores that each can use
 BODIES = ("bar", "torus")
-SECTIONS = ("at rest", *BODIES, "laws", "first")
+SECTIONS = (*BODIES, "at rest", "laws", "first")
 AT_REST = ("pliant", "calculix", "torch_fem")
 MOVE = {"bar": ("pliant", "newton", "mujoco", "calculix"), "torus": ("pliant", "newton", "mujoco")}
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -68,7 +68,7 @@ def machine():
 
 def rounded(value):
     if isinstance(value, float):
-        return float(f"{value:.4g}")
+        return float(f"{value:.6g}")
     if isinstance(value, dict):
         return {key: rounded(item) for key, item in value.items()}
     return [rounded(item) for item in value] if isinstance(value, list) else value
@@ -94,7 +94,7 @@ def main():
         RESULTS.write_text(json.dumps(results, indent=1) + "\n")
         print(section, program, cores, out.get("reason", f"{len(out.get('runs', []))} runs"), flush=True)
 
-    for section, programs in {"at rest": AT_REST, **MOVE}.items():
+    for section, programs in {**MOVE, "at rest": AT_REST}.items():
         for program in programs:
             if section not in given.sections or program not in given.only:
                 continue

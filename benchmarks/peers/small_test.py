@@ -32,7 +32,7 @@ def rms(a, b):
 
 
 def check(what, holds):
-    print(f"{'ok' if holds else 'FAILED'}: {what}")
+    print(f"{'ok' if holds else 'FAILED'}: {what}", flush=True)
     if not holds:
         check.failed = True
 

@@ -9,7 +9,6 @@ import torchfem.solid
 from bodies import GRAVITY
 from measured import Clock, Outcome, Unreached
 
-THREADS = (1, 2)
 METHODS = {}
 EQUILIBRIA = {"Saint Venant and Kirchhoff": {"law": "saint_venant_kirchhoff"}, "neo-Hookean": {"law": "stable_neo_hookean"}}
 INCREMENTS = (1, 4)  # of gravity: it halves those that do not converge by itself
