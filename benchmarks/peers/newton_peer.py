@@ -46,7 +46,7 @@ def scene(body, method):
         builder.particle_flags[i] = int(builder.particle_flags[i]) & ~int(newton.ParticleFlags.ACTIVE)
     if body.floor:
         ke = contact_stiffness(body)
-        builder.add_shape_plane(plane=(0.0, 1.0, 0.0, RADIUS), body=-1, cfg=newton.ModelBuilder.ShapeConfig(ke=ke, kd=0.0, kf=0.0, mu=0.0))
+        builder.add_shape_plane(plane=(0.0, 1.0, 0.0, RADIUS), width=0.0, length=0.0, body=-1, cfg=newton.ModelBuilder.ShapeConfig(ke=ke, kd=0.0, kf=0.0, mu=0.0))
     builder.color()
     model = builder.finalize(device="cpu")
     model.particle_grid = None  # particles do not meet each other
@@ -56,10 +56,10 @@ def scene(body, method):
 
 
 def contact_stiffness(body):
-    """[N/m] of a particle: that the weight, on a tenth of the surface's particles, presses it in by 1e-3 of the size."""
+    """[N/m] of a particle: that the weight, on a tenth of the surface's particles, presses it in by 1e-4 of the size."""
     size = float(np.ptp(body.nodes, axis=0).max())
     weight = 9.81 * body.density * float(np.abs(np.linalg.det(body.nodes[body.elements[:, 1:]] - body.nodes[body.elements[:, :1]])).sum()) / 6
-    return weight / (0.1 * len(np.unique(body.surface)) * 1e-3 * size)
+    return weight / (0.1 * len(np.unique(body.surface)) * 1e-4 * size)
 
 
 def run(body, method, settings):
