@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""pliant beside other programs on the same bar and torus, in the same run: time of a step, and error against fine references.
+"""pliant beside other programs on the same bar and torus, on one machine: time of a step, and error against fine references.
 
     apt-get install calculix-ccx python3-venv
     python3 benchmarks/peers/run.py build/release [--work DIR] [--only PROGRAM ...] [--sections SECTION ...]
@@ -57,7 +57,7 @@ def worker(python, build, program, folder, cores, *options, **variables):
         return {**json.loads(done.stdout.splitlines()[-1]), "load": os.getloadavg()[0]}
     except (json.JSONDecodeError, IndexError):
         lines = [line for line in done.stderr.splitlines() if line.strip()]
-        return {"reason": lines[-1] if lines else f"ended with {done.returncode}"}
+        return {"reason": " ".join(lines[-2:]) if lines else f"ended with {done.returncode}"}
 
 
 def machine():
