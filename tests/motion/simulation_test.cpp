@@ -1,5 +1,6 @@
 #include "motion/simulation.hpp"
 
+#include "base/parallel.hpp"
 #include "support/derivatives.hpp"
 #include "support/scenes.hpp"
 #include "support/tolerance.hpp"
@@ -135,6 +136,58 @@ TEST(Simulation, StepsThatAreTooLongAreHalved) {
 }
 
 /// Two schemes of one equation: their difference vanishes with the step, the fully implicit one's own error too.
+/// Two steppers take the steps of a run with tangents in turns, and threads share the directions.
+TEST(Simulation, TangentsChangeNoBitOfTheMotionAndThreadsNoneOfTheTangents) {
+  const test::TorusScene scene = test::torus_scene(0.04, 4);
+  const MatrixX directions = MatrixX::Identity(scene.theta.size(), scene.theta.size()).leftCols(9);
+  struct Frame {
+    Points x;
+    std::vector<Points> tangents;
+  };
+  const auto frames_of = [&](const MatrixX& along) {
+    std::vector<Frame> frames;
+    Simulation simulation(scene.body, scene.options);
+    const RolloutSummary summary =
+        simulation.run(scene.theta, along, 3, [&](int, const State& state, std::span<const State> tangents) {
+          frames.push_back({state.x, {}});
+          for (const State& t : tangents) frames.back().tangents.push_back(t.x);
+          return true;
+        });
+    EXPECT_TRUE(summary.succeeded) << summary.failure;
+    EXPECT_EQ(summary.frames, 4);
+    return frames;
+  };
+  const std::vector<Frame> alone = frames_of(MatrixX(scene.theta.size(), 0)), with = frames_of(directions);
+  std::vector<Frame> in_one_thread;
+  {
+    const ThreadLimit limit(1);
+    in_one_thread = frames_of(directions);
+  }
+  ASSERT_EQ(alone.size(), 4u);
+  ASSERT_EQ(with.size(), 4u);
+  ASSERT_EQ(in_one_thread.size(), 4u);
+  for (std::size_t f = 0; f < 4; ++f) {
+    EXPECT_EQ(alone[f].x, with[f].x) << f;
+    ASSERT_EQ(with[f].tangents.size(), 9u);
+    for (std::size_t c = 0; c < 9; ++c) EXPECT_EQ(with[f].tangents[c], in_one_thread[f].tangents[c]) << f << ' ' << c;
+  }
+  EXPECT_GT(with[3].tangents[0].norm(), 0.0);
+}
+
+TEST(Simulation, ARunWithTangentsEndsWhereItsFramesSay) {
+  const test::TorusScene scene = test::torus_scene(0.04, 4);
+  const MatrixX directions = MatrixX::Identity(scene.theta.size(), scene.theta.size()).leftCols(5);
+  int seen = 0;
+  const auto until_second = [&](int frame, const State&, std::span<const State>) { return ++seen, frame < 2; };
+  Simulation simulation(scene.body, scene.options);
+  const RolloutSummary with = simulation.run(scene.theta, directions, 3, until_second);
+  EXPECT_EQ(seen, 3);
+  const RolloutSummary without = simulation.run(scene.theta, MatrixX(scene.theta.size(), 0), 3, until_second);
+  EXPECT_TRUE(with.succeeded && without.succeeded);
+  EXPECT_EQ(with.frames, without.frames);
+  EXPECT_EQ(with.steps, without.steps) << "one that was taken in vain does not count";
+}
+
 TEST(Simulation, BothIntegratorsAgreeAsStepsShrink) {
   const auto difference = [](double share) {
     std::array<VectorX, 2> x;
