@@ -153,7 +153,7 @@ def equilibrium(body, law, tolerance=1e-10):
                 return (ends[1] - ends[0]).ravel() / (2 * scale)
 
             operator = scipy.sparse.linalg.LinearOperator((3 * size, 3 * size), matvec=product)
-            change, _ = scipy.sparse.linalg.cg(operator, force.ravel(), rtol=1e-6, maxiter=400,
+            change, _ = scipy.sparse.linalg.cg(operator, force.ravel(), maxiter=400,  # its tolerance, 1e-5, has two names
                                                M=scipy.sparse.linalg.LinearOperator((3 * size, 3 * size), matvec=inverse.solve))
             step = 1.0
             while step > 1e-3:
