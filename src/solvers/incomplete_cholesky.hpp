@@ -22,7 +22,7 @@ class IncompleteCholesky {
   void apply_to_lanes(const std::vector<double>& r, std::vector<double>& z, std::vector<float>& work) const;
 
  private:
-  static constexpr std::size_t rows_of_a_part = 16384;
+  static constexpr std::size_t rows_of_a_part = 131072;
   [[nodiscard]] bool try_factorise(const BlockMatrix& matrix, double shift);
   [[nodiscard]] bool factorise_rows(const BlockMatrix& matrix, double shift, int first, int last);
   void sweep(const double* r, double* z, int first, int last) const;
