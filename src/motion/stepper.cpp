@@ -382,7 +382,7 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   }
   clear_held(w_);
 
-  mass_part_.setZero();
+  mass_part_.setZero(delta.rows(), 3);
   body_->add_mass_product(1.0, w_, mass_part_);
   const double w_m_delta = mass_part_.cwiseProduct(delta).sum();
   theta_bar[mass_damping_block_] -= density_ * w_m_delta;
@@ -392,8 +392,8 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   bar.v = -(1.0 - t) / t * bar.v + density_ / t * mass_part_;
   add_carried(1.0 / t, w_, bar.v);
   w_ *= dt;
-  for (Points& p : lag_bar_) p.setZero();
-  for (Points& p : bar_at_) p.setZero();
+  for (Points& p : lag_bar_) p.setZero(delta.rows(), 3);
+  for (Points& p : bar_at_) p.setZero(delta.rows(), 3);
   for (auto& term : terms_) {
     const auto at = std::size_t(term->at());
     term->add_force_adjoint(points_at_[at], w_, lag_bar_[std::size_t(term->lag())], bar_at_[at], theta_bar);
