@@ -497,7 +497,7 @@ std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const Parame
 }
 
 /// Whether the mesh's part in the uncertainty of a modulus is more than half of the noise's, and the next finer mesh
-/// can be had within the budget, or within half of it where other parts are larger: what was spent is in the records,
+/// can be had within the budget, or within a little less where other parts are larger: what was spent is in the records,
 /// what it takes follows from the last estimate's iterations. Both are counted, not timed: a machine that is busy, or
 /// slow, gives the same answer.
 StageRecord FitRun::look_at_resolution(const Stage& stage) {
@@ -530,7 +530,7 @@ StageRecord FitRun::look_at_resolution(const Stage& stage) {
   for (const StageRecord& r : state_.done) spent += r.work / work_of_a_minute;
   const double predicted =
       at.work / work_of_a_minute / (at.iterations + 1) * iterations * std::pow(Refinement::mesh_ratio, growth);
-  const double price = share * share > 0.5 * whole * whole ? 1.0 : 2.0;
+  const double price = share * share > 0.5 * whole * whole ? 1.0 : 1.1;
   record.converged = price * (spent + predicted) <= options_.budget;
   if (!record.converged)
     record.told = fmt::format(
