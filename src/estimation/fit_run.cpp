@@ -497,9 +497,9 @@ std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const Parame
 }
 
 /// Whether the mesh's part in the uncertainty of a modulus is more than half of the noise's, and the next finer mesh
-/// can be had within the budget, or within a little less where other parts are larger: what was spent is in the records,
-/// what it takes follows from the last estimate's iterations. Both are counted, not timed: a machine that is busy, or
-/// slow, gives the same answer.
+/// can be had within the budget, or within a little less where other parts are larger: what was spent is in the
+/// records, what it takes follows from the last estimate's iterations. Both are counted, not timed: a machine that is
+/// busy, or slow, gives the same answer.
 StageRecord FitRun::look_at_resolution(const Stage& stage) {
   constexpr double tolerated = 0.5, growth = 3.5;  // of the noise's; power of the ratio of edges, of work
   constexpr int iterations = 4;                    // from an estimate that is near, with the first linearisation
@@ -535,9 +535,9 @@ StageRecord FitRun::look_at_resolution(const Stage& stage) {
   if (!record.converged)
     record.told = fmt::format(
         "The mesh contributes {:.1f} % to the uncertainty of Young's modulus, noise {:.1f} %: a finer one would narrow "
-        "it and takes about {:.0f} minutes in all, --budget {:.0f}.",
+        "it and takes about {:.0f} {} in all, --budget {:.0f}.",
         100.0 * share, 100.0 * statistical, std::ceil(spent + predicted),
-        std::ceil(1.001 * price * (spent + predicted)));
+        spent + predicted > 1.0 ? "minutes" : "minute", std::ceil(1.001 * price * (spent + predicted)));
   return record;
 }
 

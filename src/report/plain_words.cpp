@@ -121,7 +121,7 @@ std::string starts_sentence(const Result& result) {
                                   [&](const StartResult& s) { return s.cost.value_or(HUGE_VAL) <= 1.02 * best; });
   const auto given_up = std::ranges::count_if(result.starts, [](const StartResult& s) { return !s.cost.has_value(); });
   std::string words = fmt::format("{} of {} starts led to the best cost", same, result.starts.size());
-  if (given_up > 0) words += fmt::format(", {} were given up", given_up);
+  if (given_up > 0) words += fmt::format(", {} {} given up", given_up, given_up == 1 ? "was" : "were");
   const bool is_alone = same == 1 && given_up + 1 < std::ssize(result.starts);
   return words + (is_alone ? ", so look at the other starts before trusting it." : ".");
 }
