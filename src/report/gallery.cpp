@@ -91,7 +91,8 @@ ReportField draw_field(const Gallery& gallery, const std::vector<FieldState>& st
   field.scale = colour_scale(all, ends);
   const PinholeCamera view = view_of(gallery, box);
   PictureOptions options;
-  options.samples = 2, options.light_rays = 2, options.even_light = 0.75;  // colours speak; light shows the shape alone
+  options.samples = gallery.samples, options.light_rays = 1,
+  options.even_light = 0.75;  // colours speak; light shows the shape alone
   field.pictures.resize(states.size());
   parallel_tasks(states.size(), [&](std::size_t i) {
     const FieldState& state = states[i];
