@@ -222,10 +222,12 @@ void add_fit(CommandLine& line, int& exit_code) {
       .range(1, 3)
       .type_name("N");
   command
-      .option("--budget", arguments->budget,
-              "about as long as the fit may take on two cores of a laptop with repetitions on finer meshes, which are "
-              "made as long as the mesh contributes to the uncertainty of a modulus more than half of what the noise "
-              "does; counted in steps, so that a busy machine gives the same answer; 0: none")
+      .option(
+          "--budget", arguments->budget,
+          "about as long as the fit may take on two cores of a laptop with repetitions on finer meshes, which are "
+          "made as long as the mesh contributes to the uncertainty of a modulus more than half of what the noise "
+          "does; counted in steps, so that a busy machine gives the same answer, and a tenth dearer where the mesh is "
+          "not what contributes most; 0: none")
       .type_name("MINUTES");
   command.option("--threads", arguments->threads, "most threads to use; all processors where left out").positive();
   command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");

@@ -95,10 +95,13 @@ void read_csv(const fs::path& path, std::string_view header, std::vector<Problem
               const std::function<void(CsvRow&)>& row) {
   const auto is_that = [&](const std::vector<std::string>& names) {
     if (names == names_in(header)) return true;
-    problems.push_back({{path, 1, 1},
-                        "the header " + in_quotes(joined(names)),
-                        in_quotes(header),
-                        "name the columns so, in this order"});
+    if (names.empty())
+      problems.push_back({{path}, "the file is empty", "the header " + in_quotes(header) + " and rows below it", ""});
+    else
+      problems.push_back({{path, 1, 1},
+                          "the header " + in_quotes(joined(names)),
+                          in_quotes(header),
+                          "name the columns so, in this order"});
     return false;
   };
   read_csv(path, is_that, problems, row);
@@ -133,10 +136,11 @@ void read_csv(const fs::path& path, const std::function<bool(const std::vector<s
                           std::to_string(names.size()) + " cells: " + joined(names),
                           "separate cells by commas, write decimals with a point"});
   }
-  if (current.line_ == 0)
-    problems.push_back({{path}, "the file is empty", "a CSV file with a header", ""});
-  else if (!has_rows)
+  if (current.line_ == 0) {
+    if (header({})) problems.push_back({{path}, "the file is empty", "a CSV file with a header", ""});
+  } else if (!has_rows) {
     problems.push_back({{path}, "no row below the header", "one row at least", ""});
+  }
 }
 
 std::string csv_cell(std::string text) {

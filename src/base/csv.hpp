@@ -50,7 +50,8 @@ void read_csv(const std::filesystem::path& path, std::string_view header, std::v
 
 /// The same for a file whose columns may be of several kinds. A cell that begins with a quote ends with one, and may
 /// have commas.
-/// @param header  called with the names of the columns; false, with a problem told, where they will not do
+/// @param header  called with the names of the columns, none of an empty file; false, with a problem told, where they
+///                will not do
 void read_csv(const std::filesystem::path& path, const std::function<bool(const std::vector<std::string>&)>& header,
               std::vector<Problem>& problems, const std::function<void(CsvRow&)>& row);
 

@@ -283,14 +283,16 @@ class LocalStiffness<4> {
         const double diagonal = mu * h.col(a).dot(h.col(b));
         const Wide<double> by_lambda = lambda * wide[a], by_mu = mu * wide[b];
         double* block = matrix.block(blocks[4 * a + b]);
-        // The fourth lane is the next column's first entry, which stays what it is: load all before storing any.
+        // The fourth lane is the next column's first entry, which stays what it is: load all before storing any. Of the
+        // last column three: behind it is another block, to which another thread may add.
+        Wide<double> last{};
+        std::memcpy(&last, block + 6, 3 * sizeof(double));
         const Wide<double> c0 = load_wide(block) + by_lambda * h(0, b) + by_mu * h(0, a),
                            c1 = load_wide(block + 3) + by_lambda * h(1, b) + by_mu * h(1, a),
-                           c2 = load_wide(block + 6) + by_lambda * h(2, b) + by_mu * h(2, a);
+                           c2 = last + by_lambda * h(2, b) + by_mu * h(2, a);
         store_wide(block, c0 + Wide<double>{diagonal, 0.0, 0.0, 0.0});
         store_wide(block + 3, c1 + Wide<double>{0.0, diagonal, 0.0, 0.0});
-        // Of the last column three lanes: behind it is another block, to which another thread may add.
-        const Wide<double> last = c2 + Wide<double>{0.0, 0.0, diagonal, 0.0};
+        last = c2 + Wide<double>{0.0, 0.0, diagonal, 0.0};
         std::memcpy(block + 6, &last, 3 * sizeof(double));
       }
   }

@@ -22,6 +22,8 @@ constexpr double impossible = -std::numeric_limits<double>::infinity();
 /// What a field must take off the cost at the least. What a mesh lacks is no noise, and many points make evidence of
 /// little: a second modulus took 4 % off for an even bar of another simulator, 18 % for one of two stiffnesses.
 double least_gain(int best_control_points) { return best_control_points == 1 ? 0.10 : 0.03; }
+/// Of that gain, what one step shows, or the wide band, where dampings and others made up for it.
+constexpr double share_on_the_way = 0.3;
 
 /// Whether a field that was fitted is kept beside the best one before.
 bool is_worth_it(const TriedField& tried, const TriedField& best) {
@@ -106,16 +108,17 @@ bool FieldChoice::is_decided() const {
 }
 
 std::optional<PassState> FieldChoice::beginning_of(int count) {
-  if (count == 1 || resumed_ == count) {
-    resumed_ = 0;
-    return left_;
-  }
+  const bool goes_on = resumed_ == count;
+  if (goes_on) resumed_ = 0;
+  if (count == 1) return left_;
   TriedField promised{count, false, std::numeric_limits<double>::infinity(), impossible};
   PassState begin;
   try {
     begin = with_field(count, promised);
   } catch (const InputError&) {  // the mesh has no room for so many points
   }
+  promised_ = promised;
+  if (goes_on) return left_;
   // Where one modulus does not explain what was seen, dampings stand where they make up for it: one step from there
   // tells nothing.
   const bool may_lead_elsewhere =
@@ -166,8 +169,17 @@ ModulusField FieldChoice::field_of(const Body& body, int count) const {
   return modulus_field(body, recordings_.front().capture.scene, {count, options_.control_weights}).field;
 }
 
+double FieldChoice::wide_band_limit() const {
+  const StageId estimate = estimate_of(*choice_.state)->id;
+  const int narrow = estimate.number - (estimate.kind == StageKind::Corrected ? 1 : 0);
+  const StageRecord* wide = find_record(choice_.state->done, {StageKind::Fine, estimate.start, narrow - 1});
+  return wide ? (1.0 - share_on_the_way * least_gain(best().control_points)) * wide->cost
+              : std::numeric_limits<double>::infinity();
+}
+
 void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {
   TriedField tried{count_, true, outcome.final_cost, impossible};
+  const bool is_given_up = !outcome.evaluation.succeeded && std::isfinite(outcome.final_cost);
   if (count_ > 1 && outcome.evaluation.succeeded) {
     const Body& body = *outcome.recordings.front().discretisation.body;
     const VectorX p = outcome.parameters.to_unconstrained(outcome.theta);
@@ -175,6 +187,7 @@ void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {
                                               carried_over(body, field_of(body, best().control_points), body.modulus));
   }
   if (count_ == 1) tried.log_bayes_factor = 0.0;
+  if (is_given_up) tried = promised_;
   if (count_ == 1 || is_worth_it(tried, best())) {
     choice_.best = int(choice_.tried.size());
     choice_.state = std::move(reached);
@@ -189,6 +202,7 @@ Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double d
   pass.options = with_controls(options_, count);
   pass.options.refine = refine;
   pass.options.alternatives = options_.alternatives && is_last_;
+  if (count > 1 && !is_last_) pass.options.wide_band_limit = wide_band_limit();
   pass.begin = from;
   if (count > 1) pass.stage = points(count);
   pass.done_from = done_from, pass.done_to = done_to;
@@ -214,12 +228,11 @@ FitOutcome FieldChoice::with_history(FitOutcome outcome) {
 }
 
 bool is_worth_a_fit(const TriedField& promised, const TriedField& best) {
-  constexpr double share = 0.3;  // of the gain, that one step shows where dampings and others made up for it
   // From moduli that vary one step tells less than there is: Poisson's ratio stands where it makes up for what they
   // lack.
   const double least_evidence = best.control_points == 1 ? strong_evidence : 0.0;
   return promised.log_bayes_factor > least_evidence &&
-         promised.cost < (1.0 - share * least_gain(best.control_points)) * best.cost;
+         promised.cost < (1.0 - share_on_the_way * least_gain(best.control_points)) * best.cost;
 }
 
 std::string explained(const std::vector<TriedField>& tried) {

@@ -9,7 +9,8 @@ namespace pliant {
 
 /// Plans a fit with as many control points of Young's modulus as the recordings support. The homogeneous object is
 /// fitted first; then fields of 2, 3, 4, 6, 8, ... points, each from the best one so far and only where one step of
-/// Gauss and Newton promises enough (`is_worth_a_fit`). A field of more points is kept where there is strong evidence
+/// Gauss and Newton promises enough (`is_worth_a_fit`), and to its end only where the stage in the wide band takes off
+/// as large a part of the best one's cost there. A field of more points is kept where there is strong evidence
 /// of what it has beyond the best one before (`log_bayes_factor` above `strong_evidence`); two numbers in a row without
 /// it end the search, and the best one is repeated where the options ask for that.
 class FieldChoice : public PassPlanner {
@@ -30,6 +31,8 @@ class FieldChoice : public PassPlanner {
   std::optional<PassState> beginning_of(int count);
   /// The best fit's state as one of another field, and what one step promises of that.
   PassState with_field(int count, TriedField& promised);
+  /// What a field's cost must come below in the wide band to be followed further.
+  double wide_band_limit() const;
   Pass pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const;
   void judge(const FitOutcome& outcome, PassState reached);
   /// With all that was done on the way.
@@ -43,6 +46,7 @@ class FieldChoice : public PassPlanner {
   PassState left_;        // by an interruption
   int resumed_ = 0;       // control points of the fit that was interrupted, until it goes on
   int count_ = 0;         // of the pass that was handed out last
+  TriedField promised_;   // of the same, where another field was best before
   bool is_last_ = false;  // that pass
   bool is_cut_ = false;   // interrupted, and the best so far is looked at
   std::optional<FitOutcome> outcome_;

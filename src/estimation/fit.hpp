@@ -54,14 +54,17 @@ struct FitOptions {
   /// explains where the object meets obstacles (`ExplainedSpan`).
   double span = 0.0;
   bool ends_if_unexplained = false;  ///< after its estimate; of a search for that part alone
-  int points_per_frame = 1000;       ///< >= 10: an even subset of the pixels; 0: all
-  int scan_per_decade = 3;           ///< values of Young's modulus tried in each decade, >= 1
-  int starts = 3;                    ///< best ones of the scan that are followed, >= 1
-  int most_starts = 7;               ///< with those that are drawn as long as the best one is not good, >= 1
-  int max_iterations = 25;           ///< of each stage of the optimiser, >= 1
-  double wide_band = 0.12;           ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
-  double fine_band = 0.05;           ///< of the last stage, (0, 0.5)
-  double newmark_theta = 0.51;       ///< [0.5, 1)
+  /// What the cost of the last stage in the wide band must come below, or the fit ends there; of a search among fields
+  /// of moduli alone.
+  double wide_band_limit = std::numeric_limits<double>::infinity();
+  int points_per_frame = 1000;  ///< >= 10: an even subset of the pixels; 0: all
+  int scan_per_decade = 3;      ///< values of Young's modulus tried in each decade, >= 1
+  int starts = 3;               ///< best ones of the scan that are followed, >= 1
+  int most_starts = 7;          ///< with those that are drawn as long as the best one is not good, >= 1
+  int max_iterations = 25;      ///< of each stage of the optimiser, >= 1
+  double wide_band = 0.12;      ///< outlier scale of the coarse stages, times the object's size, (0, 0.5)
+  double fine_band = 0.05;      ///< of the last stage, (0, 0.5)
+  double newmark_theta = 0.51;  ///< [0.5, 1)
   /// Left out: hexahedra, or quadratic tetrahedra where it follows from the fit where the object is stress-free.
   std::optional<ElementKind> element;
   Integrator integrator = Integrator::Lagged;

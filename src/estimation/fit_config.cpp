@@ -172,7 +172,7 @@ const std::vector<Entry>& entries() {
           "budget", "minutes", "0 and more",
           "about how long the fit may take on two cores of a laptop, counted in steps, with repetitions on finer "
           "meshes, made as long as the mesh's part in the uncertainty of a modulus is more than half of the "
-          "noise's; 0: never",
+          "noise's; a tenth dearer where the mesh is not what contributes most; 0: never",
           &FitOptions::budget),
       real_entry("span", "", "0..1",
                  "part of each recording that is compared, from where it begins; 0: all of it, or the part that the "

@@ -66,12 +66,11 @@ namespace {
 
 /// Whether how many moduli the object needs is asked without being told to. Where it is held, and bends and swings, it
 /// shows where it is how stiff. Under impacts errors of the contact would be taken for that, and a motion that was
-/// tracked bends where the tracker bent it. Scans that sag are left to who asks: their fits take many times as long.
+/// tracked bends where the tracker bent it.
 bool shows_where_it_is_stiff(const RecordedCapture& r) {
   const Scene& scene = r.capture.scene;
-  return !r.followed && scene.object.shape_is == ShapeIs::Reference && !scene.fixed.empty() && scene.planes.empty() &&
-         !scene.timing.is_static && r.capture.markers.empty() &&
-         (!r.capture.clouds.empty() || !r.capture.depth.empty());
+  return !r.followed && !scene.fixed.empty() && scene.planes.empty() && !scene.timing.is_static &&
+         r.capture.markers.empty() && (!r.capture.clouds.empty() || !r.capture.depth.empty());
 }
 
 bool looks_for_fields(const std::vector<RecordedCapture>& recordings, const FitOptions& options) {

@@ -255,6 +255,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
     stage.band = is_narrow ? options.fine_band : options.wide_band;
     stage.iterations = is_narrow ? options.max_iterations : std::max(1, options.max_iterations / 4);
     if (!is_narrow) is_intermediate(stage);
+    if (i + 2 == horizons.size()) stage.give_up_above = options.wide_band_limit;
     stage.free = free_at_last(done);
     // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
     if (facts_.swings && !is_last)

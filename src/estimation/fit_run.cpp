@@ -309,6 +309,10 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   if (joined) record.joined = joined, record.reason = "came into the valley of start " + std::to_string(*joined + 1);
   record.iterations = s.iterations, record.work = s.work;
   record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
+  if (s.succeeded && !is_cut && s.evaluation.cost > stage.give_up_above) {
+    record.succeeded = record.converged = s.evaluation.succeeded = false;
+    record.reason = s.evaluation.failure = "the cost falls by too little to be followed further";
+  }
   if (s.succeeded) record.misfit = misfit_of(s.evaluation), record.is_explained = is_explained(s.evaluation);
   record.elements = grid(stage.grid).recording.front().body->element_count();
   if (s.succeeded) record.theta = parameters.to_theta(s.p);

@@ -86,6 +86,7 @@ struct Stage {
   /// Of the optimiser: a tenth of a standard deviation, and a part of the cost.
   double promise_tolerance = 0.005, cost_tolerance = 2e-4;
   int iterations_before = 0;           ///< of its start, that are counted on
+  double give_up_above = infinite;     ///< cost at its end that is worth no further stage
   std::vector<std::string> free = {};  ///< parameters that are estimated
   std::vector<VectorX> from = {};      ///< theta; of several the best end counts; empty: where the stage before ended
   std::vector<double> trials = {};     ///< of a scan: Young's moduli of the object's own material [Pa]

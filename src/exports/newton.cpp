@@ -74,9 +74,9 @@ if __name__ == "__main__":
 
 }  // namespace
 
-/// Newton's vertex block descent has a stable neo-Hookean energy, in which k_lambda plays lambda + mu of small strains,
-/// and a damping that acts on its shear part alone. Which nodes are held stands in `export.json`: its reader takes no
-/// arrays of nodes that it does not know.
+/// Newton's vertex block descent has the stable neo-Hookean energy of Smith et al. 2018, whose constants it makes of
+/// Lame's (`k_mu`, `k_lambda`) itself, and a damping that acts on its shear part alone. Which nodes are held stands in
+/// `export.json`: its reader takes no arrays of nodes that it does not know.
 std::vector<std::string> write_newton(const ExportModel& model, const std::filesystem::path& folder) {
   const Body& body = *model.body;
   VtuGrid grid;
@@ -88,7 +88,7 @@ std::vector<std::string> write_newton(const ExportModel& model, const std::files
   for (const double E : model.moduli) {
     const double shear = E / (2.0 * (1.0 + nu)), first = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
     mu.values.push_back(shear);
-    lambda.values.push_back(first + shear);
+    lambda.values.push_back(first);
     damp.values.push_back(0.5 * model.stiffness_damping * shear);
     density.values.push_back(model.density);
   }

@@ -69,6 +69,7 @@ class CholmodSolver : public LinearSolver {
   }
 
   std::string name() const override { return "CHOLMOD supernodal Cholesky"; }
+  FactorCounts counts() const { return {common_.lnz, common_.fl}; }
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<CholmodSolver>(pattern_); }
 
  private:
@@ -131,12 +132,21 @@ std::unique_ptr<LinearSolver> make_cholmod_solver(std::shared_ptr<const BlockPat
   return std::make_unique<CholmodSolver>(std::move(pattern));
 }
 
+FactorCounts count_factor(std::shared_ptr<const BlockPattern> pattern) {
+  return CholmodSolver(std::move(pattern)).counts();
+}
+
 #else
 
-std::unique_ptr<LinearSolver> make_cholmod_solver(std::shared_ptr<const BlockPattern>) {
+namespace {
+[[noreturn]] void refuse() {
   throw std::invalid_argument(
       "this build has no CHOLMOD (PLIANT_WITH_CHOLMOD=OFF); choose `iterative` or `simplicial`");
 }
+}  // namespace
+
+std::unique_ptr<LinearSolver> make_cholmod_solver(std::shared_ptr<const BlockPattern>) { refuse(); }
+FactorCounts count_factor(std::shared_ptr<const BlockPattern>) { refuse(); }
 
 #endif
 

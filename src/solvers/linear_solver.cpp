@@ -3,6 +3,8 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "solvers/cholmod_solver.hpp"
@@ -13,10 +15,15 @@ namespace pliant {
 
 namespace {
 
-/// From so many block rows on multigrid is the other way than iterating.
+/// From so many block rows on multigrid may be the other way than iterating.
 constexpr int rows_for_multigrid = 8192;
 /// From so many on a factor of a stiffness is too large: some ten kilobytes a node, and more the more there are.
 constexpr int rows_too_many_to_factorise = 32768;
+
+/// No factor is worth fewer iterations, however small.
+constexpr int least_worth_of_a_factor = 50;
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
 
 /// Eigen's simplicial Cholesky: the direct solver of builds without CHOLMOD.
 class SimplicialSolver : public LinearSolver {
@@ -51,17 +58,24 @@ class SimplicialSolver : public LinearSolver {
   bool analysed_ = false;
 };
 
+/// So many iterations with the incomplete factor take about as long as a factorisation and a solve with it, as measured
+/// (docs/performance.md): slender and thin bodies have small factors, and matrices of large ones come from beyond the
+/// caches.
+double iterations_worth_a_factor(const std::shared_ptr<const BlockPattern>& pattern) {
+  if (best_direct_kind() != SolverKind::Cholmod) return 12.0 * std::sqrt(double(pattern->rows));
+  const FactorCounts factor = count_factor(pattern);
+  const double by_entry = pattern->rows < rows_for_multigrid ? 5.0 : 3.0;
+  return std::max({double(least_worth_of_a_factor), by_entry * factor.entries / pattern->block_count(),
+                   factor.operations / (200.0 * pattern->block_count())});
+}
+
 /// Iterates, until that has cost more than another way several times in a row, which it goes from then on: a
-/// factorisation, of large bodies multigrid. What counts are iterations, not time, so that every run takes the same
-/// way.
+/// factorisation, or, of large bodies that are not slender, multigrid. What counts are iterations, not time, so that
+/// every run takes the same way.
 class AutomaticSolver : public LinearSolver {
  public:
   AutomaticSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
-      : pattern_(std::move(pattern)), options_(options), iterative_(pattern_, options) {
-    // As measured (docs/performance.md): another way costs about as much as so many iterations.
-    const double by_kind = best_direct_kind() == SolverKind::Cholmod ? 4.0 : 12.0;
-    worth_another_ = is_large() ? multigrid_iterations : int(by_kind * std::sqrt(double(pattern_->rows)));
-  }
+      : pattern_(std::move(pattern)), options_(options), iterative_(pattern_, options) {}
 
   void set_positions(const Points& positions) override {
     if (other_)
@@ -73,7 +87,7 @@ class AutomaticSolver : public LinearSolver {
     matrix_ = &matrix;
     if (other_) return other_->factorise(matrix);
     constexpr int often_enough = 3;
-    too_long_ = iterations_ > worth_another_ ? too_long_ + 1 : 0;
+    too_long_ = is_too_long() ? too_long_ + 1 : 0;
     iterations_ = 0;
     return too_long_ >= often_enough ? turn() : iterative_.factorise(matrix);
   }
@@ -95,11 +109,26 @@ class AutomaticSolver : public LinearSolver {
   std::unique_ptr<LinearSolver> clone() const override { return std::make_unique<AutomaticSolver>(pattern_, options_); }
 
  private:
-  static constexpr int multigrid_iterations = 40;
+  /// Where multigrid takes over. What it takes grows with how slender a body is, what a factor takes is certain: that
+  /// is the other way as long as it is worth no more than a hard solve by multigrid.
+  static constexpr int multigrid_iterations = 40, hard_multigrid = 200;
   bool is_large() const { return pattern_->rows >= rows_for_multigrid; }
+  bool is_too_long() {
+    return iterations_ > std::min(least_worth_of_a_factor, multigrid_iterations) && iterations_ > worth_another();
+  }
+  /// Iterations that another way is worth.
+  int worth_another() {
+    if (worth_another_) return *worth_another_;
+    double factor = infinite;
+    if (pattern_->rows <= rows_too_many_to_factorise && (!is_large() || best_direct_kind() == SolverKind::Cholmod))
+      factor = iterations_worth_a_factor(pattern_);
+    factorises_ = !is_large() || factor <= hard_multigrid;
+    return *(worth_another_ = factorises_ ? int(factor) : multigrid_iterations);
+  }
   bool turn() {
     SolverOptions other = options_;
-    other.kind = is_large() ? SolverKind::Multigrid : best_direct_kind();
+    (void)worth_another();
+    other.kind = factorises_ ? best_direct_kind() : SolverKind::Multigrid;
     other_ = make_linear_solver(pattern_, other);
     other_->set_positions(positions_);
     return other_->factorise(*matrix_);
@@ -111,7 +140,9 @@ class AutomaticSolver : public LinearSolver {
   std::unique_ptr<LinearSolver> other_;
   Points positions_;  // of large bodies
   const BlockMatrix* matrix_ = nullptr;
-  int worth_another_, iterations_ = 0, too_long_ = 0;
+  std::optional<int> worth_another_;  // where it has been asked for
+  bool factorises_ = false;           // as the other way
+  int iterations_ = 0, too_long_ = 0;
 };
 
 }  // namespace

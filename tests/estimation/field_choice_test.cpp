@@ -313,6 +313,8 @@ TEST(FieldChoice, IsTheDefaultWhereAHeldObjectSwings) {
   bar.capture.scene.timing.is_static = false;
   bar.capture.scene.timing.times = {0.0, 0.1};
   EXPECT_TRUE(looks(bar, options));
+  bar.capture.scene.object.shape_is = ShapeIs::Static;
+  EXPECT_TRUE(looks(bar, options)) << "whether it sags in its scan or not";
   FitOptions named = options;
   named.parameters["youngs_modulus"].start = VectorX::Constant(1, stiff);
   EXPECT_FALSE(looks(bar, named));
