@@ -60,7 +60,7 @@ def judge(program, fit, data):
 
 
 def main():
-    arguments = common.arguments(__doc__, gather={"action": "store_true", "help": "no new fits: gather those that are in --work"})
+    arguments = common.arguments(__doc__, gather={"action": "store_true", "help": "no new fits: gather those that are in --work, and leave the others as they are stored"})
     data = common.shared_data() / RECORDING
     if not (data / "capture.toml").exists():
         raise SystemExit(f"{data} is not there")
@@ -71,7 +71,8 @@ def main():
     for name in ("rest.ply", "clouds"):
         if not (taken / name).is_symlink():
             (taken / name).symlink_to((data / name).resolve())
-    fits = {}
+    file = HERE / "results.json"
+    fits = common.read(file)["fits"] if arguments.gather and file.exists() else {}
     for name, (is_taken, choices) in FITS.items():
         if arguments.gather and not (arguments.work / name / "figures.json").exists():
             continue
