@@ -91,16 +91,17 @@ class CholmodSolver : public LinearSolver {
     return {done, 0, 0.0};
   }
 
-  /// The lower triangle by columns; by symmetry a block row's blocks on and right of the diagonal, transposed.
+  /// The upper triangle by columns, which CHOLMOD permutes in one pass (the lower one in two): by symmetry a block
+  /// row's blocks on and left of the diagonal, transposed.
   void build_structure() {
     const BlockPattern& pattern = *pattern_;
     std::size_t count = 0;
     for (int row = 0; row < pattern.rows; ++row) {
-      const std::size_t right = std::size_t(pattern.row_start[row + 1] - pattern.diagonal[row] - 1);
-      count += 9 * right + 6;
+      const std::size_t left = std::size_t(pattern.diagonal[row] - pattern.row_start[row]);
+      count += 9 * left + 6;
     }
     const std::size_t n = 3 * std::size_t(pattern.rows);
-    matrix_ = cholmod_allocate_sparse(n, n, count, true, true, -1, CHOLMOD_REAL, &common_);
+    matrix_ = cholmod_allocate_sparse(n, n, count, true, true, 1, CHOLMOD_REAL, &common_);
     auto* start = static_cast<int*>(matrix_->p);
     auto* index = static_cast<int*>(matrix_->i);
     source_.reserve(count);
@@ -108,9 +109,9 @@ class CholmodSolver : public LinearSolver {
     for (int row = 0; row < pattern.rows; ++row)
       for (int c = 0; c < 3; ++c) {
         start[3 * row + c] = filled;
-        for (int b = pattern.diagonal[row]; b < pattern.row_start[row + 1]; ++b)
+        for (int b = pattern.row_start[row]; b <= pattern.diagonal[row]; ++b)
           for (int r = 0; r < 3; ++r) {
-            if (pattern.column[b] == row && r < c) continue;
+            if (pattern.column[b] == row && r > c) continue;
             index[filled++] = 3 * pattern.column[b] + r;
             source_.push_back(9 * std::size_t(b) + 3 * std::size_t(r) + std::size_t(c));  // entry (c, r) of the block
           }
