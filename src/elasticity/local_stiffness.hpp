@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cstring>
 #include <memory>
 #include <span>
 #include <vector>
@@ -276,24 +275,23 @@ class LocalStiffness<4> {
     const Matrix3x4 h = R * gradients(element);
     const double volume = factor * body_->element_volume[std::size_t(element)];
     const double lambda = volume * lame_.lambda, mu = volume * lame_.mu;
-    Wide<double> wide[4];
-    for (int a = 0; a < 4; ++a) wide[a] = Wide<double>{h(0, a), h(1, a), h(2, a), 0.0};
+    // Entry 3 j + i of an outer product x y^T is x_i y_j: nine entries in two wide numbers and a plain one, so that
+    // nothing beyond the block is touched, to which another thread may add.
+    Wide<double> row[4][2], column[4][2];
+    for (int a = 0; a < 4; ++a) {
+      const double x = h(0, a), y = h(1, a), z = h(2, a);
+      row[a][0] = Wide<double>{x, y, z, x}, row[a][1] = Wide<double>{y, z, x, y};
+      column[a][0] = Wide<double>{x, x, x, y}, column[a][1] = Wide<double>{y, y, z, z};
+    }
     for (int a = 0; a < 4; ++a)
       for (int b = 0; b < 4; ++b) {
         const double diagonal = mu * h.col(a).dot(h.col(b));
-        const Wide<double> by_lambda = lambda * wide[a], by_mu = mu * wide[b];
+        const Wide<double> on_diagonal{diagonal, 0.0, 0.0, 0.0};
         double* block = matrix.block(blocks[4 * a + b]);
-        // The fourth lane is the next column's first entry, which stays what it is: load all before storing any. Of the
-        // last column three: behind it is another block, to which another thread may add.
-        Wide<double> last{};
-        std::memcpy(&last, block + 6, 3 * sizeof(double));
-        const Wide<double> c0 = load_wide(block) + by_lambda * h(0, b) + by_mu * h(0, a),
-                           c1 = load_wide(block + 3) + by_lambda * h(1, b) + by_mu * h(1, a),
-                           c2 = last + by_lambda * h(2, b) + by_mu * h(2, a);
-        store_wide(block, c0 + Wide<double>{diagonal, 0.0, 0.0, 0.0});
-        store_wide(block + 3, c1 + Wide<double>{0.0, diagonal, 0.0, 0.0});
-        last = c2 + Wide<double>{0.0, 0.0, diagonal, 0.0};
-        std::memcpy(block + 6, &last, 3 * sizeof(double));
+        for (int half = 0; half < 2; ++half)
+          store_wide(block + 4 * half, load_wide(block + 4 * half) + lambda * row[a][half] * column[b][half] +
+                                           mu * row[b][half] * column[a][half] + on_diagonal);
+        block[8] += lambda * h(2, a) * h(2, b) + mu * h(2, b) * h(2, a) + diagonal;
       }
   }
 
