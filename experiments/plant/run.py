@@ -32,6 +32,8 @@ FITS = {
     "auto": ("plant", {"control_points": "auto"}),
     "placed": ("placed", {}),
     "together": ("plant", {"tracking": "both"}),
+    # Of the first 50 frames, which a laptop fits while one waits.
+    "placed-beginning": ("placed", {"span": 0.2}),
     "loop-auto": ("plant", {"tracking": "loop", "control_points": "auto"}),
 }
 

@@ -13,7 +13,6 @@ namespace pliant {
 
 namespace {
 using Block = Eigen::Map<Matrix3>;
-using ConstBlock = Eigen::Map<const Matrix3>;
 }  // namespace
 
 IncompleteCholesky::IncompleteCholesky(const BlockPattern& pattern)
@@ -57,22 +56,55 @@ bool IncompleteCholesky::try_factorise(const BlockMatrix& matrix, double shift) 
   return done;
 }
 
+namespace {
+
+/// The columns of a block (3 x 3, column by column), a wide number each. Nothing beyond the block is read.
+inline void load_block(const float* block, Wide<double>* columns) {
+  const Wide<float> last = load_wide(block + 5);
+  columns[0] = __builtin_convertvector(load_wide(block), Wide<double>);
+  columns[1] = __builtin_convertvector(load_wide(block + 3), Wide<double>);
+  columns[2] = Wide<double>{last[1], last[2], last[3], 0.0};
+}
+inline void load_block(const double* block, Wide<double>* columns) {
+  const Wide<double> last = load_wide(block + 5);
+  columns[0] = load_wide(block), columns[1] = load_wide(block + 3);
+  columns[2] = Wide<double>{last[1], last[2], last[3], 0.0};
+}
+
+/// sum -= x y^T; `y` entry by entry, column by column.
+template <class Entry>
+inline void subtract_product(const Wide<double>* x, const Entry& y, Wide<double>* sum) {
+  for (int c = 0; c < 3; ++c) sum[c] -= x[0] * y(c, 0) + x[1] * y(c, 1) + x[2] * y(c, 2);
+}
+
+}  // namespace
+
 bool IncompleteCholesky::factorise_rows(const BlockMatrix& matrix, double shift, int first, int last) {
-  const auto stored = [&](int l) -> Matrix3 {
-    return Eigen::Map<const Eigen::Matrix3f>(&forward_[9 * std::size_t(l)]).cast<double>();
-  };
   for (int i = first; i < last; ++i) {
-    Matrix3 pivot = ConstBlock(matrix.block(source_diagonal_[i]));
-    pivot.diagonal() *= 1.0 + shift;
+    Wide<double> pivots[3];
+    load_block(matrix.block(source_diagonal_[i]), pivots);
+    for (int d = 0; d < 3; ++d) pivots[d][d] *= 1.0 + shift;
     for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
-      Matrix3 sum = ConstBlock(matrix.block(source_[l]));
-      for (int p = product_start_[l]; p < product_start_[l + 1]; ++p)
-        sum.noalias() -= stored(products_[p].left) * stored(products_[p].right).transpose();
-      const Matrix3 lower = sum * ConstBlock(&inverse_diagonal_[9 * std::size_t(column_[l])]).transpose();
-      Eigen::Map<Eigen::Matrix3f>{&forward_[9 * std::size_t(l)]} = lower.cast<float>();
-      Eigen::Map<Eigen::Matrix3f>{&backward_[9 * std::size_t(l)]} = lower.transpose().cast<float>();
-      pivot.noalias() -= lower * lower.transpose();
+      Wide<double> sum[3], left[3];
+      load_block(matrix.block(source_[l]), sum);
+      for (int p = product_start_[l]; p < product_start_[l + 1]; ++p) {
+        load_block(&forward_[9 * std::size_t(products_[p].left)], left);
+        const float* right = &forward_[9 * std::size_t(products_[p].right)];
+        subtract_product(
+            left, [&](int c, int k) { return double(right[3 * k + c]); }, sum);
+      }
+      const double* inverse = &inverse_diagonal_[9 * std::size_t(column_[l])];
+      const Wide<double> lower[3] = {sum[0] * inverse[0], sum[0] * inverse[1] + sum[1] * inverse[4],
+                                     sum[0] * inverse[2] + sum[1] * inverse[5] + sum[2] * inverse[8]};
+      float *forward = &forward_[9 * std::size_t(l)], *backward = &backward_[9 * std::size_t(l)];
+      for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) forward[3 * c + r] = backward[3 * r + c] = float(lower[c][r]);
+      subtract_product(
+          lower, [&](int c, int k) { return lower[k][c]; }, pivots);
     }
+    Matrix3 pivot;
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r) pivot(r, c) = pivots[c][r];
     const double scale = pivot.trace();
     const double l00 = pivot(0, 0);
     if (!(l00 > 1e-12 * scale)) return false;
