@@ -81,7 +81,14 @@ std::shared_ptr<Communicator> launched_processes() {
   const Launch launch = launch_of_environment();
   if (launch.size == 1) return std::make_shared<SingleProcess>();
 #ifdef PLIANT_WITH_MPI
-  return mpi_processes();
+  std::shared_ptr<Communicator> all = mpi_processes();
+  if (all->size() != launch.size)
+    throw InputError({{},
+                      std::to_string(launch.size) + " processes were started together, and MPI knows of " +
+                          std::to_string(all->size()),
+                      "the launcher of the MPI that this program was built with",
+                      "start it with that one's mpirun"});
+  return all;
 #else
   throw InputError({{},
                     std::to_string(launch.size) + " processes were started together, and this program is built without MPI",

@@ -63,7 +63,7 @@ bool has_mpi();
 
 /// The processes that a launcher has started together with this one; this one by itself where there are no others.
 /// Called once in a process.
-/// Throws InputError where there are others and the build has no MPI.
+/// Throws InputError where there are others and the build has no MPI, or another one than the launcher.
 std::shared_ptr<Communicator> launched_processes();
 
 /// How many threads each process should use so that those on one machine share out the processors that they may run on;

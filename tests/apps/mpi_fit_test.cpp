@@ -158,10 +158,13 @@ TEST_F(JointFit, ThatIsAskedToStopTellsWhatItHasAndIsResumedByAnyNumber) {
   EXPECT_EQ(occurrences(stopped.out, "--resume"), 1) << stopped.out;
   EXPECT_TRUE(fs::is_regular_file(at("stopped") + "/state.json"));
   EXPECT_TRUE(fs::is_regular_file(at("stopped") + "/result.json"));
+  fs::copy(at("stopped"), at("stopped too"), fs::copy_options::recursive);
   const ProgramRun resumed = run_together(3, fit_of(captures, "stopped", {"--resume"}));
-  EXPECT_EQ(resumed.exit_code, alone_->exit_code) << resumed.err;
+  const ProgramRun by_one = run_pliant(fit_of(captures, "stopped too", {"--resume"}));
+  EXPECT_EQ(resumed.exit_code, by_one.exit_code) << resumed.err;
+  EXPECT_EQ(occurrences(resumed.err, "resuming the fit"), 1) << resumed.err;
   EXPECT_FALSE(fs::exists(at("stopped") + "/state.json"));
-  EXPECT_EQ(result("stopped"), result("alone"));
+  EXPECT_EQ(result("stopped"), result("stopped too"));
 }
 
 TEST_F(JointFit, ThereIsNothingToResumeIsSaidOnce) {
@@ -180,9 +183,9 @@ TEST_F(JointFit, ARecordingThatOneProcessCannotReadEndsAllWithOneComplaint) {
   EXPECT_EQ(occurrences(both.err, at("broken")), 1) << both.err;
   EXPECT_FALSE(fs::exists(at("of a broken one") + "/result.json"));
   const ProgramRun second =
-      run_each({fit_of({at("a"), at("b")}, "missing"), fit_of({at("a"), at("not there")}, "missing")});
+      run_each({fit_of({at("a"), at("b")}, "missing"), fit_of({at("a"), at("absent")}, "missing")});
   EXPECT_EQ(second.exit_code, bad_input) << second.err;
-  EXPECT_EQ(occurrences(second.err, "not there"), 1) << second.err;
+  EXPECT_EQ(occurrences(second.err, at("absent")), 1) << second.err;
 }
 
 TEST_F(JointFit, ProcessesOfOtherRecordingsComeApartAtOnce) {

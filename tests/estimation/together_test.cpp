@@ -175,30 +175,32 @@ TEST(FittedTogether, AFitIsThatOfOneProcessToTheLastBit) {
 }
 
 TEST(FittedTogether, AStopThatOneIsAskedForStopsAllAndLeadsToTheSameEnd) {
-  const FitOutcome undisturbed = fit(two_bars(), test::quick_fit_of_bar());
+  FitOptions options = test::quick_fit_of_bar();
+  options.alternatives = false, options.cells = options.coarse_cells = 5.0;
+  const FitOutcome undisturbed = fit(two_bars(), options);
   test::Interruption never;
   expect_none_failed(test::run_ranks(2, [&](const auto& communicator) {  // questions put to the second one
     FitMonitor monitor = communicator->rank() == 1 ? never.monitor() : FitMonitor();
     monitor.processes = std::make_shared<ProcessGroup>(communicator, monitor.interrupted);
-    (void)fit(two_bars(), test::quick_fit_of_bar(), monitor);
+    (void)fit(two_bars(), options, monitor);
   }));
   const int all = never.asked();
   ASSERT_GT(all, 10);
-  for (const double part : {0.1, 0.4, 0.6, 0.9}) {
+  for (const double part : {0.3, 0.8}) {
     test::Interruption of_second(int(part * all)), of_first;
     std::vector<FitOutcome> outcomes(2);
     expect_none_failed(test::run_ranks(2, [&](const auto& communicator) {
       const bool is_first = communicator->rank() == 0;
       FitMonitor monitor = (is_first ? of_first : of_second).monitor();
       monitor.processes = std::make_shared<ProcessGroup>(communicator, monitor.interrupted);
-      outcomes[std::size_t(communicator->rank())] = fit(two_bars(), test::quick_fit_of_bar(), monitor);
+      outcomes[std::size_t(communicator->rank())] = fit(two_bars(), options, monitor);
     }));
     ASSERT_TRUE(of_second.came()) << part;
     for (const FitOutcome& outcome : outcomes) {
       EXPECT_TRUE(outcome.interrupted) << part;
       EXPECT_EQ(outcome.theta, outcomes.front().theta) << part;
     }
-    const FitOutcome resumed = fit(two_bars(), test::quick_fit_of_bar(), {}, of_first.left());
+    const FitOutcome resumed = fit(two_bars(), options, {}, of_first.left());
     EXPECT_EQ(resumed.theta, undisturbed.theta) << part << ": resumed by one process alone";
   }
 }
