@@ -281,7 +281,11 @@ void add_fit(CommandLine& line, int& exit_code) {
               "made as long as the mesh contributes to the uncertainty of a modulus more than half of what the noise "
               "does; counted in steps, so that a busy machine gives the same answer; 0: none")
       .type_name("MINUTES");
-  command.option("--threads", arguments->threads, "most threads to use; all processors where left out, divided among the processes that mpirun starts on a machine").positive();
+  command
+      .option("--threads", arguments->threads,
+              "most threads to use; all processors where left out, divided among the processes that mpirun starts on a "
+              "machine")
+      .positive();
   command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
   command.flag("--profile", arguments->profile, "tell where the time went, also in result.json");
   command.flag("--check-gradient", arguments->check_gradient,

@@ -18,17 +18,13 @@ namespace pliant {
 class ByteWriter {
  public:
   template <class T>
-    requires std::is_arithmetic_v<T> || std::is_enum_v<T>
-  void add(const T& value) {
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void add(const T& value) { bytes_.append(reinterpret_cast<const char*>(&value), sizeof value); }
   void add(std::string_view text) { add_all(text.data(), text.size()); }
   void add(const std::string& text) { add(std::string_view(text)); }
   template <class T>
-    requires std::is_trivially_copyable_v<T>
-  void add(const std::vector<T>& values) {
-    add_all(values.data(), values.size());
-  }
+  requires std::is_trivially_copyable_v<T>
+  void add(const std::vector<T>& values) { add_all(values.data(), values.size()); }
   void add(const VectorX& vector) { add_all(vector.data(), std::size_t(vector.size())); }
   void add(const MatrixX& matrix) {
     add(matrix.rows());
@@ -52,16 +48,14 @@ class ByteReader {
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
 
   template <class T>
-    requires std::is_arithmetic_v<T> || std::is_enum_v<T>
-  void read(T& value) {
-    take(&value, 1);
-  }
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void read(T& value) { take(&value, 1); }
   void read(std::string& text) {
     text.resize(count_of(1));
     take(text.data(), text.size());
   }
   template <class T>
-    requires std::is_trivially_copyable_v<T>
+  requires std::is_trivially_copyable_v<T>
   void read(std::vector<T>& values) {
     values.resize(count_of(sizeof(T)));
     take(values.data(), values.size());

@@ -90,10 +90,11 @@ std::shared_ptr<Communicator> launched_processes() {
                       "start it with that one's mpirun"});
   return all;
 #else
-  throw InputError({{},
-                    std::to_string(launch.size) + " processes were started together, and this program is built without MPI",
-                    "one process, or a build with MPI",
-                    "configure with -DPLIANT_WITH_MPI=ON (Debian: libopenmpi-dev), or start it without mpirun"});
+  throw InputError(
+      {{},
+       std::to_string(launch.size) + " processes were started together, and this program is built without MPI",
+       "one process, or a build with MPI",
+       "configure with -DPLIANT_WITH_MPI=ON (Debian: libopenmpi-dev), or start it without mpirun"});
 #endif
 }
 

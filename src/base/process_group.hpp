@@ -11,8 +11,8 @@
 namespace pliant {
 
 /// Processes that carry out one task together. Each goes the same way with the same numbers, does its share of the work
-/// that is shared out, and takes from the others what they found. What only one of them can know, a signal or a failure,
-/// is agreed on before any of them acts on it.
+/// that is shared out, and takes from the others what they found. What only one of them can know, a signal or a
+/// failure, is agreed on before any of them acts on it.
 class ProcessGroup {
  public:
   /// @param asked  whether this process is asked to stop; from any thread; may be empty

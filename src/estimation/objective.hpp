@@ -14,9 +14,9 @@ namespace pliant {
 /// same parameter vector, each by the handles of its own blocks. One instance for one thread; trials are simulated side
 /// by side, and their frames stand in the evaluation in the trials' order.
 ///
-/// Processes of a group share out the trials, the same one always to the same process, and evaluate together: each calls
-/// the same functions with the same vectors in the same order, and each holds what one process alone would, to the last
-/// bit. Where a trial throws in one of them they all throw (`ProcessGroup::gather`).
+/// Processes of a group share out the trials, the same one always to the same process, and evaluate together: each
+/// calls the same functions with the same vectors in the same order, and each holds what one process alone would, to
+/// the last bit. Where a trial throws in one of them they all throw (`ProcessGroup::gather`).
 class Objective : public CostFunction {
  public:
   /// Throws std::invalid_argument where a trial is missing.

@@ -53,8 +53,8 @@ struct FitJobOutcome {
 
 /// Runs it, and writes the output folder of docs/formats.md, section 2: also `fit.toml` at once, `state.json` as long
 /// as it is under way or was interrupted, and `log.txt`. Throws InputError where a capture or the state to resume
-/// cannot be used, Interrupted where it was stopped before the fit began, std::runtime_error where processes that should
-/// run it together were given different jobs.
+/// cannot be used, Interrupted where it was stopped before the fit began, std::runtime_error where processes that
+/// should run it together were given different jobs.
 FitJobOutcome run_fit_job(const FitJob& job, const FitWatch& watch = {});
 FitJobOutcome run_fit_job(const FitJob& job, JobRecordings recordings, const FitWatch& watch = {});
 

@@ -1,11 +1,14 @@
-// `mpirun -n N pliant fit A B C`: whatever the number of processes, the same answer to the last bit, one voice, and an end.
+// `mpirun -n N pliant fit A B C`: whatever the number of processes, the same answer to the last bit, one voice, and an
+// end.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "apps/program.hpp"
@@ -51,8 +54,8 @@ sensor = { preset = "ideal", noise_base = 0.0005 }
 frame_rate = 60.0
 start_frame = 1
 frame_count = )toml" +
-         std::to_string(frames) + "\n[initial]\nreleased = true\npulled = { at = [0.08, 0, 0], radius = 0.03, force = " +
-         force + " }\n";
+         std::to_string(frames) +
+         "\n[initial]\nreleased = true\npulled = { at = [0.08, 0, 0], radius = 0.03, force = " + force + " }\n";
 }
 
 int occurrences(const std::string& text, const std::string& word) {
@@ -87,7 +90,8 @@ class JointFit : public testing::Test {
     std::vector<std::string> words = {"fit"};
     words.insert(words.end(), captures.begin(), captures.end());
     words.insert(words.end(), {"--out", at(out)});
-    for (const char* setting : {"cells=6", "coarse_cells=5", "control_points=1", "starts=1", "most_starts=1", "budget=0"})
+    for (const char* setting :
+         {"cells=6", "coarse_cells=5", "control_points=1", "starts=1", "most_starts=1", "budget=0"})
       words.insert(words.end(), {"--set", setting});
     words.insert(words.end(), more.begin(), more.end());
     return words;
@@ -165,6 +169,23 @@ TEST_F(JointFit, ThatIsAskedToStopTellsWhatItHasAndIsResumedByAnyNumber) {
   EXPECT_EQ(occurrences(resumed.err, "resuming the fit"), 1) << resumed.err;
   EXPECT_FALSE(fs::exists(at("stopped") + "/state.json"));
   EXPECT_EQ(result("stopped"), result("stopped too"));
+}
+
+TEST_F(JointFit, TheScriptForSlurmStartsItAndHandsASignalOn) {
+  const std::map<std::string, std::string> variables = {{"PLIANT", PLIANT_PROGRAM},
+                                                        {"MPIRUN", PLIANT_MPIRUN},
+                                                        {"MPIRUN_OPTIONS", "--oversubscribe --allow-run-as-root"},
+                                                        {"SLURM_NTASKS", "2"},
+                                                        {"SLURM_CPUS_PER_TASK", "1"}};
+  for (const auto& [name, value] : variables) ::setenv(name.c_str(), value.c_str(), 1);
+  std::vector<std::string> words = fit_of({at("a"), at("b")}, "of Slurm");
+  words.front() = PLIANT_SOURCE_DIR "/examples/engines/joint.sh";
+  words.insert(words.begin(), "bash");
+  const ProgramRun run = run_words(words, "\ncoarse", [](pid_t script) { ::kill(script, SIGUSR1); });
+  for (const auto& [name, value] : variables) ::unsetenv(name.c_str());
+  EXPECT_EQ(run.exit_code, was_interrupted) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("2 processes share out 2 recordings; this one with 1 thread\n"));
+  EXPECT_EQ(occurrences(run.out, "--resume"), 1) << run.out;
 }
 
 TEST_F(JointFit, ThereIsNothingToResumeIsSaidOnce) {

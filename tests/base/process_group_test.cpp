@@ -157,9 +157,8 @@ TEST(Threads, OfProcessesOfOneMachineAreItsProcessorsSharedOut) {
   SingleProcess alone;
   const int all = fair_threads(alone);
   EXPECT_GE(all, 1);
-  const auto thrown = test::run_ranks(2, [&](const auto& communicator) {
-    EXPECT_EQ(fair_threads(*communicator), std::max(1, all / 2));
-  });
+  const auto thrown = test::run_ranks(
+      2, [&](const auto& communicator) { EXPECT_EQ(fair_threads(*communicator), std::max(1, all / 2)); });
   for (const std::exception_ptr& failure : thrown) EXPECT_EQ(test::what_of(failure), "");
 }
 

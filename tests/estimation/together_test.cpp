@@ -32,7 +32,8 @@ void expect_none_failed(const std::vector<std::exception_ptr>& thrown) {
 /// Three flights of one torus, of unlike lengths, seen from other parameters than those that made them.
 struct Flights {
   Flights() {
-    for (const int frames : {3, 6, 4}) recordings.push_back(test::torus_recording(0.05, frames, 0, 1e-3, unsigned(frames)));
+    for (const int frames : {3, 6, 4})
+      recordings.push_back(test::torus_recording(0.05, frames, 0, 1e-3, unsigned(frames)));
     const MotionLayout& layout = recordings.front().scene.layout;
     VectorX theta = recordings.front().truth;
     layout.scale_moduli(theta, 1.4);
@@ -144,8 +145,7 @@ TEST(EvaluatedTogether, OtherNumbersAreFoundOut) {
 // Fits ----------------------------------------------------------------------------------------------------------------
 
 std::vector<RecordedCapture> two_bars() {
-  return {test::sagging_bar(test::stiffness_of_bar),
-          test::sagging_bar(test::stiffness_of_bar, {0.0, -6.0, 7.0}, 8)};
+  return {test::sagging_bar(test::stiffness_of_bar), test::sagging_bar(test::stiffness_of_bar, {0.0, -6.0, 7.0}, 8)};
 }
 
 void expect_same(const FitOutcome& a, const FitOutcome& b) {
