@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 /// Commands of the program, one file each. A command registers itself and stores its exit code when it runs.
 namespace pliant::apps {
 
@@ -34,6 +36,17 @@ bool is_interrupted();
 
 /// Throws Interrupted if Ctrl-C was pressed.
 void stop_if_interrupted();
+
+/// From now on SIGTERM and SIGUSR1 ask to stop as Ctrl-C does: what mpirun and Slurm send.
+void stop_on_termination();
+
+/// What the program says of an exception, and how it ends.
+struct Failure {
+  int exit_code = 1;
+  std::string message;
+};
+/// Of the exception that is being handled.
+Failure failure_at_hand();
 
 /// Shows "what 3/64" on the terminal's line of progress, on stderr; nothing where stderr is no terminal.
 void show_progress(const char* what, int done, int total);

@@ -1,7 +1,10 @@
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -10,6 +13,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "base/parallel.hpp"
+#include "base/process_group.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "estimation/fit_config.hpp"
@@ -140,44 +144,94 @@ void print_profile(const TimeResult& time) {
 
 /// Says how to go on with an interrupted fit.
 int ended(const FitJobOutcome& done, const std::string& words, const std::string& out) {
-  if (!done.result) return done.outcome.interrupted ? WasInterrupted : NotConverged;
-  if (done.outcome.interrupted) {
+  if (done.result && done.outcome.interrupted)
     std::cout << "Interrupted: this is the best so far. Go on with: pliant fit " << words << " --out " << out
               << " --resume\n";
-    return WasInterrupted;
-  }
-  return done.outcome.converged ? Fine : NotConverged;
+  if (done.outcome.interrupted) return WasInterrupted;
+  return done.outcome.evaluation.succeeded && done.outcome.converged ? Fine : NotConverged;
 }
 
-int run(const Arguments& arguments) {
+/// Processes of one machine share out its processors where the user does not say how many each takes.
+int threads_of(const Arguments& arguments, Communicator& processes) {
+  if (arguments.threads > 0 || processes.size() == 1) return arguments.threads;
+  return fair_threads(processes);
+}
+
+std::string words_of(const ProcessGroup& processes, int started, std::size_t recordings, int threads) {
+  std::string text = std::to_string(processes.size()) + " processes share out " + std::to_string(recordings) +
+                     " recordings; this one with " + std::to_string(threads) + (threads == 1 ? " thread" : " threads");
+  if (const int idle = started - processes.size(); idle > 0)
+    text += "; " + std::to_string(idle) + " more " + (idle == 1 ? "has" : "have") + " nothing to do";
+  return text;
+}
+
+/// @param started  processes that were started together, with those that have nothing to do
+int run_fit(const Arguments& arguments, const std::shared_ptr<Communicator>& communicator, int started) {
+  const auto processes = std::make_shared<ProcessGroup>(communicator, [] { return is_interrupted(); });
   FitJob job;
-  job.options = read_options(arguments);
-  job.captures.assign(arguments.captures.begin(), arguments.captures.end());
-  if (!arguments.held_out.empty()) job.held_out = arguments.held_out;
-  job.out = arguments.out, job.resume = arguments.resume, job.profile = arguments.profile;
-  job.version = PLIANT_VERSION, job.commit = PLIANT_COMMIT;
-  JobRecordings recordings = read_recordings(job);
+  JobRecordings recordings;
+  (void)processes->gather("captures", [&] {
+    job.options = read_options(arguments);
+    job.captures.assign(arguments.captures.begin(), arguments.captures.end());
+    if (!arguments.held_out.empty()) job.held_out = arguments.held_out;
+    job.out = arguments.out, job.resume = arguments.resume, job.profile = arguments.profile;
+    job.version = PLIANT_VERSION, job.commit = PLIANT_COMMIT;
+    recordings = read_recordings(job);
+    return std::string();
+  });
+  const int most_threads = threads_of(arguments, *communicator);
   std::optional<ThreadLimit> threads;
-  if (arguments.threads > 0) threads.emplace(arguments.threads);
-  if (arguments.check_gradient) {
-    make_folder(job.out);
-    return run_gradient_check(std::move(recordings.recordings), job.options, job.out);
-  }
+  if (most_threads > 0) threads.emplace(most_threads);
+  if (arguments.check_gradient)
+    return run_gradient_check(std::move(recordings.recordings), job.options, job.out, processes);
   Screen screen;
+  if (processes->is_first() && started > 1)
+    screen.line(words_of(*processes, started, arguments.captures.size(), most_threads));
   FitWatch watch;
+  watch.processes = processes;
   watch.on_line = [&](const std::string& line) { screen.line(line); };
   watch.on_event = [&](const FitEvent&, const std::string& line) { screen.live(line); };
   watch.progress = [&](const char* what, int count, int total) {
     screen.clear_live();
     show_progress(what, count, total);
   };
-  watch.interrupted = [] { return is_interrupted(); };
   const std::string words = recordings.words;
   const FitJobOutcome done = run_fit_job(job, std::move(recordings), watch);
   screen.clear_live();
   if (done.result) print_result(*done.result, done.outcome, job.out, done.seconds);
   if (done.result && job.profile) print_profile(done.result->time);
   return ended(done, words, arguments.out);
+}
+
+/// The end of one of several processes: what one of them alone could not do ends all of them, and what all could not do
+/// is told once.
+int end_together(Communicator& all, const std::function<int()>& run_own) {
+  constexpr std::chrono::seconds patience{3};  // for the others to fail alike
+  int exit_code = Fine;
+  try {
+    exit_code = run_own();
+  } catch (...) {
+    const Failure failure = failure_at_hand();
+    const auto codes = all.end(failure.exit_code, patience);
+    const bool is_told_by_first = all.rank() > 0 && codes && codes->front() != Fine;
+    if (!is_told_by_first)
+      std::cerr << (all.rank() > 0 ? "process " + std::to_string(all.rank() + 1) + ": " : "") << failure.message
+                << std::endl;
+    if (!codes) all.abort(failure.exit_code);
+    return failure.exit_code;
+  }
+  (void)all.end(exit_code);
+  return exit_code;
+}
+
+int run(const Arguments& arguments) {
+  if (const Launch launch = launch_of_environment(); launch.size > 1 && launch.rank > 0 && !has_mpi())
+    return Fine;  // the first one says what is wrong
+  const std::shared_ptr<Communicator> all = launched_processes();
+  if (all->size() == 1) return run_fit(arguments, all, 1);
+  stop_on_termination();
+  const std::shared_ptr<Communicator> working = all->first(std::min(all->size(), int(arguments.captures.size())));
+  return end_together(*all, [&] { return working ? run_fit(arguments, working, all->size()) : int(Fine); });
 }
 
 std::string key_help() {
@@ -229,7 +283,11 @@ void add_fit(CommandLine& line, int& exit_code) {
           "does; counted in steps, so that a busy machine gives the same answer, and a tenth dearer where the mesh is "
           "not what contributes most; 0: none")
       .type_name("MINUTES");
-  command.option("--threads", arguments->threads, "most threads to use; all processors where left out").positive();
+  command
+      .option("--threads", arguments->threads,
+              "most threads to use; all processors where left out, divided among the processes that mpirun starts on a "
+              "machine")
+      .positive();
   command.flag("--resume", arguments->resume, "go on with the interrupted fit in DIR");
   command.flag("--profile", arguments->profile, "tell where the time went, also in result.json");
   command.flag("--check-gradient", arguments->check_gradient,

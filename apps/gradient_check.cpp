@@ -29,21 +29,29 @@ void write_csv(const std::filesystem::path& path, const GradientCheck& check) {
 }  // namespace
 
 int run_gradient_check(std::vector<RecordedCapture> recordings, const FitOptions& options,
-                       const std::filesystem::path& out) {
+                       const std::filesystem::path& out, const std::shared_ptr<ProcessGroup>& processes) {
   ObserveOptions observe_options;
   observe_options.max_points_per_frame = options.points_per_frame;
-  for (RecordedCapture& recording : recordings) {
-    if (is_of_static_tests(recording.capture)) continue;
-    recording.observed = observe_placed(recording.capture, observe_options,
-                                        [](int done, int total) { show_progress("read", done, total); });
-    stop_if_interrupted();
-  }
+  const auto progress = [&](int done, int total) {
+    if (processes->is_first()) show_progress("read", done, total);
+  };
+  (void)processes->gather("a gradient's check", [&] {
+    for (RecordedCapture& recording : recordings) {
+      if (is_of_static_tests(recording.capture)) continue;
+      recording.observed = observe_placed(recording.capture, observe_options, progress);
+      stop_if_interrupted();
+    }
+    return std::string();
+  });
   FitOptions exact = options;  // solved for as well as differences can tell, which a fit's tangents are not
   exact.solver_tolerance = std::min(options.solver_tolerance, 1e-11);
-  const StartObjective start = start_objective(std::move(recordings), exact);
+  const StartObjective start = start_objective(std::move(recordings), exact, processes);
   const GradientCheck check = check_gradient(*start.cost, start.p);
-  std::cout << describe(check);
-  write_csv(out / "gradient.csv", check);
+  if (processes->is_first()) {
+    make_folder(out);
+    std::cout << describe(check);
+    write_csv(out / "gradient.csv", check);
+  }
   return check.succeeded && check.agrees() ? Fine : NotConverged;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <string>
 
 #include "base/error.hpp"
 #include "command_line.hpp"
@@ -23,6 +24,9 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 void on_interrupt(int) {
   if (interrupted.exchange(true)) ::_exit(WasInterrupted);
 }
+
+// What launchers of several processes send: once or more often, it asks.
+void on_termination(int) { interrupted = true; }
 
 constexpr const char* footer = R"(Examples:
   pliant check recordings/bear              what was recorded, and what can be estimated from it
@@ -82,6 +86,22 @@ void stop_if_interrupted() {
   if (interrupted) throw Interrupted();
 }
 
+void stop_on_termination() {
+  for (const int signal : {SIGTERM, SIGUSR1}) std::signal(signal, on_termination);
+}
+
+Failure failure_at_hand() {
+  try {
+    throw;
+  } catch (const Interrupted&) {
+    return {WasInterrupted, "pliant: interrupted"};
+  } catch (const InputError& error) {
+    return {BadInput, error.what()};
+  } catch (const std::exception& error) {
+    return {1, std::string("pliant: ") + error.what()};
+  }
+}
+
 void show_progress(const char* what, int done, int total) {
   static const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
   if (!is_terminal) return;
@@ -93,15 +113,10 @@ int run_program(int argc, char** argv) {
   std::signal(SIGINT, on_interrupt);
   try {
     return run(argc, argv);
-  } catch (const Interrupted&) {
-    std::cerr << "pliant: interrupted\n";
-    return WasInterrupted;
-  } catch (const InputError& error) {
-    std::cerr << error.what() << '\n';
-    return BadInput;
-  } catch (const std::exception& error) {
-    std::cerr << "pliant: " << error.what() << '\n';
-    return 1;
+  } catch (...) {
+    const Failure failure = failure_at_hand();
+    std::cerr << failure.message << '\n';
+    return failure.exit_code;
   }
 }
 

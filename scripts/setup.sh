@@ -1,11 +1,19 @@
 #!/usr/bin/env bash
-# Installs the Debian packages of scripts/debian-packages.txt that are missing, and with `tests` those of
-# scripts/debian-packages-tests.txt. Quick when all are there.
+# Installs the Debian packages of scripts/debian-packages.txt that are missing, with `tests` those of
+# scripts/debian-packages-tests.txt, too, and with `mpi` those of scripts/debian-packages-mpi.txt. Quick when all are there.
 set -euo pipefail
 
 folder="$(dirname "${BASH_SOURCE[0]}")"
 lists=("$folder/debian-packages.txt")
-[[ "${1:-}" == tests ]] && lists+=("$folder/debian-packages-tests.txt")
+for more in "$@"; do
+  case "$more" in
+    tests | mpi) lists+=("$folder/debian-packages-$more.txt") ;;
+    *)
+      echo "setup: found $more; expected nothing, tests or mpi" >&2
+      exit 2
+      ;;
+  esac
+done
 mapfile -t wanted < <(sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "${lists[@]}")
 
 if ! command -v dpkg-query > /dev/null; then

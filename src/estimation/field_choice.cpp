@@ -55,8 +55,12 @@ double done_before(int fields) { return 0.95 * (1.0 - std::pow(0.6, fields)); }
 
 }  // namespace
 
-FieldChoice::FieldChoice(std::vector<RecordedCapture> recordings, const FitOptions& options, FitState resume)
-    : recordings_(std::move(recordings)), options_(options), left_(std::move(resume.pass)) {
+FieldChoice::FieldChoice(std::vector<RecordedCapture> recordings, const FitOptions& options, FitState resume,
+                         std::shared_ptr<ProcessGroup> processes)
+    : recordings_(std::move(recordings)),
+      options_(options),
+      processes_(std::move(processes)),
+      left_(std::move(resume.pass)) {
   if (resume.field) choice_ = std::move(*resume.field);
   resumed_ = choice_.under_way;
 }
@@ -146,8 +150,8 @@ PassState FieldChoice::with_field(int count, TriedField& promised) {
   if (const StageRecord* test = find_record(begin.done, {StageKind::Test}))
     for (const std::string& name : test->corrected) parameters.set_estimated(name, true);
   parameters.set_reference(theta);
-  Objective objective =
-      recordings.objective(grid, parameters, options_.fine_band, [](const Recording& r) { return r.last_frame; });
+  Objective objective = recordings.objective(
+      grid, parameters, options_.fine_band, [](const Recording& r) { return r.last_frame; }, {}, processes_);
   const VectorX p = parameters.to_unconstrained(theta);
   const CostEvaluation e = objective.linearise(p);
   forward_steps_ += e.steps;

@@ -16,7 +16,9 @@ namespace pliant {
 class FieldChoice : public PassPlanner {
  public:
   /// @param resume  the state of an interrupted choice goes on with the field that was under way
-  FieldChoice(std::vector<RecordedCapture> recordings, const FitOptions& options, FitState resume);
+  /// @param processes  as in `FitMonitor`
+  FieldChoice(std::vector<RecordedCapture> recordings, const FitOptions& options, FitState resume,
+              std::shared_ptr<ProcessGroup> processes = nullptr);
 
   std::optional<Pass> next() override;
   bool take(FitOutcome outcome, PassState reached) override;
@@ -42,6 +44,7 @@ class FieldChoice : public PassPlanner {
 
   std::vector<RecordedCapture> recordings_;
   FitOptions options_;
+  std::shared_ptr<ProcessGroup> processes_;
   FitState::FieldChoice choice_;
   PassState left_;        // by an interruption
   int resumed_ = 0;       // control points of the fit that was interrupted, until it goes on

@@ -41,8 +41,8 @@ OnePass pass_of_held_out(RecordedCapture held_out, const FitOutcome& fitted, con
 std::unique_ptr<PassPlanner> planner_of(std::vector<RecordedCapture> recordings, const FitOptions& options,
                                         const FitMonitor& monitor, FitState resume) {
   if (tracks(recordings, options))
-    return planner_of_tracking(std::move(recordings), options, monitor.interrupted, std::move(resume));
-  return planner_of_points(std::move(recordings), options, std::move(resume));
+    return planner_of_tracking(std::move(recordings), options, monitor, std::move(resume));
+  return planner_of_points(std::move(recordings), options, std::move(resume), monitor.processes);
 }
 
 /// The capture whose presses are all that there is to fit; null where more than presses is fitted.

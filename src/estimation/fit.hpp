@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/process_group.hpp"
 #include "estimation/fit_stage.hpp"
 #include "estimation/law_zones.hpp"
 #include "estimation/press_sampling.hpp"
@@ -283,9 +284,20 @@ struct FitOutcome {
 
 /// Watches a fit. All members may be empty.
 struct FitMonitor {
+  /// Whether it is to end: of processes that carry it out together the same in all of them (`ProcessGroup`).
+  bool is_interrupted() const { return processes ? processes->is_interrupted() : interrupted && interrupted(); }
+  /// The same where nothing is exchanged for long; asked as often by each of them.
+  bool agrees_to_stop() const { return processes ? processes->agrees_to_stop() : is_interrupted(); }
+  /// Whether this process is asked to end, in the midst of its share of the work.
+  bool is_asked_to_stop() const { return processes ? processes->is_asked_to_stop() : is_interrupted(); }
+  bool has_others() const { return processes && !processes->is_alone(); }
+
   std::function<void(const FitEvent&)> on_event;
   std::function<void(const FitState&)> on_state;  ///< something is done that a resumed fit need not do again
-  std::function<bool()> interrupted;
+  std::function<bool()> interrupted;  ///< asked of this process alone; not with `processes`, which ask it themselves
+  /// Processes that carry out the fit together: each is given the same recordings, options and state, and returns the
+  /// same outcome, to the last bit that of one process; null: this one alone.
+  std::shared_ptr<ProcessGroup> processes;
 };
 
 /// Estimates the unknown parameters of an object from what recordings hold of it.

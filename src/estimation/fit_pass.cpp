@@ -26,7 +26,7 @@ FitOutcome carry_out(PassPlanner& planner, const FitMonitor& monitor) {
   while (std::optional<Pass> pass = planner.next()) {
     PassState reached = pass->begin;
     FitMonitor of_pass;
-    of_pass.interrupted = monitor.interrupted;
+    of_pass.interrupted = monitor.interrupted, of_pass.processes = monitor.processes;
     of_pass.on_event = [&](FitEvent event) {
       event.fraction_done = pass->done_from + (pass->done_to - pass->done_from) * event.fraction_done;
       rename(*pass, event);
@@ -83,9 +83,9 @@ bool looks_for_fields(const std::vector<RecordedCapture>& recordings, const FitO
 }  // namespace
 
 std::unique_ptr<PassPlanner> planner_of_points(std::vector<RecordedCapture> recordings, const FitOptions& options,
-                                               FitState resume) {
+                                               FitState resume, std::shared_ptr<ProcessGroup> processes) {
   if (looks_for_fields(recordings, options))
-    return std::make_unique<FieldChoice>(std::move(recordings), options, std::move(resume));
+    return std::make_unique<FieldChoice>(std::move(recordings), options, std::move(resume), std::move(processes));
   FitOptions given = options;
   if (given.control_points == FitOptions::automatic) given.control_points = 1;  // the capture names the field
   if (ExplainedSpan::suits(recordings, given))

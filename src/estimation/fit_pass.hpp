@@ -56,7 +56,8 @@ class OnePass : public PassPlanner {
 
 /// The planner of a fit of motions and equilibria without tracking: with the number of control points that the options
 /// give, or a choice of it (`FieldChoice`).
+/// @param processes  as in `FitMonitor`
 std::unique_ptr<PassPlanner> planner_of_points(std::vector<RecordedCapture> recordings, const FitOptions& options,
-                                               FitState resume);
+                                               FitState resume, std::shared_ptr<ProcessGroup> processes = nullptr);
 
 }  // namespace pliant

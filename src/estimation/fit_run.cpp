@@ -94,7 +94,7 @@ FitRun::Carrying FitRun::carrying(const VectorX& theta) {
     if (d.simulation.holds.empty()) continue;
     const bool sags = d.simulation.scan_sags;
     const double modulus =
-        sags ? pliant::carrying_modulus(d.body, d.simulation, theta, [this] { return is_interrupted(); })
+        sags ? pliant::carrying_modulus(d.body, d.simulation, theta, [this] { return monitor_.agrees_to_stop(); })
              : modulus_of_sag(d.body, d.simulation.holds, r.blocks.motion, theta, moderate);
     const double part = sags ? part_of_scan : d.simulation.is_static ? part_at_rest : part_in_motion;
     found.modulus = std::max(found.modulus, modulus);
@@ -264,7 +264,7 @@ ParameterSet FitRun::parameters_of(const Stage& stage, const VectorX& theta) con
 Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const {
   return recordings_.objective(
       grid, parameters, stage.band, [&](const Recording& r) { return last_frame(stage.horizon, r); },
-      [this] { return !stages_are_over_ && is_interrupted(); });
+      [this] { return !stages_are_over_ && monitor_.is_asked_to_stop(); }, monitor_.processes);
 }
 
 OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, const OptimiserState& from,

@@ -295,8 +295,12 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
 }
 
 FitState read_fit_state(const std::filesystem::path& path, const std::string& key) {
+  return to_fit_state(read_file(path), path, key);
+}
+
+FitState to_fit_state(const std::string& text, const std::filesystem::path& path, const std::string& key) {
   try {
-    const Json json = Json::parse(read_file(path));
+    const Json json = Json::parse(text);
     if (json.at("format") != format) throw std::runtime_error("another format");
     if (json.at("key") != key)
       throw InputError({{path},

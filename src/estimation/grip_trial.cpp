@@ -175,6 +175,8 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
   return result;
 }
 
+double GripTrial::expected_work() const { return steps_of_an_equilibrium * scene_->body->node_count(); }
+
 CostEvaluation GripTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   CostEvaluation result;
   Points off;

@@ -101,6 +101,10 @@ CostEvaluation IndentationTrial::run(const VectorX& theta, const MatrixX& direct
 }
 
 /// A back-substitution a depth gives the force's derivative by all parameters: nothing is left to sweep back.
+double IndentationTrial::expected_work() const {
+  return double(test().curve.depths.size()) * steps_of_an_equilibrium * scene_->body->node_count();
+}
+
 CostEvaluation IndentationTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   CostEvaluation result;
   const ForceCurve& curve = test().curve;

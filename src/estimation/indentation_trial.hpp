@@ -39,6 +39,7 @@ class IndentationTrial : public Trial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  [[nodiscard]] double expected_work() const override;
 
  private:
   const ObservedIndentation& test() const;

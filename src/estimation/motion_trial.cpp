@@ -31,6 +31,12 @@ class MotionTrial::Comparison {
 
   const ObservedMotion& motion() const { return motion_; }
   int number() const { return number_; }
+  double expected_work() const {
+    const SimulationOptions& s = motion_.simulation;
+    const double steps = s.is_static ? steps_of_an_equilibrium * double(instants_.size())
+                                     : (instants_.back() - instants_.front()) / s.max_dt;
+    return steps * motion_.body->node_count();
+  }
   bool hold_shape(const VectorX& theta) { return simulation_.hold_shape(theta).empty(); }
 
   CostEvaluation run(const VectorX& theta, const MatrixX& all_directions);
@@ -364,6 +370,8 @@ CostEvaluation MotionTrial::run(const VectorX& theta, const MatrixX& directions)
 CostEvaluation MotionTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   return comparison_->gradient(theta, theta_bar);
 }
+
+double MotionTrial::expected_work() const { return comparison_->expected_work(); }
 
 bool MotionTrial::hold_shape(const VectorX& theta) { return comparison_->hold_shape(theta); }
 

@@ -58,6 +58,7 @@ class MotionTrial : public Trial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  [[nodiscard]] double expected_work() const override;
   [[nodiscard]] bool hold_shape(const VectorX& theta) override;
   [[nodiscard]] std::unique_ptr<Trial> anew() const override;
 

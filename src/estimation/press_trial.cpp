@@ -139,6 +139,8 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
   return result;
 }
 
+double PressTrial::expected_work() const { return steps_of_an_equilibrium * scene_->body->node_count(); }
+
 CostEvaluation PressTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   CostEvaluation result;
   VectorX slope, weight;

@@ -52,6 +52,7 @@ class PressTrial : public Trial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
+  [[nodiscard]] double expected_work() const override;
   [[nodiscard]] std::unique_ptr<Trial> anew() const override;
 
   void set_options(const PressTrialOptions& options);

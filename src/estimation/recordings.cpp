@@ -372,7 +372,8 @@ std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recor
 
 Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters, double band,
                                 const std::function<int(const Recording&)>& last_frame,
-                                const std::function<bool()>& interrupted) const {
+                                const std::function<bool()>& interrupted,
+                                const std::shared_ptr<ProcessGroup>& processes) const {
   std::vector<std::unique_ptr<Trial>> trials;
   // How the motion begins says nothing about what stands still.
   const std::vector<const Parameter*> estimated = parameters.coordinate_parameters();
@@ -394,7 +395,7 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
     add_loads(all_[i], grid.recording[i], options[i], trials);
     if (grid.presses[i]) add_presses(all_[i], grid.presses[i], parameters, trials);
   }
-  return {std::move(trials), with_field_prior(parameters, grid)};
+  return {std::move(trials), with_field_prior(parameters, grid), processes};
 }
 
 void Recordings::add_loads(const Recording& recording, const Discretisation& d, ObjectiveOptions options,

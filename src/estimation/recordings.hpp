@@ -86,9 +86,11 @@ class Recordings {
   /// @param band        outlier scale, times the object's size
   /// @param last_frame  of each recording that is compared
   /// @param interrupted of its motions: see `ObjectiveOptions`
+  /// @param processes   that evaluate it together; null: this one alone
   [[nodiscard]] Objective objective(const Grid& grid, const ParameterSet& parameters, double band,
                                     const std::function<int(const Recording&)>& last_frame,
-                                    const std::function<bool()>& interrupted = {}) const;
+                                    const std::function<bool()>& interrupted = {},
+                                    const std::shared_ptr<ProcessGroup>& processes = nullptr) const;
   /// The parameters with the prior of their moduli at the grid's control points, if it has any.
   [[nodiscard]] ParameterSet with_field_prior(ParameterSet parameters, const Grid& grid) const;
 

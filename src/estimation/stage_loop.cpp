@@ -11,6 +11,10 @@ void StageLoop::execute() {
   while (!interrupted_) {
     const std::vector<StageChain> chains = next();
     if (chains.empty()) return;
+    if (monitor_.has_others()) {  // what they exchange has an order
+      for (const StageChain& chain : chains) run_chain(chain);
+      continue;
+    }
     parallel_tasks(chains.size(), [&](std::size_t i) { run_chain(chains[i]); });
   }
 }

@@ -19,7 +19,7 @@ class StageLoop {
   StageLoop(const FitOptions& options, const FitMonitor& monitor, PassState state)
       : options_(options), monitor_(monitor), state_(std::move(state)) {}
 
-  /// The stages that are next, chains side by side; none: all is done.
+  /// The stages that are next, chains side by side (by several processes one after the other); none: all is done.
   virtual std::vector<StageChain> next() = 0;
   /// Runs one stage. Chains side by side run on several threads.
   /// @param is_cut  set where it was interrupted; the record has what it reached
@@ -29,7 +29,7 @@ class StageLoop {
 
   /// Until there are no more stages, or it is interrupted.
   void execute();
-  bool is_interrupted() const { return monitor_.interrupted && monitor_.interrupted(); }
+  bool is_interrupted() const { return monitor_.is_interrupted(); }
   /// Tells and keeps it; from any thread.
   void emit(FitEvent event);
   /// Keeps where the optimiser of a stage stands; of one stage at a time.

@@ -34,15 +34,16 @@ StartObjective of_static_tests(const Capture& capture, const FitOptions& options
 
 }  // namespace
 
-StartObjective start_objective(std::vector<RecordedCapture> recordings, const FitOptions& options) {
+StartObjective start_objective(std::vector<RecordedCapture> recordings, const FitOptions& options,
+                               std::shared_ptr<ProcessGroup> processes) {
   if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
   if (is_of_static_tests(recordings.front().capture)) return of_static_tests(recordings.front().capture, options);
   std::vector<std::string> notes;
   const Recordings all(std::move(recordings), options, notes);
   const Grid grid = all.grid(options.cells, options.steps);
   const ParameterSet& parameters = all.parameters();
-  auto objective = std::make_shared<Objective>(
-      all.objective(grid, parameters, options.wide_band, [](const Recording& r) { return r.last_frame; }));
+  auto objective = std::make_shared<Objective>(all.objective(
+      grid, parameters, options.wide_band, [](const Recording& r) { return r.last_frame; }, {}, std::move(processes)));
   return {std::move(objective), parameters.to_unconstrained(parameters.reference())};
 }
 

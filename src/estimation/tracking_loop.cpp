@@ -42,11 +42,10 @@ TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOpti
 /// with all frames.
 class TrackingLoop : public PassPlanner {
  public:
-  TrackingLoop(std::vector<RecordedCapture> recordings, const FitOptions& options, std::function<bool()> interrupted,
-               FitState resume)
+  TrackingLoop(std::vector<RecordedCapture> recordings, const FitOptions& options, FitMonitor monitor, FitState resume)
       : all_(std::move(recordings)),
         options_(options),
-        interrupted_(std::move(interrupted)),
+        monitor_(std::move(monitor)),
         is_both_(use_of(all_, options) == TrackingUse::Both) {
     options_.tracking = TrackingUse::Off;
     if (resume.tracking) {
@@ -102,7 +101,7 @@ class TrackingLoop : public PassPlanner {
     held_out_.push_back(std::move(held_out));
   }
 
-  bool interrupted() const { return interrupted_ && interrupted_(); }
+  bool interrupted() const { return monitor_.agrees_to_stop(); }
 
   JointLayout layout_of(int controls) const { return joint_layout(all_, options_, controls); }
   /// Follows with so many control moduli from now on.
@@ -197,7 +196,7 @@ class TrackingLoop : public PassPlanner {
     FitOptions own = options;
     own.alternatives = options.alternatives && (part == Part::Last || !is_both_);
     own.budget = 0.0;  // every round would spend it
-    inner_ = planner_of_points(std::move(recordings), own, std::move(from));
+    inner_ = planner_of_points(std::move(recordings), own, std::move(from), monitor_.processes);
   }
 
   /// A fit that looks again from an estimate, with other observations.
@@ -459,7 +458,7 @@ class TrackingLoop : public PassPlanner {
 
   std::vector<RecordedCapture> all_;
   FitOptions options_;
-  std::function<bool()> interrupted_;
+  FitMonitor monitor_;
   bool is_both_;
   std::vector<RecordedCapture> training_, held_out_;
   std::vector<FollowedRecording> followed_;
@@ -509,8 +508,8 @@ TrackedPoints supported_points(const Track& track, double size) {
 }
 
 std::unique_ptr<PassPlanner> planner_of_tracking(std::vector<RecordedCapture> recordings, const FitOptions& options,
-                                                 std::function<bool()> interrupted, FitState resume) {
-  return std::make_unique<TrackingLoop>(std::move(recordings), options, std::move(interrupted), std::move(resume));
+                                                 const FitMonitor& monitor, FitState resume) {
+  return std::make_unique<TrackingLoop>(std::move(recordings), options, monitor, std::move(resume));
 }
 
 }  // namespace pliant

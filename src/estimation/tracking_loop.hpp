@@ -16,11 +16,11 @@ bool tracks(const std::vector<RecordedCapture>& recordings, const FitOptions& op
 /// points were seen about them: elsewhere the track is what its own dynamics say. With `TrackingUse::Both` every fifth
 /// frame is left out, the points are also fitted themselves, and the estimate that predicts the frames left out better
 /// is finished with all of them.
-/// @param interrupted  asked while it follows; may be empty
-/// @param resume       see `fit`
+/// @param monitor  asked whether it is interrupted while it follows
+/// @param resume   see `fit`
 /// Throws InputError where a recording cannot be tracked or fitted.
 std::unique_ptr<PassPlanner> planner_of_tracking(std::vector<RecordedCapture> recordings, const FitOptions& options,
-                                                 std::function<bool()> interrupted, FitState resume);
+                                                 const FitMonitor& monitor, FitState resume);
 
 /// Points of a track's surface where and when it was supported by what was seen.
 TrackedPoints supported_points(const Track& track, double size);

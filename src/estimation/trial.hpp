@@ -25,6 +25,10 @@ class Trial {
   /// @param theta_bar  out: d cost / d theta, as long as theta; of no meaning where the evaluation failed
   [[nodiscard]] virtual CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) = 0;
 
+  /// About what a run takes, as `CostEvaluation::work` counts it, by what is known before the first one: so that
+  /// processes share out trials evenly. Here next to nothing.
+  [[nodiscard]] virtual double expected_work() const { return 1.0; }
+
   /// From now on load-free shapes and corrected scans stay what they are for theta: costs and derivatives leave their
   /// changes out. False where there is none for theta.
   [[nodiscard]] virtual bool hold_shape(const VectorX& theta) {

@@ -12,6 +12,7 @@
 #include <list>
 #include <thread>
 
+#include "base/communicator.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "jobs/claim.hpp"
@@ -42,6 +43,10 @@ pid_t start(const Job& job, int threads) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
+  std::vector<std::string> environment = environment_without_launch();  // the job is no part of what mpirun started
+  std::vector<char*> variables;
+  for (std::string& variable : environment) variables.push_back(variable.data());
+  variables.push_back(nullptr);
   const std::string said = job.messages().string();
   int told[2];  // closed when the program is started; carries the error where it is not
   if (::pipe2(told, O_CLOEXEC) != 0) throw InputError({{words.front()}, "it cannot be started", "a pipe", ""});
@@ -56,7 +61,7 @@ pid_t start(const Job& job, int threads) {
     const int nothing = ::open("/dev/null", O_RDONLY),
               messages = ::open(said.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
     ::dup2(nothing, STDIN_FILENO), ::dup2(messages, STDOUT_FILENO), ::dup2(messages, STDERR_FILENO);
-    ::execvp(arguments[0], arguments.data());
+    ::execvpe(arguments[0], arguments.data(), variables.data());
     const int error = errno;
     (void)!::write(told[1], &error, sizeof error);
     ::_exit(127);

@@ -8,6 +8,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "base/profile.hpp"
+#include "base/sha256.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_state.hpp"
 #include "estimation/press_scene.hpp"
@@ -51,7 +52,7 @@ std::string describe(const FitEvent& event, double seconds) {
 
 /// Reads what the sensors saw, with the scan placed first where its pose is unknown.
 void observe_recording(RecordedCapture& recording, const FitOptions& options, const FitWatch& watch,
-                       const std::function<void(const std::string&)>& say) {
+                       const ProcessGroup& processes, const std::function<void(const std::string&)>& say) {
   if (is_of_static_tests(recording.capture)) return;
   const Timed timed(Activity::Reading);
   ObserveOptions observe_options;
@@ -60,7 +61,7 @@ void observe_recording(RecordedCapture& recording, const FitOptions& options, co
   recording.observed = observe_placed(
       recording.capture, observe_options,
       [&](int done, int total) {
-        if (watch.progress) watch.progress("read", done, total);
+        if (watch.progress && processes.is_first()) watch.progress("read", done, total);
       },
       &pose);
   if (pose)
@@ -68,7 +69,7 @@ void observe_recording(RecordedCapture& recording, const FitOptions& options, co
                     100.0 * pose->overlap));
   if (pose && pose->runner_up > 0.0 && pose->runner_up < 1.3)
     say("note: another pose of the scan fits nearly as well; `pliant place` draws the one that was taken");
-  if (watch.interrupted && watch.interrupted()) throw Interrupted();
+  if (processes.is_asked_to_stop()) throw Interrupted();
 }
 
 }  // namespace
@@ -105,42 +106,62 @@ FitJobOutcome run_fit_job(const FitJob& job, JobRecordings all, const FitWatch& 
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const fs::path state_file = job.out / "state.json";
   const std::string key = all.fingerprint + to_toml(job.options);
-  make_folder(job.out);
+  const std::shared_ptr<ProcessGroup> processes =
+      watch.processes ? watch.processes
+                      : std::make_shared<ProcessGroup>(std::make_shared<SingleProcess>(), watch.interrupted);
+  const bool is_first = processes->is_first();
 
   std::string log;
   const auto say = [&](const std::string& line) {
     log += line + "\n";
-    if (watch.on_line) watch.on_line(line);
+    if (watch.on_line && is_first) watch.on_line(line);
   };
   say("pliant " + job.version + " fit " + all.words);
-  for (RecordedCapture& recording : all.recordings) observe_recording(recording, job.options, watch, say);
-  if (all.held_out) observe_recording(*all.held_out, job.options, watch, say);
+  (void)processes->of_first("the folder", [&] {
+    make_folder(job.out);
+    return std::string();
+  });
+  (void)processes->gather("recordings and choices " + sha256({job.version, job.commit, key}), [&] {
+    for (RecordedCapture& recording : all.recordings) observe_recording(recording, job.options, watch, *processes, say);
+    if (all.held_out) observe_recording(*all.held_out, job.options, watch, *processes, say);
+    return std::string();
+  });
 
-  FitState state;
-  if (job.resume) {
-    if (!is_file(state_file))
+  const std::string left = processes->of_first("the state that was left", [&] {
+    if (job.resume && !is_file(state_file))
       throw InputError({{state_file},
                         "there is no interrupted fit to resume",
                         "the state that an interrupted fit leaves",
                         "begin the fit anew, without resuming"});
-    state = read_fit_state(state_file, key);
+    std::string text;
+    if (job.resume)
+      text = read_file(state_file);
+    else
+      remove_file(state_file);
+    write_file(job.out / "fit.toml", to_toml(job.options));
+    return text;
+  });
+  FitState state;
+  if (job.resume) {
+    state = to_fit_state(left, state_file, key);
     say("resuming the fit in " + job.out.string());
-  } else {
-    remove_file(state_file);
   }
-  write_file(job.out / "fit.toml", to_toml(job.options));
 
   FitMonitor monitor;
-  monitor.on_event = [&](const FitEvent& event) {
-    const std::string line = describe(event, seconds());
-    log += line + "\n";
-    if (watch.on_event) watch.on_event(event, line);
-  };
-  monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
-  monitor.interrupted = watch.interrupted;
+  if (is_first) {
+    monitor.on_event = [&](const FitEvent& event) {
+      const std::string line = describe(event, seconds());
+      log += line + "\n";
+      if (watch.on_event) watch.on_event(event, line);
+    };
+    monitor.on_state = [&](const FitState& s) { write_fit_state(state_file, s, key); };
+  }
+  monitor.processes = processes;
   FitJobOutcome done;
   done.outcome = fit(all.recordings, job.options, monitor, std::move(state), std::move(all.held_out));
   const FitOutcome& outcome = done.outcome;
+  done.seconds = seconds();
+  if (!is_first) return done;
   if (outcome.interrupted && !is_file(state_file)) write_fit_state(state_file, {}, key);  // nothing was done yet
   if (!outcome.evaluation.succeeded) {
     say("the fit ended without a result: " + outcome.reason);

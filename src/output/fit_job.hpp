@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,18 +38,23 @@ struct FitWatch {
   std::function<void(const std::string& line)> on_line;                          ///< something worth knowing
   std::function<void(const FitEvent& event, const std::string& line)> on_event;  ///< a step, and the same in words
   std::function<void(const char* what, int done, int total)> progress;
-  std::function<bool()> interrupted;
+  std::function<bool()> interrupted;  ///< not with `processes`, which ask it themselves
+  /// Processes that run the job together (`FitMonitor`), each called with the same job: the first one alone tells,
+  /// writes, and has a result; null: this one alone.
+  std::shared_ptr<ProcessGroup> processes;
 };
 
 struct FitJobOutcome {
   FitOutcome outcome;
-  std::optional<Result> result;  ///< nothing: it ended without an estimate, and no files but its log and its state
+  /// Nothing: it ended without an estimate, and no files but its log and its state; or another process has it.
+  std::optional<Result> result;
   double seconds = 0.0;
 };
 
 /// Runs it, and writes the output folder of docs/formats.md, section 2: also `fit.toml` at once, `state.json` as long
 /// as it is under way or was interrupted, and `log.txt`. Throws InputError where a capture or the state to resume
-/// cannot be used, Interrupted where it was stopped before the fit began.
+/// cannot be used, Interrupted where it was stopped before the fit began, std::runtime_error where processes that
+/// should run it together were given different jobs.
 FitJobOutcome run_fit_job(const FitJob& job, const FitWatch& watch = {});
 FitJobOutcome run_fit_job(const FitJob& job, JobRecordings recordings, const FitWatch& watch = {});
 

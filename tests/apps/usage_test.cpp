@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <fstream>
 
 #include "apps/program.hpp"
@@ -170,6 +171,21 @@ TEST(Mesh, RefusesWithThePlace) {
   EXPECT_EQ(run.exit_code, bad_input);
   EXPECT_THAT(run.err, HasSubstr("bad.msh:3:5: \"x\"; expected a coordinate"));
 }
+
+#ifndef PLIANT_WITH_MPI
+TEST(Usage, ProcessesOfMpirunAreToldOnceThatThisBuildHasNoMpi) {
+  ::setenv("OMPI_COMM_WORLD_SIZE", "2", 1);
+  ::setenv("OMPI_COMM_WORLD_RANK", "0", 1);
+  const ProgramRun first = run_pliant({"fit", "a", "b", "--out", "never"});
+  ::setenv("OMPI_COMM_WORLD_RANK", "1", 1);
+  const ProgramRun second = run_pliant({"fit", "a", "b", "--out", "never"});
+  ::unsetenv("OMPI_COMM_WORLD_SIZE"), ::unsetenv("OMPI_COMM_WORLD_RANK");
+  EXPECT_EQ(first.exit_code, bad_input);
+  EXPECT_THAT(first.err, HasSubstr("-DPLIANT_WITH_MPI=ON"));
+  EXPECT_EQ(second.exit_code, 0) << "mpirun ends the others where one fails: the first one is to have its say";
+  EXPECT_THAT(second.err, IsEmpty());
+}
+#endif
 
 }  // namespace
 }  // namespace pliant::test::usage_test

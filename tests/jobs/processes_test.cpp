@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <cstdlib>
 #include <map>
 #include <thread>
 
@@ -68,6 +69,15 @@ TEST_F(Processes, RunWhatHasNotEnded) {
   EXPECT_EQ(runs("b"), 0);
   EXPECT_EQ(read_file(folder / "a.txt"), "said\n");
   EXPECT_TRUE(fs::is_empty(folder / "claims"));
+}
+
+TEST_F(Processes, AreNoPartOfWhatMpirunStarted) {
+  ::setenv("OMPI_COMM_WORLD_SIZE", "2", 1);
+  ::setenv("PLIANT_OF_THE_TEST", "kept", 1);
+  add("a", "touch a; echo \"${OMPI_COMM_WORLD_SIZE:-alone} $PLIANT_OF_THE_TEST\"");
+  EXPECT_EQ(run_processes(jobs, options), 1);
+  ::unsetenv("OMPI_COMM_WORLD_SIZE"), ::unsetenv("PLIANT_OF_THE_TEST");
+  EXPECT_EQ(read_file(folder / "a.txt"), "alone kept\n");
 }
 
 TEST_F(Processes, TellHowTheyEnded) {
