@@ -296,7 +296,8 @@ struct FitMonitor {
   std::function<void(const FitState&)> on_state;  ///< something is done that a resumed fit need not do again
   std::function<bool()> interrupted;  ///< asked of this process alone; not with `processes`, which ask it themselves
   /// Processes that carry out the fit together: each is given the same recordings, options and state, and returns the
-  /// same outcome, to the last bit that of one process; null: this one alone.
+  /// same outcome, to the last bit that of one process; null: this one alone. Fits of presses alone are not shared out:
+  /// one process is to make them.
   std::shared_ptr<ProcessGroup> processes;
 };
 

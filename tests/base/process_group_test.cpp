@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <bit>
+#include <cstdint>
 #include <cstdlib>
 
 #include "base/bytes.hpp"
@@ -40,8 +42,10 @@ TEST(Bytes, ComeBackAsTheyWere) {
   EXPECT_EQ(reader.get<std::string>(), std::string("words\0and", 9));
   EXPECT_EQ(reader.get<VectorX>(), vector);
   const auto back = reader.get<MatrixX>();
-  EXPECT_EQ(back.rows(), 2);
-  EXPECT_EQ(std::memcmp(back.data(), matrix.data(), sizeof(double) * 6), 0);
+  ASSERT_EQ(back.rows(), 2);
+  ASSERT_EQ(back.cols(), 3);
+  for (Eigen::Index i = 0; i < 6; ++i)
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(back.data()[i]), std::bit_cast<std::uint64_t>(matrix.data()[i])) << i;
   EXPECT_EQ(reader.get<std::vector<float>>(), floats);
   EXPECT_EQ(reader.get<MatrixX>().size(), 0);
   EXPECT_FALSE(reader.at_end());
