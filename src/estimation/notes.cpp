@@ -16,6 +16,9 @@ namespace {
 std::string spoken(std::string name) {
   for (char& c : name)
     if (c == '_') c = ' ';
+  using Names = std::pair<std::string_view, std::string_view>;
+  for (const auto& [plain, written] : {Names{"youngs", "Young's"}, Names{"poissons", "Poisson's"}})
+    if (name.starts_with(plain)) name.replace(0, plain.size(), written);
   return name;
 }
 
