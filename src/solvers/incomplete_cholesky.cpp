@@ -59,15 +59,11 @@ bool IncompleteCholesky::try_factorise(const BlockMatrix& matrix, double shift) 
 namespace {
 
 /// The columns of a block (3 x 3, column by column), a wide number each. Nothing beyond the block is read.
-inline void load_block(const float* block, Wide<double>* columns) {
-  const Wide<float> last = load_wide(block + 5);
+template <class Real>
+inline void load_block(const Real* block, Wide<double>* columns) {
+  const Wide<Real> last = load_wide(block + 5);
   columns[0] = __builtin_convertvector(load_wide(block), Wide<double>);
   columns[1] = __builtin_convertvector(load_wide(block + 3), Wide<double>);
-  columns[2] = Wide<double>{last[1], last[2], last[3], 0.0};
-}
-inline void load_block(const double* block, Wide<double>* columns) {
-  const Wide<double> last = load_wide(block + 5);
-  columns[0] = load_wide(block), columns[1] = load_wide(block + 3);
   columns[2] = Wide<double>{last[1], last[2], last[3], 0.0};
 }
 
