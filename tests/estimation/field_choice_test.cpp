@@ -354,6 +354,19 @@ TEST(FieldChoice, FitsWhatOneStepPromises) {
   EXPECT_FALSE(is_worth_a_fit({3, false, 995.0, 4.0}, two));
 }
 
+/// A field that does not gain enough in the wide band has no estimate, but a cost: it was not impossible to simulate.
+TEST(FieldChoice, AFitEndsInTheWideBandWhereItGainsTooLittle) {
+  FitOptions options = quick();
+  options.control_points = 1;
+  options.cells = 12.0;  // finer than the starts: stages in the wide band come first
+  options.wide_band_limit = 1e-9;
+  const FitOutcome outcome = fit({sagging_bar(soft)}, options);
+  EXPECT_FALSE(outcome.evaluation.succeeded);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_TRUE(std::isfinite(outcome.final_cost));
+  EXPECT_THAT(outcome.reason, ::testing::HasSubstr("too little"));
+}
+
 TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {
   const Vector3 aside(0.0, 0.0, -9.81);
   const FitOutcome outcome = fit({sagging_bar(soft), sagging_bar(soft, aside, 8)}, quick());

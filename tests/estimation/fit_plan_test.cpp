@@ -401,6 +401,23 @@ TEST_F(Plans, EndWhereTheEstimateFails) {
   EXPECT_EQ(FitPlan(facts).estimate(state.done), nullptr);
 }
 
+/// The last stage in the wide band must gain enough, and not the one in the narrow band; where it does not, nothing
+/// follows.
+TEST_F(Plans, EndInTheWideBandWhereTheLimitIsNotReached) {
+  facts.options.wide_band_limit = 1.7;
+  has_followed();
+  const std::vector<StageChain> chains = next();
+  ASSERT_EQ(chains.size(), 1u);
+  const StageChain& chain = chains.front();
+  ASSERT_EQ(chain.size(), 2u);
+  EXPECT_EQ(chain[0].give_up_above, 1.7);
+  EXPECT_EQ(chain[1].give_up_above, infinite);
+  has_done(record(chain[0].id, 2.0));
+  EXPECT_FALSE(next().empty());
+  state.done.back().succeeded = false;
+  EXPECT_TRUE(next().empty());
+}
+
 TEST_F(Plans, CorrectWhatTheTestFinds) {
   has_estimated();
   const auto tests = next();
