@@ -185,6 +185,7 @@ std::vector<StageChain> FitRun::next() {
   std::vector<StageChain> chains = plan_.next(state_);
   ended_before_ = state_.done;  // what stages beside each other may know of others
   const bool at_alternatives = !chains.empty() && chains.front().front().alternative;
+  if (at_alternatives) (void)grid(plan_.spacing_of(*plan_.result(state_.done)));  // on which they begin
   if (at_alternatives && !grids_of_fit_) grids_of_fit_ = grids_.size();
   if (!at_alternatives && grids_of_fit_) {  // those of alternatives are not used again
     grids_.resize(*grids_of_fit_);
@@ -472,9 +473,17 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   OptimiserOptions o;
   o.max_iterations = alternative.iterations;
   o.promise_tolerance = promise_of_alternative;
+  if (!recordings_
+           .all_static()) {  // a gradient takes as long as two simulations, tangents as one and a third more each
+    Stage own = stage;
+    own.grid = plan_.spacing_of(*plan_.result(ended_before_));
+    o.kind = OptimiserKind::Lbfgs;
+    o.curvature = linearised_at(*plan_.result(ended_before_), own, parameters).gauss_newton;
+  }
   const VectorX p = parameters.to_unconstrained(theta);
-  const OptimiserSummary s =
+  OptimiserSummary s =
       minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
+  if (o.curvature.size() > 0) s.evaluation.gauss_newton = o.curvature;
   is_cut = s.interrupted;
   record.cost = s.succeeded ? s.evaluation.cost : infinite;
   record.iterations = s.iterations, record.work = s.work;
@@ -512,11 +521,7 @@ StageRecord FitRun::look_at_resolution(const Stage& stage) {
   record.succeeded = true;
   const StageRecord& at = *plan_.result(state_.done);
   const ParameterSet parameters = parameters_of(stage, theta);
-  const auto ended = std::ranges::find(ended_, at.id, &Ended::id);
-  const bool has_ended = ended != ended_.end() && ended->evaluation.gauss_newton.rows() == parameters.dimension();
-  const CostEvaluation e =
-      has_ended ? ended->evaluation
-                : objective_of(stage, parameters, grid(stage.grid)).linearise(parameters.to_unconstrained(theta));
+  const CostEvaluation e = linearised_at(at, stage, parameters);
   const VectorX own = gauss_newton_shift(e, largest_shift);
   const std::optional<VectorX> mesh = mesh_shift(state_.done, own);
   if (!e.succeeded || !mesh) return record;

@@ -70,6 +70,9 @@ class FitRun : StageLoop {
 
   void finish(const std::vector<StageRecord>& done);
   CostEvaluation evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters);
+  /// At an estimate, with derivatives by these parameters: what its optimiser found where it ran here, else anew.
+  /// @param stage  of the same grid and band as the estimate's
+  CostEvaluation linearised_at(const StageRecord& estimate, const Stage& stage, const ParameterSet& parameters);
   void say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate);
   const StageRecord& refined(const std::vector<StageRecord>& done, const StageRecord& first);
   std::vector<Alternative> alternatives() const;

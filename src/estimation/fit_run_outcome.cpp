@@ -121,10 +121,15 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
 /// With derivatives, but for a last look; that of the optimiser where it ran here.
 CostEvaluation FitRun::evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters) {
   const auto ended = std::ranges::find(ended_, record.id, &Ended::id);
-  const bool is_whole = ended != ended_.end() && (!record.succeeded || ended->is_last_look ||
-                                                  ended->evaluation.gauss_newton.rows() == parameters.dimension());
-  if (is_whole) return std::move(ended->evaluation);
-  return objective_of(narrow, parameters, grid(narrow.grid)).linearise(parameters.to_unconstrained(record.theta));
+  const bool has_no_derivatives = ended != ended_.end() && (!record.succeeded || ended->is_last_look);
+  return has_no_derivatives ? ended->evaluation : linearised_at(record, narrow, parameters);
+}
+
+CostEvaluation FitRun::linearised_at(const StageRecord& estimate, const Stage& stage, const ParameterSet& parameters) {
+  const auto ended = std::ranges::find(ended_, estimate.id, &Ended::id);
+  if (ended != ended_.end() && ended->evaluation.gauss_newton.rows() == parameters.dimension())
+    return ended->evaluation;
+  return objective_of(stage, parameters, grid(stage.grid)).linearise(parameters.to_unconstrained(estimate.theta));
 }
 
 void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate) {

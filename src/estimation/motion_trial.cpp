@@ -59,7 +59,6 @@ class MotionTrial::Comparison {
   std::vector<TrackObservation> corrected(const std::vector<TrackObservation>& tracks) const;
   bool is_corrected(int sensor) const { return sensor < int(sensors_.corrections.size()); }
   const SensorBlocks& sensor_blocks(int sensor) const { return motion_.mismatch.sensors[std::size_t(sensor)]; }
-  static bool changes_any(const std::vector<ParameterHandle>& blocks, const Eigen::Ref<const VectorX>& direction);
 
   /// How positions change along those of all directions that move the body; sensors alone change along the others.
   struct Tangents {
@@ -241,14 +240,6 @@ FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const
   if (!seen.points.empty()) fit_surface(seen, positions, tangents, fit);
   if (!seen.tracks.empty()) fit_tracks(seen, positions, tangents, fit);
   return fit;
-}
-
-bool MotionTrial::Comparison::changes_any(const std::vector<ParameterHandle>& blocks,
-                                          const Eigen::Ref<const VectorX>& direction) {
-  const auto changes = [&](const ParameterHandle& block) {
-    return !direction.segment(block.first, block.size).isZero(0.0);
-  };
-  return std::ranges::any_of(blocks, changes);
 }
 
 CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX& all_directions) {

@@ -21,6 +21,8 @@ constexpr double fastest_growth =
 constexpr double most_left = 4.0;  // of what was left to do, after one step
 constexpr double rounding = 1e-6;  // of the load: below, iterations that gain nothing have met rounding
 constexpr double least_share = 1e-4, least_stride = 1.0 / 40.0;  // of the load, and of what is carried already
+// Relative residuals of linear systems.
+constexpr double of_a_step = 1e-6, of_a_length = 1e-2, of_a_derivative = 1e-12;
 constexpr int most_steps = 30;  // of pseudo-time: a load that they do not balance is better taken part by part
 
 std::string percent(double share) {
@@ -41,7 +43,7 @@ ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std
       scan_(body_->scanned_positions()),
       options_(options),
       forces_(material_.make_reference_forces(body_)),
-      solver_(body_->pattern),
+      solver_(body_->pattern, options.solver),
       turning_(body_, options.solver),
       jacobian_(body_->pattern),
       metric_(body_->pattern),
@@ -96,6 +98,28 @@ void ReferenceShapeSolver::set_jacobian() {
   constrain(jacobian_);
 }
 
+bool ReferenceShapeSolver::factorise(const BlockMatrix& matrix) {
+  system_ = &matrix;
+  is_by_lu_ = false;
+  solver_.set_positions(scan_);
+  if (solver_.factorise(matrix, metric_) && solver_.symmetric_part_is_definite()) return true;
+  return factorise_as_it_is();
+}
+
+bool ReferenceShapeSolver::factorise_as_it_is() {
+  if (!lu_) lu_ = std::make_unique<LuSolver>(body_->pattern);
+  return is_by_lu_ = lu_->factorise(*system_);
+}
+
+VectorX ReferenceShapeSolver::solve(const VectorX& b, double tolerance, GeneralSolver::Side side) {
+  VectorX x;
+  if (!is_by_lu_) {
+    if (solver_.solve(b, x, tolerance, side).converged) return x;
+    if (!factorise_as_it_is()) return VectorX::Constant(b.size(), std::numeric_limits<double>::quiet_NaN());
+  }
+  return side == GeneralSolver::Side::Plain ? lu_->solve(b) : lu_->solve_transposed(b);
+}
+
 Points ReferenceShapeSolver::turned_back(const Points& forces) const {
   Points out(forces.rows(), 3);
   for (Eigen::Index n = 0; n < forces.rows(); ++n) out.row(n) = forces.row(n) * turn_[std::size_t(n)];
@@ -147,8 +171,8 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
         metric_.multiply(flat(velocity), inertia);
         b += inertia / step;
       }
-      const bool solved = solver_.factorise(matrix_);
-      const VectorX solution = solved ? solver_.solve(b) : VectorX();
+      const bool solved = factorise(matrix_);
+      const VectorX solution = solved ? solve(b, of_a_step) : VectorX();
       if (!solved || !solution.allFinite()) {
         if (is_newton) return a.reason = "the linear system cannot be solved", a;
         continue;
@@ -160,7 +184,7 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
       // The same matrix says how far nodes would have to move now: forces of slender bodies say little of that.
       double left = 0.0;
       if (fits && !is_newton && !is_virtual)
-        left = solver_.solve(flat(turned_back(residual_))).norm() / solution.norm();
+        left = solve(flat(turned_back(residual_)), of_a_length).norm() / solution.norm();
       if (!fits || left > most_left) {
         if (fits && a.residual < rounding) return a.converged = true, a;
         continue;
@@ -245,20 +269,20 @@ bool ReferenceShapeSolver::prepare_derivatives(const VectorX& theta, const Point
   if (!forces_->linearise(X, scan_)) return false;
   set_turns();
   set_jacobian();
-  return solver_.factorise(jacobian_);
+  return factorise(jacobian_);
 }
 
 Points ReferenceShapeSolver::tangent(const Points& d_force) {
   Points b = -turned_back(d_force);
   clear_held(b);
-  const VectorX change = solver_.solve(flat(b));
+  const VectorX change = solve(flat(b), of_a_derivative);
   return as_points(change);
 }
 
 Points ReferenceShapeSolver::adjoint(const Points& X_bar) {
   Points b = -X_bar;
   clear_held(b);
-  const VectorX y = solver_.solve_transposed(flat(b));
+  const VectorX y = solve(flat(b), of_a_derivative, GeneralSolver::Side::Transposed);
   Points force_bar(X_bar.rows(), 3);
   for (Eigen::Index n = 0; n < force_bar.rows(); ++n)
     force_bar.row(n) = y.segment<3>(3 * n).transpose() * turn_[std::size_t(n)].transpose();

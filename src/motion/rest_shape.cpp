@@ -76,7 +76,10 @@ RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& h
     throw std::invalid_argument("hexahedra are regular where they are stress-free");
   if (basis_.cols() != Eigen::Index(blocks_.scan_corrections.size()))
     throw std::invalid_argument("one parameter block a correction of the scan is expected");
+  depends_on_ = blocks_.scan_corrections;
   if (!sags_) return;
+  depends_on_.insert(depends_on_.end(), {blocks_.density, blocks_.gravity});
+  for (const ParameterHandle& block : material.parameters()) depends_on_.push_back(block);
   ReferenceShapeOptions options;
   options.by_parts = false;
   options.max_iterations = most_iterations;
@@ -94,9 +97,10 @@ Points RestShape::scan_tangent(const VectorX& d_theta) const {
 }
 
 std::string RestShape::find(const VectorX& theta) {
-  if (theta_.size() == theta.size() && theta_ == theta) return {};
+  if (theta_.size() == theta.size() && !changes_any(depends_on_, theta - theta_)) return {};
   const bool first = theta_.size() == 0;
   theta_.resize(0);
+  has_derivatives_ = false;
   const Points scan = body_->scanned_positions() + scan_tangent(theta);
   Points X = scan;
   if (sags_) {
@@ -121,15 +125,16 @@ std::string RestShape::find(const VectorX& theta) {
 }
 
 bool RestShape::prepare_derivatives() {
-  if (!sags_) return true;
+  if (!sags_ || has_derivatives_) return true;
   elasticity_->set_reference(free_);
   elasticity_->set_parameters(theta_);
   elasticity_->linearise(scan_);
-  return solver_->prepare_derivatives(theta_, free_->reference_positions());
+  return has_derivatives_ = solver_->prepare_derivatives(theta_, free_->reference_positions());
 }
 
 Points RestShape::reference_tangent(const VectorX& d_theta, const Points& d_scan) {
   if (!sags_) return d_scan;
+  if (!changes_any(depends_on_, d_theta)) return Points::Zero(scan_.rows(), 3);
   Points d_force = Points::Zero(scan_.rows(), 3);
   elasticity_->add_force_tangent(scan_, d_scan, d_scan, d_theta, d_force);
   for (auto& term : terms_) term->add_force_tangent(scan_, d_scan, d_scan, d_theta, d_force);

@@ -38,7 +38,8 @@ class RestShape {
             const std::vector<PointMass>& weights, MatrixX basis, const MotionBlocks& blocks,
             const BodyMaterial& material);
 
-  /// Finds them for theta, from those found before. Empty, or why there are none.
+  /// Finds them for theta, from those found before; at once where nothing that they depend on has changed. Empty, or
+  /// why there are none.
   [[nodiscard]] std::string find(const VectorX& theta);
   const Points& scan() const { return scan_; }  ///< n x 3 [m]
   /// The body, stress-free where it was found to be.
@@ -61,7 +62,9 @@ class RestShape {
   std::unique_ptr<ReferenceShapeSolver> solver_;   // where it sags
   std::unique_ptr<Elasticity> elasticity_;         // likewise
   std::vector<std::unique_ptr<ForceTerm>> terms_;  // what acts on the scan but elasticity
+  std::vector<ParameterHandle> depends_on_;        // of theta
   VectorX theta_;                                  // of what was found
+  bool has_derivatives_ = false;                   // of that
   Points scan_;
 };
 

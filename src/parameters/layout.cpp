@@ -1,8 +1,14 @@
 #include "parameters/layout.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace pliant {
+
+bool changes_any(std::span<const ParameterHandle> blocks, const Eigen::Ref<const VectorX>& d_theta) {
+  return std::ranges::any_of(
+      blocks, [&](const ParameterHandle& block) { return !d_theta.segment(block.first, block.size).isZero(0.0); });
+}
 
 int ParameterLayout::find_index(std::string_view name) const {
   for (std::size_t i = 0; i < blocks_.size(); ++i)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,9 @@ struct ParameterHandle {
   Vector3 vector(const VectorX& theta) const { return theta.segment<3>(first); }
   bool operator==(const ParameterHandle&) const = default;
 };
+
+/// Whether a change of a parameter vector changes a number of any of these blocks; all of them exist.
+bool changes_any(std::span<const ParameterHandle> blocks, const Eigen::Ref<const VectorX>& d_theta);
 
 /// The blocks of a parameter vector in their order.
 class ParameterLayout {

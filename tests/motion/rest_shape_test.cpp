@@ -135,6 +135,36 @@ TEST(Shape, WhatCannotCarryTheScanFailsAndSaysSo) {
   EXPECT_THAT(summary.failure, ::testing::HasSubstr("cannot be held up"));
 }
 
+/// What pulls, dampings and velocities change is the motion: the shape is that which was found, and its derivatives by
+/// them are zero.
+TEST(Shape, FollowsWhatItDependsOnAndNothingElse) {
+  const Shaped scene(ElementKind::QuadraticTetrahedron, Integrator::Lagged, Unknown::Both);
+  const std::vector<int> held = held_nodes(*scene.body, scene.options.holds);
+  RestShape shape(scene.body, held, true, {}, shape_basis(*scene.body, scene.options.shape, held), scene.layout,
+                  scene_material(scene.options));
+  ASSERT_EQ(shape.find(scene.theta), "");
+  ASSERT_TRUE(shape.prepare_derivatives());
+  const std::shared_ptr<const Body> found = shape.body();
+  const MotionLayout& l = scene.layout;
+  std::vector<ParameterHandle> followed = {l.youngs_moduli[0], l.poissons_ratio, l.density, l.gravity};
+  followed.insert(followed.end(), l.scan_corrections.begin(), l.scan_corrections.end());
+  for (Eigen::Index i = 0; i < scene.theta.size(); ++i) {
+    const VectorX unit = VectorX::Unit(scene.theta.size(), i);
+    const Points tangent = shape.reference_tangent(unit, shape.scan_tangent(unit));
+    EXPECT_EQ(tangent.isZero(0.0), !changes_any(followed, unit)) << i;
+  }
+  for (const ParameterHandle& block : l.all()) {
+    ASSERT_EQ(shape.find(scene.theta), "");
+    const std::shared_ptr<const Body> before = shape.body();
+    VectorX theta = scene.theta;
+    theta[block] += 1e-3 * std::max(std::abs(theta[block]), 0.1);
+    ASSERT_EQ(shape.find(theta), "");
+    EXPECT_EQ(shape.body() == before, !changes_any(followed, theta - scene.theta)) << block.first;
+  }
+  ASSERT_EQ(shape.find(scene.theta), "");
+  EXPECT_LT((shape.body()->reference_positions() - found->reference_positions()).cwiseAbs().maxCoeff(), 1e-7);
+}
+
 /// Drawn from the prior, the field has its width far from what is held, and vanishes there.
 TEST(ShapeField, HasThePriorsWidthAndVanishesWhereHeld) {
   const auto body = bar(ElementKind::QuadraticTetrahedron);

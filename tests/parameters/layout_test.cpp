@@ -185,6 +185,17 @@ TEST(MotionBlocksOf, AMotionMoveWithTheirLayout) {
   EXPECT_EQ(moved.planes[1].point, expected.planes[1].point);
 }
 
+TEST(ParameterHandles, ChangeWithAnyOfTheirNumbers) {
+  const MotionLayout layout(many);
+  const std::vector<ParameterHandle> blocks = {layout.gravity, layout.youngs_moduli[1]};
+  for (Eigen::Index i = 0; i < layout.size(); ++i) {
+    const bool is_theirs = (i >= layout.gravity && i < layout.gravity + 3) || i == layout.youngs_moduli[1];
+    EXPECT_EQ(changes_any(blocks, VectorX::Unit(layout.size(), i)), is_theirs) << i;
+  }
+  EXPECT_FALSE(changes_any(blocks, VectorX::Zero(layout.size())));
+  EXPECT_FALSE(changes_any({}, VectorX::Ones(layout.size())));
+}
+
 TEST(MaterialBlocksOf, AMotionReadAndWriteAllModuli) {
   const MotionLayout layout(many);
   VectorX theta = VectorX::LinSpaced(layout.size(), 1.0, layout.size());
