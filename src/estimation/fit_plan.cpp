@@ -207,8 +207,9 @@ StageChain FitPlan::start(int index, const Records& done) const {
     stage.horizon.part = horizons[i];
     stage.band = facts_.options.wide_band, stage.iterations = last ? 10 : 5;
     is_intermediate(stage);
-    // Poisson's ratio is told from the rest only once the fit is close.
-    stage.free = names([](const Parameter& p) { return !shapes_law(p); });
+    // Poisson's ratio is told from the rest only once the fit is close; what holds a released object was found from its
+    // first frames, in units of its stiffness, and takes most of an iteration's time where it is free.
+    stage.free = names([](const Parameter& p) { return !shapes_law(p) && !is_pull(p); });
     stage.done_from = 0.15 + 0.3 * (last ? 0.4 : 0.0), stage.done_to = stage.done_from + 0.15;
     chain.push_back(std::move(stage));
   }
@@ -248,18 +249,21 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
   StageChain chain;
   if (!begin && !names(is_pull).empty()) chain.push_back(pulls(from, grid, 0));
   for (std::size_t i = 0; i < horizons.size(); ++i) {
-    const bool is_narrow = i + 1 == horizons.size(), is_last = is_narrow && !is_last_one_corrected;
+    const bool is_narrow = i + 1 == horizons.size(), is_last_wide = i + 2 == horizons.size(),
+               is_last = is_narrow && !is_last_one_corrected;
     if ((!is_last && is_close) || (begin && int(i) < begin->stage)) continue;
     Stage stage{{StageKind::Fine, index, int(i)}, is_narrow ? "fine" : "fine, wide band", grid};
     stage.horizon.part = horizons[i];
     stage.band = is_narrow ? options.fine_band : options.wide_band;
     stage.iterations = is_narrow ? options.max_iterations : std::max(1, options.max_iterations / 4);
     if (!is_narrow) is_intermediate(stage);
-    if (i + 2 == horizons.size()) stage.give_up_above = options.wide_band_limit;
+    if (is_last_wide) stage.give_up_above = options.wide_band_limit;
     stage.free = free_at_last(done);
     // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
     if (facts_.swings && !is_last)
       for (const std::string& name : names(shapes_law)) std::erase(stage.free, name);
+    if (!is_narrow && !is_last_wide)
+      for (const std::string& name : names(is_pull)) std::erase(stage.free, name);
     stage.done_from = is_narrow ? 0.6 : 0.45 + share * double(i);
     stage.done_to = is_narrow ? 0.9 : stage.done_from + share;
     chain.push_back(std::move(stage));

@@ -506,6 +506,11 @@ TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
   facts.parameters = ParameterSet(layout, list, reference);
   facts.repetitions = {{18.0, 1.0}};
   facts.options.correct = false, facts.swings = true;
+  has_scanned();
+  for (const StageChain& chain : next())
+    for (const Stage& stage : chain)
+      EXPECT_THAT(stage.free, UnorderedElementsAre("youngs_modulus", "linear_velocity")) << "pulls are known by then";
+  state.done.clear();
   has_followed();
   for (const int number : {2, 3})
     for (const int start : {0, 1}) has_done(record({StageKind::Coarse, start, number}, 2.0, 415.0));
@@ -522,6 +527,8 @@ TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
     EXPECT_THAT(chains[0][i].free, testing::Not(testing::Contains("poissons_ratio")))
         << "it would make up for what others lack";
   EXPECT_THAT(chains[0].back().free, testing::Contains("poissons_ratio"));
+  for (std::size_t i = 1; i < chains[0].size(); ++i)  // at last together with all else, in the wide band first
+    EXPECT_EQ(std::ranges::count(chains[0][i].free, "pull@1"), i + 2 < chains[0].size() ? 0 : 1) << i;
   for (const Stage& stage : chains[0]) has_done(record(stage.id, 1.0, 430.0));
   const auto finer = next();
   ASSERT_EQ(finer[0].size(), 2u);
