@@ -150,7 +150,7 @@ StageChain FitPlan::motion(int first, const VectorX& from) const {
   if (free.empty()) return {};
   StageChain chain;
   for (int i = 0; i < 2; ++i) {
-    Stage stage{{StageKind::Motion, 0, first + i}, "motion", {facts_.options.coarse_cells, facts_.options.steps}};
+    Stage stage{{StageKind::Motion, 0, first + i}, "motion", facts_.coarse};
     stage.horizon = {Horizon::Until::Beginning, i == 0 ? 1.0 / 8 : 1.0 / 4};
     stage.band = facts_.options.wide_band, stage.iterations = 12;
     is_intermediate(stage);
@@ -163,7 +163,7 @@ StageChain FitPlan::motion(int first, const VectorX& from) const {
 }
 
 Stage FitPlan::swing(const VectorX& from) const {
-  Stage stage{{StageKind::Swing}, "swing", {facts_.options.coarse_cells, facts_.options.steps}};
+  Stage stage{{StageKind::Swing}, "swing", facts_.coarse};
   stage.from = {from};
   stage.done_from = stage.done_to = 0.05;
   return stage;
@@ -186,7 +186,7 @@ std::vector<double> fine_horizons(bool swings) {
 /// Over decades from the softest on that may hold itself up.
 Stage FitPlan::scan(const VectorX& from) const {
   const FitOptions& options = facts_.options;
-  Stage stage{{StageKind::Scan}, "scan", {options.coarse_cells, options.steps}};
+  Stage stage{{StageKind::Scan}, "scan", facts_.coarse};
   stage.band = options.wide_band;
   stage.horizon.part = growing_horizon(facts_.swings).front();
   stage.from = {from};
@@ -203,7 +203,7 @@ StageChain FitPlan::start(int index, const Records& done) const {
   const std::vector<double> horizons = growing_horizon(facts_.swings);
   for (std::size_t i = 0; i < horizons.size(); ++i) {
     const bool last = i + 1 == horizons.size();
-    Stage stage{{StageKind::Coarse, index, int(i)}, "coarse", {facts_.options.coarse_cells, facts_.options.steps}};
+    Stage stage{{StageKind::Coarse, index, int(i)}, "coarse", facts_.coarse};
     stage.horizon.part = horizons[i];
     stage.band = facts_.options.wide_band, stage.iterations = last ? 10 : 5;
     is_intermediate(stage);
@@ -325,23 +325,41 @@ StageChain FitPlan::finer(const Records& done) const {
   return {};
 }
 
-/// Those that are left, at the result.
+/// Those that are left, at the result. What holds a released object is looked for anew, from its first frames, where
+/// mesh or law is another one, and held while the rest follows.
 std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
   const StageRecord* at = result(done);
   if (!at) return {};
   const Spacing own = spacing_of(*at);
-  std::vector<StageChain> left;
+  std::vector<StageChain> chains;
   for (std::size_t i = 0; i < facts_.alternatives.size(); ++i) {
     const Alternative& a = facts_.alternatives[i];
     Stage stage{{StageKind::Alternative, at->id.start, int(i)}, a.cause, {own.cells * a.cells, own.steps * a.steps}};
-    if (find_record(done, stage.id)) continue;
     stage.band = facts_.options.fine_band;
     stage.free = free_at_last(done);
-    stage.from = {at->theta};
     stage.alternative = a;
     stage.done_from = stage.done_to = 1.0;
-    left.push_back({std::move(stage)});
+    StageChain chain;
+    if (!a.given && !names(is_pull).empty()) {
+      for (const std::string& name : names(is_pull)) std::erase(stage.free, name);
+      if (a.cells != 1.0 || a.change != ModelChange{}) {
+        chain.push_back(pulls(at->theta, stage.grid, -1 - int(i)));
+        chain.back().alternative = a;
+        chain.back().done_from = chain.back().done_to = 1.0;
+      }
+    }
+    chain.push_back(std::move(stage));
+    chain.front().from = {at->theta};
+    if (a.beside_the_first) {  // from where that ends
+      chain.front().from.clear();
+      chains.front().insert(chains.front().end(), chain.begin(), chain.end());
+    } else {
+      chains.push_back(std::move(chain));
+    }
   }
+  std::vector<StageChain> left;
+  for (StageChain& chain : chains)
+    if (StageChain rest = left_of(std::move(chain), done); !rest.empty()) left.push_back(std::move(rest));
   return left;
 }
 

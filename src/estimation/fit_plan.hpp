@@ -18,7 +18,8 @@ struct PlanFacts {
   bool is_scanned = true;                 ///< Young's modulus is looked for
   double softest = 0.0;                   ///< Young's modulus that is tried [Pa]; 0: the stress under its own weight
   bool swings = false;                    ///< some object is let go
-  bool coarse_is_as_fine = false;         ///< starts are followed on the full grid already
+  Spacing coarse;                         ///< of the grid on which starts are followed
+  bool coarse_is_as_fine = false;         ///< its elements are those of the full grid
   std::vector<Spacing> repetitions;       ///< on finer grids, after the first estimate
   bool repeats_by_need = false;           ///< each only where a look at the resolution asks for it
   std::vector<Alternative> alternatives;  ///< models that are tried at the last estimate

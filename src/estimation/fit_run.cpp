@@ -82,12 +82,20 @@ std::optional<double> FitRun::given_start(const std::string& name) const {
   return (*change->second.start)[0];
 }
 
+/// What swings freely meets nothing: longer steps resolve it while starts are followed.
+Spacing FitRun::coarse_spacing() const {
+  constexpr double of_swings = 0.5;  // steps in each of the fit's
+  const bool swings = std::ranges::all_of(
+      recordings_.all(), [](const Recording& r) { return r.is_released() && r.capture.scene.planes.empty(); });
+  return {options_.coarse_cells, options_.steps * (swings ? of_swings : 1.0)};
+}
+
 FitRun::Carrying FitRun::carrying(const VectorX& theta) {
   constexpr double moderate = 0.2;  // sag of the object's size, under its weight as linear elasticity has it
   // What is seen as it sags must bear that; others may hang as a rag does, where few simulations are lost in trying.
   constexpr double part_of_scan = 0.25, part_at_rest = 0.02, part_in_motion = 0.1;
   Carrying found;
-  const Grid& coarse = grid({options_.coarse_cells, options_.steps});
+  const Grid& coarse = grid(coarse_spacing());
   for (std::size_t i = 0; i < coarse.recording.size(); ++i) {
     const Discretisation& d = coarse.recording[i];
     const Recording& r = recordings_.all()[i];
@@ -112,6 +120,7 @@ PlanFacts FitRun::facts() {
   f.density = first.blocks.motion.density, f.gravity = first.blocks.motion.gravity;
   f.size = first.size;
   f.swings = recordings_.any_released();
+  f.coarse = coarse_spacing();
   f.is_scanned = !given_start("youngs_modulus");
   // Moduli of regions and control points begin where the object's own does, but for those that the user has given.
   VectorX theta = f.parameters.reference();
@@ -137,7 +146,7 @@ PlanFacts FitRun::facts() {
        cells *= Refinement::mesh_ratio)
     f.repetitions.push_back({cells, options_.steps});
   constexpr double hardly = 0.8;  // of the elements
-  const Grid &coarse = grid({options_.coarse_cells, options_.steps}), &fine = grid({options_.cells, options_.steps});
+  const Grid &coarse = grid(coarse_spacing()), &fine = grid({options_.cells, options_.steps});
   f.coarse_is_as_fine = true;
   for (std::size_t i = 0; i < fine.recording.size(); ++i)
     f.coarse_is_as_fine = f.coarse_is_as_fine &&
@@ -185,7 +194,7 @@ std::vector<StageChain> FitRun::next() {
   std::vector<StageChain> chains = plan_.next(state_);
   ended_before_ = state_.done;  // what stages beside each other may know of others
   const bool at_alternatives = !chains.empty() && chains.front().front().alternative;
-  if (at_alternatives) (void)grid(plan_.spacing_of(*plan_.result(state_.done)));  // on which they begin
+  if (at_alternatives) (void)grid(plan_.spacing_of(*plan_.result(state_.done)));  // that of the estimate
   if (at_alternatives && !grids_of_fit_) grids_of_fit_ = grids_.size();
   if (!at_alternatives && grids_of_fit_) {  // those of alternatives are not used again
     grids_.resize(*grids_of_fit_);
@@ -317,7 +326,8 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   if (s.succeeded) record.misfit = misfit_of(s.evaluation), record.is_explained = is_explained(s.evaluation);
   record.elements = grid(stage.grid).recording.front().body->element_count();
   if (s.succeeded) record.theta = parameters.to_theta(s.p);
-  if (is_on_full_grid(stage.id.kind)) ended_.push_back({stage.id, std::move(s.evaluation)});
+  if (is_on_full_grid(stage.id.kind))
+    record.evaluation = std::make_shared<const CostEvaluation>(std::move(s.evaluation));
   return record;
 }
 
@@ -325,9 +335,11 @@ StageRecord FitRun::find_pulls(const Stage& stage, bool& is_cut) {
   StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
   record.cost = infinite;
   record.succeeded = true;  // without them the next stage looks for them
+  if (not_made_.contains(stage.id.number)) return record;
+  const ModelChange change = stage.alternative ? stage.alternative->change : ModelChange{};
   for (const VectorX& from : stage.from) {
     const ParameterSet pulls = parameters_of(stage, from);
-    Objective objective = objective_of(stage, pulls, grid(stage.grid));
+    Objective objective = objective_of(stage, pulls, grid(stage.grid, change));
     OptimiserOptions o;
     o.max_iterations = stage.iterations;
     const OptimiserSummary s =
@@ -433,9 +445,8 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
   record.succeeded = true;
   if (const StageRecord* estimate = plan_.estimate(state_.done)) {
     record.cost = estimate->cost;
-    const auto ended = std::ranges::find(ended_, estimate->id, &Ended::id);
-    const bool has_ended = ended != ended_.end();
-    if (has_ended && !may_need_correction(record.cost, ended->evaluation.independent_observations())) return record;
+    const CostEvaluation* ended = estimate->evaluation.get();
+    if (ended && !may_need_correction(record.cost, ended->independent_observations())) return record;
   }
   std::vector<std::string> chosen;
   for (const auto& [name, change] : options_.parameters) chosen.push_back(name);
@@ -457,10 +468,11 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
 
 StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   const Alternative& alternative = *stage.alternative;
-  const VectorX& theta = stage.from.front();
-  StageRecord record{stage.id, stage.name, theta, theta};
+  const VectorX& from = stage.from.front();
+  const VectorX& estimate = plan_.result(ended_before_)->theta;
+  StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = true;
-  const ParameterSet parameters = parameters_of(stage, theta);
+  const ParameterSet parameters = parameters_of(stage, from);
   if (const auto failure = not_made_.find(stage.id.number); failure != not_made_.end()) {
     record.reason = failure->second;
     return record;
@@ -473,26 +485,20 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   OptimiserOptions o;
   o.max_iterations = alternative.iterations;
   o.promise_tolerance = promise_of_alternative;
-  if (!recordings_
-           .all_static()) {  // a gradient takes as long as two simulations, tangents as one and a third more each
-    Stage own = stage;
-    own.grid = plan_.spacing_of(*plan_.result(ended_before_));
-    o.kind = OptimiserKind::Lbfgs;
-    o.curvature = linearised_at(*plan_.result(ended_before_), own, parameters).gauss_newton;
-  }
-  const VectorX p = parameters.to_unconstrained(theta);
-  OptimiserSummary s =
+  const OptimiserSummary s =
       minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
-  if (o.curvature.size() > 0) s.evaluation.gauss_newton = o.curvature;
   is_cut = s.interrupted;
   record.cost = s.succeeded ? s.evaluation.cost : infinite;
   record.iterations = s.iterations, record.work = s.work;
   if (!s.succeeded) record.reason = s.reason;
   if (s.succeeded) {
-    VectorX shift = s.p - p;
     const VectorX rest = gauss_newton_shift(s.evaluation, largest_shift);
     const double promised = -(s.evaluation.gradient + 0.5 * s.evaluation.gauss_newton * rest).dot(rest);
-    if (promised < promise_to_trust) shift += rest;
+    record.converged = promised < promise_to_trust;
+    const VectorX end = parameters.to_theta(parameters.clamp(record.converged ? VectorX(s.p + rest) : s.p));
+    if (record.converged) record.theta = end;
+    const ParameterSet all = plan_.estimated(ended_before_);
+    const VectorX shift = all.to_unconstrained(end) - all.to_unconstrained(estimate);
     record.shifts = {{alternative.cause, shift.cwiseMax(-largest_shift).cwiseMin(largest_shift)}};
   }
   const std::lock_guard lock(mutex_);

@@ -56,6 +56,7 @@ class FitRun : StageLoop {
   void tell(FitEvent event);
 
   PlanFacts facts();
+  Spacing coarse_spacing() const;
   /// A Young's modulus that holds up every object that is held, and the softest one that is worth a trial [Pa]; 0:
   /// none is held.
   struct Carrying {
@@ -70,7 +71,7 @@ class FitRun : StageLoop {
 
   void finish(const std::vector<StageRecord>& done);
   CostEvaluation evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters);
-  /// At an estimate, with derivatives by these parameters: what its optimiser found where it ran here, else anew.
+  /// At an estimate, with derivatives by these parameters: what its optimiser found where the record has it, else anew.
   /// @param stage  of the same grid and band as the estimate's
   CostEvaluation linearised_at(const StageRecord& estimate, const Stage& stage, const ParameterSet& parameters);
   void say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate);
@@ -83,21 +84,14 @@ class FitRun : StageLoop {
   VectorX floor(const ParameterSet& parameters, const VectorX& theta) const;
   void time_steps(const Stage& narrow, const ParameterSet& parameters);
 
-  /// What the optimiser found at the end of a stage on the full grid.
-  struct Ended {
-    StageId id;
-    CostEvaluation evaluation;
-    bool is_last_look = false;
-  };
-
   Recordings recordings_;
   std::shared_ptr<const ParameterLayout> layout_;
   std::vector<std::unique_ptr<Grid>> grids_;
   std::optional<std::size_t> grids_of_fit_;  // how many there were before the alternatives'
   std::map<int, std::string> not_made_;      // why, by the alternative's number
   FitPlan plan_;
-  std::vector<Ended> ended_;               // in this run
   std::vector<StageRecord> ended_before_;  // the chains that run side by side
+  bool has_looked_last_ = false;           // at what an interrupted fit has reached
   std::atomic<bool> stages_are_over_ = false;
 };
 

@@ -37,7 +37,8 @@ FitOutcome FitRun::run() {
   execute();
   stages_are_over_ = true;
   PassState end = reached();
-  if (interrupted_ && !plan_.estimate(end.done)) end.done.push_back(last_look(end));
+  has_looked_last_ = interrupted_ && !plan_.estimate(end.done);
+  if (has_looked_last_) end.done.push_back(last_look(end));
   finish(end.done);
   return std::move(outcome_);
 }
@@ -58,8 +59,9 @@ StageRecord FitRun::last_look(const PassState& at) {
         "interrupted before the first estimate on the full mesh, where one simulation takes long; Young's modulus was "
         "{} Pa so far, and --resume goes on from there",
         in_three_digits(theta[plan_.facts().moduli.front()]));
-    ended_.push_back({stage.id, {}, true});
-    ended_.back().evaluation.failure = record.reason;
+    CostEvaluation none;
+    none.failure = record.reason;
+    record.evaluation = std::make_shared<const CostEvaluation>(std::move(none));
     return record;
   }
   const ParameterSet parameters = parameters_of(stage, theta);
@@ -67,7 +69,7 @@ StageRecord FitRun::last_look(const PassState& at) {
   record.succeeded = e.succeeded;
   record.cost = e.succeeded ? e.cost : infinite;
   record.elements = grid(stage.grid).recording.front().body->element_count();
-  ended_.push_back({stage.id, std::move(e), true});
+  record.evaluation = std::make_shared<const CostEvaluation>(std::move(e));
   return record;
 }
 
@@ -120,15 +122,13 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
 
 /// With derivatives, but for a last look; that of the optimiser where it ran here.
 CostEvaluation FitRun::evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters) {
-  const auto ended = std::ranges::find(ended_, record.id, &Ended::id);
-  const bool has_no_derivatives = ended != ended_.end() && (!record.succeeded || ended->is_last_look);
-  return has_no_derivatives ? ended->evaluation : linearised_at(record, narrow, parameters);
+  const bool is_without = record.evaluation && (!record.succeeded || has_looked_last_);
+  return is_without ? *record.evaluation : linearised_at(record, narrow, parameters);
 }
 
 CostEvaluation FitRun::linearised_at(const StageRecord& estimate, const Stage& stage, const ParameterSet& parameters) {
-  const auto ended = std::ranges::find(ended_, estimate.id, &Ended::id);
-  if (ended != ended_.end() && ended->evaluation.gauss_newton.rows() == parameters.dimension())
-    return ended->evaluation;
+  if (estimate.evaluation && estimate.evaluation->gauss_newton.rows() == parameters.dimension())
+    return *estimate.evaluation;
   return objective_of(stage, parameters, grid(stage.grid)).linearise(parameters.to_unconstrained(estimate.theta));
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <compare>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -120,6 +121,8 @@ struct StageRecord {
   std::string told = {};                    ///< for people: the swing that was found, what needs correction
   std::vector<ModelShift> shifts = {};      ///< of an alternative: of the estimate
   std::optional<LawFinding> law = {};       ///< of a search for the law of a pressed object
+  /// Of a minimisation, at its end; null where another process made it: files do not keep it.
+  std::shared_ptr<const CostEvaluation> evaluation = {};
 };
 
 /// A stage that is under way.

@@ -2,7 +2,6 @@
 
 #include <LBFGSpp/BFGSMat.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -240,7 +239,7 @@ void gradient_descent(Run& run, const OptimiserOptions& options, const VectorX& 
 class LbfgsRun {
  public:
   LbfgsRun(Run& run, const OptimiserOptions& options, const VectorX& memory)
-      : run_(run), options_(options), n_(run.summary.p.size()), root_(options.curvature) {
+      : run_(run), options_(options), n_(run.summary.p.size()) {
     if (memory.size() < 2) return;
     share_ = memory[0], length_ = memory[1];
     for (Eigen::Index at = 2; at < memory.size(); at += 2 * n_)
@@ -250,12 +249,7 @@ class LbfgsRun {
   void minimise() {
     OptimiserSummary& s = run_.summary;
     for (bool done = false; !done;) {
-      const VectorX step = full_step();
-      if (has_root() && -0.5 * step.dot(s.evaluation.gradient) < options_.promise_tolerance) {
-        run_.end(true, "the minimum is within a fraction of its standard deviation");
-        return;
-      }
-      const VectorX trial = run_.clamp(s.p + share_ * step);
+      const VectorX trial = run_.clamp(s.p + share_ * full_step());
       const double moved = (trial - s.p).cwiseAbs().maxCoeff();
       if (moved == 0.0) {
         run_.end(true, "the step is zero");
@@ -266,7 +260,7 @@ class LbfgsRun {
       const double gain = s.evaluation.cost - e.cost;
       const bool accepted = e.succeeded && gain > 1e-4 * std::max(predicted, 0.0);
       // A first step of arbitrary length that gains little says nothing: only those of a curvature that is known do.
-      const bool knows_curvature = has_root() || !changes_.empty();
+      const bool knows_curvature = !changes_.empty();
       if (accepted) {
         const bool small = moved < options_.step_tolerance || gain < options_.cost_tolerance * s.evaluation.cost;
         learn(trial - s.p, e.gradient - s.evaluation.gradient);
@@ -299,23 +293,16 @@ class LbfgsRun {
     return free;
   }
 
-  bool has_root() const { return root_.rows() > 0 && root_.info() == Eigen::Success; }
-
   /// The step of the limited-memory matrix, no number of it longer than allowed; along the steepest descent where the
-  /// matrix knows nothing or leads uphill. A curvature C = L L^T that is known is unity for the numbers L^T p.
+  /// matrix knows nothing or leads uphill.
   VectorX full_step() const {
     const VectorX free = free_gradient();
-    if (has_root() || !changes_.empty()) {
-      const auto whitened = [&](const VectorX& gradient) {
-        return has_root() ? VectorX(root_.matrixL().solve(gradient)) : gradient;
-      };
+    if (!changes_.empty()) {
       LBFGSpp::BFGSMat<double> matrix;
       matrix.reset(int(n_), int(most_changes));
-      for (const Change& change : changes_)
-        matrix.add_correction(has_root() ? VectorX(root_.matrixU() * change.p) : change.p, whitened(change.gradient));
+      for (const Change& change : changes_) matrix.add_correction(change.p, change.gradient);
       VectorX step;
-      matrix.apply_Hv(whitened(free), -1.0, step);
-      if (has_root()) step = root_.matrixU().solve(step).eval();
+      matrix.apply_Hv(free, -1.0, step);
       step = (free.array() == 0.0).select(0.0, step);
       const double longest = step.cwiseAbs().maxCoeff();
       if (step.dot(free) < 0.0) return std::min(1.0, options_.max_step / longest) * step;
@@ -352,7 +339,6 @@ class LbfgsRun {
   Run& run_;
   const OptimiserOptions& options_;
   Eigen::Index n_;
-  Eigen::LLT<MatrixX> root_;     // of the curvature that is known
   double share_ = 1.0;           // of the full step that is tried next
   double length_ = 0.1;          // of a full step along the steepest descent
   std::vector<Change> changes_;  // of accepted steps, the oldest first

@@ -21,12 +21,8 @@ struct OptimiserOptions {
   double step_tolerance = 1e-3;  ///< stop when no unconstrained number moves more than this, > 0
   double cost_tolerance = 2e-4;  ///< or the cost falls by less than this fraction, > 0; not Nelder-Mead's
   /// Or an undamped Gauss-Newton step promises the cost, a negative log likelihood, to fall by less than this, >= 0:
-  /// the minimum is then sqrt(2 * this) standard deviations away. Levenberg-Marquardt's, and that of L-BFGS where it
-  /// knows a curvature.
+  /// the minimum is then sqrt(2 * this) standard deviations away. Levenberg-Marquardt's alone.
   double promise_tolerance = 0.0;
-  /// Second derivatives of a cost that is nearly the one to be minimised, symmetric and positive definite: L-BFGS
-  /// begins with Newton's step by them. Empty: it knows none.
-  MatrixX curvature = {};
   /// Most that any unconstrained number moves in one iteration (a factor of two), > 0; Nelder-Mead's first simplex has
   /// edges of half of it.
   double max_step = 0.7;

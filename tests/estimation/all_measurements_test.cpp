@@ -26,7 +26,7 @@ using test::tolerance;
 
 constexpr double length = 0.3, edge = 0.05, modulus = 1e5, noise = 5e-4;
 constexpr int frames = 12;
-const OptimiserOptions converged{.step_tolerance = 1e-7, .cost_tolerance = 1e-10};
+constexpr OptimiserOptions converged{.step_tolerance = 1e-7, .cost_tolerance = 1e-10};
 
 /// How stiff the material is that a kind of measurement sees.
 struct Truths {

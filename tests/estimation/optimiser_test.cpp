@@ -395,31 +395,6 @@ TEST(Lbfgs, FollowsALongValleyWhereGradientDescentDoesNotArrive) {
   EXPECT_GT((other.p - minimum).cwiseAbs().maxCoeff(), 1e-2);
 }
 
-/// With the cost's own curvature the first step leads to the minimum; with one that is somewhat off, a few do, where
-/// those that know none need many.
-TEST(Lbfgs, BeginsWithTheCurvatureThatItIsTold) {
-  VectorX minimum(20);
-  for (Eigen::Index i = 0; i < minimum.size(); ++i) minimum[i] = 0.5 * std::sin(double(i));
-  BoundedQuadratic cost = long_valley(minimum);
-  OptimiserOptions options = precise(OptimiserKind::Lbfgs);
-  const int without = minimise(cost, VectorX::Zero(20), options).iterations;
-  const MatrixX H = cost.evaluate(minimum).gauss_newton;
-  options.curvature = H;
-  options.promise_tolerance = 1e-10;
-  const OptimiserSummary exact = minimise(cost, VectorX::Zero(20), options);
-  EXPECT_TRUE(exact.converged) << exact.reason;
-  EXPECT_EQ(exact.iterations, 1);
-  EXPECT_LT((exact.p - minimum).cwiseAbs().maxCoeff(), tolerance(1e-9));
-  const VectorX off = VectorX::LinSpaced(20, 0.8, 1.25);
-  options.curvature = off.asDiagonal() * H * off.asDiagonal();
-  const OptimiserSummary close = minimise(cost, VectorX::Zero(20), options);
-  EXPECT_TRUE(close.converged) << close.reason;
-  EXPECT_LT((close.p - minimum).cwiseAbs().maxCoeff(), 1e-3);
-  EXPECT_LT(3 * close.iterations, without);
-  options.promise_tolerance = 1e6;  // more than there is to gain
-  EXPECT_EQ(minimise(cost, VectorX::Zero(20), options).p, VectorX::Zero(20));
-}
-
 TEST(Lbfgs, ANumberAtItsBoundDoesNotHoldUpTheOthers) {
   VectorX minimum = VectorX::Constant(6, 0.5);
   minimum[2] = 3.0;  // beyond its bound
