@@ -534,6 +534,28 @@ TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
   ASSERT_EQ(finer[0].size(), 2u);
   EXPECT_EQ(only(finer).id.kind, StageKind::Pulls);
   EXPECT_EQ(only(finer).grid.cells, 18.0);
+  facts.repetitions.clear();
+  facts.alternatives = {{"mesh", 0.5, 1.0, {}, false, 0.8},
+                        {"time step", 1.0, 0.5, {}, false, 0.6},
+                        {"law", 0.5, 1.0, {.small_strain = true}, false, 0.5, true},
+                        {"what is given", 0.5, 1.0, {}, true, 1.0}};
+  const auto others = next();
+  ASSERT_EQ(others.size(), 3u) << "the law follows the mesh that it shares, from where that ended";
+  ASSERT_EQ(others[0].size(), 4u);
+  for (const std::size_t i : {0, 2}) {
+    EXPECT_EQ(others[0][i].id.kind, StageKind::Pulls);
+    EXPECT_THAT(others[0][i].free, ElementsAre("pull@1"));
+    EXPECT_EQ(others[0][i].alternative->cause, others[0][i + 1].alternative->cause);
+    EXPECT_THAT(others[0][i + 1].free, testing::Not(testing::Contains("pull@1")));
+    EXPECT_EQ(others[0][i].from.size(), i == 0 ? 1u : 0u) << "the rest from where the stage before ends";
+  }
+  ASSERT_EQ(others[1].size(), 1u) << "another step changes no equilibrium";
+  EXPECT_THAT(others[1][0].free, testing::Not(testing::Contains("pull@1")));
+  EXPECT_THAT(others[2][0].free, testing::Contains("pull@1")) << "what is given is told by all numbers together";
+  for (std::size_t i = 0; i < 2; ++i) has_done(record(others[0][i].id, 1.0, 440.0));
+  const auto law = next();
+  ASSERT_EQ(law[0].size(), 2u);
+  EXPECT_EQ(only(law).from.front()[facts.moduli[0]], 440.0);
 }
 
 TEST_F(Plans, BegunFromAnotherFitLookAgainAtTheLastStage) {
