@@ -207,9 +207,9 @@ StageChain FitPlan::start(int index, const Records& done) const {
     stage.horizon.part = horizons[i];
     stage.band = facts_.options.wide_band, stage.iterations = last ? 10 : 5;
     is_intermediate(stage);
-    // Poisson's ratio is told from the rest only once the fit is close; what holds a released object was found from its
-    // first frames, in units of its stiffness, and takes most of an iteration's time where it is free.
-    stage.free = names([](const Parameter& p) { return !shapes_law(p) && !is_pull(p); });
+    // Poisson's ratio is told from the rest only once the fit is close. What holds a released object is known from its
+    // first swing, in units of its stiffness, and takes most of an iteration's time where it is free.
+    stage.free = names([i](const Parameter& p) { return !shapes_law(p) && (i == 0 || !is_pull(p)); });
     stage.done_from = 0.15 + 0.3 * (last ? 0.4 : 0.0), stage.done_to = stage.done_from + 0.15;
     chain.push_back(std::move(stage));
   }
@@ -262,7 +262,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
     // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
     if (facts_.swings && !is_last)
       for (const std::string& name : names(shapes_law)) std::erase(stage.free, name);
-    if (!is_narrow && !is_last_wide)
+    if (i > 0 && !is_narrow && !is_last_wide)
       for (const std::string& name : names(is_pull)) std::erase(stage.free, name);
     stage.done_from = is_narrow ? 0.6 : 0.45 + share * double(i);
     stage.done_to = is_narrow ? 0.9 : stage.done_from + share;
@@ -325,8 +325,7 @@ StageChain FitPlan::finer(const Records& done) const {
   return {};
 }
 
-/// Those that are left, at the result. What holds a released object is looked for anew, from its first frames, where
-/// mesh or law is another one, and held while the rest follows.
+/// Those that are left, at the result.
 std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
   const StageRecord* at = result(done);
   if (!at) return {};
@@ -339,23 +338,12 @@ std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
     stage.free = free_at_last(done);
     stage.alternative = a;
     stage.done_from = stage.done_to = 1.0;
-    StageChain chain;
-    if (!a.given && !names(is_pull).empty()) {
-      for (const std::string& name : names(is_pull)) std::erase(stage.free, name);
-      if (a.cells != 1.0 || a.change != ModelChange{}) {
-        chain.push_back(pulls(at->theta, stage.grid, -1 - int(i)));
-        chain.back().alternative = a;
-        chain.back().done_from = chain.back().done_to = 1.0;
-      }
-    }
-    chain.push_back(std::move(stage));
-    chain.front().from = {at->theta};
     if (a.beside_the_first) {  // from where that ends
-      chain.front().from.clear();
-      chains.front().insert(chains.front().end(), chain.begin(), chain.end());
-    } else {
-      chains.push_back(std::move(chain));
+      chains.front().push_back(std::move(stage));
+      continue;
     }
+    stage.from = {at->theta};
+    chains.push_back({std::move(stage)});
   }
   std::vector<StageChain> left;
   for (StageChain& chain : chains)

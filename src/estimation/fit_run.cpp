@@ -343,11 +343,9 @@ StageRecord FitRun::find_pulls(const Stage& stage, bool& is_cut) {
   StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
   record.cost = infinite;
   record.succeeded = true;  // without them the next stage looks for them
-  if (not_made_.contains(stage.id.number)) return record;
-  const ModelChange change = stage.alternative ? stage.alternative->change : ModelChange{};
   for (const VectorX& from : stage.from) {
     const ParameterSet pulls = parameters_of(stage, from);
-    Objective objective = objective_of(stage, pulls, grid(stage.grid, change));
+    Objective objective = objective_of(stage, pulls, grid(stage.grid));
     OptimiserOptions o;
     o.max_iterations = stage.iterations;
     const OptimiserSummary s =
