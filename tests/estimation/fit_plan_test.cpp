@@ -553,7 +553,7 @@ TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
   has_done(record(others[0][0].id, 1.0, 440.0));
   const auto law = next();
   ASSERT_EQ(law[0].size(), 1u);
-  EXPECT_EQ(only(law).from.front()[facts.moduli[0]], 440.0);
+  EXPECT_EQ(law[0].front().from.front()[facts.moduli[0]], 440.0);
 }
 
 TEST_F(Plans, BegunFromAnotherFitLookAgainAtTheLastStage) {
