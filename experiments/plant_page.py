@@ -80,7 +80,7 @@ def plant():
             ["10 minutes on two cores", f"{f['wall_seconds']:.0f} s" + (f" on {f['threads']}" if f["threads"] else ""), judged(f["wall_seconds"] <= GOAL_SECONDS)]])
     if poses := figures.get("poses"):
         told = " and ".join(f"{1e3 * row['surface_rms']:.1f} mm with {row['pull_points']}" for row in poses["rows"])
-        text += ("\nWhat stops all of them is the pose from which the plant is let go. It is looked for with pulls at points far from the pot, the default's four or more (`pull_points`): after "
+        text += ("\nWhat stops a fit is, most likely, the pose from which the plant is let go. It is looked for with pulls at points far from the pot, the default's four or more (`pull_points`): after "
                  f"{poses['rows'][0]['iterations']} iterations, of at most 24, the surface lies {told} from the points of the first frame (rms, control points placed), and each iteration gains little. "
                  "Leaves that are 6 mm thick are farther than that from where they were seen, and the nearest surface of a point is most likely another leaf's or the other side's.\n")
     return text + f"\nMeasured on {machine(figures)}.\n"

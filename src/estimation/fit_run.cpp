@@ -45,7 +45,7 @@ int last_frame(const Horizon& horizon, const Recording& r) {
 constexpr double most_cells = 64.0;  // along the object's longest axis
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
-constexpr int few_iterations = 2, several_iterations = 3, many_iterations = 5;
+constexpr int few_iterations = 2, many_iterations = 5;
 constexpr int single_iteration = 1;  // of fully implicit steps, from where the first alternative ends
 constexpr double promise_of_alternative = 0.1, promise_to_trust = 0.5;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
@@ -182,15 +182,10 @@ std::vector<Alternative> FitRun::alternatives() const {
                      size_of_small_strain,
                      has_coarser,
                      has_coarser ? many_iterations : few_iterations});
-    else if (recordings_.are_tetrahedra())
-      all.push_back({"law at large strain",
-                     cells,
-                     1.0,
-                     {.neo_hookean = true},
-                     false,
-                     1.0,
-                     has_coarser,
-                     is_static ? several_iterations : single_iteration});
+    else if (recordings_.are_tetrahedra()) {
+      all.push_back({"law at large strain", cells, 1.0, {.neo_hookean = true}, false, 1.0, has_coarser});
+      if (!is_static) all.back().iterations = single_iteration;
+    }
   }
   all.push_back({"what is given", cells, 1.0, {}, true, 1.0});
   return all;
