@@ -85,7 +85,7 @@ void run(const Arguments& arguments) {
   const ImportFormat& format = import_format(arguments.from, arguments.source);
   const CaptureFacts facts = facts_of(arguments);
   const ImportOptions options = options_of(arguments);
-  Recording recording = format.read(arguments.source, options);
+  ImportedRecording recording = format.read(arguments.source, options);
   if (options.frame_rate) {
     for (DepthStream& stream : recording.depth) stream.times.clear(), stream.frame_rate = *options.frame_rate;
     if (recording.markers) recording.markers->frame_rate = options.frame_rate;

@@ -14,7 +14,7 @@ struct ImportFormat {
   /// Whether a file or folder looks like this format; never throws.
   bool (*recognises)(const std::filesystem::path& source);
   /// Reads what is needed to describe the recording; images are read later. Throws InputError for what cannot be used.
-  Recording (*read)(const std::filesystem::path& source, const ImportOptions& options);
+  ImportedRecording (*read)(const std::filesystem::path& source, const ImportOptions& options);
 };
 
 /// All formats, the more particular ones first.
@@ -27,29 +27,29 @@ const ImportFormat& import_format(const std::string& name, const std::filesystem
 /// @name Readers and recognisers of the formats
 /// @{
 bool is_image_folder(const std::filesystem::path& source);
-Recording read_image_folder(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_image_folder(const std::filesystem::path& source, const ImportOptions& options);
 bool is_redwood_folder(const std::filesystem::path& source);
-Recording read_redwood_folder(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_redwood_folder(const std::filesystem::path& source, const ImportOptions& options);
 bool is_tum_folder(const std::filesystem::path& source);
-Recording read_tum_folder(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_tum_folder(const std::filesystem::path& source, const ImportOptions& options);
 bool is_ros1_bag(const std::filesystem::path& source);
-Recording read_ros1_bag(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_ros1_bag(const std::filesystem::path& source, const ImportOptions& options);
 bool is_ros2_bag(const std::filesystem::path& source);
-Recording read_ros2_bag(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_ros2_bag(const std::filesystem::path& source, const ImportOptions& options);
 bool is_record3d(const std::filesystem::path& source);
-Recording read_record3d(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_record3d(const std::filesystem::path& source, const ImportOptions& options);
 bool is_stray_scanner(const std::filesystem::path& source);
-Recording read_stray_scanner(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_stray_scanner(const std::filesystem::path& source, const ImportOptions& options);
 bool is_c3d(const std::filesystem::path& source);
-Recording read_c3d_markers(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_c3d_markers(const std::filesystem::path& source, const ImportOptions& options);
 bool is_marker_csv(const std::filesystem::path& source);
-Recording read_marker_csv(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_marker_csv(const std::filesystem::path& source, const ImportOptions& options);
 bool is_machine_csv(const std::filesystem::path& source);
-Recording read_machine_csv(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_machine_csv(const std::filesystem::path& source, const ImportOptions& options);
 bool is_matroska(const std::filesystem::path& source);
-Recording read_matroska(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_matroska(const std::filesystem::path& source, const ImportOptions& options);
 bool is_weiss_folder(const std::filesystem::path& source);
-Recording read_weiss_folder(const std::filesystem::path& source, const ImportOptions& options);
+ImportedRecording read_weiss_folder(const std::filesystem::path& source, const ImportOptions& options);
 /// @}
 
 }  // namespace pliant

@@ -80,7 +80,7 @@ void read_trajectory(const fs::path& file, DepthStream& stream) {
   }
 }
 
-Recording read_images(const fs::path& source, const ImportOptions& options, std::optional<double> usual_scale) {
+ImportedRecording read_images(const fs::path& source, const ImportOptions& options, std::optional<double> usual_scale) {
   if (!is_folder(source)) refuse(source, "a file", "a folder with depth images");
   const CameraFile camera = camera_of_folder(source, options);
   const fs::path folder = images_folder(source);
@@ -91,7 +91,7 @@ Recording read_images(const fs::path& source, const ImportOptions& options, std:
                                       : camera.depth_scale ? camera.depth_scale
                                                            : usual_scale;
   if (!scale) ask_for_scale(folder, "neither images nor the camera's file tell it");
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   DepthStream stream = stream_of_files(camera.camera, *scale, files, folder);
   read_times(source, files, camera, stream);
@@ -107,7 +107,7 @@ bool is_image_folder(const fs::path& source) {
   return is_folder(source) && !image_files(images_folder(source)).empty();
 }
 
-Recording read_image_folder(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_image_folder(const fs::path& source, const ImportOptions& options) {
   return read_images(source, options, std::nullopt);
 }
 
@@ -116,7 +116,7 @@ bool is_redwood_folder(const fs::path& source) {
   return is_folder(source / "color") || is_folder(source / "image") || is_folder(source / "rgb");
 }
 
-Recording read_redwood_folder(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_redwood_folder(const fs::path& source, const ImportOptions& options) {
   return read_images(source, options, redwood_scale);
 }
 

@@ -147,8 +147,8 @@ bool is_marker_header(const std::vector<std::string>& cells) {
 
 bool is_c3d(const fs::path& source) { return source.extension() == ".c3d" || source.extension() == ".C3D"; }
 
-Recording read_c3d_markers(const fs::path& source, const ImportOptions& options) {
-  Recording recording;
+ImportedRecording read_c3d_markers(const fs::path& source, const ImportOptions& options) {
+  ImportedRecording recording;
   recording.name = source_name(source);
   recording.markers = read_c3d(source);
   if (options.frame_rate) recording.markers->frame_rate = options.frame_rate;
@@ -165,11 +165,11 @@ bool is_marker_csv(const fs::path& source) {
   }
 }
 
-Recording read_marker_csv(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_marker_csv(const fs::path& source, const ImportOptions& options) {
   const TextTable table = read_table(source);
   if (table.lines.empty() || !is_marker_header(table.lines[0]))
     refuse(source, "a first line that names no markers", "frame,id,x,y,z, or columns NAME_x_m, NAME_y_m, NAME_z_m");
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   recording.markers = is_long_header(table.lines[0]) ? long_markers(table) : wide_markers(table, options);
   if (options.frame_rate) recording.markers->frame_rate = options.frame_rate;

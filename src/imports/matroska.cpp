@@ -201,13 +201,13 @@ class MkvFrames {
 
 bool is_matroska(const fs::path& source) { return source.extension() == ".mkv"; }
 
-Recording read_matroska(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_matroska(const fs::path& source, const ImportOptions& options) {
   require_ffmpeg(source);
   const MkvJson streams = probed(source);
   const MkvJson& track = depth_track(streams, source);
   const int width = track.value("width", 0), height = track.value("height", 0), index = track.value("index", 0);
   if (width < 1 || height < 1) refuse(source, "a depth track without a size", "pictures");
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   DepthStream stream;
   stream.name = "kinect";

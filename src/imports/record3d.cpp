@@ -62,12 +62,12 @@ Image<std::uint16_t> r3d_image(const ZipArchive& archive, int i, const PinholeCa
 
 bool is_record3d(const fs::path& source) { return source.extension() == ".r3d"; }
 
-Recording read_record3d(const fs::path& source, const ImportOptions& /*options*/) {
+ImportedRecording read_record3d(const fs::path& source, const ImportOptions& /*options*/) {
   const auto archive = std::make_shared<const ZipArchive>(source);
   const fs::path place = source.string() + " (metadata)";
   const R3dJson json = R3dJson::parse(archive->read("metadata"), nullptr, false);
   if (json.is_discarded() || !json.is_object()) refuse(place, "no JSON object", "the metadata of Record3D");
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   DepthStream stream;
   stream.name = "iphone";

@@ -43,7 +43,7 @@ struct MachineTest {
 };
 
 /// A recording of another program.
-struct Recording {
+struct ImportedRecording {
   std::string name;                        ///< of the file or the folder
   std::vector<DepthStream> depth;          ///< the first gives the times of the frames
   std::optional<C3dTrajectories> markers;  ///< labels are the ids

@@ -236,7 +236,7 @@ bool is_ros1_bag(const fs::path& source) {
   return begin == bag_magic.substr(0, 8) || source.extension() == ".bag";
 }
 
-Recording read_ros1_bag(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_ros1_bag(const fs::path& source, const ImportOptions& options) {
   return recording_of_bag(open_ros1_bag(source), options);
 }
 

@@ -123,7 +123,7 @@ bool is_ros2_bag(const fs::path& source) {
   return source.extension() == ".db3";
 }
 
-Recording read_ros2_bag(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_ros2_bag(const fs::path& source, const ImportOptions& options) {
   return recording_of_bag(open_ros2_bag(source), options);
 }
 

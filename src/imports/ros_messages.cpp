@@ -288,8 +288,8 @@ DepthStream stream_of_topic(const RosBag& bag, const RosTopic& topic, const Impo
 
 }  // namespace
 
-Recording recording_of_bag(const RosBag& bag, const ImportOptions& options) {
-  Recording recording;
+ImportedRecording recording_of_bag(const RosBag& bag, const ImportOptions& options) {
+  ImportedRecording recording;
   recording.name = source_name(bag.file);
   const std::vector<const RosTopic*> topics = depth_topics(bag, options);
   for (std::size_t i = 0; i < topics.size(); ++i) {

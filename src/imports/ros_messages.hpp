@@ -38,6 +38,6 @@ RosBag open_ros2_bag(const std::filesystem::path& source);
 /// the option Depth Units; others are asked for. Times are those of the images' headers. Throws InputError where there
 /// is none, where several are and `options.topics` chooses none, and for what cannot be used: 8-bit images of depth, an
 /// unknown lens, no camera info.
-Recording recording_of_bag(const RosBag& bag, const ImportOptions& options);
+ImportedRecording recording_of_bag(const RosBag& bag, const ImportOptions& options);
 
 }  // namespace pliant

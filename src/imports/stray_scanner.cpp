@@ -48,12 +48,12 @@ bool is_stray_scanner(const fs::path& source) {
   return is_file(source / "odometry.csv") && is_file(source / "camera_matrix.csv");
 }
 
-Recording read_stray_scanner(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_stray_scanner(const fs::path& source, const ImportOptions& options) {
   const PinholeCamera colour = stray_camera(source / "camera_matrix.csv");
   std::vector<fs::path> files = image_files(source / "depth");
   if (files.empty()) refuse(source / "depth", "no depth image", "PNG files in millimetres");
   const ImageHeader header = read_image_header(files.front());
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   DepthStream stream = stream_of_files(resized(colour, header.width, header.height),
                                        options.depth_scale.value_or(stray_scale), files, source);

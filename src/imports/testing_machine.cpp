@@ -129,12 +129,12 @@ bool is_machine_csv(const fs::path& source) {
   }
 }
 
-Recording read_machine_csv(const fs::path& source, const ImportOptions& /*options*/) {
+ImportedRecording read_machine_csv(const fs::path& source, const ImportOptions& /*options*/) {
   const TextTable table = read_table(source);
   const auto titles = titles_of(table);
   if (!titles)
     refuse(source, "no line of titles above numbers", "columns of extension and load, or of strain and stress");
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   MachineTest test;
   test.name = recording.name;

@@ -34,7 +34,7 @@ void read_tum_poses(const fs::path& file, DepthStream& stream) {
 
 bool is_tum_folder(const fs::path& source) { return is_file(source / "depth.txt"); }
 
-Recording read_tum_folder(const fs::path& source, const ImportOptions& options) {
+ImportedRecording read_tum_folder(const fs::path& source, const ImportOptions& options) {
   const fs::path list = source / "depth.txt";
   std::vector<fs::path> files;
   std::vector<double> times;
@@ -49,7 +49,7 @@ Recording read_tum_folder(const fs::path& source, const ImportOptions& options) 
                                "name the folder that holds depth.txt and depth/"});
   }
   const CameraFile camera = camera_of_folder(source, options);
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   DepthStream stream = stream_of_files(camera.camera, options.depth_scale.value_or(tum_scale), std::move(files), list);
   stream.times = std::move(times);

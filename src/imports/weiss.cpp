@@ -91,7 +91,7 @@ bool is_weiss_folder(const fs::path& source) {
   }
 }
 
-Recording read_weiss_folder(const fs::path& source, const ImportOptions& /*options*/) {
+ImportedRecording read_weiss_folder(const fs::path& source, const ImportOptions& /*options*/) {
   const fs::path file = source / "config.json";
   const WeissJson json = WeissJson::parse(read_file(file), nullptr, false);
   if (json.is_discarded() || !json.is_object()) refuse(file, "no JSON object", "the configuration of a recording");
@@ -99,7 +99,7 @@ Recording read_weiss_folder(const fs::path& source, const ImportOptions& /*optio
   const double duration = weiss_number(json, "duration", file), rate = weiss_number(json, "framerate", file);
   if (!(width >= 2 && height >= 2 && width <= 32768 && height <= 32768 && duration >= 1 && duration <= 1e7 && rate > 0))
     refuse(file, "a size, duration or framerate that is none", "pixels, frames, and frames a second");
-  Recording recording;
+  ImportedRecording recording;
   recording.name = source_name(source);
   const WeissJson cameras = json.value("cameras", WeissJson::array());
   if (!cameras.is_array() || cameras.empty()) refuse(file, "no camera", "`cameras` with a matrix each");

@@ -132,8 +132,8 @@ void write_images(const fs::path& folder, const DepthStream& stream, const std::
   }
 }
 
-void write_depth(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result,
-                 const std::function<void(int, int)>& progress) {
+void write_depth(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
+                 ImportedCapture& result, const std::function<void(int, int)>& progress) {
   const DepthStream& first = recording.depth.front();
   if (first.times.empty() && !(first.frame_rate > 0.0))
     refuse(recording.name, "images without times", "times, or a frame rate", "give --rate, frames a second");
@@ -169,14 +169,14 @@ void write_depth(const fs::path& out, const Recording& recording, const CaptureF
 }
 
 // Where the top of the first image points, in world coordinates.
-Vector3 picture_top(const Recording& recording) {
+Vector3 picture_top(const ImportedRecording& recording) {
   if (recording.depth.empty()) return Vector3::UnitY();
   const DepthStream& first = recording.depth.front();
   return -(first.poses.empty() ? first.camera.camera_to_world : first.poses.front()).rotation.col(1).normalized();
 }
 
-void write_facts(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result,
-                 std::string& comment) {
+void write_facts(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
+                 ImportedCapture& result, std::string& comment) {
   Scene& scene = result.capture.scene;
   if (facts.mass && facts.density)
     refuse(recording.name, "both a mass and a density", "one of the two", "keep what was measured");
@@ -208,7 +208,7 @@ void write_facts(const fs::path& out, const Recording& recording, const CaptureF
         " ([[plane]]) or is held by ([[fixed]])";
 }
 
-void write_markers(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+void write_markers(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
                    ImportedCapture& result) {
   const C3dTrajectories& all = *recording.markers;
   if (!all.frame_rate)
@@ -290,7 +290,7 @@ double greatest_of(const std::vector<double>& values, const std::string& name) {
   return greatest;
 }
 
-void write_indentation(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+void write_indentation(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
                        ImportedCapture& result) {
   const MachineTest& test = *recording.test;
   if (!facts.contact || !facts.surface)
@@ -318,7 +318,7 @@ void write_indentation(const fs::path& out, const Recording& recording, const Ca
   result.notes.push_back("depths count from the machine's zero: it must be where the probe touches the object");
 }
 
-void write_material_curve(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+void write_material_curve(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
                           ImportedCapture& result) {
   const MachineTest& test = *recording.test;
   const bool has_size = facts.length && facts.area;
@@ -347,7 +347,8 @@ void write_material_curve(const fs::path& out, const Recording& recording, const
   result.capture.material_curves.push_back(material);
 }
 
-void write_test(const fs::path& out, const Recording& recording, const CaptureFacts& facts, ImportedCapture& result) {
+void write_test(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
+                ImportedCapture& result) {
   if (facts.probe)
     write_indentation(out, recording, facts, result);
   else
@@ -360,7 +361,7 @@ void write_test(const fs::path& out, const Recording& recording, const CaptureFa
 
 }  // namespace
 
-ImportedCapture write_recording(const fs::path& out, const Recording& recording, const CaptureFacts& facts,
+ImportedCapture write_recording(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
                                 const std::function<void(int, int)>& progress) {
   const fs::path folder = (fs::absolute(out) / "").lexically_normal().parent_path();
   if (is_file(folder / "capture.toml"))

@@ -42,7 +42,7 @@ struct ImportedCapture {
 /// @param progress  called with the number of images written and their total; may be empty, and may throw
 /// Throws InputError for a folder that holds a capture already, facts that contradict each other, images that do not
 /// exist, and whatever the recording's images do.
-ImportedCapture write_recording(const std::filesystem::path& out, const Recording& recording, const CaptureFacts& facts,
-                                const std::function<void(int, int)>& progress = {});
+ImportedCapture write_recording(const std::filesystem::path& out, const ImportedRecording& recording,
+                                const CaptureFacts& facts, const std::function<void(int, int)>& progress = {});
 
 }  // namespace pliant

@@ -190,8 +190,8 @@ class Reader {
   }
 
   /// Of Ogden's law; what is not written is that of `otherwise`.
-  LawNumbers read_law_numbers(TomlTable& t, LawNumbers otherwise) {
-    LawNumbers& numbers = otherwise;
+  SyntheticNumbers read_law_numbers(TomlTable& t, SyntheticNumbers otherwise) {
+    SyntheticNumbers& numbers = otherwise;
     using List = std::vector<double>;
     for (const auto& [key, list] : {std::pair<const char*, List*>{"exponents", &numbers.exponents},
                                     {"stiffness_ratios", &numbers.stiffness_ratios},
@@ -236,7 +236,7 @@ class Reader {
       scene_.law_numbers = own_numbers_;
       if (!has_own) scene_.law_numbers.resize(1);
       if (has_own && has_controls_) scene_.law_numbers.erase(scene_.law_numbers.begin());
-      for (const LawNumbers& numbers : scene_.law_numbers)
+      for (const SyntheticNumbers& numbers : scene_.law_numbers)
         if (numbers.exponents.size() != std::size_t(form.terms) || numbers.poissons_ratios.empty() == form.own_ratios)
           context_.reject("material", "laws of different forms", "as many terms everywhere",
                           "give each region as many `exponents` as [material]");
@@ -298,7 +298,7 @@ class Reader {
 
   void read_part_modulus(TomlTable& block) {
     scene_.part_moduli.push_back(read_number(block, "youngs_modulus", positive("in pascals")));
-    LawNumbers numbers = own_numbers_.empty() ? LawNumbers{} : own_numbers_.front();
+    SyntheticNumbers numbers = own_numbers_.empty() ? SyntheticNumbers{} : own_numbers_.front();
     bool has_own = false;
     for (const char* key : {"poissons_ratio", "exponents", "stiffness_ratios", "poissons_ratios"})
       has_own = has_own || block.has(key);
@@ -598,8 +598,8 @@ class Reader {
   SyntheticScene scene_;
   bool has_controls_ = false, has_tests_ = false, has_element_ = false;
   std::string law_name_ = "linear";
-  std::vector<LawNumbers> own_numbers_;  // of the object's own material, then of each region or control point
-  std::vector<bool> part_has_own_;       // of each of the latter
+  std::vector<SyntheticNumbers> own_numbers_;  // of the object's own material, then of each region or control point
+  std::vector<bool> part_has_own_;             // of each of the latter
 };
 
 }  // namespace
@@ -633,7 +633,7 @@ VectorX SyntheticScene::law_parameters(const LawLayout& layout) const {
   const std::vector<double> moduli = youngs_moduli();
   for (std::size_t k = 0; k < moduli.size(); ++k) theta[layout.modulus(int(k))] = moduli[k];
   for (int l = 0; l < layout.form().laws; ++l) {
-    const LawNumbers numbers = law ? law_numbers[std::size_t(l)] : LawNumbers{poissons_ratio, {}, {}, {}};
+    const SyntheticNumbers numbers = law ? law_numbers[std::size_t(l)] : SyntheticNumbers{poissons_ratio, {}, {}, {}};
     theta[layout.poissons_ratio(0, l)] = numbers.poissons_ratio;
     for (int i = 0; i < layout.form().terms; ++i) {
       theta[layout.exponent(i, l)] = numbers.exponents[std::size_t(i)];

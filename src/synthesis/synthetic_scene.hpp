@@ -14,7 +14,7 @@
 namespace pliant {
 
 /// What a part of the object is made of, beside its Young's modulus.
-struct LawNumbers {
+struct SyntheticNumbers {
   double poissons_ratio = 0.0;
   std::vector<double> exponents;         ///< of Ogden's law, one a term
   std::vector<double> stiffness_ratios;  ///< of each further term, mu_i / mu_1
@@ -68,7 +68,7 @@ struct SyntheticScene {
   bool is_rayleigh = false;        ///< stiffness damping is Rayleigh's, not Kelvin and Voigt's
   /// Form of a law of its own, of tetrahedra; nothing: linear elasticity.
   std::optional<LawForm> law;
-  std::vector<LawNumbers> law_numbers;  ///< of each law of the form
+  std::vector<SyntheticNumbers> law_numbers;  ///< of each law of the form
 
   ElementKind element = ElementKind::Hexahedron;
   double cell_size = 0.0;  ///< [m]

@@ -25,7 +25,7 @@ TEST(ImageFolder, BecomesACaptureWithItsPixelsTimesAndCamera) {
   folder.write("in/camera.json", plain_camera);
   ImportOptions options;
   options.depth_scale = 1000.0;
-  Recording recording = import_format("", folder / "in").read(folder / "in", options);
+  ImportedRecording recording = import_format("", folder / "in").read(folder / "in", options);
   recording.depth.front().frame_rate = 50.0;
   CaptureFacts facts;
   facts.up = Vector3(0, -2, 0), facts.first = 2, facts.last = 10, facts.every = 4;
@@ -127,7 +127,7 @@ TEST(RedwoodFolder, TakesMillimetresTimesInNamesAndATrajectoryThatStands) {
     log += std::to_string(i) + " " + std::to_string(i) + " 3\n0 -1 0 0.5\n1 0 0 0\n0 0 1 0.001\n0 0 0 1\n";
   folder.write("in/trajectory.log", log);
   EXPECT_EQ(import_format("", folder / "in").name, "redwood");
-  Recording recording = read_redwood_folder(folder / "in", {});
+  ImportedRecording recording = read_redwood_folder(folder / "in", {});
   EXPECT_NEAR(recording.depth.front().times[0], 0.033360, 1e-9);
   recording.depth.front().times = {0.0, 0.1, 0.25};
   (void)write_recording(folder / "out", recording, {});
@@ -181,7 +181,7 @@ TEST(ImageFolder, PicturesBesideDepthAreLeftAlone) {
   folder.write("camera.json", plain_camera);
   ImportOptions options;
   options.depth_scale = 1000.0;
-  const Recording recording = read_image_folder(folder.path(), options);
+  const ImportedRecording recording = read_image_folder(folder.path(), options);
   ASSERT_EQ(recording.depth.front().image_count, 3);
   EXPECT_EQ(recording.depth.front().read(2).pixels, ramp_image(24, 18, 2).pixels);
 }
@@ -195,7 +195,7 @@ TEST(ImageFolder, ReadsImagesOfARealSensor) {
   folder.write("in/camera.json", R"({"width":640,"height":480,"fx":518,"fy":519,"cx":325.5,"cy":253.5})");
   ImportOptions options;
   options.depth_scale = 1000.0;
-  Recording recording = read_image_folder(folder / "in", options);
+  ImportedRecording recording = read_image_folder(folder / "in", options);
   recording.depth.front().frame_rate = 30.0;
   (void)write_recording(folder / "out", recording, {});
   const Capture capture = read_capture(folder / "out");

@@ -27,8 +27,8 @@ DepthStream stream(const std::string& name, std::vector<double> times) {
   return result;
 }
 
-Recording recording_of(std::vector<DepthStream> streams) {
-  Recording recording;
+ImportedRecording recording_of(std::vector<DepthStream> streams) {
+  ImportedRecording recording;
   recording.name = "made here";
   recording.depth = std::move(streams);
   return recording;
@@ -37,7 +37,7 @@ Recording recording_of(std::vector<DepthStream> streams) {
 TEST(WriteRecording, GivesEachSensorsNearestImageAndItsOffset) {
   const TemporaryFolder folder;
   // The second sensor began two images earlier, and is 4 ms late.
-  const Recording recording = recording_of(
+  const ImportedRecording recording = recording_of(
       {stream("left", {10.0, 10.1, 10.2, 10.3}), stream("right/up", {9.804, 9.904, 10.004, 10.104, 10.204, 10.304})});
   const ImportedCapture written = write_recording(folder / "out", recording, {});
   EXPECT_EQ(written.notes.size(), 1u);  // up
@@ -86,7 +86,7 @@ TEST(WriteRecording, TakesTheScanAlongAndRefusesContradictions) {
   write_mesh(folder / "scan.ply", box_mesh({-0.2, -0.2, 0.5}, {0.2, 0.2, 0.9}));
   CaptureFacts facts;
   facts.surface = folder / "scan.ply", facts.mass = 0.5, facts.density = 100.0;
-  const Recording recording = recording_of({stream("a", {0.0, 0.1})});
+  const ImportedRecording recording = recording_of({stream("a", {0.0, 0.1})});
   EXPECT_THAT(complaint_of([&] { (void)write_recording(folder / "out", recording, facts); }), HasSubstr("both a mass"));
   facts.mass.reset(), facts.last = 2;
   EXPECT_THAT(complaint_of([&] { (void)write_recording(folder / "out", recording, facts); }), HasSubstr("0 to 1"));
