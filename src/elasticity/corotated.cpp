@@ -31,7 +31,7 @@ class CorotatedElasticity : public Elasticity {
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
   void set_reference(std::shared_ptr<const Body> body) override;
   void linearise_reference(const Points& z) override;
-  void add_reference_tangent(const Points& d_reference, Points& force) override;
+  void add_reference_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) override;
   void add_reference_adjoint(const Points& w, Points& reference_bar) override;
   double energy(const Points& z) const override;
   Matrix3 cauchy_stress(int element) const override;
@@ -158,8 +158,9 @@ void CorotatedElasticity<N>::linearise_reference(const Points& z) {
 }
 
 template <int N>
-void CorotatedElasticity<N>::add_reference_tangent(const Points& d_reference, Points& force) {
-  if (by_reference_) by_reference_->add_tangent(d_reference, force);
+void CorotatedElasticity<N>::add_reference_tangents(std::span<const Points* const> d_references,
+                                                    std::span<Points* const> forces) {
+  if (by_reference_) by_reference_->add_tangents(d_references, forces);
 }
 
 template <int N>
@@ -323,7 +324,7 @@ void CorotatedElasticity<N>::add_force_tangents(const Points& z, const ForceChan
   for (int e = 0; e < count(); ++e) {
     const int* nodes = nodes_of(e);
     const auto g = gradients(e);
-    const Matrix3 &R = polar_[e].R, &rate = polar_[e].rate_inverse;
+    const Matrix3& R = polar_[e].R;
     const double E = modulus_[e];
     const auto& [q, d, y] = strained_[std::size_t(e)];
     Vector by_nu = Vector::Zero();
@@ -341,16 +342,7 @@ void CorotatedElasticity<N>::add_force_tangents(const Points& z, const ForceChan
       gather_lanes<N>(nodes, changes.lag.subspan(first, used), false, lag);
       gather_lanes<N>(nodes, changes.z.subspan(first, used), true, f);
       const MatrixLanes dF = mean_gradient_lanes<N>(g, lag);
-      // w = rate vee(R^T dF - dF^T R)
-      MatrixLanes A;
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j) {
-          const auto c = Eigen::Index(i);
-          A[3 * i + j] = R(0, c) * dF[j] + R(1, c) * dF[3 + j] + R(2, c) * dF[6 + j];
-        }
-      const Wide<double> skew[3] = {A[7] - A[5], A[2] - A[6], A[3] - A[1]};
-      Wide<double> w[3];
-      for (int i = 0; i < 3; ++i) w[i] = rate(i, 0) * skew[0] + rate(i, 1) * skew[1] + rate(i, 2) * skew[2];
+      const std::array<Wide<double>, 3> w = rotation_rate_lanes(polar_[e], dF);
       // dd = R^T dz - w x q
       for (std::size_t a = 0; a < N; ++a) {
         const double* qa = q.data() + 3 * a;

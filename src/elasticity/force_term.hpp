@@ -77,7 +77,7 @@ class ForceTerm {
   virtual void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) { (void)z, (void)d_theta; }
   /// The same as `add_force_tangent` along several directions at once, each into its own force: elements whose
   /// stiffness is large read it once for all. Once it was made ready, threads may call it side by side, each for
-  /// directions of its own, and `add_start_tangent` and `add_reference_tangent` with it.
+  /// directions of its own, and `add_start_tangent` and `add_reference_tangents` with it.
   /// @param forces  n x 3 each [N], as many as directions
   virtual void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) {
     VectorX direction;
@@ -109,8 +109,18 @@ class ForceTerm {
   /// Makes ready for the two products below, about the lag point and z. Most terms do not depend on the
   /// stress-free reference.
   virtual void linearise_reference(const Points& z) { (void)z; }
-  /// force += df for a change of the stress-free reference positions, p, z and theta staying as they are.
-  virtual void add_reference_tangent(const Points& d_reference, Points& force) { (void)d_reference, (void)force; }
+  /// force += df for a change of the stress-free reference positions, p, z and theta staying as they are, along
+  /// several directions at once, each into its own force.
+  /// @param d_references  n x 3 each [m], as many as forces [N]
+  virtual void add_reference_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) {
+    (void)d_references, (void)forces;
+  }
+  /// The same along one direction.
+  void add_reference_tangent(const Points& d_reference, Points& force) {
+    const Points* along = &d_reference;
+    Points* into = &force;
+    add_reference_tangents({&along, 1}, {&into, 1});
+  }
   /// Adds the cotangent of the reference positions for the cotangent `w` of f.
   virtual void add_reference_adjoint(const Points& w, Points& reference_bar) { (void)w, (void)reference_bar; }
 };

@@ -72,7 +72,7 @@ class TetLawElasticity : public LawElasticity {
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
   void set_reference(std::shared_ptr<const Body> body) override;
   void linearise_reference(const Points& z) override { reference_z_ = z; }
-  void add_reference_tangent(const Points& d_reference, Points& force) override;
+  void add_reference_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) override;
   void add_reference_adjoint(const Points& w, Points& reference_bar) override;
   double energy(const Points& z) const override;
 
@@ -536,14 +536,17 @@ void TetLawElasticity<N>::add_force_adjoint(const Points& z, const Points& w, Po
 
 /// With G = sum_b dX_b g_b^T: volumes change by tr(G), deformations by -F G and gradients by -G^T g.
 template <int N>
-void TetLawElasticity<N>::add_reference_tangent(const Points& d_reference, Points& force) {
+void TetLawElasticity<N>::add_reference_tangents(std::span<const Points* const> d_references,
+                                                 std::span<Points* const> forces) {
   const std::vector<PointChange>& all = changes(reference_z_, false);
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
       const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       const Matrix3 F_z = deformation(e, point.gradient, reference_z_);
-      subtract(e, point, reference_change(point, all[p], F_z, deformation(e, point.gradient, d_reference)), force);
+      for (std::size_t c = 0; c < forces.size(); ++c)
+        subtract(e, point, reference_change(point, all[p], F_z, deformation(e, point.gradient, *d_references[c])),
+                 *forces[c]);
     }
 }
 

@@ -62,7 +62,7 @@ class LawElasticity : public Elasticity {
   /// Smallest ratio of a quadrature point's volume to that in the body as it was given.
   virtual double least_volume_ratio() const = 0;
   /// matrix += scale times the derivative of the force by where the nodes are stress-free, p, z and theta staying as
-  /// they are: what `add_reference_tangent` multiplies by. Not symmetric.
+  /// they are: what `add_reference_tangents` multiplies by. Not symmetric.
   virtual void add_reference_matrix(double scale, BlockMatrix& matrix) = 0;
 
  protected:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
+#include "elasticity/polar.hpp"
 #include "solvers/wide.hpp"
 
 namespace pliant {
@@ -65,6 +66,24 @@ MatrixLanes mean_gradient_lanes(const Gradients& g, const ElementLanes<N>& x) {
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j) F[3 * i + j] += x[3 * a + i] * g(Eigen::Index(a), Eigen::Index(j));
   return F;
+}
+
+/// `rotation_rate` of four changes of F: w = (tr(S) I - S)^-1 vee(R^T dF - dF^T R).
+inline std::array<Wide<double>, 3> rotation_rate_lanes(const Polar& polar, const MatrixLanes& dF) {
+  const Matrix3 &R = polar.R, &rate = polar.rate_inverse;
+  MatrixLanes A;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) {
+      const auto c = Eigen::Index(i);
+      A[3 * i + j] = R(0, c) * dF[j] + R(1, c) * dF[3 + j] + R(2, c) * dF[6 + j];
+    }
+  const Wide<double> skew[3] = {A[7] - A[5], A[2] - A[6], A[3] - A[1]};
+  std::array<Wide<double>, 3> w;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto r = Eigen::Index(i);
+    w[i] = rate(r, 0) * skew[0] + rate(r, 1) * skew[1] + rate(r, 2) * skew[2];
+  }
+  return w;
 }
 
 /// Mean over an element of N nodes of the gradient of a field that its nodes carry.

@@ -23,8 +23,8 @@ class LawReferenceForces : public ReferenceForces {
   void add_matrix(double scale, BlockMatrix& matrix) const override {
     elasticity_->add_reference_matrix(scale, matrix);
   }
-  void add_tangent(const Points& d_reference, Points& force) const override {
-    elasticity_->add_reference_tangent(d_reference, force);
+  void add_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) const override {
+    elasticity_->add_reference_tangents(d_references, forces);
   }
   void add_adjoint(const Points& w, Points& reference_bar) const override {
     elasticity_->add_reference_adjoint(w, reference_bar);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "elasticity/local_stiffness.hpp"
 #include "mesh/tet_shape.hpp"
 
 namespace pliant {
@@ -20,23 +21,24 @@ class TetReferenceForces : public ReferenceForces {
   bool linearise(const Points& X, const Points& p, const Points& z) override;
   void add_force(Points& force) const override;
   void add_matrix(double scale, BlockMatrix& matrix) const override;
-  void add_tangent(const Points& d_reference, Points& force) const override;
+  void add_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) const override;
   void add_adjoint(const Points& w, Points& reference_bar) const override;
   const Matrix3& rotation(int e) const override { return elements_[std::size_t(e)].polar.R; }
   double least_volume_ratio() const override { return least_volume_ratio_; }
 
  private:
   using Nodes = Eigen::Matrix<double, N, 3>;
-  using ByNode = Eigen::Matrix<double, 3, N>;
   static constexpr int points = N == 4 ? 1 : 14;
 
   struct Element {
     double volume = 0.0;
     Polar polar;
-    std::array<double, points> part;       // of the volume
-    std::array<Nodes, points> gradient;    // of the shape functions
-    std::array<Matrix3, points> F, lag_F;  // of z, of p
-    std::array<Matrix3, points> stress;    // E C : (R^T F - I), in the element's own frame
+    std::array<double, points> part;     // of the volume
+    std::array<Nodes, points> gradient;  // of the shape functions
+    std::array<Matrix3, points> F;       // of z, in the element's own frame: R^T F
+    std::array<Matrix3, points> lag_F;   // of p
+    Matrix3 mean;                        // of those, times the volume
+    std::array<Matrix3, points> stress;  // E C : (R^T F - I), in the element's own frame
   };
 
   const int* nodes_of(int e) const { return body_->connectivity.data() + std::size_t(e) * N; }
@@ -50,8 +52,8 @@ class TetReferenceForces : public ReferenceForces {
     sigma.diagonal().array() += lame_.lambda * H.trace();
     return modulus_[e] * sigma;
   }
-  /// Change of the forces for a change of the element's nodes X; column a is that of node a.
-  ByNode tangent(int e, const Nodes& d_reference) const;
+  /// Changes of the forces for four changes of the element's nodes X, lane by lane.
+  void tangent(int e, const ElementLanes<N>& d_reference, ElementLanes<N>& change) const;
 
   std::shared_ptr<const Body> body_;
   ParameterHandle poissons_ratio_;
@@ -94,7 +96,7 @@ bool TetReferenceForces<N>::linearise(const Points& X, const Points& p, const Po
   for (int e = 0; e < body_->element_count(); ++e) {
     Element& element = elements_[std::size_t(e)];
     const Nodes own = of_element(e, X), lagging = of_element(e, p), moved = of_element(e, z);
-    Matrix3 sum = Matrix3::Zero();
+    element.mean.setZero();
     element.volume = 0.0;
     for (int q = 0; q < points; ++q) {
       const auto i = std::size_t(q);
@@ -106,13 +108,14 @@ bool TetReferenceForces<N>::linearise(const Points& X, const Points& p, const Po
       element.F[i].noalias() = moved.transpose() * element.gradient[i];
       element.lag_F[i].noalias() = lagging.transpose() * element.gradient[i];
       element.volume += element.part[i];
-      sum += element.part[i] * element.lag_F[i];
+      element.mean += element.part[i] * element.lag_F[i];
     }
     if (!(least_volume_ratio_ > 0.0)) return false;
-    element.polar = polar_decomposition(sum / element.volume, element.polar.quaternion);
+    element.polar = polar_decomposition(element.mean / element.volume, element.polar.quaternion);
     for (int q = 0; q < points; ++q) {
       const auto i = std::size_t(q);
-      element.stress[i] = stress(e, element.polar.R.transpose() * element.F[i] - Matrix3::Identity());
+      element.F[i] = element.polar.R.transpose() * element.F[i];
+      element.stress[i] = stress(e, element.F[i] - Matrix3::Identity());
     }
   }
   return true;
@@ -129,54 +132,111 @@ void TetReferenceForces<N>::add_force(Points& force) const {
   }
 }
 
-/// With G = sum_b dX_b g_b^T: volumes change by tr(G), F by -F G, g by -G^T g, and R by R [w]x.
+/// With G = sum_b dX_b g_b^T: volumes change by tr(G), F by -F G, g by -G^T g, and R by R [w]x. Entry (i, j) of a
+/// matrix of lanes is in [3 i + j].
 template <int N>
-auto TetReferenceForces<N>::tangent(int e, const Nodes& d_reference) const -> ByNode {
+void TetReferenceForces<N>::tangent(int e, const ElementLanes<N>& d_reference, ElementLanes<N>& change) const {
   const Element& element = elements_[std::size_t(e)];
-  std::array<Matrix3, points> G;
-  Matrix3 mean = Matrix3::Zero(), d_mean = Matrix3::Zero();
-  double d_volume = 0.0;
+  const double lambda = modulus_[e] * lame_.lambda, mu = modulus_[e] * lame_.mu;
+  std::array<MatrixLanes, points> G;
+  MatrixLanes d_mean{};
+  Wide<double> d_volume{};
   for (std::size_t q = 0; q < points; ++q) {
-    G[q].noalias() = d_reference.transpose() * element.gradient[q];
-    const double growth = G[q].trace();
-    mean += element.part[q] * element.lag_F[q];
-    d_mean += element.part[q] * (growth * element.lag_F[q] - element.lag_F[q] * G[q]);
-    d_volume += element.part[q] * growth;
+    G[q] = mean_gradient_lanes<N>(element.gradient[q], d_reference);
+    const Wide<double> growth = element.part[q] * (G[q][0] + G[q][4] + G[q][8]);
+    const Matrix3& F = element.lag_F[q];
+    for (int i = 0; i < 3; ++i) {
+      const double row[3] = {element.part[q] * F(i, 0), element.part[q] * F(i, 1), element.part[q] * F(i, 2)};
+      for (int j = 0; j < 3; ++j)
+        d_mean[std::size_t(3 * i + j)] +=
+            growth * F(i, j) -
+            (row[0] * G[q][std::size_t(j)] + row[1] * G[q][std::size_t(3 + j)] + row[2] * G[q][std::size_t(6 + j)]);
+    }
+    d_volume += growth;
   }
-  d_mean = (d_mean - mean * (d_volume / element.volume)) / element.volume;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      Wide<double>& entry = d_mean[std::size_t(3 * i + j)];
+      entry = (entry - (element.mean(i, j) / element.volume) * d_volume) * (1.0 / element.volume);
+    }
+  const std::array<Wide<double>, 3> w = rotation_rate_lanes(element.polar, d_mean);
+  // Entry (i, j) of [w]x M.
+  const auto turned = [&w](const Matrix3& M, int i, int j) {
+    const int k = (i + 1) % 3, l = (i + 2) % 3;
+    return w[std::size_t(k)] * M(l, j) - w[std::size_t(l)] * M(k, j);
+  };
+  change.fill(Wide<double>{});
+  for (std::size_t q = 0; q < points; ++q) {
+    const Matrix3 &F = element.F[q], &sigma = element.stress[q];
+    const MatrixLanes& own = G[q];
+    const Wide<double> growth = own[0] + own[4] + own[8];
+    MatrixLanes loss;  // of R^T F
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        loss[std::size_t(3 * i + j)] = turned(F, i, j) + F(i, 0) * own[std::size_t(j)] +
+                                       F(i, 1) * own[std::size_t(3 + j)] + F(i, 2) * own[std::size_t(6 + j)];
+    const Wide<double> pressure = lambda * (loss[0] + loss[4] + loss[8]);
+    MatrixLanes T;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const auto at = std::size_t(3 * i + j), across = std::size_t(3 * j + i), row = std::size_t(3 * j);
+        T[at] = turned(sigma, i, j) + growth * sigma(i, j) - mu * (loss[at] + loss[across]) -
+                (sigma(i, 0) * own[row] + sigma(i, 1) * own[row + 1] + sigma(i, 2) * own[row + 2]);
+        if (i == j) T[at] -= pressure;
+        T[at] *= element.part[q];
+      }
+    const Nodes& g = element.gradient[q];
+    for (std::size_t a = 0; a < N; ++a) {
+      const auto row = Eigen::Index(a);
+      for (std::size_t i = 0; i < 3; ++i)
+        change[3 * a + i] -= T[3 * i] * g(row, 0) + T[3 * i + 1] * g(row, 1) + T[3 * i + 2] * g(row, 2);
+    }
+  }
   const Matrix3& R = element.polar.R;
-  const Matrix3 W = cross_matrix(rotation_rate(element.polar, d_mean));
-  ByNode change = ByNode::Zero();
-  for (std::size_t q = 0; q < points; ++q) {
-    const Matrix3 Q = R.transpose() * element.F[q];
-    const Matrix3& sigma = element.stress[q];
-    const Matrix3 d_sigma = stress(e, -W * Q - Q * G[q]);
-    change.noalias() -= element.part[q] * (W * sigma + G[q].trace() * sigma + d_sigma - sigma * G[q].transpose()) *
-                        element.gradient[q].transpose();
+  for (std::size_t a = 0; a < N; ++a) {
+    const Wide<double> local[3] = {change[3 * a], change[3 * a + 1], change[3 * a + 2]};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto r = Eigen::Index(i);
+      change[3 * a + i] = R(r, 0) * local[0] + R(r, 1) * local[1] + R(r, 2) * local[2];
+    }
   }
-  return R * change;
 }
 
+/// Column by column, four at a time.
 template <int N>
 void TetReferenceForces<N>::add_matrix(double scale, BlockMatrix& matrix) const {
+  constexpr std::size_t lanes = 4;
+  ElementLanes<N> unit, columns;
   for (int e = 0; e < body_->element_count(); ++e) {
     const int* blocks = body_->blocks->data() + std::size_t(e) * (N * N);
-    for (int b = 0; b < N; ++b)
-      for (int i = 0; i < 3; ++i) {
-        Nodes unit = Nodes::Zero();
-        unit(b, i) = 1.0;
-        const ByNode column = scale * tangent(e, unit);
-        for (int a = 0; a < N; ++a) Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).col(i) += column.col(a);
+    for (std::size_t first = 0; first < 3 * N; first += lanes) {
+      const std::size_t used = std::min(lanes, 3 * N - first);
+      unit.fill(Wide<double>{});
+      for (std::size_t l = 0; l < used; ++l) unit[first + l][l] = scale;
+      tangent(e, unit, columns);
+      for (std::size_t l = 0; l < used; ++l) {
+        const int b = int((first + l) / 3), i = int((first + l) % 3);
+        for (int a = 0; a < N; ++a)
+          for (int k = 0; k < 3; ++k) matrix.block(blocks[N * a + b])[3 * i + k] += columns[std::size_t(3 * a + k)][l];
       }
+    }
   }
 }
 
 template <int N>
-void TetReferenceForces<N>::add_tangent(const Points& d_reference, Points& force) const {
-  for (int e = 0; e < body_->element_count(); ++e) {
-    const ByNode change = tangent(e, of_element(e, d_reference));
-    for (int a = 0; a < N; ++a) force.row(nodes_of(e)[a]) += change.col(a).transpose();
-  }
+void TetReferenceForces<N>::add_tangents(std::span<const Points* const> d_references,
+                                         std::span<Points* const> forces) const {
+  constexpr std::size_t lanes = 4;
+  ElementLanes<N> d_reference, change;
+  for (int e = 0; e < body_->element_count() && !forces.empty(); ++e)
+    for (std::size_t first = 0; first < forces.size(); first += lanes) {
+      const std::size_t used = std::min(lanes, forces.size() - first);
+      gather_lanes<N>(nodes_of(e), d_references.subspan(first, used), false, d_reference);
+      tangent(e, d_reference, change);
+      for (std::size_t l = 0; l < used; ++l)
+        for (int a = 0; a < N; ++a)
+          for (int i = 0; i < 3; ++i) (*forces[first + l])(nodes_of(e)[a], i) += change[std::size_t(3 * a + i)][l];
+    }
 }
 
 /// The transpose of `tangent`, line by line.
@@ -188,10 +248,8 @@ void TetReferenceForces<N>::add_adjoint(const Points& w, Points& reference_bar) 
     const Nodes c = of_element(e, w) * R;  // rows are R^T w_a
     Vector3 w_bar = Vector3::Zero();
     std::array<Matrix3, points> G_bar;
-    Matrix3 mean = Matrix3::Zero();
     for (std::size_t q = 0; q < points; ++q) {
-      const Matrix3 Q = R.transpose() * element.F[q];
-      const Matrix3& sigma = element.stress[q];
+      const Matrix3 &Q = element.F[q], &sigma = element.stress[q];
       // change = -V T g, so T's cotangent is -V c^T g; that of d_sigma passes through the symmetric map C.
       const Matrix3 T_bar = -element.part[q] * c.transpose() * element.gradient[q];
       const Matrix3 H_bar = stress(e, T_bar);
@@ -199,10 +257,9 @@ void TetReferenceForces<N>::add_adjoint(const Points& w, Points& reference_bar) 
       w_bar += Vector3(W_bar(2, 1) - W_bar(1, 2), W_bar(0, 2) - W_bar(2, 0), W_bar(1, 0) - W_bar(0, 1));
       G_bar[q] =
           T_bar.cwiseProduct(sigma).sum() * Matrix3::Identity() - Q.transpose() * H_bar - T_bar.transpose() * sigma;
-      mean += element.part[q] * element.lag_F[q];
     }
     const Matrix3 mean_bar = rotation_rate_adjoint(element.polar, w_bar) / element.volume;
-    const double volume_bar = -mean_bar.cwiseProduct(mean).sum() / element.volume;
+    const double volume_bar = -mean_bar.cwiseProduct(element.mean).sum() / element.volume;
     for (std::size_t q = 0; q < points; ++q) {
       const double growth_bar = element.part[q] * (mean_bar.cwiseProduct(element.lag_F[q]).sum() + volume_bar);
       G_bar[q] += growth_bar * Matrix3::Identity() - element.part[q] * element.lag_F[q].transpose() * mean_bar;

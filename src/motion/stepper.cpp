@@ -278,6 +278,11 @@ void Stepper::find_changes_of_force(const State& start, const Points& delta, con
     for (const auto lag : all_lags) d_lag_[std::size_t(lag)][c] = change.x + s.prediction[std::size_t(lag)] * change.v;
     d_force_[c].setZero();
   }
+  std::array<const Points*, directions_together> along{};  // those that move the reference: pulls and dampings do not
+  std::array<Points*, directions_together> into{};
+  std::size_t moved = 0;
+  for (std::size_t c = first; c < first + count && !d_reference.empty(); ++c)
+    if (!d_reference[c].isZero(0.0)) along[moved] = &d_reference[c], into[moved++] = &d_force_[c];
   for (auto& term : terms_) {
     const bool blended = term->at() == ForceTerm::At::Blended, way_alone = term->sees_way_alone();
     const std::vector<Points>& lag = d_lag_[std::size_t(term->lag())];
@@ -292,8 +297,7 @@ void Stepper::find_changes_of_force(const State& start, const Points& delta, con
                               d_theta.middleCols(Eigen::Index(first), Eigen::Index(count)),
                               Eigen::Index(first)},
                              forces);
-    for (std::size_t c = first; c < first + count && !d_reference.empty(); ++c)  // pulls and dampings leave it be
-      if (!d_reference[c].isZero(0.0)) term->add_reference_tangent(d_reference[c], d_force_[c]);
+    term->add_reference_tangents({along.data(), moved}, {into.data(), moved});
     if (!term->sees_start() || way_alone) continue;
     for (std::size_t c = first; c < first + count; ++c)
       term->add_start_tangent(z, changes[c].x, changes[c].v, d_force_[c]);
