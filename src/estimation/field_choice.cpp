@@ -151,7 +151,7 @@ PassState FieldChoice::with_field(int count, TriedField& promised) {
     for (const std::string& name : test->corrected) parameters.set_estimated(name, true);
   parameters.set_reference(theta);
   Objective objective = recordings.objective(
-      grid, parameters, options_.fine_band, [](const Recording& r) { return r.last_frame; }, {}, processes_);
+      grid, parameters, {options_.fine_band, [](const Recording& r) { return r.last_frame; }}, {}, processes_);
   const VectorX p = parameters.to_unconstrained(theta);
   const CostEvaluation e = objective.linearise(p);
   forward_steps_ += e.steps;

@@ -5,6 +5,7 @@
 #include "base/error.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_pass.hpp"
+#include "estimation/followed.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/press_scene.hpp"
 #include "estimation/tracking_loop.hpp"
@@ -70,6 +71,9 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
     return fit_presses(*capture, options, monitor, std::move(resume));
   const bool has_presses =
       std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
+  const auto stops = [&] { return monitor.agrees_to_stop(); };
+  for (RecordedCapture& r : recordings) r.pose = registered_pose(r, options, stops);
+  if (held_out) held_out->pose = registered_pose(*held_out, options, stops);
   FitOutcome outcome = carry_out(*planner_of(std::move(recordings), options, monitor, std::move(resume)), monitor);
   for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
   if (held_out && outcome.evaluation.succeeded && !outcome.interrupted) {

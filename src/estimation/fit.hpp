@@ -210,6 +210,9 @@ struct RecordedCapture {
   Capture capture;
   std::vector<ObservedFrame> observed;
   std::optional<TrackedPoints> followed = {};  ///< points of the object, instead of the capture's markers
+  /// Of an object that is released: points of its surface in the frame before that, as it was registered there (see
+  /// `registered_pose`).
+  std::optional<TrackedPoints> pose = {};
 };
 
 /// How an estimate predicts frames that took no part in it.

@@ -201,15 +201,19 @@ Stage FitPlan::scan(const VectorX& from) const {
 StageChain FitPlan::start(int index, const Records& done) const {
   StageChain chain;
   const std::vector<double> horizons = growing_horizon(facts_.swings);
+  std::optional<StageId> pose;
+  for (const StageRecord& r : done)
+    if (r.id.kind == StageKind::Motion && r.succeeded && !names(is_pull).empty()) pose = r.id;
   for (std::size_t i = 0; i < horizons.size(); ++i) {
     const bool last = i + 1 == horizons.size();
     Stage stage{{StageKind::Coarse, index, int(i)}, "coarse", facts_.coarse};
     stage.horizon.part = horizons[i];
     stage.band = facts_.options.wide_band, stage.iterations = last ? 10 : 5;
     is_intermediate(stage);
-    // Poisson's ratio is told from the rest only once the fit is close. What holds a released object is known from its
-    // first swing, in units of its stiffness, and takes most of an iteration's time where it is free.
-    stage.free = names([i](const Parameter& p) { return !shapes_law(p) && (i == 0 || !is_pull(p)); });
+    // Poisson's ratio is told from the rest only once the fit is close. Pulls beside several moduli would make up for
+    // what these lack: the pose that they hold is known, and takes no tangents where it is given.
+    stage.pose_of = pose;
+    stage.free = names([&](const Parameter& p) { return !shapes_law(p) && !(pose && is_pull(p)); });
     stage.done_from = 0.15 + 0.3 * (last ? 0.4 : 0.0), stage.done_to = stage.done_from + 0.15;
     chain.push_back(std::move(stage));
   }
@@ -262,7 +266,8 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
     // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
     if (facts_.swings && !is_last)
       for (const std::string& name : names(shapes_law)) std::erase(stage.free, name);
-    if (i > 0 && !is_narrow && !is_last_wide)
+    if (!begin && !is_narrow && !is_last_wide && !names(is_pull).empty()) stage.pose_of = StageId{StageKind::Pulls};
+    if ((i > 0 || stage.pose_of) && !is_narrow && !is_last_wide)
       for (const std::string& name : names(is_pull)) std::erase(stage.free, name);
     stage.done_from = is_narrow ? 0.6 : 0.45 + share * double(i);
     stage.done_to = is_narrow ? 0.9 : stage.done_from + share;

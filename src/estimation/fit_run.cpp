@@ -274,9 +274,17 @@ ParameterSet FitRun::parameters_of(const Stage& stage, const VectorX& theta) con
   return set;
 }
 
+VectorX FitRun::pose_of(const Stage& stage) const {
+  const std::lock_guard lock(mutex_);
+  const StageRecord* record = stage.pose_of ? find_record(state_.done, *stage.pose_of) : nullptr;
+  return record ? record->theta : VectorX();
+}
+
 Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const {
   return recordings_.objective(
-      grid, parameters, stage.band, [&](const Recording& r) { return last_frame(stage.horizon, r); },
+      grid, parameters,
+      {stage.band, [&](const Recording& r) { return last_frame(stage.horizon, r); }, pose_of(stage),
+       stage.horizon.until != Horizon::Until::Part},
       [this] { return !stages_are_over_ && monitor_.is_asked_to_stop(); }, monitor_.processes);
 }
 

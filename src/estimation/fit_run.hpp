@@ -48,6 +48,8 @@ class FitRun : StageLoop {
   OptimiserSummary optimise(Objective& objective, const Stage& stage, const OptimiserState& from,
                             std::optional<int>& joined);
   ParameterSet parameters_of(const Stage& stage, const VectorX& theta) const;
+  /// Parameters that hold released objects in the pose in which a stage has them start; empty: those of the stage do.
+  VectorX pose_of(const Stage& stage) const;
   Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const;
   const Grid& grid(const Spacing& spacing, const ModelChange& change = {});
   /// Makes a stage's grid; an alternative's that cannot be made is told by the stage.

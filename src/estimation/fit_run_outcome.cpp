@@ -207,7 +207,7 @@ const StageRecord& FitRun::refined(const std::vector<StageRecord>& done, const S
 
 void FitRun::time_steps(const Stage& narrow, const ParameterSet& parameters) {
   Objective objective = recordings_.objective(
-      grid(narrow.grid), parameters, narrow.band, [](const Recording&) { return 20; }, {}, monitor_.processes);
+      grid(narrow.grid), parameters, {narrow.band, [](const Recording&) { return 20; }}, {}, monitor_.processes);
   const VectorX p = parameters.to_unconstrained(parameters.reference());
   auto begin = std::chrono::steady_clock::now();
   const CostEvaluation forward = objective.evaluate(p);

@@ -86,6 +86,9 @@ struct Stage {
   int iterations = 0;
   /// Of the optimiser: a tenth of a standard deviation, and a part of the cost.
   double promise_tolerance = 0.005, cost_tolerance = 2e-4;
+  /// Released objects start in the pose in which that stage's end holds them, whatever their material: pulls are not
+  /// estimated beside it then. None: in the equilibrium under their pulls.
+  std::optional<StageId> pose_of = {};
   int iterations_before = 0;           ///< of its start, that are counted on
   double give_up_above = infinite;     ///< cost at its end that is worth no further stage
   std::vector<std::string> free = {};  ///< parameters that are estimated

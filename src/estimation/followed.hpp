@@ -38,4 +38,15 @@ class FollowedRecording {
   VectorX start_;
 };
 
+/// Points of a track's surface where and when it was supported by what was seen.
+TrackedPoints supported_points(const Track& track, double size);
+
+/// The pose from which an object is released: points of its surface where the tracker registered it in the frames in
+/// which it was held, from as scanned. It may lie as far from the scan as the object is large, where the nearest
+/// surface of what was seen is that of another part; it is no more than where to look for what held the object. None
+/// where nothing is released or seen, where markers are followed or a known weight held it, and where it is not found.
+/// @param interrupted  asked on the way; may be empty
+std::optional<TrackedPoints> registered_pose(const RecordedCapture& recorded, const FitOptions& options,
+                                             const std::function<bool()>& interrupted = {});
+
 }  // namespace pliant

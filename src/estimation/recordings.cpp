@@ -173,6 +173,32 @@ ParameterSet joined(const std::vector<CaptureParameters>& recordings, const Join
   return {joint.layout, std::move(list), std::move(theta)};
 }
 
+/// An object that is released starts where its pulls hold it for these parameters; with the pulls themselves where they
+/// hold it nowhere.
+void start_in_pose(const VectorX& theta, ObservedMotion& motion) {
+  if (motion.simulation.blocks.pulls.empty()) return;
+  SimulationOptions held = motion.simulation;
+  held.times.resize(1);
+  Points pose;
+  Simulation(motion.body, held).run(theta, [&](int, const State& state, auto) {
+    pose = state.x;
+    return false;
+  });
+  if (pose.rows() == 0) return;
+  motion.simulation.blocks.pulls.clear();
+  motion.simulation.start = std::move(pose);
+}
+
+/// The first frame of a released object by points that were registered there: all of them are the object's.
+void compare_pose(const Recording& recording, ObservedMotion& motion) {
+  constexpr double far = 10.0;  // times the size: what is no outlier counts fully
+  motion.observations =
+      std::make_shared<std::vector<FrameObservations>>(frame_observations(recording.capture, {}, *recording.pose));
+  motion.mismatch = {nullptr, std::make_shared<PointTracks>(*motion.body, recording.pose->rest), Vector3::Zero(), {}};
+  motion.options.last_frame = 0;
+  motion.options.outlier_scale = far * recording.size;
+}
+
 }  // namespace
 
 std::string JointLayout::name_of(const std::string& block, std::size_t recording) const {
@@ -227,8 +253,9 @@ VectorX with_moduli(const JointLayout& from, const VectorX& theta, const JointLa
 
 int Recording::horizon(double part) const {
   if (capture.scene.timing.is_static) return last_frame;
-  const int least = is_released() ? std::min(last_frame, 10) : std::max(1, last_frame / 3);
-  return std::max(least, int(part * last_frame));
+  // Swings take their time, however little of them is compared.
+  if (is_released()) return std::min(last_frame, std::max(10, int(part * last_seen)));
+  return std::max({1, last_frame / 3, int(part * last_frame)});
 }
 
 Recordings::Recordings(std::vector<RecordedCapture> recorded, const FitOptions& options,
@@ -260,6 +287,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
     notes.push_back("Plane " + std::to_string(plane + 1) +
                     " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
   recording.tracked = recorded.followed ? std::move(*recorded.followed) : tracked_points(capture);
+  recording.pose = std::move(recorded.pose);
   recording.common_error = weigh_by_scatter(capture, recorded.observed, notes);
   recording.observations = std::make_shared<std::vector<FrameObservations>>(
       frame_observations(capture, recorded.observed, recording.tracked));
@@ -279,6 +307,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
   if (!recording.observations->empty())
     recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
                                     recording.observations->back().frame);
+  recording.last_seen = recording.last_frame;
   if (options_.span > 0.0) recording.last_frame = std::max(1, int(options_.span * recording.last_frame));
   recording.distance = capture_distance(capture, widest_band());
   CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
@@ -370,8 +399,7 @@ std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recor
   return std::make_shared<PressScene>(make_press_scene(capture, std::move(body)));
 }
 
-Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters, double band,
-                                const std::function<int(const Recording&)>& last_frame,
+Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters, const Compared& compared,
                                 const std::function<bool()>& interrupted,
                                 const std::shared_ptr<ProcessGroup>& processes) const {
   std::vector<std::unique_ptr<Trial>> trials;
@@ -384,12 +412,14 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
     const Recording& r = all_[i];
     const Discretisation& d = grid.recording[i];
     ObjectiveOptions o;
-    o.outlier_scale = band * r.size;
-    o.last_frame = std::min(r.last_frame, last_frame(r));
+    o.outlier_scale = compared.band * r.size;
+    o.last_frame = std::min(r.last_frame, compared.last_frame(r));
     o.interrupted = interrupted;
     options.push_back(o);
-    trials.push_back(
-        std::make_unique<MotionTrial>(ObservedMotion{d.mismatch, d.body, d.simulation, r.observations, o}, int(i)));
+    ObservedMotion motion{d.mismatch, d.body, d.simulation, r.observations, o};
+    if (compared.by_pose && r.pose) compare_pose(r, motion);
+    if (compared.pose_of.size() > 0) start_in_pose(compared.pose_of, motion);
+    trials.push_back(std::make_unique<MotionTrial>(std::move(motion), int(i)));
   }
   for (std::size_t i = 0; i < all_.size() && has_statics; ++i) {
     add_loads(all_[i], grid.recording[i], options[i], trials);

@@ -24,9 +24,11 @@ struct Recording {
   Capture capture;
   TrackedPoints tracked;
   std::shared_ptr<const std::vector<FrameObservations>> observations;
+  std::optional<TrackedPoints> pose;  ///< from which it is released, where it was registered
   std::shared_ptr<const SignedDistance> distance;
-  double size = 0.0;  ///< of the object [m]
-  int last_frame = 0;
+  double size = 0.0;                 ///< of the object [m]
+  int last_frame = 0;                ///< that is compared
+  int last_seen = 0;                 ///< of the whole recording
   std::vector<double> common_error;  ///< of each depth camera, what all its readings err by together [m]
   CaptureBlocks blocks;
   std::vector<LoadCase> loads;  ///< those that are fitted
@@ -44,6 +46,16 @@ struct Grid {
   std::vector<Discretisation> recording;  ///< of each
   /// Presses of each recording around a body of tetrahedra; null where it has none that are fitted.
   std::vector<std::shared_ptr<const PressScene>> presses;
+};
+
+/// What an objective compares of recordings.
+struct Compared {
+  double band = 0.0;                                ///< outlier scale, times the object's size
+  std::function<int(const Recording&)> last_frame;  ///< of each
+  /// Parameters whose pulls hold released objects in the pose from which they start, whatever their material; empty:
+  /// the equilibrium under their pulls is that.
+  VectorX pose_of = {};
+  bool by_pose = false;  ///< the first frame of released objects by where they were registered, if they were
 };
 
 /// The recordings of one object side by side: they share its material, and each has its own start, planes and sensors.
@@ -83,12 +95,9 @@ class Recordings {
 
   /// The objective of the recordings' motions and, where parameters of the object are estimated or none are, of their
   /// loads and presses.
-  /// @param band        outlier scale, times the object's size
-  /// @param last_frame  of each recording that is compared
-  /// @param interrupted of its motions: see `ObjectiveOptions`
+  /// @param interrupted  of its motions: see `ObjectiveOptions`
   /// @param processes   that evaluate it together; null: this one alone
-  [[nodiscard]] Objective objective(const Grid& grid, const ParameterSet& parameters, double band,
-                                    const std::function<int(const Recording&)>& last_frame,
+  [[nodiscard]] Objective objective(const Grid& grid, const ParameterSet& parameters, const Compared& compared,
                                     const std::function<bool()>& interrupted = {},
                                     const std::shared_ptr<ProcessGroup>& processes = nullptr) const;
   /// The parameters with the prior of their moduli at the grid's control points, if it has any.

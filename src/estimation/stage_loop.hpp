@@ -45,7 +45,7 @@ class StageLoop {
   FitOutcome outcome_;
   std::vector<StageRecord> partial_;  // of stages that were interrupted
   std::atomic<bool> interrupted_ = false;
-  std::mutex mutex_;  // of all above that stages write, and of the monitor
+  mutable std::mutex mutex_;  // of all above that stages write, and of the monitor
 
  private:
   void run_chain(const StageChain& chain);

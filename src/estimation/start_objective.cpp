@@ -42,8 +42,9 @@ StartObjective start_objective(std::vector<RecordedCapture> recordings, const Fi
   const Recordings all(std::move(recordings), options, notes);
   const Grid grid = all.grid(options.cells, options.steps);
   const ParameterSet& parameters = all.parameters();
-  auto objective = std::make_shared<Objective>(all.objective(
-      grid, parameters, options.wide_band, [](const Recording& r) { return r.last_frame; }, {}, std::move(processes)));
+  auto objective = std::make_shared<Objective>(
+      all.objective(grid, parameters, {options.wide_band, [](const Recording& r) { return r.last_frame; }}, {},
+                    std::move(processes)));
   return {std::move(objective), parameters.to_unconstrained(parameters.reference())};
 }
 

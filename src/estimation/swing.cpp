@@ -67,7 +67,8 @@ Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<dou
   return path;
 }
 
-Path simulated_path(Simulation& simulation, const VectorX& theta) {
+/// @param last  where to stop [s]
+Path simulated_path(Simulation& simulation, const VectorX& theta, double last) {
   std::vector<Vector3> samples;
   for (const SurfacePoint& p : simulation.body().surface) samples.push_back(p.position);
   const Embedding surface(simulation.body(), samples);
@@ -75,7 +76,7 @@ Path simulated_path(Simulation& simulation, const VectorX& theta) {
   simulation.run(theta, [&](int frame, const State& state, auto) {
     path.times.push_back(simulation.options().times[std::size_t(frame)]);
     path.points.push_back(middle(surface.positions(state.x)));
-    return true;
+    return path.times.back() < last;
   });
   return path;
 }
@@ -107,15 +108,18 @@ std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters
   const auto observed = swing_of(path, direction);
   if (!observed) return std::nullopt;
   constexpr int most_rounds = 6;
+  constexpr double periods = 6.0;  // that are enough to tell a frequency by
   constexpr double near_enough = 1.05;
   const ParameterHandle modulus = simulation.options().blocks.youngs_moduli.front();
+  const double last = path.times.front() + periods * 2.0 * std::numbers::pi / *observed;
+  const auto until_then = std::ranges::count_if(path.times, [&](double time) { return time <= last; });
   std::optional<TriedModulus> before;
   for (int round = 0; round < most_rounds; ++round) {
-    const Path moves = simulated_path(simulation, parameters);
+    const Path moves = simulated_path(simulation, parameters, last);
     const auto simulated = swing_of(moves, direction);
     // Too slow or too fast to show in these frames: try a body that is stiffer, then one that is softer. One that
     // cannot hold itself up has to be stiffer. Where one that swung went before, the step from it was too long.
-    const bool fails = moves.points.size() < path.points.size();
+    const bool fails = int(moves.points.size()) < int(until_then);
     double ratio = before ? std::sqrt(before->modulus / parameters[modulus]) : fails ? 3.0 : round == 0 ? 10.0 : 0.1;
     if (simulated && !fails) {
       const TriedModulus now{parameters[modulus], *simulated * *simulated};

@@ -486,27 +486,6 @@ bool tracks(const std::vector<RecordedCapture>& recordings, const FitOptions& op
   return use_of(recordings, options) != TrackingUse::Off;
 }
 
-TrackedPoints supported_points(const Track& track, double size) {
-  constexpr int fewest = 2;             // points about a mark
-  constexpr double least_noise = 5e-4;  // times the size
-  TrackedPoints tracked;
-  tracked.rest = track.marks;
-  const Embedding marks(*track.body, track.marks);
-  for (const TrackedFrame& frame : track.frames) {
-    if (frame.is_lost || frame.points == 0) continue;
-    std::vector<TrackObservation> seen;
-    for (int m = 0; m < marks.point_count(); ++m)
-      if (frame.mark_points[std::size_t(m)] >= fewest) seen.push_back({m, marks.position(m, frame.nodes), 0.0, 0});
-    if (seen.empty()) continue;
-    // Neighbouring marks err together, as neighbouring pixels do: a frame counts as much as its points would.
-    const double together = std::max(1.0, 3.0 * double(seen.size()) / ObjectiveOptions{}.independent_points);
-    for (TrackObservation& mark : seen)
-      mark.noise = std::max(frame.surface_rms, least_noise * size) * std::sqrt(together);
-    tracked.frames[frame.frame] = std::move(seen);
-  }
-  return tracked;
-}
-
 std::unique_ptr<PassPlanner> planner_of_tracking(std::vector<RecordedCapture> recordings, const FitOptions& options,
                                                  const FitMonitor& monitor, FitState resume) {
   return std::make_unique<TrackingLoop>(std::move(recordings), options, monitor, std::move(resume));

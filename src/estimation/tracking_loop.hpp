@@ -22,7 +22,4 @@ bool tracks(const std::vector<RecordedCapture>& recordings, const FitOptions& op
 std::unique_ptr<PassPlanner> planner_of_tracking(std::vector<RecordedCapture> recordings, const FitOptions& options,
                                                  const FitMonitor& monitor, FitState resume);
 
-/// Points of a track's surface where and when it was supported by what was seen.
-TrackedPoints supported_points(const Track& track, double size);
-
 }  // namespace pliant

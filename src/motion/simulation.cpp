@@ -266,7 +266,7 @@ std::vector<State> Simulation::start_tangents(const State& start, const MatrixX&
   for (Eigen::Index c = 0; c < directions.cols(); ++c) {
     const VectorX direction = directions.col(c);
     tangents.push_back({Points::Zero(rest_.rows(), 3), velocities(direction)});  // velocities are linear in theta
-    if (!shape.scan.empty()) tangents.back().x = shape.scan[std::size_t(c)];
+    if (!shape.scan.empty() && options_.start.rows() == 0) tangents.back().x = shape.scan[std::size_t(c)];
     if (starts_held()) tangents.back().x = statics_.tangent(start.x, direction, shape.of(std::size_t(c)));
   }
   hold_start(false);
@@ -289,7 +289,8 @@ bool Simulation::start_adjoint(const State& start, const State& bar, VectorX& th
   }
   if (!follows_shape()) return true;
   if (!shape_->prepare_derivatives()) return false;
-  shape_->adjoint(starts_held() ? Points::Zero(rest_.rows(), 3) : bar.x, reference_bar_, theta_bar);
+  const bool starts_as_scanned = !starts_held() && options_.start.rows() == 0;
+  shape_->adjoint(starts_as_scanned ? bar.x : Points::Zero(rest_.rows(), 3), reference_bar_, theta_bar);
   return true;
 }
 

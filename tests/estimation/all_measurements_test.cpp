@@ -222,7 +222,7 @@ class SeenInEveryWay : public ::testing::Test {
     recordings.material().set_moduli(start, 1.2 * modulus);
     set.set_reference(start);
     Objective objective =
-        recordings.objective(recordings.grid(10.0, 1.0), set, 0.2, [](const Recording& r) { return r.last_frame; });
+        recordings.objective(recordings.grid(10.0, 1.0), set, {0.2, [](const Recording& r) { return r.last_frame; }});
     const OptimiserSummary s = minimise(objective, set.to_unconstrained(start), converged);
     EXPECT_TRUE(s.succeeded) << s.reason;
     return set.to_theta(s.p)[recordings.material().youngs_moduli.front()];
@@ -284,7 +284,7 @@ TEST_F(SeenInEveryWay, PressesAndLoadsBesideAMotionFollowItsLaw) {
   const Grid grid = recordings.grid(4.0, 1.0);
   EXPECT_EQ(grid.recording.front().body->kind, ElementKind::QuadraticTetrahedron);
   EXPECT_EQ(grid.presses.front()->body, grid.recording.front().body);
-  Objective objective = recordings.objective(grid, set, 0.2, [](const Recording&) { return 2; });
+  Objective objective = recordings.objective(grid, set, {0.2, [](const Recording&) { return 2; }});
   const VectorX p = set.to_unconstrained(theta);
   const CostEvaluation e = objective.linearise(p);
   ASSERT_TRUE(e.succeeded) << e.failure;

@@ -7,6 +7,7 @@
 
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_plan.hpp"
+#include "estimation/followed.hpp"
 #include "geometry/primitives.hpp"
 #include "support/interruption.hpp"
 
