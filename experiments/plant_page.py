@@ -2,6 +2,7 @@
 from page import judged, machine, percent, results, table, with_truth
 
 FIT_NAMES = {"no-choice": "no choice", "auto": "as many control points as the evidence supports", "placed": "control points placed at joints and leaves",
+             "placed-beginning": "control points placed, the first 50 frames", "painted-beginning": "stem and leaves painted, the first 50 frames",
              "together": "tracking and estimation together, and the points by themselves", "loop-auto": "tracking and estimation in turns, control points by evidence"}
 GOAL_SECONDS = 600
 
@@ -69,7 +70,7 @@ def plant():
         if f["exit_code"] == 130 and f.get("limit"):
             text += (f"\n{fit_name(f, name)[:1].upper()}{fit_name(f, name)[1:]}: asked to stop after {f['limit']:.0f} s, and it ended {f['wall_seconds'] - f['limit']:.0f} s later: "
                      "what is told is the best so far, with one iteration on the full mesh, and no result of a whole fit.\n")
-    for name in ("no-choice", "auto", "placed"):
+    for name in ("no-choice", "auto", "placed", "placed-beginning", "painted-beginning"):
         f = fits.get(name)
         if not f:
             continue
@@ -78,9 +79,8 @@ def plant():
             ["zones within 15 %", f"{percent(worst[0])} at most, {worst[1]}", judged(abs(worst[0]) <= 0.15)],
             ["load-free shape to 1 % of the size", f"{percent(f['load_free_greatest'], False)} at most", judged(f["load_free_greatest"] <= 0.01)],
             ["10 minutes on two cores", f"{f['wall_seconds']:.0f} s" + (f" on {f['threads']}" if f["threads"] else ""), judged(f["wall_seconds"] <= GOAL_SECONDS)]])
-    if poses := figures.get("poses"):
-        told = " and ".join(f"{1e3 * row['surface_rms']:.1f} mm with {row['pull_points']}" for row in poses["rows"])
-        text += ("\nWhat stops a fit is, most likely, the pose from which the plant is let go. It is looked for with pulls at points far from the pot, the default's four or more (`pull_points`): after "
-                 f"{poses['rows'][0]['iterations']} iterations, of at most 24, the surface lies {told} from the points of the first frame (rms, control points placed), and each iteration gains little. "
-                 "Leaves that are 6 mm thick are farther than that from where they were seen, and the nearest surface of a point is most likely another leaf's or the other side's.\n")
+    if held := figures.get("registered"):
+        text += (f"\nThe pose from which the plant is let go is where the tracker registers it before that, with no choices: {1e3 * held['rms']:.1f} mm off (rms of {held['points']} points of the scan; median "
+                 f"{1e3 * held['median']:.1f} mm, {1e3 * held['greatest']:.1f} mm at most), where the plant was moved by {1e3 * held['way_rms']:.0f} mm (rms) and {1e3 * held['way_greatest']:.0f} mm at most. "
+                 "Pulls at points far from the pot are then fitted to that. Looked for by the nearest surface alone they had not come nearer than 26 mm: leaves that are 6 mm thick were farther than that from where they were seen.\n")
     return text + f"\nMeasured on {machine(figures)}.\n"

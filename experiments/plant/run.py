@@ -26,6 +26,9 @@ NAMES = ["poisson_ratio", "mass_damping", "stiffness_damping"]
 # Where one who looks at the scan would place control points: at the stem's foot and joints, and on each leaf, a third of its length out.
 PLACED = {"foot": [0.0, 0.0, 0.0], "low joint": [0.011, 0.114, 0.002], "middle joint": [0.023, 0.190, 0.004], "top joint": [0.036, 0.260, 0.007],
           "low leaf": [-0.032, 0.126, 0.023], "middle leaf": [0.056, 0.211, 0.031], "top leaf": [0.044, 0.289, -0.024]}
+# Of the stem, which is so thick there: what is farther from the line through its foot and joints is a leaf's.
+STEM_RADIUS = 0.008
+STEM, LEAVES = ["foot", "low joint", "middle joint", "top joint"], ["low leaf", "middle leaf", "top leaf"]
 # name: (capture, choices)
 FITS = {
     "no-choice": ("plant", {}),
@@ -34,6 +37,7 @@ FITS = {
     "together": ("plant", {"tracking": "both"}),
     # Of the first 50 frames, which a laptop fits while one waits.
     "placed-beginning": ("placed", {"span": 0.2}),
+    "painted-beginning": ("painted", {"span": 0.2}),
     "loop-auto": ("plant", {"tracking": "loop", "control_points": "auto"}),
 }
 
@@ -53,6 +57,37 @@ def with_placed_points(recording, folder):
     text = (recording / "capture.toml").read_text()
     for name, point in PLACED.items():
         text += f'\n[[control]]\nname = "{name}"\npoint = {common.toml(point)}\n'
+    (folder / "capture.toml").write_text(text)
+    for name in ("rest.ply", "clouds"):
+        if not (folder / name).is_symlink():
+            (folder / name).symlink_to((recording / name).resolve())
+    return folder
+
+
+def from_segment(p, a, b):
+    """Distance of a place from a segment."""
+    along = [q - o for o, q in zip(a, b)]
+    share = sum((c - o) * d for c, o, d in zip(p, a, along)) / sum(d * d for d in along)
+    return math.dist(p, [o + min(1.0, max(0.0, share)) * d for o, d in zip(a, along)])
+
+
+def with_painted_organs(recording, folder):
+    """The stem and each leaf have a modulus of their own, by vertex, as one would paint them who looks at the scan."""
+    folder.mkdir(parents=True, exist_ok=True)
+    organs = ["stem", *LEAVES]
+    stem = [PLACED[name] for name in STEM]
+
+    def organ_of(p):
+        if min(from_segment(p, a, b) for a, b in zip(stem, stem[1:])) < STEM_RADIUS:
+            return "stem"
+        return min(LEAVES, key=lambda name: math.dist(p, PLACED[name]))
+
+    painted = [organ_of(p) for p in common.read_vertices(recording / "rest.ply")]
+    text = (recording / "capture.toml").read_text()
+    for organ in organs:
+        file = organ.replace(" ", "-") + ".txt"
+        (folder / file).write_text("".join(f"{int(o == organ)}\n" for o in painted))
+        text += f'\n[[control]]\nname = "{organ}"\nweights = "{file}"\n'
     (folder / "capture.toml").write_text(text)
     for name in ("rest.ply", "clouds"):
         if not (folder / name).is_symlink():
@@ -162,6 +197,28 @@ def meshes(program, recording, work, truth):
     return {"youngs_modulus": REST_MODULUS, "rows": rows}
 
 
+def registered(program, recording, work):
+    """How far the tracker registers the plant from the truth in the last frame in which it was held, with no choices: every twentieth vertex of the scan."""
+    capture, out = work / "captures/held", work / "held"
+    capture.mkdir(parents=True, exist_ok=True)
+    (capture / "capture.toml").write_text((recording / "capture.toml").read_text().replace("frame_count = 250", "frame_count = 6"))
+    for name in ("rest.ply", "clouds"):
+        if not (capture / name).is_symlink():
+            (capture / name).symlink_to((recording / name).resolve())
+    scan, pulled = (common.read_vertices(recording / file) for file in ("rest.ply", "truth/pulled.ply"))
+    followed = range(0, len(scan), 20)
+    points = work / "followed.csv"
+    points.write_text("id,x,y,z\n" + "".join(f"{i},{','.join(map(str, scan[i]))}\n" for i in followed))
+    if not (out / "points.csv").exists():
+        common.run(program, "track", capture, "--out", out, "--points", points, "--no-pictures")
+    with open(out / "points.csv", newline="") as file:
+        there = {int(row["id"]): tuple(float(row[c]) for c in "xyz") for row in csv.DictReader(file) if row["frame"] == "4"}
+    off, way = sorted(math.dist(there[i], pulled[i]) for i in followed), [math.dist(scan[i], pulled[i]) for i in followed]
+    rms = lambda values: math.sqrt(sum(v * v for v in values) / len(values))
+    return {"points": len(off), "rms": common.number(rms(off), 3), "median": common.number(off[len(off) // 2], 3), "greatest": common.number(off[-1], 3),
+            "way_rms": common.number(rms(way), 3), "way_greatest": common.number(max(way), 3)}
+
+
 def judged_fit(program, recording, captures, name, work, zones, truth, threads, limit):
     capture, choices = FITS[name]
     refusal = work / name / "refused.json"
@@ -263,11 +320,15 @@ def main():
     recording, checks = make_recording(arguments.python, arguments.work)
     truth = common.read(recording / "truth.json")
     common.run(arguments.program, "check", recording)
-    captures = {"plant": recording, "placed": with_placed_points(recording, arguments.work / "captures/placed")}
+    captures = {"plant": recording, "placed": with_placed_points(recording, arguments.work / "captures/placed"),
+                "painted": with_painted_organs(recording, arguments.work / "captures/painted")}
     zones, fits = true_cells(recording), {}
+    before = common.read(HERE / "results.json")["fits"] if (HERE / "results.json").exists() else {}
     for name in FITS:
         is_done = any((arguments.work / name / file).exists() for file in ("figures.json", "refused.json"))
         if not is_done and (arguments.gather or (arguments.only and name != arguments.only)):
+            if name in before:  # of the program that it names
+                fits[name] = before[name]
             continue
         f = fits[name] = judged_fit(arguments.program, recording, captures, name, arguments.work, zones, truth, arguments.threads, arguments.limit)
         if "refused" in f:
@@ -278,7 +339,7 @@ def main():
               f", cost {f['cost']}, {f['verdict']}", flush=True)
     picture(recording, fits, arguments.work, zones)
     common.write_results(__file__, {"checks": checks, "recording": {key: truth[key] for key in ("size", "tips", "mesh", "points_a_frame", "energy_J", "pull_N", "seconds")},
-                                    "zones": truth["zones"], "placed": PLACED, "meshes": meshes(arguments.program, recording, arguments.work, truth), "fits": fits})
+                                    "zones": truth["zones"], "placed": PLACED, "registered": registered(arguments.program, recording, arguments.work), "meshes": meshes(arguments.program, recording, arguments.work, truth), "fits": fits})
 
 
 if __name__ == "__main__":

@@ -154,6 +154,7 @@ StageChain FitPlan::motion(int first, const VectorX& from) const {
     stage.horizon = {Horizon::Until::Beginning, i == 0 ? 1.0 / 8 : 1.0 / 4};
     stage.band = facts_.options.wide_band, stage.iterations = 12;
     is_intermediate(stage);
+    stage.by_pose = i == 0;
     stage.free = free;
     stage.done_to = 0.05;
     chain.push_back(std::move(stage));
@@ -266,8 +267,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
     // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
     if (facts_.swings && !is_last)
       for (const std::string& name : names(shapes_law)) std::erase(stage.free, name);
-    if (!begin && !is_narrow && !is_last_wide && !names(is_pull).empty()) stage.pose_of = StageId{StageKind::Pulls};
-    if ((i > 0 || stage.pose_of) && !is_narrow && !is_last_wide)
+    if (i > 0 && !is_narrow && !is_last_wide)
       for (const std::string& name : names(is_pull)) std::erase(stage.free, name);
     stage.done_from = is_narrow ? 0.6 : 0.45 + share * double(i);
     stage.done_to = is_narrow ? 0.9 : stage.done_from + share;

@@ -46,7 +46,6 @@ constexpr double most_cells = 64.0;  // along the object's longest axis
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
 constexpr int few_iterations = 2, many_iterations = 5;
-constexpr int single_iteration = 1;  // of fully implicit steps, from where the first alternative ends
 constexpr double promise_of_alternative = 0.1, promise_to_trust = 0.5;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 // From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
@@ -184,7 +183,7 @@ std::vector<Alternative> FitRun::alternatives() const {
                      has_coarser ? many_iterations : few_iterations});
     else if (recordings_.are_tetrahedra()) {
       all.push_back({"law at large strain", cells, 1.0, {.neo_hookean = true}, false, 1.0, has_coarser});
-      if (!is_static) all.back().iterations = single_iteration;
+      if (!is_static) all.back().iterations = few_iterations;  // fully implicit steps, from where the first one ends
     }
   }
   all.push_back({"what is given", cells, 1.0, {}, true, 1.0});
@@ -283,8 +282,7 @@ VectorX FitRun::pose_of(const Stage& stage) const {
 Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const {
   return recordings_.objective(
       grid, parameters,
-      {stage.band, [&](const Recording& r) { return last_frame(stage.horizon, r); }, pose_of(stage),
-       stage.horizon.until != Horizon::Until::Part},
+      {stage.band, [&](const Recording& r) { return last_frame(stage.horizon, r); }, pose_of(stage), stage.by_pose},
       [this] { return !stages_are_over_ && monitor_.is_asked_to_stop(); }, monitor_.processes);
 }
 
@@ -346,19 +344,26 @@ StageRecord FitRun::find_pulls(const Stage& stage, bool& is_cut) {
   StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
   record.cost = infinite;
   record.succeeded = true;  // without them the next stage looks for them
-  for (const VectorX& from : stage.from) {
-    const ParameterSet pulls = parameters_of(stage, from);
-    Objective objective = objective_of(stage, pulls, grid(stage.grid));
-    OptimiserOptions o;
-    o.max_iterations = stage.iterations;
-    const OptimiserSummary s =
-        minimise(objective, start_of(pulls), o, [&](const Iteration&) { return !is_interrupted(); });
-    outcome_.forward_steps += s.steps;
-    is_cut = is_cut || s.interrupted;
-    record.iterations += s.iterations, record.work += s.work;
+  const bool is_registered =
+      std::ranges::any_of(recordings_.all(), [](const Recording& r) { return r.pose.has_value(); });
+  for (VectorX theta : stage.from) {
+    OptimiserSummary s;
+    for (Stage part = stage; const bool by_pose : {true, false}) {
+      if (by_pose && !is_registered) continue;
+      part.by_pose = by_pose;
+      const ParameterSet pulls = parameters_of(part, theta);
+      Objective objective = objective_of(part, pulls, grid(part.grid));
+      OptimiserOptions o;
+      o.max_iterations = part.iterations;
+      s = minimise(objective, start_of(pulls), o, [&](const Iteration&) { return !is_interrupted(); });
+      outcome_.forward_steps += s.steps;
+      is_cut = is_cut || s.interrupted;
+      record.iterations += s.iterations, record.work += s.work;
+      if (s.succeeded) theta = pulls.to_theta(s.p);
+    }
     if (!s.succeeded || !(s.evaluation.cost < record.cost)) continue;
     record.cost = s.evaluation.cost;
-    record.theta = pulls.to_theta(s.p);
+    record.theta = theta;
   }
   return record;
 }

@@ -89,6 +89,9 @@ struct Stage {
   /// Released objects start in the pose in which that stage's end holds them, whatever their material: pulls are not
   /// estimated beside it then. None: in the equilibrium under their pulls.
   std::optional<StageId> pose_of = {};
+  /// Released objects are compared where they were registered before their release, if they were: that leads there from
+  /// afar, and the surface goes on from where it ends.
+  bool by_pose = false;
   int iterations_before = 0;           ///< of its start, that are counted on
   double give_up_above = infinite;     ///< cost at its end that is worth no further stage
   std::vector<std::string> free = {};  ///< parameters that are estimated
