@@ -27,7 +27,7 @@ NAMES = ["poisson_ratio", "mass_damping", "stiffness_damping"]
 PLACED = {"foot": [0.0, 0.0, 0.0], "low joint": [0.011, 0.114, 0.002], "middle joint": [0.023, 0.190, 0.004], "top joint": [0.036, 0.260, 0.007],
           "low leaf": [-0.032, 0.126, 0.023], "middle leaf": [0.056, 0.211, 0.031], "top leaf": [0.044, 0.289, -0.024]}
 # Of the stem, which is so thick there: what is farther from the line through its foot and joints is a leaf's.
-STEM_RADIUS = 0.008
+STEM_RADIUS = 0.014
 STEM, LEAVES = ["foot", "low joint", "middle joint", "top joint"], ["low leaf", "middle leaf", "top leaf"]
 # name: (capture, choices)
 FITS = {
