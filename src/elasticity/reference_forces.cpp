@@ -12,6 +12,9 @@ namespace pliant {
 
 namespace {
 
+/// Where lanes have entry (i, j) of a matrix, or coordinate j of node i.
+constexpr std::size_t entry(int i, int j) { return 3 * std::size_t(i) + std::size_t(j); }
+
 template <int N>
 class TetReferenceForces : public ReferenceForces {
  public:
@@ -148,15 +151,14 @@ void TetReferenceForces<N>::tangent(int e, const ElementLanes<N>& d_reference, E
     for (int i = 0; i < 3; ++i) {
       const double row[3] = {element.part[q] * F(i, 0), element.part[q] * F(i, 1), element.part[q] * F(i, 2)};
       for (int j = 0; j < 3; ++j)
-        d_mean[std::size_t(3 * i + j)] +=
-            growth * F(i, j) -
-            (row[0] * G[q][std::size_t(j)] + row[1] * G[q][std::size_t(3 + j)] + row[2] * G[q][std::size_t(6 + j)]);
+        d_mean[entry(i, j)] +=
+            growth * F(i, j) - (row[0] * G[q][entry(0, j)] + row[1] * G[q][entry(1, j)] + row[2] * G[q][entry(2, j)]);
     }
     d_volume += growth;
   }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
-      Wide<double>& entry = d_mean[std::size_t(3 * i + j)];
+      Wide<double>& entry = d_mean[entry(i, j)];
       entry = (entry - (element.mean(i, j) / element.volume) * d_volume) * (1.0 / element.volume);
     }
   const std::array<Wide<double>, 3> w = rotation_rate_lanes(element.polar, d_mean);
@@ -173,13 +175,13 @@ void TetReferenceForces<N>::tangent(int e, const ElementLanes<N>& d_reference, E
     MatrixLanes loss;  // of R^T F
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
-        loss[std::size_t(3 * i + j)] = turned(F, i, j) + F(i, 0) * own[std::size_t(j)] +
-                                       F(i, 1) * own[std::size_t(3 + j)] + F(i, 2) * own[std::size_t(6 + j)];
+        loss[entry(i, j)] =
+            turned(F, i, j) + F(i, 0) * own[entry(0, j)] + F(i, 1) * own[entry(1, j)] + F(i, 2) * own[entry(2, j)];
     const Wide<double> pressure = lambda * (loss[0] + loss[4] + loss[8]);
     MatrixLanes T;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
-        const auto at = std::size_t(3 * i + j), across = std::size_t(3 * j + i), row = std::size_t(3 * j);
+        const auto at = entry(i, j), across = entry(j, i), row = entry(j, 0);
         T[at] = turned(sigma, i, j) + growth * sigma(i, j) - mu * (loss[at] + loss[across]) -
                 (sigma(i, 0) * own[row] + sigma(i, 1) * own[row + 1] + sigma(i, 2) * own[row + 2]);
         if (i == j) T[at] -= pressure;
@@ -217,7 +219,7 @@ void TetReferenceForces<N>::add_matrix(double scale, BlockMatrix& matrix) const 
       for (std::size_t l = 0; l < used; ++l) {
         const int b = int((first + l) / 3), i = int((first + l) % 3);
         for (int a = 0; a < N; ++a)
-          for (int k = 0; k < 3; ++k) matrix.block(blocks[N * a + b])[3 * i + k] += columns[std::size_t(3 * a + k)][l];
+          for (int k = 0; k < 3; ++k) matrix.block(blocks[N * a + b])[3 * i + k] += columns[entry(a, k)][l];
       }
     }
   }
@@ -235,7 +237,7 @@ void TetReferenceForces<N>::add_tangents(std::span<const Points* const> d_refere
       tangent(e, d_reference, change);
       for (std::size_t l = 0; l < used; ++l)
         for (int a = 0; a < N; ++a)
-          for (int i = 0; i < 3; ++i) (*forces[first + l])(nodes_of(e)[a], i) += change[std::size_t(3 * a + i)][l];
+          for (int i = 0; i < 3; ++i) (*forces[first + l])(nodes_of(e)[a], i) += change[entry(a, i)][l];
     }
 }
 
