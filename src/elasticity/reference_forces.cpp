@@ -158,8 +158,8 @@ void TetReferenceForces<N>::tangent(int e, const ElementLanes<N>& d_reference, E
   }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
-      Wide<double>& entry = d_mean[entry(i, j)];
-      entry = (entry - (element.mean(i, j) / element.volume) * d_volume) * (1.0 / element.volume);
+      Wide<double>& own = d_mean[entry(i, j)];
+      own = (own - (element.mean(i, j) / element.volume) * d_volume) * (1.0 / element.volume);
     }
   const std::array<Wide<double>, 3> w = rotation_rate_lanes(element.polar, d_mean);
   // Entry (i, j) of [w]x M.
