@@ -82,5 +82,5 @@ def plant():
     if held := figures.get("registered"):
         text += (f"\nThe pose from which the plant is let go is where the tracker registers it before that, with no choices: {1e3 * held['rms']:.1f} mm off (rms of {held['points']} points of the scan; median "
                  f"{1e3 * held['median']:.1f} mm, {1e3 * held['greatest']:.1f} mm at most), where the plant was moved by {1e3 * held['way_rms']:.0f} mm (rms) and {1e3 * held['way_greatest']:.0f} mm at most. "
-                 "Pulls at points far from the pot are then fitted to that. Looked for by the nearest surface alone they had not come nearer than 26 mm: leaves that are 6 mm thick were farther than that from where they were seen.\n")
+                 "Pulls at points far from the pot are fitted to that first, then to the surface: leaves that are 6 mm thick are farther than that from where they were seen, and nearest to others.\n")
     return text + f"\nMeasured on {machine(figures)}.\n"

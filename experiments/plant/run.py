@@ -52,15 +52,20 @@ def make_recording(python, work):
     return folder, common.read(checks)
 
 
+def link_files(recording, folder):
+    """The scan and the clouds of the recording beside another capture.toml."""
+    for name in ("rest.ply", "clouds"):
+        if not (folder / name).is_symlink():
+            (folder / name).symlink_to((recording / name).resolve())
+
+
 def with_placed_points(recording, folder):
     folder.mkdir(parents=True, exist_ok=True)
     text = (recording / "capture.toml").read_text()
     for name, point in PLACED.items():
         text += f'\n[[control]]\nname = "{name}"\npoint = {common.toml(point)}\n'
     (folder / "capture.toml").write_text(text)
-    for name in ("rest.ply", "clouds"):
-        if not (folder / name).is_symlink():
-            (folder / name).symlink_to((recording / name).resolve())
+    link_files(recording, folder)
     return folder
 
 
@@ -89,9 +94,7 @@ def with_painted_organs(recording, folder):
         (folder / file).write_text("".join(f"{int(o == organ)}\n" for o in painted))
         text += f'\n[[control]]\nname = "{organ}"\nweights = "{file}"\n'
     (folder / "capture.toml").write_text(text)
-    for name in ("rest.ply", "clouds"):
-        if not (folder / name).is_symlink():
-            (folder / name).symlink_to((recording / name).resolve())
+    link_files(recording, folder)
     return folder
 
 
@@ -202,9 +205,7 @@ def registered(program, recording, work):
     capture, out = work / "captures/held", work / "held"
     capture.mkdir(parents=True, exist_ok=True)
     (capture / "capture.toml").write_text((recording / "capture.toml").read_text().replace("frame_count = 250", "frame_count = 6"))
-    for name in ("rest.ply", "clouds"):
-        if not (capture / name).is_symlink():
-            (capture / name).symlink_to((recording / name).resolve())
+    link_files(recording, capture)
     scan, pulled = (common.read_vertices(recording / file) for file in ("rest.ply", "truth/pulled.ply"))
     followed = range(0, len(scan), 20)
     points = work / "followed.csv"

@@ -8,8 +8,8 @@ namespace {
 
 constexpr double noise = 1e-3;
 
-/// A leaf of 6 mm that is held 100 mm aside, and let go: most of what was seen is nearer to another side of the scan,
-/// or to another part of it.
+/// A bar that hangs, is held aside by several of its widths, and let go: what was seen of its end is nearest to another
+/// part of the scan, if to any.
 struct PulledBar : ::testing::Test {
   static test::SwingOptions options() {
     test::SwingOptions o;
@@ -133,22 +133,22 @@ TEST_F(FittedBar, StartsInAPoseWhateverItsMaterial) {
   ParameterSet parameters = pulls_alone();
   parameters.set_estimated("youngs_modulus", true);
   parameters.set_reference(found);
-  const auto cost_of_first = [&](Objective o, const VectorX& at) {
+  const auto first_and_last_cost = [&](Objective o, const VectorX& at) {
     const CostEvaluation e = o.evaluate(parameters.to_unconstrained(at));
     EXPECT_TRUE(e.succeeded) << e.failure;
     return std::pair(e.frames.front().cost, e.frames.back().cost);
   };
   VectorX other = found;
   for (const ParameterHandle& pull : recordings->front().blocks.motion.pulls) other.segment<3>(pull).setZero();
-  const auto [pose, all] = cost_of_first(objective(parameters, found, false, 3), found);
-  EXPECT_NEAR(cost_of_first(objective(parameters, {}, false, 3), found).second, all, 1e-6 * all)
+  const auto [pose, last] = first_and_last_cost(objective(parameters, found, false, 3), found);
+  EXPECT_NEAR(first_and_last_cost(objective(parameters, {}, false, 3), found).second, last, 1e-6 * last)
       << "the same motion with the same parameters";
-  EXPECT_EQ(cost_of_first(objective(parameters, found, false, 3), other).second, all) << "pulls play no part";
+  EXPECT_EQ(first_and_last_cost(objective(parameters, found, false, 3), other).second, last) << "pulls play no part";
   VectorX softer = found;
   recordings->set_moduli(softer, VectorX::Constant(1, 0.25 * swing().options.youngs_modulus));
-  const auto [same_pose, slower] = cost_of_first(objective(parameters, found, false, 3), softer);
+  const auto [same_pose, slower] = first_and_last_cost(objective(parameters, found, false, 3), softer);
   EXPECT_EQ(same_pose, pose);
-  EXPECT_GT(std::abs(slower / all - 1.0), 0.05) << "it swings otherwise";
+  EXPECT_GT(std::abs(slower / last - 1.0), 0.05) << "it swings otherwise";
 }
 
 }  // namespace
