@@ -297,7 +297,7 @@ void Stepper::find_changes_of_force(const State& start, const Points& delta, con
                               d_theta.middleCols(Eigen::Index(first), Eigen::Index(count)),
                               Eigen::Index(first)},
                              forces);
-    term->add_reference_tangents({along.data(), moved}, {into.data(), moved});
+    if (moved > 0) term->add_reference_tangents({along.data(), moved}, {into.data(), moved});
     if (!term->sees_start() || way_alone) continue;
     for (std::size_t c = first; c < first + count; ++c)
       term->add_start_tangent(z, changes[c].x, changes[c].v, d_force_[c]);
