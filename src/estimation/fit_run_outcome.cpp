@@ -52,8 +52,9 @@ StageRecord FitRun::last_look(const PassState& at) {
     theta = parameters_of(next.front().front(), left->from).to_theta(left->optimiser.p);
   StageRecord record{stage.id, stage.name, theta, theta};
   record.reason = "interrupted";
-  constexpr double at_most = 0.25;  // minutes: who interrupts does not wait
-  if (work_of_a_look(grid(stage.grid)) > at_most * work_of_a_minute) {
+  constexpr double at_most = 0.25;                                         // minutes: who interrupts does not wait
+  const bool has_begun = left || find_record(at.done, {StageKind::Fine});  // many simulations came before
+  if (!has_begun && work_of_a_look(grid(stage.grid)) > at_most * work_of_a_minute) {
     record.cost = infinite;
     record.reason = fmt::format(
         "interrupted before the first estimate on the full mesh, where one simulation takes long; Young's modulus was "

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "base/error.hpp"
 #include "estimation/bounded_step.hpp"
 
 #ifdef PLIANT_WITH_NLOPT
@@ -428,6 +429,21 @@ void nelder_mead(Run& run, const OptimiserOptions&, const VectorX&) {
 
 #endif
 
+void descend(Run& run, const OptimiserOptions& options, const VectorX& memory) {
+  switch (options.kind) {
+    case OptimiserKind::LevenbergMarquardt:
+      return levenberg_marquardt(run, options, memory);
+    case OptimiserKind::Rprop:
+      return rprop(run, options, memory);
+    case OptimiserKind::GradientDescent:
+      return gradient_descent(run, options, memory);
+    case OptimiserKind::Lbfgs:
+      return LbfgsRun(run, options, memory).minimise();
+    case OptimiserKind::NelderMead:
+      return nelder_mead(run, options, memory);
+  }
+}
+
 }  // namespace
 
 OptimiserSummary minimise(CostFunction& objective, const OptimiserState& state, const OptimiserOptions& options,
@@ -439,22 +455,11 @@ OptimiserSummary minimise(CostFunction& objective, const OptimiserState& state, 
     return run.summary;
   }
   if (run.has_done_all()) return run.summary;
-  switch (options.kind) {
-    case OptimiserKind::LevenbergMarquardt:
-      levenberg_marquardt(run, options, state.memory);
-      break;
-    case OptimiserKind::Rprop:
-      rprop(run, options, state.memory);
-      break;
-    case OptimiserKind::GradientDescent:
-      gradient_descent(run, options, state.memory);
-      break;
-    case OptimiserKind::Lbfgs:
-      LbfgsRun(run, options, state.memory).minimise();
-      break;
-    case OptimiserKind::NelderMead:
-      nelder_mead(run, options, state.memory);
-      break;
+  try {
+    descend(run, options, state.memory);
+  } catch (const Interrupted&) {  // in the midst of a trial: the best point stands
+    run.summary.interrupted = true;
+    run.end(false, "interrupted");
   }
   return run.summary;
 }

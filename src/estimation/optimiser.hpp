@@ -67,7 +67,8 @@ struct OptimiserSummary {
 };
 
 /// Minimises from p. A failed or non-finite evaluation is a step back, not an end; only a start that cannot be
-/// evaluated fails, and Nelder-Mead in a program built without NLopt.
+/// evaluated fails, and Nelder-Mead in a program built without NLopt. Where an evaluation after the start's is
+/// interrupted, the best point so far is the end. Throws Interrupted where the start's is.
 /// @param on_iteration  called after each; false stops ("interrupted")
 OptimiserSummary minimise(CostFunction& objective, const VectorX& p, const OptimiserOptions& options,
                           const std::function<bool(const Iteration&)>& on_iteration = {});

@@ -44,5 +44,18 @@ TEST(Interruption, BeforeAnEstimateTellsWhatFitsBestSoFar) {
   EXPECT_FALSE(interrupted.converged);
 }
 
+/// In the last stage, whose derivatives at the best point are there: deviations are stated.
+TEST(Interruption, WithinTheLastStageTellsTheBestPointAndItsDeviations) {
+  const RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  test::Interruption in_the_last([](const FitState& state) {
+    return state.pass.under_way && state.pass.under_way->id == StageId{StageKind::Fine, 0, 1};
+  });
+  const FitOutcome interrupted = fit({bar}, test::quick_fit_of_bar(), in_the_last.monitor());
+  ASSERT_TRUE(in_the_last.came());
+  EXPECT_TRUE(interrupted.interrupted);
+  ASSERT_TRUE(interrupted.evaluation.succeeded);
+  EXPECT_GT(interrupted.uncertainty.std.size(), 0);
+}
+
 }  // namespace
 }  // namespace pliant::interruption_test

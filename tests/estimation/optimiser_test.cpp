@@ -1,5 +1,6 @@
 #include "estimation/optimiser.hpp"
 
+#include "base/error.hpp"
 #include "estimation/fit.hpp"
 #include "support/recordings.hpp"
 #include "support/tolerance.hpp"
@@ -224,6 +225,42 @@ class BoundedQuadratic : public CostFunction {
   VectorX b_;
   ParameterSet set_;
 };
+
+/// Interrupted in the midst of an evaluation.
+class InterruptedQuadratic : public BoundedQuadratic {
+ public:
+  explicit InterruptedQuadratic(int evaluations)
+      : BoundedQuadratic(Eigen::Vector2d(4.0, 1.0).asDiagonal(), Eigen::Vector2d(2.0, 0.1)), left_(evaluations) {}
+  using BoundedQuadratic::evaluate;
+  CostEvaluation evaluate(const VectorX& x) override {
+    if (left_-- == 0) throw Interrupted();
+    return BoundedQuadratic::evaluate(x);
+  }
+
+ private:
+  int left_;
+};
+
+TEST_P(BaselineOptimiser, InterruptedInATrialEndsAtTheBestPoint) {
+  OptimiserOptions options;
+  options.kind = GetParam();
+  const Eigen::Vector2d far(-0.4, 0.9);
+  InterruptedQuadratic at_once(0);
+  EXPECT_THROW((void)minimise(at_once, far, options), Interrupted) << "there is nothing to end at";
+  for (const int evaluations : {1, 3}) {
+    InterruptedQuadratic cost(evaluations), undisturbed(-1);
+    const OptimiserSummary s = minimise(cost, far, options);
+    EXPECT_TRUE(s.interrupted);
+    EXPECT_TRUE(s.succeeded);
+    EXPECT_FALSE(s.converged);
+    EXPECT_EQ(s.reason, "interrupted");
+    EXPECT_EQ(s.evaluation.cost, undisturbed.evaluate(s.p).cost);
+    EXPECT_LE(s.evaluation.cost, s.start_cost);
+    if (evaluations > 1) {
+      EXPECT_LT(s.evaluation.cost, s.start_cost);
+    }
+  }
+}
 
 TEST(CostFunction, EvaluatesSeveralVectorsOneAfterTheOther) {
   BoundedQuadratic cost(MatrixX::Identity(2, 2), Eigen::Vector2d(1.0, 0.5));
