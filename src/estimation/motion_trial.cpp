@@ -38,6 +38,7 @@ class MotionTrial::Comparison {
     return steps * motion_.body->node_count();
   }
   bool hold_shape(const VectorX& theta) { return simulation_.hold_shape(theta).empty(); }
+  void begin_shape_from(const Comparison& other) { simulation_.begin_shape_from(other.simulation_); }
 
   CostEvaluation run(const VectorX& theta, const MatrixX& all_directions);
   /// @param theta_bar  out: the cost's derivative by theta
@@ -367,7 +368,9 @@ double MotionTrial::expected_work() const { return comparison_->expected_work();
 bool MotionTrial::hold_shape(const VectorX& theta) { return comparison_->hold_shape(theta); }
 
 std::unique_ptr<Trial> MotionTrial::anew() const {
-  return std::make_unique<MotionTrial>(comparison_->motion(), comparison_->number());
+  auto same = std::make_unique<MotionTrial>(comparison_->motion(), comparison_->number());
+  same->comparison_->begin_shape_from(*comparison_);
+  return same;
 }
 
 }  // namespace pliant

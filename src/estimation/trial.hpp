@@ -36,8 +36,8 @@ class Trial {
     return true;
   }
 
-  /// The same trial as if nothing had been run yet, for another thread; null where there can be only one. Shapes that
-  /// are held are not held in it.
+  /// The same trial as if nothing had been run yet, but for where load-free shapes are looked for first, for another
+  /// thread; null where there can be only one. Shapes that are held are not held in it.
   [[nodiscard]] virtual std::unique_ptr<Trial> anew() const { return nullptr; }
 };
 

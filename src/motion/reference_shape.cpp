@@ -19,7 +19,9 @@ constexpr double least_step = 1e-4;
 constexpr double fastest_growth =
     8.0;                           // of steps that go well, in one iteration; those that go better grow with r's fall
 constexpr double most_left = 4.0;  // of what was left to do, after one step
-constexpr double rounding = 1e-6;  // of the load: below, iterations that gain nothing have met rounding
+// Of the load, and of the body's size by which a node moves on average: below, iterations that gain nothing have met
+// rounding. Forces in slender bodies are so much larger than the load that they never get as low.
+constexpr double rounding = 1e-6, rounding_of_length = 1e-10;
 constexpr double least_share = 1e-4, least_stride = 1.0 / 40.0;  // of the load, and of what is carried already
 // Relative residuals of linear systems.
 constexpr double of_a_step = 1e-6, of_a_length = 1e-2, of_a_derivative = 1e-12;
@@ -44,6 +46,7 @@ ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std
       options_(options),
       forces_(material_.make_reference_forces(body_)),
       solver_(body_->pattern, options.solver),
+      stability_(body_->pattern, options.solver),
       turning_(body_, options.solver),
       jacobian_(body_->pattern),
       metric_(body_->pattern),
@@ -98,26 +101,10 @@ void ReferenceShapeSolver::set_jacobian() {
   constrain(jacobian_);
 }
 
-bool ReferenceShapeSolver::factorise(const BlockMatrix& matrix) {
-  system_ = &matrix;
-  is_by_lu_ = false;
-  solver_.set_positions(scan_);
-  if (solver_.factorise(matrix, metric_) && solver_.symmetric_part_is_definite()) return true;
-  return factorise_as_it_is();
-}
-
-bool ReferenceShapeSolver::factorise_as_it_is() {
-  if (!lu_) lu_ = std::make_unique<LuSolver>(body_->pattern);
-  return is_by_lu_ = lu_->factorise(*system_);
-}
-
 VectorX ReferenceShapeSolver::solve(const VectorX& b, double tolerance, GeneralSolver::Side side) {
   VectorX x;
-  if (!is_by_lu_) {
-    if (solver_.solve(b, x, tolerance, side).converged) return x;
-    if (!factorise_as_it_is()) return VectorX::Constant(b.size(), std::numeric_limits<double>::quiet_NaN());
-  }
-  return side == GeneralSolver::Side::Plain ? lu_->solve(b) : lu_->solve_transposed(b);
+  if (solver_.solve(b, x, tolerance, side).converged) return x;
+  return VectorX::Constant(b.size(), std::numeric_limits<double>::quiet_NaN());
 }
 
 Points ReferenceShapeSolver::turned_back(const Points& forces) const {
@@ -144,11 +131,12 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
   if (!set_residual(a.X, load)) return a.reason = "elements of the first guess are inside out", a;
   double r = residual_.norm();
   const bool is_newton = options_.scheme == ReferenceScheme::Newton,
-             is_virtual = options_.scheme == ReferenceScheme::VirtualForce;
+             is_virtual = options_.scheme == ReferenceScheme::VirtualForce, by_pseudo_time = !is_newton && !is_virtual;
   double step = is_newton ? std::numeric_limits<double>::infinity() : is_virtual ? options_.virtual_step : pseudo_step;
   Points velocity = Points::Zero(load.rows(), 3);
   const int blocks = body_->pattern->block_count();
-  const bool is_part = options_.by_parts && !is_newton && !is_virtual;
+  const double least_length = rounding_of_length * body_->size() * std::sqrt(double(body_->node_count()));
+  const bool is_part = options_.by_parts && by_pseudo_time;
   const int most = is_part ? std::min(options_.max_iterations, most_steps) : options_.max_iterations;
   for (;; ++a.iterations) {
     a.residual = r / scale;
@@ -171,29 +159,35 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
         metric_.multiply(flat(velocity), inertia);
         b += inertia / step;
       }
-      const bool solved = factorise(matrix_);
+      solver_.set_positions(scan_);
+      const bool solved = solver_.factorise(matrix_, GeneralSolver::Lu::Before);
       const VectorX solution = solved ? solve(b, of_a_step) : VectorX();
       if (!solved || !solution.allFinite()) {
         if (is_newton) return a.reason = "the linear system cannot be solved", a;
         continue;
       }
       const Points change = as_points(std::as_const(solution));
-      const Points X = is_newton || is_virtual ? Points(a.X + change) : moved(a.X, change);
+      const Points X = by_pseudo_time ? moved(a.X, change) : Points(a.X + change);
       const bool fits = set_residual(X, load) && forces_->least_volume_ratio() >= options_.least_volume_ratio;
       if (is_newton && !fits) return a.reason = "elements fold", a;
       // The same matrix says how far nodes would have to move now: forces of slender bodies say little of that.
       double left = 0.0;
-      if (fits && !is_newton && !is_virtual)
-        left = solve(flat(turned_back(residual_)), of_a_length).norm() / solution.norm();
+      if (fits && by_pseudo_time) left = solve(flat(turned_back(residual_)), of_a_length).norm() / solution.norm();
+      const bool is_newtons = by_pseudo_time && step >= next_step;  // about
+      const bool is_at_rounding = a.residual < rounding || (is_newtons && solution.norm() < least_length);
       if (!fits || left > most_left) {
-        if (fits && a.residual < rounding) return a.converged = true, a;
+        if (fits && is_at_rounding) return a.converged = true, a;
         continue;
       }
-      if (left > 0.3 && a.residual < rounding) return a.converged = true, a;
+      if (left > 0.3 && is_at_rounding) return a.converged = true, a;
       a.X = X;
       velocity = change / step;
-      if (!is_newton && !is_virtual) step *= left < 0.9 ? std::max(fastest_growth, 1.0 / left) : 1.0 / left;
+      if (by_pseudo_time) step *= left < 0.9 ? std::max(fastest_growth, 1.0 / left) : 1.0 / left;
       r = residual_.norm();
+      if (is_newtons && left * solution.norm() < 0.01 * least_length) {
+        a.residual = r / scale, a.least_volume_ratio = forces_->least_volume_ratio();
+        return a.converged = true, a;
+      }
       break;
     }
   }
@@ -208,8 +202,7 @@ bool ReferenceShapeSolver::holds_still(const VectorX& theta, const Points& X) {
   elasticity->add_matrix(1.0, matrix_);
   elasticity->add_lag_matrix(scan_, 1.0, matrix_);
   constrain(matrix_);
-  GeneralSolver general(body_->pattern, options_.solver);
-  return general.factorise(matrix_, metric_) && general.symmetric_part_is_definite();
+  return stability_.factorise(matrix_, metric_) && stability_.symmetric_part_is_definite();
 }
 
 ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& load, const Points* guess) {
@@ -247,8 +240,10 @@ ReferenceShape ReferenceShapeSolver::find(const VectorX& theta, const Points& lo
   while (const auto share = steps.next()) {
     const bool is_whole = shape.X.rows() == 0;
     const double done = steps.carried();
-    Attempt part = try_share(*share, is_whole && guess ? *guess : from, *share < 2.0 * done ? next_step : first_step);
-    if (is_whole && guess && !part.converged) part = try_share(*share, scan);
+    const bool has_guess = is_whole && guess;
+    const double pseudo_step = has_guess || *share < 2.0 * done ? next_step : first_step;
+    Attempt part = try_share(*share, has_guess ? *guess : from, pseudo_step);
+    if (has_guess && !part.converged) part = try_share(*share, scan);
     if (part.converged || is_whole) take(part, part.converged ? *share : 0.0);
     if (part.converged) from = part.X;
     if (!part.converged) shape.reason = part.reason;
@@ -269,7 +264,8 @@ bool ReferenceShapeSolver::prepare_derivatives(const VectorX& theta, const Point
   if (!forces_->linearise(X, scan_)) return false;
   set_turns();
   set_jacobian();
-  return factorise(jacobian_);
+  solver_.set_positions(scan_);
+  return solver_.factorise(jacobian_);
 }
 
 Points ReferenceShapeSolver::tangent(const Points& d_force) {

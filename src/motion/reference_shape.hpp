@@ -8,7 +8,6 @@
 #include "motion/body_forces.hpp"
 #include "motion/rotation_strain_step.hpp"
 #include "solvers/general_solver.hpp"
-#include "solvers/lu_solver.hpp"
 
 namespace pliant {
 
@@ -95,11 +94,7 @@ class ReferenceShapeSolver {
   /// which df/dX itself is not where parts have turned.
   void set_turns();
   void set_jacobian();
-  /// Makes ready for solves with a matrix that is nearly symmetric, to be kept while they go on: iterations about the
-  /// factors of its symmetric part, or its own factors where that is indefinite. False where it is singular.
-  [[nodiscard]] bool factorise(const BlockMatrix& matrix);
-  [[nodiscard]] bool factorise_as_it_is();
-  /// By the factors of the matrix itself where iterations do not get to the tolerance.
+  /// Of the system that was factorised.
   /// @param tolerance  of |b - A x| / |b|
   VectorX solve(const VectorX& b, double tolerance, GeneralSolver::Side side = GeneralSolver::Side::Plain);
   Points turned_back(const Points& forces) const;
@@ -114,10 +109,7 @@ class ReferenceShapeSolver {
   Points scan_;
   ReferenceShapeOptions options_;
   std::unique_ptr<ReferenceForces> forces_;
-  GeneralSolver solver_;
-  std::unique_ptr<LuSolver> lu_;         // made where it is asked for
-  const BlockMatrix* system_ = nullptr;  // to be solved with
-  bool is_by_lu_ = false;                // and has factors of its own
+  GeneralSolver solver_, stability_;
   RotationStrainStep turning_;
   BlockMatrix jacobian_, metric_, matrix_;  // metric: what resists a step of pseudo-time
   std::vector<Matrix3> turn_;               // of each node

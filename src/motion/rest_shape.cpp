@@ -98,7 +98,6 @@ Points RestShape::scan_tangent(const VectorX& d_theta) const {
 
 std::string RestShape::find(const VectorX& theta) {
   if (theta_.size() == theta.size() && !changes_any(depends_on_, theta - theta_)) return {};
-  const bool first = theta_.size() == 0;
   theta_.resize(0);
   has_derivatives_ = false;
   const Points scan = body_->scanned_positions() + scan_tangent(theta);
@@ -110,7 +109,7 @@ std::string RestShape::find(const VectorX& theta) {
       term->set_parameters(theta);
       term->add_force(scan, load);
     }
-    const ReferenceShape shape = solver_->find(theta, load, first ? nullptr : &free_->reference_positions());
+    const ReferenceShape shape = solver_->find(theta, load, nearby_ ? &nearby_->reference_positions() : nullptr);
     if (!shape.found) return "the object as it was scanned cannot be held up: " + shape.reason;
     X = shape.X;
   }
@@ -119,6 +118,7 @@ std::string RestShape::find(const VectorX& theta) {
   } catch (const std::invalid_argument&) {
     return "the corrected scan has elements inside out";
   }
+  nearby_ = free_;
   scan_ = scan;
   theta_ = theta;
   return {};

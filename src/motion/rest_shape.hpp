@@ -38,9 +38,11 @@ class RestShape {
             const std::vector<PointMass>& weights, MatrixX basis, const MotionBlocks& blocks,
             const BodyMaterial& material);
 
-  /// Finds them for theta, from those found before; at once where nothing that they depend on has changed. Empty, or
+  /// Finds them for theta, from those found last; at once where nothing that they depend on has changed. Empty, or
   /// why there are none.
   [[nodiscard]] std::string find(const VectorX& theta);
+  /// Looks for them from those that another of the same body found last.
+  void begin_from(const RestShape& other) { nearby_ = other.nearby_; }
   const Points& scan() const { return scan_; }  ///< n x 3 [m]
   /// The body, stress-free where it was found to be.
   const std::shared_ptr<const Body>& body() const { return free_; }
@@ -55,6 +57,7 @@ class RestShape {
 
  private:
   std::shared_ptr<const Body> body_, free_;
+  std::shared_ptr<const Body> nearby_;  // found last, for another theta; none yet: null
   std::vector<int> held_;
   bool sags_;
   MatrixX basis_;

@@ -213,6 +213,10 @@ std::shared_ptr<const Body> Simulation::rest_body(const VectorX& parameters) {
   return shape_ ? shape_->body() : reference_body_ ? reference_body_ : body_;
 }
 
+void Simulation::begin_shape_from(const Simulation& other) {
+  if (shape_ && other.shape_) shape_->begin_from(*other.shape_);
+}
+
 std::string Simulation::hold_shape(const VectorX& parameters) {
   shape_is_held_ = false;
   RolloutSummary summary;

@@ -97,6 +97,9 @@ class Simulation {
   /// too. Returns why it cannot, or nothing.
   [[nodiscard]] std::string hold_shape(const VectorX& theta);
 
+  /// Looks for load-free shapes from that which another simulation of the same body and options found last.
+  void begin_shape_from(const Simulation& other);
+
   /// The body with its load-free shape for theta; the given one where theta does not say, or there is none.
   std::shared_ptr<const Body> rest_body(const VectorX& theta);
 

@@ -8,6 +8,7 @@ namespace pliant {
 
 namespace {
 constexpr int most_iterations = 60;
+constexpr int most_about_others = 10;  // by LU factors of another matrix: more take about as long as factors anew
 }  // namespace
 
 GeneralSolver::GeneralSolver(std::shared_ptr<const BlockPattern> pattern, SolverKind kind)
@@ -19,14 +20,39 @@ GeneralSolver::GeneralSolver(std::shared_ptr<const BlockPattern> pattern, Solver
       transposed_block_.push_back(pattern_->find(pattern_->column[b], row));
 }
 
-bool GeneralSolver::factorise(const BlockMatrix& matrix, const BlockMatrix& substitute) {
+void GeneralSolver::take(const BlockMatrix& matrix) {
   matrix_ = matrix;
   for (int b = 0; b < pattern_->block_count(); ++b) {
     const Eigen::Map<const Matrix3> block(matrix.block(b)), mirror(matrix.block(transposed_block_[std::size_t(b)]));
     Eigen::Map<Matrix3>(symmetric_.block(b)) = 0.5 * (block + mirror.transpose());
   }
+}
+
+bool GeneralSolver::factorise(const BlockMatrix& matrix, const BlockMatrix& substitute) {
+  take(matrix);
+  has_substitute_ = true;
+  goes_by_lu_ = false;
   is_definite_ = factor_->factorise(symmetric_);
   return is_definite_ || factor_->factorise(substitute);
+}
+
+bool GeneralSolver::factorise(const BlockMatrix& matrix, Lu lu) {
+  take(matrix);
+  has_substitute_ = false;
+  if (!goes_by_lu_ || lu == Lu::Own) return factorise_itself();
+  lu_is_own_ = false;
+  return true;
+}
+
+bool GeneralSolver::factorise_itself() {
+  goes_by_lu_ = false;
+  is_definite_ = factor_->factorise(symmetric_);
+  return is_definite_ || factorise_by_lu();
+}
+
+bool GeneralSolver::factorise_by_lu() {
+  if (!lu_) lu_ = std::make_unique<LuSolver>(pattern_);
+  return goes_by_lu_ = lu_is_own_ = lu_->factorise(matrix_);
 }
 
 void GeneralSolver::transpose() {
@@ -46,24 +72,41 @@ void GeneralSolver::precondition(const VectorX& b, VectorX& x) const {
 }
 
 SolveSummary GeneralSolver::solve(const VectorX& b, VectorX& x, double tolerance, Side side) {
+  if (goes_by_lu_ && lu_is_own_) {
+    x = side == Side::Plain ? lu_->solve(b) : lu_->solve_transposed(b);
+    return {x.allFinite(), 0, 0.0};
+  }
+  const SolveSummary summary = iterate(b, x, tolerance, side);
+  if (summary.converged || has_substitute_) return summary;
+  const bool is_factorised = goes_by_lu_ ? factorise_itself() : factorise_by_lu();
+  return is_factorised ? solve(b, x, tolerance, side) : summary;
+}
+
+SolveSummary GeneralSolver::iterate(const VectorX& b, VectorX& x, double tolerance, Side side) {
   const Eigen::Index n = b.size();
+  const int most = goes_by_lu_ ? most_about_others : most_iterations;
   x.setZero(n);
   const double scale = b.norm();
   if (!(scale > 0.0)) return {scale == 0.0, 0, 0.0};
   if (side == Side::Transposed) transpose();  // for the while
 
-  basis_.resize(n, most_iterations + 1);
-  preconditioned_.resize(n, most_iterations);
-  MatrixX R = MatrixX::Zero(most_iterations + 1, most_iterations);
-  VectorX residual = VectorX::Zero(most_iterations + 1);
+  basis_.resize(n, most + 1);
+  preconditioned_.resize(n, most);
+  MatrixX R = MatrixX::Zero(most + 1, most);
+  VectorX residual = VectorX::Zero(most + 1);
   std::vector<Eigen::JacobiRotation<double>> rotations;
   basis_.col(0) = b / scale;
   residual[0] = scale;
   SolveSummary summary;
   int k = 0;
-  while (k < most_iterations && std::abs(residual[k]) > tolerance * scale) {
-    guess_.setZero(n);
-    factor_->solve(basis_.col(k), guess_);
+  while (k < most && std::abs(residual[k]) > tolerance * scale) {
+    if (goes_by_lu_) {
+      guess_ = side == Side::Plain ? lu_->solve(basis_.col(k), LuSolver::Refined::No)
+                                   : lu_->solve_transposed(basis_.col(k), LuSolver::Refined::No);
+    } else {
+      guess_.setZero(n);
+      factor_->solve(basis_.col(k), guess_);
+    }
     preconditioned_.col(k) = guess_;
     matrix_.multiply(guess_, product_);
     for (int pass = 0; pass < 2; ++pass)  // orthogonalised twice: once loses digits

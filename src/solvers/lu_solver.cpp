@@ -34,6 +34,8 @@ Eigen::SparseMatrix<double> transposed_of(const BlockPattern& pattern) {
 struct LuSolver::Factors {
   explicit Factors(std::shared_ptr<const BlockPattern> p) : pattern(std::move(p)), transposed(transposed_of(*pattern)) {
     umfpack_di_defaults(control);
+    umfpack_di_defaults(without_refinement);
+    without_refinement[UMFPACK_IRSTEP] = 0;
     umfpack_di_symbolic(size(), size(), transposed.outerIndexPtr(), transposed.innerIndexPtr(), transposed.valuePtr(),
                         &symbolic, control, nullptr);
   }
@@ -49,17 +51,18 @@ struct LuSolver::Factors {
     return umfpack_di_numeric(transposed.outerIndexPtr(), transposed.innerIndexPtr(), transposed.valuePtr(), symbolic,
                               &numeric, control, nullptr) == UMFPACK_OK;
   }
-  VectorX solve(const VectorX& b, bool of_transposed) const {
+  VectorX solve(const VectorX& b, bool of_transposed, Refined refined) const {
     VectorX x(b.size());
+    const double* how = refined == Refined::Yes ? control : without_refinement;
     // What is stored is the transpose already.
     umfpack_di_solve(of_transposed ? UMFPACK_A : UMFPACK_At, transposed.outerIndexPtr(), transposed.innerIndexPtr(),
-                     transposed.valuePtr(), x.data(), b.data(), numeric, control, nullptr);
+                     transposed.valuePtr(), x.data(), b.data(), numeric, how, nullptr);
     return x;
   }
 
   std::shared_ptr<const BlockPattern> pattern;
   Eigen::SparseMatrix<double> transposed;
-  double control[UMFPACK_CONTROL] = {};
+  double control[UMFPACK_CONTROL] = {}, without_refinement[UMFPACK_CONTROL] = {};
   void *symbolic = nullptr, *numeric = nullptr;
 };
 
@@ -75,7 +78,7 @@ struct LuSolver::Factors {
     other.factorize(transposed);
     return plain.info() == Eigen::Success && other.info() == Eigen::Success;
   }
-  VectorX solve(const VectorX& b, bool of_transposed) const {
+  VectorX solve(const VectorX& b, bool of_transposed, Refined) const {
     return of_transposed ? VectorX(other.solve(b)) : VectorX(plain.solve(b));
   }
 
@@ -101,7 +104,9 @@ bool LuSolver::factorise(const BlockMatrix& matrix) {
   return factors_->factorise();
 }
 
-VectorX LuSolver::solve(const VectorX& b) const { return factors_->solve(b, false); }
-VectorX LuSolver::solve_transposed(const VectorX& b) const { return factors_->solve(b, true); }
+VectorX LuSolver::solve(const VectorX& b, Refined refined) const { return factors_->solve(b, false, refined); }
+VectorX LuSolver::solve_transposed(const VectorX& b, Refined refined) const {
+  return factors_->solve(b, true, refined);
+}
 
 }  // namespace pliant

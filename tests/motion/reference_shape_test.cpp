@@ -142,6 +142,23 @@ TEST(ReferenceShape, WhatNothingHoldsIsRefused) {
   EXPECT_THROW(ReferenceShapeSolver(scene.scanned, {}, scene.layout), InputError);
 }
 
+/// So stiff that rounding in its own forces is more than a millionth of its weight: what they move is told apart.
+TEST(ReferenceShape, ThatRoundingAloneKeepsFromBalanceIsFound) {
+  const Sagging scene(true, 1e15);
+  ReferenceShapeSolver solver(scene.scanned, scene.held, scene.layout);
+  const Points load = scan_load(*scene.scanned, scene.layout, scene.theta, {});
+  const ReferenceShape first = solver.find(scene.theta, load);
+  ASSERT_TRUE(first.found) << first.reason;
+  EXPECT_GT(first.residual, 1e-6) << "or this shows nothing";
+  EXPECT_LT(first.iterations, 12);
+  EXPECT_LT((first.X - scene.straight).rowwise().norm().maxCoeff(), 1e-9 * length);
+  VectorX other = scene.theta;
+  other[scene.layout.youngs_moduli[0]] *= 0.5;
+  const ReferenceShape from_first = solver.find(other, load, &first.X);
+  ASSERT_TRUE(from_first.found) << from_first.reason;
+  EXPECT_LT(from_first.iterations, 12);
+}
+
 /// The rivals find the same shape where they find one.
 TEST(ReferenceShape, OtherSchemesAgree) {
   const Sagging scene(false, 3e6);

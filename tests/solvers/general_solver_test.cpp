@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <cmath>
 #include <random>
 
 #include "solvers/lu_solver.hpp"
@@ -71,6 +72,52 @@ TEST_P(General, TakesTheSubstituteWhereTheMatrixIsIndefinite) {
   VectorX x;
   ASSERT_TRUE(solver.solve(b, x, 1e-10).converged);
   EXPECT_LT((A * x - b).norm(), tolerance(1e-9) * b.norm());
+}
+
+/// An indefinite matrix, one nearby, and one that is far from both: the factors of the first serve the second.
+TEST_P(General, TakesLuFactorsOfAMatrixBeforeAsLongAsTheyServe) {
+  const Chain first(0.3, 2.0), far(0.1, 3.5);
+  Chain nearby(0.3, 2.0);
+  for (int b = 0; b < nearby.pattern->block_count(); ++b)
+    for (int k = 0; k < 9; ++k) nearby.matrix.block(b)[k] *= 1.0 + 1e-3 * std::sin(7.0 * k + b);
+  GeneralSolver solver(first.pattern, GetParam());
+  VectorX x;
+  for (const Chain* chain : std::initializer_list<const Chain*>{&first, &nearby, &far}) {
+    ASSERT_TRUE(solver.factorise(chain->matrix, GeneralSolver::Lu::Before));
+    EXPECT_FALSE(solver.symmetric_part_is_definite());
+    const MatrixX A = test::dense(chain->matrix);
+    const VectorX b = VectorX::Random(A.rows());
+    const SolveSummary plain = solver.solve(b, x, 1e-12);
+    ASSERT_TRUE(plain.converged);
+    EXPECT_LT((A * x - b).norm(), tolerance(1e-10) * b.norm());
+    if (chain == &nearby) {
+      EXPECT_GT(plain.iterations, 0) << "about other factors";
+    } else {
+      EXPECT_EQ(plain.iterations, 0) << "by its own factors";
+    }
+    ASSERT_TRUE(solver.solve(b, x, 1e-12, GeneralSolver::Side::Transposed).converged);
+    EXPECT_LT((A.transpose() * x - b).norm(), tolerance(1e-10) * b.norm());
+  }
+  ASSERT_TRUE(solver.factorise(nearby.matrix));
+  EXPECT_EQ(solver.solve(VectorX::Ones(90), x, 1e-12).iterations, 0) << "its own factors, where they are asked for";
+}
+
+/// Definite, but so far from symmetric that iterations about the symmetric part do not end.
+TEST_P(General, TakesLuFactorsWhereIterationsDoNotEnd) {
+  Chain chain(0.0);
+  for (int row = 0; row < chain.pattern->rows; ++row)
+    for (int b = chain.pattern->row_start[row]; b < chain.pattern->row_start[row + 1]; ++b)
+      for (int k = 0; k < 9; ++k)
+        if (const int column = chain.pattern->column[b]; column != row)
+          chain.matrix.block(b)[k] += (column > row ? 40.0 : -40.0) * double(k % 4 == 0);
+  GeneralSolver solver(chain.pattern, GetParam());
+  ASSERT_TRUE(solver.factorise(chain.matrix));
+  EXPECT_TRUE(solver.symmetric_part_is_definite());
+  const MatrixX A = test::dense(chain.matrix);
+  const VectorX b = VectorX::Random(A.rows());
+  VectorX x;
+  ASSERT_TRUE(solver.solve(b, x, 1e-14).converged);
+  EXPECT_LT((A * x - b).norm(), tolerance(1e-10) * b.norm());
 }
 
 TEST_P(General, NothingOnTheRightIsNothing) {
