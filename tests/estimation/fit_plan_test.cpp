@@ -94,6 +94,8 @@ TEST_F(Plans, BeginWithTheMotionAtTheStart) {
   EXPECT_EQ(chains[0][0].from.front(), facts.parameters.reference());
   EXPECT_TRUE(chains[0][1].from.empty()) << "from where the one before ends";
   EXPECT_GT(chains[0][1].horizon.part, chains[0][0].horizon.part);
+  EXPECT_TRUE(chains[0][0].by_pose) << "where points were registered, before the surface that is nearest";
+  EXPECT_FALSE(chains[0][1].by_pose);
 }
 
 TEST_F(Plans, EndWithAlternativeModelsAtTheFinestEstimate) {
