@@ -81,6 +81,8 @@ def fit(program, capture, out, choices=None, threads=None, limit=None, more=()):
     else:
         figures = run(program, *words, allowed=(0, 3) if limit is None else (0, 3, INTERRUPTED), limit=limit)
         (out / "figures.json").write_text(json.dumps(figures))
+    if not (out / "result.json").exists():  # the log says why
+        raise SystemExit(f"{out}: " + (out / "log.txt").read_text().strip().splitlines()[-1])
     figures["result"] = read(out / "result.json")
     with open(out / "convergence.csv", newline="") as file:
         rows = list(csv.DictReader(file))
