@@ -187,6 +187,7 @@ class LawRun : StageLoop {
         if (!task.is_brief) keep_under_way(stage, i.state());
         return !(is_cut = is_cut || is_interrupted());
       });
+      is_cut = is_cut || done.interrupted;
       if (round > 0 && !done.succeeded) break;  // the first round stands
       s = done;
       objective.emplace(std::move(*next));
@@ -265,7 +266,8 @@ class LawRun : StageLoop {
     OptimiserOptions o;
     o.max_iterations = stage.iterations;
     const OptimiserSummary s = minimise(objective.cost(), {0, form.parameters.to_unconstrained(record.from), {}}, o,
-                                        [&](const Iteration&) { return !(is_cut = is_cut || is_interrupted()); });
+                                        [&](const Iteration&) { return !is_interrupted(); });
+    is_cut = s.interrupted;
     record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
     record.iterations = s.iterations;
     if (s.succeeded) record.theta = form.parameters.to_theta(s.p), record.cost = s.evaluation.cost;
