@@ -29,13 +29,14 @@ PLACED = {"foot": [0.0, 0.0, 0.0], "low joint": [0.011, 0.114, 0.002], "middle j
 # Of the stem, which is so thick there: what is farther from the line through its foot and joints is a leaf's.
 STEM_RADIUS = 0.014
 STEM, LEAVES = ["foot", "low joint", "middle joint", "top joint"], ["low leaf", "middle leaf", "top leaf"]
+LAST_HELD = 4  # frame in which the twin is let go: twin.py's start_frame
 # name: (capture, choices)
 FITS = {
     "no-choice": ("plant", {}),
     "auto": ("plant", {"control_points": "auto"}),
     "placed": ("placed", {}),
     "together": ("plant", {"tracking": "both"}),
-    # Of the first 50 frames, which a laptop fits while one waits.
+    # Of the first 50 frames: a fifth of the steps.
     "placed-beginning": ("placed", {"span": 0.2}),
     "painted-beginning": ("painted", {"span": 0.2}),
     "loop-auto": ("plant", {"tracking": "loop", "control_points": "auto"}),
@@ -213,7 +214,7 @@ def registered(program, recording, work):
     if not (out / "points.csv").exists():
         common.run(program, "track", capture, "--out", out, "--points", points, "--no-pictures")
     with open(out / "points.csv", newline="") as file:
-        there = {int(row["id"]): tuple(float(row[c]) for c in "xyz") for row in csv.DictReader(file) if row["frame"] == "4"}
+        there = {int(row["id"]): tuple(float(row[c]) for c in "xyz") for row in csv.DictReader(file) if row["frame"] == str(LAST_HELD)}
     off, way = sorted(math.dist(there[i], pulled[i]) for i in followed), [math.dist(scan[i], pulled[i]) for i in followed]
     rms = lambda values: math.sqrt(sum(v * v for v in values) / len(values))
     return {"points": len(off), "rms": common.number(rms(off), 3), "median": common.number(off[len(off) // 2], 3), "greatest": common.number(off[-1], 3),

@@ -109,7 +109,8 @@ std::string RestShape::find(const VectorX& theta) {
       term->set_parameters(theta);
       term->add_force(scan, load);
     }
-    const ReferenceShape shape = solver_->find(theta, load, nearby_ ? &nearby_->reference_positions() : nullptr);
+    const ReferenceShape shape =
+        solver_->find(theta, load, last_found_ ? &last_found_->reference_positions() : nullptr);
     if (!shape.found) return "the object as it was scanned cannot be held up: " + shape.reason;
     X = shape.X;
   }
@@ -118,7 +119,7 @@ std::string RestShape::find(const VectorX& theta) {
   } catch (const std::invalid_argument&) {
     return "the corrected scan has elements inside out";
   }
-  nearby_ = free_;
+  last_found_ = free_;
   scan_ = scan;
   theta_ = theta;
   return {};

@@ -42,7 +42,7 @@ class RestShape {
   /// why there are none.
   [[nodiscard]] std::string find(const VectorX& theta);
   /// Looks for them from those that another of the same body found last.
-  void begin_from(const RestShape& other) { nearby_ = other.nearby_; }
+  void begin_from(const RestShape& other) { last_found_ = other.last_found_; }
   const Points& scan() const { return scan_; }  ///< n x 3 [m]
   /// The body, stress-free where it was found to be.
   const std::shared_ptr<const Body>& body() const { return free_; }
@@ -57,7 +57,7 @@ class RestShape {
 
  private:
   std::shared_ptr<const Body> body_, free_;
-  std::shared_ptr<const Body> nearby_;  // found last, for another theta; none yet: null
+  std::shared_ptr<const Body> last_found_;  // null: none yet
   std::vector<int> held_;
   bool sags_;
   MatrixX basis_;
