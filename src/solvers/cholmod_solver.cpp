@@ -4,10 +4,10 @@
 
 #ifdef PLIANT_WITH_CHOLMOD
 #include <cholmod.h>
-#include <dlfcn.h>
 
 #include <algorithm>
-#include <mutex>
+
+#include "solvers/blas.hpp"
 #endif
 
 namespace pliant {
@@ -16,25 +16,10 @@ namespace pliant {
 
 namespace {
 
-/// CHOLMOD as packaged opens its supernodal loops with four OpenMP threads whatever the machine has, which costs a
-/// multiple of the factorisation itself at our sizes. Its OpenMP runtime, where one is loaded, is told to stay serial.
-void keep_cholmod_serial() {
-  using Setter = void (*)(int);
-  static const auto set = reinterpret_cast<Setter>(::dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
-  if (set) set(0);
-}
-
-/// Recordings are simulated side by side, and not every BLAS that CHOLMOD calls may be called by two threads at once:
-/// OpenBLAS in its build without threads then now and then finds a good matrix indefinite.
-std::mutex& blas() {
-  static std::mutex mutex;
-  return mutex;
-}
-
 class CholmodSolver : public LinearSolver {
  public:
   explicit CholmodSolver(std::shared_ptr<const BlockPattern> pattern) : pattern_(std::move(pattern)) {
-    keep_cholmod_serial();
+    const BlasCall blas;
     cholmod_start(&common_);
     common_.supernodal = CHOLMOD_SUPERNODAL;
     common_.print = 0;
@@ -53,10 +38,9 @@ class CholmodSolver : public LinearSolver {
   CholmodSolver& operator=(const CholmodSolver&) = delete;
 
   [[nodiscard]] bool factorise(const BlockMatrix& matrix) override {
-    keep_cholmod_serial();
     auto* values = static_cast<double*>(matrix_->x);
     for (std::size_t k = 0; k < source_.size(); ++k) values[k] = matrix.block(0)[source_[k]];
-    const std::lock_guard lock(blas());
+    const BlasCall blas;
     return cholmod_factorize(matrix_, factor_, &common_) && common_.status == CHOLMOD_OK;
   }
 
@@ -76,7 +60,6 @@ class CholmodSolver : public LinearSolver {
   /// @param x  out: as large as B, columns one after the other
   template <class Dense>
   SolveSummary solve_dense(const Dense& B, double* x) {
-    keep_cholmod_serial();
     cholmod_dense rhs{};
     rhs.nrow = rhs.d = std::size_t(B.rows());
     rhs.ncol = std::size_t(B.cols());
@@ -84,7 +67,7 @@ class CholmodSolver : public LinearSolver {
     rhs.x = const_cast<double*>(B.data());
     rhs.xtype = CHOLMOD_REAL;
     rhs.dtype = CHOLMOD_DOUBLE;
-    const std::lock_guard lock(blas());
+    const BlasCall blas;
     const bool done =
         cholmod_solve2(CHOLMOD_A, factor_, &rhs, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_);
     if (done) std::copy_n(static_cast<const double*>(solution_->x), B.size(), x);

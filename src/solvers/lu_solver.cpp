@@ -8,6 +8,8 @@
 #endif
 #include <utility>
 
+#include "solvers/blas.hpp"
+
 namespace pliant {
 
 namespace {
@@ -47,12 +49,14 @@ struct LuSolver::Factors {
   Factors& operator=(const Factors&) = delete;
   int size() const { return int(transposed.rows()); }
   bool factorise() {
+    const BlasCall blas;
     umfpack_di_free_numeric(&numeric);
     return umfpack_di_numeric(transposed.outerIndexPtr(), transposed.innerIndexPtr(), transposed.valuePtr(), symbolic,
                               &numeric, control, nullptr) == UMFPACK_OK;
   }
   VectorX solve(const VectorX& b, bool of_transposed, Refined refined) const {
     VectorX x(b.size());
+    const BlasCall blas;
     const double* how = refined == Refined::Yes ? control : without_refinement;
     // What is stored is the transpose already.
     umfpack_di_solve(of_transposed ? UMFPACK_A : UMFPACK_At, transposed.outerIndexPtr(), transposed.innerIndexPtr(),
