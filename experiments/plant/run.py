@@ -23,12 +23,12 @@ IMAGE = common.ROOT / "docs/images/plant.png"
 TITLES = {"auto": "control points by evidence", "placed": "control points placed", "together": "tracking and points"}
 REST_MODULUS, REST_CELLS = 4.5e6, (12, 24, 40, 64)
 NAMES = ["poisson_ratio", "mass_damping", "stiffness_damping"]
-# Where one who looks at the scan would place control points: at the stem's foot and joints, and on each leaf, a third of its length out.
+# Where one who looks at the scan would place control points: at the foot, joints and tip of the stem, and on each leaf, a third of its length out.
 PLACED = {"foot": [0.0, 0.0, 0.0], "low joint": [0.011, 0.114, 0.002], "middle joint": [0.023, 0.190, 0.004], "top joint": [0.036, 0.260, 0.007],
-          "low leaf": [-0.032, 0.126, 0.023], "middle leaf": [0.056, 0.211, 0.031], "top leaf": [0.044, 0.289, -0.024]}
+          "tip": [0.045, 0.300, 0.008], "low leaf": [-0.032, 0.126, 0.023], "middle leaf": [0.056, 0.211, 0.031], "top leaf": [0.044, 0.289, -0.024]}
 # Of the stem, which is so thick there: what is farther from the line through its foot and joints is a leaf's.
 STEM_RADIUS = 0.014
-STEM, LEAVES = ["foot", "low joint", "middle joint", "top joint"], ["low leaf", "middle leaf", "top leaf"]
+STEM, LEAVES = ["foot", "low joint", "middle joint", "top joint", "tip"], ["low leaf", "middle leaf", "top leaf"]
 LAST_HELD = 4  # frame in which the twin is let go: twin.py's start_frame
 # name: (capture, choices)
 FITS = {

@@ -160,7 +160,7 @@ class Writer {
 void write_capture(const fs::path& folder, const Capture& capture, const std::string& comment) {
   const fs::path place = (fs::absolute(folder) / "").lexically_normal().parent_path();
   Capture written = capture;
-  written.scene.initial.pulls.clear();  // of models alone
+  written.scene.initial.pulls.clear(), written.scene.initial.pulled_at.clear();  // of models alone
   if (const auto& surface = capture.scene.object.surface; surface && capture.scene.object.file.empty()) {
     written.scene.object.file = place / "rest.ply";
     written.scene.object.volume.reset();

@@ -72,8 +72,14 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
   const bool has_presses =
       std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
   const auto stops = [&] { return monitor.agrees_to_stop(); };
-  for (RecordedCapture& r : recordings) r.pose = registered_pose(r, options, stops);
-  if (held_out) held_out->pose = registered_pose(*held_out, options, stops);
+  const auto look_before_release = [&](RecordedCapture& r) {
+    const std::optional<RegisteredPose> found = registered_pose(r, options, stops);
+    if (!found) return;
+    r.pose = found->points;
+    r.capture.scene.initial.pulled_at = found->pulled_at;
+  };
+  for (RecordedCapture& r : recordings) look_before_release(r);
+  if (held_out) look_before_release(*held_out);
   FitOutcome outcome = carry_out(*planner_of(std::move(recordings), options, monitor, std::move(resume)), monitor);
   for (std::string& note : unused_choices(options, true, has_presses)) outcome.notes.push_back(std::move(note));
   if (held_out && outcome.evaluation.succeeded && !outcome.interrupted) {

@@ -69,7 +69,7 @@ struct FitOptions {
   /// Left out: hexahedra, or quadratic tetrahedra where it follows from the fit where the object is stress-free.
   std::optional<ElementKind> element;
   Integrator integrator = Integrator::Lagged;
-  int pull_points = 4;  ///< that hold a released object until it is let go, 1..50
+  int pull_points = 4;  ///< that hold a released object until it is let go, at most, 1..50; see `pull_places`
   TrackingUse tracking = TrackingUse::Off;
   int tracking_rounds = 3;  ///< of tracking and estimation in turns, at most, 1..10
   LoadFreeScheme load_free = LoadFreeScheme::Monolithic;

@@ -224,7 +224,9 @@ const std::vector<Entry>& entries() {
                    "time integration: rotations predicted (semi-implicit), or fully implicit by Newton's method",
                    integrators, &FitOptions::integrator),
       integer_entry("pull_points", "1..50",
-                    "application points of the unknown loads that hold a released object before its release",
+                    "application points of the unknown loads that hold a released object before its release, at most: "
+                    "as few as its "
+                    "registered pose asks for",
                     &FitOptions::pull_points),
       control_points_entry(),
       real_entry("modulus_variation", "", "0..10",

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "estimation/pull_places.hpp"
 #include "motion/linear_statics.hpp"
 
 namespace pliant {
@@ -68,8 +69,8 @@ TrackedPoints supported_points(const Track& track, double size) {
   return tracked;
 }
 
-std::optional<TrackedPoints> registered_pose(const RecordedCapture& recorded, const FitOptions& options,
-                                             const std::function<bool()>& interrupted) {
+std::optional<RegisteredPose> registered_pose(const RecordedCapture& recorded, const FitOptions& options,
+                                              const std::function<bool()>& interrupted) {
   const Scene& scene = recorded.capture.scene;
   const int last = scene.timing.start_frame;
   const bool is_seen = std::ranges::any_of(
@@ -82,9 +83,12 @@ std::optional<TrackedPoints> registered_pose(const RecordedCapture& recorded, co
     const FollowedRecording held(recorded, options, ignored);
     const Track found =
         held.follow(held.start(), [&](int done, int) { return done <= last && !(interrupted && interrupted()); });
-    TrackedPoints pose = supported_points(found, held.recording().size);
-    std::erase_if(pose.frames, [&](const auto& frame) { return frame.first != last; });
-    if (!pose.frames.empty()) return pose;
+    RegisteredPose pose{supported_points(found, held.recording().size)};
+    std::erase_if(pose.points.frames, [&](const auto& frame) { return frame.first != last; });
+    if (pose.points.frames.empty()) return std::nullopt;
+    const auto there = std::ranges::find(found.frames, last, &TrackedFrame::frame);
+    pose.pulled_at = pull_places(held, found, *there, pose.points.frames.begin()->second, options.pull_points);
+    return pose;
   } catch (const InputError&) {  // of a recording that cannot be tracked: its surface tells where it was held
   }
   return std::nullopt;

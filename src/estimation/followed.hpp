@@ -23,6 +23,7 @@ class FollowedRecording {
   /// what is too stiff is drawn to where it was seen.
   const VectorX& start() const { return start_; }
   const Recording& recording() const { return recordings_.front(); }
+  const Discretisation& discretisation() const { return grid_.recording.front(); }
   /// Where a parameter vector of this recording alone has its Young's moduli and Poisson's ratio.
   const MaterialBlocks& material() const { return recordings_.material(); }
   /// @param theta     of this recording
@@ -41,12 +42,18 @@ class FollowedRecording {
 /// Points of a track's surface where and when it was supported by what was seen.
 TrackedPoints supported_points(const Track& track, double size);
 
-/// The pose from which an object is released: points of its surface where the tracker registered it in the frames in
-/// which it was held, from as scanned. It may lie as far from the scan as the object is large, where the nearest
-/// surface of what was seen is that of another part; it is no more than where to look for what held the object. None
-/// where nothing is released or seen, where markers are followed or a known weight held it, and where it is not found.
+/// The pose from which an object is released, and where it is held in it.
+struct RegisteredPose {
+  TrackedPoints points;                 ///< of its surface, in the last frame in which it was held
+  std::vector<Vector3> pulled_at = {};  ///< places [m], in the scan, see `pull_places`; none: not known
+};
+
+/// That pose where the tracker registered it in the frames in which the object was held, from as scanned. It may lie as
+/// far from the scan as the object is large, where the nearest surface of what was seen is that of another part; it is
+/// no more than where to look for what held the object. None where nothing is released or seen, where markers are
+/// followed or a known weight held it, and where it is not found.
 /// @param interrupted  asked on the way; may be empty
-std::optional<TrackedPoints> registered_pose(const RecordedCapture& recorded, const FitOptions& options,
-                                             const std::function<bool()>& interrupted = {});
+std::optional<RegisteredPose> registered_pose(const RecordedCapture& recorded, const FitOptions& options,
+                                              const std::function<bool()>& interrupted = {});
 
 }  // namespace pliant

@@ -114,7 +114,7 @@ LiveData live_data(const Model& model) {
   Model free = model;
   free.scene.inner.clear();  // what they hold is among the held nodes
   free.scene.initial.released = false;
-  free.scene.initial.release_of.reset(), free.scene.initial.pulls.clear();
+  free.scene.initial.release_of.reset(), free.scene.initial.pulls.clear(), free.scene.initial.pulled_at.clear();
   free.scene.wind.reset(), free.scene.forces.clear();  // hands and sliders take their place
   if (free.scene.timing.times.empty() || free.scene.timing.is_static) free.scene.timing = evenly_timed(30.0, 2);
   const ModelScene made = make_scene(free, free.scene, scene_distance(free.scene, Resolution{}.band), {}, true);

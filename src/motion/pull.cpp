@@ -43,23 +43,29 @@ VectorX greatest_displacements(const std::shared_ptr<const Body>& body, const st
 
 }  // namespace
 
+MatrixX pull_spread(const Body& body, const PullPoints& points) {
+  const VectorX volume = volume_of_nodes(body);
+  const double reach = width * points.size;
+  MatrixX spread(body.node_count(), Eigen::Index(points.at.size()));
+  for (Eigen::Index k = 0; k < spread.cols(); ++k) {
+    const VectorX r2 =
+        (body.scanned_positions().rowwise() - points.at[std::size_t(k)].transpose()).rowwise().squaredNorm();
+    spread.col(k) = volume.cwiseProduct((-0.5 * r2.array() / (reach * reach)).exp().matrix());
+  }
+  return spread;
+}
+
 Pull::Pull(const std::shared_ptr<const Body>& body, const PullPoints& points, const std::vector<int>& held,
            const MotionBlocks& blocks)
     : DeadLoad(body->nodes), pull_blocks_(blocks.pulls), material_(blocks) {
-  const VectorX volume = volume_of_nodes(*body);
-  const double reach = width * points.size;
   const auto n = Eigen::Index(points.at.size());
-  spread_.resize(body->node_count(), n);
+  spread_ = pull_spread(*body, points);
   std::vector<Points> forces;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const VectorX r2 =
-        (body->scanned_positions().rowwise() - points.at[std::size_t(k)].transpose()).rowwise().squaredNorm();
-    spread_.col(k) = volume.cwiseProduct((-0.5 * r2.array() / (reach * reach)).exp().matrix());
+  for (Eigen::Index k = 0; k < n; ++k)
     for (int d = 0; d < 3; ++d) {
       forces.emplace_back(Points::Zero(body->node_count(), 3));
       forces.back().col(d) = spread_.col(k);
     }
-  }
   const VectorX greatest = greatest_displacements(body, held, forces);
   if (points.at.size() != pull_blocks_.size()) throw std::invalid_argument("one parameter block a pull is expected");
   strength_.resize(n, 3);

@@ -20,6 +20,9 @@ struct PullPoints {
 /// Throws std::invalid_argument where there are no candidates or nothing is held.
 std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const std::vector<Vector3>& held, int count);
 
+/// How forces spread about points: w_k(X_n) V_n of `Pull`, n x k [m^3].
+MatrixX pull_spread(const Body& body, const PullPoints& points);
+
 /// What holds an object in the pose from which it is released: forces spread smoothly about a few points,
 ///   f_n = E_0 sum_k w_k(X_n) V_n c_k / s_k,
 /// with w_k a Gaussian about point k, V_n the node's volume, and s_k (of each axis) such that a unit c_k would move the

@@ -115,6 +115,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   scene.initial.angular_velocity = blocks.angular_velocity.vector(t);
   scene.initial.known = true;
   for (const ParameterHandle& pull : blocks.pulls) scene.initial.pulls.push_back(pull.vector(t));
+  scene.initial.pulled_at = d.simulation.pull_points.at;
   model.cell_size = object_size(capture.scene) / cells;
   if (const auto* grid = std::get_if<HexGrid>(&d.body->mesh)) {
     model.cell_size = grid->cell_size;

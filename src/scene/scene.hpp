@@ -122,6 +122,8 @@ struct Initial {
   bool released = false;                       ///< from a held, deformed pose
   /// Forces on an object of a model that is released, until then, in the unit of `Pull`.
   std::vector<Vector3> pulls = {};
+  /// Where those act [m], in the scan, as many; empty: far from what is held and from each other.
+  std::vector<Vector3> pulled_at = {};
   /// Weight that hangs from a released object until its string is cut. Nothing: nobody knows what held the object.
   std::optional<Weight> release_of = {};
   bool operator==(const Initial&) const = default;

@@ -427,7 +427,14 @@ Initial read_initial(TomlTable& table, bool may_pull) {
   initial.angular_velocity = table.optional<Vector3>("angular_velocity").value_or(Vector3::Zero());
   initial.known = table.optional<bool>("known").value_or(true);
   initial.released = table.optional<bool>("released").value_or(false);
-  if (may_pull) initial.pulls = table.optional<std::vector<Vector3>>("pulls").value_or(std::vector<Vector3>{});
+  if (may_pull) {
+    initial.pulls = table.optional<std::vector<Vector3>>("pulls").value_or(std::vector<Vector3>{});
+    initial.pulled_at = table.optional<std::vector<Vector3>>("pulled_at").value_or(std::vector<Vector3>{});
+    if (!initial.pulled_at.empty() && initial.pulled_at.size() != initial.pulls.size())
+      table.context().complain(table.key_of("pulled_at"),
+                               fmt::format("`pulled_at` with {} places", initial.pulled_at.size()),
+                               fmt::format("one for each of {} `pulls`", initial.pulls.size()));
+  }
   table.with_table("release_of", [&](TomlTable& weight) { initial.release_of = read_weight(weight); });
   return initial;
 }
@@ -521,9 +528,14 @@ void write_toml(std::ostream& out, const Initial& initial) {
       << "   # rad/s\nknown = " << (initial.known ? "true" : "false")
       << "\nreleased = " << (initial.released ? "true" : "false") << "\n";
   if (!initial.pulls.empty()) {
-    out << "pulls = [";
-    for (std::size_t k = 0; k < initial.pulls.size(); ++k) out << (k > 0 ? ", " : "") << toml_text(initial.pulls[k]);
-    out << "]   # what holds the object until it is released, times its size about how far each moves it\n";
+    const auto write_list = [&](const char* name, const std::vector<Vector3>& list, const char* meaning) {
+      out << name << " = [";
+      for (std::size_t k = 0; k < list.size(); ++k) out << (k > 0 ? ", " : "") << toml_text(list[k]);
+      out << "]   # " << meaning << "\n";
+    };
+    write_list("pulls", initial.pulls,
+               "what holds the object until it is released, times its size about how far each moves it");
+    if (!initial.pulled_at.empty()) write_list("pulled_at", initial.pulled_at, "m, where in the scan those act");
   }
   if (initial.release_of)
     out << "release_of = { mass = " << toml_text(initial.release_of->mass)

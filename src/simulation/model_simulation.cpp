@@ -176,6 +176,7 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
                         "the model of a fit to this recording",
                         "let `pliant fit --hold-out` find the pose and score the rest"});
     scene.initial.pulls = model.scene.initial.pulls;
+    scene.initial.pulled_at = model.scene.initial.pulled_at;
   }
   const Vector3 gravity = scene.world.gravity.value_or(model.scene.world.gravity.value_or(-9.81 * scene.world.up));
   ModelScene made;

@@ -190,13 +190,15 @@ std::vector<Hold> held_regions(const Scene& scene) { return held_regions(scene.f
 
 int pull_count(const Scene& scene, const Resolution& resolution) {
   if (!scene.initial.released || scene.initial.release_of) return 0;
-  return scene.initial.pulls.empty() ? resolution.pulls : int(scene.initial.pulls.size());
+  const Initial& initial = scene.initial;
+  if (!initial.pulls.empty()) return int(initial.pulls.size());
+  return initial.pulled_at.empty() ? resolution.pulls : int(initial.pulled_at.size());
 }
 
 namespace {
 
 /// Of the scan, far from what is held; none where the regions hold no vertex of it.
-PullPoints pull_points(const Scene& scene, int count) {
+PullPoints far_from_holds(const Scene& scene, int count) {
   std::vector<Vector3> held;
   for (const FixedRegion& fixed : scene.fixed) {
     const auto contains = is_in_region(*scene.object.surface, fixed.region);
@@ -206,12 +208,17 @@ PullPoints pull_points(const Scene& scene, int count) {
   return {far_points(scene.object.surface->vertices, held, count), object_size(scene)};
 }
 
+PullPoints pull_points(const Scene& scene, int count) {
+  if (!scene.initial.pulled_at.empty()) return {scene.initial.pulled_at, object_size(scene)};
+  return far_from_holds(scene, count);
+}
+
 constexpr double shape_length = 0.25;  // over which a scan's errors are alike, times the object's size
 
 ShapeField shape_field(const Scene& scene, const Resolution& resolution) {
   if (resolution.shape_points == 0) return {};
   const double size = object_size(scene);
-  PullPoints far = pull_points(scene, resolution.shape_points);
+  PullPoints far = far_from_holds(scene, resolution.shape_points);
   const std::vector<Vector3>& vertices = scene.object.surface->vertices;
   if (far.at.empty()) far.at = far_points(vertices, {vertices.front()}, resolution.shape_points);
   return {std::move(far.at), resolution.shape_std * size, shape_length * size};

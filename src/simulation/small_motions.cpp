@@ -7,79 +7,54 @@
 
 #include "base/error.hpp"
 #include "elasticity/modes.hpp"
-#include "motion/statics.hpp"
+#include "motion/compliance.hpp"
 
 namespace pliant {
 
 namespace {
 
-/// Small motions about rest of a body that is held: forces to displacements.
-class Compliance {
- public:
-  Compliance(const std::shared_ptr<const Body>& body, const SimulationOptions& options, const VectorX& theta)
-      : body_(body), terms_(scene_forces(body, options)), statics_(body, pointers(terms_)) {
-    for (const auto& term : terms_) term->set_parameters(theta);
-    statics_.hold(eliminated_nodes(*body, options));
-    is_ready_ = statics_.prepare_derivatives(body->nodes);
-  }
-  bool is_ready() const { return is_ready_; }
-  Points displacements(const Points& forces) { return statics_.response(forces); }
+Points mass_product(const Body& body, double density, const Points& x) {
+  Points product = Points::Zero(x.rows(), 3);
+  body.add_mass_product(density, x, product);
+  return product;
+}
 
-  /// Subspace iteration (Bathe 1996, section 11.6) with masses of this density [kg/m^3].
-  std::vector<double> frequencies(double density, int count) {
-    constexpr int most_iterations = 60;
-    const int size = 2 * count;
-    std::mt19937 random(1);
-    std::normal_distribution<double> normal;
-    std::vector<Points> x(std::size_t(size), Points(body_->node_count(), 3));
-    for (Points& shape : x)
-      for (Eigen::Index k = 0; k < shape.size(); ++k) shape.data()[k] = normal(random);
-    VectorX lambda = VectorX::Zero(size);
-    for (int i = 0; i < most_iterations; ++i) {
-      std::vector<Points> masses, moved, masses_moved;
-      for (const Points& shape : x) {
-        masses.push_back(mass_product(density, shape));
-        moved.push_back(displacements(masses.back()));
-        masses_moved.push_back(mass_product(density, moved.back()));
-      }
-      MatrixX K(size, size), M(size, size);
-      for (int a = 0; a < size; ++a)
-        for (int b = 0; b < size; ++b) {
-          K(a, b) = moved[std::size_t(a)].cwiseProduct(masses[std::size_t(b)]).sum();
-          M(a, b) = moved[std::size_t(a)].cwiseProduct(masses_moved[std::size_t(b)]).sum();
-        }
-      const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixX> small(0.5 * (K + K.transpose()),
-                                                                    0.5 * (M + M.transpose()));
-      for (int a = 0; a < size; ++a) {
-        x[std::size_t(a)].setZero();
-        for (int b = 0; b < size; ++b) x[std::size_t(a)] += small.eigenvectors()(b, a) * moved[std::size_t(b)];
-      }
-      const VectorX before = lambda;
-      lambda = small.eigenvalues();
-      if (((lambda - before).head(count).array().abs() < 1e-9 * lambda.head(count).array()).all()) break;
+/// Subspace iteration (Bathe 1996, section 11.6) with masses of this density [kg/m^3].
+std::vector<double> frequencies(const Body& body, Compliance& compliance, double density, int count) {
+  constexpr int most_iterations = 60;
+  const int size = 2 * count;
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<Points> x(std::size_t(size), Points(body.node_count(), 3));
+  for (Points& shape : x)
+    for (Eigen::Index k = 0; k < shape.size(); ++k) shape.data()[k] = normal(random);
+  VectorX lambda = VectorX::Zero(size);
+  for (int i = 0; i < most_iterations; ++i) {
+    std::vector<Points> masses, moved, masses_moved;
+    for (const Points& shape : x) {
+      masses.push_back(mass_product(body, density, shape));
+      moved.push_back(compliance.displacements(masses.back()));
+      masses_moved.push_back(mass_product(body, density, moved.back()));
     }
-    std::vector<double> hertz;
-    for (int k = 0; k < count; ++k) hertz.push_back(std::sqrt(lambda[k]) / (2.0 * std::numbers::pi));
-    return hertz;
+    MatrixX K(size, size), M(size, size);
+    for (int a = 0; a < size; ++a)
+      for (int b = 0; b < size; ++b) {
+        K(a, b) = moved[std::size_t(a)].cwiseProduct(masses[std::size_t(b)]).sum();
+        M(a, b) = moved[std::size_t(a)].cwiseProduct(masses_moved[std::size_t(b)]).sum();
+      }
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixX> small(0.5 * (K + K.transpose()), 0.5 * (M + M.transpose()));
+    for (int a = 0; a < size; ++a) {
+      x[std::size_t(a)].setZero();
+      for (int b = 0; b < size; ++b) x[std::size_t(a)] += small.eigenvectors()(b, a) * moved[std::size_t(b)];
+    }
+    const VectorX before = lambda;
+    lambda = small.eigenvalues();
+    if (((lambda - before).head(count).array().abs() < 1e-9 * lambda.head(count).array()).all()) break;
   }
-
- private:
-  static std::vector<ForceTerm*> pointers(const std::vector<std::unique_ptr<ForceTerm>>& terms) {
-    std::vector<ForceTerm*> all;
-    for (const auto& term : terms) all.push_back(term.get());
-    return all;
-  }
-  Points mass_product(double density, const Points& x) const {
-    Points product = Points::Zero(x.rows(), 3);
-    body_->add_mass_product(density, x, product);
-    return product;
-  }
-
-  std::shared_ptr<const Body> body_;
-  std::vector<std::unique_ptr<ForceTerm>> terms_;
-  Statics statics_;
-  bool is_ready_ = false;
-};
+  std::vector<double> hertz;
+  for (int k = 0; k < count; ++k) hertz.push_back(std::sqrt(lambda[k]) / (2.0 * std::numbers::pi));
+  return hertz;
+}
 
 }  // namespace
 
@@ -106,16 +81,15 @@ SmallMotions small_motions(const std::shared_ptr<const Body>& body, const Simula
     for (int k = rigid; k < modes.count(); ++k) motions.frequencies.push_back(modes.frequency(k));
     return motions;
   }
-  Compliance compliance(body, options, theta);
+  Compliance compliance(body, options, theta, body->nodes);
   if (!compliance.is_ready())
     throw InputError({{}, "the model's stiffness cannot be factorised", "regions that hold the whole object", ""});
-  motions.frequencies = compliance.frequencies(density, count);
+  motions.frequencies = frequencies(*body, compliance, density, count);
   const Points gravity = theta.segment<3>(options.blocks.gravity).transpose().replicate(body->node_count(), 1);
-  Points weight = Points::Zero(body->node_count(), 3);
-  body->add_mass_product(density, gravity, weight);
   std::vector<Vector3> places;
   for (Eigen::Index n = 0; n < points.rows(); ++n) places.push_back(points.row(n).transpose());
-  const Points moved = Embedding(*body, places).positions(compliance.displacements(weight));
+  const Points moved =
+      Embedding(*body, places).positions(compliance.displacements(mass_product(*body, density, gravity)));
   motions.sag = std::sqrt(moved.rowwise().squaredNorm().maxCoeff());
   return motions;
 }

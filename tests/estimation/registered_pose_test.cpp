@@ -41,15 +41,15 @@ struct PulledBar : ::testing::Test {
 TEST_F(PulledBar, IsRegisteredWhereItWasHeld) {
   const auto pose = registered_pose(recorded, choices);
   ASSERT_TRUE(pose.has_value());
-  ASSERT_EQ(pose->frames.size(), 1u) << "the last of the frames in which it was held";
-  const auto& seen = pose->frames.at(last_held);
+  ASSERT_EQ(pose->points.frames.size(), 1u) << "the last of the frames in which it was held";
+  const auto& seen = pose->points.frames.at(last_held);
   EXPECT_GT(seen.size(), 100u);
-  const Embedding marks(*swing().truth, pose->rest);
+  const Embedding marks(*swing().truth, pose->points.rest);
   const Points& there = swing().positions[std::size_t(last_held)];
   double error = 0.0, way = 0.0;
   for (const TrackObservation& mark : seen) {
     error += (mark.position - marks.position(mark.point, there)).norm() / double(seen.size());
-    way += (mark.position - pose->rest[std::size_t(mark.point)]).norm() / double(seen.size());
+    way += (mark.position - pose->points.rest[std::size_t(mark.point)]).norm() / double(seen.size());
   }
   EXPECT_GT(way, 0.05 * swing().size);
   EXPECT_LT(error, 0.05 * way);
@@ -73,10 +73,45 @@ TEST_F(PulledBar, HasNoPoseWhereItWasNotReleasedOrNotSeenOrIsFollowed) {
   EXPECT_FALSE(registered_pose(recorded, choices, [] { return true; }).has_value()) << "interrupted at once";
 }
 
+/// How far a place is from a point of the bar's middle line, times its length.
+double off(const Vector3& place, double height) { return std::abs(place.z() - height) / 0.6; }
+
+TEST_F(PulledBar, IsHeldWhereAHandWas) {
+  const auto pose = registered_pose(recorded, choices);
+  ASSERT_TRUE(pose.has_value());
+  ASSERT_EQ(pose->pulled_at.size(), 1u) << "the other pull is a twentieth of it";
+  EXPECT_LT(off(pose->pulled_at[0], -0.6), 0.15);
+  recorded.capture.scene.initial.pulled_at = pose->pulled_at;
+  std::vector<std::string> notes;
+  const Recordings recordings({recorded}, choices, notes);
+  EXPECT_EQ(recordings.front().blocks.motion.pulls.size(), 1u);
+  EXPECT_EQ(recordings.grid(8.0, 1.0).recording.front().simulation.pull_points.at, pose->pulled_at);
+}
+
+TEST_F(PulledBar, IsHeldInItsMiddleWhereItsEndHangsFreely) {
+  test::SwingOptions in_the_middle = options();
+  in_the_middle.pulls = {{0.0, 0.0, 0.0}, {0.3, 0.1, 0.0}};
+  const auto pose = registered_pose(recording(test::Swing(in_the_middle)), choices);
+  ASSERT_TRUE(pose.has_value());
+  ASSERT_EQ(pose->pulled_at.size(), 1u);
+  EXPECT_LT(off(pose->pulled_at[0], -0.3), 0.15);
+}
+
+TEST_F(PulledBar, IsHeldInTwoPlacesWhereOneIsNotEnough) {
+  test::SwingOptions bent = options();
+  bent.pulls = {{-0.4, 0.0, 0.0}, {0.6, 0.1, 0.0}};
+  const RecordedCapture other = recording(test::Swing(bent));
+  const auto pose = registered_pose(other, choices);
+  ASSERT_TRUE(pose.has_value());
+  EXPECT_GE(pose->pulled_at.size(), 2u);
+  choices.pull_points = 1;
+  EXPECT_EQ(registered_pose(other, choices)->pulled_at.size(), 1u) << "no more than are allowed";
+}
+
 /// What a fit makes of it.
 struct FittedBar : PulledBar {
   FittedBar() {
-    recorded.pose = registered_pose(recorded, choices);
+    recorded.pose = registered_pose(recorded, choices)->points;
     choices.points_per_frame = 0;
     recordings = std::make_unique<Recordings>(std::vector{recorded}, choices, notes);
     grid = recordings->grid(12.0, 1.0);

@@ -29,7 +29,7 @@ Model full_model() {
   m.scene.weights = {{0.05, {0.01, -0.06, 0.15}}};
   m.scene.wind.emplace().over_time = {{0.0, {1, 2, 3}}, {2.0, {3, 2, 1}}};
   m.scene.forces = {{{0.01, -0.06, 0.15}, 0.02, {{0.0, {0, 0.5, 0}}}}};
-  m.scene.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true, {}, Weight{0.02, {0.1, 1.0 / 3.0, 0}}};
+  m.scene.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true, {}, {}, Weight{0.02, {0.1, 1.0 / 3.0, 0}}};
   m.scene.timing = evenly_timed(60.0, 80, 4);
   m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
   m.substeps = 4, m.theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;

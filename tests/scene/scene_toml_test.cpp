@@ -55,7 +55,13 @@ Scene full_scene() {
   scene.world.gravity = Vector3(0.1, -9.81, 1.0 / 3.0);
   scene.world.up = -scene.world.gravity->normalized();
   scene.timing = evenly_timed(59.94, 7, 2);
-  scene.initial = {{0, -2.1, 0}, {0.1, 0.2, 1.0 / 3.0}, false, true, {{1, 2, 3}, {0.1, 0, 0}}, Weight{0.02, {0, 1, 0}}};
+  scene.initial = {{0, -2.1, 0},
+                   {0.1, 0.2, 1.0 / 3.0},
+                   false,
+                   true,
+                   {{1, 2, 3}, {0.1, 0, 0}},
+                   {{0, 0, 1.0 / 3.0}, {4, 5, 6}},
+                   Weight{0.02, {0, 1, 0}}};
   scene.planes = {{{0, 0.1, 0}, {0.6, 0.8, 0}, false}, {}};
   scene.fixed = {{RegionBox{{-1, -1, -1}, {0.01, 1, 1}}, std::nullopt},
                  {RegionSphere{{0, 0, 1}, 0.02},
@@ -81,6 +87,13 @@ TEST(SceneToml, ComesBackAsItWasWritten) {
   EXPECT_EQ(is.translation, was.translation);
   EXPECT_EQ(read.regions, scene.regions);
   EXPECT_EQ(read.weights, scene.weights);
+}
+
+TEST(SceneToml, EachPullHasItsPlace) {
+  const TemporaryFolder folder;
+  const std::string text = "[initial]\nreleased = true\npulls = [[1,0,0],[0,1,0]]\npulled_at = [[0,0,1]]";
+  EXPECT_THAT(test::complaint_of([&] { read_scene(folder, text, true); }),
+              testing::HasSubstr("`pulled_at` with 1 places; expected one for each of 2 `pulls`"));
 }
 
 TEST(SceneToml, ControlPointsComeBack) {

@@ -80,6 +80,9 @@ TEST(ModelSimulation, AReleaseNeedsThePoseBefore) {
   const ModelScene made = make_scene(model, other, scene_distance(other, 0.15), "other/capture.toml");
   EXPECT_EQ(made.simulation.blocks.pulls.size(), 2u) << "those of the model";
   EXPECT_EQ(made.simulation.blocks.pulls[1].vector(made.theta), Vector3(0, 0.1, 0));
+  model.scene.initial.pulled_at = {{0.1, 0, 0}, {0.2, 0, 0}};
+  EXPECT_EQ(make_scene(model, other, scene_distance(other, 0.15), {}).simulation.pull_points.at,
+            model.scene.initial.pulled_at);
 }
 
 TEST(Trajectory, HasAFileForEachFrame) {

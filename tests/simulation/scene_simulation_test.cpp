@@ -118,6 +118,8 @@ TEST(SceneSimulation, PullsHoldOnlyWhatIsReleasedFromAnUnknownPose) {
   EXPECT_EQ(pull_count(scene, resolution), 0);
   scene.initial.released = true;
   EXPECT_EQ(pull_count(scene, resolution), 3);
+  scene.initial.pulled_at = {Vector3::Zero(), Vector3::UnitX()};
+  EXPECT_EQ(pull_count(scene, resolution), 2) << "as many as there are places";
   scene.initial.pulls = {Vector3::Zero()};
   EXPECT_EQ(pull_count(scene, resolution), 1) << "as many as are known";
   scene.initial.release_of = Weight{0.1, Vector3::Zero()};
