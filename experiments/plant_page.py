@@ -79,5 +79,9 @@ def plant():
     if held := figures.get("registered"):
         text += (f"\nThe pose from which the plant is let go is where the tracker registers it before that, with no choices: {1e3 * held['rms']:.1f} mm off (rms of {held['points']} points of the scan; median "
                  f"{1e3 * held['median']:.1f} mm, {1e3 * held['greatest']:.1f} mm at most), where the plant was moved by {1e3 * held['way_rms']:.0f} mm (rms) and {1e3 * held['way_greatest']:.0f} mm at most. "
-                 "Pulls at points far from the pot are fitted to that first, then to the surface: leaves that are 6 mm thick are farther than that from where they were seen, and nearest to others.\n")
+                 "Pulls are fitted to that first, then to the surface: leaves that are 6 mm thick are farther than that from where they were seen, and nearest to others.\n")
+    for name, f in fits.items():
+        if f.get("pulled_at"):
+            text += (f"\n{fit_name(f, name)[:1].upper()}{fit_name(f, name)[1:]}: pulls act at as few places as that pose asks for, {', '.join(f'({1e3 * p[0]:.0f}, {1e3 * p[1]:.0f}, {1e3 * p[2]:.0f}) mm' for p in f['pulled_at'])}; "
+                     f"what truly held it is a force on the stem at a height of {1e3 * r['pull_height']:.0f} mm.\n")
     return text + f"\nMeasured on {machine(figures)}.\n"

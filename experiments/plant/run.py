@@ -14,6 +14,7 @@ import struct
 import subprocess
 import sys
 import time
+import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
@@ -241,10 +242,11 @@ def judged_fit(program, recording, captures, name, work, zones, truth, threads, 
     moduli = {key: common.number(p["value"]) for key, p in result["parameters"].items() if key.startswith("youngs_modulus")}
     found, off, elements = zones_of((work / name / "model.toml").with_suffix(".vtu"), zones, truth["zones"])
     tracking = result.get("tracking")
+    pulled_at = tomllib.loads((work / name / "model.toml").read_text())["initial"].get("pulled_at", [])
     return {"choices": choices, "capture": capture, "threads": threads, "parameters": parameters, "moduli": moduli,
             "field": [{"point": [common.number(v, 4) for v in c[:3]], "value": common.number(c[3]), "std": common.number(c[4], 2)} for c in field.get("control_points", [])],
             "tried": field.get("tried"), "zones": found, "mean_factor_off": off, "elements": elements, "surface_rms": common.number(result["error"]["surface_rms"], 4),
-            "cost": common.number(result["cost"]["final"]), "verdict": result.get("verdict"), "reasons": result.get("reasons"),
+            "cost": common.number(result["cost"]["final"]), "verdict": result.get("verdict"), "pulled_at": pulled_at, "reasons": result.get("reasons"),
             "tracking": tracking and {"kept": tracking.get("kept"), "why": tracking.get("why"), "rounds": len(tracking.get("rounds", []))},
             "forward_steps": result["time"].get("forward_steps"), "converged": figures["exit_code"] == 0, "commit": result["software"]["commit"], "limit": limit, **figures,
             **shape(program, work / name, recording)}
@@ -340,7 +342,7 @@ def main():
               f", load-free {f['load_free_rms']} / {f['load_free_greatest']}, " + ", ".join(f"{k} {p['value']} ({p['truth']})" for k, p in f["parameters"].items()) +
               f", cost {f['cost']}, {f['verdict']}", flush=True)
     picture(recording, fits, arguments.work, zones)
-    common.write_results(__file__, {"checks": checks, "recording": {key: truth[key] for key in ("size", "tips", "mesh", "points_a_frame", "energy_J", "pull_N", "seconds")},
+    common.write_results(__file__, {"checks": checks, "recording": {key: truth[key] for key in ("size", "tips", "mesh", "points_a_frame", "energy_J", "pull_N", "seconds")} | {"pull_height": truth["truth"]["pull"]["y"]},
                                     "zones": truth["zones"], "placed": PLACED, "registered": registered(arguments.program, recording, arguments.work), "meshes": meshes(arguments.program, recording, arguments.work, truth), "fits": fits})
 
 

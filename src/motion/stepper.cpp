@@ -250,8 +250,8 @@ bool Stepper::prepare_derivatives(const State& start, const Points& delta) {
   return factorise_exact(scheme());
 }
 
-void Stepper::solve_derivative(const Points& b, Points& y, GeneralSolver::Side side) {
-  general_->solve(flat(b), solution_, 1e-12, side);
+void Stepper::solve_derivative(const Points& b, Points& y, GeneralSolver::Side side, double tolerance) {
+  general_->solve(flat(b), solution_, tolerance, side);
   y = as_points(std::as_const(solution_));
 }
 
@@ -261,8 +261,9 @@ void Stepper::prepare_reference_derivatives(const State& start, const Points& de
 }
 
 namespace {
+constexpr double derivative_tolerance = 1e-12;  // of fully implicit steps, where no other is asked for
 constexpr std::size_t directions_together = 4;  // as many as wide registers take
-}
+}  // namespace
 
 void Stepper::find_changes_of_force(const State& start, const Points& delta, const MatrixX& d_theta,
                                     std::span<const State> changes, std::span<const Points> d_reference,
@@ -346,8 +347,9 @@ void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d
     }
   });
   if (is_newton()) {
+    const double asked = options_.solver.column_tolerance, tolerance = asked > 0.0 ? asked : derivative_tolerance;
     for (std::size_t c = 0; c < count; ++c) {
-      solve_derivative(d_force_[c], w_, GeneralSolver::Side::Plain);
+      solve_derivative(d_force_[c], w_, GeneralSolver::Side::Plain, tolerance);
       tangent_solutions_.col(Eigen::Index(c)) = flat(w_);
     }
   } else {
@@ -370,7 +372,7 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   force_ = bar.x + bar.v / (t * dt);
   clear_held(force_);
   if (is_newton()) {
-    solve_derivative(force_, w_, GeneralSolver::Side::Transposed);
+    solve_derivative(force_, w_, GeneralSolver::Side::Transposed, derivative_tolerance);
   } else {
     // Successive steps' solutions lie on a smooth curve, but for what frames between them add.
     if (adjoint_solutions_ == 0)

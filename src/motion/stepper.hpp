@@ -138,7 +138,8 @@ class Stepper : private NewtonProblem {
   double size() const override { return body_->size(); }
 
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
-  void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
+  /// @param tolerance  of |b - A y| / |b|
+  void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side, double tolerance);
   /// `d_force_`: changes of the step's right-hand side along directions from `first` on, Delta staying as it is.
   void find_changes_of_force(const State& start, const Points& delta, const MatrixX& d_theta,
                              std::span<const State> changes, std::span<const Points> d_reference, std::size_t first,

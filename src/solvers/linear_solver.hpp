@@ -50,9 +50,10 @@ SolverKind best_direct_kind();
 
 struct SolverOptions {
   SolverKind kind = SolverKind::Automatic;
-  double tolerance = 1e-8;        ///< relative residual of the iterative solver, (0, 1)
-  int max_iterations = 500;       ///< of the iterative solver, >= 1
-  double column_tolerance = 0.0;  ///< of `solve_columns`, as `tolerance` otherwise; 0: that
+  double tolerance = 1e-8;   ///< relative residual of the iterative solver, (0, 1)
+  int max_iterations = 500;  ///< of the iterative solver, >= 1
+  /// Of `solve_columns`, as `tolerance` otherwise, and of tangents of fully implicit steps; 0: that, and 1e-12.
+  double column_tolerance = 0.0;
 };
 
 /// How equilibria solve with their stiffness, whose conditioning no mass helps: by a factorisation, and of bodies whose

@@ -2,6 +2,8 @@
 #include <numbers>
 
 #include "base/error.hpp"
+#include "motion/compliance.hpp"
+#include "motion/pull.hpp"
 #include "support/derivatives.hpp"
 #include "support/released.hpp"
 #include "support/tolerance.hpp"
@@ -240,6 +242,34 @@ TEST(Releases, AFreeObjectCannotBePulled) {
   Released scene(bar(ElementKind::Tetrahedron), Integrator::Newton);
   scene.options.holds.clear();
   EXPECT_THROW(Simulation(scene.body, scene.options), InputError);
+}
+
+/// About the pose that pulls hold, the scene's forces lack just those pulls, and a little more of them moves the nodes
+/// as equilibria under more pulls do.
+TEST(Compliance, WhatAPoseLacksIsWhatHoldsIt) {
+  Released scene(bar(ElementKind::QuadraticTetrahedron), Integrator::Newton);
+  const double length = test::hanging::length;
+  scene.options.pull_points = {{Vector3(0.5 * length, 0.0, 0.0), Vector3::Zero()}, length};
+  const Points pose = as_points(scene.positions_at(scene.theta, 0));
+  const std::vector<int> held = held_nodes(*scene.body, scene.options.holds);
+  Pull pull(scene.body, scene.options.pull_points, held, scene.options.blocks);
+  pull.set_parameters(scene.theta);
+  Points force = Points::Zero(pose.rows(), 3);
+  pull.add_force(pose, force);
+
+  Compliance compliance(scene.body, scene.options, scene.theta, pose);
+  ASSERT_TRUE(compliance.is_ready());
+  Points lacks = compliance.missing_forces() - force;
+  for (const int node : held) lacks.row(node).setZero();
+  EXPECT_LT(lacks.norm(), tolerance(1e-8) * force.norm());
+
+  const VectorX moved = flat(compliance.displacements(force));
+  const auto under_more = [&](double share) {
+    VectorX theta = scene.theta;
+    for (const ParameterHandle& block : scene.options.blocks.pulls) theta.segment<3>(block) *= 1.0 + share;
+    return scene.positions_at(theta, 0);
+  };
+  EXPECT_LT(test::best_relative_error(under_more, moved, 0.1), tolerance(1e-6));
 }
 
 /// Pulls at points of the scan hold the same object in about the same pose on every mesh.
