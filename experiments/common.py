@@ -233,7 +233,7 @@ def pyplot():
 
 def at_rest(program, fit):
     """Nodes of a fit's load-free volume, and how far each moves as the model comes to rest under gravity: coordinates one after the other [m]."""
-    moving = ("[timing]", "frame_rate", "frame_count", "start_frame", "substeps", "released", "pulls")
+    moving = ("[timing]", "frame_rate", "frame_count", "start_frame", "substeps", "released", "pulls", "pulled_at")
     still = [line for line in (fit / "model.toml").read_text().splitlines() if not line.startswith(moving)]
     folder = fit / "at-rest"
     folder.mkdir(exist_ok=True)

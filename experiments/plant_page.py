@@ -84,4 +84,9 @@ def plant():
         if f.get("pulled_at"):
             text += (f"\n{fit_name(f, name)[:1].upper()}{fit_name(f, name)[1:]}: pulls act at as few places as that pose asks for, {', '.join(f'({1e3 * p[0]:.0f}, {1e3 * p[1]:.0f}, {1e3 * p[2]:.0f}) mm' for p in f['pulled_at'])}; "
                      f"what truly held it is a force on the stem at a height of {1e3 * r['pull_height']:.0f} mm.\n")
+    if f := fits.get("painted-beginning"):
+        stem, lower = f["moduli"]["youngs_modulus@stem"], f["zones"][0]
+        text += (f"\nWhat is wrong there is the mesh, as far as the stem goes. Of the zones' volume it has {', '.join(percent(z['elements_volume'], False) for z in f['zones'])}, in the order of the table: its vertices lie on the "
+                 f"scan, and flat faces between them cut corners. Stiffness in bending goes with the square of a cross-section, so that a stem of {1e-6 * lower['truth']:.2f} MPa bends as one of {1e-6 * lower['truth'] / lower['elements_volume'] ** 2:.1f} MPa on this mesh; "
+                 f"{1e-6 * stem:.1f} MPa were found. The low leaf swings with the stem and hardly bends; it is fitted as a rigid one, {1e-6 * f['moduli']['youngs_modulus@low leaf']:.0f} MPa.\n")
     return text + f"\nMeasured on {machine(figures)}.\n"
