@@ -9,6 +9,7 @@
 #include "base/instants.hpp"
 #include "capture/markers.hpp"
 #include "estimation/press_law.hpp"
+#include "estimation/pull_places.hpp"
 
 namespace pliant {
 
@@ -211,7 +212,7 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
         scalar(layout, m.strengths[k], Transform::Logarithm, 1e-3, 1e3, 0.0, 1.5, !capture.scene.forces[k].known));
   for (std::size_t k = 0; k < m.pulls.size(); ++k) {
     if (k < capture.scene.initial.pulls.size()) theta.segment<3>(m.pulls[k]) = capture.scene.initial.pulls[k];
-    p.push_back(vector(layout, m.pulls[k], 1.0, Vector3::Zero(), 0.5, true));
+    p.push_back(vector(layout, m.pulls[k], 1.0, Vector3::Zero(), pull_std, true));
     p.back().is_auxiliary = true;
   }
   for (std::size_t k = 0; k < blocks.sensors.size(); ++k) {

@@ -24,10 +24,9 @@ SimulationOptions held_alone(SimulationOptions options) {
 /// The cost of the best pulls: half the squares of what they leave, and of themselves over their prior deviation.
 /// @param moved  what they do, a column each
 double least_cost(const MatrixX& moved, const VectorX& left) {
-  constexpr double prior_std = 0.5;  // as the fit has it
-  const MatrixX H = moved.transpose() * moved + MatrixX::Identity(moved.cols(), moved.cols()) / (prior_std * prior_std);
+  const MatrixX H = moved.transpose() * moved + MatrixX::Identity(moved.cols(), moved.cols()) / (pull_std * pull_std);
   const VectorX pulls = H.ldlt().solve(moved.transpose() * left);
-  return 0.5 * (left - moved * pulls).squaredNorm() + 0.5 * (pulls / prior_std).squaredNorm();
+  return 0.5 * (left - moved * pulls).squaredNorm() + 0.5 * (pulls / pull_std).squaredNorm();
 }
 
 class PlacesOfPose {

@@ -6,6 +6,9 @@
 
 namespace pliant {
 
+/// Prior deviation of pulls about none, of each axis, in the unit of `Pull`.
+inline constexpr double pull_std = 0.5;
+
 /// Where an object was held, in the scan [m]: as few places as the pose asks for in which the tracker registered it.
 /// Forces F would have to be added for the body to stay in that pose x; pulls P c in the place of F hold it away from
 /// there by K^-1 (P c - F), to first order and with the exact stiffness K at x. Each place is the one of many over the
