@@ -9,6 +9,8 @@
 #include <string>
 #include <unsupported/Eigen/BVH>
 
+#include "mesh/tet_boundary.hpp"
+
 namespace pliant {
 
 namespace {
@@ -142,35 +144,6 @@ void check_volumes(const TetMesh& mesh) {
   }
 }
 
-struct Face {
-  std::array<int, 3> sorted;  // global corners
-  int tet, face;
-};
-
-/// The faces that belong to one element only, in the order of the elements.
-std::vector<Face> boundary_faces(const TetMesh& mesh) {
-  std::vector<Face> faces, boundary;
-  faces.reserve(4 * mesh.tets.size());
-  for (int e = 0; e < mesh.tet_count(); ++e)
-    for (int f = 0; f < 4; ++f) {
-      faces.push_back({{}, e, f});
-      for (int k = 0; k < 3; ++k) faces.back().sorted[k] = mesh.tets[std::size_t(e)][tet_faces[f][k]];
-      std::ranges::sort(faces.back().sorted);
-    }
-  std::ranges::stable_sort(faces, {}, &Face::sorted);
-  for (std::size_t i = 0; i < faces.size();) {
-    std::size_t next = i + 1;
-    while (next < faces.size() && faces[next].sorted == faces[i].sorted) ++next;
-    if (next - i > 2)
-      refuse("a face of element " + std::to_string(faces[i].tet) + " belongs to " + std::to_string(next - i) +
-             " elements");
-    if (next - i == 1) boundary.push_back(faces[i]);
-    i = next;
-  }
-  std::ranges::sort(boundary, {}, [](const Face& f) { return std::pair(f.tet, f.face); });
-  return boundary;
-}
-
 /// Three samples of an element's face, by the element's own shape functions, so that curved faces are followed.
 template <int N>
 void add_samples(const Eigen::Matrix<double, N, 3>& X, int face, std::vector<SurfacePoint>& samples) {
@@ -228,10 +201,8 @@ TetMesh make_tet_mesh(Points nodes, std::vector<std::array<int, 4>> tets, std::v
            std::to_string(mesh.tets.size()));
   check_nodes(mesh);
   check_volumes(mesh);
-  for (const Face& face : boundary_faces(mesh)) {
-    std::array<int, 3> corners;
-    for (int k = 0; k < 3; ++k) corners[k] = mesh.tets[std::size_t(face.tet)][tet_faces[face.face][k]];
-    mesh.boundary.push_back(corners);
+  for (const TetFace& face : boundary_faces(mesh.tets)) {
+    mesh.boundary.push_back(face.corners(mesh.tets));
     if (mesh.is_quadratic())
       add_samples<10>(element_nodes<10>(mesh, face.tet), face.face, mesh.surface);
     else

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
-#include "mesh/tet_shape.hpp"
+#include "mesh/tet_boundary.hpp"
 
 namespace pliant {
 
@@ -73,19 +72,11 @@ class Follower {
     star_.assign(nodes_.size(), {});
     for (std::size_t t = 0; t < tets_.size(); ++t)
       for (const int n : tets_[t]) star_[std::size_t(n)].push_back(int(t));
-    std::map<std::array<int, 3>, std::pair<int, std::array<int, 3>>> faces;
-    for (const Tet& t : tets_)
-      for (const auto& f : tet_faces) {
-        const std::array<int, 3> face = {t[std::size_t(f[0])], t[std::size_t(f[1])], t[std::size_t(f[2])]};
-        std::array<int, 3> key = face;
-        std::ranges::sort(key);
-        auto& [count, as] = faces[key];
-        ++count, as = face;
-      }
     boundary_.assign(nodes_.size(), {});
-    for (const auto& [key, counted] : faces)
-      if (counted.first == 1)
-        for (const int n : key) boundary_[std::size_t(n)].push_back(counted.second);
+    for (const TetFace& face : boundary_faces(tets_)) {
+      const std::array<int, 3> corners = face.corners(tets_);
+      for (const int n : corners) boundary_[std::size_t(n)].push_back(corners);
+    }
   }
 
   bool is_boundary_edge(int a, int b) const {

@@ -29,6 +29,7 @@
 #include "meshing/part_boundary.hpp"
 #include "meshing/sharp_edges.hpp"
 #include "meshing/tet_improve.hpp"
+#include "meshing/volume_match.hpp"
 #endif
 
 namespace pliant {
@@ -198,8 +199,9 @@ struct LocalSizes {
 
 /// Refines, takes over the cells inside and makes the worst of them better. Slivers are perturbed, not exuded: CGAL's
 /// exudation depends on addresses.
+/// @param scan  whose volume the elements shall have; none: they enclose it
 template <class Domain>
-TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options, const LocalSizes& sizes) {
+TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options, const LocalSizes& sizes, const ScanTree* scan) {
   using Triangulation = typename CGAL::Mesh_triangulation_3<Domain>::type;
   using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
   const double h = options.cell_size;
@@ -241,6 +243,11 @@ TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options, const Local
   }
   if (tets.empty()) refuse("no tetrahedron lies inside the object", "", "choose smaller cells");
   improve(points, tets, {.surface_tolerance = 0.2 * facet_tolerance * h});
+  if (scan != nullptr)
+    match_volume(points, tets, [&](const Vector3& p) -> Vector3 {
+      const Kernel::Point_3 at = scan->closest_point(cgal(p));
+      return {at.x(), at.y(), at.z()};
+    });
   for (const auto& part : options.parts) follow_part(points, tets, part, 0.2 * facet_tolerance * h);
   Points nodes(Eigen::Index(points.size()), 3);
   for (std::size_t n = 0; n < points.size(); ++n) nodes.row(Eigen::Index(n)) = points[n].transpose();
@@ -291,10 +298,9 @@ std::vector<std::pair<double, Vector3>> thicknesses(const TriangleMesh& surface,
 /// Edges of three times the thickness where that is less than what is asked for, at the least a third of it: what is
 /// thin bends, and the mesher does not find a leaf that is much thinner than elements are wide. Faces lie closer to a
 /// stalk than its thickness: chords would take away from how stiff it is.
-LocalSizes sizes_of_thin_parts(const TriangleMesh& surface, const Polyhedron& scan, double cell_size) {
+LocalSizes sizes_of_thin_parts(const TriangleMesh& surface, const ScanTree& scan, double cell_size) {
   constexpr double slenderness = 3.0, least = 1.0 / 3.0, gap = 0.12, enough = 0.8;
-  const ScanTree tree(faces(scan).begin(), faces(scan).end(), scan);
-  std::vector<std::pair<double, Vector3>> through = thicknesses(surface, tree);
+  std::vector<std::pair<double, Vector3>> through = thicknesses(surface, scan);
   std::ranges::sort(through, [](const auto& a, const auto& b) { return a.first < b.first; });
   LocalSizes sizes(cell_size);
   for (const auto& [thickness, place] : through) {
@@ -308,12 +314,12 @@ LocalSizes sizes_of_thin_parts(const TriangleMesh& surface, const Polyhedron& sc
 
 /// A mesh whose elements are smaller where larger ones would miss parts of the scan.
 template <class Domain>
-TetMesh mesh_of_all_parts(const Domain& domain, const TriangleMesh& surface, const Polyhedron& scan,
+TetMesh mesh_of_all_parts(const Domain& domain, const TriangleMesh& surface, const ScanTree& scan,
                           const TetMeshOptions& options) {
   constexpr int most_rounds = 4;
   constexpr double shorter = 0.6;
   LocalSizes sizes = sizes_of_thin_parts(surface, scan, options.cell_size);
-  TetMesh mesh = mesh_of(domain, options, sizes);
+  TetMesh mesh = mesh_of(domain, options, sizes, &scan);
   for (int round = 0; round < most_rounds; ++round) {
     std::vector<std::pair<Vector3, double>> places;
     for (const auto& lost : lost_places(surface, mesh, sizes)) {
@@ -324,7 +330,7 @@ TetMesh mesh_of_all_parts(const Domain& domain, const TriangleMesh& surface, con
     }
     if (places.empty()) break;
     for (const auto& [place, size] : places) sizes.edges.shorten(place, 2.0 * size, size);
-    mesh = mesh_of(domain, options, sizes);
+    mesh = mesh_of(domain, options, sizes, &scan);
   }
   return mesh;
 }
@@ -343,7 +349,8 @@ TetMesh conforming(const TriangleMesh& surface, const Polyhedron& scan, const Te
   domain.add_features(lines.begin(), lines.end());
   if (shells.size() > 1)  // the mesher might find only one of them by itself
     for (const Vector3& vertex : shells) domain.add_corner(cgal(vertex));
-  TetMesh mesh = mesh_of_all_parts(domain, surface, scan, options);
+  const ScanTree tree(faces(scan).begin(), faces(scan).end(), scan);
+  TetMesh mesh = mesh_of_all_parts(domain, surface, tree, options);
   for (const Vector3& vertex : shells) {
     double nearest = std::numeric_limits<double>::max();
     for (const SurfacePoint& p : mesh.surface) nearest = std::min(nearest, (p.position - vertex).norm());
@@ -377,7 +384,7 @@ TetMesh enclosing(const TriangleMesh& surface, const Polyhedron& scan, const Tet
     const double error = 0.01 * gap / radius;
     const GapDomain domain =
         GapDomain::create_implicit_mesh_domain(beyond_gap, bound, parameters::relative_error_bound = error);
-    TetMesh mesh = mesh_of(domain, options, LocalSizes(options.cell_size));
+    TetMesh mesh = mesh_of(domain, options, LocalSizes(options.cell_size), nullptr);
     if (encloses(mesh, tree, shells)) return mesh;
   }
   refuse("tetrahedra of " + text_of(options.cell_size) + " m do not enclose the surface", "", "choose smaller cells");
