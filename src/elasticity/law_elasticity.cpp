@@ -2,8 +2,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -29,11 +31,18 @@ struct Projection {
   Matrix9 vectors, positive;
 
   Projection() = default;
-  explicit Projection(const Matrix9& tangent) {
-    const Eigen::SelfAdjointEigenSolver<Matrix9> solver(tangent);
-    values = solver.eigenvalues();
-    vectors = solver.eigenvectors();
-    positive = values[0] >= 0.0 ? tangent : Matrix9(vectors * values.cwiseMax(0.0).asDiagonal() * vectors.transpose());
+  /// @param F  deformation in the frame of the stress's tangent, of an isotropic law; null: of any law
+  Projection(const Matrix9& tangent, const Matrix3* F) {
+    const PrincipalStretches* principal = nullptr;
+    std::optional<PrincipalStretches> own;
+    if (F && own.emplace(*F).is_valid) principal = &*own;
+    if (principal)
+      decompose(tangent, *principal);
+    else
+      decompose(tangent);
+    positive = tangent;
+    for (int i = 0; i < 9 && values[i] < 0.0; ++i)
+      positive.noalias() -= (values[i] * vectors.col(i)) * vectors.col(i).transpose();
   }
   int negative_count() const { return int((values.array() < 0.0).count()); }
   /// How much of a change between two of its vectors the projection leaves out: 1 less the divided difference of
@@ -44,7 +53,44 @@ struct Projection {
     const double less = std::min(values[i], values[j]), more = std::max(values[i], values[j]);
     return less / (less - more);
   }
+
+ private:
+  void decompose(const Matrix9& tangent) {
+    const Eigen::SelfAdjointEigenSolver<Matrix9> solver(tangent);
+    values = solver.eigenvalues();
+    vectors = solver.eigenvectors();
+  }
+
+  /// In the frame of the principal stretches the tangent of an isotropic law falls apart (Smith et al. 2019): into 3 x
+  /// 3 numbers of the stretches and, for each two of them, one of shear, sym(u v^T), and one of rotation, skew(u v^T).
+  void decompose(const Matrix9& tangent, const PrincipalStretches& p) {
+    Matrix9 own;
+    Vector9 of_own;
+    Eigen::Matrix<double, 9, 3> stretches;
+    for (int i = 0; i < 3; ++i) stretches.col(i) = vec(Matrix3(p.U.col(i) * p.V.col(i).transpose()));
+    const Eigen::SelfAdjointEigenSolver<Matrix3> solver(stretches.transpose() * tangent * stretches);
+    own.leftCols<3>() = stretches * solver.eigenvectors();
+    of_own.head<3>() = solver.eigenvalues();
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3;
+      const Matrix3 one = std::sqrt(0.5) * p.U.col(i) * p.V.col(j).transpose();
+      const Matrix3 other = std::sqrt(0.5) * p.U.col(j) * p.V.col(i).transpose();
+      own.col(3 + i) = vec(Matrix3(one + other));
+      own.col(6 + i) = vec(Matrix3(one - other));
+    }
+    for (int i = 3; i < 9; ++i) of_own[i] = own.col(i).dot(tangent * own.col(i));
+    std::array<int, 9> order = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+    std::ranges::sort(order, {}, [&](int i) { return of_own[i]; });
+    for (int i = 0; i < 9; ++i)
+      values[i] = of_own[order[std::size_t(i)]], vectors.col(i) = own.col(order[std::size_t(i)]);
+  }
 };
+
+/// A tangent that stands in the frame of a stress's.
+Matrix9 in_world(const PointStress& frame, const Matrix9& tangent) {
+  if (frame.left.isIdentity(0.0) && frame.right.isIdentity(0.0)) return tangent;
+  return world_tangent({.left = frame.left, .right = frame.right, .tangent = tangent});
+}
 
 template <int N>
 class TetLawElasticity : public LawElasticity {
@@ -144,9 +190,10 @@ class TetLawElasticity : public LawElasticity {
   const std::vector<Projection>& projections() const;
   /// product += K d at the last `evaluate`, K the positive stiffness.
   void add_product(const Points& d, double scale, Points& product) const;
-  /// matrix += scale times the stiffness of a point whose tangent is M in the frame of `left` and `right`.
-  void add_point_stiffness(int e, const Point& point, const Matrix9& M, const Matrix3& left, const Matrix3& right,
-                           double scale, BlockMatrix& matrix) const;
+  /// matrix += scale times the elements' stiffness.
+  /// @param tangent_at  tangent of a point, by its number, in the frame of the world
+  template <bool is_symmetric, class TangentAt>
+  void add_elements(const TangentAt& tangent_at, double scale, BlockMatrix& matrix) const;
   /// The changes of all points' stresses about the lag point and z.
   const std::vector<PointChange>& changes(const Points& z, bool by_parameters);
   PointChange change_of(int e, std::size_t point, const Points& z, bool by_parameters) const;
@@ -249,7 +296,12 @@ template <int N>
 const std::vector<Projection>& TetLawElasticity<N>::projections() const {
   if (has_projections_) return projections_;
   projections_.resize(points_.size());
-  for_all_points([&](int, std::size_t p) { projections_[p] = Projection(points_[p].stress.tangent); });
+  const bool is_isotropic = law_->is_isotropic();
+  for_all_points([&](int, std::size_t p) {
+    const PointStress& s = points_[p].stress;
+    const Matrix3 F = s.left.transpose() * points_[p].F * s.right;
+    projections_[p] = Projection(s.tangent, is_isotropic ? &F : nullptr);
+  });
   has_projections_ = true;
   return projections_;
 }
@@ -277,36 +329,46 @@ void TetLawElasticity<N>::add_gradient(Points& gradient) const {
     }
 }
 
-/// K_ab(i, k) = V sum_jl g_a(j) M(ij, kl) g_b(l) in the frame of M, turned by `left`.
+/// K_ab(i, k) = sum over points of V g_a^T M_ik g_b with (M_ik)(j, l) = M(ij, kl): for each i and k all nodes at once.
 template <int N>
-void TetLawElasticity<N>::add_point_stiffness(int e, const Point& point, const Matrix9& M, const Matrix3& left,
-                                              const Matrix3& right, double scale, BlockMatrix& matrix) const {
-  const int* blocks = blocks_->data() + std::size_t(e) * (N * N);
-  const Nodes g = point.gradient * right;
-  const double factor = scale * point.volume;
-  for (int b = 0; b < N; ++b) {
-    // H = M g_b, 9 x 3: a change of node b's coordinate k
-    Eigen::Matrix<double, 9, 3> H;
-    for (int k = 0; k < 3; ++k) H.col(k) = M.col(k) * g(b, 0) + M.col(k + 3) * g(b, 1) + M.col(k + 6) * g(b, 2);
-    const Eigen::Matrix<double, 9, 3> turned = factor * H * left.transpose();
-    for (int a = 0; a < N; ++a) {
-      const Matrix3 block =
-          turned.middleRows<3>(0) * g(a, 0) + turned.middleRows<3>(3) * g(a, 1) + turned.middleRows<3>(6) * g(a, 2);
-      Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])).noalias() += left * block;
+template <bool is_symmetric, class TangentAt>
+void TetLawElasticity<N>::add_elements(const TangentAt& tangent_at, double scale, BlockMatrix& matrix) const {
+  using Plane = Eigen::Matrix<double, N, N>;
+  using Part = Eigen::Map<const Matrix3, 0, Eigen::Stride<27, 3>>;  // M_ik
+  body_->loop->each([&](int e) {
+    std::array<std::array<Plane, 3>, 3> K;
+    for (int q = 0; q < points; ++q) {
+      const std::size_t p = std::size_t(e) * points + std::size_t(q);
+      const Nodes& g = points_[p].gradient;
+      const Nodes weighted = scale * points_[p].volume * g;
+      const Matrix9& M = tangent_at(p);
+      for (int i = 0; i < 3; ++i)
+        for (int k = is_symmetric ? i : 0; k < 3; ++k) {
+          const Nodes left = weighted * Part(&M(i, k));
+          if (q == 0)
+            K[i][k].noalias() = left * g.transpose();
+          else
+            K[i][k].noalias() += left * g.transpose();
+        }
     }
-  }
+    const int* blocks = blocks_->data() + std::size_t(e) * (N * N);
+    for (int a = 0; a < N; ++a)
+      for (int b = 0; b < N; ++b) {
+        double* block = matrix.block(blocks[N * a + b]);  // columns first
+        for (int k = 0; k < 3; ++k)
+          for (int i = 0; i < 3; ++i) block[i + 3 * k] += is_symmetric && k < i ? K[k][i](b, a) : K[i][k](a, b);
+      }
+  });
 }
 
 template <int N>
 void TetLawElasticity<N>::add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const {
   if (which == Stiffness::Positive) projections();
-  for (int e = 0; e < body_->element_count(); ++e)
-    for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e) * points + std::size_t(q);
-      const PointStress& s = points_[p].stress;
-      add_point_stiffness(e, points_[p], which == Stiffness::Exact ? s.tangent : projections_[p].positive, s.left,
-                          s.right, scale, matrix);
-    }
+  const auto tangent_at = [&](std::size_t p) -> Matrix9 {
+    const PointStress& s = points_[p].stress;
+    return in_world(s, which == Stiffness::Exact ? s.tangent : projections_[p].positive);
+  };
+  add_elements<true>(tangent_at, scale, matrix);
 }
 
 template <int N>
@@ -429,11 +491,9 @@ template <int N>
 auto TetLawElasticity<N>::change_of(int e, std::size_t p, const Points& z, bool by_parameters) const -> PointChange {
   const Point& point = points_[p];
   const PointStress& s = point.stress;
-  PointStress frame = s;
-  frame.tangent = projections_[p].positive;
   PointChange change;
-  change.by_z = world_tangent(frame);
-  change.by_lag = world_tangent(s) - change.by_z;
+  change.by_z = in_world(s, projections_[p].positive);
+  change.by_lag = in_world(s, s.tangent) - change.by_z;
   const Matrix3 H = deformation(e, point.gradient, z) - point.F;
   change.stress = s.P + matrix_of(change.by_z * vec(H));
   const auto count = by_parameters ? field_->law()->table().cols() : 0;
@@ -492,12 +552,7 @@ auto TetLawElasticity<N>::changes(const Points& z, bool by_parameters) -> const 
 template <int N>
 void TetLawElasticity<N>::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
   const std::vector<PointChange>& all = changes(z, false);
-  const Matrix3 world = Matrix3::Identity();
-  for (int e = 0; e < body_->element_count(); ++e)
-    for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e) * points + std::size_t(q);
-      add_point_stiffness(e, points_[p], all[p].by_lag, world, world, scale, matrix);
-    }
+  add_elements<false>([&](std::size_t p) -> const Matrix9& { return all[p].by_lag; }, scale, matrix);
 }
 
 template <int N>

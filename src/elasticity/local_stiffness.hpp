@@ -1,12 +1,14 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "elasticity/body.hpp"
 #include "elasticity/polar.hpp"
+#include "elasticity/tet_element.hpp"
 #include "solvers/wide.hpp"
 
 namespace pliant {
@@ -139,6 +141,20 @@ struct ReverseProducts {
   double d_work = 0.0;                ///< c . (dK / d nu) d
 };
 
+/// @param y, k, dy  K d, K c and (dK / d nu) d
+template <int N>
+ReverseProducts<N> reverse_products(const Eigen::Matrix<double, 3 * N, 1>& q, const Eigen::Matrix<double, 3 * N, 1>& c,
+                                    const Eigen::Matrix<double, 3 * N, 1>& y, const Eigen::Matrix<double, 3 * N, 1>& k,
+                                    const Eigen::Matrix<double, 3 * N, 1>& dy) {
+  ReverseProducts<N> products{k, Vector3::Zero(), c.dot(y), c.dot(dy)};
+  for (int a = 0; a < N; ++a) {
+    const Vector3 q_a = element_vector::node(q, a), k_a = element_vector::node(k, a);
+    const Vector3 y_a = element_vector::node(y, a), c_a = element_vector::node(c, a);
+    products.turn += q_a.cross(k_a) - y_a.cross(c_a);
+  }
+  return products;
+}
+
 /// Stiffness of a body's elements of N nodes in their own, unrotated frame, for E = 1 Pa: products, and blocks turned
 /// into the world. All elements pass through here in every step, so it is kept to what they need.
 template <int N>
@@ -165,11 +181,7 @@ class LocalStiffness {
   /// (dK / d nu) d.
   Vector derivative_times(int element, const Vector& d) const { return of(element).dK.lazyProduct(d); }
   [[nodiscard]] ReverseProducts<N> reverse(int element, const Vector& q, const Vector& d, const Vector& c) const {
-    const Vector y = times(element, d);
-    ReverseProducts<N> products{times(element, c), Vector3::Zero(), c.dot(y), c.dot(derivative_times(element, d))};
-    const auto node = [](const Vector& v, int a) -> Vector3 { return v.template segment<3>(3 * a); };
-    for (int a = 0; a < N; ++a) products.turn += node(q, a).cross(node(products.k, a)) - node(y, a).cross(node(c, a));
-    return products;
+    return reverse_products<N>(q, c, times(element, d), times(element, c), derivative_times(element, d));
   }
   /// Adds factor A K_ab A^T to the matrix's blocks.
   /// @param blocks  N x N numbers: where block (a, b) goes
@@ -339,6 +351,154 @@ class LocalStiffness<4> {
   }
 
   std::shared_ptr<const Body> body_;
+  UnitLame lame_;
+};
+
+/// Quadratic tetrahedra by the points of their stiffness's rule, four at a time in the lanes of wide registers:
+///   K d = sum V (lambda tr(H) I + mu (H + H^T)) g,  H = sum_b d_b g_b^T.
+/// K itself, of which every element of an unstructured mesh has its own, is seven times as large and comes from beyond
+/// the cache.
+template <>
+class LocalStiffness<10> {
+ public:
+  using Vector = Eigen::Matrix<double, 30, 1>;
+
+  explicit LocalStiffness(std::shared_ptr<const Body> body) : body_(std::move(body)) {
+    first_.push_back(0);
+    for (const int e : body_->class_representative) {
+      Eigen::Matrix<double, 10, 3> X;
+      for (int a = 0; a < 10; ++a) X.row(a) = body_->nodes.row(body_->element(e)[std::size_t(a)]);
+      const std::vector<StiffnessPoint<10>> points = stiffness_points<10>(X);
+      for (std::size_t p = 0; p < points.size(); ++p) {
+        if (p % 4 == 0) groups_.emplace_back();
+        const double root = std::sqrt(points[p].volume);
+        for (std::size_t a = 0; a < 10; ++a)
+          for (std::size_t j = 0; j < 3; ++j)
+            groups_.back()[3 * a + j][p % 4] = root * points[p].gradients(Eigen::Index(a), Eigen::Index(j));
+      }
+      first_.push_back(groups_.size());
+    }
+  }
+  void set_poissons_ratio(double poissons_ratio) { lame_ = unit_lame(poissons_ratio); }
+
+  Vector times(int element, const Vector& d) const { return times(element, d, lame_.lambda, lame_.mu); }
+  /// K d of four vectors, one a lane, point by point.
+  void times(int element, const ElementLanes<10>& d, ElementLanes<10>& y) const {
+    const Wide<double> lambda = Wide<double>{} + lame_.lambda, mu = Wide<double>{} + lame_.mu;
+    y = {};
+    for (const Group& g : of(element))
+      for (std::size_t p = 0; p < 4; ++p) {
+        MatrixLanes H{};
+        for (std::size_t a = 0; a < 10; ++a)
+          for (std::size_t i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 3; ++j) H[3 * i + j] += d[3 * a + i] * g[3 * a + j][p];
+        const MatrixLanes T = stress(H, lambda, mu);
+        for (std::size_t a = 0; a < 10; ++a)
+          for (std::size_t i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 3; ++j) y[3 * a + i] += T[3 * i + j] * g[3 * a + j][p];
+      }
+  }
+  Vector derivative_times(int element, const Vector& d) const { return times(element, d, lame_.d_lambda, lame_.d_mu); }
+  [[nodiscard]] ReverseProducts<10> reverse(int element, const Vector& q, const Vector& d, const Vector& c) const {
+    return reverse_products<10>(q, c, times(element, d), times(element, c), derivative_times(element, d));
+  }
+  void add_transformed(int element, const Matrix3& A, double factor, const int* blocks, BlockMatrix& matrix) const {
+    add<false>(element, A, factor, blocks, matrix);
+  }
+  void add_rotated(int element, const Matrix3& R, double factor, const int* blocks, BlockMatrix& matrix) const {
+    add<true>(element, R, factor, blocks, matrix);
+  }
+
+ private:
+  /// Of four points, or fewer and zeros, entry j of the gradient of node a in [3 a + j], times the root of the volume.
+  using Group = ElementLanes<10>;
+  std::span<const Group> of(int element) const {
+    const auto c = std::size_t(body_->element_class[std::size_t(element)]);
+    return std::span(groups_).subspan(first_[c], first_[c + 1] - first_[c]);
+  }
+  [[gnu::always_inline]] static MatrixLanes stress(const MatrixLanes& H, Wide<double> lambda, Wide<double> mu) {
+    MatrixLanes T;
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) T[3 * i + j] = mu * (H[3 * i + j] + H[3 * j + i]);
+    for (std::size_t i = 0; i < 3; ++i) T[4 * i] += lambda * (H[0] + H[4] + H[8]);
+    return T;
+  }
+  [[gnu::always_inline]] Vector times(int element, const Vector& d, double lambda, double mu) const {
+    ElementLanes<10> sum{};
+    for (const Group& g : of(element)) {
+      MatrixLanes H{};
+      for (std::size_t a = 0; a < 10; ++a)
+        for (std::size_t i = 0; i < 3; ++i)
+          for (std::size_t j = 0; j < 3; ++j) H[3 * i + j] += d[Eigen::Index(3 * a + i)] * g[3 * a + j];
+      const MatrixLanes T = stress(H, Wide<double>{} + lambda, Wide<double>{} + mu);
+      for (std::size_t a = 0; a < 10; ++a)
+        for (std::size_t i = 0; i < 3; ++i)
+          for (std::size_t j = 0; j < 3; ++j) sum[3 * a + i] += T[3 * i + j] * g[3 * a + j];
+    }
+    Vector y;
+    for (std::size_t k = 0; k < 30; ++k) y[Eigen::Index(k)] = sum_of(sum[k]);
+    return y;
+  }
+  static double sum_of(Wide<double> lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
+
+  /// A K_ab A^T = lambda S_ab + mu S_ba + mu (integral of g_a . g_b) A A^T with S_ab = integral of (A g_a) (A g_b)^T.
+  template <bool is_rotation>
+  void add(int element, const Matrix3& A, double factor, const int* blocks, BlockMatrix& matrix) const {
+    Eigen::Matrix<double, 30, 30> S;
+    Eigen::Matrix<double, 10, 10> dots;  // where A is no rotation, which keeps them
+    bool is_first = true;
+    for (const Group& g : of(element)) {
+      Eigen::Matrix<double, 4, 30> h;
+      for (std::size_t a = 0; a < 10; ++a)
+        for (std::size_t i = 0; i < 3; ++i) {
+          const auto r = Eigen::Index(i);
+          store_wide(h.col(Eigen::Index(3 * a + i)).data(),
+                     A(r, 0) * g[3 * a] + A(r, 1) * g[3 * a + 1] + A(r, 2) * g[3 * a + 2]);
+        }
+      const Eigen::Matrix<double, 30, 4> rows = h.transpose();
+      if (is_first)
+        S = rows.lazyProduct(h);
+      else
+        S += rows.lazyProduct(h);
+      if constexpr (!is_rotation) {
+        if (is_first) dots.setZero();
+        for (std::size_t a = 0; a < 10; ++a)
+          for (std::size_t b = 0; b <= a; ++b)
+            dots(Eigen::Index(a), Eigen::Index(b)) +=
+                sum_of(g[3 * a] * g[3 * b] + g[3 * a + 1] * g[3 * b + 1] + g[3 * a + 2] * g[3 * b + 2]);
+      }
+      is_first = false;
+    }
+    const Matrix3 square = is_rotation ? Matrix3::Identity() : Matrix3(A * A.transpose());
+    const double lambda = factor * lame_.lambda, mu = factor * lame_.mu;
+    for (int a = 0; a < 10; ++a)
+      for (int b = 0; b <= a; ++b) {
+        const double *left = &S(3 * a, 3 * b), *right = &S(3 * b, 3 * a);  // of S_ab and of S_ba, columns first
+        double K[9], transposed[9];
+        for (int k = 0; k < 3; ++k)
+          for (int i = 0; i < 3; ++i) {
+            const double one = left[30 * k + i], other = right[30 * k + i];
+            K[3 * k + i] = lambda * one + mu * other;
+            transposed[3 * k + i] = lambda * other + mu * one;
+          }
+        if constexpr (is_rotation) {
+          const double dot = mu * (left[0] + left[31] + left[62]);
+          for (const int d : {0, 4, 8}) K[d] += dot, transposed[d] += dot;
+        } else {
+          for (int k = 0; k < 9; ++k)
+            K[k] += (mu * dots(a, b)) * square.data()[k], transposed[k] += (mu * dots(a, b)) * square.data()[k];
+        }
+        double* block = matrix.block(blocks[10 * a + b]);
+        for (int k = 0; k < 9; ++k) block[k] += K[k];
+        if (a == b) continue;
+        block = matrix.block(blocks[10 * b + a]);
+        for (int k = 0; k < 9; ++k) block[k] += transposed[k];
+      }
+  }
+
+  std::shared_ptr<const Body> body_;
+  std::vector<Group> groups_;
+  std::vector<std::size_t> first_;  // of each class of elements
   UnitLame lame_;
 };
 

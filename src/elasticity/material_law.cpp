@@ -105,6 +105,7 @@ class ScaledLaw : public MaterialLaw {
     const SmallStrainModuli m = law_->small_strain(element);
     return {factor_ * m.youngs_modulus, m.poissons_ratio};
   }
+  bool is_isotropic() const override { return law_->is_isotropic(); }
   Matrix9 tangent_derivative(int element, const Matrix3& F, const Matrix3& dF) const override {
     return factor_ * law_->tangent_derivative(element, F, dF);
   }
@@ -293,25 +294,16 @@ SmallStrainModuli LinearLaw::small_strain(int e) const { return moduli_of({table
 
 // ---- Ogden
 
-namespace {
-
-/// A law of the principal stretches at F: F = U diag(l) V^T.
-struct Principal {
-  Vector3 stretch;
-  Matrix3 U, V;
-  bool is_valid = false;  // J > 0
-};
-
-Principal principal(const Matrix3& F) {
-  Principal p;
-  if (!(F.determinant() > 0.0)) return p;
+PrincipalStretches::PrincipalStretches(const Matrix3& F) {
+  if (!(F.determinant() > 0.0)) return;
   const Eigen::SelfAdjointEigenSolver<Matrix3> solver(F.transpose() * F);
-  p.stretch = solver.eigenvalues().cwiseMax(1e-300).cwiseSqrt();
-  p.V = solver.eigenvectors();
-  p.U = F * p.V * p.stretch.cwiseInverse().asDiagonal();
-  p.is_valid = p.stretch.allFinite() && p.stretch.minCoeff() > 1e-100;
-  return p;
+  stretch = solver.eigenvalues().cwiseMax(1e-300).cwiseSqrt();
+  V = solver.eigenvectors();
+  U = F * V * stretch.cwiseInverse().asDiagonal();
+  is_valid = stretch.allFinite() && stretch.minCoeff() > 1e-100;
 }
+
+namespace {
 
 /// (exp(-a b ln J) - 1) / b, also for b = 0.
 double volumetric(double a, double b, double log_J) {
@@ -340,7 +332,7 @@ void OgdenLaw::check(const MatrixX& table) const {
 }
 
 void OgdenLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
-  const Principal p = principal(F);
+  const PrincipalStretches p(F);
   if (!p.is_valid) {
     out.energy = std::numeric_limits<double>::infinity();
     return;
@@ -390,7 +382,7 @@ void OgdenLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& o
 
 /// Each term is one of the stretches one by one and one of ln J: 2 mu / (a^2 b) (exp(-a b ln J) - 1).
 Matrix9 OgdenLaw::tangent_derivative(int e, const Matrix3& F, const Matrix3& dF) const {
-  const Principal p = principal(F);
+  const PrincipalStretches p(F);
   if (!p.is_valid) return Matrix9::Constant(std::numeric_limits<double>::quiet_NaN());
   const double log_J = p.stretch.array().log().sum();
   OddPowers powers;
@@ -406,7 +398,7 @@ Matrix9 OgdenLaw::tangent_derivative(int e, const Matrix3& F, const Matrix3& dF)
 }
 
 void OgdenLaw::parameter_derivatives(int e, const Matrix3& F, std::span<Matrix3> out) const {
-  const Principal p = principal(F);
+  const PrincipalStretches p(F);
   for (Matrix3& derivative : out) derivative.setZero();
   if (!p.is_valid) return;
   const Vector3 l = p.stretch, log_l = l.array().log();

@@ -43,6 +43,8 @@ class MaterialLaw {
   /// Energy, stress and, where asked for, tangent of an element at F.
   virtual void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const = 0;
   virtual SmallStrainModuli small_strain(int element) const = 0;
+  /// Whether the energy follows from the principal stretches alone.
+  virtual bool is_isotropic() const { return true; }
 
   /// Numbers q of an element that can be estimated; none where `parameter_names` is empty.
   virtual std::vector<std::string> parameter_names() const { return {}; }
@@ -58,6 +60,15 @@ class MaterialLaw {
   /// Changes of `parameter_derivatives`, likewise.
   virtual void parameter_derivative_changes(int element, const Matrix3& F, const Matrix3& dF,
                                             std::span<Matrix3> out) const;
+};
+
+/// F = U diag(stretch) V^T with rotations U and V, stretches ascending.
+struct PrincipalStretches {
+  explicit PrincipalStretches(const Matrix3& F);
+
+  Vector3 stretch;
+  Matrix3 U, V;
+  bool is_valid = false;  ///< J > 0 and no stretch is lost to rounding; else there is none of the others
 };
 
 /// Turns a tangent given in the frame of `left` and `right` into that of the world.

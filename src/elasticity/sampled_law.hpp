@@ -33,6 +33,7 @@ class SampledLaw : public MaterialLaw {
   void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override;
   /// Of the isotropic stiffness that is closest to that at rest.
   SmallStrainModuli small_strain(int element) const override;
+  bool is_isotropic() const override { return false; }  // the samples lie where they lie
 
   const TabulatedLaw& law() const { return *law_; }
   const StressSamples& samples(int element) const { return elements_[std::size_t(element)].given; }

@@ -64,6 +64,13 @@ ElementStiffness<N> tet_stiffness(const NodeMatrix<N>& X, double poissons_ratio)
 }
 
 template <int N>
+std::vector<StiffnessPoint<N>> stiffness_points(const NodeMatrix<N>& X) {
+  std::vector<StiffnessPoint<N>> points;
+  for_gradients<N>(X, [&](double volume, const NodeMatrix<N>& g) { points.push_back({volume, g}); });
+  return points;
+}
+
+template <int N>
 Eigen::Matrix<double, N, N> tet_mass(const NodeMatrix<N>& X) {
   Eigen::Matrix<double, N, N> M = Eigen::Matrix<double, N, N>::Zero();
   for (const TetQuadraturePoint& q : tet_quadrature(N == 4 ? 2 : 5)) {
@@ -94,6 +101,7 @@ NodeMatrix<N> tet_mean_gradients(const NodeMatrix<N>& X) {
 
 template ElementStiffness<4> tet_stiffness<4>(const NodeMatrix<4>&, double);
 template ElementStiffness<10> tet_stiffness<10>(const NodeMatrix<10>&, double);
+template std::vector<StiffnessPoint<10>> stiffness_points<10>(const NodeMatrix<10>&);
 template Eigen::Matrix<double, 4, 4> tet_mass<4>(const NodeMatrix<4>&);
 template Eigen::Matrix<double, 10, 10> tet_mass<10>(const NodeMatrix<10>&);
 template NodeMatrix<4> tet_gradients<4>(const NodeMatrix<4>&, const Barycentric&);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "base/types.hpp"
 #include "elasticity/lame.hpp"
 #include "mesh/tet_shape.hpp"
@@ -20,6 +22,16 @@ struct ElementStiffness {
 };
 template <int N>
 ElementStiffness<N> tet_stiffness(const Eigen::Matrix<double, N, 3>& X, double poissons_ratio);
+
+/// A point of the rule that integrates the stiffness: exactly for straight edges.
+template <int N>
+struct StiffnessPoint {
+  double volume = 0.0;                    ///< that it stands for [m^3]
+  Eigen::Matrix<double, N, 3> gradients;  ///< of the shape functions [1/m]
+};
+/// All of them: 4 of a quadratic element with straight edges, 14 of one with curved ones.
+template <int N>
+std::vector<StiffnessPoint<N>> stiffness_points(const Eigen::Matrix<double, N, 3>& X);
 
 /// Consistent mass for unit density [m^3], N x N (the same for x, y and z). Exact for straight edges; total and centre
 /// of mass are exact for curved ones too.

@@ -1,5 +1,7 @@
 #include "elasticity/law_elasticity.hpp"
 
+#include <array>
+
 #include "support/bodies.hpp"
 #include "support/dense.hpp"
 #include "support/derivatives.hpp"
@@ -132,6 +134,56 @@ TEST(LawElasticity, OfTheLinearLawIsCorotatedElasticity) {
   EXPECT_LT((f - g).norm(), tolerance(1e-10) * f.norm());
   EXPECT_NEAR(by_law->energy(x), corotated->energy(x), tolerance(1e-10) * corotated->energy(x));
 }
+
+/// A law of which nothing is known but what it says.
+class AnyLaw : public MaterialLaw {
+ public:
+  explicit AnyLaw(std::shared_ptr<const MaterialLaw> law) : law_(std::move(law)) {}
+  std::string name() const override { return law_->name(); }
+  int element_count() const override { return law_->element_count(); }
+  void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override {
+    law_->stress(element, F, with_tangent, out);
+  }
+  SmallStrainModuli small_strain(int element) const override { return law_->small_strain(element); }
+  bool is_isotropic() const override { return false; }
+
+ private:
+  std::shared_ptr<const MaterialLaw> law_;
+};
+
+/// Principal stretches, two or three of which may be the same.
+class Projected : public ::testing::TestWithParam<Vector3> {};
+
+TEST_P(Projected, StiffnessOfIsotropicLawsIsThatOfAnyLaw) {
+  const auto body = test::tet_body({0.2, 0.1, 0.12}, {1, 1, 1}, true);
+  const Matrix3 U = Eigen::AngleAxisd(0.7, Vector3(1.0, -2.0, 0.5).normalized()).toRotationMatrix();
+  const Matrix3 V = Eigen::AngleAxisd(-1.9, Vector3(0.3, 0.4, 2.0).normalized()).toRotationMatrix();
+  const Matrix3 F = U * GetParam().asDiagonal() * V.transpose();
+  const Points x = body->nodes * F.transpose();
+  MatrixX two(body->element_count(), 2);
+  two.rowwise() = Eigen::RowVector2d(900.0, 300.0);
+  const std::array<std::shared_ptr<const MaterialLaw>, 3> laws = {std::make_shared<NeoHookeanLaw>(two),
+                                                                  std::make_shared<LinearLaw>(two), foam(*body)};
+  for (const auto& law : laws) {
+    const auto stiffness = [&](const std::shared_ptr<const MaterialLaw>& of, LawElasticity::Stiffness which) {
+      const auto term = LawElasticity::make(body, of);
+      term->evaluate(x, true);
+      BlockMatrix K(body->pattern);
+      term->add_stiffness(which, 2.0, K);
+      return test::dense(K);
+    };
+    using enum LawElasticity::Stiffness;
+    ASSERT_TRUE(law->is_isotropic());
+    const MatrixX any = stiffness(std::make_shared<AnyLaw>(law), Positive);
+    EXPECT_LT((stiffness(law, Positive) - any).norm(), tolerance(1e-12) * any.norm()) << law->name();
+    if (GetParam().minCoeff() < 0.9) {
+      EXPECT_GT((stiffness(law, Exact) - any).norm(), 1e-3 * any.norm()) << law->name() << ": nothing is left out";
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Stretches, Projected,
+                         ::testing::Values(Vector3(1.0, 1.0, 1.0), Vector3(0.7, 0.8, 1.1), Vector3(0.6, 0.6, 0.6),
+                                           Vector3(0.8, 0.8, 1.3), Vector3(0.7, 0.9, 0.9), Vector3(1.2, 1.5, 1.5)));
 
 TEST(LawElasticity, RefusesOtherBodies) {
   const auto hexahedra = test::box_body({0.1, 0.1, 0.1}, 0.05);
