@@ -40,6 +40,7 @@ FITS = {
     # Of the first 50 frames: a fifth of the steps.
     "placed-beginning": ("placed", {"span": 0.2}),
     "painted-beginning": ("painted", {"span": 0.2}),
+    "internodes-beginning": ("internodes", {"span": 0.2}),
     "loop-auto": ("plant", {"tracking": "loop", "control_points": "auto"}),
 }
 
@@ -78,23 +79,23 @@ def from_segment(p, a, b):
     return math.dist(p, [o + min(1.0, max(0.0, share)) * d for o, d in zip(a, along)])
 
 
-def with_painted_organs(recording, folder):
-    """The stem and each leaf have a modulus of their own, by vertex, as one would paint them who looks at the scan."""
+def with_painted_parts(recording, folder, internodes):
+    """Each leaf has a modulus of its own, by vertex, and so has the stem: one as a whole, or one below, between and above its lower joints; as
+    one would paint them who looks at the scan."""
     folder.mkdir(parents=True, exist_ok=True)
-    organs = ["stem", *LEAVES]
     stem = [PLACED[name] for name in STEM]
+    between = ["low internode", "middle internode", "high internode", "high internode"] if internodes else ["stem"] * (len(stem) - 1)
 
-    def organ_of(p):
-        if min(from_segment(p, a, b) for a, b in zip(stem, stem[1:])) < STEM_RADIUS:
-            return "stem"
-        return min(LEAVES, key=lambda name: math.dist(p, PLACED[name]))
+    def part_of(p):
+        off, part = min((from_segment(p, a, b), name) for a, b, name in zip(stem, stem[1:], between))
+        return part if off < STEM_RADIUS else min(LEAVES, key=lambda name: math.dist(p, PLACED[name]))
 
-    painted = [organ_of(p) for p in common.read_vertices(recording / "rest.ply")]
+    painted = [part_of(p) for p in common.read_vertices(recording / "rest.ply")]
     text = (recording / "capture.toml").read_text()
-    for organ in organs:
-        file = organ.replace(" ", "-") + ".txt"
-        (folder / file).write_text("".join(f"{int(o == organ)}\n" for o in painted))
-        text += f'\n[[control]]\nname = "{organ}"\nweights = "{file}"\n'
+    for part in [*dict.fromkeys(between), *LEAVES]:
+        file = part.replace(" ", "-") + ".txt"
+        (folder / file).write_text("".join(f"{int(o == part)}\n" for o in painted))
+        text += f'\n[[control]]\nname = "{part}"\nweights = "{file}"\n'
     (folder / "capture.toml").write_text(text)
     link_files(recording, folder)
     return folder
@@ -325,7 +326,8 @@ def main():
     truth = common.read(recording / "truth.json")
     common.run(arguments.program, "check", recording)
     captures = {"plant": recording, "placed": with_placed_points(recording, arguments.work / "captures/placed"),
-                "painted": with_painted_organs(recording, arguments.work / "captures/painted")}
+                "painted": with_painted_parts(recording, arguments.work / "captures/painted", internodes=False),
+                "internodes": with_painted_parts(recording, arguments.work / "captures/internodes", internodes=True)}
     zones, fits = true_cells(recording), {}
     before = common.read(HERE / "results.json")["fits"] if (HERE / "results.json").exists() else {}
     for name in FITS:

@@ -172,14 +172,24 @@ Stage FitPlan::swing(const VectorX& from) const {
 
 namespace {
 
-/// Swings out of step are as wrong as any other: the valley about the truth narrows as more of them are seen.
-std::vector<double> growing_horizon(bool swings) {
-  return swings ? std::vector{0.12, 0.25, 0.5, 1.0} : std::vector{0.6, 1.0};
+/// Less than all, without those that hold as much as what is compared at all.
+std::vector<double> within_span(std::vector<double> parts, const PlanFacts& facts) {
+  if (const double span = facts.options.span; span > 0.0)
+    std::erase_if(parts, [&](double part) { return part < 1.0 && part >= span; });
+  return parts;
+}
+
+/// Swings out of step are as wrong as any other: the valley about the truth narrows as more of them are seen. Parts of
+/// an object swing faster than all of it: where they have moduli of their own, the first frames come first.
+std::vector<double> growing_horizon(const PlanFacts& facts) {
+  if (!facts.swings) return {0.6, 1.0};
+  if (facts.moduli.size() > 1) return within_span({0.04, 0.07, 0.12, 0.25, 0.5, 1.0}, facts);
+  return within_span({0.12, 0.25, 0.5, 1.0}, facts);
 }
 
 /// Of the stages on the full grid; the last one is in the narrow band.
-std::vector<double> fine_horizons(bool swings) {
-  return swings ? std::vector{0.25, 0.5, 1.0, 1.0} : std::vector{1.0, 1.0};
+std::vector<double> fine_horizons(const PlanFacts& facts) {
+  return facts.swings ? within_span({0.25, 0.5, 1.0, 1.0}, facts) : std::vector{1.0, 1.0};
 }
 
 }  // namespace
@@ -189,7 +199,7 @@ Stage FitPlan::scan(const VectorX& from) const {
   const FitOptions& options = facts_.options;
   Stage stage{{StageKind::Scan}, "scan", facts_.coarse};
   stage.band = options.wide_band;
-  stage.horizon.part = growing_horizon(facts_.swings).front();
+  stage.horizon.part = growing_horizon(facts_).front();
   stage.from = {from};
   const double g = std::max(facts_.gravity.vector(from).norm(), 0.1);
   const double softest = facts_.softest > 0.0 ? facts_.softest : from[facts_.density] * g * facts_.size;
@@ -201,7 +211,7 @@ Stage FitPlan::scan(const VectorX& from) const {
 
 StageChain FitPlan::start(int index, const Records& done) const {
   StageChain chain;
-  const std::vector<double> horizons = growing_horizon(facts_.swings);
+  const std::vector<double> horizons = growing_horizon(facts_);
   std::optional<StageId> pose;
   for (const StageRecord& r : done)
     if (r.id.kind == StageKind::Motion && r.succeeded && !names(is_pull).empty()) pose = r.id;
@@ -218,6 +228,8 @@ StageChain FitPlan::start(int index, const Records& done) const {
     stage.done_from = 0.15 + 0.3 * (last ? 0.4 : 0.0), stage.done_to = stage.done_from + 0.15;
     chain.push_back(std::move(stage));
   }
+  // Where others are wrong, the first of them are told wrongly: once more as far as swings of parts are in step.
+  for (int i = 0; facts_.swings && facts_.moduli.size() > 1 && i < 2; ++i) chain[std::size_t(i)].tries_moduli = true;
   const VectorX theta = before_starts(done);
   const std::vector<double> moduli = start_moduli(done);
   if (index >= int(moduli.size()))
@@ -243,7 +255,7 @@ Stage FitPlan::pulls(const VectorX& from, const Spacing& grid, int number) const
 StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beginning>& begin) const {
   const FitOptions& options = facts_.options;
   const Spacing grid{options.cells, options.steps};
-  const std::vector<double> horizons = fine_horizons(facts_.swings);
+  const std::vector<double> horizons = fine_horizons(facts_);
   const double share = 0.15 / double(horizons.size() - 1);
   const bool is_last_one_corrected = begin && !needed_corrections(done).empty();
   const auto [start, index] = best_start(done);
@@ -290,7 +302,7 @@ StageChain FitPlan::corrected(const Records& done, const std::optional<PassState
   const StageRecord* fine = narrow(done);
   if (!fine && !begin) return {};
   const FitOptions& options = facts_.options;
-  const int number = int(fine_horizons(facts_.swings).size());
+  const int number = int(fine_horizons(facts_).size());
   Stage stage{{StageKind::Corrected, best_start(done).second, number}, "corrected", {options.cells, options.steps}};
   stage.band = options.fine_band, stage.iterations = options.max_iterations;
   stage.iterations_before = iterations_on_full_grid(done);
@@ -393,7 +405,7 @@ const StageRecord* FitPlan::first_of_start(int index, const Records& done) const
 }
 
 const StageRecord* FitPlan::end_of_start(int index, const Records& done) const {
-  return find_record(done, {StageKind::Coarse, index, int(growing_horizon(facts_.swings).size()) - 1});
+  return find_record(done, {StageKind::Coarse, index, int(growing_horizon(facts_).size()) - 1});
 }
 
 /// Starts are followed over the first frames, and on if one leads about as far down as the best one, elsewhere.
@@ -619,7 +631,7 @@ ParameterSet FitPlan::estimated(const Records& done) const {
 }
 
 const StageRecord* FitPlan::narrow(const Records& done) const {
-  const int number = int(fine_horizons(facts_.swings).size()) - 1;
+  const int number = int(fine_horizons(facts_).size()) - 1;
   const auto it = std::ranges::find_if(
       done, [&](const StageRecord& r) { return r.id.kind == StageKind::Fine && r.id.number == number; });
   return it == done.end() || !it->succeeded ? nullptr : &*it;

@@ -312,6 +312,39 @@ OptimiserSummary FitRun::optimise(Objective& objective, const Stage& stage, cons
   return s;
 }
 
+VectorX FitRun::with_tried_moduli(Objective& objective, VectorX p, double& work) const {
+  constexpr int most_rounds = 2, most_worse = 2;
+  const std::vector<const Parameter*> of = objective.parameters().coordinate_parameters();
+  double least = infinite;
+  // One after the other: each load-free shape is near the one before.
+  const auto is_less = [&](const VectorX& trial) {
+    const CostEvaluation e = objective.evaluate(trial);
+    work += e.work;
+    if (!e.succeeded || e.cost >= least) return false;
+    least = e.cost;
+    return true;
+  };
+  (void)is_less(p);
+  bool moved = true;
+  for (int round = 0; round < most_rounds && std::exchange(moved, false); ++round)
+    for (std::size_t i = 0; i < of.size() && !is_interrupted(); ++i) {
+      if (!is_modulus(*of[i])) continue;
+      const VectorX from = p;
+      const auto is_better = [&](double factor) {
+        VectorX trial = from;
+        trial[Eigen::Index(i)] += std::log(factor);
+        trial = objective.parameters().clamp(trial);
+        if (!is_less(trial)) return false;
+        p = trial;
+        return moved = true;
+      };
+      int worse = 0;
+      for (double factor = 0.5; factor > 0.1 && worse < most_worse; factor *= 0.5) worse += is_better(factor) ? 0 : 1;
+      if (p == from && is_better(2.0)) (void)is_better(4.0);
+    }
+  return p;
+}
+
 StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   const StageUnderWay* left = under_way(stage.id);
   const VectorX from = left ? left->from : stage.from.front();
@@ -319,14 +352,16 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   Objective objective = objective_of(stage, parameters, grid(stage.grid));
   Stage own = stage;
   own.from = {from};
-  const OptimiserState begin = left && left->optimiser.p.size() > 0 ? left->optimiser : start_of(parameters);
+  OptimiserState begin = left && left->optimiser.p.size() > 0 ? left->optimiser : start_of(parameters);
+  double tried = 0.0;
+  if (stage.tries_moduli && begin.iterations == 0) begin.p = with_tried_moduli(objective, begin.p, tried);
   std::optional<int> joined;
   OptimiserSummary s = optimise(objective, own, begin, joined);
   is_cut = s.interrupted && !joined;
   StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
   if (joined) record.joined = joined, record.reason = "came into the valley of start " + std::to_string(*joined + 1);
-  record.iterations = s.iterations, record.work = s.work;
+  record.iterations = s.iterations, record.work = tried + s.work;
   record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
   if (s.succeeded && !is_cut && s.evaluation.cost > stage.give_up_above) {
     record.succeeded = record.converged = s.evaluation.succeeded = false;

@@ -40,6 +40,8 @@ class FitRun : StageLoop {
   StageRecord test_corrections(const Stage& stage);
   StageRecord look_at_resolution(const Stage& stage);
   std::optional<VectorX> mesh_shift(const std::vector<StageRecord>& done, const VectorX& own) const;
+  /// The least cost that is found where each modulus in turn is several times smaller or larger.
+  VectorX with_tried_moduli(Objective& objective, VectorX p, double& work) const;
   StageRecord try_alternative(const Stage& stage, bool& is_cut);
   std::vector<ModelShift> shifts_of_given(const Stage& stage, const ParameterSet& estimated, double& work);
 

@@ -92,6 +92,9 @@ struct Stage {
   /// Released objects are compared where they were registered before their release, if they were: that leads there from
   /// afar, and the surface goes on from where it ends.
   bool by_pose = false;
+  /// First each modulus is tried several times smaller and larger, the others staying: a part that swings out of step
+  /// seems stiff, and no valley leads back from there.
+  bool tries_moduli = false;
   int iterations_before = 0;           ///< of its start, that are counted on
   double give_up_above = infinite;     ///< cost at its end that is worth no further stage
   std::vector<std::string> free = {};  ///< parameters that are estimated

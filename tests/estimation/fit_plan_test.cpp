@@ -230,6 +230,31 @@ TEST_F(Plans, BeginAtTheSwingThatWasSeen) {
   EXPECT_EQ(FitPlan(facts).start_theta(state.done), theta(5e3));
 }
 
+TEST_F(Plans, LookAtTheFirstFramesWhereSeveralModuliSwing) {
+  const auto horizons = [&] {
+    std::vector<double> parts;
+    for (const StageChain& chain : next())
+      for (const Stage& stage : chain) parts.push_back(stage.horizon.part);
+    return parts;
+  };
+  facts.swings = true, facts.is_scanned = false;
+  has_moved();
+  StageRecord swing = record({StageKind::Swing}, 0.0, 5e3);
+  swing.converged = true;
+  has_done(swing);
+  has_done(record({StageKind::Motion, 0, 2}, 9.0, 5e3));
+  has_done(record({StageKind::Motion, 0, 3}, 8.0, 5e3));
+  EXPECT_THAT(horizons(), ElementsAre(0.12, 0.25, 0.5, 1.0));
+  EXPECT_FALSE(next()[0][0].tries_moduli) << "the swing has told the one there is";
+  facts.moduli.push_back(facts.moduli.front());
+  facts.relative_moduli = VectorX::Ones(2);
+  EXPECT_THAT(horizons(), ElementsAre(0.04, 0.07, 0.12, 0.25, 0.5, 1.0));
+  const StageChain chain = next()[0];
+  for (std::size_t i = 0; i < chain.size(); ++i) EXPECT_EQ(chain[i].tries_moduli, i < 2) << i;
+  facts.options.span = 0.2;
+  EXPECT_THAT(horizons(), ElementsAre(0.04, 0.07, 0.12, 1.0)) << "no stage of frames that are not compared";
+}
+
 TEST_F(Plans, BeginWhereTheUserSays) {
   facts.is_scanned = false;
   has_moved();
