@@ -2,7 +2,7 @@
 from page import judged, machine, percent, results, table, with_truth
 
 FIT_NAMES = {"no-choice": "no choice", "auto": "as many control points as the evidence supports", "placed": "control points placed at joints and leaves",
-             "placed-beginning": "control points placed, the first 50 frames", "painted-beginning": "stem and leaves painted, the first 50 frames",
+             "placed-beginning": "control points placed, the first 50 frames", "painted-beginning": "stem and leaves painted, the first 50 frames", "internodes-beginning": "stem in three parts and leaves painted, the first 50 frames",
              "together": "tracking and estimation together, and the points by themselves", "loop-auto": "tracking and estimation in turns, control points by evidence"}
 GOAL_SECONDS = 600
 
@@ -39,7 +39,7 @@ def plant():
             f"Each frame has {r['points_a_frame'][0]} to {r['points_a_frame'][2]} points. Of the energy that is lost in the recording, {percent(abs(r['energy_J']['not_accounted_share']), False)} is not what the dampings take.\n\n")
     text += verified(figures["checks"])
     m = figures["meshes"]
-    text += (f"\nThe load-free shape of one even material of {1e-6 * m['youngs_modulus']:g} MPa, by `pliant rest`, on meshes of several sizes: what a mesh leaves out of leaves and stem makes the plant too soft.\n\n" +
+    text += (f"\nThe load-free shape of one even material of {1e-6 * m['youngs_modulus']:g} MPa, by `pliant rest`, on meshes of several sizes, whose nodes are moved until they have the scan's volume: chords of leaves and stem would make the plant too soft.\n\n" +
              table(["cells along the height", "elements", "nodes", "volume, of the twin's", "sag [mm]", "time [s]"],
                    [[row["cells"], row["elements"], row["nodes"], *([percent(row["volume"], False), f"{1e3 * row['sag']:.1f}"] if row["found"] else ["", "no shape found"]), f"{row['seconds']:.0f}"] for row in m["rows"]]))
     refused = {name: f for name, f in fits.items() if "refused" in f}
@@ -67,7 +67,7 @@ def plant():
         if f["exit_code"] == 130 and f.get("limit"):
             text += (f"\n{fit_name(f, name)[:1].upper()}{fit_name(f, name)[1:]}: asked to stop after {f['limit']:.0f} s, and it ended {f['wall_seconds'] - f['limit']:.0f} s later: "
                      "what is told is the best so far, with one iteration on the full mesh, and no result of a whole fit.\n")
-    for name in ("no-choice", "auto", "placed", "placed-beginning", "painted-beginning"):
+    for name in ("no-choice", "auto", "placed", "placed-beginning", "painted-beginning", "internodes-beginning"):
         f = fits.get(name)
         if not f:
             continue

@@ -228,8 +228,7 @@ StageChain FitPlan::start(int index, const Records& done) const {
     stage.done_from = 0.15 + 0.3 * (last ? 0.4 : 0.0), stage.done_to = stage.done_from + 0.15;
     chain.push_back(std::move(stage));
   }
-  // Where others are wrong, the first of them are told wrongly: once more as far as swings of parts are in step.
-  for (int i = 0; facts_.swings && facts_.moduli.size() > 1 && i < 2; ++i) chain[std::size_t(i)].tries_moduli = true;
+  chain.front().tries_moduli = facts_.swings && facts_.moduli.size() > 1;
   const VectorX theta = before_starts(done);
   const std::vector<double> moduli = start_moduli(done);
   if (index >= int(moduli.size()))
