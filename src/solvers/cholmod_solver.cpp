@@ -134,10 +134,12 @@ class CholmodSolver : public LinearSolver {
     for (std::size_t k = 0; k < n; ++k) {
       const int node = order_[k] / 3, c = order_[k] % 3;
       column.clear();
-      for (int b = pattern.row_start[node]; b < pattern.row_start[node + 1]; ++b)
+      for (int b = pattern.row_start[node]; b < pattern.row_start[node + 1]; ++b) {
+        const int* places = place.data() + 3 * std::size_t(pattern.column[b]);
         for (int r = 0; r < 3; ++r)
-          if (const int at = place[std::size_t(3 * pattern.column[b] + r)]; at >= int(k))
-            column.emplace_back(at, 9 * std::uint32_t(b) + 3 * std::uint32_t(r) + std::uint32_t(c));  // (c, r)
+          if (places[r] >= int(k))
+            column.emplace_back(places[r], 9 * std::uint32_t(b) + 3 * std::uint32_t(r) + std::uint32_t(c));  // (c, r)
+      }
       std::ranges::sort(column);
       start[k] = int(source_.size());
       for (const auto& [at, from] : column) {
