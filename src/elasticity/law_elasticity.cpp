@@ -33,10 +33,8 @@ struct Projection {
   Projection() = default;
   /// @param F  deformation in the frame of the stress's tangent, of an isotropic law; null: of any law
   Projection(const Matrix9& tangent, const Matrix3* F) {
-    const PrincipalStretches* principal = nullptr;
-    std::optional<PrincipalStretches> own;
-    if (F && own.emplace(*F).is_valid) principal = &*own;
-    if (principal)
+    std::optional<PrincipalStretches> principal;
+    if (F && principal.emplace(*F).is_valid)
       decompose(tangent, *principal);
     else
       decompose(tangent);

@@ -172,24 +172,23 @@ Stage FitPlan::swing(const VectorX& from) const {
 
 namespace {
 
-/// Less than all, without those that hold as much as what is compared at all.
-std::vector<double> within_span(std::vector<double> parts, const PlanFacts& facts) {
-  if (const double span = facts.options.span; span > 0.0)
-    std::erase_if(parts, [&](double part) { return part < 1.0 && part >= span; });
-  return parts;
+/// Whether a part of the recording holds as much as what is compared of it at all. Its stage is left out; the others
+/// keep their numbers, as passes over other spans take them over.
+bool is_all_of_span(double part, const PlanFacts& facts) {
+  return part < 1.0 && facts.options.span > 0.0 && part >= facts.options.span;
 }
 
 /// Swings out of step are as wrong as any other: the valley about the truth narrows as more of them are seen. Parts of
 /// an object swing faster than all of it: where they have moduli of their own, the first frames come first.
 std::vector<double> growing_horizon(const PlanFacts& facts) {
   if (!facts.swings) return {0.6, 1.0};
-  if (facts.moduli.size() > 1) return within_span({0.04, 0.07, 0.12, 0.25, 0.5, 1.0}, facts);
-  return within_span({0.12, 0.25, 0.5, 1.0}, facts);
+  if (facts.moduli.size() > 1) return {0.04, 0.07, 0.12, 0.25, 0.5, 1.0};
+  return {0.12, 0.25, 0.5, 1.0};
 }
 
 /// Of the stages on the full grid; the last one is in the narrow band.
 std::vector<double> fine_horizons(const PlanFacts& facts) {
-  return facts.swings ? within_span({0.25, 0.5, 1.0, 1.0}, facts) : std::vector{1.0, 1.0};
+  return facts.swings ? std::vector{0.25, 0.5, 1.0, 1.0} : std::vector{1.0, 1.0};
 }
 
 }  // namespace
@@ -217,6 +216,7 @@ StageChain FitPlan::start(int index, const Records& done) const {
     if (r.id.kind == StageKind::Motion && r.succeeded && !names(is_pull).empty()) pose = r.id;
   for (std::size_t i = 0; i < horizons.size(); ++i) {
     const bool last = i + 1 == horizons.size();
+    if (i > 0 && is_all_of_span(horizons[i], facts_)) continue;
     Stage stage{{StageKind::Coarse, index, int(i)}, "coarse", facts_.coarse};
     stage.horizon.part = horizons[i];
     stage.band = facts_.options.wide_band, stage.iterations = last ? 10 : 5;
@@ -267,7 +267,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
   for (std::size_t i = 0; i < horizons.size(); ++i) {
     const bool is_narrow = i + 1 == horizons.size(), is_last_wide = i + 2 == horizons.size(),
                is_last = is_narrow && !is_last_one_corrected;
-    if ((!is_last && is_close) || (begin && int(i) < begin->stage)) continue;
+    if ((!is_last && is_close) || is_all_of_span(horizons[i], facts_) || (begin && int(i) < begin->stage)) continue;
     Stage stage{{StageKind::Fine, index, int(i)}, is_narrow ? "fine" : "fine, wide band", grid};
     stage.horizon.part = horizons[i];
     stage.band = is_narrow ? options.fine_band : options.wide_band;

@@ -253,6 +253,7 @@ TEST_F(Plans, LookAtTheFirstFramesWhereSeveralModuliSwing) {
   for (std::size_t i = 0; i < chain.size(); ++i) EXPECT_EQ(chain[i].tries_moduli, i == 0) << i;
   facts.options.span = 0.2;
   EXPECT_THAT(horizons(), ElementsAre(0.04, 0.07, 0.12, 1.0)) << "no stage of frames that are not compared";
+  EXPECT_EQ(next()[0].back().id, chain.back().id) << "numbers do not depend on the span";
 }
 
 TEST_F(Plans, BeginWhereTheUserSays) {
