@@ -41,6 +41,8 @@ FITS = {
     "placed-beginning": ("placed", {"span": 0.2}),
     "painted-beginning": ("painted", {"span": 0.2}),
     "internodes-beginning": ("internodes", {"span": 0.2}),
+    # Not a user's: the true surface at rest in the place of the scan, to tell what the scan's own errors do.
+    "true-scan-beginning": ("true-scan", {"span": 0.2}),
     "loop-auto": ("plant", {"tracking": "loop", "control_points": "auto"}),
 }
 
@@ -55,11 +57,11 @@ def make_recording(python, work):
     return folder, common.read(checks)
 
 
-def link_files(recording, folder):
-    """The scan and the clouds of the recording beside another capture.toml."""
-    for name in ("rest.ply", "clouds"):
+def link_files(recording, folder, scan="rest.ply"):
+    """A scan and the clouds of the recording beside another capture.toml."""
+    for name, file in (("rest.ply", scan), ("clouds", "clouds")):
         if not (folder / name).is_symlink():
-            (folder / name).symlink_to((recording / name).resolve())
+            (folder / name).symlink_to((recording / file).resolve())
 
 
 def with_placed_points(recording, folder):
@@ -79,7 +81,7 @@ def from_segment(p, a, b):
     return math.dist(p, [o + min(1.0, max(0.0, share)) * d for o, d in zip(a, along)])
 
 
-def with_painted_parts(recording, folder, internodes):
+def with_painted_parts(recording, folder, internodes, scan="rest.ply"):
     """Each leaf has a modulus of its own, by vertex, and so has the stem: one as a whole, or one below, between and above its lower joints; as
     one would paint them who looks at the scan."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -96,8 +98,10 @@ def with_painted_parts(recording, folder, internodes):
         file = part.replace(" ", "-") + ".txt"
         (folder / file).write_text("".join(f"{int(o == part)}\n" for o in painted))
         text += f'\n[[control]]\nname = "{part}"\nweights = "{file}"\n'
+    if scan != "rest.ply":
+        text = text.replace(next(line for line in text.splitlines(True) if line.startswith("surface_noise")), "")
     (folder / "capture.toml").write_text(text)
-    link_files(recording, folder)
+    link_files(recording, folder, scan)
     return folder
 
 
@@ -327,7 +331,8 @@ def main():
     common.run(arguments.program, "check", recording)
     captures = {"plant": recording, "placed": with_placed_points(recording, arguments.work / "captures/placed"),
                 "painted": with_painted_parts(recording, arguments.work / "captures/painted", internodes=False),
-                "internodes": with_painted_parts(recording, arguments.work / "captures/internodes", internodes=True)}
+                "internodes": with_painted_parts(recording, arguments.work / "captures/internodes", internodes=True),
+                "true-scan": with_painted_parts(recording, arguments.work / "captures/true-scan", internodes=True, scan="truth/static.ply")}
     zones, fits = true_cells(recording), {}
     before = common.read(HERE / "results.json")["fits"] if (HERE / "results.json").exists() else {}
     for name in FITS:

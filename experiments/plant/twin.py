@@ -29,6 +29,7 @@ TRUTH = {
     "blend": [0.010, 0.035],  # from stem to leaf the logarithm of the modulus goes over these distances from the stem's axis [m]
     "pull": {"y": 0.245, "radius": 0.014, "direction": [0.80, -0.15, 0.58], "moves": 0.060},
     "frame_rate": 30.0, "frame_count": 250, "start_frame": 4, "substeps": 12, "cell": 0.0078, "seed": 4711,
+    "surface_noise": 0.00025,  # of the scan along its normals [m], alike over some 20 mm
 }
 
 
@@ -325,6 +326,7 @@ name = "a plant scanned while it sags, then pulled aside and let go"
 surface = "rest.ply"
 mass = {mass}
 shape_is = "static"
+surface_noise = {surface_noise}
 
 [world]
 gravity = [0.0, -9.81, 0.0]
@@ -360,7 +362,7 @@ def record(out):
     vertices, triangles = boundary(body.elements)
     print(f"{len(vertices)} vertices; sag {1e3 * np.linalg.norm(rest - body.X, axis=1).max():.1f} mm; pull {np.linalg.norm(force):.3f} N; {time.monotonic() - begin:.0f} s", flush=True)
     scan = rest[vertices]
-    scan = scan + normals(scan, triangles) * smooth_noise(scan, 0.00025, 0.02, random)[:, None]
+    scan = scan + normals(scan, triangles) * smooth_noise(scan, TRUTH["surface_noise"], 0.02, random)[:, None]
     scan[~body.free.reshape(-1, 3)[vertices].any(axis=1), 1] = np.minimum(scan[~body.free.reshape(-1, 3)[vertices].any(axis=1), 1], 0.0)
     write_mesh(out / "rest.ply", scan, triangles)
     write_mesh(out / "truth/reference.ply", body.X[vertices], triangles)
@@ -390,7 +392,7 @@ def record(out):
         points.append(len(cloud))
         write_cloud(out / f"clouds/{k:06d}.ply", cloud)
     np.savez_compressed(out / "truth/trajectory.npz", q=np.round(np.array(frames) / 1e-5).astype("<i4"), scale=np.array([1e-5]))
-    (out / "capture.toml").write_text(CAPTURE.format(mass=round(body.mass, 7), frame_rate=rate, frame_count=count, start_frame=start))
+    (out / "capture.toml").write_text(CAPTURE.format(mass=round(body.mass, 7), surface_noise=TRUTH["surface_noise"], frame_rate=rate, frame_count=count, start_frame=start))
     total = lambda e: e[0] + e[1] + e[2]
     tips = {}
     for name, leaf in TRUTH["leaves"].items():

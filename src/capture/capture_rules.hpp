@@ -32,6 +32,7 @@ std::string item(const char* name, std::size_t i, const char* key = "");
 void check_surface_is_solid(RuleContext&);
 void check_object_size(RuleContext&);
 void check_pose(RuleContext&);
+void check_surface_noise(RuleContext&);
 void check_mass_or_density(RuleContext&);
 void check_gravity(RuleContext&);
 void check_timing(RuleContext&);

@@ -120,6 +120,17 @@ void check_object_size(RuleContext& context) {
                                               : "meshes are in metres: check the unit of this one");
 }
 
+void check_surface_noise(RuleContext& context) {
+  constexpr double most = 0.02;  // of the object's size: beyond that it is another object's
+  const Object& object = context.capture.scene.object;
+  const double noise = object.surface_noise;
+  const double size = object.surface && object.scale_is_known ? size_of(*object.surface) : infinite;
+  if (noise < 0.0 || noise > most * size)
+    context.toml.complain("object.surface_noise", "a surface that errs by " + text_of(noise, "m"),
+                          size < infinite ? "0 to " + text_of(most * size, "m") : "0 or more",
+                          "it is a standard deviation in metres, that of the scanner");
+}
+
 void check_mass_or_density(RuleContext& context) {
   const Capture& capture = context.capture;
   if (capture.scene.object.mass && capture.scene.object.density)

@@ -145,6 +145,7 @@ std::vector<Rule> make_rules() {
   return {check_surface_is_solid,
           check_object_size,
           check_pose,
+          check_surface_noise,
           check_mass_or_density,
           check_gravity,
           check_timing,

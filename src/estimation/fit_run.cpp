@@ -46,6 +46,8 @@ constexpr double most_cells = 64.0;  // along the object's longest axis
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
 constexpr int few_iterations = 2, many_iterations = 5;
+const std::string cause_scan = "errors of the scan";
+constexpr int draws_of_scan = 4;
 constexpr double promise_of_alternative = 0.1, promise_to_trust = 0.5;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 // From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
@@ -155,7 +157,7 @@ PlanFacts FitRun::facts() {
 }
 
 /// Each stands for what is known to differ between a model and what is recorded: its mesh and time step, the law at
-/// large strain, how hard a floor is, and what the capture gives.
+/// large strain, how thick the object is where its scan errs, and what the capture gives.
 std::vector<Alternative> FitRun::alternatives() const {
   const bool is_static = recordings_.all_static();
   std::vector<Alternative> all;
@@ -169,6 +171,10 @@ std::vector<Alternative> FitRun::alternatives() const {
   if (!is_static)
     all.push_back(
         {"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step, false, few_iterations});
+  for (int draw = 1; recordings_.any_scan_errs() && draw <= draws_of_scan; ++draw) {
+    const double share = std::sqrt(1.0 / draws_of_scan);  // of the variance of all draws
+    all.push_back({cause_scan, cells, 1.0, {.scan_error = draw}, false, share, has_coarser, few_iterations});
+  }
   if (!options_.law_of_motion()) {
     const bool has_large_strain =
         !is_static && !recordings_.moves_reference() && options_.material != MaterialKind::Linear;

@@ -61,6 +61,7 @@ struct Horizon {
 struct ModelChange {
   bool neo_hookean = false;   ///< at every quadrature point, in the place of linear elasticity in turning frames
   bool small_strain = false;  ///< linear elasticity in turning frames, and Rayleigh's damping
+  int scan_error = 0;         ///< the object's surface lies beside its scan, as that may err: which draw; 0: on it
   bool operator==(const ModelChange&) const = default;
 };
 

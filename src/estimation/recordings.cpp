@@ -12,6 +12,7 @@
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/press_objective.hpp"
+#include "geometry/random_field.hpp"
 
 namespace pliant {
 
@@ -368,30 +369,34 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
   if (options_.material == MaterialKind::Linear || change.small_strain) settings.elastic_law = ElasticLaw::Corotated;
   if (options_.damping == StiffnessDamping::Rayleigh || change.small_strain)
     settings.stiffness_damping = StiffnessDamping::Rayleigh;
+  constexpr double alike = 0.1;  // of the object's size: over so far are errors of a scan alike
   Grid grid{cells, steps, change, {}, {}};
   for (const Recording& r : all_) {
-    grid.recording.push_back(discretise(r.capture, r.distance, resolution(cells, steps), r.blocks,
-                                        parameters_.reference(), settings, r.tracked.rest));
+    Resolution own = resolution(cells, steps);
+    if (const double noise = r.capture.scene.object.surface_noise; change.scan_error > 0 && noise > 0.0)
+      own.offset = RandomField(noise, alike * r.size, std::uint64_t(change.scan_error));
+    grid.recording.push_back(
+        discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
     if (change.neo_hookean) {
       ParameterLayout unchanged = parameters_.layout();  // the law has no numbers beside those of linear elasticity
       const LawForm form{1, 0, 1, false, TwoNumberLaw::NeoHookean};
       grid.recording.back().simulation.law_layout = LawLayout::of_motion(unchanged, r.blocks.motion, form);
     }
-    grid.presses.push_back(press_scene(r, grid.recording.back(), cells));
+    grid.presses.push_back(press_scene(r, grid.recording.back(), own));
   }
   return grid;
 }
 
 /// The presses of a recording around its own body, or, where that is of hexahedra, around one of tetrahedra as large.
 std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recording, const Discretisation& d,
-                                                          double cells) const {
+                                                          const Resolution& resolution) const {
   const Capture& capture = recording.capture;
   if (!std::ranges::any_of(capture.presses, [](const Press& p) { return is_fitted(p.role); }) &&
       !has_static_tests_to_fit(capture))
     return nullptr;
   auto body = d.body;
   if (body->kind == ElementKind::Hexahedron) {
-    Resolution tetrahedra = resolution(cells, 1.0);
+    Resolution tetrahedra = resolution;
     tetrahedra.element = ElementKind::Tetrahedron;
     std::vector<Vector3> control_points;
     body = make_body_of(capture.scene, *recording.distance, tetrahedra, control_points);

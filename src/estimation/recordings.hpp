@@ -79,6 +79,10 @@ class Recordings {
     return std::ranges::any_of(all_,
                                [](const Recording& r) { return r.capture.scene.object.shape_is == ShapeIs::Static; });
   }
+  /// Whether a capture states how far its scan errs.
+  bool any_scan_errs() const {
+    return std::ranges::any_of(all_, [](const Recording& r) { return r.capture.scene.object.surface_noise > 0.0; });
+  }
   bool any_meshed_here() const {
     return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.scene.object.volume; });
   }
@@ -112,7 +116,7 @@ class Recordings {
   CaptureParameters make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes);
   Resolution resolution(double cells, double steps) const;
   std::shared_ptr<const PressScene> press_scene(const Recording& recording, const Discretisation& d,
-                                                double cells) const;
+                                                const Resolution& resolution) const;
   void add_loads(const Recording& recording, const Discretisation& d, ObjectiveOptions options,
                  std::vector<std::unique_ptr<Trial>>& trials) const;
   void add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,

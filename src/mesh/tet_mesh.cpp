@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <unsupported/Eigen/BVH>
@@ -228,6 +229,64 @@ TetMesh with_mid_nodes(const TetMesh& mesh) {
   nodes.topRows(mesh.node_count()) = mesh.nodes;
   for (std::size_t m = 0; m < mids.size(); ++m) nodes.row(mesh.node_count() + Eigen::Index(m)) = mids[m].transpose();
   return make_tet_mesh(std::move(nodes), mesh.tets, std::move(mid_nodes));
+}
+
+namespace {
+
+/// Corners that are not given moves go as the mean of those around them does: nearly, after so many sweeps.
+void move_along_inside(const std::vector<std::array<int, 4>>& tets, const std::function<bool(int)>& is_given,
+                       Points& moves) {
+  constexpr int sweeps = 50;
+  std::vector<std::set<int>> around(std::size_t(moves.rows()));
+  for (const auto& tet : tets)
+    for (const int a : tet)
+      for (const int b : tet)
+        if (a != b && !is_given(a)) around[std::size_t(a)].insert(b);
+  for (int sweep = 0; sweep < sweeps; ++sweep)
+    for (std::size_t n = 0; n < around.size(); ++n) {
+      if (around[n].empty()) continue;
+      Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+      for (const int other : around[n]) sum += moves.row(other);
+      moves.row(Eigen::Index(n)) = sum / double(around[n].size());
+    }
+}
+
+}  // namespace
+
+TetMesh with_offset_boundary(const TetMesh& mesh, const std::function<double(const Vector3&)>& offset) {
+  // Of the planes of the faces about a node each moves by one: n . d = 1, by least squares over their areas, of all
+  // answers the shortest. What two nearly parallel faces differ by says nothing.
+  constexpr double hardly = 0.05;  // of the greatest eigenvalue
+  std::vector<Matrix3> squares(std::size_t(mesh.node_count()), Matrix3::Zero());
+  std::vector<Vector3> sums(std::size_t(mesh.node_count()), Vector3::Zero());
+  for (const auto& face : mesh.boundary) {
+    const Vector3 a = mesh.nodes.row(face[0]), b = mesh.nodes.row(face[1]), c = mesh.nodes.row(face[2]);
+    const Vector3 area = 0.5 * (b - a).cross(c - a), normal = area.normalized();
+    for (const int n : face) {
+      squares[std::size_t(n)] += area * normal.transpose();
+      sums[std::size_t(n)] += area;
+    }
+  }
+  Points moves = Points::Zero(mesh.node_count(), 3);
+  for (std::size_t n = 0; n < sums.size(); ++n) {
+    if (squares[n].isZero(0.0)) continue;
+    const double by = offset(mesh.nodes.row(Eigen::Index(n)));
+    const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(squares[n]);
+    for (int k = 0; k < 3; ++k)
+      if (eigen.eigenvalues()[k] > hardly * eigen.eigenvalues()[2]) {
+        const Vector3 axis = eigen.eigenvectors().col(k);
+        moves.row(Eigen::Index(n)) += by * axis.dot(sums[n]) / eigen.eigenvalues()[k] * axis.transpose();
+      }
+  }
+  move_along_inside(
+      mesh.tets, [&](int n) { return !squares[std::size_t(n)].isZero(0.0); }, moves);
+  for (std::size_t e = 0; e < mesh.mid_nodes.size(); ++e)
+    for (std::size_t m = 0; m < 6; ++m) {
+      const auto& [a, b] = tet_edges[m];
+      moves.row(mesh.mid_nodes[e][m]) =
+          0.5 * (moves.row(mesh.tets[e][std::size_t(a)]) + moves.row(mesh.tets[e][std::size_t(b)]));
+    }
+  return make_tet_mesh(mesh.nodes + moves, mesh.tets, mesh.mid_nodes);
 }
 
 TetMesh make_tet_box(const Box& box, const Eigen::Vector3i& cells, bool quadratic) {

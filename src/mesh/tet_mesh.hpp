@@ -52,6 +52,12 @@ TetMesh make_tet_mesh(Points nodes, std::vector<std::array<int, 4>> tets,
 /// quadratic already comes back as it is.
 TetMesh with_mid_nodes(const TetMesh& mesh);
 
+/// The same elements with the boundary moved outwards, inwards where it is negative: nodes of faces that meet at an
+/// edge go so far that each of the faces does, those inside as the ones around them, and mid nodes as their edges'
+/// ends. Throws std::invalid_argument where an element is left without a positive volume.
+/// @param offset  by which the boundary moves at a place of it [m]
+TetMesh with_offset_boundary(const TetMesh& mesh, const std::function<double(const Vector3&)>& offset);
+
 /// A box of nx x ny x nz cells of six tetrahedra each. Throws std::invalid_argument where the box is empty or a count
 /// is below one.
 TetMesh make_tet_box(const Box& box, const Eigen::Vector3i& cells, bool quadratic);
@@ -68,6 +74,7 @@ struct TetMeshOptions {
   TetFit fit = TetFit::Conforming;
   double feature_angle_deg = 60.0;  ///< edges whose faces' normals differ by more are kept sharp, (0, 180]; 180: none
   std::vector<std::function<bool(const Vector3&)>> parts = {};  ///< of space, whose boundaries the faces follow
+  std::function<double(const Vector3&)> offset = {};            ///< see `with_offset_boundary`; none: on the scan
 };
 
 /// Fills a closed surface with elements, by CGAL's Mesh_3 (Delaunay refinement, slivers removed). Conforming elements

@@ -174,6 +174,7 @@ std::string largest_share_sentence(const Result& result) {
       {"noise", "a longer recording, or a better sensor"},
       {"mesh", "a finer mesh (--set cells)"},
       {"time step", "smaller time steps (--set steps)"},
+      {"errors of the scan", "a scan that errs less (surface_noise of [object])"},
       {"stiffness of contact", "a hard floor, or less of it in the recording"},
       {"form of the law", "presses of other sizes and at other places"},
       {"elastic law", "smaller strains, or the law of the object's material (--set material)"},

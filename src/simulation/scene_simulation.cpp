@@ -149,28 +149,70 @@ HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double c
   return make_hex_grid(distance, object, cell_size, options, shift);
 }
 
-std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
-                                         const Resolution& resolution, std::vector<Vector3>& control_points) {
-  const double edge = object_size(scene) / resolution.cells;
-  Body body;
+namespace {
+
+/// The scene's tetrahedra, their boundary beside the scan by an offset [m]; none: on it.
+TetMesh tetrahedra_of(const Scene& scene, const Resolution& resolution,
+                      const std::function<double(const Vector3&)>& offset = {}) {
+  const bool quadratic = resolution.element == ElementKind::QuadraticTetrahedron;
   if (scene.object.volume) {
     const VolumeMesh& volume = *scene.object.volume;
     const TetMesh mesh = make_tet_mesh(volume.nodes, volume.tets, volume.mid_nodes);
-    body = make_body(resolution.element == ElementKind::QuadraticTetrahedron ? with_mid_nodes(mesh) : mesh);
-  } else if (resolution.element == ElementKind::Hexahedron) {
-    double cell_size = resolution.follows_thickness ? hex_cell_size(scene, distance, resolution.cells) : edge;
-    HexGrid grid = hex_grid_of(scene, distance, cell_size);
-    // Where a neck falls between cells, a part of the object would hang by an edge, or not at all.
-    for (int smaller = 0; smaller < 6 && face_connected_parts(grid) > 1; ++smaller)
-      grid = hex_grid_of(scene, distance, cell_size *= 0.85);
-    body = make_body(std::move(grid));
-  } else {
-    TetMeshOptions options;
-    options.cell_size = edge;
-    options.quadratic = resolution.element == ElementKind::QuadraticTetrahedron;
-    for (const Hold& hold : held_regions(scene)) options.parts.push_back(hold.contains);
-    body = make_body(make_tet_mesh(*scene.object.surface, options));
+    const TetMesh own = quadratic ? with_mid_nodes(mesh) : mesh;
+    return offset ? with_offset_boundary(own, offset) : own;
   }
+  TetMeshOptions options;
+  options.offset = offset;
+  options.cell_size = object_size(scene) / resolution.cells;
+  options.quadratic = quadratic;
+  for (const Hold& hold : held_regions(scene)) options.parts.push_back(hold.contains);
+  return make_tet_mesh(*scene.object.surface, options);
+}
+
+HexGrid hexahedra_of(const Scene& scene, const SignedDistance& distance, const Resolution& resolution) {
+  double cell_size = resolution.follows_thickness ? hex_cell_size(scene, distance, resolution.cells)
+                                                  : object_size(scene) / resolution.cells;
+  HexGrid grid = hex_grid_of(scene, distance, cell_size);
+  // Where a neck falls between cells, a part of the object would hang by an edge, or not at all.
+  for (int smaller = 0; smaller < 6 && face_connected_parts(grid) > 1; ++smaller)
+    grid = hex_grid_of(scene, distance, cell_size *= 0.85);
+  return grid;
+}
+
+/// The body with its surface beside the scan but where it is held, on the same lattice or by the same elements; as
+/// heavy where the scene tells the mass.
+Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body& body, const Resolution& resolution) {
+  const auto offset = [&, holds = held_regions(scene)](const Vector3& p) {
+    return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); }) ? 0.0 : resolution.offset(p);
+  };
+  Body other;
+  if (body.kind == ElementKind::Hexahedron) {
+    const SignedDistance moved(distance.box(), distance.spacing(),
+                               [&](const Vector3& p) { return distance.value(p) - offset(p); });
+    other = make_body(hex_grid_of(scene, moved, body.grid().cell_size), body.options);
+  } else {
+    try {
+      other = make_body(tetrahedra_of(scene, resolution, offset), body.options);
+    } catch (const std::invalid_argument&) {
+      throw InputError({{},
+                        "elements turn inside out where the surface is as far from the scan as that may err",
+                        "errors that are a small part of the object's thickness",
+                        "check surface_noise of [object], in metres"});
+    }
+  }
+  if (scene.object.mass)
+    for (double& mass : other.mass) mass *= body.volume() / other.volume();
+  return other;
+}
+
+}  // namespace
+
+std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
+                                         const Resolution& resolution, std::vector<Vector3>& control_points) {
+  const bool are_hexahedra = !scene.object.volume && resolution.element == ElementKind::Hexahedron;
+  Body body = are_hexahedra ? make_body(hexahedra_of(scene, distance, resolution))
+                            : make_body(tetrahedra_of(scene, resolution));
+  if (resolution.offset) body = beside_scan(scene, distance, body, resolution);
   ControlledField field = modulus_field(body, scene, resolution.field);
   body.modulus = std::move(field.field);
   control_points = std::move(field.points);

@@ -34,6 +34,8 @@ struct Resolution {
   int shape_points = 0;            ///< about which the scan may err; 0: it is exact. Tetrahedra only
   double shape_std = 0.01;         ///< by how much, times the object's longest axis
   double band = 0.15;              ///< of the mismatch, times the object's longest axis
+  /// By which the object's surface lies outside its scan, at a place of the scan [m]; none: it is the scan.
+  std::function<double(const Vector3&)> offset = {};
 };
 
 /// Moduli of the scene's regions or control points, or as many as are asked for where it names none.
@@ -66,7 +68,9 @@ double hex_cell_size(const Scene& scene, const SignedDistance& distance, double 
 /// @param cell_size  [m]
 HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size);
 
-/// The object's elements at one resolution; `control_points` are those of its field of moduli, if any.
+/// The object's elements at one resolution; `control_points` are those of its field of moduli, if any. One whose
+/// surface is not its scan has the same mass where the scene tells that.
+/// Throws InputError where so thin an object cannot be so far from its scan.
 /// @param distance  of the scene's surface; only hexahedra ask for it
 std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
                                          const Resolution& resolution, std::vector<Vector3>& control_points);

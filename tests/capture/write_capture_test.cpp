@@ -13,6 +13,7 @@ void expect_same_scene(const Scene& is, const Scene& was) {
   EXPECT_EQ(is.object.mass, was.object.mass);
   EXPECT_EQ(is.object.density, was.object.density);
   EXPECT_EQ(is.object.shape_is, was.object.shape_is);
+  EXPECT_EQ(is.object.surface_noise, was.object.surface_noise);
   EXPECT_EQ(is.object.surface, was.object.surface);
   EXPECT_EQ(is.object.volume.has_value(), was.object.volume.has_value());
   EXPECT_EQ(is.world, was.world);
@@ -72,7 +73,7 @@ void fill(SmallCapture& small) {
   small.folder.write("press/000_std.csv", "id,sx,sy,sz\n0,1e-4,1e-4,2e-4\n");
   write_png(small.folder / "load.png", SmallCapture::depth_image(0.0));
   write_png(small.folder / "load_mask.png", SmallCapture::mask_image(0.0));
-  small.edit("mass = 0.8", "density = 100.0\nshape_is = \"static\"");
+  small.edit("mass = 0.8", "density = 100.0\nsurface_noise = 0.0002\nshape_is = \"static\"");
   small.edit("noise = 0.002",
              "background = \"front/background.png\"\nevery = 1\nnoise = 0.002\ntime_offset = -0.004\n"
              "distortion = [-0.1, 0.02, 0.001, -0.002, 0.003]");

@@ -39,6 +39,28 @@ TEST(Alternatives, WidenWhatTheNoiseLeavesOpen) {
   EXPECT_NEAR(share(with, "mass")->std[0], 0.01, 0.002);
 }
 
+TEST(Alternatives, CountWhatAScanMayErrBy) {
+  const std::string scan = "errors of the scan";
+  RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  const FitOptions options = test::quick_fit_of_bar();
+  const FitOutcome exact = fit({bar}, options);
+  EXPECT_EQ(share(exact, scan), nullptr);
+  std::vector<double> std;
+  for (const double noise : {0.0005, 0.001}) {
+    bar.capture.scene.object.surface_noise = noise;
+    const FitOutcome outcome = fit({bar}, options);
+    EXPECT_EQ(outcome.theta, exact.theta) << "it leaves the estimate alone";
+    ASSERT_NE(share(outcome, scan), nullptr) << ::testing::PrintToString(outcome.notes);
+    std.push_back(share(outcome, scan)->std[0]);
+    EXPECT_GT(outcome.uncertainty.std[0], exact.uncertainty.std[0]);
+  }
+  // Were all errors alike, a millimetre on either side of 50 would be 8 % of the modulus by the density and the sag,
+  // q l^4 / (8 E I) with q of the thickness squared and I to the fourth power; along the bar they are not.
+  EXPECT_GT(std[1], 0.01);
+  EXPECT_LT(std[1], 0.08);
+  EXPECT_NEAR(std[1], 2.0 * std[0], 0.2 * std[1]) << "to first order";
+}
+
 /// A hexahedron high: the bar is far too stiff for its mesh, and the noise is small beside that.
 FitOptions one_hexahedron() {
   FitOptions options = test::quick_fit_of_bar();

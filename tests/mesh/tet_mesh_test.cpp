@@ -219,6 +219,27 @@ TEST(TetMesh, MidNodesAreSharedAndInTheMiddle) {
   EXPECT_NEAR(quadratic.volume(), linear.volume(), tolerance(1e-14) * linear.volume());
 }
 
+TEST(TetMesh, AnOffsetMovesEveryFaceOfABoxByAsMuch) {
+  const Vector3 size(0.4, 0.1, 0.05);
+  const TetMesh box = make_tet_box({Vector3::Zero(), size}, {8, 4, 3}, true);
+  const auto by = [](double offset) { return [=](const Vector3&) { return offset; }; };
+  for (const double offset : {0.004, -0.004}) {
+    const TetMesh moved = with_offset_boundary(box, by(offset));
+    const Vector3 low = moved.nodes.colwise().minCoeff(), high = moved.nodes.colwise().maxCoeff();
+    EXPECT_LT((low + Vector3::Constant(offset)).norm(), tolerance(1e-15)) << "edges and corners as far as faces";
+    EXPECT_LT((high - size - Vector3::Constant(offset)).norm(), tolerance(1e-15));
+    EXPECT_NEAR(moved.volume(), (high - low).prod(), tolerance(1e-12) * box.volume()) << "faces stay flat";
+    for (int e = 0; e < moved.tet_count(); ++e)
+      for (int m = 0; m < 6; ++m) {
+        const int a = moved.tets[e][tet_edges[m][0]], b = moved.tets[e][tet_edges[m][1]];
+        EXPECT_LT((moved.nodes.row(moved.mid_nodes[e][m]) - 0.5 * (moved.nodes.row(a) + moved.nodes.row(b))).norm(),
+                  tolerance(1e-15));
+      }
+  }
+  EXPECT_EQ(with_offset_boundary(box, by(0.0)).nodes, box.nodes);
+  EXPECT_THROW((void)with_offset_boundary(box, by(-0.03)), std::invalid_argument) << "thicker than the box";
+}
+
 TEST(TetMesh, RefusesWhatIsNoMesh) {
   Points nodes(5, 3);
   nodes << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1;

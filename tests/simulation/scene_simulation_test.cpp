@@ -1,7 +1,9 @@
 #include "simulation/scene_simulation.hpp"
 
 #include <cmath>
+#include <numeric>
 
+#include "base/error.hpp"
 #include "geometry/primitives.hpp"
 #include "motion/linear_statics.hpp"
 
@@ -76,6 +78,35 @@ TEST_P(HeldEnds, HangABeamFromWhereTheyEndWhateverTheElements) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Lengths, HeldEnds, testing::Values(0.008, 0.02, 0.037, 0.05, 0.09));
+
+TEST(SceneSimulation, ASurfaceBesideItsScanMakesAThickerBodyAsHeavy) {
+  constexpr double length = 0.4, edge = 0.04, offset = 0.0006;
+  Scene scene;
+  scene.object.surface = make_box(Vector3(length, edge, edge), 0.02);
+  scene.timing = evenly_timed(50.0, 3);
+  const double grown = (length + 2.0 * offset) * (edge + 2.0 * offset) * (edge + 2.0 * offset) / (length * edge * edge);
+  for (const ElementKind element :
+       {ElementKind::Hexahedron, ElementKind::Tetrahedron, ElementKind::QuadraticTetrahedron})
+    for (const bool is_weighed : {false, true}) {
+      scene.object.mass.reset();
+      if (is_weighed) scene.object.mass = 0.5;
+      Resolution resolution;
+      resolution.element = element, resolution.cells = 10.0;
+      std::vector<Vector3> controls;
+      const auto distance = scene_distance(scene, 0.15);
+      const auto on_scan = make_body_of(scene, *distance, resolution, controls);
+      resolution.offset = [](const Vector3&) { return offset; };
+      const auto beside = make_body_of(scene, *distance, resolution, controls);
+      EXPECT_NEAR(beside->volume() / on_scan->volume(), grown, 0.003) << int(element);
+      const auto weight = [](const Body& body) { return std::accumulate(body.mass.begin(), body.mass.end(), 0.0); };
+      EXPECT_NEAR(weight(*beside) / weight(*on_scan), is_weighed ? 1.0 : grown, 0.003) << int(element);
+    }
+  Resolution thin;
+  thin.element = ElementKind::Tetrahedron;
+  thin.offset = [](const Vector3&) { return -0.6 * edge; };
+  std::vector<Vector3> controls;
+  EXPECT_THROW((void)make_body_of(scene, *scene_distance(scene, 0.15), thin, controls), InputError);
+}
 
 TEST(SceneSimulation, ThicknessIsThatOfMostOfTheSurface) {
   const auto of = [](TriangleMesh mesh) {
