@@ -81,10 +81,9 @@ def from_segment(p, a, b):
     return math.dist(p, [o + min(1.0, max(0.0, share)) * d for o, d in zip(a, along)])
 
 
-def with_painted_parts(recording, folder, internodes, scan="rest.ply"):
-    """Each leaf has a modulus of its own, by vertex, and so has the stem: one as a whole, or one below, between and above its lower joints; as
-    one would paint them who looks at the scan."""
-    folder.mkdir(parents=True, exist_ok=True)
+def painted_parts(recording, internodes):
+    """The part of each vertex of the scan, as one would paint them who looks at it: leaves, and the stem as a whole, or below, between and above
+    its lower joints."""
     stem = [PLACED[name] for name in STEM]
     between = ["low internode", "middle internode", "high internode", "high internode"] if internodes else ["stem"] * (len(stem) - 1)
 
@@ -92,9 +91,15 @@ def with_painted_parts(recording, folder, internodes, scan="rest.ply"):
         off, part = min((from_segment(p, a, b), name) for a, b, name in zip(stem, stem[1:], between))
         return part if off < STEM_RADIUS else min(LEAVES, key=lambda name: math.dist(p, PLACED[name]))
 
-    painted = [part_of(p) for p in common.read_vertices(recording / "rest.ply")]
+    return [part_of(p) for p in common.read_vertices(recording / "rest.ply")], [*dict.fromkeys(between), *LEAVES]
+
+
+def with_painted_parts(recording, folder, internodes, scan="rest.ply"):
+    """Each painted part has a modulus of its own, by vertex."""
+    folder.mkdir(parents=True, exist_ok=True)
+    painted, parts = painted_parts(recording, internodes)
     text = (recording / "capture.toml").read_text()
-    for part in [*dict.fromkeys(between), *LEAVES]:
+    for part in parts:
         file = part.replace(" ", "-") + ".txt"
         (folder / file).write_text("".join(f"{int(o == part)}\n" for o in painted))
         text += f'\n[[control]]\nname = "{part}"\nweights = "{file}"\n'
@@ -103,6 +108,22 @@ def with_painted_parts(recording, folder, internodes, scan="rest.ply"):
     (folder / "capture.toml").write_text(text)
     link_files(recording, folder, scan)
     return folder
+
+
+def scan_errors(recording):
+    """By how much the scan lies outside the true surface at rest, along its normals: mean and rms over each part [m]."""
+    scan, true = (common.read_vertices(recording / file) for file in ("rest.ply", "truth/static.ply"))
+    normals = [[0.0, 0.0, 0.0] for _ in true]
+    for face in faces_of(recording / "truth/static.ply"):
+        a, b, c = (true[k] for k in face)
+        u, v = ([q - o for o, q in zip(a, to)] for to in (b, c))
+        area = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+        for k in face:
+            normals[k] = [n + d for n, d in zip(normals[k], area)]
+    off = [sum((p - q) * d for p, q, d in zip(*row)) / math.hypot(*row[2]) for row in zip(scan, true, normals)]
+    painted, parts = painted_parts(recording, internodes=True)
+    of = {part: [o for o, name in zip(off, painted) if name == part] for part in parts}
+    return {part: {"mean": common.number(sum(o) / len(o), 3), "rms": common.number(math.sqrt(sum(d * d for d in o) / len(o)), 3)} for part, o in of.items()}
 
 
 class Nearest:
@@ -350,7 +371,7 @@ def main():
               f", cost {f['cost']}, {f['verdict']}", flush=True)
     picture(recording, fits, arguments.work, zones)
     common.write_results(__file__, {"checks": checks, "recording": {key: truth[key] for key in ("size", "tips", "mesh", "points_a_frame", "energy_J", "pull_N", "seconds")} | {"pull_height": truth["truth"]["pull"]["y"]},
-                                    "zones": truth["zones"], "placed": PLACED, "registered": registered(arguments.program, recording, arguments.work), "meshes": meshes(arguments.program, recording, arguments.work, truth), "fits": fits})
+                                    "zones": truth["zones"], "scan_errors": scan_errors(recording), "placed": PLACED, "registered": registered(arguments.program, recording, arguments.work), "meshes": meshes(arguments.program, recording, arguments.work, truth), "fits": fits})
 
 
 if __name__ == "__main__":
