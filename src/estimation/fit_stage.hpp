@@ -57,11 +57,15 @@ struct Horizon {
   bool operator==(const Horizon&) const = default;
 };
 
+/// Of a scan's standard deviation, how far an object's surface lies beside it where that is tried: what follows is to
+/// first order as much larger, and an optimiser finds back from there at once.
+inline constexpr double part_of_scan_error = 0.25;
+
 /// In what a model differs from the one that is fitted.
 struct ModelChange {
   bool neo_hookean = false;   ///< at every quadrature point, in the place of linear elasticity in turning frames
   bool small_strain = false;  ///< linear elasticity in turning frames, and Rayleigh's damping
-  int scan_error = 0;         ///< the object's surface lies beside its scan, as that may err: which draw; 0: on it
+  int scan_error = 0;         ///< the object's surface lies beside its scan, as part of that errs: which draw; 0: on it
   bool operator==(const ModelChange&) const = default;
 };
 

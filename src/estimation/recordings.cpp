@@ -374,7 +374,7 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
   for (const Recording& r : all_) {
     Resolution own = resolution(cells, steps);
     if (const double noise = r.capture.scene.object.surface_noise; change.scan_error > 0 && noise > 0.0)
-      own.offset = RandomField(noise, alike * r.size, std::uint64_t(change.scan_error));
+      own.offset = RandomField(part_of_scan_error * noise, alike * r.size, std::uint64_t(change.scan_error));
     grid.recording.push_back(
         discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
     if (change.neo_hookean) {
