@@ -173,7 +173,7 @@ std::vector<Alternative> FitRun::alternatives() const {
         {"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step, false, few_iterations});
   for (int draw = 1; recordings_.any_scan_errs() && draw <= draws_of_scan; ++draw) {
     const double size = std::sqrt(1.0 / draws_of_scan) / part_of_scan_error;  // so that their variances add to one
-    all.push_back({cause_scan, cells, 1.0, {.scan_error = draw}, false, size, has_coarser, few_iterations});
+    all.push_back({cause_scan, cells, 1.0, {.scan_error = draw}, false, size, has_coarser, many_iterations});
   }
   if (!options_.law_of_motion()) {
     const bool has_large_strain =
