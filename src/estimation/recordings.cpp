@@ -433,7 +433,7 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
   return {std::move(trials), with_field_prior(parameters, grid), processes};
 }
 
-void Recordings::add_loads(const Recording& recording, const Discretisation& d, ObjectiveOptions options,
+void Recordings::add_loads(const Recording& recording, const Discretisation& d, const ObjectiveOptions& options,
                            std::vector<std::unique_ptr<Trial>>& trials) const {
   for (const LoadCase& load : recording.loads) {
     ObservedMotion at_rest{d.mismatch, d.body, d.simulation, load.observations, options};

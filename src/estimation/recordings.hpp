@@ -117,7 +117,7 @@ class Recordings {
   Resolution resolution(double cells, double steps) const;
   std::shared_ptr<const PressScene> press_scene(const Recording& recording, const Discretisation& d,
                                                 const Resolution& resolution) const;
-  void add_loads(const Recording& recording, const Discretisation& d, ObjectiveOptions options,
+  void add_loads(const Recording& recording, const Discretisation& d, const ObjectiveOptions& options,
                  std::vector<std::unique_ptr<Trial>>& trials) const;
   void add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
                    const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const;
