@@ -1,5 +1,6 @@
 #include "mesh/tet_mesh.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>

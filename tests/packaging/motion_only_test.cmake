@@ -13,7 +13,7 @@ must_run(${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/build -G ${GENERATOR} -DCMAKE_
 must_run(${CMAKE_COMMAND} --build ${WORK}/build -j 2)
 must_run(${CMAKE_COMMAND} --install ${WORK}/build --prefix ${WORK}/installed)
 
-# A body of its own, moved by what was installed.
+# A body of its own, moved by what was installed. Compiled without optimisation, it moves for a few frames.
 file(WRITE ${WORK}/consumer/CMakeLists.txt [[
 cmake_minimum_required(VERSION 3.25)
 project(consumer LANGUAGES CXX)
@@ -22,6 +22,7 @@ add_executable(consumer main.cpp)
 target_link_libraries(consumer PRIVATE pliant::motion)
 ]])
 file(READ ${SOURCE}/examples/consumer/main.cpp program)
+string(REPLACE "frame <= 30" "frame <= 3" program "${program}")
 file(WRITE ${WORK}/consumer/main.cpp "${program}")
 must_run(${CMAKE_COMMAND} -S ${WORK}/consumer -B ${WORK}/consumer/build -G ${GENERATOR} -DCMAKE_BUILD_TYPE=None
   -DCMAKE_CXX_COMPILER=${COMPILER} "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}" "-DCMAKE_CXX_FLAGS=${FLAGS}"
@@ -30,6 +31,6 @@ must_run(${CMAKE_COMMAND} --build ${WORK}/consumer/build)
 must_run(${WORK}/consumer/build/consumer)
 string(REGEX MATCHALL "[0-9.]+ m" heights "${output}")
 list(LENGTH heights count)
-if(NOT count EQUAL 31)
-  message(FATAL_ERROR "31 heights were expected:\n${output}")
+if(NOT count EQUAL 4)
+  message(FATAL_ERROR "4 heights were expected:\n${output}")
 endif()
