@@ -14,11 +14,6 @@ class Elasticity : public ForceTerm {
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::Blended; }
 
-  /// From now on the nodes are stress-free where this body has them, the same but for its reference
-  /// (`with_reference`). Only then does the term have derivatives by the reference. Parameters are to be set anew.
-  /// Throws std::invalid_argument for hexahedra.
-  virtual void set_reference(std::shared_ptr<const Body> body) = 0;
-
   /// Elastic energy [J] of the positions with the rotations of the lag point; of the neo-Hookean law, whose mean strain
   /// is the lag point's, only where the positions are that point.
   virtual double energy(const Points& z) const = 0;

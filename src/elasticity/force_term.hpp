@@ -1,11 +1,14 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 
 #include "solvers/block_matrix.hpp"
 
 namespace pliant {
+
+struct Body;
 
 /// The step in which forces act, for those that depend on more than positions: friction on the way since the start,
 /// wind on velocities, led bodies on the time.
@@ -106,8 +109,11 @@ class ForceTerm {
     (void)z, (void)w, (void)start_bar, (void)start_velocity_bar;
   }
 
-  /// Makes ready for the two products below, about the lag point and z. Most terms do not depend on the
-  /// stress-free reference.
+  /// From now on the nodes are stress-free where this body has them, the same but for its reference
+  /// (`with_reference`). Only then does a term have derivatives by the reference; most do not depend on it. Parameters
+  /// are to be set anew. Throws std::invalid_argument where the term depends on it and has no derivatives.
+  virtual void set_reference(std::shared_ptr<const Body> body) { (void)body; }
+  /// Makes ready for the two products below, about the lag point and z.
   virtual void linearise_reference(const Points& z) { (void)z; }
   /// force += df for a change of the stress-free reference positions, p, z and theta staying as they are, along
   /// several directions at once, each into its own force.

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "elasticity/local_stiffness.hpp"
 #include "elasticity/tet_element.hpp"
 
 namespace pliant {
@@ -113,6 +114,8 @@ class TetLawElasticity : public LawElasticity {
   std::optional<double> potential(const Points&) override { return energy_; }
   void add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z, const VectorX& d_theta,
                          Points& force) override;
+  void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) override;
+  void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
   void set_reference(std::shared_ptr<const Body> body) override;
   void linearise_reference(const Points& z) override { reference_z_ = z; }
@@ -556,17 +559,54 @@ void TetLawElasticity<N>::add_lag_matrix(const Points& z, double scale, BlockMat
 template <int N>
 void TetLawElasticity<N>::add_force_tangent(const Points& z, const Points& d_lag, const Points& d_z,
                                             const VectorX& d_theta, Points& force) {
-  if (field_) field_->set_change(d_theta);
-  const bool has_change = field_ && field_->has_change();
-  const std::vector<PointChange>& all = changes(z, has_change);
+  const Points *lag = &d_lag, *at = &d_z;
+  prepare_tangents(z, d_theta);
+  add_force_tangents(z, {{&lag, 1}, {&at, 1}, d_theta}, {&force, 1});
+}
+
+template <int N>
+void TetLawElasticity<N>::prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) {
+  if (field_) field_->set_changes(d_theta);
+  (void)changes(z, field_ && field_->has_changes());
+}
+
+/// Four directions at a time, side by side in the lanes of wide registers.
+template <int N>
+void TetLawElasticity<N>::add_force_tangents(const Points&, const ForceChanges& along, std::span<Points> forces) {
+  constexpr std::size_t lanes = 4;
+  const bool by_parameters = field_ && field_->has_changes();
+  ElementLanes<N> lag, at, f;
   for (int e = 0; e < body_->element_count(); ++e)
-    for (int q = 0; q < points; ++q) {
-      const std::size_t p = std::size_t(e) * points + std::size_t(q);
-      const Point& point = points_[p];
-      Vector9 change = all[p].by_lag * vec(deformation(e, point.gradient, d_lag));
-      change += all[p].by_z * vec(deformation(e, point.gradient, d_z));
-      if (has_change) change += all[p].by_parameters * field_->change(e);
-      subtract(e, point, matrix_of(change), force);
+    for (std::size_t first = 0; first < forces.size(); first += lanes) {
+      const std::size_t used = std::min(lanes, forces.size() - first);
+      gather_lanes<N>(nodes_of(e), along.lag.subspan(first, used), false, lag);
+      gather_lanes<N>(nodes_of(e), along.z.subspan(first, used), false, at);
+      f.fill(Wide<double>{});
+      for (int q = 0; q < points; ++q) {
+        const std::size_t p = std::size_t(e) * points + std::size_t(q);
+        const Point& point = points_[p];
+        const PointChange& own = changes_[p];
+        const MatrixLanes d_lag = mean_gradient_lanes<N>(point.gradient, lag);
+        const MatrixLanes d_z = mean_gradient_lanes<N>(point.gradient, at);
+        MatrixLanes stress{};
+        for (std::size_t i = 0; i < 3; ++i)
+          for (std::size_t j = 0; j < 3; ++j)
+            for (std::size_t k = 0; k < 9; ++k) {
+              const auto row = Eigen::Index(3 * j + i), column = Eigen::Index(k / 3 + 3 * (k % 3));  // by `vec`
+              stress[3 * i + j] += own.by_lag(row, column) * d_lag[k] + own.by_z(row, column) * d_z[k];
+            }
+        for (std::size_t l = 0; l < used && by_parameters; ++l) {
+          const Vector9 change = own.by_parameters * field_->change(e, along.first + Eigen::Index(first + l));
+          for (std::size_t i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 3; ++j) stress[3 * i + j][l] += change[Eigen::Index(3 * j + i)];
+        }
+        for (std::size_t a = 0; a < N; ++a) {
+          const auto g = point.volume * point.gradient.row(Eigen::Index(a));
+          for (std::size_t i = 0; i < 3; ++i)
+            f[3 * a + i] += stress[3 * i] * g[0] + stress[3 * i + 1] * g[1] + stress[3 * i + 2] * g[2];
+        }
+      }
+      subtract_lanes<N>(nodes_of(e), f, forces.subspan(first, used));
     }
 }
 

@@ -48,9 +48,11 @@ auto MaterialField::derivatives() -> const Matrix& {
   return derivatives_;
 }
 
-void MaterialField::set_change(const VectorX& d_theta) {
-  has_change_ = !values_at(handles_, d_theta).isZero(0.0);
-  if (has_change_) change_.noalias() = derivatives() * d_theta;
+void MaterialField::set_changes(const Eigen::Ref<const MatrixX>& d_theta) {
+  has_changes_ = false;
+  for (Eigen::Index c = 0; c < d_theta.cols(); ++c)
+    has_changes_ = has_changes_ || !values_at(handles_, d_theta.col(c)).isZero(0.0);
+  if (has_changes_) changes_.noalias() = derivatives() * d_theta;
 }
 
 void MaterialField::end_adjoint(VectorX& theta_bar) { theta_bar += derivatives().transpose() * bar_; }

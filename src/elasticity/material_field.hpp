@@ -22,11 +22,13 @@ class MaterialField {
   /// The law of all elements there; its table is elements x q.
   const std::shared_ptr<const TabulatedLaw>& law() const { return law_; }
 
-  /// Sets the change of every element's q for a change of theta.
-  void set_change(const VectorX& d_theta);
-  /// That of one element, q; where `has_change` is false it is zero.
-  auto change(int element) const { return change_.segment(Eigen::Index(element) * parameters(), parameters()); }
-  bool has_change() const { return has_change_; }
+  /// Sets the changes of every element's q for changes of theta, one a column.
+  void set_changes(const Eigen::Ref<const MatrixX>& d_theta);
+  /// That of one element, q; where `has_changes` is false all are zero, and there is none to ask for.
+  auto change(int element, Eigen::Index direction = 0) const {
+    return changes_.col(direction).segment(Eigen::Index(element) * parameters(), parameters());
+  }
+  bool has_changes() const { return has_changes_; }
 
   /// Collects cotangents of q ...
   void begin_adjoint() { bar_.setZero(Eigen::Index(body_->element_count()) * parameters()); }
@@ -46,8 +48,9 @@ class MaterialField {
   VectorX theta_, values_;  // theta as it was set, and the law's numbers in it
   std::shared_ptr<const TabulatedLaw> law_;
   Matrix derivatives_;
-  bool has_derivatives_ = false, has_change_ = false;
-  VectorX change_, bar_;
+  bool has_derivatives_ = false, has_changes_ = false;
+  MatrixX changes_;  // one direction a column
+  VectorX bar_;
 };
 
 }  // namespace pliant

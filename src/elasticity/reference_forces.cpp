@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "elasticity/local_stiffness.hpp"
@@ -15,10 +16,19 @@ namespace {
 /// Where lanes have entry (i, j) of a matrix, or coordinate j of node i.
 constexpr std::size_t entry(int i, int j) { return 3 * std::size_t(i) + std::size_t(j); }
 
-template <int N>
+/// What carries stresses from an element's frame into the world, A in
+///   f_a = -A integral of E C : (A^T grad z - B) g_a.
+enum class Frame {
+  Rotation,     ///< the rotation R of p; B = I
+  Deformation,  ///< the deformation F of p itself; B = 0
+};
+
+template <int N, Frame kind>
 class TetReferenceForces : public ReferenceForces {
  public:
-  TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material);
+  /// @param damping  what E is multiplied by, where there is one
+  TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material,
+                     std::optional<ParameterHandle> damping = {});
 
   void set_parameters(const VectorX& theta) override;
   bool linearise(const Points& X, const Points& p, const Points& z) override;
@@ -26,7 +36,7 @@ class TetReferenceForces : public ReferenceForces {
   void add_matrix(double scale, BlockMatrix& matrix) const override;
   void add_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) const override;
   void add_adjoint(const Points& w, Points& reference_bar) const override;
-  const Matrix3& rotation(int e) const override { return elements_[std::size_t(e)].polar.R; }
+  const Matrix3& rotation(int e) const override { return elements_[std::size_t(e)].frame; }
   double least_volume_ratio() const override { return least_volume_ratio_; }
 
  private:
@@ -35,13 +45,16 @@ class TetReferenceForces : public ReferenceForces {
 
   struct Element {
     double volume = 0.0;
-    Polar polar;
+    Polar polar;                         // of the frame of rotation
+    Matrix3 frame;                       // A
     std::array<double, points> part;     // of the volume
     std::array<Nodes, points> gradient;  // of the shape functions
-    std::array<Matrix3, points> F;       // of z, in the element's own frame: R^T F
-    std::array<Matrix3, points> lag_F;   // of p
+    std::array<Matrix3, points> F;       // grad z
+    std::array<Matrix3, points> own_F;   // A^T grad z
+    std::array<Matrix3, points> lag_F;   // grad p
     Matrix3 mean;                        // of those, times the volume
-    std::array<Matrix3, points> stress;  // E C : (R^T F - I), in the element's own frame
+    std::array<Matrix3, points> stress;  // E C : (A^T grad z - B), in the element's own frame
+    Nodes force;                         // integral of stress g_a
   };
 
   const int* nodes_of(int e) const { return body_->connectivity.data() + std::size_t(e) * N; }
@@ -53,13 +66,16 @@ class TetReferenceForces : public ReferenceForces {
   Matrix3 stress(int e, const Matrix3& H) const {
     Matrix3 sigma = lame_.mu * (H + H.transpose());
     sigma.diagonal().array() += lame_.lambda * H.trace();
-    return modulus_[e] * sigma;
+    return modulus(e) * sigma;
   }
+  double modulus(int e) const { return factor_ * modulus_[e]; }
   /// Changes of the forces for four changes of the element's nodes X, lane by lane.
   void tangent(int e, const ElementLanes<N>& d_reference, ElementLanes<N>& change) const;
 
   std::shared_ptr<const Body> body_;
   ParameterHandle poissons_ratio_;
+  std::optional<ParameterHandle> damping_;
+  double factor_ = 1.0;
   ElementModuli modulus_;
   UnitLame lame_{};
   std::array<Nodes, points> derivatives_;
@@ -69,9 +85,10 @@ class TetReferenceForces : public ReferenceForces {
   double least_volume_ratio_ = 1.0;
 };
 
-template <int N>
-TetReferenceForces<N>::TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material)
-    : body_(std::move(body)), poissons_ratio_(material.poissons_ratio), modulus_(body_, material) {
+template <int N, Frame kind>
+TetReferenceForces<N, kind>::TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material,
+                                                 std::optional<ParameterHandle> damping)
+    : body_(std::move(body)), poissons_ratio_(material.poissons_ratio), damping_(damping), modulus_(body_, material) {
   // Mid nodes move on their own: curved elements need the rule that integrates their gradients exactly.
   const auto rule = tet_quadrature(N == 4 ? 0 : 5);
   for (int q = 0; q < points; ++q) {
@@ -87,14 +104,15 @@ TetReferenceForces<N>::TetReferenceForces(std::shared_ptr<const Body> body, cons
   }
 }
 
-template <int N>
-void TetReferenceForces<N>::set_parameters(const VectorX& theta) {
+template <int N, Frame kind>
+void TetReferenceForces<N, kind>::set_parameters(const VectorX& theta) {
   modulus_.set_parameters(theta);
   lame_ = unit_lame(theta[poissons_ratio_]);
+  if (damping_) factor_ = theta[*damping_];
 }
 
-template <int N>
-bool TetReferenceForces<N>::linearise(const Points& X, const Points& p, const Points& z) {
+template <int N, Frame kind>
+bool TetReferenceForces<N, kind>::linearise(const Points& X, const Points& p, const Points& z) {
   least_volume_ratio_ = std::numeric_limits<double>::infinity();
   for (int e = 0; e < body_->element_count(); ++e) {
     Element& element = elements_[std::size_t(e)];
@@ -114,33 +132,40 @@ bool TetReferenceForces<N>::linearise(const Points& X, const Points& p, const Po
       element.mean += element.part[i] * element.lag_F[i];
     }
     if (!(least_volume_ratio_ > 0.0)) return false;
-    element.polar = polar_decomposition(element.mean / element.volume, element.polar.quaternion);
+    element.frame = element.mean / element.volume;
+    if (kind == Frame::Rotation) {
+      element.polar = polar_decomposition(element.frame, element.polar.quaternion);
+      element.frame = element.polar.R;
+    }
+    element.force.setZero();
     for (int q = 0; q < points; ++q) {
       const auto i = std::size_t(q);
-      element.F[i] = element.polar.R.transpose() * element.F[i];
-      element.stress[i] = stress(e, element.F[i] - Matrix3::Identity());
+      element.own_F[i].noalias() = element.frame.transpose() * element.F[i];
+      Matrix3 strain = element.own_F[i];
+      if (kind == Frame::Rotation) strain -= Matrix3::Identity();
+      element.stress[i] = stress(e, strain);
+      element.force.noalias() += element.part[i] * element.gradient[i] * element.stress[i].transpose();
     }
   }
   return true;
 }
 
-template <int N>
-void TetReferenceForces<N>::add_force(Points& force) const {
+template <int N, Frame kind>
+void TetReferenceForces<N, kind>::add_force(Points& force) const {
   for (int e = 0; e < body_->element_count(); ++e) {
     const Element& element = elements_[std::size_t(e)];
-    Nodes f = Nodes::Zero();
-    for (std::size_t q = 0; q < points; ++q)
-      f.noalias() += element.part[q] * element.gradient[q] * element.stress[q].transpose();
-    for (int a = 0; a < N; ++a) force.row(nodes_of(e)[a]) -= (element.polar.R * f.row(a).transpose()).transpose();
+    for (int a = 0; a < N; ++a)
+      force.row(nodes_of(e)[a]) -= (element.frame * element.force.row(a).transpose()).transpose();
   }
 }
 
-/// With G = sum_b dX_b g_b^T: volumes change by tr(G), F by -F G, g by -G^T g, and R by R [w]x. Entry (i, j) of a
-/// matrix of lanes is in [3 i + j].
-template <int N>
-void TetReferenceForces<N>::tangent(int e, const ElementLanes<N>& d_reference, ElementLanes<N>& change) const {
+/// With G = sum_b dX_b g_b^T: volumes change by tr(G), gradients of fields by -F G, g by -G^T g, the frame R by R [w]x,
+/// and a frame that is the deformation as that does. Entry (i, j) of a matrix of lanes is in [3 i + j].
+template <int N, Frame kind>
+void TetReferenceForces<N, kind>::tangent(int e, const ElementLanes<N>& d_reference, ElementLanes<N>& change) const {
   const Element& element = elements_[std::size_t(e)];
-  const double lambda = modulus_[e] * lame_.lambda, mu = modulus_[e] * lame_.mu;
+  const double lambda = modulus(e) * lame_.lambda, mu = modulus(e) * lame_.mu;
+  const Matrix3& A = element.frame;
   std::array<MatrixLanes, points> G;
   MatrixLanes d_mean{};
   Wide<double> d_volume{};
@@ -161,28 +186,32 @@ void TetReferenceForces<N>::tangent(int e, const ElementLanes<N>& d_reference, E
       Wide<double>& own = d_mean[entry(i, j)];
       own = (own - (element.mean(i, j) / element.volume) * d_volume) * (1.0 / element.volume);
     }
-  const std::array<Wide<double>, 3> w = rotation_rate_lanes(element.polar, d_mean);
-  // Entry (i, j) of [w]x M.
-  const auto turned = [&w](const Matrix3& M, int i, int j) {
-    const int k = (i + 1) % 3, l = (i + 2) % 3;
-    return w[std::size_t(k)] * M(l, j) - w[std::size_t(l)] * M(k, j);
-  };
+  MatrixLanes dA = d_mean;
+  if (kind == Frame::Rotation) {
+    const std::array<Wide<double>, 3> w = rotation_rate_lanes(element.polar, d_mean);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const int k = (j + 1) % 3, l = (j + 2) % 3;
+        dA[entry(i, j)] = w[std::size_t(l)] * A(i, k) - w[std::size_t(k)] * A(i, l);
+      }
+  }
   change.fill(Wide<double>{});
   for (std::size_t q = 0; q < points; ++q) {
-    const Matrix3 &F = element.F[q], &sigma = element.stress[q];
+    const Matrix3 &F = element.F[q], &own_F = element.own_F[q], &sigma = element.stress[q];
     const MatrixLanes& own = G[q];
     const Wide<double> growth = own[0] + own[4] + own[8];
-    MatrixLanes loss;  // of R^T F
+    MatrixLanes loss;  // of A^T grad z
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
-        loss[entry(i, j)] =
-            turned(F, i, j) + F(i, 0) * own[entry(0, j)] + F(i, 1) * own[entry(1, j)] + F(i, 2) * own[entry(2, j)];
+        loss[entry(i, j)] = own_F(i, 0) * own[entry(0, j)] + own_F(i, 1) * own[entry(1, j)] +
+                            own_F(i, 2) * own[entry(2, j)] - dA[entry(0, i)] * F(0, j) - dA[entry(1, i)] * F(1, j) -
+                            dA[entry(2, i)] * F(2, j);
     const Wide<double> pressure = lambda * (loss[0] + loss[4] + loss[8]);
     MatrixLanes T;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         const auto at = entry(i, j), across = entry(j, i), row = entry(j, 0);
-        T[at] = turned(sigma, i, j) + growth * sigma(i, j) - mu * (loss[at] + loss[across]) -
+        T[at] = growth * sigma(i, j) - mu * (loss[at] + loss[across]) -
                 (sigma(i, 0) * own[row] + sigma(i, 1) * own[row + 1] + sigma(i, 2) * own[row + 2]);
         if (i == j) T[at] -= pressure;
         T[at] *= element.part[q];
@@ -194,19 +223,18 @@ void TetReferenceForces<N>::tangent(int e, const ElementLanes<N>& d_reference, E
         change[3 * a + i] -= T[3 * i] * g(row, 0) + T[3 * i + 1] * g(row, 1) + T[3 * i + 2] * g(row, 2);
     }
   }
-  const Matrix3& R = element.polar.R;
   for (std::size_t a = 0; a < N; ++a) {
     const Wide<double> local[3] = {change[3 * a], change[3 * a + 1], change[3 * a + 2]};
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto r = Eigen::Index(i);
-      change[3 * a + i] = R(r, 0) * local[0] + R(r, 1) * local[1] + R(r, 2) * local[2];
-    }
+    const auto y = element.force.row(Eigen::Index(a));
+    for (int i = 0; i < 3; ++i)
+      change[entry(int(a), i)] = A(i, 0) * local[0] + A(i, 1) * local[1] + A(i, 2) * local[2] -
+                                 (dA[entry(i, 0)] * y[0] + dA[entry(i, 1)] * y[1] + dA[entry(i, 2)] * y[2]);
   }
 }
 
 /// Column by column, four at a time.
-template <int N>
-void TetReferenceForces<N>::add_matrix(double scale, BlockMatrix& matrix) const {
+template <int N, Frame kind>
+void TetReferenceForces<N, kind>::add_matrix(double scale, BlockMatrix& matrix) const {
   constexpr std::size_t lanes = 4;
   ElementLanes<N> unit, columns;
   for (int e = 0; e < body_->element_count(); ++e) {
@@ -225,9 +253,9 @@ void TetReferenceForces<N>::add_matrix(double scale, BlockMatrix& matrix) const 
   }
 }
 
-template <int N>
-void TetReferenceForces<N>::add_tangents(std::span<const Points* const> d_references,
-                                         std::span<Points* const> forces) const {
+template <int N, Frame kind>
+void TetReferenceForces<N, kind>::add_tangents(std::span<const Points* const> d_references,
+                                                std::span<Points* const> forces) const {
   constexpr std::size_t lanes = 4;
   ElementLanes<N> d_reference, change;
   for (int e = 0; e < body_->element_count() && !forces.empty(); ++e)
@@ -242,25 +270,28 @@ void TetReferenceForces<N>::add_tangents(std::span<const Points* const> d_refere
 }
 
 /// The transpose of `tangent`, line by line.
-template <int N>
-void TetReferenceForces<N>::add_adjoint(const Points& w, Points& reference_bar) const {
+template <int N, Frame kind>
+void TetReferenceForces<N, kind>::add_adjoint(const Points& w, Points& reference_bar) const {
   for (int e = 0; e < body_->element_count(); ++e) {
     const Element& element = elements_[std::size_t(e)];
-    const Matrix3& R = element.polar.R;
-    const Nodes c = of_element(e, w) * R;  // rows are R^T w_a
-    Vector3 w_bar = Vector3::Zero();
+    const Nodes own_w = of_element(e, w), c = own_w * element.frame;  // rows of c are A^T w_a
+    Matrix3 frame_bar = -own_w.transpose() * element.force;
     std::array<Matrix3, points> G_bar;
     for (std::size_t q = 0; q < points; ++q) {
-      const Matrix3 &Q = element.F[q], &sigma = element.stress[q];
+      const Matrix3& sigma = element.stress[q];
       // change = -V T g, so T's cotangent is -V c^T g; that of d_sigma passes through the symmetric map C.
       const Matrix3 T_bar = -element.part[q] * c.transpose() * element.gradient[q];
       const Matrix3 H_bar = stress(e, T_bar);
-      const Matrix3 W_bar = T_bar * sigma.transpose() - H_bar * Q.transpose();
-      w_bar += Vector3(W_bar(2, 1) - W_bar(1, 2), W_bar(0, 2) - W_bar(2, 0), W_bar(1, 0) - W_bar(0, 1));
-      G_bar[q] =
-          T_bar.cwiseProduct(sigma).sum() * Matrix3::Identity() - Q.transpose() * H_bar - T_bar.transpose() * sigma;
+      frame_bar.noalias() += element.F[q] * H_bar.transpose();
+      G_bar[q] = T_bar.cwiseProduct(sigma).sum() * Matrix3::Identity() - element.own_F[q].transpose() * H_bar -
+                 T_bar.transpose() * sigma;
     }
-    const Matrix3 mean_bar = rotation_rate_adjoint(element.polar, w_bar) / element.volume;
+    Matrix3 mean_bar = frame_bar / element.volume;
+    if (kind == Frame::Rotation) {
+      const Matrix3 W = element.frame.transpose() * frame_bar;
+      const Vector3 w_bar(W(2, 1) - W(1, 2), W(0, 2) - W(2, 0), W(1, 0) - W(0, 1));
+      mean_bar = rotation_rate_adjoint(element.polar, w_bar) / element.volume;
+    }
     const double volume_bar = -mean_bar.cwiseProduct(element.mean).sum() / element.volume;
     for (std::size_t q = 0; q < points; ++q) {
       const double growth_bar = element.part[q] * (mean_bar.cwiseProduct(element.lag_F[q]).sum() + volume_bar);
@@ -271,18 +302,29 @@ void TetReferenceForces<N>::add_adjoint(const Points& w, Points& reference_bar) 
   }
 }
 
-}  // namespace
-
-std::unique_ptr<ReferenceForces> ReferenceForces::make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks) {
+template <Frame kind, class... Arguments>
+std::unique_ptr<ReferenceForces> make_for(std::shared_ptr<const Body> body, Arguments&&... arguments) {
   switch (body->kind) {
     case ElementKind::Tetrahedron:
-      return std::make_unique<TetReferenceForces<4>>(std::move(body), blocks);
+      return std::make_unique<TetReferenceForces<4, kind>>(std::move(body), arguments...);
     case ElementKind::QuadraticTetrahedron:
-      return std::make_unique<TetReferenceForces<10>>(std::move(body), blocks);
+      return std::make_unique<TetReferenceForces<10, kind>>(std::move(body), arguments...);
     case ElementKind::Hexahedron:
       break;
   }
   throw std::invalid_argument("reference shapes are those of tetrahedra");
+}
+
+}  // namespace
+
+std::unique_ptr<ReferenceForces> ReferenceForces::make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks) {
+  return make_for<Frame::Rotation>(std::move(body), blocks);
+}
+
+std::unique_ptr<ReferenceForces> ReferenceForces::make_viscous(std::shared_ptr<const Body> body,
+                                                               const MaterialBlocks& blocks,
+                                                               ParameterHandle stiffness_damping) {
+  return make_for<Frame::Deformation>(std::move(body), blocks, stiffness_damping);
 }
 
 }  // namespace pliant

@@ -17,6 +17,11 @@ class ReferenceForces {
  public:
   /// Corotated ones. Throws std::invalid_argument for a body of hexahedra.
   static std::unique_ptr<ReferenceForces> make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks);
+  /// Kelvin-Voigt damping (`make_viscous_forces`), z being velocities [m/s]:
+  ///   f_a = -beta E_e F integral of C : (F^T D) g_a,   D = sum_b z_b g_b^T,  F = sum_b p_b (mean g_b)^T.
+  /// Throws as the one above.
+  static std::unique_ptr<ReferenceForces> make_viscous(std::shared_ptr<const Body> body, const MaterialBlocks& blocks,
+                                                       ParameterHandle stiffness_damping);
   virtual ~ReferenceForces() = default;
 
   virtual void set_parameters(const VectorX& theta) = 0;
@@ -39,7 +44,7 @@ class ReferenceForces {
   }
   /// The cotangent of X for the cotangent `w` of f is added.
   virtual void add_adjoint(const Points& w, Points& reference_bar) const = 0;
-  /// From the reference to p, of an element as a whole.
+  /// From the reference to p, of an element as a whole; not of viscous ones.
   virtual const Matrix3& rotation(int element) const = 0;
   /// Smallest ratio of a volume at a quadrature point to that in the body as it was given.
   virtual double least_volume_ratio() const = 0;

@@ -1,6 +1,9 @@
 #include "elasticity/viscous_forces.hpp"
 
+#include <stdexcept>
+
 #include "elasticity/local_stiffness.hpp"
+#include "elasticity/reference_forces.hpp"
 
 namespace pliant {
 
@@ -38,6 +41,10 @@ class ViscousForces : public ForceTerm {
   void add_start_tangent(const Points& z, const Points& d_start, const Points& d_start_velocity,
                          Points& force) override;
   void add_start_adjoint(const Points& z, const Points& w, Points& start_bar, Points& start_velocity_bar) override;
+  void set_reference(std::shared_ptr<const Body> body) override;
+  void linearise_reference(const Points& z) override;
+  void add_reference_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) override;
+  void add_reference_adjoint(const Points& w, Points& reference_bar) override;
 
  private:
   using Vector = Eigen::Matrix<double, 3 * N, 1>;
@@ -92,6 +99,7 @@ class ViscousForces : public ForceTerm {
   Points strained_at_;
   bool has_strained_ = false;
   StepContext step_;
+  std::unique_ptr<ReferenceForces> by_reference_;  // where the reference was set
 };
 
 template <int N>
@@ -100,6 +108,7 @@ void ViscousForces<N>::set_parameters(const VectorX& theta) {
   has_strained_ = false;
   modulus_.set_parameters(theta);
   damping_ = theta[damping_block_];
+  if (by_reference_) by_reference_->set_parameters(theta);
   const double nu = theta[material_.poissons_ratio];
   if (nu == poissons_ratio_) return;
   poissons_ratio_ = nu;
@@ -266,6 +275,35 @@ void ViscousForces<N>::add_start_adjoint(const Points&, const Points& w, Points&
     const Matrix3& F = gradients_[std::size_t(e)];
     scatter(e, rate() * modulus_[e], F, stiffness_.times(e, turned(F, gathered(e, w))), start_bar);
   }
+}
+
+template <int N>
+void ViscousForces<N>::set_reference(std::shared_ptr<const Body> body) {
+  has_strained_ = false;
+  body_ = std::move(body);
+  stiffness_ = LocalStiffness<N>(body_);
+  poissons_ratio_ = -2.0;
+  gradients_ = MeanGradients<N>(body_);
+  if (!by_reference_) by_reference_ = ReferenceForces::make_viscous(body_, material_, damping_block_);
+}
+
+template <int N>
+void ViscousForces<N>::linearise_reference(const Points& z) {
+  if (!by_reference_ || !is_active()) return;
+  const Points velocity = (z - *step_.start) / step_.dt;
+  if (!by_reference_->linearise(body_->reference_positions(), gradients_.field(), velocity))
+    throw std::logic_error("the reference has elements inside out");
+}
+
+template <int N>
+void ViscousForces<N>::add_reference_tangents(std::span<const Points* const> d_references,
+                                              std::span<Points* const> forces) {
+  if (by_reference_ && is_active()) by_reference_->add_tangents(d_references, forces);
+}
+
+template <int N>
+void ViscousForces<N>::add_reference_adjoint(const Points& w, Points& reference_bar) {
+  if (by_reference_ && is_active()) by_reference_->add_adjoint(w, reference_bar);
 }
 
 }  // namespace

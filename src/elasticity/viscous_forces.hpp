@@ -13,7 +13,7 @@ namespace pliant {
 /// compression it is weaker along the way, under extension stronger. A rigid motion is not damped. With K_e the
 /// stiffness of the unturned element, over a step from x0 that is dt long,
 ///   f(z | p) = - beta / dt sum_e F_e(p) K_e F_e(p)^T (z - x0).
-/// At rest, where there is no step, it is nothing.
+/// At rest, where there is no step, it is nothing. Of tetrahedra it has derivatives by the stress-free reference.
 /// @param blocks             of the elements' material
 /// @param stiffness_damping  of beta [s]
 /// Throws std::invalid_argument where there is not one block for each control of the body's field of moduli.

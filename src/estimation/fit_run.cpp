@@ -189,7 +189,7 @@ std::vector<Alternative> FitRun::alternatives() const {
                      has_coarser ? many_iterations : few_iterations});
     else if (recordings_.are_tetrahedra()) {
       all.push_back({"law at large strain", cells, 1.0, {.neo_hookean = true}, false, 1.0, has_coarser});
-      if (!is_static) all.back().iterations = few_iterations;  // fully implicit steps, from where the first one ends
+      if (!is_static) all.back().iterations = few_iterations;  // from where the first one ends
     }
   }
   all.push_back({"what is given", cells, 1.0, {}, true, 1.0});

@@ -83,17 +83,16 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   return terms;
 }
 
-/// With the integrator that the material needs.
+/// With a law that has derivatives by the stress-free shape where that is unknown.
 SimulationOptions completed(SimulationOptions options) {
+  const bool has_law = options.law || options.law_layout;
   if (options.scan_sags || !options.shape.points.empty()) {
     options.elastic_law = ElasticLaw::Corotated;
-    options.stiffness_damping = StiffnessDamping::Rayleigh;
+    if (!has_law) options.stiffness_damping = StiffnessDamping::Rayleigh;
   }
-  if (options.law || options.law_layout || options.is_static) options.elastic_law = ElasticLaw::Corotated;
-  if (!options.law && !options.law_layout) return options;
+  if (has_law || options.is_static) options.elastic_law = ElasticLaw::Corotated;
   if (options.law && options.law_layout)
     throw std::invalid_argument("a material is given as it is or by the parameter vector, not both");
-  options.integrator = Integrator::Newton;
   return options;
 }
 
@@ -157,7 +156,7 @@ void Simulation::prepare_second(const VectorX& parameters) {
     if (forces.fixed_regions) forces.fixed_regions->move_to(options_.holds);
   }
   const std::shared_ptr<const Body> reference = shape_ ? shape_->body() : reference_body_;
-  if (reference && reference != second_->reference) second_->forces.elasticity->set_reference(reference);
+  if (reference && reference != second_->reference) second_->stepper.set_reference(reference);
   second_->reference = reference;
   second_->stepper.set_parameters(parameters);
 }
@@ -180,19 +179,16 @@ void Simulation::set_start(Points positions, Points velocities) {
 
 void Simulation::check_reference() const {
   const bool has_derivatives = body_->kind != ElementKind::Hexahedron && !options_.law && !options_.law_layout &&
-                               options_.elastic_law == ElasticLaw::Corotated &&
-                               (options_.stiffness_damping == StiffnessDamping::Rayleigh || options_.is_static);
+                               options_.elastic_law == ElasticLaw::Corotated;
   if (!has_derivatives || shape_)
     throw std::invalid_argument(
-        "a stress-free shape that is set wants tetrahedra, the corotated law and Rayleigh's damping, and parameters "
-        "that "
-        "do not say it");
+        "a stress-free shape that is set wants tetrahedra, the corotated law, and parameters that do not say it");
 }
 
 void Simulation::set_reference(Points reference) {
   check_reference();
   reference_body_ = std::make_shared<Body>(with_reference(*body_, std::move(reference)));
-  forces_.elasticity->set_reference(reference_body_);
+  stepper_.set_reference(reference_body_);
 }
 
 bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summary) {
@@ -200,7 +196,7 @@ bool Simulation::set_parameters(const VectorX& parameters, RolloutSummary& summa
     const Timed timed(Activity::LoadFree);
     summary.failure = shape_->find(parameters);
     if (!summary.failure.empty()) return false;
-    forces_.elasticity->set_reference(shape_->body());
+    stepper_.set_reference(shape_->body());
     rest_ = shape_->scan();
     if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   }

@@ -23,9 +23,9 @@ struct SimulationOptions {
   double max_dt = 0.0;        ///< [s], > 0: each interval is cut into equal steps no longer than this
   double newmark_theta = 0.51;
   double contact_weight = 0.6, rotation_prediction = 0.5;  ///< see StepOptions
-  /// Of the elements' mean strain, and of stiffness damping, at large strain. The corotated law and Rayleigh's damping
-  /// take their place where the scan sags or errs, since they have no derivatives by the stress-free shape; the law
-  /// also at rest and where another is given below.
+  /// Of the elements' mean strain, and of stiffness damping, at large strain. The corotated law takes the place of the
+  /// other where the scan sags or errs, since that has no derivatives by the stress-free shape, with Rayleigh's
+  /// damping; the law also at rest and where another is given below.
   ElasticLaw elastic_law = ElasticLaw::NeoHookean;
   StiffnessDamping stiffness_damping = StiffnessDamping::KelvinVoigt;
   SolverOptions solver;
@@ -57,7 +57,7 @@ struct SimulationOptions {
   Points start_velocities;
   bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
-  /// parameter vector, with derivatives by its numbers. Tetrahedra only; steps are fully implicit then.
+  /// parameter vector, with derivatives by its numbers. Tetrahedra only.
   std::shared_ptr<const MaterialLaw> law;
   std::optional<LawLayout> law_layout;  ///< with handles of the parameter vectors (`LawLayout::of_motion`)
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
@@ -127,8 +127,8 @@ class Simulation {
   void set_start(Points positions, Points velocities);
   /// From now on the body is stress-free where its nodes are there [m], n x 3; it still starts where it was scanned,
   /// and mass, surface and the unit of pulls stay those of the body as it was given. Throws std::invalid_argument where
-  /// the elements are not tetrahedra with the corotated law and Rayleigh's damping, where the parameters say where the
-  /// body is stress-free, and where an element has no positive volume.
+  /// the elements are not tetrahedra with the corotated law, where the parameters say where the body is
+  /// stress-free, and where an element has no positive volume.
   void set_reference(Points reference);
   /// Bytes of states that the last reverse sweep held at its most.
   std::size_t peak_state_bytes() const { return peak_state_bytes_; }

@@ -41,6 +41,10 @@ void Stepper::set_parameters(const VectorX& parameters) {
   for (auto& term : terms_) term->set_parameters(parameters);
 }
 
+void Stepper::set_reference(const std::shared_ptr<const Body>& body) {
+  for (auto& term : terms_) term->set_reference(body);
+}
+
 namespace {
 constexpr std::array all_lags = {ForceTerm::Lag::Rotation, ForceTerm::Lag::Contact};
 constexpr std::array all_ats = {ForceTerm::At::Blended, ForceTerm::At::Contact, ForceTerm::At::End};
@@ -334,10 +338,7 @@ void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d
       const std::size_t first = i * directions_together;
       of_direction_range(first, std::min(directions_together, count - first));
     };
-    if (is_newton())  // material laws keep what they need of one direction
-      for (std::size_t i = 0; i < parts; ++i) part(i);
-    else
-      parallel_tasks(parts, std::cref(part));
+    parallel_tasks(parts, std::cref(part));
   };
   beside([&](std::size_t first, std::size_t some) {
     find_changes_of_force(start, delta, d_theta, changes, d_reference, first, some);

@@ -69,6 +69,8 @@ class Stepper : private NewtonProblem {
   /// Time [s] of the start of the steps to come, for forces that change with it.
   void set_time(double time) { time_ = time; }
   void set_parameters(const VectorX& theta);
+  /// Where the nodes are stress-free from now on (`ForceTerm::set_reference`); parameters are to be set anew.
+  void set_reference(const std::shared_ptr<const Body>& body);
   /// Nodes that stay where they are (strong Dirichlet elimination).
   void hold(std::vector<int> nodes) { held_ = std::move(nodes); }
   /// Point masses that move along with points of the body: they add the inertia sum_i m_i w_i w_i^T, w_i the points'

@@ -49,8 +49,8 @@ struct Fields : ::testing::TestWithParam<LawForm> {
 TEST_P(Fields, ChangeAsTheTableDoesWithEveryParameter) {
   for (const ParameterHandle& at : layout.all()) {
     const VectorX direction = VectorX::Unit(theta.size(), at.first);
-    field.set_change(direction);
-    ASSERT_TRUE(field.has_change());
+    field.set_changes(direction);
+    ASSERT_TRUE(field.has_changes());
     VectorX change(table(theta).size());
     for (int e = 0; e < body->element_count(); ++e)
       change.segment(e * field.law()->table().cols(), field.law()->table().cols()) = field.change(e);
@@ -59,8 +59,8 @@ TEST_P(Fields, ChangeAsTheTableDoesWithEveryParameter) {
     EXPECT_LT(test::best_relative_error(along, change, 0.1 * theta[at]), tolerance(1e-7))
         << layout.layout().block_of(at).name;
   }
-  field.set_change(VectorX::Zero(theta.size()));
-  EXPECT_FALSE(field.has_change());
+  field.set_changes(VectorX::Zero(theta.size()));
+  EXPECT_FALSE(field.has_changes());
 }
 
 TEST_P(Fields, AdjointIsTheTransposeOfTheTangent) {
@@ -71,7 +71,7 @@ TEST_P(Fields, AdjointIsTheTransposeOfTheTangent) {
   for (int e = 0; e < body->element_count(); ++e) field.adjoint(e) += w.segment(e * q, q);
   field.end_adjoint(theta_bar);
   for (const ParameterHandle& at : layout.all()) {
-    field.set_change(VectorX::Unit(theta.size(), at.first));
+    field.set_changes(VectorX::Unit(theta.size(), at.first));
     double by_tangent = 0.0, size = 0.0;
     for (int e = 0; e < body->element_count(); ++e) {
       by_tangent += field.change(e).dot(w.segment(e * q, q));

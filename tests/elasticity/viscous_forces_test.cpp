@@ -6,7 +6,10 @@
 #include <cmath>
 
 #include "elasticity/corotated.hpp"
+#include "elasticity/reference_forces.hpp"
 #include "support/bodies.hpp"
+#include "support/derivatives.hpp"
+#include "support/tolerance.hpp"
 
 namespace pliant {
 namespace {
@@ -105,6 +108,45 @@ TEST(ViscousForces, AreThoseOfTheirMatrix) {
     for (Eigen::Index n = 0; n < X.rows(); ++n)
       ASSERT_LT((force.row(n).transpose() + expected.segment<3>(3 * n)).norm(), 1e-10 * expected.norm())
           << kind.name << ", node " << n;
+  }
+}
+
+/// Where the nodes are stress-free is not where the body was given: the forces are those of a body with that reference,
+/// and their derivatives by it those of central differences.
+TEST(ViscousForces, OfTetrahedraHaveDerivativesByTheReference) {
+  for (const test::BodyKind& kind : test::body_kinds()) {
+    Damped damped(kind);
+    if (damped.body->kind == ElementKind::Hexahedron) {
+      EXPECT_THROW(damped.term->set_reference(damped.body), std::invalid_argument);
+      continue;
+    }
+    const Points &nodes = damped.body->nodes, X = test::deformed(nodes, 0.1, 0.2);
+    const Points start = test::deformed(nodes, 0.25, 1.7), lag = test::deformed(nodes, 0.3, 0.9),
+                 end = test::deformed(nodes, 0.2, -0.6), along = test::deformed(nodes, 0.3, -0.4);
+    const auto force_of = [&](const Points& reference) {
+      damped.term->set_reference(std::make_shared<Body>(with_reference(*damped.body, reference)));
+      damped.term->set_parameters(damped.theta);
+      return damped.force(start, lag, end);
+    };
+    const auto by_reference =
+        ReferenceForces::make_viscous(damped.body, damped.layout, damped.layout.stiffness_damping);
+    by_reference->set_parameters(damped.theta);
+    ASSERT_TRUE(by_reference->linearise(X, lag, (end - start) / Damped::dt));
+    Points expected = Points::Zero(X.rows(), 3);
+    by_reference->add_force(expected);
+    const Points f = force_of(X);
+    ASSERT_GT(f.norm(), 0.0);
+    EXPECT_LT((f - expected).norm(), test::tolerance(1e-10) * f.norm()) << kind.name;
+
+    damped.term->linearise_reference(end);
+    Points tangent = Points::Zero(X.rows(), 3), bar = Points::Zero(X.rows(), 3);
+    damped.term->add_reference_tangent(along, tangent);
+    const Points weight = test::deformed(nodes, 0.5, 2.1);
+    damped.term->add_reference_adjoint(weight, bar);
+    EXPECT_NEAR(bar.cwiseProduct(along).sum() / weight.cwiseProduct(tangent).sum(), 1.0, test::tolerance(1e-10))
+        << kind.name;
+    const auto at = [&](double h) -> VectorX { return flat(force_of(X + h * along)); };
+    EXPECT_LT(test::best_relative_error(at, VectorX(flat(tangent)), 0.1, 6), test::tolerance(1e-7)) << kind.name;
   }
 }
 

@@ -39,13 +39,13 @@ struct LetGo {
 
 /// @param speed  of all that is not held, along the bar and across [m/s]
 LetGo let_go(const std::shared_ptr<const Body>& body, const std::shared_ptr<const MaterialLaw>& law, double speed,
-             double dt) {
+             double dt, Integrator integrator = Integrator::Newton) {
   SimulationOptions options;
   for (int f = 0; f <= 20; ++f) options.times.push_back(5e-3 * f);
   options.max_dt = dt;
   options.newmark_theta = 0.5;
   options.law = law;
-  options.integrator = Integrator::Newton;
+  options.integrator = integrator;
   options.newton.tolerance = 1e-10;
   options.holds = {Hold{[](const Vector3& p) { return p.x() < -0.199; }}};
   const MotionLayout layout;
@@ -86,6 +86,19 @@ TEST_P(LawMotion, OfGreatAmplitudeKeepsItsEnergyAsStepsShrink) {
   EXPECT_LT(fine.least_kinetic, 0.3) << "most of the energy must have been stored in between";
   EXPECT_LT(fine.greatest_change, 0.02);
   EXPECT_LT(fine.greatest_change, 0.25 * coarse.greatest_change);
+}
+
+/// Steps that are linear about where the start leads are off implicit ones of the same length by far less than either
+/// is off the motion.
+TEST_P(LawMotion, OfPredictedStepsIsNearlyThatOfImplicitOnes) {
+  const double speed = 1.0;
+  const Points exact = let_go(body, law, speed, 0.078125e-3).last;
+  for (const double dt : {1.25e-3, 0.3125e-3}) {
+    const Points implicit = let_go(body, law, speed, dt).last;
+    const Points predicted = let_go(body, law, speed, dt, Integrator::Lagged).last;
+    ASSERT_GT((implicit - exact).norm(), 0.002 * (exact - body->nodes).norm());
+    EXPECT_LT((predicted - implicit).norm(), 0.2 * (implicit - exact).norm()) << dt;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, LawMotion, ::testing::Values(&ogden, &sampled),

@@ -16,11 +16,13 @@ enum class Start { Thrown, Pulled, Sagging };
 /// A bar of 0.2 x 0.05 x 0.05 m that is held at one end: thrown along and across, or pulled aside and let go; its scan
 /// may err. A stiffer one was scanned as it sags, and is thrown from there.
 struct LawScene {
-  LawScene(const LawForm& form, bool quadratic, Start start)
+  LawScene(const LawForm& form, bool quadratic, Start start, Integrator integrator = Integrator::Newton)
       : body(test::tet_body({0.2, 0.05, 0.05}, {3, 1, 1}, quadratic, 0.0)) {
     for (int f = 0; f <= last; ++f) options.times.push_back(0.01 * f);
     options.max_dt = 0.005;
     options.newton.tolerance = 1e-13;
+    options.integrator = integrator;
+    if (integrator == Integrator::Lagged) options.solver.tolerance = options.solver.column_tolerance = 1e-12;
     options.holds = {Hold{[](const Vector3& p) { return p.x() < -0.0999; }}};
     options.shape = {{Vector3(0.1, 0.01, 0.0)}, 0.01, 0.1};
     MotionBlocks blocks = add_motion_blocks(layout, {.pulls = start == Start::Pulled ? 1 : 0, .scan_corrections = 1});
@@ -67,10 +69,11 @@ struct Form {
 const Form linear{"Linear", {1, 0}}, neo_hookean{"NeoHookean", {1, 0, 1, false, TwoNumberLaw::NeoHookean}},
     ogden{"Ogden", {1, 1}}, two_terms{"OgdenOfTwoTerms", {1, 2, 1, true}};
 
-/// The law, the elements, the start.
-class LawSensitivity : public ::testing::TestWithParam<std::tuple<Form, bool, Start>> {
+/// The law, the elements, the start, the integrator.
+class LawSensitivity : public ::testing::TestWithParam<std::tuple<Form, bool, Start, Integrator>> {
  protected:
-  LawScene scene{std::get<0>(GetParam()).form, std::get<1>(GetParam()), std::get<2>(GetParam())};
+  LawScene scene{std::get<0>(GetParam()).form, std::get<1>(GetParam()), std::get<2>(GetParam()),
+                 std::get<3>(GetParam())};
   /// All numbers of the law and some that meet it in other terms, each changed by as much as it is.
   std::vector<VectorX> directions() const {
     const MotionBlocks& blocks = scene.options.blocks;
@@ -131,25 +134,35 @@ TEST_P(LawSensitivity, AdjointMatchesTangents) {
 
 INSTANTIATE_TEST_SUITE_P(Laws, LawSensitivity,
                          ::testing::Combine(::testing::Values(linear, neo_hookean, ogden, two_terms),
-                                            ::testing::Values(false), ::testing::Values(Start::Thrown)),
+                                            ::testing::Values(false), ::testing::Values(Start::Thrown),
+                                            ::testing::Values(Integrator::Newton)),
                          [](const auto& c) { return std::string(std::get<0>(c.param).name); });
 INSTANTIATE_TEST_SUITE_P(OfQuadraticElements, LawSensitivity,
                          ::testing::Combine(::testing::Values(neo_hookean, two_terms), ::testing::Values(true),
-                                            ::testing::Values(Start::Thrown)),
+                                            ::testing::Values(Start::Thrown), ::testing::Values(Integrator::Newton)),
                          [](const auto& c) { return std::string(std::get<0>(c.param).name); });
 INSTANTIATE_TEST_SUITE_P(Released, LawSensitivity,
                          ::testing::Combine(::testing::Values(neo_hookean, two_terms), ::testing::Values(false),
-                                            ::testing::Values(Start::Pulled)),
+                                            ::testing::Values(Start::Pulled), ::testing::Values(Integrator::Newton)),
                          [](const auto& c) { return std::string(std::get<0>(c.param).name); });
 
 INSTANTIATE_TEST_SUITE_P(ScannedSagging, LawSensitivity,
                          ::testing::Combine(::testing::Values(linear, neo_hookean, two_terms), ::testing::Values(false),
-                                            ::testing::Values(Start::Sagging)),
+                                            ::testing::Values(Start::Sagging), ::testing::Values(Integrator::Newton)),
                          [](const auto& c) { return std::string(std::get<0>(c.param).name); });
 INSTANTIATE_TEST_SUITE_P(QuadraticScannedSagging, LawSensitivity,
                          ::testing::Combine(::testing::Values(neo_hookean, two_terms), ::testing::Values(true),
-                                            ::testing::Values(Start::Sagging)),
+                                            ::testing::Values(Start::Sagging), ::testing::Values(Integrator::Newton)),
                          [](const auto& c) { return std::string(std::get<0>(c.param).name); });
+
+std::string name_of(Start start) {
+  return start == Start::Thrown ? "Thrown" : start == Start::Pulled ? "Pulled" : "Sagging";
+}
+INSTANTIATE_TEST_SUITE_P(OfPredictedSteps, LawSensitivity,
+                         ::testing::Combine(::testing::Values(neo_hookean, two_terms), ::testing::Values(true),
+                                            ::testing::Values(Start::Thrown, Start::Pulled, Start::Sagging),
+                                            ::testing::Values(Integrator::Lagged)),
+                         [](const auto& c) { return std::get<0>(c.param).name + name_of(std::get<2>(c.param)); });
 
 /// The thrown bar of the linear law moves as corotated elasticity has it, whose rotations are one an element: the same
 /// for linear tetrahedra without stiffness damping.

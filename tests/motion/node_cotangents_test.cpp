@@ -92,19 +92,21 @@ TEST(NodeCotangents, AStartOfAnotherBodyIsRefused) {
 
 /// A bar that is held, pulled aside and let go, or at rest under its weight.
 struct Bar : test::released::Released {
-  Bar(ElementKind kind, Integrator integrator, bool is_static) : Released(test::released::bar(kind), integrator) {
+  Bar(ElementKind kind, Integrator integrator, bool is_static,
+      StiffnessDamping damping = StiffnessDamping::KelvinVoigt)
+      : Released(test::released::bar(kind), integrator) {
     options.elastic_law = ElasticLaw::Corotated;
-    options.stiffness_damping = StiffnessDamping::Rayleigh;
+    options.stiffness_damping = damping;
     options.is_static = is_static;
     if (is_static) set_blocks({});
   }
 };
 
-class Reference : public ::testing::TestWithParam<std::tuple<ElementKind, Integrator, bool>> {};
+class Reference : public ::testing::TestWithParam<std::tuple<ElementKind, Integrator, bool, StiffnessDamping>> {};
 
 TEST_P(Reference, MatchesCentralDifferences) {
-  const auto [kind, integrator, is_static] = GetParam();
-  Bar scene(kind, integrator, is_static);
+  const auto [kind, integrator, is_static, damping] = GetParam();
+  Bar scene(kind, integrator, is_static, damping);
   const Points rest = scene.body->reference_positions(), weight = test::deformed(rest, 0.3);
   const Points direction = test::deformed(rest, 0.7);
   Simulation simulation(scene.body, scene.options);
@@ -121,7 +123,8 @@ TEST_P(Reference, MatchesCentralDifferences) {
 INSTANTIATE_TEST_SUITE_P(
     NodeCotangents, Reference,
     ::testing::Combine(::testing::Values(ElementKind::Tetrahedron, ElementKind::QuadraticTetrahedron),
-                       ::testing::Values(Integrator::Lagged, Integrator::Newton), ::testing::Bool()));
+                       ::testing::Values(Integrator::Lagged, Integrator::Newton), ::testing::Bool(),
+                       ::testing::Values(StiffnessDamping::Rayleigh, StiffnessDamping::KelvinVoigt)));
 
 TEST(NodeCotangents, AReferenceThatIsSetIsThatOfABodyWithIt) {
   Bar scene(ElementKind::QuadraticTetrahedron, Integrator::Lagged, false);
