@@ -324,11 +324,10 @@ SimulationOptions make_simulation(const Scene& scene, const Body& body, const Re
   const double gravity = std::max(blocks.gravity.vector(theta).norm(), 0.1);
   simulation.max_dt = default_time_step(body, gravity);
   simulation.scan_sags = scene.object.shape_is == ShapeIs::Static && !body.is_free_elsewhere();
-  // What hangs and touches nothing moves smoothly; its elements are quadratic, and its steps dear. Four a frame resolve
-  // what frames can show.
+  // What hangs and touches nothing moves smoothly; its elements are quadratic, and its steps dear.
   const std::vector<double>& times = simulation.times;
   if (simulation.scan_sags && scene.planes.empty() && times.size() > 1)
-    simulation.max_dt = std::max(simulation.max_dt, 0.25 * (times.back() - times.front()) / double(times.size() - 1));
+    simulation.max_dt = std::max(simulation.max_dt, 0.125 * (times.back() - times.front()) / double(times.size() - 1));
   simulation.max_dt /= resolution.steps;
   simulation.blocks = blocks;
   simulation.contact = default_contact(body, theta[blocks.density] * body.volume(), gravity);
