@@ -87,7 +87,7 @@ class TetReferenceForces : public ReferenceForces {
 
 template <int N, Frame kind>
 TetReferenceForces<N, kind>::TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material,
-                                                 std::optional<ParameterHandle> damping)
+                                                std::optional<ParameterHandle> damping)
     : body_(std::move(body)), poissons_ratio_(material.poissons_ratio), damping_(damping), modulus_(body_, material) {
   // Mid nodes move on their own: curved elements need the rule that integrates their gradients exactly.
   const auto rule = tet_quadrature(N == 4 ? 0 : 5);
@@ -255,7 +255,7 @@ void TetReferenceForces<N, kind>::add_matrix(double scale, BlockMatrix& matrix) 
 
 template <int N, Frame kind>
 void TetReferenceForces<N, kind>::add_tangents(std::span<const Points* const> d_references,
-                                                std::span<Points* const> forces) const {
+                                               std::span<Points* const> forces) const {
   constexpr std::size_t lanes = 4;
   ElementLanes<N> d_reference, change;
   for (int e = 0; e < body_->element_count() && !forces.empty(); ++e)

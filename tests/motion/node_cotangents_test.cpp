@@ -92,8 +92,7 @@ TEST(NodeCotangents, AStartOfAnotherBodyIsRefused) {
 
 /// A bar that is held, pulled aside and let go, or at rest under its weight.
 struct Bar : test::released::Released {
-  Bar(ElementKind kind, Integrator integrator, bool is_static,
-      StiffnessDamping damping = StiffnessDamping::KelvinVoigt)
+  Bar(ElementKind kind, Integrator integrator, bool is_static, StiffnessDamping damping = StiffnessDamping::KelvinVoigt)
       : Released(test::released::bar(kind), integrator) {
     options.elastic_law = ElasticLaw::Corotated;
     options.stiffness_damping = damping;
