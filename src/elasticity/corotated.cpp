@@ -29,7 +29,7 @@ class CorotatedElasticity : public Elasticity {
   void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) override;
   void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
-  void set_reference(std::shared_ptr<const Body> body) override;
+  void set_reference(const std::shared_ptr<const Body>& body) override;
   void linearise_reference(const Points& z) override;
   void add_reference_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) override;
   void add_reference_adjoint(const Points& w, Points& reference_bar) override;
@@ -140,10 +140,10 @@ double CorotatedElasticity<N>::tangent_modulus(int e) const {
 }
 
 template <int N>
-void CorotatedElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
+void CorotatedElasticity<N>::set_reference(const std::shared_ptr<const Body>& body) {
   if (is_corrected()) throw std::invalid_argument("a corrected law has no derivatives by the reference");
   has_strained_ = false;
-  body_ = std::move(body);
+  body_ = body;
   stiffness_ = LocalStiffness<N>(body_);
   poissons_ratio_ = -2.0;
   gradients_ = MeanGradients<N>(body_);

@@ -112,7 +112,7 @@ class ForceTerm {
   /// From now on the nodes are stress-free where this body has them, the same but for its reference
   /// (`with_reference`). Only then does a term have derivatives by the reference; most do not depend on it. Parameters
   /// are to be set anew. Throws std::invalid_argument where the term depends on it and has no derivatives.
-  virtual void set_reference(std::shared_ptr<const Body> body) { (void)body; }
+  virtual void set_reference(const std::shared_ptr<const Body>& body) { (void)body; }
   /// Makes ready for the two products below, about the lag point and z.
   virtual void linearise_reference(const Points& z) { (void)z; }
   /// force += df for a change of the stress-free reference positions, p, z and theta staying as they are, along

@@ -1,16 +1,15 @@
 #include "elasticity/law_elasticity.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "base/parallel.hpp"
 #include "elasticity/local_stiffness.hpp"
+#include "elasticity/tangent_projection.hpp"
 #include "elasticity/tet_element.hpp"
 
 namespace pliant {
@@ -25,65 +24,6 @@ Strain6 biot_strain(const Matrix3& F) {
 namespace {
 
 Matrix3 matrix_of(const Vector9& v) { return Eigen::Map<const Matrix3>(v.data()); }
-
-/// A symmetric tangent and the same without its negative eigenvalues, the first of an ascending order.
-struct Projection {
-  Vector9 values;
-  Matrix9 vectors, positive;
-
-  Projection() = default;
-  /// @param F  deformation in the frame of the stress's tangent, of an isotropic law; null: of any law
-  Projection(const Matrix9& tangent, const Matrix3* F) {
-    std::optional<PrincipalStretches> principal;
-    if (F && principal.emplace(*F).is_valid)
-      decompose(tangent, *principal);
-    else
-      decompose(tangent);
-    positive = tangent;
-    for (int i = 0; i < 9 && values[i] < 0.0; ++i)
-      positive.noalias() -= (values[i] * vectors.col(i)) * vectors.col(i).transpose();
-  }
-  int negative_count() const { return int((values.array() < 0.0).count()); }
-  /// How much of a change between two of its vectors the projection leaves out: 1 less the divided difference of
-  /// max(value, 0) (Daleckii & Krein 1965).
-  double left_out(int i, int j) const {
-    if (values[i] >= 0.0 && values[j] >= 0.0) return 0.0;
-    if (values[i] < 0.0 && values[j] < 0.0) return 1.0;
-    const double less = std::min(values[i], values[j]), more = std::max(values[i], values[j]);
-    return less / (less - more);
-  }
-
- private:
-  void decompose(const Matrix9& tangent) {
-    const Eigen::SelfAdjointEigenSolver<Matrix9> solver(tangent);
-    values = solver.eigenvalues();
-    vectors = solver.eigenvectors();
-  }
-
-  /// In the frame of the principal stretches the tangent of an isotropic law falls apart (Smith et al. 2019): into 3 x
-  /// 3 numbers of the stretches and, for each two of them, one of shear, sym(u v^T), and one of rotation, skew(u v^T).
-  void decompose(const Matrix9& tangent, const PrincipalStretches& p) {
-    Matrix9 own;
-    Vector9 of_own;
-    Eigen::Matrix<double, 9, 3> stretches;
-    for (int i = 0; i < 3; ++i) stretches.col(i) = vec(Matrix3(p.U.col(i) * p.V.col(i).transpose()));
-    const Eigen::SelfAdjointEigenSolver<Matrix3> solver(stretches.transpose() * tangent * stretches);
-    own.leftCols<3>() = stretches * solver.eigenvectors();
-    of_own.head<3>() = solver.eigenvalues();
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3;
-      const Matrix3 one = std::sqrt(0.5) * p.U.col(i) * p.V.col(j).transpose();
-      const Matrix3 other = std::sqrt(0.5) * p.U.col(j) * p.V.col(i).transpose();
-      own.col(3 + i) = vec(Matrix3(one + other));
-      own.col(6 + i) = vec(Matrix3(one - other));
-    }
-    for (int i = 3; i < 9; ++i) of_own[i] = own.col(i).dot(tangent * own.col(i));
-    std::array<int, 9> order = {0, 1, 2, 3, 4, 5, 6, 7, 8};
-    std::ranges::sort(order, {}, [&](int i) { return of_own[i]; });
-    for (int i = 0; i < 9; ++i)
-      values[i] = of_own[order[std::size_t(i)]], vectors.col(i) = own.col(order[std::size_t(i)]);
-  }
-};
 
 /// A tangent that stands in the frame of a stress's.
 Matrix9 in_world(const PointStress& frame, const Matrix9& tangent) {
@@ -117,7 +57,7 @@ class TetLawElasticity : public LawElasticity {
   void prepare_tangents(const Points& z, const Eigen::Ref<const MatrixX>& d_theta) override;
   void add_force_tangents(const Points& z, const ForceChanges& changes, std::span<Points> forces) override;
   void add_force_adjoint(const Points& z, const Points& w, Points& lag_bar, Points& z_bar, VectorX& theta_bar) override;
-  void set_reference(std::shared_ptr<const Body> body) override;
+  void set_reference(const std::shared_ptr<const Body>& body) override;
   void linearise_reference(const Points& z) override { reference_z_ = z; }
   void add_reference_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) override;
   void add_reference_adjoint(const Points& w, Points& reference_bar) override;
@@ -188,7 +128,7 @@ class TetLawElasticity : public LawElasticity {
   template <class Function>
   void for_all_points(Function&& function) const;
   /// The tangents in their own frames, without negative parts, at the last `evaluate`.
-  const std::vector<Projection>& projections() const;
+  const std::vector<TangentProjection>& projections() const;
   /// product += K d at the last `evaluate`, K the positive stiffness.
   void add_product(const Points& d, double scale, Points& product) const;
   /// matrix += scale times the elements' stiffness.
@@ -213,7 +153,7 @@ class TetLawElasticity : public LawElasticity {
   Points lag_, reference_z_;
   double energy_ = 0.0;  // at the last `evaluate`; infinite where the law knows no such deformation
   bool has_rotations_ = false;
-  mutable std::vector<Projection> projections_;
+  mutable std::vector<TangentProjection> projections_;
   mutable bool has_projections_ = false;
   std::vector<PointChange> changes_;
   Points changes_z_;
@@ -260,8 +200,8 @@ void TetLawElasticity<N>::take_reference(const Points& reference) {
 }
 
 template <int N>
-void TetLawElasticity<N>::set_reference(std::shared_ptr<const Body> body) {
-  body_ = std::move(body);
+void TetLawElasticity<N>::set_reference(const std::shared_ptr<const Body>& body) {
+  body_ = body;
   take_reference(body_->nodes);
 }
 
@@ -294,14 +234,14 @@ void TetLawElasticity<N>::for_all_points(Function&& function) const {
 }
 
 template <int N>
-const std::vector<Projection>& TetLawElasticity<N>::projections() const {
+const std::vector<TangentProjection>& TetLawElasticity<N>::projections() const {
   if (has_projections_) return projections_;
   projections_.resize(points_.size());
   const bool is_isotropic = law_->is_isotropic();
   for_all_points([&](int, std::size_t p) {
     const PointStress& s = points_[p].stress;
     const Matrix3 F = s.left.transpose() * points_[p].F * s.right;
-    projections_[p] = Projection(s.tangent, is_isotropic ? &F : nullptr);
+    projections_[p] = TangentProjection(s.tangent, is_isotropic ? &F : nullptr);
   });
   has_projections_ = true;
   return projections_;
@@ -512,7 +452,7 @@ auto TetLawElasticity<N>::change_of(int e, std::size_t p, const Points& z, bool 
   if (H.isZero(0.0)) return change;
   change.by_lag += law_->tangent_derivative(e, point.F, H);
   along(H, [&](Eigen::Index k, const Vector9& m) { change.by_parameters.col(k) += m; });
-  const Projection& projection = projections_[p];
+  const TangentProjection& projection = projections_[p];
   const int negative = projection.negative_count();
   if (negative == 0) return change;
   Matrix9 V;

@@ -41,7 +41,7 @@ class ViscousForces : public ForceTerm {
   void add_start_tangent(const Points& z, const Points& d_start, const Points& d_start_velocity,
                          Points& force) override;
   void add_start_adjoint(const Points& z, const Points& w, Points& start_bar, Points& start_velocity_bar) override;
-  void set_reference(std::shared_ptr<const Body> body) override;
+  void set_reference(const std::shared_ptr<const Body>& body) override;
   void linearise_reference(const Points& z) override;
   void add_reference_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) override;
   void add_reference_adjoint(const Points& w, Points& reference_bar) override;
@@ -278,9 +278,9 @@ void ViscousForces<N>::add_start_adjoint(const Points&, const Points& w, Points&
 }
 
 template <int N>
-void ViscousForces<N>::set_reference(std::shared_ptr<const Body> body) {
+void ViscousForces<N>::set_reference(const std::shared_ptr<const Body>& body) {
   has_strained_ = false;
-  body_ = std::move(body);
+  body_ = body;
   stiffness_ = LocalStiffness<N>(body_);
   poissons_ratio_ = -2.0;
   gradients_ = MeanGradients<N>(body_);

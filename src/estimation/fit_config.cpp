@@ -221,7 +221,8 @@ const std::vector<Entry>& entries() {
       real_entry("scan_std", "object sizes", "0..0.2", "prior standard deviation of the scan-correction field",
                  &FitOptions::scan_std),
       choice_entry("integrator",
-                   "time integration: rotations predicted (semi-implicit), or fully implicit by Newton's method",
+                   "time integration: rotations and a law's tangent predicted (semi-implicit), or fully implicit by "
+                   "Newton's method",
                    integrators, &FitOptions::integrator),
       integer_entry("pull_points", "1..50",
                     "application points of the unknown loads that hold a released object before its release, at most: "

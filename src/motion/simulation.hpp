@@ -23,9 +23,9 @@ struct SimulationOptions {
   double max_dt = 0.0;        ///< [s], > 0: each interval is cut into equal steps no longer than this
   double newmark_theta = 0.51;
   double contact_weight = 0.6, rotation_prediction = 0.5;  ///< see StepOptions
-  /// Of the elements' mean strain, and of stiffness damping, at large strain. The corotated law takes the place of the
-  /// other where the scan sags or errs, since that has no derivatives by the stress-free shape, with Rayleigh's
-  /// damping; the law also at rest and where another is given below.
+  /// Of the elements' mean strain, and of stiffness damping, at large strain. At rest and where another law is given
+  /// below, the mean strain's is the corotated one; where the scan sags or errs, too, since the neo-Hookean one has no
+  /// derivatives by the stress-free shape, and damping is Rayleigh's there, unless another law is given.
   ElasticLaw elastic_law = ElasticLaw::NeoHookean;
   StiffnessDamping stiffness_damping = StiffnessDamping::KelvinVoigt;
   SolverOptions solver;

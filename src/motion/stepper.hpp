@@ -19,8 +19,8 @@ struct State {
 };
 
 enum class Integrator {
-  Lagged,  ///< rotations and contact predicted from the start: one linear solve a step (Weiss 2020)
-  Newton,  ///< fully implicit with the exact corotational stiffness (Wang 2015)
+  Lagged,  ///< rotations, contact and a law's tangent predicted from the start: one linear solve a step (Weiss 2020)
+  Newton,  ///< fully implicit with the exact stiffness (Wang 2015)
 };
 
 /// How stiffness damping acts at large strain; at small strain both are Rayleigh's beta K v.
