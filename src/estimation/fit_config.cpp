@@ -258,7 +258,8 @@ const std::vector<Entry>& entries() {
       choice_entry(
           "damping",
           "law of stiffness damping at large strain: kelvin_voigt, on the rate of the Green strain, or rayleigh, "
-          "by the turned stiffness; rayleigh where the scan was taken sagging or may err",
+          "by the turned stiffness; rayleigh where the scan was taken sagging or may err and no other material is "
+          "chosen",
           dampings, &FitOptions::damping),
       choice_entry(
           "material",
