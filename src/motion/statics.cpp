@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "motion/rounding.hpp"
 
 namespace pliant {
 
@@ -73,6 +74,7 @@ void Statics::assemble_exact() {
   clear_matrix();
   for (ForceTerm* term : terms_) term->add_tangent_stiffness(x_, 1.0, matrix_);
   constrain(matrix_);
+  rounding_ = rounding_of_residual(matrix_, body_->size());
 }
 
 void Statics::assemble_positive() {
@@ -117,10 +119,7 @@ bool Statics::factorise_general() {
   for (ForceTerm* term : terms_) term->add_lag_matrix(x_, 1.0, matrix_);
   constrain(positive_);
   constrain(matrix_);
-  double squares = 0.0;
-  for (const int diagonal : pattern_->diagonal)
-    for (int d = 0; d < 3; ++d) squares += std::pow(matrix_.block(diagonal)[4 * d], 2);
-  rounding_ = std::sqrt(squares) * body_->size() * std::numeric_limits<double>::epsilon();
+  rounding_ = rounding_of_residual(matrix_, body_->size());
   general_->set_positions(x_.topRows(body_->node_count()));
   if (!general_->factorise(matrix_, positive_)) return false;
   // Where the exact matrix is indefinite, Newton's step leads to whatever point has no force, or nowhere. The matrix

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "motion/rounding.hpp"
 
 namespace pliant {
 
@@ -224,10 +224,7 @@ bool Stepper::factorise_exact(const Scheme& s) {
     matrix_.constrain(node);
     exact_matrix_.constrain(node);
   }
-  double squares = 0.0;
-  for (const int diagonal : body_->pattern->diagonal)
-    for (int d = 0; d < 3; ++d) squares += std::pow(exact_matrix_.block(diagonal)[4 * d], 2);
-  rounding_ = std::sqrt(squares) * body_->size() * std::numeric_limits<double>::epsilon();
+  rounding_ = rounding_of_residual(exact_matrix_, body_->size());
   solver.set_positions(lag_[std::size_t(ForceTerm::Lag::Rotation)]);
   return solver.factorise(exact_matrix_, matrix_);
 }

@@ -114,5 +114,37 @@ TEST(LawMotionSmall, IsThatOfItsModuliAtRest) {
   EXPECT_LT((by_law - by_moduli).norm(), 0.01 * moved);
 }
 
+/// What rounding leaves of the forces is far more than a billionth of the weight where a body hardly strains.
+TEST(LawAtRest, IsFoundHoweverStiffTheBodyIs) {
+  const auto body = test::tet_body({0.4, 0.1, 0.1}, {8, 2, 2}, true, 0.1);
+  SimulationOptions options;
+  options.times = {0.0};
+  options.is_static = true;
+  options.holds = {Hold{[](const Vector3& p) { return p.x() < -0.199; }}};
+  const MotionLayout layout;
+  options.blocks = layout;
+  const auto sag = [&](double stiffer) {
+    MatrixX q(body->element_count(), 3);
+    q.rowwise() = (Eigen::RowVectorXd(3) << stiffer * modulus / (2.0 * (1.0 + nu)), 2.0, nu).finished();
+    options.law = std::make_shared<OgdenLaw>(q);
+    VectorX theta = layout.zero();
+    layout.set_moduli(theta, stiffer * modulus);
+    theta[layout.poissons_ratio] = nu;
+    theta[layout.density] = density;
+    theta.segment<3>(layout.gravity) = Vector3(0.0, -9.81, 0.0);
+    double farthest = 0.0;
+    Simulation simulation(body, options);
+    const RolloutSummary summary = simulation.run(theta, [&](int, const State& state, auto) {
+      farthest = (state.x - body->nodes).rowwise().norm().maxCoeff();
+      return true;
+    });
+    EXPECT_TRUE(summary.succeeded) << stiffer << ": " << summary.failure;
+    return farthest;
+  };
+  const double soft = sag(1e3);
+  ASSERT_GT(soft, 1e-5);
+  EXPECT_NEAR(1e5 * sag(1e8) / soft, 1.0, 0.01);
+}
+
 }  // namespace
 }  // namespace pliant::law_motion_test
