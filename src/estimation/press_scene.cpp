@@ -132,7 +132,8 @@ const StaticTests& PressScene::static_tests() const {
 PressedBody::PressedBody(const PressScene& scene, int press, std::shared_ptr<const MaterialLaw> law,
                          double youngs_modulus)
     : equilibrium_(scene.body, std::move(law), scene.held,
-                   scene.contacts(contact_of(scene, scene.facts[std::size_t(press)], youngs_modulus), youngs_modulus)),
+                   scene.contacts(contact_of(scene, scene.facts[std::size_t(press)], youngs_modulus), youngs_modulus),
+                   {.reuse_factor = true}),
       points_(*scene.body, without_probe(scene.presses[std::size_t(press)])),
       centre_(scene.facts[std::size_t(press)].contact_centre),
       has_probe_(scene.presses[std::size_t(press)].has_probe) {
@@ -149,6 +150,15 @@ SolveSummary PressedBody::solve() {
   placement_ = equilibrium_.rest();
   const SolveSummary summary = equilibrium_.solve(placement_);
   has_placement_ = summary.converged;
+  return summary;
+}
+
+SolveSummary PressedBody::solve_from(const Placement& guess) {
+  Placement near = guess;
+  const SolveSummary summary = equilibrium_.solve(near);
+  if (!summary.converged) return solve();
+  placement_ = std::move(near);
+  has_placement_ = true;
   return summary;
 }
 

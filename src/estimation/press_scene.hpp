@@ -72,6 +72,8 @@ class PressedBody {
 
   /// To equilibrium from where it was last; where that fails, or at first, from rest.
   SolveSummary solve();
+  /// The same, first from a placement that is nearly in equilibrium.
+  SolveSummary solve_from(const Placement& guess);
   void forget() { has_placement_ = false; }
   Equilibrium& equilibrium() { return equilibrium_; }
   const Placement& placement() const { return placement_; }

@@ -22,6 +22,7 @@ void PressedMaterial::set_form(std::shared_ptr<const Body> body, LawLayout layou
   body_ = std::move(body);
   layout_ = std::move(layout);
   law_.reset();
+  ++form_;
 }
 
 PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press,
@@ -74,11 +75,29 @@ std::unique_ptr<Trial> PressTrial::anew() const {
   return trial;
 }
 
+std::optional<Placement> PressTrial::guess(const VectorX& theta) const {
+  constexpr double farthest = 0.02;  // of the object's size
+  const Linearised& l = linearised_;
+  if (l.form != material_->form() || l.theta.size() != theta.size()) return std::nullopt;
+  Points change = Points::Zero(l.changes.front().rows(), 3);
+  for (std::size_t k = 0; k < l.changes.size(); ++k)
+    if (const double d = theta[l.rows[k]] - l.theta[l.rows[k]]; d != 0.0) change += d * l.changes[k];
+  if (!(change.cwiseAbs().maxCoeff() < farthest * scene_->body->size())) return std::nullopt;
+  const Eigen::Index n = l.placement.nodes.rows();
+  return Placement{l.placement.nodes + change.topRows(n),
+                   l.placement.translations + change.bottomRows(change.rows() - n)};
+}
+
 bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight) {
   const ObservedPress& seen = scene_->presses[std::size_t(press_)];
   body_.equilibrium().set_law(material_->law(theta));
   result.steps = 1, result.work = steps_of_an_equilibrium * scene_->body->node_count();
-  is_placed_ = body_.solve().converged;
+  const bool is_there = is_placed_ && placed_for_.size() == theta.size() && placed_for_ == theta;
+  const std::optional<Placement> nearly = is_there ? std::nullopt : guess(theta);
+  const SolveSummary solved = nearly ? body_.solve_from(*nearly) : body_.solve();
+  is_placed_ = solved.converged;
+  iterations_ = solved.iterations;
+  placed_for_ = theta;
   if (!is_placed_) return result.failure = seen.name + ": " + body_.equilibrium().failure(), false;
   Points residuals = body_.points();
   for (Eigen::Index m = 0; m < residuals.rows(); ++m) residuals.row(m) -= seen.loaded[std::size_t(m)].transpose();
@@ -106,6 +125,10 @@ bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& 
   return true;
 }
 
+namespace {
+constexpr std::size_t most_changes_kept = 64;  // of a press: a field of nodes for each
+}
+
 CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) {
   CostEvaluation result;
   VectorX slope, weight;
@@ -124,6 +147,8 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
                         for (std::size_t a = 0; a < nodes.size(); ++a)
                           force.row(nodes[a]) -= share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
                       });
+  const bool is_kept = numbers.count() > 0 && numbers.count() <= most_changes_kept;
+  linearised_ = {is_kept ? material_->form() : -1, theta, body_.placement(), numbers.rows, {}};
   MatrixX by_parameters(residuals_.size(), Eigen::Index(numbers.count()));
   for (std::size_t k = 0; k < numbers.count(); ++k) {
     const Points& change = body_.equilibrium().response(forces[k]);
@@ -131,6 +156,7 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
     moved.topRows(body_.embedding().point_count()) = body_.embedding().positions(change.topRows(n));
     if (body_.has_probe()) moved.row(moved.rows() - 1) = change.row(n);
     by_parameters.col(Eigen::Index(k)) = flat(moved);
+    if (is_kept) linearised_.changes.push_back(change);
   }
   const MatrixX J = by_parameters * directions(numbers.rows, Eigen::all);
   FrameFit& fit = result.frames.front();

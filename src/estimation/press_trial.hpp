@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "estimation/press_law.hpp"
@@ -23,10 +24,13 @@ class PressedMaterial {
   /// Goes on with another form of the law.
   /// @param body  the same but for its modulus field
   void set_form(std::shared_ptr<const Body> body, LawLayout layout);
+  /// How many forms it has had before this one.
+  int form() const { return form_; }
 
  private:
   std::shared_ptr<const Body> body_;
   LawLayout layout_;
+  int form_ = 0;
   std::mutex mutex_;
   VectorX theta_;
   std::shared_ptr<const MaterialLaw> law_;
@@ -41,8 +45,8 @@ struct PressTrialOptions {
 /// they were seen, over the noise, robust beyond `outlier_scale`. Noise that grows with displacement goes by where the
 /// simulation has the points when the options are set (by what was measured before it has any): measured displacements
 /// would weigh those markers most that noise has moved least. Derivatives are those of the equilibrium, by its
-/// exact Hessian: a back-substitution a parameter, or one for all by the adjoint. Each run sets out from the last
-/// equilibrium.
+/// exact Hessian: a back-substitution a parameter, or one for all by the adjoint. Each run sets out from where the last
+/// derivatives lead from their equilibrium, or from the last equilibrium where there are none.
 class PressTrial : public Trial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is
@@ -60,6 +64,8 @@ class PressTrial : public Trial {
   const Points& residuals() const { return residuals_; }
   const Points& deviations() const { return deviations_; }
   const ObservedPress& seen() const { return scene_->presses[std::size_t(press_)]; }
+  /// Newton's iterations of the last run.
+  int iterations() const { return iterations_; }
   /// How far each point was moved in the last run [m]; as measured where none has succeeded.
   VectorX displacements() const;
 
@@ -75,6 +81,17 @@ class PressTrial : public Trial {
   /// The equilibrium and its cost. `slope` and `weight` are those of each coordinate's loss.
   bool compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight);
 
+  /// An equilibrium and how it changes with each number of the law, by which those of other parameters are guessed.
+  struct Linearised {
+    int form = -1;  ///< of the law; -1: none
+    VectorX theta;
+    Placement placement;
+    std::vector<Eigen::Index> rows;  ///< of the law's numbers, in theta
+    std::vector<Points> changes;     ///< by each number, nodes' and then rigid bodies' [m]
+  };
+  /// Nothing where there is no linearisation of this form, or where it leads too far to be trusted.
+  std::optional<Placement> guess(const VectorX& theta) const;
+
   std::shared_ptr<const PressScene> scene_;
   int press_, number_;
   std::shared_ptr<PressedMaterial> material_;
@@ -82,6 +99,9 @@ class PressTrial : public Trial {
   ContactMaterial contact_;
   PressedBody body_;
   bool is_placed_ = false;
+  int iterations_ = 0;
+  VectorX placed_for_;  // parameters of the placement
+  Linearised linearised_;
   Points residuals_, deviations_;
 };
 

@@ -71,6 +71,29 @@ TEST_P(Presses, GradientByTheAdjointIsThatByTangents) {
   EXPECT_LT((adjoint.gradient - tangents.gradient).norm(), tolerance(1e-6) * tangents.gradient.norm());
 }
 
+/// What is guessed from derivatives shortens the way to an equilibrium, and leads to the same one, near and far from
+/// where they were taken.
+TEST_P(Presses, SetOutFromWhereDerivativesLead) {
+  const auto material = std::make_shared<PressedMaterial>(scene->body, layout);
+  const auto trial = [&] { return PressTrial(scene, 0, material, set.reference(), {{1e-4}, 5.0}); };
+  PressTrial led = trial(), unled = trial();
+  const VectorX p = set.to_unconstrained(set.reference());
+  const VectorX towards = VectorX::Constant(p.size(), 1.0);
+  const MatrixX none(set.reference().size(), 0);
+  const auto theta = [&](double share) { return set.to_theta(p + share * towards); };
+  ASSERT_TRUE(led.run(theta(0.0), set.jacobian(p)).succeeded);
+  ASSERT_TRUE(unled.run(theta(0.0), none).succeeded);
+  for (const double share : {0.01, 1.0, 0.1}) {
+    ASSERT_TRUE(led.run(theta(share), none).succeeded && unled.run(theta(share), none).succeeded) << share;
+    EXPECT_LT((led.residuals() - unled.residuals()).norm(), 1e-7 * unled.displacements().norm()) << share;
+    if (share == 0.01) {
+      EXPECT_LT(led.iterations(), unled.iterations());
+    }
+  }
+  ASSERT_TRUE(led.run(theta(0.1), none).succeeded);
+  EXPECT_EQ(led.iterations(), 0) << "it is there";
+}
+
 TEST_P(Presses, NoiseThatGrowsGoesByWhereTheLawHasThePoints) {
   PressObjective cost(scene, {0, 1, 2, 3}, layout, set, {{1e-4, 0.05}, 5.0});
   const VectorX p = set.to_unconstrained(set.reference());
