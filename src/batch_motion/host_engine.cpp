@@ -1,0 +1,123 @@
+#include <new>
+#include <stdexcept>
+#include <utility>
+
+#include "batch_motion/engine.hpp"
+#include "batch_motion/host_lane.hpp"
+
+namespace pliant::batch_motion {
+
+namespace {
+
+/// Memory that begins with a cache line.
+template <class Number>
+class AlignedArray {
+ public:
+  AlignedArray() = default;
+  explicit AlignedArray(std::size_t size) { resize(size); }
+  AlignedArray(AlignedArray&& other) noexcept
+      : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+  AlignedArray& operator=(AlignedArray&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    return *this;
+  }
+  ~AlignedArray() { ::operator delete[](data_, alignment); }
+  /// What it held is lost where the size changes.
+  void resize(std::size_t size) {
+    if (size == size_) return;
+    ::operator delete[](std::exchange(data_, nullptr), alignment);
+    data_ = static_cast<Number*>(::operator new[](size * sizeof(Number), alignment));
+    size_ = size;
+    for (std::size_t i = 0; i < size; ++i) data_[i] = Number(0);
+  }
+  Number* data() { return data_; }
+  const Number* data() const { return data_; }
+  std::size_t size() const { return size_; }
+
+ private:
+  static constexpr std::align_val_t alignment{64};
+  Number* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+/// Items one after the other, `lane_width` members at once.
+/// @tparam gathers  rows are found by gathering alone, as on a device
+template <bool gathers>
+struct HostBackend {
+  template <class Number>
+  using Array = AlignedArray<Number>;
+  static constexpr int iterations_together = 1;
+  std::shared_ptr<const MeshData> mesh;
+
+  std::size_t set_members(int) { return lane_width; }
+  /// The mesh stays where it is.
+  template <class Number>
+  const Number* place(const std::vector<Number>& values, std::vector<Array<int>>&, std::vector<Array<double>>&) const {
+    return values.data();
+  }
+  void upload(const double* from, Array<double>& to) const {
+    if (to.size() > 0) std::memcpy(to.data(), from, to.size() * sizeof(double));
+  }
+  void download(const Array<double>& from, double* to) const {
+    if (from.size() > 0) std::memcpy(to, from.data(), from.size() * sizeof(double));
+  }
+  template <class Kernel>
+  void each(int items, const Kernel& kernel) const {
+    for (int i = 0; i < items; ++i) kernel(i, HostLane());
+  }
+  template <class Kernel>
+  void symmetric(const Kernel& kernel) const {
+    for (int i = 0; i < mesh->nodes; ++i)
+      if constexpr (gathers)
+        kernel.gather(i, HostLane());
+      else
+        kernel.scatter(i, HostLane());
+  }
+  template <class Kernel>
+  void forward(const Kernel& kernel) const {
+    if constexpr (gathers)  // rows of a colour in any order
+      for (std::size_t c = 0; c + 1 < mesh->colour_start.size(); ++c)
+        for (int i = mesh->colour_start[c + 1] - 1; i >= mesh->colour_start[c]; --i) kernel.gather(i, HostLane());
+    else
+      for (int i = 0; i < mesh->nodes; ++i) kernel.gather(i, HostLane());
+  }
+  template <class Kernel>
+  void backward(const Kernel& kernel) const {
+    if constexpr (gathers)
+      for (std::size_t c = mesh->colour_start.size() - 1; c-- > 0;)
+        for (int i = mesh->colour_start[c]; i < mesh->colour_start[c + 1]; ++i) kernel.gather(i, HostLane());
+    else
+      for (int i = mesh->nodes - 1; i >= 0; --i) kernel.scatter(i, HostLane());
+  }
+  bool any(const double* numbers) const {
+    for (int l = 0; l < lane_width; ++l)
+      if (numbers[l] != 0.0) return true;
+    return false;
+  }
+};
+
+template <bool gathers>
+class HostEngines : public EngineMaker {
+ public:
+  using Backend = HostBackend<gathers>;
+  HostEngines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step, const SolverNumbers& solver)
+      : shared_(std::make_shared<Shared<Backend>>(mesh, step, solver, Backend{mesh})) {}
+  std::unique_ptr<BatchEngine> make(int members) override {
+    if (shared_->data().nodes_per_element == 8) return std::make_unique<Engine<Backend, 8>>(shared_, members);
+    return std::make_unique<Engine<Backend, 4>>(shared_, members);
+  }
+
+ private:
+  std::shared_ptr<Shared<Backend>> shared_;
+};
+
+}  // namespace
+
+std::unique_ptr<EngineMaker> make_host_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+                                               const SolverNumbers& solver, bool gathers) {
+  if (gathers) return std::make_unique<HostEngines<true>>(mesh, step, solver);
+  return std::make_unique<HostEngines<false>>(mesh, step, solver);
+}
+
+}  // namespace pliant::batch_motion
