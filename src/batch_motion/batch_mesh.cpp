@@ -109,6 +109,10 @@ void set_elements(const Body& body, MeshData& mesh) {
   std::vector<double> codes;
   of_block.flatten(mesh.part_start, mesh.part_element, &codes);
   for (const double code : codes) mesh.part_corners.push_back(int(code));
+  for (int i = 0; i < 4; ++i) {  // `AssembleBlock` looks so far ahead
+    mesh.part_element.push_back(mesh.part_element.back());
+    mesh.part_corners.push_back(mesh.part_corners.back());
+  }
   mesh.gradient.assign(body.mean_gradient.data(), body.mean_gradient.data() + body.mean_gradient.size());
   mesh.volume = body.element_volume;
   mesh.element_class = body.element_class;

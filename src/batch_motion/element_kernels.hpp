@@ -49,6 +49,12 @@ struct MemberStiffness<8> {
                                   typename Lane::Real* y, const Lane& lane) const {
     multiply(change, element, d, y, lane);
   }
+  /// Has a block that is needed soon brought near.
+  template <class Lane>
+  PLIANT_DEVICE void fetch(int element, int a, int b, const Lane& lane) const {
+    const int p = a <= b ? pair(a, b) : pair(b, a);
+    lane.fetch(value, 9 * (pairs * std::size_t(element_class[element]) + std::size_t(p)), 9);
+  }
   /// out += factor R K_ab R^T
   template <class Lane>
   PLIANT_DEVICE void add_block(const MeshView&, const double*, int element, int a, int b,
@@ -104,6 +110,8 @@ struct MemberStiffness<4> {
                                   const typename Lane::Real* d, typename Lane::Real* y, const Lane& lane) const {
     stress_times<Lane>(mesh, element, lane.load(members, LambdaChange), lane.load(members, MuChange), d, y);
   }
+  template <class Lane>
+  PLIANT_DEVICE void fetch(int, int, int, const Lane&) const {}
   template <class Lane>
   PLIANT_DEVICE void add_block(const MeshView& mesh, const double* members, int element, int a, int b,
                                const typename Lane::Real* R, const typename Lane::Real& factor,

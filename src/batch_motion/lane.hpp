@@ -46,6 +46,8 @@ struct DeviceLane {
   PLIANT_DEVICE float load(const float* array, std::size_t i) const { return array[i * stride + member]; }
   PLIANT_DEVICE void store(double* array, std::size_t i, double value) const { array[i * stride + member] = value; }
   PLIANT_DEVICE void store(float* array, std::size_t i, float value) const { array[i * stride + member] = value; }
+  /// Has some numbers that are needed soon brought near.
+  PLIANT_DEVICE void fetch(const double*, std::size_t, std::size_t) const {}
   /// Sets one member's number.
   PLIANT_DEVICE void put(double* array, std::size_t i, std::size_t of, double value) const {
     if (of == member) array[i * stride + member] = value;

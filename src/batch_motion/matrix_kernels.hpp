@@ -90,6 +90,9 @@ struct AssembleBlock {
     for (int p = mesh.part_start[block]; p < mesh.part_start[block + 1]; ++p) {
       const int element = mesh.part_element[p], corners = mesh.part_corners[p];
       Real R[9];
+      constexpr int ahead = 4;  // the list has so many more parts at its end
+      const int corners_ahead = mesh.part_corners[p + ahead];
+      stiffness.fetch(mesh.part_element[p + ahead], corners_ahead / N, corners_ahead % N, lane);
       load_rotation<N>(rotation, element, R, lane);
       stiffness.add_block(mesh, members, element, corners / N, corners % N, R,
                           scale * Real(mesh.relative_modulus[element]), A, lane);

@@ -226,8 +226,10 @@ void MotionBatch::check(int steps, const std::vector<int>& at) const {
 
 void MotionBatch::begin() {
   Engines& e = *engines_;
-  for (const BatchMember& m : members_)
-    if (auto& known = e.stiffness[m.poissons_ratio]; !known)
+  for (std::size_t k = 0; k < members_.size(); ++k)
+    if (const BatchMember& m = members_[k]; e.poissons_ratio[k] == m.poissons_ratio)
+      continue;
+    else if (auto& known = e.stiffness[m.poissons_ratio]; !known)
       known = std::make_shared<const ClassStiffness>(class_stiffness(*body_, m.poissons_ratio));
   const auto lanes = std::size_t(stride());
   e.each_engine([&](std::size_t i) {
