@@ -27,6 +27,8 @@ class BatchEngine {
   virtual void set_stiffness(int member, const double* value, const double* change) = 0;
   virtual void set_state(const double* x, const double* v) = 0;
   virtual void get_state(double* x, double* v) const = 0;
+  /// Of all members at once, which then share it.
+  virtual void set_shared_stiffness(const double* value, const double* change) = 0;
   /// A run begins: members whose number is 1 go along, and rotations are looked for from none.
   virtual void begin(const double* alive) = 0;
   virtual void steps(int count) = 0;

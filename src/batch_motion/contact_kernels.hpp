@@ -102,6 +102,37 @@ struct SampleForces {
   }
 };
 
+/// The product of the samples' part of the step's matrix with a vector, 3 a sample [N s].
+template <int N>
+struct SampleProducts {
+  MeshView mesh;
+  StepNumbers step;
+  const double *members, *matrix, *way;
+  double* product;
+
+  template <class Lane>
+  PLIANT_DEVICE void operator()(int sample, const Lane& lane) const {
+    using Real = typename Lane::Real;
+    const std::size_t s = std::size_t(sample);
+    const Real slope = lane.load(matrix, 2 * s), zero = Real(0.0);
+    Real out[3] = {zero, zero, zero};
+    if (any(slope > zero)) {
+      Real u[3] = {zero, zero, zero}, n[3], squares = zero;
+      for (int a = 0; a < N; ++a) {
+        const std::size_t corner = N * s + std::size_t(a);
+        for (int i = 0; i < 3; ++i)
+          u[i] += lane.load(way, 3 * std::size_t(mesh.sample_node[corner]) + std::size_t(i)) *
+                  Real(mesh.sample_weight[corner]);
+      }
+      for (int i = 0; i < 3; ++i) n[i] = lane.load(members, std::size_t(PlaneNormal + i)), squares += n[i] * n[i];
+      const Real scale = Real(step.dt * step.contact_weight), drag = scale * lane.load(matrix, 2 * s + 1);
+      const Real along = (scale * slope - drag / squares) * dot(n, u);
+      for (int i = 0; i < 3; ++i) out[i] = along * n[i] + drag * u[i];
+    }
+    for (std::size_t i = 0; i < 3; ++i) lane.store(product, 3 * s + i, out[i]);
+  }
+};
+
 /// The reverse sweep (`RigidContact::add_force_adjoint` and `add_start_adjoint`) for the cotangent dt w of the force: of
 /// positions and velocities at the step's start, 3 a sample each, and of the plane's point and normal, the friction and
 /// the logarithm of the stiffness.

@@ -141,10 +141,6 @@ struct CudaBackend {
     check(cudaPeekAtLastError(), "start a kernel");
   }
   template <class Kernel>
-  void symmetric(const Kernel& kernel) const {
-    gather(kernel, 0, mesh->nodes);
-  }
-  template <class Kernel>
   void forward(const Kernel& kernel) const {
     for (std::size_t c = 0; c + 1 < mesh->colour_start.size(); ++c)
       gather(kernel, mesh->colour_start[c], mesh->colour_start[c + 1]);

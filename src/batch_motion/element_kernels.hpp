@@ -9,49 +9,66 @@ namespace pliant::batch_motion {
 template <int N>
 struct MemberStiffness;
 
-/// Of hexahedra: the blocks (a, b), a <= b, of each class of elements, nine numbers each.
+/// Of hexahedra: the blocks (a, b), a <= b, of each class of elements, nine numbers each; of each member, or once for
+/// all where they share Poisson's ratio.
 template <>
 struct MemberStiffness<8> {
   static constexpr int pairs = 36;
   const double *value, *change;  ///< [m], and derivative by Poisson's ratio
   const int* element_class;
+  bool is_shared;
 
   static PLIANT_DEVICE int pair(int a, int b) { return a * 8 - a * (a - 1) / 2 + b - a; }
 
-  /// y = K d, for the array's K.
-  template <class Lane>
+  template <bool shared, class Lane>
+  static PLIANT_DEVICE typename Lane::Real entry(const double* array, std::size_t k, const Lane& lane) {
+    if constexpr (shared)
+      return typename Lane::Real(array[k]);
+    else
+      return lane.load(array, k);
+  }
+
+  /// y = K d of some vectors, 24 each, for the array's K, which may have to come from far and is read once for them.
+  template <bool shared, int vectors, class Lane>
   PLIANT_DEVICE void multiply(const double* array, int element, const typename Lane::Real* d, typename Lane::Real* y,
                               const Lane& lane) const {
     using Real = typename Lane::Real;
-    const std::size_t first = 9 * pairs * std::size_t(element_class[element]);
-    for (int k = 0; k < 24; ++k) y[k] = Real(0.0);
-    std::size_t k = first;
-    for (int a = 0; a < 8; ++a) {
-      Real own[3] = {y[3 * a], y[3 * a + 1], y[3 * a + 2]};
+    for (int k = 0; k < 24 * vectors; ++k) y[k] = Real(0.0);
+    std::size_t k = 9 * pairs * std::size_t(element_class[element]);
+    for (int a = 0; a < 8; ++a)
       for (int b = a; b < 8; ++b, k += 9) {
         Real K[9];
-        for (int i = 0; i < 9; ++i) K[i] = lane.load(array, k + std::size_t(i));
-        for (int i = 0; i < 3; ++i)
-          own[i] += K[3 * i] * d[3 * b] + K[3 * i + 1] * d[3 * b + 1] + K[3 * i + 2] * d[3 * b + 2];
-        if (a == b) continue;
-        for (int j = 0; j < 3; ++j) y[3 * b + j] += K[j] * d[3 * a] + K[3 + j] * d[3 * a + 1] + K[6 + j] * d[3 * a + 2];
+        for (int i = 0; i < 9; ++i) K[i] = entry<shared>(array, k + std::size_t(i), lane);
+        for (int v = 0; v < 24 * vectors; v += 24) {
+          const Real *da = d + v + 3 * a, *db = d + v + 3 * b;
+          Real *ya = y + v + 3 * a, *yb = y + v + 3 * b;
+          for (int i = 0; i < 3; ++i) ya[i] += K[3 * i] * db[0] + K[3 * i + 1] * db[1] + K[3 * i + 2] * db[2];
+          if (a == b) continue;
+          for (int j = 0; j < 3; ++j) yb[j] += K[j] * da[0] + K[3 + j] * da[1] + K[6 + j] * da[2];
+        }
       }
-      for (int i = 0; i < 3; ++i) y[3 * a + i] = own[i];
-    }
   }
-  template <class Lane>
+  /// y = K d of some vectors, 3 N each.
+  template <int vectors, class Lane>
   PLIANT_DEVICE void times(const MeshView&, const double*, int element, const typename Lane::Real* d,
                            typename Lane::Real* y, const Lane& lane) const {
-    multiply(value, element, d, y, lane);
+    if (is_shared)
+      multiply<true, vectors>(value, element, d, y, lane);
+    else
+      multiply<false, vectors>(value, element, d, y, lane);
   }
   template <class Lane>
   PLIANT_DEVICE void change_times(const MeshView&, const double*, int element, const typename Lane::Real* d,
                                   typename Lane::Real* y, const Lane& lane) const {
-    multiply(change, element, d, y, lane);
+    if (is_shared)
+      multiply<true, 1>(change, element, d, y, lane);
+    else
+      multiply<false, 1>(change, element, d, y, lane);
   }
   /// Has a block that is needed soon brought near.
   template <class Lane>
   PLIANT_DEVICE void fetch(int element, int a, int b, const Lane& lane) const {
+    if (is_shared) return;
     const int p = a <= b ? pair(a, b) : pair(b, a);
     lane.fetch(value, 9 * (pairs * std::size_t(element_class[element]) + std::size_t(p)), 9);
   }
@@ -60,6 +77,14 @@ struct MemberStiffness<8> {
   PLIANT_DEVICE void add_block(const MeshView&, const double*, int element, int a, int b,
                                const typename Lane::Real* R, const typename Lane::Real& factor,
                                typename Lane::Real* out, const Lane& lane) const {
+    if (is_shared)
+      add<true>(element, a, b, R, factor, out, lane);
+    else
+      add<false>(element, a, b, R, factor, out, lane);
+  }
+  template <bool shared, class Lane>
+  PLIANT_DEVICE void add(int element, int a, int b, const typename Lane::Real* R, const typename Lane::Real& factor,
+                         typename Lane::Real* out, const Lane& lane) const {
     using Real = typename Lane::Real;
     const bool is_upper = a <= b;
     const int p = is_upper ? pair(a, b) : pair(b, a);
@@ -68,7 +93,7 @@ struct MemberStiffness<8> {
     Real half[9];  // factor R K
     for (int j = 0; j < 3; ++j) {
       Real K[3];
-      for (int l = 0; l < 3; ++l) K[l] = factor * lane.load(value, k + row * std::size_t(l) + column * std::size_t(j));
+      for (int l = 0; l < 3; ++l) K[l] = factor * entry<shared>(value, k + row * std::size_t(l) + column * std::size_t(j), lane);
       for (int i = 0; i < 3; ++i) half[3 * i + j] = R[3 * i] * K[0] + R[3 * i + 1] * K[1] + R[3 * i + 2] * K[2];
     }
     for (int i = 0; i < 3; ++i)
@@ -100,10 +125,11 @@ struct MemberStiffness<4> {
       }
     for (int a = 0; a < 4; ++a) pliant::batch_motion::times(T, g + 3 * a, y + 3 * a);
   }
-  template <class Lane>
+  template <int vectors, class Lane>
   PLIANT_DEVICE void times(const MeshView& mesh, const double* members, int element, const typename Lane::Real* d,
                            typename Lane::Real* y, const Lane& lane) const {
-    stress_times<Lane>(mesh, element, lane.load(members, Lambda), lane.load(members, Mu), d, y);
+    for (int v = 0; v < 12 * vectors; v += 12)
+      stress_times<Lane>(mesh, element, lane.load(members, Lambda), lane.load(members, Mu), d + v, y + v);
   }
   template <class Lane>
   PLIANT_DEVICE void change_times(const MeshView& mesh, const double* members, int element,
@@ -197,28 +223,85 @@ PLIANT_DEVICE void unrotate(const MeshView& mesh, const double* x, const double*
   }
 }
 
-/// Elastic forces at the step's start, -E R K (R^T x - X), 3 N an element [N].
+/// R^T times a field at an element's nodes relative to the first.
+template <int N, class Lane>
+PLIANT_DEVICE void unrotate_field(const MeshView& mesh, const double* field, int element,
+                                  const typename Lane::Real* R, typename Lane::Real* d, const Lane& lane) {
+  using Real = typename Lane::Real;
+  Real first[3];
+  const int* nodes = mesh.connectivity + N * std::size_t(element);
+  for (int a = 0; a < N; ++a) {
+    Real z[3];
+    for (int i = 0; i < 3; ++i) {
+      z[i] = lane.load(field, 3 * std::size_t(nodes[a]) + std::size_t(i));
+      if (a == 0) first[i] = z[i];
+      z[i] -= first[i];
+    }
+    transposed_times(R, z, d + 3 * a);
+  }
+}
+/// scale R y, 3 N an element.
+template <int N, class Lane>
+PLIANT_DEVICE void store_rotated(const typename Lane::Real* R, const typename Lane::Real* y,
+                                 const typename Lane::Real& scale, int element, double* out, const Lane& lane) {
+  using Real = typename Lane::Real;
+  for (int a = 0; a < N; ++a) {
+    Real f[3];
+    times(R, y + 3 * a, f);
+    for (int i = 0; i < 3; ++i)
+      lane.store(out, 3 * (N * std::size_t(element) + std::size_t(a)) + std::size_t(i), scale * f[i]);
+  }
+}
+/// What an element's stiffness is multiplied with in the step's matrix, dt s E.
+template <class Lane>
+PLIANT_DEVICE typename Lane::Real stiffness_factor(const MeshView& mesh, const StepNumbers& step, const double* members,
+                                                   int element, const Lane& lane) {
+  using Real = typename Lane::Real;
+  return lane.load(members, YoungsModulus) * Real(mesh.relative_modulus[element]) *
+         (Real(step.theta * step.dt) + lane.load(members, StiffnessDamping));
+}
+
+/// Elastic forces at the step's start, -E R K (R^T x - X), and the product of the elements' part of the step's matrix
+/// with a vector, 3 N an element each [N], [N s].
 template <int N>
 struct ElementForces {
   MeshView mesh;
+  StepNumbers step;
   MemberStiffness<N> stiffness;
-  const double *members, *x, *rotation;
-  double* force;
+  const double *members, *x, *way, *rotation;
+  double *force, *product;
 
   template <class Lane>
   PLIANT_DEVICE void operator()(int element, const Lane& lane) const {
     using Real = typename Lane::Real;
-    Real R[9], q[3 * N], d[3 * N], y[3 * N];
+    Real R[9], q[3 * N], d[6 * N], y[6 * N];
     load_rotation<N>(rotation, element, R, lane);
     unrotate<N>(mesh, x, nullptr, Real(0.0), element, R, q, d, lane);
-    stiffness.times(mesh, members, element, d, y, lane);
+    unrotate_field<N>(mesh, way, element, R, d + 3 * N, lane);
+    stiffness.template times<2>(mesh, members, element, d, y, lane);
     const Real scale = lane.load(members, YoungsModulus) * Real(-mesh.relative_modulus[element]);
-    for (int a = 0; a < N; ++a) {
-      Real f[3];
-      times(R, y + 3 * a, f);
-      for (int i = 0; i < 3; ++i)
-        lane.store(force, 3 * (N * std::size_t(element) + std::size_t(a)) + std::size_t(i), scale * f[i]);
-    }
+    store_rotated<N>(R, y, scale, element, force, lane);
+    store_rotated<N>(R, y + 3 * N, stiffness_factor(mesh, step, members, element, lane), element, product, lane);
+  }
+};
+
+/// The product alone.
+template <int N>
+struct ElementProducts {
+  MeshView mesh;
+  StepNumbers step;
+  MemberStiffness<N> stiffness;
+  const double *members, *way, *rotation;
+  double* product;
+
+  template <class Lane>
+  PLIANT_DEVICE void operator()(int element, const Lane& lane) const {
+    using Real = typename Lane::Real;
+    Real R[9], d[3 * N], y[3 * N];
+    load_rotation<N>(rotation, element, R, lane);
+    unrotate_field<N>(mesh, way, element, R, d, lane);
+    stiffness.template times<1>(mesh, members, element, d, y, lane);
+    store_rotated<N>(R, y, stiffness_factor(mesh, step, members, element, lane), element, product, lane);
   }
 };
 
@@ -237,7 +320,8 @@ struct ElementAdjoint {
   template <class Lane>
   PLIANT_DEVICE void operator()(int element, const Lane& lane) const {
     using Real = typename Lane::Real;
-    Real R[9], q[3 * N], d[3 * N], y[3 * N], c[3 * N], k[3 * N], F[9], inverse[6];
+    Real R[9], q[3 * N], d[6 * N], y[6 * N], F[9], inverse[6];
+    Real *const c = d + 3 * N, *const k = y + 3 * N;
     load_rotation<N>(rotation, element, R, lane);
     const Real s = Real(step.theta) + lane.load(members, StiffnessDamping) * Real(1.0 / step.dt);
     unrotate<N>(mesh, x, end, s, element, R, q, d, lane);
@@ -248,8 +332,7 @@ struct ElementAdjoint {
         own[i] = Real(step.dt) * lane.load(w, 3 * std::size_t(nodes[a]) + std::size_t(i));
       transposed_times(R, own, c + 3 * a);
     }
-    stiffness.times(mesh, members, element, d, y, lane);
-    stiffness.times(mesh, members, element, c, k, lane);
+    stiffness.template times<2>(mesh, members, element, d, y, lane);
     Real turn[3] = {Real(0.0), Real(0.0), Real(0.0)}, work = Real(0.0);
     for (int a = 0; a < N; ++a) {
       Real one[3], other[3];

@@ -17,12 +17,14 @@ struct Workspace {
   Workspace(const MeshView& mesh, int corners, std::size_t stride)
       : rotation(9 * count(mesh.elements) * stride),
         element_force(3 * count(mesh.elements * corners) * stride),
+        element_product(3 * count(mesh.elements * corners) * stride),
         sample_force(3 * count(mesh.samples) * stride),
+        sample_product(3 * count(mesh.samples) * stride),
+        touched(count(mesh.nodes) * stride),
         sample_matrix(2 * count(mesh.samples) * stride),
         right(3 * count(mesh.nodes) * stride),
         way(3 * count(mesh.nodes) * stride),
         residual(3 * count(mesh.nodes) * stride),
-        matrix(9 * count(mesh.lower_blocks + mesh.nodes) * stride),
         partial(2 * count(mesh.chunks) * stride),
         pivot(6 * count(mesh.nodes) * stride),
         scaled(9 * count(mesh.lower_blocks) * stride),
@@ -33,7 +35,8 @@ struct Workspace {
         s(3 * count(mesh.nodes) * stride) {}
   static std::size_t count(int number) { return std::size_t(number); }
 
-  Array<double> rotation, element_force, sample_force, sample_matrix, right, way, residual, matrix, partial;
+  Array<double> rotation, element_force, element_product, sample_force, sample_product, touched, sample_matrix, right,
+      way, residual, partial;
   Array<float> pivot, scaled, y, r, p, t, s;
 
   /// Of the reverse sweep; made when one begins.
@@ -95,15 +98,21 @@ class Engine : public BatchEngine {
     quaternion_.resize(4 * std::size_t(mesh_.elements) * stride);
     members_.resize(member_number_count * stride);
     numbers_.resize(solver_number_count * stride);
-    if constexpr (N == 8)
-      for (auto* array : {&stiffness_value_, &stiffness_change_}) array->resize(stiffness_numbers() * stride);
   }
 
   int stride() const override { return int(stride_); }
   void set_numbers(const double* numbers) override { backend_.upload(numbers, members_); }
   void set_stiffness(int member, const double* value, const double* change) override {
+    shares_stiffness_ = false;
+    for (auto* array : {&stiffness_value_, &stiffness_change_}) array->resize(stiffness_numbers() * stride_);
     put(member, value, stiffness_value_);
     put(member, change, stiffness_change_);
+  }
+  void set_shared_stiffness(const double* value, const double* change) override {
+    shares_stiffness_ = true;
+    for (auto* array : {&stiffness_value_, &stiffness_change_}) array->resize(stiffness_numbers());
+    backend_.upload(value, stiffness_value_);
+    backend_.upload(change, stiffness_change_);
   }
   void set_state(const double* x, const double* v) override {
     backend_.upload(x, x_);
@@ -188,7 +197,7 @@ class Engine : public BatchEngine {
   }
   MemberStiffness<N> stiffness() const {
     if constexpr (N == 8)
-      return {stiffness_value_.data(), stiffness_change_.data(), mesh_.element_class};
+      return {stiffness_value_.data(), stiffness_change_.data(), mesh_.element_class, shares_stiffness_};
     else
       return {};
   }
@@ -198,7 +207,8 @@ class Engine : public BatchEngine {
   /// Rotations, contact and the step's matrix about the state at hand, and what preconditions it.
   void prepare();
   /// A x = b, from the x at hand.
-  void solve(const double* b, double* x);
+  /// @param has_product  whether the elements' product with it is there
+  void solve(const double* b, double* x, bool has_product);
   void iterate();
 
   std::shared_ptr<Shared<Backend>> shared_;
@@ -212,6 +222,7 @@ class Engine : public BatchEngine {
   };
   std::vector<Slot> slots_;
   int adjoint_steps_ = 0;
+  bool shares_stiffness_ = false;
   std::unique_ptr<Workspace<Backend>> work_;
 };
 
@@ -222,11 +233,10 @@ void Engine<Backend, N>::prepare() {
   backend_.each(mesh_.elements, RotateElements<N>{mesh_, step, x_.data(), v_.data(), quaternion_.data(), o.rotation.data()});
   backend_.each(mesh_.samples, SampleForces<N>{mesh_, step, members_.data(), x_.data(), v_.data(), o.sample_force.data(),
                                                o.sample_matrix.data()});
-  backend_.each(mesh_.lower_blocks + mesh_.nodes, AssembleBlock<N>{mesh_, step, stiffness(), members_.data(),
-                                                                   o.rotation.data(), o.sample_matrix.data(),
-                                                                   o.matrix.data()});
-  backend_.each(mesh_.nodes, DiagonalFactor{mesh_, o.matrix.data(), o.pivot.data()});
-  backend_.each(mesh_.lower_blocks, ScaleBlock{mesh_, o.matrix.data(), o.pivot.data(), o.scaled.data()});
+  backend_.each(mesh_.nodes, TouchedNodes{mesh_, o.sample_matrix.data(), o.touched.data()});
+  const StepMatrix<N> matrix{mesh_, step, stiffness(), members_.data(), o.rotation.data(), o.sample_matrix.data()};
+  backend_.each(mesh_.nodes, DiagonalFactor<N>{matrix, o.pivot.data()});
+  backend_.each(mesh_.lower_blocks, ScaledBlock<N>{matrix, o.pivot.data(), o.scaled.data()});
 }
 
 template <class Backend, int N>
@@ -234,21 +244,30 @@ void Engine<Backend, N>::step() {
   prepare();
   Workspace<Backend>& o = *work_;
   const StepNumbers& step = shared_->step;
-  backend_.each(mesh_.elements, ElementForces<N>{mesh_, stiffness(), members_.data(), x_.data(), o.rotation.data(),
-                                                 o.element_force.data()});
-  backend_.each(mesh_.nodes, StepRight<N>{mesh_, step, members_.data(), v_.data(), o.element_force.data(),
-                                          o.sample_force.data(), o.right.data(), o.way.data()});
-  solve(o.right.data(), o.way.data());
+  backend_.each(mesh_.nodes, FirstWay{mesh_, step, v_.data(), o.way.data()});
+  backend_.each(mesh_.elements,
+                ElementForces<N>{mesh_, step, stiffness(), members_.data(), x_.data(), o.way.data(), o.rotation.data(),
+                                 o.element_force.data(), o.element_product.data()});
+  backend_.each(mesh_.nodes, StepRight{mesh_, step, members_.data(), v_.data(), o.element_force.data(),
+                                       o.sample_force.data(), o.touched.data(), o.right.data()});
+  solve(o.right.data(), o.way.data(), true);
   backend_.each(mesh_.nodes, Advance{step, number(IsAlive), o.way.data(), x_.data(), v_.data()});
   backend_.each(1, CountSteps{numbers_.data()});
 }
 
 template <class Backend, int N>
-void Engine<Backend, N>::solve(const double* b, double* x) {
+void Engine<Backend, N>::solve(const double* b, double* x, bool has_product) {
   Workspace<Backend>& o = *work_;
   const SolverNumbers& solver = shared_->solver;
+  const StepNumbers& step = shared_->step;
   for (int refinement = 0;; ++refinement) {
-    backend_.symmetric(Residual{mesh_, o.matrix.data(), b, x, o.residual.data()});
+    if (refinement > 0 || !has_product)
+      backend_.each(mesh_.elements, ElementProducts<N>{mesh_, step, stiffness(), members_.data(), x, o.rotation.data(),
+                                                       o.element_product.data()});
+    backend_.each(mesh_.samples, SampleProducts<N>{mesh_, step, members_.data(), o.sample_matrix.data(), x,
+                                                   o.sample_product.data()});
+    backend_.each(mesh_.nodes, Residual{mesh_, step, members_.data(), b, x, o.element_product.data(),
+                                        o.sample_product.data(), o.touched.data(), o.residual.data()});
     backend_.each(mesh_.chunks, ResidualSquares{mesh_, b, o.residual.data(), o.partial.data()});
     backend_.each(1, JudgeResidual{mesh_, o.partial.data(), numbers_.data(), solver.tolerance, solver.least_reduction,
                                    refinement == 0});
@@ -311,7 +330,7 @@ void Engine<Backend, N>::adjoint_step(int slot) {
   backend_.each(mesh_.nodes, AdjointRight{mesh_, step, adjoint_steps_ > 1 ? 1.0 : 0.0, x_bar_.data(), v_bar_.data(),
                                           w_.data(), before_.data(), o.right.data()});
   ++adjoint_steps_;
-  solve(o.right.data(), w_.data());
+  solve(o.right.data(), w_.data(), false);
   backend_.each(mesh_.elements,
                 ElementAdjoint<N>{mesh_, step, stiffness(), members_.data(), x_.data(), v_.data(), added_.data(),
                                   o.rotation.data(), w_.data(), o.element_force.data(), a.element_v_bar.data(),
@@ -322,7 +341,7 @@ void Engine<Backend, N>::adjoint_step(int slot) {
   backend_.each(mesh_.nodes,
                 AdjointNodes{mesh_, step, members_.data(), x_.data(), v_.data(), added_.data(), w_.data(),
                              o.element_force.data(), a.element_v_bar.data(), o.sample_force.data(),
-                             a.sample_v_bar.data(), x_bar_.data(), v_bar_.data(), a.node_sum.data()});
+                             a.sample_v_bar.data(), o.touched.data(), x_bar_.data(), v_bar_.data(), a.node_sum.data()});
   const auto sum = [&](SumItems items, const Array<double>& values, Array<double>& partial) {
     items.values = values.data(), items.partial = partial.data();
     backend_.each(items.chunks() * items.columns, items);

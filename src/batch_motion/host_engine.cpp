@@ -1,3 +1,5 @@
+#include <sys/mman.h>
+
 #include <cstring>
 #include <new>
 #include <stdexcept>
@@ -10,7 +12,22 @@ namespace pliant::batch_motion {
 
 namespace {
 
-/// Memory that begins with a cache line.
+constexpr std::size_t cache_line = 64, huge_page = std::size_t(2) << 20;
+
+/// Memory that begins with a cache line; where there is much of it, in huge pages, if the system has them: kernels read
+/// matrices here and there, and looking up small pages would take as long as that.
+void* allocate(std::size_t bytes) {
+  const std::size_t alignment = bytes < huge_page ? cache_line : huge_page;
+  void* memory = ::operator new[](bytes, std::align_val_t(alignment));
+#ifdef MADV_HUGEPAGE
+  if (alignment == huge_page) madvise(memory, bytes, MADV_HUGEPAGE);
+#endif
+  return memory;
+}
+void release(void* memory, std::size_t bytes) {
+  ::operator delete[](memory, std::align_val_t(bytes < huge_page ? cache_line : huge_page));
+}
+
 template <class Number>
 class AlignedArray {
  public:
@@ -23,12 +40,12 @@ class AlignedArray {
     std::swap(size_, other.size_);
     return *this;
   }
-  ~AlignedArray() { ::operator delete[](data_, alignment); }
+  ~AlignedArray() { release(data_, size_ * sizeof(Number)); }
   /// What it held is lost where the size changes.
   void resize(std::size_t size) {
     if (size == size_) return;
-    ::operator delete[](std::exchange(data_, nullptr), alignment);
-    data_ = static_cast<Number*>(::operator new[](size * sizeof(Number), alignment));
+    release(std::exchange(data_, nullptr), size_ * sizeof(Number));
+    data_ = static_cast<Number*>(allocate(size * sizeof(Number)));
     size_ = size;
     for (std::size_t i = 0; i < size; ++i) data_[i] = Number(0);
   }
@@ -37,7 +54,6 @@ class AlignedArray {
   std::size_t size() const { return size_; }
 
  private:
-  static constexpr std::align_val_t alignment{64};
   Number* data_ = nullptr;
   std::size_t size_ = 0;
 };
@@ -66,14 +82,6 @@ struct HostBackend {
   template <class Kernel>
   void each(int items, const Kernel& kernel) const {
     for (int i = 0; i < items; ++i) kernel(i, HostLane());
-  }
-  template <class Kernel>
-  void symmetric(const Kernel& kernel) const {
-    for (int i = 0; i < mesh->nodes; ++i)
-      if constexpr (gathers)
-        kernel.gather(i, HostLane());
-      else
-        kernel.scatter(i, HostLane());
   }
   template <class Kernel>
   void forward(const Kernel& kernel) const {

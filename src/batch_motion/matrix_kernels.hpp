@@ -19,14 +19,72 @@ PLIANT_DEVICE void mass_times(const MeshView& mesh, const double* field, int nod
     add(mesh.mass[mesh.upper_block[k]], mesh.upper_column[k]);
 }
 
-/// The step's right-hand side (Weiss 2020, eq. 14), M v / theta + dt sum of f(x), and dt v, where its solution is
-/// looked for first.
-template <int N>
+/// rho (1/(theta dt) + alpha)
+template <class Lane>
+PLIANT_DEVICE typename Lane::Real mass_factor(const StepNumbers& step, const double* members, const Lane& lane) {
+  using Real = typename Lane::Real;
+  return lane.load(members, Density) * (Real(1.0 / (step.theta * step.dt)) + lane.load(members, MassDamping));
+}
+
+/// Whether a sample at a node is touched, a number of each member that is not zero where it is.
+struct TouchedNodes {
+  MeshView mesh;
+  const double* sample_matrix;
+  double* touched;
+
+  template <class Lane>
+  PLIANT_DEVICE void operator()(int node, const Lane& lane) const {
+    using Real = typename Lane::Real;
+    Real slopes = Real(0.0);
+    for (int k = mesh.touch_start[node]; k < mesh.touch_start[node + 1]; ++k)
+      slopes += lane.load(sample_matrix, 2 * std::size_t(mesh.touch_sample[k]));
+    lane.store(touched, std::size_t(node), slopes);
+  }
+};
+/// sum += factor times what samples at a node give it, 3 a sample.
+template <class Lane>
+PLIANT_DEVICE void add_touches(const MeshView& mesh, const double* touched, const double* values, double factor,
+                               int node, typename Lane::Real* sum, const Lane& lane) {
+  using Real = typename Lane::Real;
+  if (!any(lane.load(touched, std::size_t(node)) > Real(0.0))) return;
+  for (int k = mesh.touch_start[node]; k < mesh.touch_start[node + 1]; ++k)
+    for (int i = 0; i < 3; ++i)
+      sum[i] += lane.load(values, 3 * std::size_t(mesh.touch_sample[k]) + std::size_t(i)) *
+                Real(factor * mesh.touch_weight[k]);
+}
+/// sum += factor times what elements give a node, 3 a corner.
+template <class Lane>
+PLIANT_DEVICE void add_corners(const MeshView& mesh, const double* values, double factor, int node,
+                               typename Lane::Real* sum, const Lane& lane) {
+  using Real = typename Lane::Real;
+  for (int k = mesh.corner_start[node]; k < mesh.corner_start[node + 1]; ++k)
+    for (int i = 0; i < 3; ++i)
+      sum[i] += lane.load(values, 3 * std::size_t(mesh.corner[k]) + std::size_t(i)) * Real(factor);
+}
+
+/// dt v, where a step's solution is looked for first.
+struct FirstWay {
+  MeshView mesh;
+  StepNumbers step;
+  const double* v;
+  double* way;
+
+  template <class Lane>
+  PLIANT_DEVICE void operator()(int node, const Lane& lane) const {
+    const double scale = mesh.held[node] ? 0.0 : step.dt;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t k = 3 * std::size_t(node) + i;
+      lane.store(way, k, lane.load(v, k) * typename Lane::Real(scale));
+    }
+  }
+};
+
+/// The step's right-hand side (Weiss 2020, eq. 14), M v / theta + dt sum of f(x).
 struct StepRight {
   MeshView mesh;
   StepNumbers step;
-  const double *members, *v, *element_force, *sample_force;
-  double *right, *way;
+  const double *members, *v, *element_force, *sample_force, *touched;
+  double* right;
 
   template <class Lane>
   PLIANT_DEVICE void operator()(int node, const Lane& lane) const {
@@ -35,19 +93,13 @@ struct StepRight {
     Real force[3], inertia[3];
     const Real density = lane.load(members, Density), weight = density * Real(mesh.nodal_volume[node]);
     for (int i = 0; i < 3; ++i) force[i] = weight * lane.load(members, std::size_t(Gravity + i));
-    for (int k = mesh.corner_start[node]; k < mesh.corner_start[node + 1]; ++k)
-      for (int i = 0; i < 3; ++i)
-        force[i] += lane.load(element_force, 3 * std::size_t(mesh.corner[k]) + std::size_t(i));
-    for (int k = mesh.touch_start[node]; k < mesh.touch_start[node + 1]; ++k)
-      for (int i = 0; i < 3; ++i)
-        force[i] += lane.load(sample_force, 3 * std::size_t(mesh.touch_sample[k]) + std::size_t(i)) *
-                    Real(mesh.touch_weight[k]);
+    add_corners(mesh, element_force, 1.0, node, force, lane);
+    add_touches(mesh, touched, sample_force, 1.0, node, force, lane);
     mass_times(mesh, v, node, inertia, lane);
     const Real scale = density * Real(1.0 / step.theta);
     for (int i = 0; i < 3; ++i) {
       const std::size_t k = 3 * std::size_t(node) + std::size_t(i);
       lane.store(right, k, (force[i] * Real(step.dt) + scale * inertia[i]) * Real(free));
-      lane.store(way, k, lane.load(v, k) * Real(step.dt * free));
     }
   }
 };
@@ -55,38 +107,28 @@ struct StepRight {
 /// A block of the step's matrix, (1/(theta dt) + alpha) rho M + dt sum of s K: those below the diagonal, then those on
 /// it. Rows and columns of held nodes are the identity's.
 template <int N>
-struct AssembleBlock {
+struct StepMatrix {
   MeshView mesh;
   StepNumbers step;
   MemberStiffness<N> stiffness;
   const double *members, *rotation, *sample_matrix;
-  double* matrix;  ///< 9 a block
 
   template <class Lane>
-  PLIANT_DEVICE void operator()(int block, const Lane& lane) const {
+  PLIANT_DEVICE void find(int block, int row, int column, typename Lane::Real* A, const Lane& lane) const {
     using Real = typename Lane::Real;
-    Real A[9];
-    for (Real& a : A) a = Real(0.0);
-    const bool is_diagonal = block >= mesh.lower_blocks;
-    const int row = is_diagonal ? block - mesh.lower_blocks : mesh.row[block];
-    const int column = is_diagonal ? row : mesh.column[block];
+    for (int k = 0; k < 9; ++k) A[k] = Real(0.0);
     if (mesh.held[row] || mesh.held[column]) {
-      for (int i = 0; i < 3; ++i) A[4 * i] = Real(is_diagonal ? 1.0 : 0.0);
-    } else {
-      add_elements(block, A, lane);
-      add_samples(block, A, lane);
-      const Real mass = lane.load(members, Density) * Real(mesh.mass[block]) *
-                        (Real(1.0 / (step.theta * step.dt)) + lane.load(members, MassDamping));
-      for (int i = 0; i < 3; ++i) A[4 * i] += mass;
+      for (int i = 0; i < 3; ++i) A[4 * i] = Real(row == column ? 1.0 : 0.0);
+      return;
     }
-    for (std::size_t k = 0; k < 9; ++k) lane.store(matrix, 9 * std::size_t(block) + k, A[k]);
+    add_elements(block, A, lane);
+    add_samples(block, A, lane);
+    const Real mass = mass_factor(step, members, lane) * Real(mesh.mass[block]);
+    for (int i = 0; i < 3; ++i) A[4 * i] += mass;
   }
-
   template <class Lane>
   PLIANT_DEVICE void add_elements(int block, typename Lane::Real* A, const Lane& lane) const {
     using Real = typename Lane::Real;
-    const Real scale = lane.load(members, YoungsModulus) *
-                       (Real(step.theta * step.dt) + lane.load(members, StiffnessDamping));
     for (int p = mesh.part_start[block]; p < mesh.part_start[block + 1]; ++p) {
       const int element = mesh.part_element[p], corners = mesh.part_corners[p];
       Real R[9];
@@ -95,7 +137,7 @@ struct AssembleBlock {
       stiffness.fetch(mesh.part_element[p + ahead], corners_ahead / N, corners_ahead % N, lane);
       load_rotation<N>(rotation, element, R, lane);
       stiffness.add_block(mesh, members, element, corners / N, corners % N, R,
-                          scale * Real(mesh.relative_modulus[element]), A, lane);
+                          stiffness_factor(mesh, step, members, element, lane), A, lane);
     }
   }
   template <class Lane>
@@ -118,19 +160,18 @@ struct AssembleBlock {
   }
 };
 
-/// G = C^-1 of a diagonal block C C^T, lower triangular: 00 10 11 20 21 22. Not a number where the block is not
+/// G = C^-1 of each diagonal block C C^T, lower triangular: 00 10 11 20 21 22. Not a number where the block is not
 /// positive definite.
+template <int N>
 struct DiagonalFactor {
-  MeshView mesh;
-  const double* matrix;
+  StepMatrix<N> of;
   float* pivot;
 
   template <class Lane>
   PLIANT_DEVICE void operator()(int node, const Lane& lane) const {
     using Real = typename Lane::Real;
     Real A[9];
-    const std::size_t block = std::size_t(mesh.lower_blocks + node);
-    for (std::size_t k = 0; k < 9; ++k) A[k] = lane.load(matrix, 9 * block + k);
+    of.find(of.mesh.lower_blocks + node, node, node, A, lane);
     const Real one = Real(1.0), a = one / root(A[0]), b = A[3] * a, c = A[6] * a;
     const Real d = one / root(A[4] - b * b), e = (A[7] - c * b) * d, f = one / root(A[8] - c * c - e * e);
     const Real G[6] = {a, -(b * a * d), d, (b * e * d - c) * a * f, -(e * d * f), f};
@@ -157,29 +198,31 @@ PLIANT_DEVICE void pivot_transposed_times(const Number* G, const Number* v, Numb
 }
 
 /// L_ij = G_i A_ij G_j^T below the diagonal, in single precision: of the matrix whose diagonal blocks are the identity.
-struct ScaleBlock {
-  MeshView mesh;
-  const double* matrix;
+template <int N>
+struct ScaledBlock {
+  StepMatrix<N> of;
   const float* pivot;
   float* scaled;
 
   template <class Lane>
   PLIANT_DEVICE void operator()(int block, const Lane& lane) const {
     using Single = typename Lane::Single;
+    const int row = of.mesh.row[block], column = of.mesh.column[block];
+    typename Lane::Real A[9];
+    of.find(block, row, column, A, lane);
     Single own[6], other[6], half[9];
-    load_pivot(pivot, mesh.row[block], own, lane);
-    load_pivot(pivot, mesh.column[block], other, lane);
+    load_pivot(pivot, row, own, lane);
+    load_pivot(pivot, column, other, lane);
     for (int j = 0; j < 3; ++j) {
-      Single a[3], column[3];
-      for (std::size_t i = 0; i < 3; ++i)
-        a[i] = narrow(lane.load(matrix, 9 * std::size_t(block) + 3 * i + std::size_t(j)));
-      pivot_times(own, a, column);
-      for (int i = 0; i < 3; ++i) half[3 * i + j] = column[i];
+      const Single a[3] = {narrow(A[j]), narrow(A[3 + j]), narrow(A[6 + j])};
+      Single out[3];
+      pivot_times(own, a, out);
+      for (int i = 0; i < 3; ++i) half[3 * i + j] = out[i];
     }
     for (std::size_t i = 0; i < 3; ++i) {
-      Single row[3];
-      pivot_times(other, half + 3 * i, row);
-      for (std::size_t j = 0; j < 3; ++j) lane.store(scaled, 9 * std::size_t(block) + 3 * i + j, row[j]);
+      Single out[3];
+      pivot_times(other, half + 3 * i, out);
+      for (std::size_t j = 0; j < 3; ++j) lane.store(scaled, 9 * std::size_t(block) + 3 * i + j, out[j]);
     }
   }
 };

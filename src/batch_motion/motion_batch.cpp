@@ -144,6 +144,20 @@ struct MotionBatch::Engines {
       all[i]->add_cotangents(first[i].data(), second[i].data());
     });
   }
+  /// Of an engine's members, each with its own or all with one, where that has changed.
+  void set_stiffness(std::size_t i, const std::vector<double>& wanted) {
+    const auto lanes = std::ptrdiff_t(stride());
+    const auto own = wanted.begin() + std::ptrdiff_t(i) * lanes;
+    if (std::equal(own, own + lanes, poissons_ratio.begin() + std::ptrdiff_t(i) * lanes)) return;
+    if (std::all_of(own, own + lanes, [&](double nu) { return nu == *own; })) {
+      const ClassStiffness& unit = *stiffness.at(*own);
+      return all[i]->set_shared_stiffness(unit.value.data(), unit.change.data());
+    }
+    for (int lane = 0; lane < int(lanes); ++lane) {
+      const ClassStiffness& unit = *stiffness.at(own[lane]);
+      all[i]->set_stiffness(lane, unit.value.data(), unit.change.data());
+    }
+  }
   /// A row of the engine's numbers for each member.
   std::vector<double> solver_numbers(std::size_t engine) const {
     std::vector<double> numbers(std::size_t(solver_number_count) * std::size_t(stride()));
@@ -226,11 +240,13 @@ void MotionBatch::check(int steps, const std::vector<int>& at) const {
 
 void MotionBatch::begin() {
   Engines& e = *engines_;
-  for (std::size_t k = 0; k < members_.size(); ++k)
-    if (const BatchMember& m = members_[k]; e.poissons_ratio[k] == m.poissons_ratio)
-      continue;
-    else if (auto& known = e.stiffness[m.poissons_ratio]; !known)
-      known = std::make_shared<const ClassStiffness>(class_stiffness(*body_, m.poissons_ratio));
+  std::vector<double> wanted;  // Poisson's ratios of all lanes
+  for (std::size_t k = 0; k < e.poissons_ratio.size(); ++k)
+    wanted.push_back(members_[std::min(k, members_.size() - 1)].poissons_ratio);
+  if (body_->kind == ElementKind::Hexahedron && wanted != e.poissons_ratio)
+    for (const double nu : wanted)
+      if (auto& known = e.stiffness[nu]; !known)
+        known = std::make_shared<const ClassStiffness>(class_stiffness(*body_, nu));
   const auto lanes = std::size_t(stride());
   e.each_engine([&](std::size_t i) {
     std::vector<double> numbers(member_number_count * lanes), alive(lanes);
@@ -247,18 +263,14 @@ void MotionBatch::begin() {
       alive[std::size_t(lane)] = is_own ? 1.0 : 0.0;
       e.pack(m.start.x, lane, e.first[i]);
       e.pack(m.start.v, lane, e.second[i]);
-      double& has = e.poissons_ratio[i * lanes + std::size_t(lane)];
-      if (body_->kind == ElementKind::Hexahedron && has != m.poissons_ratio) {
-        const ClassStiffness& unit = *e.stiffness.at(m.poissons_ratio);
-        e.all[i]->set_stiffness(lane, unit.value.data(), unit.change.data());
-        has = m.poissons_ratio;
-      }
     });
+    if (body_->kind == ElementKind::Hexahedron) e.set_stiffness(i, wanted);
     e.all[i]->set_numbers(numbers.data());
     e.all[i]->set_state(e.first[i].data(), e.second[i].data());
     e.all[i]->begin(alive.data());
   });
   e.stiffness.clear();
+  e.poissons_ratio = wanted;
 }
 
 std::vector<BatchRun> MotionBatch::run(int steps, const std::vector<int>& at, const OnStates& on_states) {

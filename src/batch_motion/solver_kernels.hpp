@@ -6,7 +6,8 @@
 // matrix scaled so that it is I + L + L^T, the preconditioned one is P^-1 (I + L + L^T) P^-T, P = I + L, and
 //   P^-1 (I + L + L^T) P^-T p = t + P^-1 (p - t),   t = P^-T p,
 // so that an iteration reads L twice, as a product alone would. It runs in single precision, on a residual that is
-// measured in double precision and scaled to length one, and is begun again until that residual is small enough.
+// measured in double precision, element by element, and scaled to length one, and is begun again until that residual is
+// small enough. The matrix itself is nowhere.
 
 namespace pliant::batch_motion {
 
@@ -37,63 +38,24 @@ PLIANT_DEVICE void each_row(const MeshView& mesh, int chunk, const Body& body) {
   for (int k = 3 * first; k < 3 * last; ++k) body(std::size_t(k));
 }
 
-/// r = b - A x in double precision. `gather` finds one row; `scatter` reads each block once and must see the rows in
-/// order, one after the other.
+/// r = b - A x in double precision, out of the products of elements and samples with x.
 struct Residual {
   MeshView mesh;
-  const double *matrix, *right, *x;
+  StepNumbers step;
+  const double *members, *right, *x, *element_product, *sample_product, *touched;
   double* residual;
 
   template <class Lane>
-  PLIANT_DEVICE void begin(int row, typename Lane::Real* sum, typename Lane::Real* own, const Lane& lane) const {
-    const std::size_t r = 3 * std::size_t(row);
-    for (std::size_t i = 0; i < 3; ++i) sum[i] = lane.load(right, r + i), own[i] = lane.load(x, r + i);
-    subtract(std::size_t(mesh.lower_blocks + row), own, sum, lane);
-  }
-  template <class Lane>
-  PLIANT_DEVICE void subtract(std::size_t block, const typename Lane::Real* v, typename Lane::Real* sum,
-                              const Lane& lane) const {
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 3; ++j) sum[i] -= lane.load(matrix, 9 * block + 3 * i + j) * v[j];
-  }
-  template <class Lane>
-  PLIANT_DEVICE void load(const double* array, int row, typename Lane::Real* v, const Lane& lane) const {
-    for (std::size_t i = 0; i < 3; ++i) v[i] = lane.load(array, 3 * std::size_t(row) + i);
-  }
-  template <class Lane>
-  PLIANT_DEVICE void gather(int row, const Lane& lane) const {
+  PLIANT_DEVICE void operator()(int node, const Lane& lane) const {
     using Real = typename Lane::Real;
-    Real sum[3], v[3];
-    begin(row, sum, v, lane);
-    for (int k = mesh.row_start[row]; k < mesh.row_start[row + 1]; ++k) {
-      load(x, mesh.column[k], v, lane);
-      subtract(std::size_t(k), v, sum, lane);
-    }
-    for (int k = mesh.upper_start[row]; k < mesh.upper_start[row + 1]; ++k) {
-      load(x, mesh.upper_column[k], v, lane);
-      const std::size_t block = 9 * std::size_t(mesh.upper_block[k]);
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j) sum[i] -= lane.load(matrix, block + 3 * j + i) * v[j];
-    }
-    for (std::size_t i = 0; i < 3; ++i) lane.store(residual, 3 * std::size_t(row) + i, sum[i]);
-  }
-  template <class Lane>
-  PLIANT_DEVICE void scatter(int row, const Lane& lane) const {
-    using Real = typename Lane::Real;
-    Real sum[3], own[3];
-    begin(row, sum, own, lane);
-    for (int k = mesh.row_start[row]; k < mesh.row_start[row + 1]; ++k) {
-      Real A[9], v[3], other[3];
-      for (std::size_t i = 0; i < 9; ++i) A[i] = lane.load(matrix, 9 * std::size_t(k) + i);
-      load(x, mesh.column[k], v, lane);
-      load(residual, mesh.column[k], other, lane);
-      for (std::size_t i = 0; i < 3; ++i) {
-        sum[i] -= A[3 * i] * v[0] + A[3 * i + 1] * v[1] + A[3 * i + 2] * v[2];
-        other[i] -= A[i] * own[0] + A[3 + i] * own[1] + A[6 + i] * own[2];
-        lane.store(residual, 3 * std::size_t(mesh.column[k]) + i, other[i]);
-      }
-    }
-    for (std::size_t i = 0; i < 3; ++i) lane.store(residual, 3 * std::size_t(row) + i, sum[i]);
+    Real inertia[3], sum[3];
+    const Real free = Real(mesh.held[node] ? 0.0 : 1.0), mass = mass_factor(step, members, lane);
+    mass_times(mesh, x, node, inertia, lane);
+    for (int i = 0; i < 3; ++i)
+      sum[i] = lane.load(right, 3 * std::size_t(node) + std::size_t(i)) - mass * inertia[i];
+    add_corners(mesh, element_product, -1.0, node, sum, lane);
+    add_touches(mesh, touched, sample_product, -1.0, node, sum, lane);
+    for (int i = 0; i < 3; ++i) lane.store(residual, 3 * std::size_t(node) + std::size_t(i), sum[i] * free);
   }
 };
 

@@ -64,7 +64,7 @@ struct AdjointNodes {
   MeshView mesh;
   StepNumbers step;
   const double *members, *x, *v, *end, *w;
-  const double *element_x_bar, *element_v_bar, *sample_x_bar, *sample_v_bar;
+  const double *element_x_bar, *element_v_bar, *sample_x_bar, *sample_v_bar, *touched;
   double *x_bar, *v_bar, *sum;
 
   template <class Lane>
@@ -82,17 +82,10 @@ struct AdjointNodes {
       bar[i] = lane.load(x_bar, n + i);
       speed_bar[i] = scale * inertia[i] - lane.load(v_bar, n + i) * Real((1.0 - step.theta) / step.theta);
     }
-    for (int k = mesh.corner_start[node]; k < mesh.corner_start[node + 1]; ++k)
-      for (std::size_t i = 0; i < 3; ++i) {
-        bar[i] += lane.load(element_x_bar, 3 * std::size_t(mesh.corner[k]) + i);
-        speed_bar[i] += lane.load(element_v_bar, 3 * std::size_t(mesh.corner[k]) + i);
-      }
-    for (int k = mesh.touch_start[node]; k < mesh.touch_start[node + 1]; ++k)
-      for (std::size_t i = 0; i < 3; ++i) {
-        const std::size_t s = 3 * std::size_t(mesh.touch_sample[k]) + i;
-        bar[i] += lane.load(sample_x_bar, s) * Real(mesh.touch_weight[k]);
-        speed_bar[i] += lane.load(sample_v_bar, s) * Real(mesh.touch_weight[k]);
-      }
+    add_corners(mesh, element_x_bar, 1.0, node, bar, lane);
+    add_corners(mesh, element_v_bar, 1.0, node, speed_bar, lane);
+    add_touches(mesh, touched, sample_x_bar, 1.0, node, bar, lane);
+    add_touches(mesh, touched, sample_v_bar, 1.0, node, speed_bar, lane);
     for (std::size_t i = 0; i < 3; ++i) {
       lane.store(x_bar, n + i, bar[i]);
       lane.store(v_bar, n + i, speed_bar[i]);
