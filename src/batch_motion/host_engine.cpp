@@ -59,15 +59,58 @@ class AlignedArray {
 };
 
 /// Items one after the other, `lane_width` members at once.
-/// @tparam gathers  rows are found by gathering alone, as on a device
-template <bool gathers>
-struct HostBackend {
+struct LaneBackend {
+  static constexpr std::size_t stride = lane_width;
+  std::shared_ptr<const MeshData> mesh;
+
+  std::size_t set_members(int) { return stride; }
+  template <class Kernel>
+  void each(int items, const Kernel& kernel) const {
+    for (int i = 0; i < items; ++i) kernel(i, HostLane());
+  }
+  template <class Kernel>
+  void forward(const Kernel& kernel) const {
+    for (int i = 0; i < mesh->nodes; ++i) kernel.gather(i, HostLane());
+  }
+  template <class Kernel>
+  void backward(const Kernel& kernel) const {
+    for (int i = mesh->nodes - 1; i >= 0; --i) kernel.scatter(i, HostLane());
+  }
+};
+
+/// As a device does it: one member at a time, its numbers plain, rows of a colour in any order, by gathering alone.
+struct MimicBackend {
+  std::shared_ptr<const MeshData> mesh;
+  std::size_t stride = 0;
+
+  std::size_t set_members(int members) { return stride = (std::size_t(members) + 31) / 32 * 32; }
+  template <class Kernel>
+  void each(int items, const Kernel& kernel) const {
+    for (int i = items - 1; i >= 0; --i)
+      for (std::size_t m = 0; m < stride; ++m) kernel(i, DeviceLane{stride, m});
+  }
+  template <class Kernel>
+  void gather(std::size_t colour, const Kernel& kernel) const {
+    for (int i = mesh->colour_start[colour + 1] - 1; i >= mesh->colour_start[colour]; --i)
+      for (std::size_t m = 0; m < stride; ++m) kernel.gather(i, DeviceLane{stride, m});
+  }
+  template <class Kernel>
+  void forward(const Kernel& kernel) const {
+    for (std::size_t c = 0; c + 1 < mesh->colour_start.size(); ++c) gather(c, kernel);
+  }
+  template <class Kernel>
+  void backward(const Kernel& kernel) const {
+    for (std::size_t c = mesh->colour_start.size() - 1; c-- > 0;) gather(c, kernel);
+  }
+};
+
+/// A way of running kernels, with the host's memory.
+template <class Runner>
+struct HostBackend : Runner {
   template <class Number>
   using Array = AlignedArray<Number>;
   static constexpr int iterations_together = 1;
-  std::shared_ptr<const MeshData> mesh;
 
-  std::size_t set_members(int) { return lane_width; }
   /// The mesh stays where it is.
   template <class Number>
   const Number* place(const std::vector<Number>& values, std::vector<Array<int>>&, std::vector<Array<double>>&) const {
@@ -79,39 +122,19 @@ struct HostBackend {
   void download(const Array<double>& from, double* to) const {
     if (from.size() > 0) std::memcpy(to, from.data(), from.size() * sizeof(double));
   }
-  template <class Kernel>
-  void each(int items, const Kernel& kernel) const {
-    for (int i = 0; i < items; ++i) kernel(i, HostLane());
-  }
-  template <class Kernel>
-  void forward(const Kernel& kernel) const {
-    if constexpr (gathers)  // rows of a colour in any order
-      for (std::size_t c = 0; c + 1 < mesh->colour_start.size(); ++c)
-        for (int i = mesh->colour_start[c + 1] - 1; i >= mesh->colour_start[c]; --i) kernel.gather(i, HostLane());
-    else
-      for (int i = 0; i < mesh->nodes; ++i) kernel.gather(i, HostLane());
-  }
-  template <class Kernel>
-  void backward(const Kernel& kernel) const {
-    if constexpr (gathers)
-      for (std::size_t c = mesh->colour_start.size() - 1; c-- > 0;)
-        for (int i = mesh->colour_start[c]; i < mesh->colour_start[c + 1]; ++i) kernel.gather(i, HostLane());
-    else
-      for (int i = mesh->nodes - 1; i >= 0; --i) kernel.scatter(i, HostLane());
-  }
   bool any(const double* numbers) const {
-    for (int l = 0; l < lane_width; ++l)
-      if (numbers[l] != 0.0) return true;
+    for (std::size_t m = 0; m < this->stride; ++m)
+      if (numbers[m] != 0.0) return true;
     return false;
   }
 };
 
-template <bool gathers>
+template <class Runner>
 class HostEngines : public EngineMaker {
  public:
-  using Backend = HostBackend<gathers>;
+  using Backend = HostBackend<Runner>;
   HostEngines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step, const SolverNumbers& solver)
-      : shared_(std::make_shared<Shared<Backend>>(mesh, step, solver, Backend{mesh})) {}
+      : shared_(std::make_shared<Shared<Backend>>(mesh, step, solver, Backend{{mesh}})) {}
   std::unique_ptr<BatchEngine> make(int members) override {
     if (shared_->data().nodes_per_element == 8) return std::make_unique<Engine<Backend, 8>>(shared_, members);
     return std::make_unique<Engine<Backend, 4>>(shared_, members);
@@ -124,9 +147,13 @@ class HostEngines : public EngineMaker {
 }  // namespace
 
 std::unique_ptr<EngineMaker> make_host_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
-                                               const SolverNumbers& solver, bool gathers) {
-  if (gathers) return std::make_unique<HostEngines<true>>(mesh, step, solver);
-  return std::make_unique<HostEngines<false>>(mesh, step, solver);
+                                               const SolverNumbers& solver) {
+  return std::make_unique<HostEngines<LaneBackend>>(mesh, step, solver);
+}
+
+std::unique_ptr<EngineMaker> make_mimic_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+                                                const SolverNumbers& solver) {
+  return std::make_unique<HostEngines<MimicBackend>>(mesh, step, solver);
 }
 
 }  // namespace pliant::batch_motion

@@ -192,10 +192,10 @@ MotionBatch::MotionBatch(std::shared_ptr<const Body> body, BatchOptions options,
   pliant::check(options_, members);
   members_.resize(std::size_t(members));
   is_set_.resize(std::size_t(members), false);
-  const bool on_device = options_.device == BatchDevice::Cuda;
+  const bool on_host = options_.device == BatchDevice::Host;
   auto mesh = std::make_shared<const MeshData>(
       make_mesh_data(*body_, relative_moduli(*body_, options_), options_.held, options_.with_plane,
-                     on_device ? SweepOrder::Colours : SweepOrder::Natural));
+                     on_host ? SweepOrder::Natural : SweepOrder::Colours));
   StepNumbers step;
   step.dt = options_.dt, step.theta = options_.newmark_theta, step.contact_weight = options_.contact_weight;
   step.rotation_lag = options_.dt * options_.rotation_prediction;
@@ -206,7 +206,9 @@ MotionBatch::MotionBatch(std::shared_ptr<const Body> body, BatchOptions options,
   SolverNumbers solver;
   solver.tolerance = options_.tolerance, solver.most_iterations = options_.max_iterations;
   engines_->mesh = mesh.get();
-  engines_->maker = on_device ? make_cuda_engines(mesh, step, solver) : make_host_engines(mesh, step, solver);
+  engines_->maker = on_host                                     ? make_host_engines(mesh, step, solver)
+                    : options_.device == BatchDevice::Cuda ? make_cuda_engines(mesh, step, solver)
+                                                            : make_mimic_engines(mesh, step, solver);
   do {
     engines_->all.push_back(engines_->maker->make(members));
   } while (int(engines_->all.size()) * engines_->stride() < members);

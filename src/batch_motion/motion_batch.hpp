@@ -16,6 +16,7 @@ namespace pliant {
 enum class BatchDevice {
   Host,  ///< in the lanes of this processor's registers, eight members at a time
   Cuda,  ///< on the first CUDA device, all members at once; needs PLIANT_WITH_CUDA
+  Mimic,  ///< on this processor as a device does it, member by member: slow, a check of the device's kernels
 };
 
 /// CUDA devices that a batch can use; 0 where there is none or the program was built without CUDA.

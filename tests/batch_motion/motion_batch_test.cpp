@@ -2,8 +2,6 @@
 
 #include <stdexcept>
 
-#include "batch_motion/batch_engine.hpp"
-#include "batch_motion/batch_mesh.hpp"
 #include "batch_scenes.hpp"
 #include "support/tolerance.hpp"
 
@@ -172,76 +170,6 @@ TEST(MotionBatch, StatesComeAtTheStepsAskedFor) {
   EXPECT_EQ(seen, (std::vector<int>{0, 2, 5}));
   EXPECT_GT(lowest[0], lowest[1]);
   EXPECT_GT(lowest[1], lowest[2]);
-}
-
-/// The end of a run by engines of one kind.
-State engine_end(const BatchScene& scene, batch_motion::SweepOrder order, bool gathers, int steps) {
-  using namespace batch_motion;
-  const Body& body = *scene.body;
-  const auto mesh = std::make_shared<const MeshData>(
-      make_mesh_data(body, body.modulus.relative, scene.options.held, scene.options.with_plane, order));
-  if (order == SweepOrder::Colours) {
-    EXPECT_GT(mesh->colour_start.size(), 4U);
-    EXPECT_LT(mesh->colour_start.size(), 40U);
-  }
-  StepNumbers step;
-  step.dt = scene.options.dt, step.theta = scene.options.newmark_theta;
-  step.contact_weight = scene.options.contact_weight, step.rotation_lag = 0.5 * step.dt;
-  step.contact_lag = step.dt * step.contact_weight, step.smoothing = scene.options.contact.smoothing;
-  step.reach = scene.options.contact.reach(), step.friction_way = scene.options.friction_speed * step.dt;
-  SolverNumbers solver;
-  solver.tolerance = 1e-11;
-  const auto engine = make_host_engines(mesh, step, solver, gathers)->make(1);
-  const auto stride = std::size_t(engine->stride());
-  const BatchMember& m = scene.member;
-  std::vector<double> numbers(member_number_count * stride), alive(stride, 0.0);
-  const UnitLame lame = unit_lame(m.poissons_ratio);
-  const double values[] = {m.youngs_modulus,    m.mass_damping,      m.stiffness_damping, m.density,
-                           m.gravity.x(),       m.gravity.y(),       m.gravity.z(),       m.plane_point.x(),
-                           m.plane_point.y(),   m.plane_point.z(),   m.plane_normal.x(),  m.plane_normal.y(),
-                           m.plane_normal.z(),  m.friction,          m.contact_stiffness, lame.lambda,
-                           lame.mu,             lame.d_lambda,       lame.d_mu};
-  for (std::size_t k = 0; k < member_number_count; ++k)
-    for (std::size_t lane = 0; lane < stride; ++lane) numbers[k * stride + lane] = values[k];
-  const ClassStiffness unit = class_stiffness(body, m.poissons_ratio);
-  if (!unit.value.empty())
-    for (int lane = 0; lane < int(stride); ++lane) engine->set_stiffness(lane, unit.value.data(), unit.change.data());
-  std::vector<double> x(3 * std::size_t(mesh->nodes) * stride), v = x;
-  const auto at = [&](int node, std::size_t d) {
-    return (3 * std::size_t(mesh->order[std::size_t(node)]) + d) * stride;
-  };
-  for (int node = 0; node < mesh->nodes; ++node)
-    for (std::size_t d = 0; d < 3; ++d)
-      for (std::size_t lane = 0; lane < stride; ++lane) {
-        x[at(node, d) + lane] = m.start.x(node, Eigen::Index(d));
-        v[at(node, d) + lane] = m.start.v(node, Eigen::Index(d));
-      }
-  alive[0] = 1.0;
-  engine->set_numbers(numbers.data());
-  engine->set_state(x.data(), v.data());
-  engine->begin(alive.data());
-  engine->steps(steps);
-  engine->get_state(x.data(), v.data());
-  State end{Points(mesh->nodes, 3), Points(mesh->nodes, 3)};
-  for (int node = 0; node < mesh->nodes; ++node)
-    for (std::size_t d = 0; d < 3; ++d) {
-      end.x(node, Eigen::Index(d)) = x[at(node, d)];
-      end.v(node, Eigen::Index(d)) = v[at(node, d)];
-    }
-  return end;
-}
-
-TEST(MotionBatch, RowsByColoursAndGatheredAsOnADeviceGiveTheSameMotion) {
-  using batch_motion::SweepOrder;
-  for (const BatchScene& scene : {test::batch_torus(0.04), test::batch_bar({8, 2, 2})}) {
-    const State plain = engine_end(scene, SweepOrder::Natural, false, 20),
-                coloured = engine_end(scene, SweepOrder::Colours, true, 20);
-    EXPECT_LT(test::farthest(plain.x, coloured.x), tolerance(steps_amplify * 1e-11) * scene.body->size());
-    MotionBatch batch(scene.body, scene.options, 1);
-    batch.set_member(0, scene.member);
-    EXPECT_LT(test::farthest(plain.x, test::ends(batch, 20).front().x),
-              tolerance(steps_amplify * 1e-6) * scene.body->size());
-  }
 }
 
 std::string refusal(const std::function<void()>& call) {
