@@ -1,8 +1,9 @@
 // Steps of many members of one mesh a second: by a `Stepper` each, one after the other, beside `MotionBatch` in the
 // lanes of this processor's registers, in one thread, and on a CUDA device where there is one. Members differ in every
-// number of their material; hexahedra of one Poisson's ratio read their stiffness once for all, so that there is a torus
-// with one and one with many. The torus (704 hexahedra, 1,144 nodes) and the bar (3,000 linear tetrahedra, 756 nodes)
-// are those of step_benchmark.cpp, the one in an impact, the other let go; the gradient is a run and its reverse sweep.
+// number of their material; hexahedra of one Poisson's ratio read their stiffness once for all, so that there is a
+// torus with one and one with many. The torus (704 hexahedra, 1,144 nodes) and the bar (3,000 linear tetrahedra, 756
+// nodes) are those of step_benchmark.cpp, the one in an impact, the other let go; the gradient is a run and its reverse
+// sweep.
 
 #include <benchmark/benchmark.h>
 
@@ -208,12 +209,12 @@ void gradient_on_device(benchmark::State& state, MakeScene make, double toleranc
   together(state, make, true, tolerance, BatchDevice::Cuda, members);
 }
 
-#define PLIANT_BATCH_BENCHMARKS(scene)                                                              \
-  BENCHMARK_CAPTURE(forward_one_by_one, scene##_1e8, scene, 1e-8)->Unit(benchmark::kMillisecond);    \
-  BENCHMARK_CAPTURE(forward_one_by_one, scene##_1e6, scene, 1e-6)->Unit(benchmark::kMillisecond);    \
-  BENCHMARK_CAPTURE(forward_in_lanes, scene##_1e6, scene, 1e-6, 8)->Unit(benchmark::kMillisecond);   \
-  BENCHMARK_CAPTURE(gradient_one_by_one, scene##_1e6, scene, 1e-6)->Unit(benchmark::kMillisecond);   \
-  BENCHMARK_CAPTURE(gradient_in_lanes, scene##_1e6, scene, 1e-6, 8)->Unit(benchmark::kMillisecond);  \
+#define PLIANT_BATCH_BENCHMARKS(scene)                                                                    \
+  BENCHMARK_CAPTURE(forward_one_by_one, scene##_1e8, scene, 1e-8)->Unit(benchmark::kMillisecond);         \
+  BENCHMARK_CAPTURE(forward_one_by_one, scene##_1e6, scene, 1e-6)->Unit(benchmark::kMillisecond);         \
+  BENCHMARK_CAPTURE(forward_in_lanes, scene##_1e6, scene, 1e-6, 8)->Unit(benchmark::kMillisecond);        \
+  BENCHMARK_CAPTURE(gradient_one_by_one, scene##_1e6, scene, 1e-6)->Unit(benchmark::kMillisecond);        \
+  BENCHMARK_CAPTURE(gradient_in_lanes, scene##_1e6, scene, 1e-6, 8)->Unit(benchmark::kMillisecond);       \
   BENCHMARK_CAPTURE(forward_on_device, scene##_1e6_32, scene, 1e-6, 32)->Unit(benchmark::kMillisecond);   \
   BENCHMARK_CAPTURE(forward_on_device, scene##_1e6_512, scene, 1e-6, 512)->Unit(benchmark::kMillisecond); \
   BENCHMARK_CAPTURE(gradient_on_device, scene##_1e6_512, scene, 1e-6, 512)->Unit(benchmark::kMillisecond)

@@ -171,9 +171,9 @@ MeshData make_mesh_data(const Body& body, std::vector<double> relative_moduli, c
   if (body.kind == ElementKind::QuadraticTetrahedron)
     throw std::invalid_argument("a batch moves hexahedra and linear tetrahedra, not quadratic ones");
   if (int(relative_moduli.size()) != body.element_count())
-    throw std::invalid_argument("a batch needs one relative modulus an element: " +
-                                std::to_string(relative_moduli.size()) + " for " +
-                                std::to_string(body.element_count()) + " elements");
+    throw std::invalid_argument(
+        "a batch needs one relative modulus an element: " + std::to_string(relative_moduli.size()) + " for " +
+        std::to_string(body.element_count()) + " elements");
   for (const double r : relative_moduli)
     if (!(r > 0.0 && r < 1e300)) throw std::invalid_argument("relative moduli are positive and finite");
   MeshData mesh;

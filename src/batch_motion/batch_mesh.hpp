@@ -18,8 +18,8 @@ enum class SweepOrder {
 MeshData make_mesh_data(const Body& body, std::vector<double> relative_moduli, const std::vector<int>& held,
                         bool with_samples, SweepOrder order);
 
-/// Stiffness of each class of hexahedra for E = 1 Pa, and its derivative by Poisson's ratio, as `MemberStiffness<8>` has
-/// them. Empty for tetrahedra.
+/// Stiffness of each class of hexahedra for E = 1 Pa, and its derivative by Poisson's ratio, as `MemberStiffness<8>`
+/// has them. Empty for tetrahedra.
 struct ClassStiffness {
   std::vector<double> value, change;
 };

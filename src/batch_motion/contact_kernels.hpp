@@ -133,9 +133,9 @@ struct SampleProducts {
   }
 };
 
-/// The reverse sweep (`RigidContact::add_force_adjoint` and `add_start_adjoint`) for the cotangent dt w of the force: of
-/// positions and velocities at the step's start, 3 a sample each, and of the plane's point and normal, the friction and
-/// the logarithm of the stiffness.
+/// The reverse sweep (`RigidContact::add_force_adjoint` and `add_start_adjoint`) for the cotangent dt w of the force:
+/// of positions and velocities at the step's start, 3 a sample each, and of the plane's point and normal, the friction
+/// and the logarithm of the stiffness.
 template <int N>
 struct SampleAdjoint {
   static constexpr int sums = 8;
@@ -189,7 +189,8 @@ struct SampleAdjoint {
     if (step.friction_way > 0.0) {
       const Real across_b = dot(c.axis, b), normal_way = dot(c.axis, moved);
       Real slid[3], w_z[3], axis_bar[3];
-      for (int i = 0; i < 3; ++i) slid[i] = moved[i] - normal_way * c.axis[i], w_z[i] = slid[i] + normal_way * c.axis[i];
+      for (int i = 0; i < 3; ++i)
+        slid[i] = moved[i] - normal_way * c.axis[i], w_z[i] = slid[i] + normal_way * c.axis[i];
       const Real drag_bar = -dot(slid, b), length_bar = -(drag_bar * c.drag / c.length);
       values[6] = drag_bar * c.force / c.length;
       values[7] += c.drag * drag_bar;

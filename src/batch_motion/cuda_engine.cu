@@ -160,8 +160,8 @@ struct CudaBackend {
 class CudaEngines : public EngineMaker {
  public:
   CudaEngines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step, const SolverNumbers& solver)
-      : shared_(std::make_shared<Shared<CudaBackend>>(mesh, step, solver,
-                                                      CudaBackend{mesh, std::make_shared<Flag>()})) {}
+      : shared_(
+            std::make_shared<Shared<CudaBackend>>(mesh, step, solver, CudaBackend{mesh, std::make_shared<Flag>()})) {}
   std::unique_ptr<BatchEngine> make(int members) override {
     if (shared_->data().nodes_per_element == 8) return std::make_unique<Engine<CudaBackend, 8>>(shared_, members);
     return std::make_unique<Engine<CudaBackend, 4>>(shared_, members);

@@ -74,9 +74,8 @@ struct MemberStiffness<8> {
   }
   /// out += factor R K_ab R^T
   template <class Lane>
-  PLIANT_DEVICE void add_block(const MeshView&, const double*, int element, int a, int b,
-                               const typename Lane::Real* R, const typename Lane::Real& factor,
-                               typename Lane::Real* out, const Lane& lane) const {
+  PLIANT_DEVICE void add_block(const MeshView&, const double*, int element, int a, int b, const typename Lane::Real* R,
+                               const typename Lane::Real& factor, typename Lane::Real* out, const Lane& lane) const {
     if (is_shared)
       add<true>(element, a, b, R, factor, out, lane);
     else
@@ -93,7 +92,8 @@ struct MemberStiffness<8> {
     Real half[9];  // factor R K
     for (int j = 0; j < 3; ++j) {
       Real K[3];
-      for (int l = 0; l < 3; ++l) K[l] = factor * entry<shared>(value, k + row * std::size_t(l) + column * std::size_t(j), lane);
+      for (int l = 0; l < 3; ++l)
+        K[l] = factor * entry<shared>(value, k + row * std::size_t(l) + column * std::size_t(j), lane);
       for (int i = 0; i < 3; ++i) half[3 * i + j] = R[3 * i] * K[0] + R[3 * i + 1] * K[1] + R[3 * i + 2] * K[2];
     }
     for (int i = 0; i < 3; ++i)
@@ -109,7 +109,8 @@ template <>
 struct MemberStiffness<4> {
   template <class Lane>
   PLIANT_DEVICE void stress_times(const MeshView& mesh, int element, const typename Lane::Real& lambda,
-                                  const typename Lane::Real& mu, const typename Lane::Real* d, typename Lane::Real* y) const {
+                                  const typename Lane::Real& mu, const typename Lane::Real* d,
+                                  typename Lane::Real* y) const {
     using Real = typename Lane::Real;
     const double *g = mesh.gradient + 12 * std::size_t(element), volume = mesh.volume[element];
     Real H[9], T[9];
@@ -225,8 +226,8 @@ PLIANT_DEVICE void unrotate(const MeshView& mesh, const double* x, const double*
 
 /// R^T times a field at an element's nodes relative to the first.
 template <int N, class Lane>
-PLIANT_DEVICE void unrotate_field(const MeshView& mesh, const double* field, int element,
-                                  const typename Lane::Real* R, typename Lane::Real* d, const Lane& lane) {
+PLIANT_DEVICE void unrotate_field(const MeshView& mesh, const double* field, int element, const typename Lane::Real* R,
+                                  typename Lane::Real* d, const Lane& lane) {
   using Real = typename Lane::Real;
   Real first[3];
   const int* nodes = mesh.connectivity + N * std::size_t(element);
@@ -328,8 +329,7 @@ struct ElementAdjoint {
     const int* nodes = mesh.connectivity + N * std::size_t(element);
     for (int a = 0; a < N; ++a) {
       Real own[3];
-      for (int i = 0; i < 3; ++i)
-        own[i] = Real(step.dt) * lane.load(w, 3 * std::size_t(nodes[a]) + std::size_t(i));
+      for (int i = 0; i < 3; ++i) own[i] = Real(step.dt) * lane.load(w, 3 * std::size_t(nodes[a]) + std::size_t(i));
       transposed_times(R, own, c + 3 * a);
     }
     stiffness.template times<2>(mesh, members, element, d, y, lane);

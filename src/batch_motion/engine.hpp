@@ -230,9 +230,10 @@ template <class Backend, int N>
 void Engine<Backend, N>::prepare() {
   Workspace<Backend>& o = *work_;
   const StepNumbers& step = shared_->step;
-  backend_.each(mesh_.elements, RotateElements<N>{mesh_, step, x_.data(), v_.data(), quaternion_.data(), o.rotation.data()});
-  backend_.each(mesh_.samples, SampleForces<N>{mesh_, step, members_.data(), x_.data(), v_.data(), o.sample_force.data(),
-                                               o.sample_matrix.data()});
+  backend_.each(mesh_.elements,
+                RotateElements<N>{mesh_, step, x_.data(), v_.data(), quaternion_.data(), o.rotation.data()});
+  backend_.each(mesh_.samples, SampleForces<N>{mesh_, step, members_.data(), x_.data(), v_.data(),
+                                               o.sample_force.data(), o.sample_matrix.data()});
   backend_.each(mesh_.nodes, TouchedNodes{mesh_, o.sample_matrix.data(), o.touched.data()});
   const StepMatrix<N> matrix{mesh_, step, stiffness(), members_.data(), o.rotation.data(), o.sample_matrix.data()};
   backend_.each(mesh_.nodes, DiagonalFactor<N>{matrix, o.pivot.data()});
@@ -245,9 +246,8 @@ void Engine<Backend, N>::step() {
   Workspace<Backend>& o = *work_;
   const StepNumbers& step = shared_->step;
   backend_.each(mesh_.nodes, FirstWay{mesh_, step, v_.data(), o.way.data()});
-  backend_.each(mesh_.elements,
-                ElementForces<N>{mesh_, step, stiffness(), members_.data(), x_.data(), o.way.data(), o.rotation.data(),
-                                 o.element_force.data(), o.element_product.data()});
+  backend_.each(mesh_.elements, ElementForces<N>{mesh_, step, stiffness(), members_.data(), x_.data(), o.way.data(),
+                                                 o.rotation.data(), o.element_force.data(), o.element_product.data()});
   backend_.each(mesh_.nodes, StepRight{mesh_, step, members_.data(), v_.data(), o.element_force.data(),
                                        o.sample_force.data(), o.touched.data(), o.right.data()});
   solve(o.right.data(), o.way.data(), true);
@@ -264,8 +264,8 @@ void Engine<Backend, N>::solve(const double* b, double* x, bool has_product) {
     if (refinement > 0 || !has_product)
       backend_.each(mesh_.elements, ElementProducts<N>{mesh_, step, stiffness(), members_.data(), x, o.rotation.data(),
                                                        o.element_product.data()});
-    backend_.each(mesh_.samples, SampleProducts<N>{mesh_, step, members_.data(), o.sample_matrix.data(), x,
-                                                   o.sample_product.data()});
+    backend_.each(mesh_.samples,
+                  SampleProducts<N>{mesh_, step, members_.data(), o.sample_matrix.data(), x, o.sample_product.data()});
     backend_.each(mesh_.nodes, Residual{mesh_, step, members_.data(), b, x, o.element_product.data(),
                                         o.sample_product.data(), o.touched.data(), o.residual.data()});
     backend_.each(mesh_.chunks, ResidualSquares{mesh_, b, o.residual.data(), o.partial.data()});
@@ -331,10 +331,9 @@ void Engine<Backend, N>::adjoint_step(int slot) {
                                           w_.data(), before_.data(), o.right.data()});
   ++adjoint_steps_;
   solve(o.right.data(), w_.data(), false);
-  backend_.each(mesh_.elements,
-                ElementAdjoint<N>{mesh_, step, stiffness(), members_.data(), x_.data(), v_.data(), added_.data(),
-                                  o.rotation.data(), w_.data(), o.element_force.data(), a.element_v_bar.data(),
-                                  a.element_sum.data()});
+  backend_.each(mesh_.elements, ElementAdjoint<N>{mesh_, step, stiffness(), members_.data(), x_.data(), v_.data(),
+                                                  added_.data(), o.rotation.data(), w_.data(), o.element_force.data(),
+                                                  a.element_v_bar.data(), a.element_sum.data()});
   backend_.each(mesh_.samples,
                 SampleAdjoint<N>{mesh_, step, members_.data(), x_.data(), v_.data(), added_.data(), w_.data(),
                                  o.sample_force.data(), a.sample_v_bar.data(), a.sample_sum.data()});
@@ -349,9 +348,9 @@ void Engine<Backend, N>::adjoint_step(int slot) {
   sum(of_elements, a.element_sum, a.element_partial);
   sum(of_samples, a.sample_sum, a.sample_partial);
   sum(of_nodes, a.node_sum, a.node_partial);
-  backend_.each(1, AddGradient{step, members_.data(), of_elements.chunks(), of_samples.chunks(), of_nodes.chunks(),
-                               a.element_partial.data(), a.sample_partial.data(), a.node_partial.data(),
-                               gradient_.data()});
+  backend_.each(
+      1, AddGradient{step, members_.data(), of_elements.chunks(), of_samples.chunks(), of_nodes.chunks(),
+                     a.element_partial.data(), a.sample_partial.data(), a.node_partial.data(), gradient_.data()});
   backend_.each(1, CountSteps{numbers_.data()});
 }
 

@@ -24,8 +24,8 @@ struct RegisterOf {
   typedef Number type __attribute__((vector_size(bytes), may_alias));
 };
 
-/// A number of each of `lane_width` members, in as many registers as that takes: two halves, one of them empty where one
-/// register does. Every operation is one of each member alone.
+/// A number of each of `lane_width` members, in as many registers as that takes: two halves, one of them empty where
+/// one register does. Every operation is one of each member alone.
 template <class Number, std::size_t bytes = lane_width * sizeof(Number), bool fits = (bytes <= register_bytes)>
 struct Registers {
   using Half = Registers<Number, bytes / 2>;
@@ -36,7 +36,9 @@ struct Registers {
   PLIANT_DEVICE void store(Number* p) const { low.store(p), high.store(p + numbers / 2); }
   PLIANT_DEVICE static Registers all(Number value) { return {Half::all(value), Half::all(value)}; }
   PLIANT_DEVICE Number at(int i) const { return i < numbers / 2 ? low.at(i) : high.at(i - numbers / 2); }
-  PLIANT_DEVICE void set(int i, Number value) { i < numbers / 2 ? low.set(i, value) : high.set(i - numbers / 2, value); }
+  PLIANT_DEVICE void set(int i, Number value) {
+    i < numbers / 2 ? low.set(i, value) : high.set(i - numbers / 2, value);
+  }
   /// f of each register of these, of a and, where there are more, of b.
   template <class F, class A>
   PLIANT_DEVICE static Registers of(const F& f, const A& a) {
@@ -90,8 +92,8 @@ struct Pack {
   PLIANT_DEVICE Pack& operator-=(const Pack& b) { return *this = *this - b; }
   PLIANT_DEVICE Pack& operator*=(const Pack& b) { return *this = *this * b; }
 
-#define PLIANT_PACK_OPERATOR(op)                                                                            \
-  PLIANT_DEVICE friend Pack operator op(const Pack& a, const Pack& b) {                                     \
+#define PLIANT_PACK_OPERATOR(op)                                                                             \
+  PLIANT_DEVICE friend Pack operator op(const Pack& a, const Pack& b) {                                      \
     return Pack(Values::of([](auto x, auto y) PLIANT_INLINE_LAMBDA { return x op y; }, a.values, b.values)); \
   }
   PLIANT_PACK_OPERATOR(+)
@@ -120,10 +122,10 @@ struct PackMask {
   }
 };
 
-#define PLIANT_PACK_COMPARISON(op)                                                                   \
-  PLIANT_DEVICE PackMask operator op(const Pack<double>& a, const Pack<double>& b) {                 \
-    return PackMask(PackMask::Values::of([](auto x, auto y) PLIANT_INLINE_LAMBDA { return x op y; }, \
-                                         a.values, b.values));                                       \
+#define PLIANT_PACK_COMPARISON(op)                                                                             \
+  PLIANT_DEVICE PackMask operator op(const Pack<double>& a, const Pack<double>& b) {                           \
+    return PackMask(                                                                                           \
+        PackMask::Values::of([](auto x, auto y) PLIANT_INLINE_LAMBDA { return x op y; }, a.values, b.values)); \
   }
 PLIANT_PACK_COMPARISON(>)
 PLIANT_PACK_COMPARISON(<)
@@ -179,9 +181,8 @@ PLIANT_DEVICE Pack<float> narrow(const Pack<double>& value) {
   c.values.own = __builtin_convertvector(value.values.own, RegisterOf<float, 32>::type);
 #elif defined(__AVX__)
   typedef RegisterOf<float, 16>::type Four;
-  c.values.own =
-      __builtin_shufflevector(__builtin_convertvector(value.values.low.own, Four),
-                              __builtin_convertvector(value.values.high.own, Four), 0, 1, 2, 3, 4, 5, 6, 7);
+  c.values.own = __builtin_shufflevector(__builtin_convertvector(value.values.low.own, Four),
+                                         __builtin_convertvector(value.values.high.own, Four), 0, 1, 2, 3, 4, 5, 6, 7);
 #else
   for (int l = 0; l < lane_width; ++l) c.values.set(l, float(value.values.at(l)));
 #endif
@@ -193,8 +194,10 @@ PLIANT_DEVICE Pack<double> widen(const Pack<float>& value) {
   c.values.own = __builtin_convertvector(value.values.own, RegisterOf<double, 64>::type);
 #elif defined(__AVX__)
   typedef RegisterOf<double, 32>::type Four;
-  c.values.low.own = __builtin_convertvector(__builtin_shufflevector(value.values.own, value.values.own, 0, 1, 2, 3), Four);
-  c.values.high.own = __builtin_convertvector(__builtin_shufflevector(value.values.own, value.values.own, 4, 5, 6, 7), Four);
+  c.values.low.own =
+      __builtin_convertvector(__builtin_shufflevector(value.values.own, value.values.own, 0, 1, 2, 3), Four);
+  c.values.high.own =
+      __builtin_convertvector(__builtin_shufflevector(value.values.own, value.values.own, 4, 5, 6, 7), Four);
 #else
   for (int l = 0; l < lane_width; ++l) c.values.set(l, value.values.at(l));
 #endif

@@ -6,14 +6,14 @@ namespace pliant::batch_motion {
 /// which the solver sweeps. Entry (i, j) of a block is [3 i + j].
 struct MeshView {
   int nodes = 0, elements = 0, samples = 0;
-  int lower_blocks = 0;  ///< blocks below the diagonal; those of the diagonal follow them
+  int lower_blocks = 0;            ///< blocks below the diagonal; those of the diagonal follow them
   int chunks = 0, chunk_rows = 0;  ///< of rows, for sums: fixed, so that sums do not depend on who takes them
 
   // Elements, N nodes each.
   const int* connectivity = nullptr;
-  const int* element_class = nullptr;      ///< whose stiffness it has
-  const double* gradient = nullptr;        ///< of mean strain, N x 3 [1/m]
-  const double* volume = nullptr;          ///< [m^3]
+  const int* element_class = nullptr;        ///< whose stiffness it has
+  const double* gradient = nullptr;          ///< of mean strain, N x 3 [1/m]
+  const double* volume = nullptr;            ///< [m^3]
   const double* relative_modulus = nullptr;  ///< [-]
 
   // Nodes.
@@ -44,12 +44,12 @@ enum MemberNumber : int {
   MassDamping,
   StiffnessDamping,
   Density,
-  Gravity,                         // 3
-  PlanePoint = Gravity + 3,        // 3
-  PlaneNormal = PlanePoint + 3,    // 3
+  Gravity,                       // 3
+  PlanePoint = Gravity + 3,      // 3
+  PlaneNormal = PlanePoint + 3,  // 3
   Friction = PlaneNormal + 3,
   ContactStiffness,
-  Lambda,                          // Lame's constants for a unit modulus, and their derivatives by Poisson's ratio
+  Lambda,  // Lame's constants for a unit modulus, and their derivatives by Poisson's ratio
   Mu,
   LambdaChange,
   MuChange,
@@ -63,9 +63,9 @@ enum GradientNumber : int {
   ByStiffnessDamping,
   ByMassDamping,
   ByDensity,
-  ByGravity,                           // 3
-  ByPlanePoint = ByGravity + 3,        // 3
-  ByPlaneNormal = ByPlanePoint + 3,    // 3
+  ByGravity,                         // 3
+  ByPlanePoint = ByGravity + 3,      // 3
+  ByPlaneNormal = ByPlanePoint + 3,  // 3
   ByFriction = ByPlaneNormal + 3,
   ByLogContactStiffness,
   gradient_number_count
@@ -73,12 +73,12 @@ enum GradientNumber : int {
 
 /// What all members' steps have in common.
 struct StepNumbers {
-  double dt = 0.0, theta = 0.5;         ///< [s], Newmark's weight of the end
+  double dt = 0.0, theta = 0.5;  ///< [s], Newmark's weight of the end
   double contact_weight = 0.6;
   double rotation_lag = 0.0, contact_lag = 0.0;  ///< how far ahead of the start points are predicted [s]
-  double smoothing = 0.0, reach = 0.0;  ///< of the penalty [m]
-  bool is_quadratic = false;            ///< its onset
-  double friction_way = 0.0;            ///< below which friction fades [m]; 0: none
+  double smoothing = 0.0, reach = 0.0;           ///< of the penalty [m]
+  bool is_quadratic = false;                     ///< its onset
+  double friction_way = 0.0;                     ///< below which friction fades [m]; 0: none
 };
 
 }  // namespace pliant::batch_motion

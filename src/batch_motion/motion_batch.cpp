@@ -59,9 +59,9 @@ void check(const BatchMember& m, int index, Eigen::Index nodes) {
           who + "gravity and plane must be finite");
   require(m.plane_normal.squaredNorm() > 0.0, who + "the plane's normal must not be zero");
   for (const Points* points : {&m.start.x, &m.start.v}) {
-    require(points->rows() == 0 || points->rows() == nodes,
-            who + "the start has " + std::to_string(points->rows()) + " rows, and the body " + std::to_string(nodes) +
-                " nodes");
+    require(points->rows() == 0 || points->rows() == nodes, who + "the start has " + std::to_string(points->rows()) +
+                                                                " rows, and the body " + std::to_string(nodes) +
+                                                                " nodes");
     require(points->allFinite(), who + "the start must be finite");
   }
 }
@@ -86,10 +86,10 @@ struct MotionBatch::Engines {
   MeshData const* mesh = nullptr;
   std::unique_ptr<EngineMaker> maker;
   std::vector<std::unique_ptr<BatchEngine>> all;
-  std::vector<double> poissons_ratio;                       // whose stiffness each lane has
+  std::vector<double> poissons_ratio;  // whose stiffness each lane has
   std::map<double, std::shared_ptr<const ClassStiffness>> stiffness;
-  std::vector<State> states, bars;                          // one a member
-  std::vector<std::vector<double>> first, second;           // numbers of an engine's members on their way
+  std::vector<State> states, bars;                 // one a member
+  std::vector<std::vector<double>> first, second;  // numbers of an engine's members on their way
 
   int stride() const { return all.front()->stride(); }
   std::size_t nodes() const { return std::size_t(mesh->nodes); }
@@ -193,9 +193,9 @@ MotionBatch::MotionBatch(std::shared_ptr<const Body> body, BatchOptions options,
   members_.resize(std::size_t(members));
   is_set_.resize(std::size_t(members), false);
   const bool on_host = options_.device == BatchDevice::Host;
-  auto mesh = std::make_shared<const MeshData>(
-      make_mesh_data(*body_, relative_moduli(*body_, options_), options_.held, options_.with_plane,
-                     on_host ? SweepOrder::Natural : SweepOrder::Colours));
+  auto mesh = std::make_shared<const MeshData>(make_mesh_data(*body_, relative_moduli(*body_, options_), options_.held,
+                                                              options_.with_plane,
+                                                              on_host ? SweepOrder::Natural : SweepOrder::Colours));
   StepNumbers step;
   step.dt = options_.dt, step.theta = options_.newmark_theta, step.contact_weight = options_.contact_weight;
   step.rotation_lag = options_.dt * options_.rotation_prediction;
@@ -206,9 +206,9 @@ MotionBatch::MotionBatch(std::shared_ptr<const Body> body, BatchOptions options,
   SolverNumbers solver;
   solver.tolerance = options_.tolerance, solver.most_iterations = options_.max_iterations;
   engines_->mesh = mesh.get();
-  engines_->maker = on_host                                     ? make_host_engines(mesh, step, solver)
+  engines_->maker = on_host                                ? make_host_engines(mesh, step, solver)
                     : options_.device == BatchDevice::Cuda ? make_cuda_engines(mesh, step, solver)
-                                                            : make_mimic_engines(mesh, step, solver);
+                                                           : make_mimic_engines(mesh, step, solver);
   do {
     engines_->all.push_back(engines_->maker->make(members));
   } while (int(engines_->all.size()) * engines_->stride() < members);
@@ -221,8 +221,8 @@ MotionBatch::MotionBatch(std::shared_ptr<const Body> body, BatchOptions options,
 int MotionBatch::stride() const { return engines_->stride(); }
 
 void MotionBatch::set_member(int index, BatchMember member) {
-  require(index >= 0 && index < member_count(), "member " + std::to_string(index) + " of a batch of " +
-                                                    std::to_string(member_count()));
+  require(index >= 0 && index < member_count(),
+          "member " + std::to_string(index) + " of a batch of " + std::to_string(member_count()));
   pliant::check(member, index, body_->nodes.rows());
   if (member.start.x.rows() == 0) member.start.x = body_->scanned_positions();
   if (member.start.v.rows() == 0) member.start.v = Points::Zero(body_->nodes.rows(), 3);
@@ -293,8 +293,8 @@ std::vector<BatchRun> MotionBatch::run(int steps, const std::vector<int>& at, co
 }
 
 std::vector<BatchRun> MotionBatch::run_adjoint(int steps, const std::vector<int>& at, const OnStates& on_states,
-                                                   const AddCotangents& add_cotangents,
-                                                   std::vector<BatchGradient>& gradients) {
+                                               const AddCotangents& add_cotangents,
+                                               std::vector<BatchGradient>& gradients) {
   check(steps, at);
   begin();
   Engines& e = *engines_;
@@ -365,7 +365,7 @@ std::vector<BatchRun> MotionBatch::run_adjoint(int steps, const std::vector<int>
 }
 
 std::vector<BatchRun> MotionBatch::collect_gradients(std::vector<BatchRun> summaries,
-                                                         std::vector<BatchGradient>& gradients) {
+                                                     std::vector<BatchGradient>& gradients) {
   Engines& e = *engines_;
   const auto lanes = std::size_t(stride());
   gradients.assign(members_.size(), {});

@@ -14,8 +14,8 @@ namespace pliant {
 
 /// Where a batch is computed.
 enum class BatchDevice {
-  Host,  ///< in the lanes of this processor's registers, eight members at a time
-  Cuda,  ///< on the first CUDA device, all members at once; needs PLIANT_WITH_CUDA
+  Host,   ///< in the lanes of this processor's registers, eight members at a time
+  Cuda,   ///< on the first CUDA device, all members at once; needs PLIANT_WITH_CUDA
   Mimic,  ///< on this processor as a device does it, member by member: slow, a check of the device's kernels
 };
 
@@ -25,13 +25,13 @@ int cuda_device_count(std::string* reason = nullptr);
 
 /// What all members of a batch have in common.
 struct BatchOptions {
-  double dt = 0.0;                                            ///< [s], > 0
-  double newmark_theta = 0.51;                                ///< [0.5, 1), see `StepOptions`
-  double contact_weight = 0.6;                                ///< (0.5, 1]
-  double rotation_prediction = 0.5;                           ///< [0, 1]
-  double tolerance = 1e-6;                                    ///< of |b - A x| / |b| in double precision, [1e-12, 1)
-  int max_iterations = 500;                                   ///< of one equation, >= 1
-  std::vector<int> held;                                      ///< nodes that stay where they are
+  double dt = 0.0;                   ///< [s], > 0
+  double newmark_theta = 0.51;       ///< [0.5, 1), see `StepOptions`
+  double contact_weight = 0.6;       ///< (0.5, 1]
+  double rotation_prediction = 0.5;  ///< [0, 1]
+  double tolerance = 1e-6;           ///< of |b - A x| / |b| in double precision, [1e-12, 1)
+  int max_iterations = 500;          ///< of one equation, >= 1
+  std::vector<int> held;             ///< nodes that stay where they are
   /// Young's modulus of each element in units of the member's [-], > 0. Empty: the body's `ModulusField::relative`,
   /// where that has one control.
   std::vector<double> relative_moduli;
@@ -44,17 +44,17 @@ struct BatchOptions {
 
 /// A member's numbers.
 struct BatchMember {
-  double youngs_modulus = 0.0;     ///< [Pa], > 0
-  double poissons_ratio = 0.0;     ///< (-1, 0.5)
-  double mass_damping = 0.0;       ///< Rayleigh, [1/s], >= 0
-  double stiffness_damping = 0.0;  ///< Rayleigh, [s], >= 0
-  double density = 0.0;            ///< [kg/m^3], > 0
-  Vector3 gravity = Vector3::Zero();         ///< [m/s^2]
-  Vector3 plane_point = Vector3::Zero();     ///< [m]
-  Vector3 plane_normal = Vector3::UnitY();   ///< unit length, out of the plane
-  double friction = 0.0;                     ///< Coulomb's coefficient [-], >= 0
-  double contact_stiffness = 0.0;            ///< [Pa/m]; 0: that of `BatchOptions::contact`
-  State start;                               ///< n x 3 each; empty positions: where nodes rest, empty velocities: none
+  double youngs_modulus = 0.0;              ///< [Pa], > 0
+  double poissons_ratio = 0.0;              ///< (-1, 0.5)
+  double mass_damping = 0.0;                ///< Rayleigh, [1/s], >= 0
+  double stiffness_damping = 0.0;           ///< Rayleigh, [s], >= 0
+  double density = 0.0;                     ///< [kg/m^3], > 0
+  Vector3 gravity = Vector3::Zero();        ///< [m/s^2]
+  Vector3 plane_point = Vector3::Zero();    ///< [m]
+  Vector3 plane_normal = Vector3::UnitY();  ///< unit length, out of the plane
+  double friction = 0.0;                    ///< Coulomb's coefficient [-], >= 0
+  double contact_stiffness = 0.0;           ///< [Pa/m]; 0: that of `BatchOptions::contact`
+  State start;                              ///< n x 3 each; empty positions: where nodes rest, empty velocities: none
 };
 
 /// Derivatives of a scalar cost by a member's numbers, each by the number of the same name. By the contact's stiffness
@@ -69,7 +69,7 @@ struct BatchGradient {
 /// How one member's run went.
 struct BatchRun {
   bool succeeded = false;
-  int steps = 0;              ///< that were taken: a member whose equation cannot be solved stays where it is
+  int steps = 0;               ///< that were taken: a member whose equation cannot be solved stays where it is
   long solver_iterations = 0;  ///< of conjugate gradients, of all its steps
 };
 
@@ -114,7 +114,7 @@ class MotionBatch {
   /// @param on_states  called forwards, as above; may be empty
   /// @param gradients  out: one a member
   std::vector<BatchRun> run_adjoint(int steps, const std::vector<int>& at, const OnStates& on_states,
-                                        const AddCotangents& add_cotangents, std::vector<BatchGradient>& gradients);
+                                    const AddCotangents& add_cotangents, std::vector<BatchGradient>& gradients);
 
   /// Members whose numbers stand beside each other in memory: those that an engine moves.
   int stride() const;
@@ -123,8 +123,7 @@ class MotionBatch {
   struct Engines;
   void check(int steps, const std::vector<int>& at) const;
   void begin();
-  std::vector<BatchRun> collect_gradients(std::vector<BatchRun> summaries,
-                                              std::vector<BatchGradient>& gradients);
+  std::vector<BatchRun> collect_gradients(std::vector<BatchRun> summaries, std::vector<BatchGradient>& gradients);
 
   std::shared_ptr<const Body> body_;
   BatchOptions options_;

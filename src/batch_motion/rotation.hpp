@@ -117,12 +117,9 @@ PLIANT_DEVICE void rate_inverse(const Real* R, const Real* F, Real* inverse) {
   for (int k = 0; k < 6; ++k) inverse[k] = adjoint[k] / det;
   if (all(is_safe)) return;
   const Real floor = Real(1e-12) * squares;  // (H^2 + (1e-6 |F|)^2 I)^-1 H
-  Real G[6] = {H[0] * H[0] + H[1] * H[1] + H[2] * H[2] + floor,
-               H[0] * H[1] + H[1] * H[3] + H[2] * H[4],
-               H[0] * H[2] + H[1] * H[4] + H[2] * H[5],
-               H[1] * H[1] + H[3] * H[3] + H[4] * H[4] + floor,
-               H[1] * H[2] + H[3] * H[4] + H[4] * H[5],
-               H[2] * H[2] + H[4] * H[4] + H[5] * H[5] + floor};
+  Real G[6] = {H[0] * H[0] + H[1] * H[1] + H[2] * H[2] + floor, H[0] * H[1] + H[1] * H[3] + H[2] * H[4],
+               H[0] * H[2] + H[1] * H[4] + H[2] * H[5],         H[1] * H[1] + H[3] * H[3] + H[4] * H[4] + floor,
+               H[1] * H[2] + H[3] * H[4] + H[4] * H[5],         H[2] * H[2] + H[4] * H[4] + H[5] * H[5] + floor};
   Real A[6], B[6];
   const Real det2 = adjugate(G, A);
   B[0] = A[0] * H[0] + A[1] * H[1] + A[2] * H[2];

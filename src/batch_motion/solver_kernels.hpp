@@ -23,10 +23,10 @@ enum SolverNumber : int {
   Target,        // of them
   Alpha,
   Beta,
-  Iterations,    // of the last equation
+  Iterations,  // of the last equation
   AllIterations,
-  Refinements,   // of the last equation
-  Steps,         // that were taken
+  Refinements,  // of the last equation
+  Steps,        // that were taken
   solver_number_count
 };
 
@@ -51,8 +51,7 @@ struct Residual {
     Real inertia[3], sum[3];
     const Real free = Real(mesh.held[node] ? 0.0 : 1.0), mass = mass_factor(step, members, lane);
     mass_times(mesh, x, node, inertia, lane);
-    for (int i = 0; i < 3; ++i)
-      sum[i] = lane.load(right, 3 * std::size_t(node) + std::size_t(i)) - mass * inertia[i];
+    for (int i = 0; i < 3; ++i) sum[i] = lane.load(right, 3 * std::size_t(node) + std::size_t(i)) - mass * inertia[i];
     add_corners(mesh, element_product, -1.0, node, sum, lane);
     add_touches(mesh, touched, sample_product, -1.0, node, sum, lane);
     for (int i = 0; i < 3; ++i) lane.store(residual, 3 * std::size_t(node) + std::size_t(i), sum[i] * free);
@@ -82,7 +81,8 @@ template <class Lane>
 PLIANT_DEVICE typename Lane::Real sum_chunks(const MeshView& mesh, const double* partial, int columns, int column,
                                              const Lane& lane) {
   typename Lane::Real sum = lane.load(partial, std::size_t(column));
-  for (int c = 1; c < mesh.chunks; ++c) sum += lane.load(partial, std::size_t(columns) * std::size_t(c) + std::size_t(column));
+  for (int c = 1; c < mesh.chunks; ++c)
+    sum += lane.load(partial, std::size_t(columns) * std::size_t(c) + std::size_t(column));
   return sum;
 }
 
@@ -197,9 +197,10 @@ struct BackwardSweep {
     for (int k = mesh.row_start[row]; k < mesh.row_start[row + 1]; ++k) {
       const std::size_t block = 9 * std::size_t(k), column = 3 * std::size_t(mesh.column[k]);
       for (std::size_t i = 0; i < 3; ++i)
-        lane.store(t, column + i,
-                   lane.load(t, column + i) - (lane.load(scaled, block + i) * v0 + lane.load(scaled, block + 3 + i) * v1 +
-                                               lane.load(scaled, block + 6 + i) * v2));
+        lane.store(
+            t, column + i,
+            lane.load(t, column + i) - (lane.load(scaled, block + i) * v0 + lane.load(scaled, block + 3 + i) * v1 +
+                                        lane.load(scaled, block + 6 + i) * v2));
     }
   }
 };

@@ -19,9 +19,9 @@ struct Advance {
       const std::size_t k = 3 * std::size_t(node) + i;
       const Real own = lane.load(x, k), speed = lane.load(v, k), d = lane.load(way, k);
       lane.store(x, k, select(is_alive, own + d, own));
-      lane.store(v, k, select(is_alive,
-                              d * Real(1.0 / (step.theta * step.dt)) - speed * Real((1.0 - step.theta) / step.theta),
-                              speed));
+      lane.store(v, k,
+                 select(is_alive,
+                        d * Real(1.0 / (step.theta * step.dt)) - speed * Real((1.0 - step.theta) / step.theta), speed));
     }
   }
 };

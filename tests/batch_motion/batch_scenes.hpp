@@ -129,8 +129,8 @@ inline std::vector<State> simulated(const BatchScene& scene, const BatchMember& 
 /// States of all members at the end.
 inline std::vector<State> ends(MotionBatch& batch, int steps, std::vector<BatchRun>* runs = nullptr) {
   std::vector<State> end;
-  const std::vector<BatchRun> all = batch.run(
-      steps, {steps}, [&](int, std::span<const State> states) { end.assign(states.begin(), states.end()); });
+  const std::vector<BatchRun> all =
+      batch.run(steps, {steps}, [&](int, std::span<const State> states) { end.assign(states.begin(), states.end()); });
   if (runs) *runs = all;
   return end;
 }

@@ -53,11 +53,12 @@ TEST_F(CudaBatch, GradientsAreTheHosts) {
     const auto gradients = [&](BatchDevice device) {
       MotionBatch batch = batch_of(scene, device);
       std::vector<BatchGradient> all;
-      batch.run_adjoint(steps, {steps}, {},
-                        [&](int, std::span<const State> states, std::span<State> bars) {
-                          for (std::size_t k = 0; k < states.size(); ++k) bars[k].x = states[k].x;
-                        },
-                        all);
+      batch.run_adjoint(
+          steps, {steps}, {},
+          [&](int, std::span<const State> states, std::span<State> bars) {
+            for (std::size_t k = 0; k < states.size(); ++k) bars[k].x = states[k].x;
+          },
+          all);
       return all;
     };
     const std::vector<BatchGradient> expected = gradients(BatchDevice::Host), found = gradients(BatchDevice::Cuda);

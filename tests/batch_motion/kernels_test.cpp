@@ -46,7 +46,8 @@ TEST(BatchKernels, RotationsAndTheirRatesAreThoseOfThePolarDecomposition) {
     for (std::size_t k = 0; k < 9; ++k) EXPECT_NEAR(R[k], truth[k], tolerance(1e-12) / polar.S.trace());
     batch_motion::rate_inverse<double, bool>(R, rows.data(), H);
     const Matrix3& inverse = polar.rate_inverse;
-    const double expected[6] = {inverse(0, 0), inverse(0, 1), inverse(0, 2), inverse(1, 1), inverse(1, 2), inverse(2, 2)};
+    const double expected[6] = {inverse(0, 0), inverse(0, 1), inverse(0, 2),
+                                inverse(1, 1), inverse(1, 2), inverse(2, 2)};
     for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(H[k], expected[k], tolerance(1e-9) * (1.0 + inverse.norm()));
     inverted += F.determinant() < 0.0;
   }

@@ -147,14 +147,15 @@ TEST(MotionBatchAdjoint, GradientIsTheSimulations) {
         return true;
       };
       ASSERT_TRUE(simulation
-                      .run_adjoint(scene.theta(members[k]), steps, position_cost,
-                                   [&](int step, const State& state, Points& x_bar) {
-                                     State own{Points::Zero(x_bar.rows(), 3), Points::Zero(x_bar.rows(), 3)};
-                                     if (std::ranges::find(at, step) != at.end())
-                                       add_cost_cotangent(*scene.body, step, state, own);
-                                     x_bar += own.x;
-                                   },
-                                   bar, &nodes)
+                      .run_adjoint(
+                          scene.theta(members[k]), steps, position_cost,
+                          [&](int step, const State& state, Points& x_bar) {
+                            State own{Points::Zero(x_bar.rows(), 3), Points::Zero(x_bar.rows(), 3)};
+                            if (std::ranges::find(at, step) != at.end())
+                              add_cost_cotangent(*scene.body, step, state, own);
+                            x_bar += own.x;
+                          },
+                          bar, &nodes)
                       .succeeded);
       // The same without velocities in the batch.
       BatchOptions options = scene.options;
@@ -162,12 +163,13 @@ TEST(MotionBatchAdjoint, GradientIsTheSimulations) {
       MotionBatch batch(scene.body, options, 1);
       batch.set_member(0, members[k]);
       std::vector<BatchGradient> gradients;
-      batch.run_adjoint(steps, at, {},
-                        [&](int step, std::span<const State> states, std::span<State> bars) {
-                          add_cost_cotangent(*scene.body, step, states[0], bars[0]);
-                          bars[0].v.setZero();
-                        },
-                        gradients);
+      batch.run_adjoint(
+          steps, at, {},
+          [&](int step, std::span<const State> states, std::span<State> bars) {
+            add_cost_cotangent(*scene.body, step, states[0], bars[0]);
+            bars[0].v.setZero();
+          },
+          gradients);
       const BatchGradient& g = gradients.front();
       const auto near = [](double a, double b, const char* name) {
         EXPECT_NEAR(a, b, tolerance(1e-7) * std::abs(b) + tolerance(1e-12)) << name;

@@ -32,14 +32,14 @@ double relative_difference(const BatchScene& scene, int steps, double solver_tol
     const double way = test::farthest(truth.back().x, truth.front().x);
     const double speed = truth.back().v.rowwise().norm().maxCoeff();
     EXPECT_GT(way, 0.05 * own.body->size());
-    largest = std::max({largest, test::farthest(end[k].x, truth.back().x) / way,
-                        test::farthest(end[k].v, truth.back().v) / speed});
+    largest = std::max(
+        {largest, test::farthest(end[k].x, truth.back().x) / way, test::farthest(end[k].v, truth.back().v) / speed});
   }
   return largest;
 }
 
-// A step's error is at most about the tolerance times the condition of its matrix, some thousands; softly damped motions
-// carry it along.
+// A step's error is at most about the tolerance times the condition of its matrix, some thousands; softly damped
+// motions carry it along.
 constexpr double steps_amplify = 1e3;
 
 TEST(MotionBatch, HexahedraInContactMoveAsTheStepperHasThem) {
@@ -201,7 +201,9 @@ TEST(MotionBatch, RefusesBadInputInWords) {
   EXPECT_THAT(with([](BatchOptions& o) { o.held = {100000}; }), HasSubstr("node 100000 is held"));
   EXPECT_THAT(with([](BatchOptions& o) { o.relative_moduli = {1.0}; }), HasSubstr("one relative modulus an element"));
   EXPECT_THAT(refusal([&] { MotionBatch(bar.body, bar.options, 0); }), HasSubstr("at least one member"));
-  EXPECT_THAT(refusal([&] { MotionBatch(test::tet_body({0.2, 0.1, 0.1}, {2, 1, 1}, true), bar.options, 1); }),
+  EXPECT_THAT(refusal([&] {
+                MotionBatch(test::tet_body({0.2, 0.1, 0.1}, {2, 1, 1}, true), bar.options, 1);
+              }),
               HasSubstr("not quadratic ones"));
 
   MotionBatch batch(bar.body, bar.options, 2);
