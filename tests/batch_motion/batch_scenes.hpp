@@ -1,6 +1,6 @@
 #pragma once
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "batch_motion/motion_batch.hpp"
 #include "motion/simulation.hpp"

@@ -1,4 +1,7 @@
+#include <gtest/gtest.h>
+
 #include <Eigen/Geometry>
+#include <array>
 #include <random>
 
 #include "batch_motion/contact_kernels.hpp"

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <functional>
+
 #include "batch_motion/motion_batch.hpp"
 #include "batch_scenes.hpp"
 #include "support/tolerance.hpp"

@@ -1,5 +1,6 @@
 #include "batch_motion/motion_batch.hpp"
 
+#include <functional>
 #include <stdexcept>
 
 #include "batch_scenes.hpp"
