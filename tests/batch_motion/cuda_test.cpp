@@ -1,3 +1,5 @@
+#include <gmock/gmock.h>
+
 #include "batch_motion/motion_batch.hpp"
 #include "batch_scenes.hpp"
 #include "support/tolerance.hpp"
