@@ -59,14 +59,14 @@ class EngineMaker {
 };
 
 /// In the lanes of this processor's registers.
-std::unique_ptr<EngineMaker> make_host_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+std::unique_ptr<EngineMaker> make_host_engines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step,
                                                const SolverNumbers& solver);
 /// On this processor, but with a device's kernels and order: slow, a check of what only devices do. The mesh is one by
 /// colours.
-std::unique_ptr<EngineMaker> make_mimic_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+std::unique_ptr<EngineMaker> make_mimic_engines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step,
                                                 const SolverNumbers& solver);
 /// On the first CUDA device. Throws std::runtime_error where there is none, or the program was built without CUDA.
-std::unique_ptr<EngineMaker> make_cuda_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+std::unique_ptr<EngineMaker> make_cuda_engines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step,
                                                const SolverNumbers& solver);
 /// Devices that can be used; why there is none in `reason`.
 int count_cuda_devices(std::string& reason);

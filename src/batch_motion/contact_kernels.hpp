@@ -59,8 +59,8 @@ PLIANT_DEVICE Touch<typename Lane::Real> touch(const MeshView& mesh, const StepN
     }
   }
   for (int i = 0; i < 3; ++i) {
-    c.n[i] = lane.load(members, std::size_t(PlaneNormal + i));
-    c.from_plane[i] = y[i] - lane.load(members, std::size_t(PlanePoint + i));
+    c.n[i] = lane.load(members, std::size_t(PlaneNormal) + std::size_t(i));
+    c.from_plane[i] = y[i] - lane.load(members, std::size_t(PlanePoint) + std::size_t(i));
     c.q[i] = start[i] - y[i];
     gap += c.n[i] * c.from_plane[i];
     squares += c.n[i] * c.n[i];
@@ -124,7 +124,8 @@ struct SampleProducts {
           u[i] += lane.load(way, 3 * std::size_t(mesh.sample_node[corner]) + std::size_t(i)) *
                   Real(mesh.sample_weight[corner]);
       }
-      for (int i = 0; i < 3; ++i) n[i] = lane.load(members, std::size_t(PlaneNormal + i)), squares += n[i] * n[i];
+      for (int i = 0; i < 3; ++i)
+        n[i] = lane.load(members, std::size_t(PlaneNormal) + std::size_t(i)), squares += n[i] * n[i];
       const Real scale = Real(step.dt * step.contact_weight), drag = scale * lane.load(matrix, 2 * s + 1);
       const Real along = (scale * slope - drag / squares) * dot(n, u);
       for (int i = 0; i < 3; ++i) out[i] = along * n[i] + drag * u[i];

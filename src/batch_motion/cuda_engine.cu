@@ -184,7 +184,7 @@ int count_cuda_devices(std::string& reason) {
   return count;
 }
 
-std::unique_ptr<EngineMaker> make_cuda_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+std::unique_ptr<EngineMaker> make_cuda_engines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step,
                                                const SolverNumbers& solver) {
   std::string reason;
   if (count_cuda_devices(reason) == 0) throw std::runtime_error("no CUDA device: " + reason);

@@ -208,7 +208,7 @@ class Engine : public BatchEngine {
   void prepare();
   /// A x = b, from the x at hand.
   /// @param has_product  whether the elements' product with it is there
-  void solve(const double* b, double* x, bool has_product);
+  void solve(const double* b, Array<double>& x, bool has_product);
   void iterate();
 
   std::shared_ptr<Shared<Backend>> shared_;
@@ -250,13 +250,14 @@ void Engine<Backend, N>::step() {
                                                  o.rotation.data(), o.element_force.data(), o.element_product.data()});
   backend_.each(mesh_.nodes, StepRight{mesh_, step, members_.data(), v_.data(), o.element_force.data(),
                                        o.sample_force.data(), o.touched.data(), o.right.data()});
-  solve(o.right.data(), o.way.data(), true);
+  solve(o.right.data(), o.way, true);
   backend_.each(mesh_.nodes, Advance{step, number(IsAlive), o.way.data(), x_.data(), v_.data()});
   backend_.each(1, CountSteps{numbers_.data()});
 }
 
 template <class Backend, int N>
-void Engine<Backend, N>::solve(const double* b, double* x, bool has_product) {
+void Engine<Backend, N>::solve(const double* b, Array<double>& solution, bool has_product) {
+  double* const x = solution.data();
   Workspace<Backend>& o = *work_;
   const SolverNumbers& solver = shared_->solver;
   const StepNumbers& step = shared_->step;
@@ -330,7 +331,7 @@ void Engine<Backend, N>::adjoint_step(int slot) {
   backend_.each(mesh_.nodes, AdjointRight{mesh_, step, adjoint_steps_ > 1 ? 1.0 : 0.0, x_bar_.data(), v_bar_.data(),
                                           w_.data(), before_.data(), o.right.data()});
   ++adjoint_steps_;
-  solve(o.right.data(), w_.data(), false);
+  solve(o.right.data(), w_, false);
   backend_.each(mesh_.elements, ElementAdjoint<N>{mesh_, step, stiffness(), members_.data(), x_.data(), v_.data(),
                                                   added_.data(), o.rotation.data(), w_.data(), o.element_force.data(),
                                                   a.element_v_bar.data(), a.element_sum.data()});

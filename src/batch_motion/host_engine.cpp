@@ -146,12 +146,12 @@ class HostEngines : public EngineMaker {
 
 }  // namespace
 
-std::unique_ptr<EngineMaker> make_host_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+std::unique_ptr<EngineMaker> make_host_engines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step,
                                                const SolverNumbers& solver) {
   return std::make_unique<HostEngines<LaneBackend>>(mesh, step, solver);
 }
 
-std::unique_ptr<EngineMaker> make_mimic_engines(std::shared_ptr<const MeshData> mesh, const StepNumbers& step,
+std::unique_ptr<EngineMaker> make_mimic_engines(const std::shared_ptr<const MeshData>& mesh, const StepNumbers& step,
                                                 const SolverNumbers& solver) {
   return std::make_unique<HostEngines<MimicBackend>>(mesh, step, solver);
 }

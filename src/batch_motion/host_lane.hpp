@@ -137,6 +137,7 @@ PLIANT_DEVICE Pack<double> select(const PackMask& mask, const Pack<double>& a, c
   return Pack<double>(Registers<double>::of([](auto m, auto x, auto y) PLIANT_INLINE_LAMBDA { return m ? x : y; },
                                             mask.values, a.values, b.values));
 }
+PLIANT_DEVICE PackMask both(const PackMask& one, const PackMask& other) { return one & other; }
 PLIANT_DEVICE PackMask negated(const PackMask& mask) {
   return PackMask(PackMask::Values::of([](auto x) PLIANT_INLINE_LAMBDA { return ~x; }, mask.values));
 }

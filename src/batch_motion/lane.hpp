@@ -24,6 +24,7 @@ PLIANT_DEVICE double select(bool mask, double a, double b) { return mask ? a : b
 PLIANT_DEVICE bool any(bool mask) { return mask; }
 PLIANT_DEVICE bool all(bool mask) { return mask; }
 PLIANT_DEVICE bool negated(bool mask) { return !mask; }
+PLIANT_DEVICE bool both(bool one, bool other) { return one && other; }
 PLIANT_DEVICE int lane_count(double) { return 1; }
 PLIANT_DEVICE double lane_of(double value, int) { return value; }
 PLIANT_DEVICE bool lane_of(bool mask, int) { return mask; }

@@ -92,7 +92,7 @@ struct StepRight {
     const double free = mesh.held[node] ? 0.0 : 1.0;
     Real force[3], inertia[3];
     const Real density = lane.load(members, Density), weight = density * Real(mesh.nodal_volume[node]);
-    for (int i = 0; i < 3; ++i) force[i] = weight * lane.load(members, std::size_t(Gravity + i));
+    for (int i = 0; i < 3; ++i) force[i] = weight * lane.load(members, std::size_t(Gravity) + std::size_t(i));
     add_corners(mesh, element_force, 1.0, node, force, lane);
     add_touches(mesh, touched, sample_force, 1.0, node, force, lane);
     mass_times(mesh, v, node, inertia, lane);
@@ -150,7 +150,8 @@ struct StepMatrix {
       slope += lane.load(sample_matrix, 2 * sample) * Real(mesh.pair_weight[p]);
       if (step.friction_way > 0.0) drag += lane.load(sample_matrix, 2 * sample + 1) * Real(mesh.pair_weight[p]);
     }
-    for (int i = 0; i < 3; ++i) n[i] = lane.load(members, std::size_t(PlaneNormal + i)), squares += n[i] * n[i];
+    for (int i = 0; i < 3; ++i)
+      n[i] = lane.load(members, std::size_t(PlaneNormal) + std::size_t(i)), squares += n[i] * n[i];
     const Real scale = Real(step.dt * step.contact_weight);
     slope *= scale, drag *= scale;
     const Real along = slope - drag / squares;

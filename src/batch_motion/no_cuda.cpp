@@ -9,7 +9,7 @@ int count_cuda_devices(std::string& reason) {
   return 0;
 }
 
-std::unique_ptr<EngineMaker> make_cuda_engines(std::shared_ptr<const MeshData>, const StepNumbers&,
+std::unique_ptr<EngineMaker> make_cuda_engines(const std::shared_ptr<const MeshData>&, const StepNumbers&,
                                                const SolverNumbers&) {
   std::string reason;
   count_cuda_devices(reason);

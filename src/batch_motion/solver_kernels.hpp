@@ -106,7 +106,7 @@ struct JudgeResidual {
       lane.store(numbers, Iterations, zero);
       lane.store(numbers, Refinements, zero);
     }
-    const auto is_open = (lane.load(numbers, IsOpen) > zero) & negated(r <= goal) & (r < Real(1e300));
+    const auto is_open = both(both(lane.load(numbers, IsOpen) > zero, negated(r <= goal)), r < Real(1e300));
     const auto is_solved = (r <= goal);
     // A member that is neither solved nor open any more has failed: its residual is no number.
     lane.store(numbers, IsAlive, select(is_open | is_solved, lane.load(numbers, IsAlive), zero));
@@ -300,8 +300,8 @@ struct NextDirection {
   PLIANT_DEVICE void operator()(int, const Lane& lane) const {
     using Real = typename Lane::Real;
     const Real zero = Real(0.0), rho = sum_chunks(mesh, partial, 1, 0, lane), before = lane.load(numbers, Rho);
-    const auto goes_on = (lane.load(numbers, IsIterating) > zero) & (rho > lane.load(numbers, Target)) &
-                         (lane.load(numbers, Iterations) < Real(most_iterations));
+    const auto goes_on = both(both(lane.load(numbers, IsIterating) > zero, rho > lane.load(numbers, Target)),
+                              lane.load(numbers, Iterations) < Real(most_iterations));
     lane.store(numbers, IsIterating, select(goes_on, Real(1.0), zero));
     lane.store(numbers, Beta, select(goes_on, rho / before, zero));
     lane.store(numbers, Rho, rho);

@@ -144,7 +144,7 @@ struct AddGradient {
                       (Real(1.0 / (step.theta * step.dt)) + lane.load(members, MassDamping)) * by_way;
     for (int i = 0; i < 3; ++i) {
       const Real volume = sum(node_partial, node_chunks, 5, 2 + i) * Real(step.dt);
-      by_density += volume * lane.load(members, std::size_t(Gravity + i));
+      by_density += volume * lane.load(members, std::size_t(Gravity) + std::size_t(i));
       add(ByGravity + i, density * volume);
     }
     add(ByDensity, by_density);

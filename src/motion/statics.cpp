@@ -13,8 +13,10 @@ Statics::Statics(std::shared_ptr<const Body> body, std::vector<ForceTerm*> terms
     : body_(std::move(body)),
       terms_(std::move(terms)),
       options_(options),
-      pattern_(pattern ? std::move(pattern) : body_->pattern),
-      newton_(options.newton) {}
+      pattern_(std::move(pattern)),
+      newton_(options.newton) {
+  if (!pattern_) pattern_ = body_->pattern;
+}
 
 void Statics::clear_held(Points& points) const {
   for (const int row : held_) points.row(row).setZero();
