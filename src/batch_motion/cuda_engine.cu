@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "batch_motion/engine.hpp"
+#include "batch_motion/owned_array.hpp"
 
 namespace pliant::batch_motion {
 
@@ -14,38 +15,21 @@ void check(cudaError_t error, const char* what) {
   throw std::runtime_error(std::string("CUDA could not ") + what + ": " + cudaGetErrorString(error));
 }
 
-/// Memory of the device, zero at first.
-template <class Number>
-class DeviceArray {
- public:
-  DeviceArray() = default;
-  explicit DeviceArray(std::size_t size) { resize(size); }
-  DeviceArray(DeviceArray&& other) noexcept
-      : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
-  DeviceArray& operator=(DeviceArray&& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
-    return *this;
+struct DeviceMemory {
+  static void* allocate(std::size_t bytes) {
+    void* memory = nullptr;
+    check(cudaMalloc(&memory, bytes), "allocate memory for the batch: use fewer members at a time");
+    if (const cudaError_t error = cudaMemset(memory, 0, bytes); error != cudaSuccess) {
+      cudaFree(memory);
+      check(error, "clear memory");
+    }
+    return memory;
   }
-  ~DeviceArray() { cudaFree(data_); }
-  /// What it held is lost where the size changes.
-  void resize(std::size_t size) {
-    if (size == size_) return;
-    check(cudaFree(std::exchange(data_, nullptr)), "free memory");
-    size_ = 0;
-    if (size == 0) return;
-    check(cudaMalloc(&data_, size * sizeof(Number)), "allocate memory for the batch: use fewer members at a time");
-    check(cudaMemset(data_, 0, size * sizeof(Number)), "clear memory");
-    size_ = size;
-  }
-  Number* data() { return data_; }
-  const Number* data() const { return data_; }
-  std::size_t size() const { return size_; }
-
- private:
-  Number* data_ = nullptr;
-  std::size_t size_ = 0;
+  static void release(void* memory, std::size_t) { cudaFree(memory); }
 };
+
+template <class Number>
+using DeviceArray = OwnedArray<Number, DeviceMemory>;
 
 constexpr unsigned members_of_block = 32, items_of_block = 8;
 

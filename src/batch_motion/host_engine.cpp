@@ -7,6 +7,7 @@
 
 #include "batch_motion/engine.hpp"
 #include "batch_motion/host_lane.hpp"
+#include "batch_motion/owned_array.hpp"
 
 namespace pliant::batch_motion {
 
@@ -16,46 +17,18 @@ constexpr std::size_t cache_line = 64, huge_page = std::size_t(2) << 20;
 
 /// Memory that begins with a cache line; where there is much of it, in huge pages, if the system has them: kernels read
 /// matrices here and there, and looking up small pages would take as long as that.
-void* allocate(std::size_t bytes) {
-  const std::size_t alignment = bytes < huge_page ? cache_line : huge_page;
-  void* memory = ::operator new[](bytes, std::align_val_t(alignment));
+struct AlignedMemory {
+  static std::align_val_t alignment(std::size_t bytes) {
+    return std::align_val_t(bytes < huge_page ? cache_line : huge_page);
+  }
+  static void* allocate(std::size_t bytes) {
+    void* memory = ::operator new[](bytes, alignment(bytes));
 #ifdef MADV_HUGEPAGE
-  if (alignment == huge_page) madvise(memory, bytes, MADV_HUGEPAGE);
+    if (bytes >= huge_page) madvise(memory, bytes, MADV_HUGEPAGE);
 #endif
-  return memory;
-}
-void release(void* memory, std::size_t bytes) {
-  ::operator delete[](memory, std::align_val_t(bytes < huge_page ? cache_line : huge_page));
-}
-
-template <class Number>
-class AlignedArray {
- public:
-  AlignedArray() = default;
-  explicit AlignedArray(std::size_t size) { resize(size); }
-  AlignedArray(AlignedArray&& other) noexcept
-      : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
-  AlignedArray& operator=(AlignedArray&& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
-    return *this;
+    return std::memset(memory, 0, bytes);
   }
-  ~AlignedArray() { release(data_, size_ * sizeof(Number)); }
-  /// What it held is lost where the size changes.
-  void resize(std::size_t size) {
-    if (size == size_) return;
-    release(std::exchange(data_, nullptr), size_ * sizeof(Number));
-    data_ = static_cast<Number*>(allocate(size * sizeof(Number)));
-    size_ = size;
-    for (std::size_t i = 0; i < size; ++i) data_[i] = Number(0);
-  }
-  Number* data() { return data_; }
-  const Number* data() const { return data_; }
-  std::size_t size() const { return size_; }
-
- private:
-  Number* data_ = nullptr;
-  std::size_t size_ = 0;
+  static void release(void* memory, std::size_t bytes) { ::operator delete[](memory, alignment(bytes)); }
 };
 
 /// Items one after the other, `lane_width` members at once.
@@ -108,7 +81,7 @@ struct MimicBackend {
 template <class Runner>
 struct HostBackend : Runner {
   template <class Number>
-  using Array = AlignedArray<Number>;
+  using Array = OwnedArray<Number, AlignedMemory>;
   static constexpr int iterations_together = 1;
 
   /// The mesh stays where it is.

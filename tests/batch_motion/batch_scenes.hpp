@@ -135,6 +135,18 @@ inline std::vector<State> ends(MotionBatch& batch, int steps, std::vector<BatchR
   return end;
 }
 
+/// Gradients of half the sum of squares of all nodes' positions at the end, one a member.
+inline std::vector<BatchGradient> gradients_of_ends(MotionBatch& batch, int steps) {
+  std::vector<BatchGradient> all;
+  batch.run_adjoint(
+      steps, {steps}, {},
+      [](int, std::span<const State> states, std::span<State> bars) {
+        for (std::size_t k = 0; k < states.size(); ++k) bars[k].x = states[k].x;
+      },
+      all);
+  return all;
+}
+
 inline double farthest(const Points& a, const Points& b) { return (a - b).rowwise().norm().maxCoeff(); }
 
 }  // namespace pliant::test

@@ -54,14 +54,7 @@ TEST_F(CudaBatch, GradientsAreTheHosts) {
   for (const BatchScene& scene : {test::batch_torus(0.05), test::batch_bar({6, 2, 2})}) {
     const auto gradients = [&](BatchDevice device) {
       MotionBatch batch = batch_of(scene, device);
-      std::vector<BatchGradient> all;
-      batch.run_adjoint(
-          steps, {steps}, {},
-          [&](int, std::span<const State> states, std::span<State> bars) {
-            for (std::size_t k = 0; k < states.size(); ++k) bars[k].x = states[k].x;
-          },
-          all);
-      return all;
+      return test::gradients_of_ends(batch, steps);
     };
     const std::vector<BatchGradient> expected = gradients(BatchDevice::Host), found = gradients(BatchDevice::Cuda);
     for (std::size_t k = 0; k < members; ++k) {

@@ -43,14 +43,7 @@ TEST(BatchDeviceOrder, GradientsAreTheLanes) {
   for (const BatchScene& scene : scenes()) {
     const auto gradients = [&](BatchDevice device) {
       MotionBatch batch = batch_of(scene, device);
-      std::vector<BatchGradient> all;
-      batch.run_adjoint(
-          steps, {steps}, {},
-          [&](int, std::span<const State> states, std::span<State> bars) {
-            for (std::size_t k = 0; k < states.size(); ++k) bars[k].x = states[k].x;
-          },
-          all);
-      return all;
+      return test::gradients_of_ends(batch, steps);
     };
     const std::vector<BatchGradient> expected = gradients(BatchDevice::Host), found = gradients(BatchDevice::Mimic);
     for (std::size_t k = 0; k < members; ++k) {
