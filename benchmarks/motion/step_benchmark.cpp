@@ -74,7 +74,8 @@ struct Motion {
   }
 };
 
-SolverOptions iterative(double tolerance) { return {SolverKind::Iterative, tolerance, 500}; }
+/// Derivatives as exact as a fit has them.
+SolverOptions iterative(double tolerance) { return {SolverKind::Iterative, tolerance, 500, 1e3 * tolerance}; }
 
 StepOptions step_options(double dt, Integrator integrator) {
   StepOptions options;

@@ -362,8 +362,8 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
   settings.newmark_theta = options_.newmark_theta;
   settings.solver.kind = options_.solver;
   settings.solver.tolerance = options_.solver_tolerance;
-  settings.solver.column_tolerance =
-      1e3 * options_.solver_tolerance;  // tangents lead to the minimum, they do not move it
+  settings.solver.derivative_tolerance =
+      1e3 * options_.solver_tolerance;  // derivatives lead to the minimum, they do not move it
   settings.hold_strongly = options_.hold_strongly;
   settings.integrator = options_.integrator;
   if (options_.material == MaterialKind::Linear || change.small_strain) settings.elastic_law = ElasticLaw::Corotated;

@@ -251,8 +251,13 @@ bool Stepper::prepare_derivatives(const State& start, const Points& delta) {
   return factorise_exact(scheme());
 }
 
-void Stepper::solve_derivative(const Points& b, Points& y, GeneralSolver::Side side, double tolerance) {
-  general_->solve(flat(b), solution_, tolerance, side);
+namespace {
+constexpr double tolerance_of_implicit_derivatives = 1e-12;  // where no other is asked for
+}  // namespace
+
+void Stepper::solve_derivative(const Points& b, Points& y, GeneralSolver::Side side) {
+  const double asked = options_.solver.derivative_tolerance;
+  general_->solve(flat(b), solution_, asked > 0.0 ? asked : tolerance_of_implicit_derivatives, side);
   y = as_points(std::as_const(solution_));
 }
 
@@ -262,7 +267,6 @@ void Stepper::prepare_reference_derivatives(const State& start, const Points& de
 }
 
 namespace {
-constexpr double derivative_tolerance = 1e-12;  // of fully implicit steps, where no other is asked for
 constexpr std::size_t directions_together = 4;  // as many as wide registers take
 }  // namespace
 
@@ -324,8 +328,8 @@ void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d
   const double dt = options_.dt, t = options_.newmark_theta;
   const auto count = std::size_t(d_theta.cols());
   set_points_at(scheme(), start.x, delta);
-  tangent_forces_.resize(delta.size(), d_theta.cols());
-  tangent_solutions_.resize(delta.size(), d_theta.cols());
+  derivative_right_.resize(delta.size(), d_theta.cols());
+  derivative_solutions_.resize(delta.size(), d_theta.cols());
   for (auto* points : {&d_blended_, &d_lag_[0], &d_lag_[1], &d_force_})
     if (points->size() < count) points->resize(count, Points(delta.rows(), 3));
   for (auto& term : terms_) term->prepare_tangents(points_at_[std::size_t(term->at())], d_theta);
@@ -340,23 +344,22 @@ void Stepper::tangents(const State& start, const Points& delta, const MatrixX& d
   beside([&](std::size_t first, std::size_t some) {
     find_changes_of_force(start, delta, d_theta, changes, d_reference, first, some);
     for (std::size_t c = first; c < first + some && !is_newton(); ++c) {
-      tangent_forces_.col(Eigen::Index(c)) = flat(d_force_[c]);
-      tangent_solutions_.col(Eigen::Index(c)) = flat(changes[c].v) * dt;
+      derivative_right_.col(Eigen::Index(c)) = flat(d_force_[c]);
+      derivative_solutions_.col(Eigen::Index(c)) = flat(changes[c].v) * dt;
     }
   });
   if (is_newton()) {
-    const double asked = options_.solver.column_tolerance, tolerance = asked > 0.0 ? asked : derivative_tolerance;
     for (std::size_t c = 0; c < count; ++c) {
-      solve_derivative(d_force_[c], w_, GeneralSolver::Side::Plain, tolerance);
-      tangent_solutions_.col(Eigen::Index(c)) = flat(w_);
+      solve_derivative(d_force_[c], w_, GeneralSolver::Side::Plain);
+      derivative_solutions_.col(Eigen::Index(c)) = flat(w_);
     }
   } else {
-    solver_->solve_columns(tangent_forces_, tangent_solutions_);
+    solver_->solve_columns(derivative_right_, derivative_solutions_);
   }
   beside([&](std::size_t first, std::size_t some) {
     for (std::size_t c = first; c < first + some; ++c) {
       State& change = changes[c];
-      const Eigen::Map<const Points> solved(&tangent_solutions_(0, Eigen::Index(c)), delta.rows(), 3);
+      const Eigen::Map<const Points> solved(&derivative_solutions_(0, Eigen::Index(c)), delta.rows(), 3);
       change.x += solved;
       change.v = solved / (t * dt) - (1.0 - t) / t * change.v;
     }
@@ -370,19 +373,20 @@ void Stepper::adjoint(const State& start, const Points& delta, State& bar, Vecto
   force_ = bar.x + bar.v / (t * dt);
   clear_held(force_);
   if (is_newton()) {
-    solve_derivative(force_, w_, GeneralSolver::Side::Transposed, derivative_tolerance);
+    solve_derivative(force_, w_, GeneralSolver::Side::Transposed);
   } else {
     // Successive steps' solutions lie on a smooth curve, but for what frames between them add.
+    derivative_right_ = flat(force_);
     if (adjoint_solutions_ == 0)
-      solution_.setZero();
+      derivative_solutions_.setZero(delta.size(), 1);
     else
-      solution_ = adjoint_solution_[0];
-    if (adjoint_solutions_ > 1) solution_ += adjoint_solution_[0] - adjoint_solution_[1];
-    solver_->solve(flat(force_), solution_);
+      derivative_solutions_ = adjoint_solution_[0];
+    if (adjoint_solutions_ > 1) derivative_solutions_ += adjoint_solution_[0] - adjoint_solution_[1];
+    solver_->solve_columns(derivative_right_, derivative_solutions_);
     adjoint_solution_[1].swap(adjoint_solution_[0]);
-    adjoint_solution_[0] = solution_;
+    adjoint_solution_[0] = derivative_solutions_;
     ++adjoint_solutions_;
-    w_ = as_points(std::as_const(solution_));
+    w_ = as_points(std::as_const(adjoint_solution_[0]));
   }
   clear_held(w_);
 

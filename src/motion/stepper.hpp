@@ -140,8 +140,7 @@ class Stepper : private NewtonProblem {
   double size() const override { return body_->size(); }
 
   /// A y = b or A^T y = b with the matrix of the derivatives at hand.
-  /// @param tolerance  of |b - A y| / |b|
-  void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side, double tolerance);
+  void solve_derivative(const Points& b, Points& y, GeneralSolver::Side side);
   /// `d_force_`: changes of the step's right-hand side along directions from `first` on, Delta staying as it is.
   void find_changes_of_force(const State& start, const Points& delta, const MatrixX& d_theta,
                              std::span<const State> changes, std::span<const Points> d_reference, std::size_t first,
@@ -172,8 +171,8 @@ class Stepper : private NewtonProblem {
   std::array<std::vector<Points>, 2> d_lag_;  // by ForceTerm::Lag; of each direction, as the two below
   std::vector<Points> d_blended_, d_force_;
   VectorX solution_, right_;
-  MatrixX tangent_forces_, tangent_solutions_;  // one direction a column
-  std::array<VectorX, 2> adjoint_solution_;     // of the last adjoint steps with these parameters: guesses of the next
+  MatrixX derivative_right_, derivative_solutions_;  // one direction a column, or the adjoint's one
+  std::array<VectorX, 2> adjoint_solution_;  // of the last adjoint steps with these parameters: guesses of the next
   int adjoint_solutions_ = 0;
 };
 

@@ -374,7 +374,7 @@ bool CoarseSpace::factorise(const BlockMatrix& matrix) {
   return Eigen::internal::llt_inplace<double, Eigen::Lower>::blocked(dense_) == -1;
 }
 
-void CoarseSpace::restrict(const std::vector<double>& r) {
+void CoarseSpace::restrict(const std::vector<double>& r, const Layout& layout) {
   std::vector<Vector6>& b = levels_.front()->b;
   for_parts(Parts(std::size_t(aggregates_.count), 64), [&](std::size_t first, std::size_t last) {
     for (std::size_t a = first; a < last; ++a) {
@@ -382,7 +382,8 @@ void CoarseSpace::restrict(const std::vector<double>& r) {
       for (int m = aggregates_.member_start[a]; m < aggregates_.member_start[a + 1]; ++m) {
         const int row = aggregates_.member[m];
         if (is_alone_[row]) continue;
-        const Eigen::Map<const Vector3> own(&r[4 * std::size_t(row)]);
+        const double* entry = &r[layout.first + layout.row_stride * std::size_t(row)];
+        const Vector3 own(entry[0], entry[layout.stride], entry[2 * layout.stride]);
         sum.head<3>() += own;
         sum.tail<3>() += lever(row).cross(own);
       }
@@ -419,15 +420,17 @@ void CoarseSpace::cycle(std::size_t l) {
   level.relax(false);
 }
 
-void CoarseSpace::add_correction(const std::vector<double>& r, std::vector<double>& z) {
-  restrict(r);
+void CoarseSpace::add_correction(const std::vector<double>& r, std::vector<double>& z, const Layout& layout) {
+  restrict(r, layout);
   cycle(0);
   const std::vector<Vector6>& x = levels_.front()->x;
   for_parts(Parts(std::size_t(pattern_->rows)), [&](std::size_t first, std::size_t last) {
     for (std::size_t row = first; row < last; ++row) {
       if (is_alone_[row]) continue;
       const Vector6& motion = x[aggregates_.of[row]];
-      Eigen::Map<Vector3>(&z[4 * row]) += motion.head<3>() + motion.tail<3>().cross(lever(int(row)));
+      const Vector3 moved = motion.head<3>() + motion.tail<3>().cross(lever(int(row)));
+      for (std::size_t d = 0; d < 3; ++d)
+        z[layout.first + layout.row_stride * row + layout.stride * d] += moved[Eigen::Index(d)];
     }
   });
 }

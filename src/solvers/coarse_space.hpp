@@ -46,15 +46,19 @@ class CoarseSpace {
   /// T^T A T and all that follows from it. Rows that meet no other are left out: those held. False where it is not
   /// positive definite.
   [[nodiscard]] bool factorise(const BlockMatrix& matrix);
-  /// z += T C T^T r, vectors with four entries a row.
-  void add_correction(const std::vector<double>& r, std::vector<double>& z);
+  /// Where the entries of a vector are: number d of a row is entry first + row_stride row + stride d.
+  struct Layout {
+    std::size_t row_stride = 4, stride = 1, first = 0;
+  };
+  /// z += T C T^T r
+  void add_correction(const std::vector<double>& r, std::vector<double>& z, const Layout& layout);
   int aggregate_count() const { return aggregates_.count; }
 
  private:
   struct Level;
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   Vector3 lever(int row) const;
-  void restrict(const std::vector<double>& r);
+  void restrict(const std::vector<double>& r, const Layout& layout);
   void cycle(std::size_t level);
 
   std::shared_ptr<const BlockPattern> pattern_;

@@ -182,8 +182,13 @@ inline Wide<double> widen(Wide<float> w) { return __builtin_convertvector(w, Wid
 void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vector<double>& z,
                                         std::vector<float>& work) const {
   work.resize(12 * std::size_t(rows_));
-  float* w = work.data();
-  for (int i = 0; i < rows_; ++i) {
+  for_parts(parts_, [&](std::size_t first, std::size_t last) {
+    sweep_lanes(r.data(), z.data(), work.data(), int(first), int(last));
+  });
+}
+
+void IncompleteCholesky::sweep_lanes(const double* r, double* z, float* w, int first, int last) const {
+  for (int i = first; i < last; ++i) {
     LaneSums<float> sum{};
     for (int l = row_start_[i]; l < row_start_[i + 1]; ++l) {
       Wide<float> v[3];
@@ -198,7 +203,7 @@ void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vecto
     store_wide(wi + 4, float(inv[1]) * left[0] + float(inv[4]) * left[1]);
     store_wide(wi + 8, float(inv[2]) * left[0] + float(inv[5]) * left[1] + float(inv[8]) * left[2]);
   }
-  for (int i = rows_ - 1; i >= 0; --i) {
+  for (int i = last - 1; i >= first; --i) {
     const double* inv = &inverse_diagonal_[9 * std::size_t(i)];
     Wide<float> own[3];
     load_lanes(&w[12 * std::size_t(i)], own);
@@ -216,7 +221,7 @@ void IncompleteCholesky::apply_to_lanes(const std::vector<double>& r, std::vecto
 
 ConjugateGradients::ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
     : pattern_(std::move(pattern)), options_(options), preconditioner_(*pattern_), parts_(std::size_t(pattern_->rows)) {
-  if (options_.column_tolerance <= 0.0) options_.column_tolerance = options_.tolerance;
+  if (options_.derivative_tolerance <= 0.0) options_.derivative_tolerance = options_.tolerance;
   const std::size_t size = 4 * std::size_t(pattern_->rows);
   for (auto* v : {&x_, &r_, &z_, &p_, &ap_}) v->assign(size, 0.0);
 }
@@ -302,104 +307,143 @@ SolveSummary ConjugateGradients::solve(const Eigen::Ref<const VectorX>& b, Eigen
   return summary;
 }
 
+namespace {
+
+/// Sum of body(begin, end), a number a lane, over the parts, taken in order.
+template <class Body>
+Wide<double> sum_lanes(const Parts& parts, const Body& body) {
+  if (parts.parts() == 1) return body(std::size_t(0), parts.count);
+  std::array<Wide<double>, Parts::most> sums;
+  for_parts(parts, [&](std::size_t first, std::size_t last) { sums[first / parts.size] = body(first, last); });
+  Wide<double> sum{};
+  for (std::size_t i = 0; i < parts.parts(); ++i) sum += sums[i];
+  return sum;
+}
+
+}  // namespace
+
 auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vector<double>& ap) const
     -> std::array<double, lanes> {
   const BlockPattern& pattern = *pattern_;
   const int* column = pattern.column.data();
-  Wide<double> dot{};
-  for (int row = 0; row < pattern.rows; ++row) {
-    LaneSums<double> sum{};
-    for (int b = pattern.row_start[row]; b < pattern.row_start[row + 1]; ++b) {
-      Wide<double> v[3];
-      load_lanes(&p[12 * std::size_t(column[b])], v);
-      add_block_times(matrix_->block(b), v, sum);
+  const Wide<double> dot = sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+    Wide<double> part{};
+    for (std::size_t row = first; row < last; ++row) {
+      LaneSums<double> sum{};
+      for (int b = pattern.row_start[row]; b < pattern.row_start[row + 1]; ++b) {
+        Wide<double> v[3];
+        load_lanes(&p[12 * std::size_t(column[b])], v);
+        add_block_times(matrix_->block(b), v, sum);
+      }
+      for (std::size_t d = 0; d < 3; ++d) {
+        const Wide<double> product = total<double>(sum, int(d));
+        store_wide(&ap[12 * row + 4 * d], product);
+        part += load_wide(&p[12 * row + 4 * d]) * product;
+      }
     }
-    for (int d = 0; d < 3; ++d) {
-      const Wide<double> product = total<double>(sum, d);
-      store_wide(&ap[12 * std::size_t(row) + 4 * d], product);
-      dot += load_wide(&p[12 * std::size_t(row) + 4 * d]) * product;
-    }
-  }
+    return part;
+  });
   return {dot[0], dot[1], dot[2], dot[3]};
 }
 
-SolveSummary ConjugateGradients::solve_lanes(Lanes& own) const {
+SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
   auto& [b, x, r, z, p, ap, work] = own;
-  const std::size_t size = b.size();
   multiply_lanes(x, ap);
-  Wide<double> b_norm{}, r_norm{};
-  for (std::size_t i = 0; i < size; i += lanes) {
-    const Wide<double> bi = load_wide(&b[i]), ri = bi - load_wide(&ap[i]);
-    store_wide(&r[i], ri);
-    b_norm += bi * bi, r_norm += ri * ri;
-  }
+  constexpr std::size_t of_a_row = 3 * lanes;
+  const auto squares = [&](const std::vector<double>& v) {
+    return sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+      Wide<double> sum{};
+      for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes)
+        sum += load_wide(&v[i]) * load_wide(&v[i]);
+      return sum;
+    });
+  };
+  for_parts(parts_, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = of_a_row * first; i < of_a_row * last; ++i) r[i] = b[i] - ap[i];
+  });
+  const Wide<double> b_norm = squares(b);
+  Wide<double> r_norm = squares(r);
   SolveSummary summary;
-  const double squared = options_.column_tolerance * options_.column_tolerance;
+  const double squared = options_.derivative_tolerance * options_.derivative_tolerance;
   std::array<bool, lanes> goes_on{};
   Wide<double> rz{};
   for (;; ++summary.iterations) {
     bool any = false;
-    for (int l = 0; l < lanes; ++l) {  // those that are done stay where they are
+    for (std::size_t l = 0; l < lanes; ++l) {  // those that are done stay where they are
       const bool is_left = r_norm[l] > squared * b_norm[l] && std::isfinite(r_norm[l]);
-      goes_on[std::size_t(l)] = is_left && (summary.iterations == 0 || goes_on[std::size_t(l)]);
-      any = any || goes_on[std::size_t(l)];
+      goes_on[l] = is_left && (summary.iterations == 0 || goes_on[l]);
+      any = any || goes_on[l];
     }
     if (!any || summary.iterations >= options_.max_iterations) break;
-    preconditioner_.apply_to_lanes(r, z, work);
-    Wide<double> rz_new{}, alpha{}, beta{};
-    for (std::size_t i = 0; i < size; i += lanes) rz_new += load_wide(&r[i]) * load_wide(&z[i]);
-    for (int l = 0; l < lanes && summary.iterations > 0; ++l)
-      beta[l] = goes_on[std::size_t(l)] ? rz_new[l] / rz[l] : 0.0;
+    precondition_lanes(r, z, work);
+    const Wide<double> rz_new = sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+      Wide<double> sum{};
+      for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes)
+        sum += load_wide(&r[i]) * load_wide(&z[i]);
+      return sum;
+    });
+    Wide<double> alpha{}, beta{};
+    for (std::size_t l = 0; l < lanes && summary.iterations > 0; ++l) beta[l] = goes_on[l] ? rz_new[l] / rz[l] : 0.0;
     rz = rz_new;
-    for (std::size_t i = 0; i < size; i += lanes) store_wide(&p[i], load_wide(&z[i]) + beta * load_wide(&p[i]));
+    for_parts(parts_, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes)
+        store_wide(&p[i], load_wide(&z[i]) + beta * load_wide(&p[i]));
+    });
     const std::array<double, lanes> curvature = multiply_lanes(p, ap);
     for (std::size_t l = 0; l < lanes; ++l) {
       goes_on[l] = goes_on[l] && curvature[l] > 0.0;
       alpha[l] = goes_on[l] ? rz[l] / curvature[l] : 0.0;
     }
-    r_norm = Wide<double>{};
-    for (std::size_t i = 0; i < size; i += lanes) {
-      store_wide(&x[i], load_wide(&x[i]) + alpha * load_wide(&p[i]));
-      const Wide<double> ri = load_wide(&r[i]) - alpha * load_wide(&ap[i]);
-      store_wide(&r[i], ri);
-      r_norm += ri * ri;
-    }
+    r_norm = sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+      Wide<double> sum{};
+      for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes) {
+        store_wide(&x[i], load_wide(&x[i]) + alpha * load_wide(&p[i]));
+        const Wide<double> ri = load_wide(&r[i]) - alpha * load_wide(&ap[i]);
+        store_wide(&r[i], ri);
+        sum += ri * ri;
+      }
+      return sum;
+    });
   }
   summary.converged = true;
-  for (int l = 0; l < lanes; ++l) {
+  for (std::size_t l = 0; l < lanes; ++l) {
     summary.converged = summary.converged && r_norm[l] <= squared * b_norm[l];
     if (b_norm[l] > 0.0) summary.residual = std::max(summary.residual, std::sqrt(r_norm[l] / b_norm[l]));
   }
   return summary;
 }
 
-SolveSummary ConjugateGradients::solve_lanes(const Columns& B, Solutions X, Lanes& own) const {
+SolveSummary ConjugateGradients::solve_lanes(const Columns& B, Solutions X, Lanes& own) {
   const std::size_t size = lanes * std::size_t(B.rows());
   for (auto* v : {&own.b, &own.x, &own.r, &own.z, &own.ap}) v->resize(size);
   own.p.assign(size, 0.0);
   for (Eigen::Index i = 0; i < B.rows(); ++i)
-    for (Eigen::Index l = 0; l < lanes; ++l) {
-      own.b[std::size_t(lanes * i + l)] = l < B.cols() ? B(i, l) : 0.0;
-      own.x[std::size_t(lanes * i + l)] = l < B.cols() ? X(i, l) : 0.0;
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const bool is_there = Eigen::Index(l) < B.cols();
+      own.b[lanes * std::size_t(i) + l] = is_there ? B(i, Eigen::Index(l)) : 0.0;
+      own.x[lanes * std::size_t(i) + l] = is_there ? X(i, Eigen::Index(l)) : 0.0;
     }
   const SolveSummary summary = solve_lanes(own);
   for (Eigen::Index i = 0; i < B.rows(); ++i)
-    for (Eigen::Index l = 0; l < B.cols(); ++l) X(i, l) = own.x[std::size_t(lanes * i + l)];
+    for (Eigen::Index l = 0; l < B.cols(); ++l) X(i, l) = own.x[lanes * std::size_t(i) + std::size_t(l)];
   return summary;
 }
 
 SolveSummary ConjugateGradients::solve_columns(const MatrixX& B, MatrixX& X) {
-  const std::size_t count = std::size_t((B.cols() + lanes - 1) / lanes);
+  const std::size_t columns = std::size_t(B.cols()), count = (columns + lanes - 1) / lanes;
   if (lanes_.size() < count) lanes_.resize(count);
   summaries_.assign(count, {});
   const auto solve_some = [&](std::size_t i) {
-    const Eigen::Index first = Eigen::Index(i) * lanes, some = std::min<Eigen::Index>(lanes, B.cols() - first);
+    const auto first = Eigen::Index(i * lanes), some = Eigen::Index(std::min(lanes, columns - i * lanes));
     if (some == 1)  // at most one of them all: it has the memory of single systems for itself
-      summaries_[i] = solve(B.col(first), X.col(first), options_.column_tolerance);
+      summaries_[i] = solve(B.col(first), X.col(first), options_.derivative_tolerance);
     else
       summaries_[i] = solve_lanes(B.middleCols(first, some), X.middleCols(first, some), lanes_[i]);
   };
-  parallel_tasks(count, std::cref(solve_some));
+  if (takes_fours_beside_each_other())
+    parallel_tasks(count, std::cref(solve_some));
+  else
+    for (std::size_t i = 0; i < count; ++i) solve_some(i);
   SolveSummary all{true, 0, 0.0};
   for (const SolveSummary& one : summaries_)
     all = {all.converged && one.converged, all.iterations + one.iterations, std::max(all.residual, one.residual)};

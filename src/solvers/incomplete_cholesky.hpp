@@ -26,6 +26,7 @@ class IncompleteCholesky {
   [[nodiscard]] bool try_factorise(const BlockMatrix& matrix, double shift);
   [[nodiscard]] bool factorise_rows(const BlockMatrix& matrix, double shift, int first, int last);
   void sweep(const double* r, double* z, int first, int last) const;
+  void sweep_lanes(const double* r, double* z, float* work, int first, int last) const;
 
   struct Product {
     int left, right;  // L_ik and L_jk, k < j < i
@@ -47,8 +48,8 @@ class ConjugateGradients : public LinearSolver {
   ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options);
   [[nodiscard]] bool factorise(const BlockMatrix& matrix) override;
   SolveSummary solve(const VectorX& b, VectorX& x) override;
-  /// Four at a time, in the lanes of wide registers: the matrix is read once for them. Fours go beside each other, each
-  /// in a thread.
+  /// Four at a time, in the lanes of wide registers: the matrix is read once for them. Fours go beside each other where
+  /// the preconditioner allows it, and of large bodies the rows of each are shared out.
   SolveSummary solve_columns(const MatrixX& B, MatrixX& X) override;
   std::string name() const override { return "conjugate gradients, 3x3-block incomplete Cholesky"; }
   std::unique_ptr<LinearSolver> clone() const override;
@@ -56,6 +57,13 @@ class ConjugateGradients : public LinearSolver {
  protected:
   /// z = P^-1 r, four entries a node.
   virtual void precondition(const std::vector<double>& r, std::vector<double>& z) { preconditioner_.apply(r, z); }
+  static constexpr std::size_t lanes = 4;
+  /// The same for four vectors, entries as in `IncompleteCholesky::apply_to_lanes`.
+  virtual void precondition_lanes(const std::vector<double>& r, std::vector<double>& z, std::vector<float>& work) {
+    preconditioner_.apply_to_lanes(r, z, work);
+  }
+  /// Whether `precondition_lanes` may be called by several threads at a time.
+  virtual bool takes_fours_beside_each_other() const { return true; }
 
   std::shared_ptr<const BlockPattern> pattern_;
   SolverOptions options_;
@@ -63,7 +71,6 @@ class ConjugateGradients : public LinearSolver {
   const BlockMatrix* matrix_ = nullptr;
 
  private:
-  static constexpr int lanes = 4;
   /// What is at hand of four systems, entries as in `IncompleteCholesky::apply_to_lanes`.
   struct Lanes {
     std::vector<double> b, x, r, z, p, ap;
@@ -77,8 +84,8 @@ class ConjugateGradients : public LinearSolver {
   /// ap = A p for four vectors; their products p . ap.
   std::array<double, lanes> multiply_lanes(const std::vector<double>& p, std::vector<double>& ap) const;
   /// At most four columns; lanes that are left over have nothing to solve.
-  SolveSummary solve_lanes(const Columns& B, Solutions X, Lanes& own) const;
-  SolveSummary solve_lanes(Lanes& own) const;
+  SolveSummary solve_lanes(const Columns& B, Solutions X, Lanes& own);
+  SolveSummary solve_lanes(Lanes& own);
 
   Parts parts_;
   std::vector<double> x_, r_, z_, p_, ap_;  // four entries a node

@@ -70,8 +70,8 @@ double iterations_worth_a_factor(const std::shared_ptr<const BlockPattern>& patt
 }
 
 /// Iterates, until that has cost more than another way several times in a row, which it goes from then on: a
-/// factorisation, or, of large bodies that are not slender, multigrid. What counts are iterations, not time, so that
-/// every run takes the same way.
+/// factorisation, which serves all right-hand sides of a matrix, or, of large bodies that are not slender, multigrid,
+/// which shortens each solve. What counts are iterations, not time, so that every run takes the same way.
 class AutomaticSolver : public LinearSolver {
  public:
   AutomaticSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
@@ -88,13 +88,14 @@ class AutomaticSolver : public LinearSolver {
     if (other_) return other_->factorise(matrix);
     constexpr int often_enough = 3;
     too_long_ = is_too_long() ? too_long_ + 1 : 0;
-    iterations_ = 0;
+    iterations_ = longest_ = 0;
     return too_long_ >= often_enough ? turn() : iterative_.factorise(matrix);
   }
   SolveSummary solve(const VectorX& b, VectorX& x) override {
     if (other_) return other_->solve(b, x);
     const SolveSummary summary = iterative_.solve(b, x);
     iterations_ += summary.iterations;
+    longest_ = std::max(longest_, summary.iterations);
     if (summary.converged || !turn()) return summary;
     return other_->solve(b, x);
   }
@@ -114,7 +115,9 @@ class AutomaticSolver : public LinearSolver {
   static constexpr int multigrid_iterations = 40, hard_multigrid = 200;
   bool is_large() const { return pattern_->rows >= rows_for_multigrid; }
   bool is_too_long() {
-    return iterations_ > std::min(least_worth_of_a_factor, multigrid_iterations) && iterations_ > worth_another();
+    if (iterations_ <= std::min(least_worth_of_a_factor, multigrid_iterations)) return false;
+    const int worth = worth_another();
+    return (factorises_ ? iterations_ : longest_) > worth;
   }
   /// Iterations that another way is worth.
   int worth_another() {
@@ -140,9 +143,9 @@ class AutomaticSolver : public LinearSolver {
   std::unique_ptr<LinearSolver> other_;
   Points positions_;  // of large bodies
   const BlockMatrix* matrix_ = nullptr;
-  std::optional<int> worth_another_;  // where it has been asked for
-  bool factorises_ = false;           // as the other way
-  int iterations_ = 0, too_long_ = 0;
+  std::optional<int> worth_another_;                 // where it has been asked for
+  bool factorises_ = false;                          // as the other way
+  int iterations_ = 0, longest_ = 0, too_long_ = 0;  // of the matrix at hand: of all solves, and of the longest one
 };
 
 }  // namespace

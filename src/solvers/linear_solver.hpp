@@ -52,8 +52,9 @@ struct SolverOptions {
   SolverKind kind = SolverKind::Automatic;
   double tolerance = 1e-8;   ///< relative residual of the iterative solver, (0, 1)
   int max_iterations = 500;  ///< of the iterative solver, >= 1
-  /// Of `solve_columns`, as `tolerance` otherwise, and of tangents of fully implicit steps; 0: that, and 1e-12.
-  double column_tolerance = 0.0;
+  /// Of derivatives, that is of `solve_columns` and of steps' tangents and adjoints, as `tolerance` otherwise; 0: that,
+  /// and 1e-12 for fully implicit steps.
+  double derivative_tolerance = 0.0;
 };
 
 /// How equilibria solve with their stiffness, whose conditioning no mass helps: by a factorisation, and of bodies whose

@@ -17,7 +17,14 @@ bool MultigridSolver::factorise(const BlockMatrix& matrix) {
 
 void MultigridSolver::precondition(const std::vector<double>& r, std::vector<double>& z) {
   ConjugateGradients::precondition(r, z);
-  coarse_.add_correction(r, z);
+  coarse_.add_correction(r, z, {});
+}
+
+void MultigridSolver::precondition_lanes(const std::vector<double>& r, std::vector<double>& z,
+                                         std::vector<float>& work) {
+  ConjugateGradients::precondition_lanes(r, z, work);
+  for (std::size_t lane = 0; lane < lanes; ++lane)
+    coarse_.add_correction(r, z, {.row_stride = 3 * lanes, .stride = lanes, .first = lane});
 }
 
 }  // namespace pliant

@@ -13,15 +13,14 @@ class MultigridSolver : public ConjugateGradients {
   MultigridSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options);
   void set_positions(const Points& positions) override { coarse_.set_positions(positions); }
   [[nodiscard]] bool factorise(const BlockMatrix& matrix) override;
-  /// One by one: the corrections of the aggregates have no lanes.
-  SolveSummary solve_columns(const MatrixX& B, MatrixX& X) override {
-    return LinearSolver::solve_columns(B, X);  // NOLINT(bugprone-parent-virtual-call)
-  }
   std::string name() const override;
   std::unique_ptr<LinearSolver> clone() const override;
 
  protected:
   void precondition(const std::vector<double>& r, std::vector<double>& z) override;
+  void precondition_lanes(const std::vector<double>& r, std::vector<double>& z, std::vector<float>& work) override;
+  /// Fours of columns follow each other: aggregates have one memory.
+  bool takes_fours_beside_each_other() const override { return false; }
 
  private:
   CoarseSpace coarse_;

@@ -22,7 +22,7 @@ struct LawScene {
     options.max_dt = 0.005;
     options.newton.tolerance = 1e-13;
     options.integrator = integrator;
-    if (integrator == Integrator::Lagged) options.solver.tolerance = options.solver.column_tolerance = 1e-12;
+    if (integrator == Integrator::Lagged) options.solver.tolerance = options.solver.derivative_tolerance = 1e-12;
     options.holds = {Hold{[](const Vector3& p) { return p.x() < -0.0999; }}};
     options.shape = {{Vector3(0.1, 0.01, 0.0)}, 0.01, 0.1};
     MotionBlocks blocks = add_motion_blocks(layout, {.pulls = start == Start::Pulled ? 1 : 0, .scan_corrections = 1});

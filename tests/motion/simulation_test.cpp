@@ -100,6 +100,39 @@ INSTANTIATE_TEST_SUITE_P(EveryParameter, Sensitivity,
                          ::testing::Combine(::testing::Range(0, MotionLayout({.planes = 1}).size()),
                                             ::testing::Values(Integrator::Lagged, Integrator::Newton)));
 
+/// Fits solve for derivatives less exactly than for steps, by either integrator, in both directions.
+TEST(Simulation, DerivativesAreAsExactAsAskedFor) {
+  for (const Integrator integrator : {Integrator::Lagged, Integrator::Newton}) {
+    test::TorusScene scene = scene_for(last + 1, integrator);
+    const VectorX direction = relative_scale(scene.theta, scene.layout.youngs_moduli[0].first);
+    const Points weight = test::deformed(scene.body->reference_positions(), 0.3);
+    std::vector<Points> ends, tangents;
+    std::vector<double> gradients;
+    for (const double asked : {0.0, 1e-5}) {
+      scene.options.solver.derivative_tolerance = asked;
+      Simulation simulation(scene.body, scene.options);
+      simulation.run(scene.theta, direction, last, [&](int f, const State& state, std::span<const State> changes) {
+        if (f == last) ends.push_back(state.x), tangents.push_back(changes[0].x);
+        return true;
+      });
+      VectorX gradient;
+      const auto summary = simulation.run_adjoint(
+          scene.theta, last, [](int, const State&) { return true; },
+          [&](int f, const State&, Points& bar) {
+            if (f == last) bar += weight;
+          },
+          gradient);
+      ASSERT_TRUE(summary.succeeded) << summary.failure;
+      gradients.push_back(gradient.dot(direction));
+    }
+    EXPECT_EQ(ends[0], ends[1]);
+    EXPECT_LT((tangents[1] - tangents[0]).norm(), 1e-3 * tangents[0].norm());
+    EXPECT_NEAR(gradients[1], gradients[0], 1e-3 * std::abs(gradients[0]));
+    EXPECT_NE(tangents[1], tangents[0]);
+    EXPECT_NE(gradients[1], gradients[0]);
+  }
+}
+
 /// One step a frame is too long for an impact: the steps in which nodes leap are taken in halves, and both derivatives
 /// follow them.
 TEST(Simulation, StepsThatAreTooLongAreHalved) {

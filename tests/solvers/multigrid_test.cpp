@@ -138,6 +138,57 @@ TEST(Multigrid, TakesAggregatesOfFewNodes) {
   EXPECT_LT((product - b).norm(), 1e-9 * b.norm());
 }
 
+MatrixX columns(const System& system, Eigen::Index count) {
+  MatrixX B(system.b.size(), count);
+  for (Eigen::Index c = 0; c < count; ++c)
+    for (Eigen::Index i = 0; i < B.rows(); ++i) B(i, c) = system.b[i] * std::cos(double(c) + 1e-3 * double(i));
+  return B;
+}
+
+/// Columns are derivatives, which have a tolerance of their own.
+TEST(LargeBodies, SolveColumnsToTheTolerancesOfDerivatives) {
+  const System system(bar(13), 1.0);
+  const MatrixX B = columns(system, 6);
+  for (const SolverKind kind : {SolverKind::Iterative, SolverKind::Multigrid}) {
+    std::vector<int> iterations;
+    for (const double asked : {0.0, 1e-4}) {
+      const auto solver = make_linear_solver(system.A.shared_pattern(), {kind, 1e-8, 5000, asked});
+      solver->set_positions(system.positions);
+      ASSERT_TRUE(solver->factorise(system.A));
+      MatrixX X = MatrixX::Zero(B.rows(), B.cols());
+      const SolveSummary summary = solver->solve_columns(B, X);
+      EXPECT_TRUE(summary.converged);
+      VectorX product;
+      for (Eigen::Index c = 0; c < B.cols(); ++c) {
+        system.A.multiply(X.col(c), product);
+        EXPECT_LT((product - B.col(c)).norm(), (asked > 0.0 ? 1.1 * asked : 2e-8) * B.col(c).norm()) << c;
+      }
+      iterations.push_back(summary.iterations);
+    }
+    EXPECT_LT(iterations[1], 0.9 * iterations[0]);
+  }
+}
+
+/// Many right-hand sides of one matrix pay for a factor, which they share; multigrid would have to solve each of them.
+TEST(LargeBodies, DoNotTurnToMultigridForManyColumns) {
+  const System system(bar(13), 1e3);
+  const MatrixX B = columns(system, 12);
+  const auto solver = make_linear_solver(system.A.shared_pattern(), {SolverKind::Automatic, 1e-8, 500});
+  VectorX x;
+  MatrixX X;
+  int together = 0;
+  for (int matrix = 0; matrix < 5; ++matrix) {
+    ASSERT_TRUE(solver->factorise(system.A));
+    x.setZero(system.b.size());
+    const SolveSummary alone = solver->solve(system.b, x);
+    EXPECT_LT(alone.iterations, 40);
+    X.setZero(B.rows(), B.cols());
+    together = alone.iterations + solver->solve_columns(B, X).iterations;
+  }
+  EXPECT_GT(together, 60) << "what would make a small body's solver turn";
+  EXPECT_EQ(solver->name().find("multigrid"), std::string::npos) << solver->name();
+}
+
 /// Large enough that loops over rows and aggregates are cut into parts; the incomplete factor's are larger.
 TEST(LargeBodies, SolveToTheSameBitsByAnyNumberOfThreads) {
   const System system(bar(17), 1.0);
@@ -151,6 +202,22 @@ TEST(LargeBodies, SolveToTheSameBitsByAnyNumberOfThreads) {
     EXPECT_TRUE(x[0] == x[1]);
     EXPECT_TRUE(x[0] == x[2]);
     EXPECT_LT(system.residual(x[0]), 2e-8);
+  }
+}
+TEST(LargeBodies, SolveColumnsToTheSameBitsByAnyNumberOfThreads) {
+  const System system(bar(17), 1.0);
+  const MatrixX B = columns(system, 6);
+  for (const SolverKind kind : {SolverKind::Iterative, SolverKind::Multigrid}) {
+    std::vector<MatrixX> X(3, MatrixX::Zero(B.rows(), B.cols()));
+    for (int threads = 1; threads <= 3; ++threads) {
+      const ThreadLimit limit(threads);
+      const auto solver = make_linear_solver(system.A.shared_pattern(), {kind, 1e-8, 5000});
+      solver->set_positions(system.positions);
+      ASSERT_TRUE(solver->factorise(system.A));
+      EXPECT_TRUE(solver->solve_columns(B, X[std::size_t(threads) - 1]).converged);
+    }
+    EXPECT_TRUE(X[0] == X[1]);
+    EXPECT_TRUE(X[0] == X[2]);
   }
 }
 
