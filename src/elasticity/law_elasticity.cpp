@@ -135,6 +135,10 @@ class TetLawElasticity : public LawElasticity {
   /// @param tangent_at  tangent of a point, by its number, in the frame of the world
   template <bool is_symmetric, class TangentAt>
   void add_elements(const TangentAt& tangent_at, double scale, BlockMatrix& matrix) const;
+  /// The same of elements of one point whose tangents stand in the frame of the principal stretches.
+  /// @param tangent_at  in that frame
+  template <class TangentAt>
+  void add_principal_elements(const TangentAt& tangent_at, double scale, BlockMatrix& matrix) const;
   /// The changes of all points' stresses about the lag point and z.
   const std::vector<PointChange>& changes(const Points& z, bool by_parameters);
   PointChange change_of(int e, std::size_t point, const Points& z, bool by_parameters) const;
@@ -250,10 +254,21 @@ const std::vector<TangentProjection>& TetLawElasticity<N>::projections() const {
 template <int N>
 double TetLawElasticity<N>::evaluate(const Points& x, bool with_tangent) {
   has_projections_ = has_changes_ = false;
-  for_all_points([&](int e, std::size_t p) {
-    Point& point = points_[p];
-    point.F = deformation(e, point.gradient, x);
-    law_->stress(e, point.F, with_tangent, point.stress);
+  // Groups that depend on the points alone: their stresses are the same for any number of threads.
+  constexpr std::size_t together = PrincipalStretches::lanes;
+  const std::size_t groups = (points_.size() + together - 1) / together;
+  parallel_ranges(0, groups, 4, [&](std::size_t begin, std::size_t end) {
+    std::array<DeformedPoint, together> group;
+    for (std::size_t g = begin; g < end; ++g) {
+      const std::size_t first = g * together, some = std::min(together, points_.size() - first);
+      for (std::size_t i = 0; i < some; ++i) {
+        Point& point = points_[first + i];
+        const int e = int((first + i) / points);
+        point.F = deformation(e, point.gradient, x);
+        group[i] = {e, &point.F, &point.stress};
+      }
+      law_->stresses({group.data(), some}, with_tangent);
+    }
   });
   double energy = 0.0;
   for (const Point& point : points_) energy += point.volume * point.stress.energy;
@@ -302,14 +317,55 @@ void TetLawElasticity<N>::add_elements(const TangentAt& tangent_at, double scale
   });
 }
 
+/// In the frame of the principal stretches a tangent M(ij, kl) of an isotropic law is none but where its indices are
+/// equal in pairs, so that with g' = V^T g and no sums but over j
+///   K'_ab(i, i) = V sum_j M(ij, ij) g'_aj g'_bj,
+///   K'_ab(i, k) = V (M(ii, kk) g'_ai g'_bk + M(ik, ki) g'_ak g'_bi),   K_ab = U K'_ab U^T.
+template <int N>
+template <class TangentAt>
+void TetLawElasticity<N>::add_principal_elements(const TangentAt& tangent_at, double scale, BlockMatrix& matrix) const {
+  static_assert(points == 1);
+  const auto at = [](int i, int j) { return i + 3 * j; };
+  body_->loop->each([&](int e) {
+    const Point& point = points_[std::size_t(e)];
+    const Matrix3& U = point.stress.left;
+    const Matrix9& M = tangent_at(std::size_t(e));
+    const Nodes g = point.gradient * point.stress.right, weighted = (scale * point.volume) * g;
+    Matrix3 own, normal, crossed;  // M(ij, ij), M(ii, kk) and M(ik, ki)
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 3; ++i) {
+        own(i, k) = M(at(i, k), at(i, k));
+        normal(i, k) = M(at(i, i), at(k, k));
+        crossed(i, k) = M(at(i, k), at(k, i));
+      }
+    const int* blocks = blocks_->data() + std::size_t(e) * (N * N);
+    for (int a = 0; a < N; ++a)
+      for (int b = a; b < N; ++b) {
+        Matrix3 local;
+        for (int i = 0; i < 3; ++i) {
+          local(i, i) = 0.0;
+          for (int j = 0; j < 3; ++j) local(i, i) += own(i, j) * weighted(a, j) * g(b, j);
+          for (int k = 0; k < 3; ++k)
+            if (k != i)
+              local(i, k) = normal(i, k) * weighted(a, i) * g(b, k) + crossed(i, k) * weighted(a, k) * g(b, i);
+        }
+        const Matrix3 turned = U * local, K = turned * U.transpose();
+        Eigen::Map<Matrix3>(matrix.block(blocks[N * a + b])) += K;
+        if (a != b) Eigen::Map<Matrix3>(matrix.block(blocks[N * b + a])) += K.transpose();
+      }
+  });
+}
+
 template <int N>
 void TetLawElasticity<N>::add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const {
   if (which == Stiffness::Positive) projections();
-  const auto tangent_at = [&](std::size_t p) -> Matrix9 {
-    const PointStress& s = points_[p].stress;
-    return in_world(s, which == Stiffness::Exact ? s.tangent : projections_[p].positive);
+  const auto own_tangent = [&](std::size_t p) -> const Matrix9& {
+    return which == Stiffness::Exact ? points_[p].stress.tangent : projections_[p].positive;
   };
-  add_elements<true>(tangent_at, scale, matrix);
+  if constexpr (points == 1)
+    if (law_->has_principal_frame()) return add_principal_elements(own_tangent, scale, matrix);
+  add_elements<true>([&](std::size_t p) -> Matrix9 { return in_world(points_[p].stress, own_tangent(p)); }, scale,
+                     matrix);
 }
 
 template <int N>

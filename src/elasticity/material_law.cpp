@@ -1,6 +1,7 @@
 #include "elasticity/material_law.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -52,7 +53,8 @@ Matrix9 world_tangent(const PointStress& s) {
   Matrix9 turn;  // vec(left A right^T) = turn vec(A)
   for (int j = 0; j < 3; ++j)
     for (int l = 0; l < 3; ++l) turn.block<3, 3>(3 * j, 3 * l) = s.right(j, l) * s.left;
-  return turn * s.tangent * turn.transpose();
+  const Matrix9 left = turn.lazyProduct(s.tangent);  // small: without the blocking of large products
+  return left.lazyProduct(turn.transpose());
 }
 
 double tangent_modulus(const MaterialLaw& law, int element, const Matrix3& F) {
@@ -106,6 +108,7 @@ class ScaledLaw : public MaterialLaw {
     return {factor_ * m.youngs_modulus, m.poissons_ratio};
   }
   bool is_isotropic() const override { return law_->is_isotropic(); }
+  bool has_principal_frame() const override { return law_->has_principal_frame(); }
   Matrix9 tangent_derivative(int element, const Matrix3& F, const Matrix3& dF) const override {
     return factor_ * law_->tangent_derivative(element, F, dF);
   }
@@ -305,10 +308,83 @@ PrincipalStretches::PrincipalStretches(const Matrix3& F) {
 
 namespace {
 
+using StretchLanes = Eigen::Array<double, int(PrincipalStretches::lanes), 1>;
+
+/// Symmetric 3 x 3 matrices, one a lane, on their way to diagonal ones, and the rotations that lead there.
+struct JacobiLanes {
+  std::array<StretchLanes, 3> diagonal, off;                // off[k] is entry (k + 1, k + 2), indices modulo three
+  std::array<std::array<StretchLanes, 3>, 3> eigenvectors;  // by column
+
+  /// Takes the entry off[k] away.
+  void rotate(std::size_t k) {
+    const std::size_t p = (k + 1) % 3, q = (k + 2) % 3;
+    const StretchLanes gap = diagonal[q] - diagonal[p], twice = 2.0 * off[k];
+    // The tangent of the smaller angle; the last term is for what is diagonal and equal.
+    const StretchLanes t =
+        (gap < 0.0).select(-twice, twice) / (gap.abs() + (gap * gap + twice * twice).sqrt() + 1e-300);
+    const StretchLanes c = (1.0 + t * t).sqrt().inverse(), s = t * c;
+    diagonal[p] -= t * off[k];
+    diagonal[q] += t * off[k];
+    off[k].setZero();
+    const auto turn = [&](StretchLanes& at_p, StretchLanes& at_q) {
+      const StretchLanes before = at_p;
+      at_p = c * before - s * at_q;
+      at_q = s * before + c * at_q;
+    };
+    turn(off[q], off[p]);
+    for (std::size_t i = 0; i < 3; ++i) turn(eigenvectors[p][i], eigenvectors[q][i]);
+  }
+  bool is_diagonal() const {
+    constexpr double negligible = 1e-34;  // squared, against the two diagonal entries
+    for (std::size_t k = 0; k < 3; ++k)
+      if ((off[k] * off[k] > negligible * diagonal[(k + 1) % 3] * diagonal[(k + 2) % 3]).any()) return false;
+    return true;
+  }
+};
+
+}  // namespace
+
+void PrincipalStretches::find(std::span<const Matrix3* const> F, std::span<PrincipalStretches> out) {
+  constexpr int most_sweeps = 12;
+  if (F.empty()) return;
+  JacobiLanes jacobi;
+  for (std::size_t l = 0; l < lanes; ++l) {
+    const Matrix3& own = *F[l < F.size() ? l : 0];
+    const Matrix3 C = own.transpose() * own;
+    const auto lane = Eigen::Index(l);
+    for (std::size_t k = 0; k < 3; ++k) {
+      jacobi.diagonal[k][lane] = C(Eigen::Index(k), Eigen::Index(k));
+      jacobi.off[k][lane] = C(Eigen::Index((k + 1) % 3), Eigen::Index((k + 2) % 3));
+      for (std::size_t i = 0; i < 3; ++i) jacobi.eigenvectors[k][i][lane] = i == k ? 1.0 : 0.0;
+    }
+  }
+  for (int sweep = 0; sweep < most_sweeps && !jacobi.is_diagonal(); ++sweep)
+    for (std::size_t k = 0; k < 3; ++k) jacobi.rotate(k);
+  for (std::size_t l = 0; l < F.size(); ++l) {
+    PrincipalStretches& p = out[l];
+    p.is_valid = F[l]->determinant() > 0.0;
+    if (!p.is_valid) continue;
+    std::array<std::size_t, 3> order = {0, 1, 2};
+    const auto square = [&](std::size_t k) { return jacobi.diagonal[k][Eigen::Index(l)]; };
+    std::ranges::sort(order, {}, square);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto column = Eigen::Index(k);
+      p.stretch[column] = std::sqrt(std::max(square(order[k]), 1e-300));
+      for (std::size_t i = 0; i < 3; ++i)
+        p.V(Eigen::Index(i), column) = jacobi.eigenvectors[order[k]][i][Eigen::Index(l)];
+    }
+    p.U = *F[l] * p.V * p.stretch.cwiseInverse().asDiagonal();
+    p.is_valid = p.stretch.allFinite() && p.stretch.minCoeff() > 1e-100;
+  }
+}
+
+namespace {
+
 /// (exp(-a b ln J) - 1) / b, also for b = 0.
-double volumetric(double a, double b, double log_J) {
+/// @param bulk_1  exp(-a b ln J) - 1
+double volumetric(double a, double b, double log_J, double bulk_1) {
   const double x = -a * b * log_J;
-  return std::abs(x) < 1e-8 ? -a * log_J * (1.0 + 0.5 * x) : std::expm1(x) / b;
+  return std::abs(x) < 1e-8 ? -a * log_J * (1.0 + 0.5 * x) : bulk_1 / b;
 }
 
 double beta_of(double nu) { return nu / (1.0 - 2.0 * nu); }
@@ -332,7 +408,22 @@ void OgdenLaw::check(const MatrixX& table) const {
 }
 
 void OgdenLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
-  const PrincipalStretches p(F);
+  stress_of(e, PrincipalStretches(F), with_tangent, out);
+}
+
+void OgdenLaw::stresses(std::span<const DeformedPoint> points, bool with_tangent) const {
+  std::array<PrincipalStretches, PrincipalStretches::lanes> stretches;
+  std::array<const Matrix3*, PrincipalStretches::lanes> F;
+  for (std::size_t first = 0; first < points.size(); first += stretches.size()) {
+    const auto some = points.subspan(first, std::min(stretches.size(), points.size() - first));
+    for (std::size_t l = 0; l < some.size(); ++l) F[l] = some[l].F;
+    PrincipalStretches::find({F.data(), some.size()}, stretches);
+    for (std::size_t l = 0; l < some.size(); ++l)
+      stress_of(some[l].element, stretches[l], with_tangent, *some[l].stress);
+  }
+}
+
+void OgdenLaw::stress_of(int e, const PrincipalStretches& p, bool with_tangent, PointStress& out) const {
   if (!p.is_valid) {
     out.energy = std::numeric_limits<double>::infinity();
     return;
@@ -345,18 +436,18 @@ void OgdenLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& o
   Matrix3 quotient = Matrix3::Zero();  // (W_k - W_m) / (l_k - l_m), k < m
   for (int i = 0; i < terms(); ++i) {
     const double mu = table_(e, 3 * i), a = table_(e, 3 * i + 1), b = beta_of(table_(e, 3 * i + 2));
-    const Vector3 power = (a * log_l).array().exp();
-    const double bulk = std::exp(-a * b * log_J), factor = 2.0 * mu / a;
-    // sum (l^a - 1) by expm1, which keeps its digits near rest
-    double shape = 0.0;
-    for (int k = 0; k < 3; ++k) shape += std::expm1(a * log_l[k]);
-    out.energy += factor / a * (shape + volumetric(a, b, log_J));
-    for (int k = 0; k < 3; ++k) first[k] += factor * (std::expm1(a * log_l[k]) - std::expm1(-a * b * log_J)) / l[k];
+    const double factor = 2.0 * mu / a;
+    // l^a - 1 and J^(-a b) - 1 by expm1, which keeps their digits near rest
+    const Vector3 power_1{std::expm1(a * log_l[0]), std::expm1(a * log_l[1]), std::expm1(a * log_l[2])};
+    const double bulk_1 = std::expm1(-a * b * log_J);
+    out.energy += factor / a * (power_1.sum() + volumetric(a, b, log_J, bulk_1));
+    for (int k = 0; k < 3; ++k) first[k] += factor * (power_1[k] - bulk_1) / l[k];
     if (!with_tangent) continue;
+    const double bulk = 1.0 + bulk_1;
     for (int k = 0; k < 3; ++k)
       for (int m = 0; m < 3; ++m) {
         second(k, m) += factor * a * b * bulk / (l[k] * l[m]);
-        if (k == m) second(k, k) += factor * ((a - 1.0) * power[k] + bulk) / (l[k] * l[k]);
+        if (k == m) second(k, k) += factor * ((a - 1.0) * (1.0 + power_1[k]) + bulk) / (l[k] * l[k]);
       }
   }
   out.P = p.U * first.asDiagonal() * p.V.transpose();
@@ -408,12 +499,12 @@ void OgdenLaw::parameter_derivatives(int e, const Matrix3& F, std::span<Matrix3>
   };
   for (int i = 0; i < terms(); ++i) {
     const double mu = table_(e, 3 * i), a = table_(e, 3 * i + 1), nu = table_(e, 3 * i + 2), b = beta_of(nu);
-    const Vector3 power = (a * log_l).array().exp();
-    const double bulk = std::exp(-a * b * log_J);
+    const double bulk_1 = std::expm1(-a * b * log_J), bulk = 1.0 + bulk_1;
     Vector3 by_mu, by_a, by_nu;
     for (int k = 0; k < 3; ++k) {
-      by_mu[k] = 2.0 / a * (std::expm1(a * log_l[k]) - std::expm1(-a * b * log_J)) / l[k];
-      by_a[k] = -mu / a * by_mu[k] + 2.0 * mu / a * (log_l[k] * power[k] + b * log_J * bulk) / l[k];
+      const double power_1 = std::expm1(a * log_l[k]);
+      by_mu[k] = 2.0 / a * (power_1 - bulk_1) / l[k];
+      by_a[k] = -mu / a * by_mu[k] + 2.0 * mu / a * (log_l[k] * (1.0 + power_1) + b * log_J * bulk) / l[k];
       by_nu[k] = 2.0 * mu * log_J * bulk / l[k] / ((1.0 - 2.0 * nu) * (1.0 - 2.0 * nu));
     }
     out[3 * i] = in_frame(by_mu);

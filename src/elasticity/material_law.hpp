@@ -32,6 +32,13 @@ struct SmallStrainModuli {
   double youngs_modulus, poissons_ratio;  ///< [Pa], [-]
 };
 
+/// A point of an element at a deformation gradient, and where its stress goes.
+struct DeformedPoint {
+  int element;
+  const Matrix3* F;
+  PointStress* stress;
+};
+
 /// An elastic material: energy of the deformation gradient F, the same in every rotated frame. Every element has its
 /// own parameters q, some of which may vary over a body. All laws here have an energy, so that no closed path of
 /// deformations gives or takes work. Reading from several threads is safe.
@@ -42,9 +49,15 @@ class MaterialLaw {
   virtual int element_count() const = 0;
   /// Energy, stress and, where asked for, tangent of an element at F.
   virtual void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const = 0;
+  /// The same of several points, which may cost less than one by one, up to rounding.
+  virtual void stresses(std::span<const DeformedPoint> points, bool with_tangent) const {
+    for (const DeformedPoint& p : points) stress(p.element, *p.F, with_tangent, *p.stress);
+  }
   virtual SmallStrainModuli small_strain(int element) const = 0;
   /// Whether the energy follows from the principal stretches alone.
   virtual bool is_isotropic() const { return true; }
+  /// Whether tangents stand in the frame of the principal stretches: `left` and `right` are U and V of F.
+  virtual bool has_principal_frame() const { return false; }
 
   /// Numbers q of an element that can be estimated; none where `parameter_names` is empty.
   virtual std::vector<std::string> parameter_names() const { return {}; }
@@ -64,10 +77,14 @@ class MaterialLaw {
 
 /// F = U diag(stretch) V^T with rotations U and V, stretches ascending.
 struct PrincipalStretches {
+  PrincipalStretches() = default;
   explicit PrincipalStretches(const Matrix3& F);
+  /// Of up to so many deformations beside each other, by Jacobi's rotations in the lanes of wide registers.
+  static constexpr std::size_t lanes = 8;
+  static void find(std::span<const Matrix3* const> F, std::span<PrincipalStretches> out);
 
-  Vector3 stretch;
-  Matrix3 U, V;
+  Vector3 stretch = Vector3::Ones();
+  Matrix3 U = Matrix3::Identity(), V = Matrix3::Identity();
   bool is_valid = false;  ///< J > 0 and no stretch is lost to rounding; else there is none of the others
 };
 
@@ -139,15 +156,20 @@ class OgdenLaw : public TabulatedLaw {
     return std::make_shared<OgdenLaw>(std::move(table));
   }
   std::string name() const override { return "ogden"; }
+  bool has_principal_frame() const override { return true; }
   int terms() const { return int(table_.cols()) / 3; }
   std::vector<std::string> parameter_names() const override;
   void stress(int element, const Matrix3& F, bool with_tangent, PointStress& out) const override;
+  void stresses(std::span<const DeformedPoint> points, bool with_tangent) const override;
   void parameter_derivatives(int element, const Matrix3& F, std::span<Matrix3> out) const override;
   Matrix9 tangent_derivative(int element, const Matrix3& F, const Matrix3& dF) const override;
   SmallStrainModuli small_strain(int element) const override;
 
  protected:
   void check(const MatrixX& table) const override;
+
+ private:
+  void stress_of(int element, const PrincipalStretches& p, bool with_tangent, PointStress& out) const;
 };
 
 /// The compressible neo-Hookean law (Bonet & Wood 2008, eq. 6.27): with J = det F and Lame's constants at rest,

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <random>
 
 #include "elasticity/sampled_law.hpp"
@@ -212,6 +213,68 @@ TEST_P(Law, ClosedPathsOfStrainTakeAndGiveNoWork) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Law, ::testing::ValuesIn(laws()), [](const auto& c) { return c.param.name; });
+
+/// Deformations of all kinds, equal stretches, tiny and large ones among them, and two that no law knows.
+std::vector<Matrix3> many_deformations() {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  std::vector<Matrix3> all = {Matrix3::Identity(),
+                              1.5 * Matrix3::Identity(),
+                              Vector3(2.0, 0.7, 2.0).asDiagonal(),
+                              Vector3(1e-3, 1.0, 40.0).asDiagonal(),
+                              Matrix3::Zero(),
+                              Vector3(1.0, 1.0, -1.0).asDiagonal(),
+                              Matrix3::Identity() + 1e-9 * Matrix3::Ones()};
+  for (const double size : {1e-12, 1e-5, 0.1, 0.6})
+    for (int k = 0; k < 5; ++k) {
+      const Matrix3 R = Eigen::AngleAxisd(normal(random), Vector3(1.0, 2.0, -1.0).normalized()).matrix();
+      all.emplace_back(R * (Matrix3::Identity() + size * Matrix3::NullaryExpr([&] { return normal(random); })));
+      if (all.back().determinant() < 0.0) all.back().col(0) *= -1.0;
+    }
+  return all;
+}
+
+TEST(PrincipalStretches, FoundBesideEachOtherAreThoseOfEachAlone) {
+  const std::vector<Matrix3> all = many_deformations();
+  for (std::size_t first = 0; first < all.size(); first += 5) {
+    std::vector<const Matrix3*> F;
+    for (std::size_t k = first; k < std::min(first + 5, all.size()); ++k) F.push_back(&all[k]);
+    std::vector<PrincipalStretches> found(F.size());
+    PrincipalStretches::find(F, found);
+    for (std::size_t k = 0; k < F.size(); ++k) {
+      const PrincipalStretches alone(*F[k]);
+      ASSERT_EQ(found[k].is_valid, alone.is_valid) << first + k;
+      if (!alone.is_valid) continue;
+      const PrincipalStretches& p = found[k];
+      EXPECT_LT((p.stretch - alone.stretch).norm(), tolerance(1e-12) * alone.stretch.norm()) << first + k;
+      EXPECT_LT((p.U * p.stretch.asDiagonal() * p.V.transpose() - *F[k]).norm(), tolerance(1e-14) * F[k]->norm());
+      EXPECT_LT((p.V.transpose() * p.V - Matrix3::Identity()).norm(), tolerance(1e-14)) << first + k;
+      EXPECT_TRUE(std::ranges::is_sorted(p.stretch)) << first + k;
+    }
+  }
+}
+
+TEST(OgdenLaw, StressesOfSeveralPointsAreThoseOfEach) {
+  const OgdenLaw law(
+      (MatrixX(2, 6) << 1500.0, 8.0, 0.2, 1500.0, -6.0, 0.15, 900.0, 3.0, 0.4, 100.0, -2.0, 0.0).finished());
+  const std::vector<Matrix3> all = many_deformations();
+  std::vector<PointStress> found(all.size());
+  std::vector<DeformedPoint> points;
+  for (std::size_t k = 0; k < all.size(); ++k) points.push_back({int(k % 2), &all[k], &found[k]});
+  law.stresses(points, true);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    PointStress alone;
+    law.stress(int(k % 2), all[k], true, alone);
+    if (!std::isfinite(alone.energy)) {
+      EXPECT_EQ(found[k].energy, alone.energy) << k;
+      continue;
+    }
+    const Matrix9 tangent = world_tangent(alone);
+    EXPECT_NEAR(found[k].energy, alone.energy, tolerance(1e-11) * alone.energy + 1e-18 * tangent.norm()) << k;
+    EXPECT_LT((found[k].P - alone.P).norm(), tolerance(1e-11) * alone.P.norm() + 1e-14 * tangent.norm()) << k;
+    EXPECT_LT((world_tangent(found[k]) - tangent).norm(), tolerance(1e-10) * tangent.norm()) << k;
+  }
+}
 
 TEST(OgdenLaw, HasTheStressOfAUniaxialStretchByHand) {
   // Uniaxial stretch of one term with nu = 0: P = 2 mu / a (l^(a-1) - 1/l), by hand.
