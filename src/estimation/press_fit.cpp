@@ -150,7 +150,7 @@ class LawRun : StageLoop {
     return form;
   }
   PressObjective objective_of(const Form& form, const MarkerNoise& noise) const {
-    return {form.scene, fitted_, form.layout, form.parameters, {noise, outlier_scale}};
+    return {form.scene, fitted_, form.layout, form.parameters, {noise, outlier_scale}, placements_};
   }
   MatrixX carried(const LawShape& before, const PressScene& scene) const {
     return carried_over(*scene.body, scene_of(before)->body->modulus, scene.body->modulus);
@@ -191,6 +191,7 @@ class LawRun : StageLoop {
       if (round > 0 && !done.succeeded) break;  // the first round stands
       s = done;
       objective.emplace(std::move(*next));
+      placements_ = objective->placements();
       if (!s.succeeded) break;
       form.parameters.set_reference(form.parameters.to_theta(s.p));
       if (!task.is_brief && options_.marker_noise <= 0.0) noise = objective->own_noise(1e-6 * scene_->body->size());
@@ -422,7 +423,8 @@ class LawRun : StageLoop {
   PressSampling::State sampled_;  // of a fit that was interrupted, until it goes on
   std::optional<PressSampling> sampling_;
   LawPlan plan_;
-  std::map<int, CostEvaluation> ended_;  // of this run, by the stage's number
+  std::map<int, CostEvaluation> ended_;    // of this run, by the stage's number
+  PressObjective::Placements placements_;  // of the stage that was minimised last: equilibria of the next are near
 };
 
 /// What presses do not know is refused; what they merely do not use is told (`unused_choices`).

@@ -12,10 +12,13 @@ namespace {
 std::vector<std::unique_ptr<PressTrial>> trials_of(const std::shared_ptr<const PressScene>& scene,
                                                    const std::vector<int>& presses,
                                                    const std::shared_ptr<PressedMaterial>& material,
-                                                   const VectorX& reference, const PressTrialOptions& options) {
+                                                   const VectorX& reference, const PressTrialOptions& options,
+                                                   const PressObjective::Placements& begin) {
   std::vector<std::unique_ptr<PressTrial>> trials;
-  for (const int press : presses)
-    trials.push_back(std::make_unique<PressTrial>(scene, press, material, reference, options));
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    const Placement* from = i < begin.size() && begin[i] ? &*begin[i] : nullptr;
+    trials.push_back(std::make_unique<PressTrial>(scene, presses[i], material, reference, options, 0, from));
+  }
   return trials;
 }
 
@@ -57,10 +60,11 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
 }
 
 PressObjective::PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
-                               const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options)
+                               const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options,
+                               const Placements& begin)
     : material_(std::make_shared<PressedMaterial>(scene->body, layout)),
       objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {
-  auto trials = trials_of(scene, presses, material_, parameters.reference(), options);
+  auto trials = trials_of(scene, presses, material_, parameters.reference(), options, begin);
   trials_ = pointers(trials);
   std::vector<std::unique_ptr<Trial>> all = as_trials(std::move(trials));
   for (std::unique_ptr<Trial>& test : static_test_trials(scene, material_, parameters, 0)) {
@@ -78,6 +82,12 @@ void PressObjective::set_form(std::shared_ptr<const Body> body, const LawLayout&
 
 void PressObjective::set_options(const PressTrialOptions& options) {
   for (PressTrial* trial : trials_) trial->set_options(options);
+}
+
+PressObjective::Placements PressObjective::placements() const {
+  Placements all;
+  for (const PressTrial* trial : trials_) all.push_back(trial->placement());
+  return all;
 }
 
 std::vector<double> PressObjective::residuals() const {

@@ -15,9 +15,13 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
 /// material, whose form can change.
 class PressObjective {
  public:
+  /// Where presses are in equilibrium; nothing for those that have not been solved.
+  using Placements = std::vector<std::optional<Placement>>;
   /// @param presses  numbers of those that take part
+  /// @param begin    one a press, of another objective of the same presses, that equilibria set out from; or none
   PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
-                 const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options);
+                 const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options,
+                 const Placements& begin = {});
 
   Objective& cost() { return objective_; }
   [[nodiscard]] CostEvaluation evaluate(const VectorX& p) { return objective_.evaluate(p); }
@@ -27,6 +31,8 @@ class PressObjective {
   /// @param body  the same but for its modulus field
   void set_form(std::shared_ptr<const Body> body, const LawLayout& layout, ParameterSet parameters);
   void set_options(const PressTrialOptions& options);
+  /// Of the last evaluation, one a press.
+  Placements placements() const;
   /// All residuals of the presses' points at the last evaluation [m], three a point.
   std::vector<double> residuals() const;
   /// The noise that these residuals show (`robust_noise`).

@@ -74,7 +74,8 @@ class PressedBody {
   SolveSummary solve();
   /// The same, first from a placement that is nearly in equilibrium.
   SolveSummary solve_from(const Placement& guess);
-  void forget() { has_placement_ = false; }
+  /// The next `solve` sets out from there.
+  void begin_from(const Placement& placement) { placement_ = placement, has_placement_ = true; }
   Equilibrium& equilibrium() { return equilibrium_; }
   const Placement& placement() const { return placement_; }
   /// Simulated places of the press' points, one row each [m]; the probe's last.

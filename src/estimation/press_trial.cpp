@@ -27,17 +27,18 @@ void PressedMaterial::set_form(std::shared_ptr<const Body> body, LawLayout layou
 
 PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press,
                        const std::shared_ptr<PressedMaterial>& material, const VectorX& reference,
-                       const PressTrialOptions& options, int number)
+                       const PressTrialOptions& options, int number, const Placement* begin)
     : PressTrial(std::move(scene), press, material,
                  ContactMaterial{material->law(reference), mean_modulus(material->body(), *material->law(reference))},
-                 options, number) {
+                 options, number, begin) {
   if (options.noise.growth == 0.0) return;
   is_placed_ = body_.solve().converged;
   set_options(options);
 }
 
 PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
-                       const ContactMaterial& contact, const PressTrialOptions& options, int number)
+                       const ContactMaterial& contact, const PressTrialOptions& options, int number,
+                       const Placement* begin)
     : scene_(std::move(scene)),
       press_(press),
       number_(number),
@@ -45,6 +46,7 @@ PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::
       options_(options),
       contact_(contact),
       body_(*scene_, press, contact_.law, contact_.youngs_modulus) {
+  if (begin) body_.begin_from(*begin);
   set_options(options);
 }
 
@@ -70,7 +72,8 @@ void PressTrial::set_options(const PressTrialOptions& options) {
 
 std::unique_ptr<Trial> PressTrial::anew() const {
   const auto material = std::make_shared<PressedMaterial>(material_->shared_body(), material_->layout());
-  std::unique_ptr<PressTrial> trial(new PressTrial(scene_, press_, material, contact_, options_, number_));
+  std::unique_ptr<PressTrial> trial(
+      new PressTrial(scene_, press_, material, contact_, options_, number_, is_placed_ ? &body_.placement() : nullptr));
   trial->deviations_ = deviations_;
   return trial;
 }
@@ -150,8 +153,9 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
   const bool is_kept = numbers.count() > 0 && numbers.count() <= most_changes_kept;
   linearised_ = {is_kept ? material_->form() : -1, theta, body_.placement(), numbers.rows, {}};
   MatrixX by_parameters(residuals_.size(), Eigen::Index(numbers.count()));
+  body_.equilibrium().respond(forces);
   for (std::size_t k = 0; k < numbers.count(); ++k) {
-    const Points& change = body_.equilibrium().response(forces[k]);
+    const Points& change = forces[k];
     Points moved = Points::Zero(residuals_.rows(), 3);
     moved.topRows(body_.embedding().point_count()) = body_.embedding().positions(change.topRows(n));
     if (body_.has_probe()) moved.row(moved.rows() - 1) = change.row(n);

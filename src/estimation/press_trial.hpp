@@ -51,8 +51,10 @@ class PressTrial : public Trial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is
   /// @param number     what its frame calls it (`FrameFit::recording`)
+  /// @param begin      a placement that the first run sets out from, of another trial of the press; null: at rest
   PressTrial(std::shared_ptr<const PressScene> scene, int press, const std::shared_ptr<PressedMaterial>& material,
-             const VectorX& reference, const PressTrialOptions& options, int number = 0);
+             const VectorX& reference, const PressTrialOptions& options, int number = 0,
+             const Placement* begin = nullptr);
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
@@ -63,6 +65,8 @@ class PressTrial : public Trial {
   /// Residuals of the last run [m], and deviations they are weighed by [m], n x 3.
   const Points& residuals() const { return residuals_; }
   const Points& deviations() const { return deviations_; }
+  /// The last run's; nothing where it has failed, or none was.
+  std::optional<Placement> placement() const { return is_placed_ ? std::optional(body_.placement()) : std::nullopt; }
   const ObservedPress& seen() const { return scene_->presses[std::size_t(press_)]; }
   /// Newton's iterations of the last run.
   int iterations() const { return iterations_; }
@@ -76,7 +80,7 @@ class PressTrial : public Trial {
     double youngs_modulus = 0.0;
   };
   PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
-             const ContactMaterial& contact, const PressTrialOptions& options, int number);
+             const ContactMaterial& contact, const PressTrialOptions& options, int number, const Placement* begin);
 
   /// The equilibrium and its cost. `slope` and `weight` are those of each coordinate's loss.
   bool compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight);

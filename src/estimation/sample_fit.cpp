@@ -175,17 +175,24 @@ MatrixX sample_jacobian(PressedBody& body, const Body& mesh, const ChangedLaw& l
     });
     return J;
   }
+  constexpr int together = 32;
   MatrixX responses(3 * rows, coordinates);  // H^-1 of each coordinate's own unit force
-  for (int c = 0; c < coordinates; ++c) {
-    Points forces = Points::Zero(rows, 3), nodal = Points::Zero(n, 3);
-    const int point = c / 3;
-    if (point < points.point_count()) {
-      points.add_transpose(point, Vector3::Unit(c % 3), nodal);
-      forces.topRows(n) = nodal;
-    } else {
-      forces(n, c % 3) = 1.0;
+  std::vector<Points> some;
+  for (int first = 0; first < coordinates; first += together) {
+    some.assign(std::size_t(std::min(together, coordinates - first)), Points::Zero(rows, 3));
+    for (int k = 0; k < int(some.size()); ++k) {
+      const int point = (first + k) / 3, axis = (first + k) % 3;
+      Points& forces = some[std::size_t(k)];
+      if (point < points.point_count()) {
+        Points nodal = Points::Zero(n, 3);
+        points.add_transpose(point, Vector3::Unit(axis), nodal);
+        forces.topRows(n) = nodal;
+      } else {
+        forces(n, axis) = 1.0;
+      }
     }
-    responses.col(c) = flat(equilibrium.response(forces));
+    equilibrium.respond(some);
+    for (int k = 0; k < int(some.size()); ++k) responses.col(first + k) = flat(some[std::size_t(k)]);
   }
   for_elements([&](int e, std::span<const int> nodes, const MatrixX& derivative) {
     MatrixX own(Eigen::Index(3 * nodes.size()), coordinates);

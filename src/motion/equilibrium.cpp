@@ -173,6 +173,7 @@ class Equilibrium::Solver {
       failure_ =
           statics_.failure() + "; the load was followed up to " + std::to_string(int(100.0 * steps.carried())) + " %";
     placement = parted(good);
+    is_linearised_ = steps.is_complete();
     summary.iterations = iterations;
     return summary;
   }
@@ -219,7 +220,10 @@ class Equilibrium::Solver {
 
   bool prepare_derivatives(const Placement& placement) {
     set_load({dead_load_, controls_});
-    return statics_.prepare_derivatives(joined(placement));
+    const Points z = joined(placement);
+    if (is_linearised_ && statics_.linearised_at() == z) return statics_.prepare_derivatives_there();
+    is_linearised_ = false;
+    return statics_.prepare_derivatives(z);
   }
 
   std::vector<ForceTerm*> terms() {
@@ -247,6 +251,7 @@ class Equilibrium::Solver {
   Drives drives_;
   Statics statics_;
   Points dead_load_;
+  bool is_linearised_ = false;  // by the last `solve`, where it ended, with the law and the controls of now
   Energies energies_;
   std::string failure_;
 };
@@ -261,14 +266,22 @@ Equilibrium::Equilibrium(Equilibrium&&) noexcept = default;
 const Body& Equilibrium::body() const { return *solver_->body_; }
 int Equilibrium::contact_count() const { return int(solver_->contacts_.size()); }
 const RigidContact& Equilibrium::contact(int i) const { return solver_->contacts_[std::size_t(i)]; }
-void Equilibrium::set_law(std::shared_ptr<const MaterialLaw> law) { solver_->elasticity_->set_law(std::move(law)); }
-void Equilibrium::set_dead_load(Points forces) { solver_->dead_load_ = std::move(forces); }
+void Equilibrium::set_law(std::shared_ptr<const MaterialLaw> law) {
+  solver_->elasticity_->set_law(std::move(law));
+  solver_->is_linearised_ = false;
+}
+void Equilibrium::set_dead_load(Points forces) {
+  solver_->dead_load_ = std::move(forces);
+  solver_->is_linearised_ = false;
+}
 void Equilibrium::set_control(int contact, const ProbeControl& control) {
   solver_->controls_[std::size_t(contact)] = control;
+  solver_->is_linearised_ = false;
 }
 
 void Equilibrium::turn(int contact, const Matrix3& rotation, const Vector3& centre) {
   solver_->contacts_[std::size_t(contact)].turn(rotation, centre);
+  solver_->is_linearised_ = false;
 }
 
 Placement Equilibrium::rest() const {
@@ -290,8 +303,12 @@ Vector3 Equilibrium::contact_force(int contact, const Placement& placement) cons
   return solver_->contacts_[std::size_t(contact)].force(placement.nodes,
                                                         placement.translations.row(contact).transpose());
 }
-LawElasticity& Equilibrium::elasticity() { return *solver_->elasticity_; }
+LawElasticity& Equilibrium::elasticity() {
+  solver_->is_linearised_ = false;  // who has it may evaluate it elsewhere
+  return *solver_->elasticity_;
+}
 bool Equilibrium::prepare_derivatives(const Placement& placement) { return solver_->prepare_derivatives(placement); }
 const Points& Equilibrium::response(const Points& forces) { return solver_->statics_.response(forces); }
+void Equilibrium::respond(std::span<Points> changes) { solver_->statics_.respond(changes); }
 
 }  // namespace pliant

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -85,6 +86,8 @@ class Equilibrium {
   /// Change of the placement for a change of the forces on nodes and rigid bodies, (n + contacts) x 3 [N]: H^-1 f, with
   /// zeros for what is held. It is its own adjoint.
   const Points& response(const Points& forces);
+  /// The same of several changes together, which costs less than one by one. In: of the forces; out: of the placement.
+  void respond(std::span<Points> changes);
 
  private:
   class Solver;

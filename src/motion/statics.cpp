@@ -194,6 +194,10 @@ void Statics::move(const Points& x, const Points& step, double share, Points& ou
 
 bool Statics::prepare_derivatives(const Points& x) {
   if (const auto energy = linearise(x); energy && !std::isfinite(*energy)) return false;
+  return prepare_derivatives_there();
+}
+
+bool Statics::prepare_derivatives_there() {
   for (ForceTerm* term : terms_) term->linearise_reference(x_);
   if (!has_energy_) return factorise_general();
   prepare_factor();
@@ -216,6 +220,24 @@ const Points& Statics::response(const Points& forces) {
   solve_derivative(force_, GeneralSolver::Side::Plain);
   response_ = as_points(std::as_const(solution_));
   return response_;
+}
+
+void Statics::respond(std::span<Points> changes) {
+  if (!has_energy_) {
+    for (Points& change : changes) change = response(change);
+    return;
+  }
+  const auto count = Eigen::Index(changes.size());
+  columns_.resize(3 * rows(), count);
+  responses_.setZero(3 * rows(), count);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    Points& change = changes[std::size_t(c)];
+    clear_held(change);
+    columns_.col(c) = flat(change);
+  }
+  factor_->solve_columns(columns_, responses_);
+  for (Eigen::Index c = 0; c < count; ++c)
+    changes[std::size_t(c)] = Eigen::Map<const Points>(responses_.col(c).data(), rows(), 3);
 }
 
 Points Statics::tangent(const Points& x, const VectorX& d_theta, const Points* d_reference) {

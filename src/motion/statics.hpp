@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -54,8 +55,15 @@ class Statics : private NewtonProblem {
   [[nodiscard]] Points tangent(const Points& x, const VectorX& d_theta, const Points* d_reference = nullptr);
   /// theta_bar and, where given, reference_bar += the cotangents for one of the equilibrium's positions.
   void adjoint(const Points& x, const Points& x_bar, VectorX& theta_bar, Points* reference_bar = nullptr);
+  /// The same where the last `solve` found x and nothing has changed since: terms are linearised there.
+  [[nodiscard]] bool prepare_derivatives_there();
+  /// Where the terms were linearised last.
+  const Points& linearised_at() const { return x_; }
   /// Change of the equilibrium for a change of the forces, rows x 3 [N]; zeros for what is held.
   const Points& response(const Points& forces);
+  /// The same of several changes together, which costs less than one by one. In: of the forces; out: of the
+  /// equilibrium.
+  void respond(std::span<Points> changes);
 
  private:
   std::optional<double> linearise(const Points& x) override;
@@ -101,6 +109,7 @@ class Statics : private NewtonProblem {
   double energy_scale_ = 0.0, rounding_ = 0.0;
   Points x_, force_, residual_, response_;
   VectorX right_, solution_;
+  MatrixX columns_, responses_;  // of several changes
 };
 
 }  // namespace pliant

@@ -94,6 +94,28 @@ TEST_P(Presses, SetOutFromWhereDerivativesLead) {
   EXPECT_EQ(led.iterations(), 0) << "it is there";
 }
 
+/// A trial that begins where another one of the press has ended finds the same, in fewer iterations.
+TEST_P(Presses, SetOutFromAnotherTrialsPlacement) {
+  const auto material = std::make_shared<PressedMaterial>(scene->body, layout);
+  const VectorX& theta = set.reference();
+  const MatrixX none(theta.size(), 0);
+  const MarkerNoise noise{1e-4};
+  PressTrial first(scene, 0, material, theta, {noise, 5.0});
+  EXPECT_FALSE(first.placement());
+  ASSERT_TRUE(first.run(theta, none).succeeded);
+  const std::optional<Placement> placement = first.placement();
+  ASSERT_TRUE(placement);
+  PressTrial second(scene, 0, material, theta, {noise, 5.0}, 0, &*placement);
+  ASSERT_TRUE(second.run(theta, none).succeeded);
+  EXPECT_GT(first.iterations(), 1);
+  EXPECT_EQ(second.iterations(), 0);
+  EXPECT_LT((first.residuals() - second.residuals()).norm(), 1e-7 * first.displacements().norm());
+  PressObjective before = objective();
+  ASSERT_TRUE(before.evaluate(set.to_unconstrained(theta)).succeeded);
+  EXPECT_EQ(before.placements().size(), 4U);
+  EXPECT_TRUE(before.placements().back());
+}
+
 TEST_P(Presses, NoiseThatGrowsGoesByWhereTheLawHasThePoints) {
   PressObjective cost(scene, {0, 1, 2, 3}, layout, set, {{1e-4, 0.05}, 5.0});
   const VectorX p = set.to_unconstrained(set.reference());

@@ -198,6 +198,45 @@ TEST(LawEquilibrium, ChangesWithForcesAsItsResponseSays) {
   EXPECT_LT(test::best_relative_error(along, derivative, 10.0), tolerance(1e-6));
 }
 
+TEST(LawEquilibrium, RespondsToSeveralChangesAsToEach) {
+  const Block block;
+  Equilibrium equilibrium = block.make();
+  equilibrium.set_control(0, {ProbeControl::Kind::Force, Vector3(1.0, -15.0, 2.0), {}, {}});
+  Placement placement = equilibrium.rest();
+  ASSERT_TRUE(equilibrium.solve(placement).converged);
+  ASSERT_TRUE(equilibrium.prepare_derivatives(placement));
+  std::vector<Points> changes(5, Points::Zero(block.body->node_count() + 1, 3));
+  for (std::size_t c = 0; c < changes.size(); ++c)
+    for (Eigen::Index i = 0; i < changes[c].size(); ++i)
+      changes[c].data()[i] = std::sin(double(c) + double(i * i % 97));
+  std::vector<Points> alone;
+  for (const Points& forces : changes) alone.push_back(equilibrium.response(forces));
+  equilibrium.respond(changes);
+  for (std::size_t c = 0; c < changes.size(); ++c)
+    EXPECT_LT((changes[c] - alone[c]).norm(), tolerance(1e-11) * alone[c].norm()) << c;
+}
+
+/// Terms are linearised where the last solve ended, which derivatives there need not do again, unless something has
+/// changed since.
+TEST(LawEquilibrium, DerivativesAreThoseOfTheLawAndTheLoadsOfNow) {
+  const Block block;
+  Equilibrium equilibrium = block.make();
+  equilibrium.set_control(0, {ProbeControl::Kind::Force, Vector3(1.0, -15.0, 2.0), {}, {}});
+  Placement placement = equilibrium.rest();
+  ASSERT_TRUE(equilibrium.solve(placement).converged);
+  Points forces = Points::Zero(block.body->node_count() + 1, 3);
+  forces(block.body->node_count(), 1) = 1.0;
+  const auto response = [&] {
+    EXPECT_TRUE(equilibrium.prepare_derivatives(placement));
+    return equilibrium.response(forces);
+  };
+  const Points there = response();
+  (void)equilibrium.elasticity().evaluate(block.body->nodes, true);  // elsewhere
+  EXPECT_LT((response() - there).norm(), tolerance(1e-12) * there.norm());
+  equilibrium.set_law(ogden(*block.body, {3000.0, 8.0, 0.2, 3000.0, -6.0, 0.15}));
+  EXPECT_LT(response().norm(), 0.9 * there.norm()) << "a stiffer law";
+}
+
 TEST(LawEquilibrium, OfASampledMaterialIsFoundToo) {
   const Block block;
   std::vector<MaterialSample> samples;
