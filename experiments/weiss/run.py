@@ -26,7 +26,7 @@ def complaints(name, found):
 
 def main():
     arguments = common.arguments(__doc__, only={"help": "names of studies, with commas; left out: all of " + ", ".join(studies.ALL)},
-                                 small={"action": "store_true", "help": "two starts and few frames of each, to see that it runs; writes no results"})
+                                 small={"action": "store_true", "help": "one start and few frames of each, to see that it runs; writes no results"})
     names = arguments.only.split(",") if arguments.only else list(studies.ALL)
     unknown = [name for name in names if name not in studies.ALL]
     if unknown:

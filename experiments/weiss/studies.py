@@ -21,7 +21,7 @@ class Study:
         self.weiss = self.pliant.parent.parent / "experiments/pliant_weiss"
 
     def count(self, full):
-        return 2 if self.small else full
+        return 1 if self.small else full
 
     def ask(self, name, request):
         """One run of pliant_weiss, or its output where it has run already."""
@@ -243,7 +243,7 @@ def differences(study):
 
 
 def swept(truth, study, decades=1.0):
-    half = 3 if study.small else 12
+    half = 2 if study.small else 12
     return [truth * 10.0**(decades * i / half) for i in range(-half, half + 1)]
 
 
