@@ -157,6 +157,7 @@ class TetLawElasticity : public LawElasticity {
   Points lag_, reference_z_;
   double energy_ = 0.0;  // at the last `evaluate`; infinite where the law knows no such deformation
   bool has_rotations_ = false;
+  bool has_frames_ = false;  // the stresses' `left` and `right`, of the last `evaluate` with tangents
   mutable std::vector<TangentProjection> projections_;
   mutable bool has_projections_ = false;
   std::vector<PointChange> changes_;
@@ -272,7 +273,9 @@ double TetLawElasticity<N>::evaluate(const Points& x, bool with_tangent) {
   });
   double energy = 0.0;
   for (const Point& point : points_) energy += point.volume * point.stress.energy;
-  return energy_ = std::isnan(energy) ? std::numeric_limits<double>::infinity() : energy;
+  energy_ = std::isnan(energy) ? std::numeric_limits<double>::infinity() : energy;
+  if (with_tangent) has_frames_ = std::isfinite(energy_);
+  return energy_;
 }
 
 template <int N>
@@ -371,16 +374,21 @@ void TetLawElasticity<N>::add_stiffness(Stiffness which, double scale, BlockMatr
 template <int N>
 void TetLawElasticity<N>::for_parameter_derivatives(const VisitDerivatives& visit) const {
   const int count = int(law_->parameter_names().size());
+  // In the frame of the last tangent, which is near that of the principal stretches, these take no search.
+  const bool is_turned = has_frames_ && law_->has_principal_frame();
   std::vector<Matrix3> by_parameter(std::size_t(count), Matrix3::Zero());
   MatrixX derivatives(3 * N, count);
   for (int e = 0; e < body_->element_count(); ++e) {
     derivatives.setZero();
     for (int q = 0; q < points; ++q) {
       const Point& point = points_[std::size_t(e) * points + std::size_t(q)];
-      law_->parameter_derivatives(e, point.F, by_parameter);
+      const PointStress& s = point.stress;
+      const Nodes gradient = is_turned ? Nodes(point.gradient * s.right) : point.gradient;
+      law_->parameter_derivatives(e, is_turned ? Matrix3(s.left.transpose() * point.F * s.right) : point.F,
+                                  by_parameter);
       for (int k = 0; k < count; ++k) {
-        const Eigen::Matrix<double, 3, N> force =
-            point.volume * by_parameter[std::size_t(k)] * point.gradient.transpose();
+        Eigen::Matrix<double, 3, N> force = point.volume * by_parameter[std::size_t(k)] * gradient.transpose();
+        if (is_turned) force = (s.left * force).eval();
         derivatives.col(k) += Eigen::Map<const Eigen::Matrix<double, 3 * N, 1>>(force.data());
       }
     }
