@@ -77,10 +77,10 @@ std::string trust_sentence(const ParameterResult& p) {
   if (!p.std || !std::isfinite(std::get<double>(*p.std)))
     return fmt::format("{} has no uncertainty: the fit did not come to its end, or the recording hardly depends on it.",
                        spoken_name(p.name));
-  const double relative = std::get<double>(*p.std) / std::abs(*value);
+  const double std = std::get<double>(*p.std), relative = std / std::abs(*value);
   if (relative < 0.3) return "";
-  return fmt::format("{} is known poorly (± {} %): the recording depends little on it.", spoken_name(p.name),
-                     readable(100.0 * relative, 2));
+  return fmt::format("{} is known poorly (± {}): the recording depends little on it.", spoken_name(p.name),
+                     std::isfinite(relative) ? readable(100.0 * relative, 2) + " %" : in_unit(std, 2, p));
 }
 
 // Where the limit lies outside the interval that the data give, the interval alone would mislead.

@@ -137,6 +137,10 @@ TEST(PlainSentences, SayHowFarTheFitCanBeTrusted) {
   EXPECT_THAT(words, Contains(HasSubstr("2 of 3 starts")));
   EXPECT_THAT(words, Contains(HasSubstr("Taken as given, not estimated: Poisson's ratio (0.35), density (95")));
   EXPECT_THAT(words, Contains("The floor was taken as known."));
+  for (ParameterResult& p : data.result.parameters)
+    if (p.name == "mass_damping") p.value = 0.0, p.std = 0.12;
+  EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("Mass damping is known poorly (± 0.12\u00a01/s)")))
+      << "no percentage of nothing";
   data.result.error.surface_rms = 0.00201;
   EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("lies 2.0\u00a0mm")));
   data.result.error.surface_rms = 0.0063;
