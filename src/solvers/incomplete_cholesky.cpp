@@ -347,7 +347,8 @@ auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vecto
 }
 
 SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
-  auto& [b, x, r, z, p, ap, work] = own;
+  const std::vector<double>& b = own.b;
+  std::vector<double>&x = own.x, &r = own.r, &z = own.z, &p = own.p, &ap = own.ap;
   multiply_lanes(x, ap);
   constexpr std::size_t of_a_row = 3 * lanes;
   const auto squares = [&](const std::vector<double>& v) {
@@ -375,7 +376,7 @@ SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
       any = any || goes_on[l];
     }
     if (!any || summary.iterations >= options_.max_iterations) break;
-    precondition_lanes(r, z, work);
+    precondition_lanes(r, z, own.work);
     const Wide<double> rz_new = sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
       Wide<double> sum{};
       for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes)
