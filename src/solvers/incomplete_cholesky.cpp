@@ -324,21 +324,23 @@ Wide<double> sum_lanes(const Parts& parts, const Body& body) {
 
 auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vector<double>& ap) const
     -> std::array<double, lanes> {
-  const BlockPattern& pattern = *pattern_;
-  const int* column = pattern.column.data();
-  const Wide<double> dot = sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+  const int *const column = pattern_->column.data(), *const row_start = pattern_->row_start.data();
+  const double* const from = p.data();
+  double* const to = ap.data();
+  const BlockMatrix& matrix = *matrix_;
+  const Wide<double> dot = sum_lanes(parts_, [=, &matrix](std::size_t first, std::size_t last) {
     Wide<double> part{};
     for (std::size_t row = first; row < last; ++row) {
       LaneSums<double> sum{};
-      for (int b = pattern.row_start[row]; b < pattern.row_start[row + 1]; ++b) {
+      for (int b = row_start[row]; b < row_start[row + 1]; ++b) {
         Wide<double> v[3];
-        load_lanes(&p[12 * std::size_t(column[b])], v);
-        add_block_times(matrix_->block(b), v, sum);
+        load_lanes(&from[12 * std::size_t(column[b])], v);
+        add_block_times(matrix.block(b), v, sum);
       }
       for (std::size_t d = 0; d < 3; ++d) {
         const Wide<double> product = total<double>(sum, int(d));
-        store_wide(&ap[12 * row + 4 * d], product);
-        part += load_wide(&p[12 * row + 4 * d]) * product;
+        store_wide(&to[12 * row + 4 * d], product);
+        part += load_wide(&from[12 * row + 4 * d]) * product;
       }
     }
     return part;
@@ -347,19 +349,20 @@ auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vecto
 }
 
 SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
-  const std::vector<double>& b = own.b;
-  std::vector<double>&x = own.x, &r = own.r, &z = own.z, &p = own.p, &ap = own.ap;
-  multiply_lanes(x, ap);
+  const double* const b = own.b.data();
+  double *const x = own.x.data(), *const r = own.r.data(), *const z = own.z.data(), *const p = own.p.data(),
+                *const ap = own.ap.data();
+  multiply_lanes(own.x, own.ap);
   constexpr std::size_t of_a_row = 3 * lanes;
-  const auto squares = [&](const std::vector<double>& v) {
-    return sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+  const auto squares = [&](const double* v) {
+    return sum_lanes(parts_, [=](std::size_t first, std::size_t last) {
       Wide<double> sum{};
       for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes)
         sum += load_wide(&v[i]) * load_wide(&v[i]);
       return sum;
     });
   };
-  for_parts(parts_, [&](std::size_t first, std::size_t last) {
+  for_parts(parts_, [=](std::size_t first, std::size_t last) {
     for (std::size_t i = of_a_row * first; i < of_a_row * last; ++i) r[i] = b[i] - ap[i];
   });
   const Wide<double> b_norm = squares(b);
@@ -376,8 +379,8 @@ SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
       any = any || goes_on[l];
     }
     if (!any || summary.iterations >= options_.max_iterations) break;
-    precondition_lanes(r, z, own.work);
-    const Wide<double> rz_new = sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+    precondition_lanes(own.r, own.z, own.work);
+    const Wide<double> rz_new = sum_lanes(parts_, [=](std::size_t first, std::size_t last) {
       Wide<double> sum{};
       for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes)
         sum += load_wide(&r[i]) * load_wide(&z[i]);
@@ -386,16 +389,16 @@ SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
     Wide<double> alpha{}, beta{};
     for (std::size_t l = 0; l < lanes && summary.iterations > 0; ++l) beta[l] = goes_on[l] ? rz_new[l] / rz[l] : 0.0;
     rz = rz_new;
-    for_parts(parts_, [&](std::size_t first, std::size_t last) {
+    for_parts(parts_, [=](std::size_t first, std::size_t last) {
       for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes)
         store_wide(&p[i], load_wide(&z[i]) + beta * load_wide(&p[i]));
     });
-    const std::array<double, lanes> curvature = multiply_lanes(p, ap);
+    const std::array<double, lanes> curvature = multiply_lanes(own.p, own.ap);
     for (std::size_t l = 0; l < lanes; ++l) {
       goes_on[l] = goes_on[l] && curvature[l] > 0.0;
       alpha[l] = goes_on[l] ? rz[l] / curvature[l] : 0.0;
     }
-    r_norm = sum_lanes(parts_, [&](std::size_t first, std::size_t last) {
+    r_norm = sum_lanes(parts_, [=](std::size_t first, std::size_t last) {
       Wide<double> sum{};
       for (std::size_t i = of_a_row * first; i < of_a_row * last; i += lanes) {
         store_wide(&x[i], load_wide(&x[i]) + alpha * load_wide(&p[i]));
