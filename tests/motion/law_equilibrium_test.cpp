@@ -174,23 +174,25 @@ TEST(LawEquilibrium, WorkOfTheProbeIsWhatTheBodyStores) {
   EXPECT_LT(std::abs(equilibrium.energies().total), tolerance(1e-9) * most);
 }
 
+/// The equilibrium under a force [N] on the first rigid body, from rest.
+Placement pushed(Equilibrium& equilibrium, const Vector3& force) {
+  equilibrium.set_control(0, {ProbeControl::Kind::Force, force, {}, {}});
+  Placement placement = equilibrium.rest();
+  EXPECT_TRUE(equilibrium.solve(placement).converged);
+  return placement;
+}
+
 TEST(LawEquilibrium, ChangesWithForcesAsItsResponseSays) {
   const Block block;
   Equilibrium equilibrium = block.make();
-  const auto solve = [&](const Vector3& force) {
-    equilibrium.set_control(0, {ProbeControl::Kind::Force, force, {}, {}});
-    Placement placement = equilibrium.rest();
-    EXPECT_TRUE(equilibrium.solve(placement).converged);
-    return placement;
-  };
   const Vector3 force(1.0, -15.0, 2.0), change(0.3, 0.5, -0.8);
-  const Placement placement = solve(force);
+  const Placement placement = pushed(equilibrium, force);
   ASSERT_TRUE(equilibrium.prepare_derivatives(placement));
   Points forces = Points::Zero(block.body->node_count() + 1, 3);
   forces.row(block.body->node_count()) = change.transpose();
   const VectorX derivative = flat(equilibrium.response(forces));
   const auto along = [&](double h) {
-    const Placement p = solve(force + h * change);
+    const Placement p = pushed(equilibrium, force + h * change);
     VectorX all(derivative.size());
     all << VectorX(flat(p.nodes)), VectorX(flat(p.translations));
     return all;
@@ -201,9 +203,7 @@ TEST(LawEquilibrium, ChangesWithForcesAsItsResponseSays) {
 TEST(LawEquilibrium, RespondsToSeveralChangesAsToEach) {
   const Block block;
   Equilibrium equilibrium = block.make();
-  equilibrium.set_control(0, {ProbeControl::Kind::Force, Vector3(1.0, -15.0, 2.0), {}, {}});
-  Placement placement = equilibrium.rest();
-  ASSERT_TRUE(equilibrium.solve(placement).converged);
+  const Placement placement = pushed(equilibrium, Vector3(1.0, -15.0, 2.0));
   ASSERT_TRUE(equilibrium.prepare_derivatives(placement));
   std::vector<Points> changes(5, Points::Zero(block.body->node_count() + 1, 3));
   for (std::size_t c = 0; c < changes.size(); ++c)
@@ -221,9 +221,7 @@ TEST(LawEquilibrium, RespondsToSeveralChangesAsToEach) {
 TEST(LawEquilibrium, DerivativesAreThoseOfTheLawAndTheLoadsOfNow) {
   const Block block;
   Equilibrium equilibrium = block.make();
-  equilibrium.set_control(0, {ProbeControl::Kind::Force, Vector3(1.0, -15.0, 2.0), {}, {}});
-  Placement placement = equilibrium.rest();
-  ASSERT_TRUE(equilibrium.solve(placement).converged);
+  const Placement placement = pushed(equilibrium, Vector3(1.0, -15.0, 2.0));
   Points forces = Points::Zero(block.body->node_count() + 1, 3);
   forces(block.body->node_count(), 1) = 1.0;
   const auto response = [&] {
