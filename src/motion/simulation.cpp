@@ -461,7 +461,6 @@ void Simulation::take_steps(const VectorX& parameters, const MatrixX& directions
   for (std::size_t s = 0; s < steps_.size() && summary.frames <= last_frame; ++s) {
     const std::size_t k = s % 2, next = 1 - k;
     const bool is_needed = !under_way || *under_way < last_frame;
-    if (is_beside && s > 0) forces[k]->look_for_rotations_from(*forces[next]);  // bit for bit as one stepper would
     const bool is_taken = is_needed && take_step(s, *steppers[k], starts[k], deltas[k], summary);
     const std::string why_not = std::exchange(summary.failure, {});
     if (const Way way = end_step(starts[k]); way != Way::On) {
@@ -474,10 +473,13 @@ void Simulation::take_steps(const VectorX& parameters, const MatrixX& directions
       return;
     }
     under_way = steps_[s].frame_after;
-    if (is_beside)
+    if (is_beside) {
+      // Bit for bit as one stepper would; and before tangents linearise again, as those of Newton's steps do.
+      forces[next]->look_for_rotations_from(*forces[k]);
       beside.run(std::cref(carry_tangents[k]));
-    else
+    } else {
       carry_tangents[k]();
+    }
     starts[next] = starts[k];
     steppers[k]->advance(deltas[k], starts[next]);
     if (is_beside) continue;
