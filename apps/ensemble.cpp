@@ -198,6 +198,7 @@ int run(const Arguments& arguments) {
   if (arguments.dry_run) return run_dry(arguments, ensemble, setup_seconds, own);
   make_folder(arguments.out);
   simulate_chunks(arguments, ensemble, own);
+  remove_messages(arguments.out, plan);
   const int ended = members_ended(arguments.out, plan), failed = say_failures(arguments, plan);
   std::cout << fmt::format("{} of {} members ended, {} failed\n", ended, plan.members(), failed);
   if (is_interrupted()) return WasInterrupted;

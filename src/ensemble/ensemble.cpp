@@ -54,6 +54,9 @@ EnsembleChunk chunk_of(const std::vector<DrawnMaterial>& materials, int first, i
   return chunk;
 }
 
+/// Where the process of a chunk says what goes wrong.
+fs::path messages_of(const fs::path& folder, const EnsembleChunk& chunk) { return folder / (chunk.name + ".txt"); }
+
 class ChunkJob : public Job {
  public:
   ChunkJob(const fs::path& ensemble, EnsembleChunk chunk, RecordShape shape,
@@ -70,7 +73,7 @@ class ChunkJob : public Job {
     make_folder(folder_);
     return words_(threads);
   }
-  fs::path messages() const override { return folder_ / (chunk_.name + ".txt"); }
+  fs::path messages() const override { return messages_of(folder_, chunk_); }
 
   Next end(const ProcessEnd& end) override {
     if (has_ended()) return ended();
@@ -150,6 +153,11 @@ void simulate_chunk(const fs::path& ensemble, const EnsembleScene& scene, const 
 std::unique_ptr<Job> chunk_job(const fs::path& ensemble, const EnsemblePlan& plan, std::size_t chunk,
                                std::function<std::vector<std::string>(int)> words, std::function<void()> on_end) {
   return std::make_unique<ChunkJob>(ensemble, plan.chunks[chunk], plan.shape, std::move(words), std::move(on_end));
+}
+
+void remove_messages(const fs::path& ensemble, const EnsemblePlan& plan) {
+  for (const EnsembleChunk& chunk : plan.chunks)
+    if (is_whole(chunks_of(ensemble), chunk, plan.shape)) remove_file(messages_of(chunks_of(ensemble), chunk));
 }
 
 int members_ended(const fs::path& ensemble, const EnsemblePlan& plan) {

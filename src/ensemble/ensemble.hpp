@@ -57,6 +57,9 @@ std::unique_ptr<Job> chunk_job(const std::filesystem::path& ensemble, const Ense
                                std::function<std::vector<std::string>(int threads)> words,
                                std::function<void()> on_end);
 
+/// Removes what processes said of chunks that are whole: the file of a process outlives a run that was killed.
+void remove_messages(const std::filesystem::path& ensemble, const EnsemblePlan& plan);
+
 /// How many members are there, in whole chunks.
 int members_ended(const std::filesystem::path& ensemble, const EnsemblePlan& plan);
 
