@@ -21,6 +21,7 @@
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
 #include "plan.hpp"
+#include "scan/calibrate.hpp"
 #include "scan/scan_pose.hpp"
 #include "speech.hpp"
 
@@ -216,6 +217,38 @@ void describe_planes(const Capture& capture, const Survey& seen, Json& json) {
   }
 }
 
+/// Where the object at rest asks each depth camera to stand, where the capture shows it as it was scanned.
+void describe_poses(const Capture& capture, Json& json) {
+  constexpr double doubtful = 3.0;
+  if (capture.depth.empty() || capture.scene.timing.is_static) return;
+  std::vector<SensorCalibration> found;
+  try {
+    CalibrationOptions options;
+    options.finds_lenses = false;
+    found = calibrate_by_object(capture, options);
+  } catch (const InputError&) {  // no frame shows it so, or its shape leaves a pose open
+    return;
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const SensorCalibration& s = found[i];
+    const PoseStd& stated = capture.depth[i].pose_std;
+    say("pose", formatted("the object at rest asks \"%s\" to turn by %.2f degrees (+- %.2f) and to shift by %.1f mm "
+                          "(+- %.1f)",
+                          s.name.c_str(), degrees(s.turned), degrees(s.turn_std), 1e3 * s.moved, 1e3 * s.shift_std));
+    if (s.turned > doubtful * std::hypot(stated.turn, s.turn_std) ||
+        s.moved > doubtful * std::hypot(stated.shift, s.shift_std))
+      say("", formatted("note: more than three times its pose_std of %.2f degrees and %.1f mm; where it, or the scan, "
+                        "stands is wrong, or pose_std too small",
+                        degrees(stated.turn), 1e3 * stated.shift));
+    json["poses"].push_back({{"camera", s.name},
+                             {"turned", s.turned},
+                             {"turn_std", s.turn_std},
+                             {"shifted", s.moved},
+                             {"shift_std", s.shift_std},
+                             {"pose_std", {{"turn", stated.turn}, {"shift", stated.shift}}}});
+  }
+}
+
 void describe_scene(const Segmentation& scene, const std::string& camera, Json& json) {
   Json own = {{"camera", camera}};
   for (const PlaneFit& plane : scene.planes) {
@@ -378,6 +411,7 @@ void check(const Arguments& arguments) {
   describe_observations(capture, seen, json);
   describe_cleaning(frames, json);
   describe_planes(capture, seen, json);
+  describe_poses(capture, json);
   for (std::size_t i = 0; i < seen.scenes.size(); ++i) describe_scene(seen.scenes[i], capture.depth[i].name, json);
   for (const CloudScene& scene : seen.clouds) describe_cloud(scene, json);
   if (!arguments.compare_masks.empty()) compare_with_masks(capture, arguments, json);

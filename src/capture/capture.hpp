@@ -25,6 +25,13 @@ struct FramePattern {
   bool operator==(const FramePattern&) const = default;
 };
 
+/// How well the pose of a sensor against the object's scan is known: standard deviations about each axis and along it.
+struct PoseStd {
+  double turn = 0.01;    ///< [rad] about the object's middle; 0: exact
+  double shift = 0.005;  ///< [m] of where it puts the object's middle; 0: exact
+  bool operator==(const PoseStd&) const = default;
+};
+
 struct DepthCamera {
   std::string name;
   PinholeCamera camera;
@@ -37,6 +44,7 @@ struct DepthCamera {
   double time_offset = 0.0;                         ///< [s] its images are taken that much later than their frames
   std::optional<std::filesystem::path> poses = {};  ///< absolute; CSV of where a camera that moves was at each image
   std::vector<RigidMotion> moved = {};              ///< camera to world at each frame; empty: the camera stands
+  PoseStd pose_std = {};  ///< of its pose; of a camera that moves of what all its poses err by together
 
   /// The camera as it stood when it took a frame's image; of one that moves `camera` is that of the first.
   PinholeCamera at(int frame) const {
@@ -52,6 +60,7 @@ struct CloudSequence {
   int every = 1;
   std::optional<double> noise;
   std::optional<std::filesystem::path> background = {};  ///< absolute; a cloud of the scene without the object
+  std::optional<PoseStd> pose_std = {};                  ///< of all clouds together; nothing: taken as exact
   bool operator==(const CloudSequence&) const = default;
 };
 

@@ -131,7 +131,20 @@ class Reader {
     depth.background = optional_path(block, "background");
     depth.noise = block.optional<double>("noise");
     depth.time_offset = block.optional<double>("time_offset").value_or(0.0);
+    depth.pose_std = read_pose_std(block).value_or(PoseStd());
     return depth;
+  }
+
+  std::optional<PoseStd> read_pose_std(TomlTable& block) {
+    std::optional<PoseStd> std;
+    block.with_table("pose_std", [&](TomlTable& table) {
+      std.emplace();
+      const NumberRule turn{0.0, 0.5, true, true, "radians about each axis; 0 where it is exact"};
+      const NumberRule shift{0.0, 0.5, true, true, "metres along each axis; 0 where it is exact"};
+      std->turn = read_number(table, "turn", turn, std->turn);
+      std->shift = read_number(table, "shift", shift, std->shift);
+    });
+    return std;
   }
 
   /// Where a camera that moves was at each frame.
@@ -156,6 +169,7 @@ class Reader {
     cloud.every = block.optional<int>("every").value_or(1);
     cloud.noise = block.optional<double>("noise");
     cloud.background = optional_path(block, "background");
+    cloud.pose_std = read_pose_std(block);
     return cloud;
   }
 

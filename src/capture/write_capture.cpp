@@ -54,6 +54,9 @@ class Writer {
   void write_noise(const std::optional<double>& noise) {
     if (noise) out_ << "noise = " << toml_text(*noise) << "   # m\n";
   }
+  void write_pose_std(const PoseStd& std) {
+    out_ << "pose_std = { turn = " << toml_text(std.turn) << ", shift = " << toml_text(std.shift) << " }   # rad, m\n";
+  }
 
   void write(const DepthCamera& depth) {
     const PinholeCamera& c = depth.camera;
@@ -73,6 +76,7 @@ class Writer {
     write_every(depth.every);
     if (depth.time_offset != 0.0) out_ << "time_offset = " << toml_text(depth.time_offset) << "   # s\n";
     write_noise(depth.noise);
+    if (depth.pose_std != PoseStd()) write_pose_std(depth.pose_std);
     out_ << "\n";
   }
 
@@ -81,6 +85,7 @@ class Writer {
     write_file_key("background", cloud.background);
     write_every(cloud.every);
     write_noise(cloud.noise);
+    if (cloud.pose_std) write_pose_std(*cloud.pose_std);
     out_ << "\n";
   }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double least_part = 0.15;     // of a recording
 constexpr double after_touch = 1.25;    // times the part until the obstacle is touched
 constexpr double growth = 1.2;          // of the part, from one that is explained
-constexpr double as_good_as_all = 0.9;  // a part that is not tried beside the whole
+constexpr double as_good_as_all = 0.9;  // a part in whose place the whole is tried
 constexpr double whole = 1.0;
 
 bool meets_obstacles(const RecordedCapture& r) {
@@ -39,6 +39,9 @@ double part_until_touch(const RecordingOutcome& r, int frames) {
   return touched < 0 ? 1.0 : double(touched) / std::max(1, frames);
 }
 
+/// A part as it is tried; nearly all is all.
+double up_to_whole(double part) { return part > as_good_as_all ? whole : part; }
+
 int last_seen(const CostEvaluation& evaluation) {
   return evaluation.frames.empty() ? 0 : evaluation.frames.back().frame;
 }
@@ -55,9 +58,7 @@ bool ExplainedSpan::suits(const std::vector<RecordedCapture>& recordings, const 
   return options.span == 0.0 && options.refine == 1 && std::ranges::any_of(recordings, meets_obstacles);
 }
 
-bool ExplainedSpan::is_decided() const {
-  return search_.has_whole && (search_.next_part > as_good_as_all || search_.is_ended);
-}
+bool ExplainedSpan::is_decided() const { return search_.has_whole && (search_.part >= whole || search_.is_ended); }
 
 std::optional<Pass> ExplainedSpan::next() {
   if (outcome_) return std::nullopt;
@@ -68,7 +69,7 @@ std::optional<Pass> ExplainedSpan::next() {
   is_last_ = is_decided();
   if (search_.has_whole) {
     pass.options.span = is_last_ ? search_.part : search_.next_part;
-    if (search_.part < whole) {
+    if (search_.has_parts) {
       pass.options.cells = std::min(64.0, options_.cells * Refinement::mesh_ratio);
       pass.stage = fmt::format("first {:.0f} %", 100.0 * pass.options.span);
     }
@@ -94,14 +95,12 @@ bool ExplainedSpan::take(FitOutcome outcome, PassState reached) {
         const RecordingOutcome& r = outcome.recordings[i];
         part = std::max(part, part_until_touch(r, last_seen(r.evaluation)));
       }
-    const double first = std::max(least_part, after_touch * part);
-    search_.next_part = search_.part = first > as_good_as_all ? whole : first;
+    search_.next_part = search_.part = up_to_whole(std::max(least_part, after_touch * part));
+    search_.has_parts = search_.part < whole;
   }
   if (has_failed || is_last_ || (was_whole && fits)) {
-    if (!was_whole && search_.part < whole) {
-      outcome.starts = starts_;
-      say(outcome);
-    }
+    if (!was_whole && search_.has_parts) outcome.starts = starts_;
+    if (!was_whole && search_.part < whole) say(outcome);
     outcome.history = std::move(history_);
     outcome.forward_steps = forward_steps_;
     outcome_ = std::move(outcome);
@@ -111,7 +110,7 @@ bool ExplainedSpan::take(FitOutcome outcome, PassState reached) {
   if (was_whole || is_first_part || fits) search_.state = std::move(reached);
   if (!was_whole) {
     if (fits) search_.part = search_.next_part;
-    search_.next_part *= growth;
+    search_.next_part = up_to_whole(growth * search_.next_part);
     search_.is_ended = !fits;
   }
   search_.has_whole = true;

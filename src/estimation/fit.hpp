@@ -200,6 +200,7 @@ struct FitState {
     bool is_ended = false;           ///< the last part that was tried is not explained
     double part = 0.0;               ///< the longest that is explained; the first one where none is; 1: none is tried
     double next_part = 0.0;          ///< to be tried
+    bool has_parts = false;          ///< parts of it are tried, on a finer mesh; the whole again after the longest
     std::optional<PassState> state;  ///< of the fit to `part`, with its estimate; of the whole before that
   };
   std::optional<SpanSearch> span = {};

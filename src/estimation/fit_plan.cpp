@@ -23,8 +23,7 @@ void is_intermediate(Stage& stage) { stage.promise_tolerance = 0.5, stage.cost_t
 
 constexpr double good_misfit = 2.0;  // on the coarse grid, in the wide band: what is left is noise and the mesh
 
-/// Whether what comes after a stage can be tried where it fails: the motion at the start is a help only.
-bool ends_at_failure(const StageRecord& record) { return !record.succeeded && record.id.kind != StageKind::Motion; }
+bool ends_at_failure(const StageRecord& record) { return !record.succeeded && !is_help(record.id.kind); }
 
 /// Failed, and nothing can follow.
 bool has_failed(const std::vector<StageRecord>& done, StageKind kind) {
@@ -52,6 +51,8 @@ StageChain left_of(StageChain chain, const std::vector<StageRecord>& done) {
 }
 
 }  // namespace
+
+bool is_help(StageKind kind) { return kind == StageKind::Pose || kind == StageKind::Motion; }
 
 bool is_on_full_grid(StageKind kind) {
   return kind == StageKind::Fine || kind == StageKind::Corrected || kind == StageKind::Finer;
@@ -109,7 +110,8 @@ std::vector<double> best_of_scan(const std::vector<std::pair<double, double>>& t
 std::vector<StageChain> FitPlan::next(const PassState& state) const {
   const Records& done = state.done;
   if (!state.begin) {
-    if (StageChain chain = left_of(motion(0, facts_.parameters.reference()), done); !chain.empty()) return {chain};
+    if (!facts_.told_at_rest.empty() && !find_record(done, {StageKind::Pose})) return {{pose()}};
+    if (StageChain chain = left_of(motion(0, beginning(done)), done); !chain.empty()) return {chain};
     const StageRecord* swung = find_record(done, {StageKind::Swing});
     if (facts_.is_scanned && !swung) return {{swing(before_starts(done))}};
     if (swung && swung->converged) {
@@ -144,6 +146,18 @@ Stage FitPlan::last_look(const PassState& state) const {
 }
 
 // Stages ----------------------------------------------------------------------------------------------------------
+
+/// Poses that are told at rest are found there, and held while starts are followed: they are linear in what is seen, so
+/// a motion that is still wrong would bend them by degrees. The last stage has them free, from there.
+Stage FitPlan::pose() const {
+  Stage stage{{StageKind::Pose}, "pose", facts_.coarse};
+  stage.horizon.until = Horizon::Until::Start;
+  stage.band = facts_.options.wide_band, stage.iterations = 20;
+  stage.free = facts_.told_at_rest;
+  stage.from = {facts_.parameters.reference()};
+  stage.done_to = 0.01;
+  return stage;
+}
 
 StageChain FitPlan::motion(int first, const VectorX& from) const {
   const std::vector<std::string> free = names(is_of_start);
@@ -258,7 +272,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
   const double share = 0.15 / double(horizons.size() - 1);
   const bool is_last_one_corrected = begin && !needed_corrections(done).empty();
   const auto [start, index] = best_start(done);
-  const VectorX from = begin ? begin->theta : start;
+  const VectorX from = begin ? with_poses_at_rest(begin->theta, done) : start;
   const StageRecord* best = end_of_start(index, done);
   const bool is_explained = best && best->misfit < good_misfit && !facts_.swings;
   const bool is_close = facts_.coarse_is_as_fine || (!begin && is_explained);
@@ -275,6 +289,9 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
     if (!is_narrow) is_intermediate(stage);
     if (is_last_wide) stage.give_up_above = options.wide_band_limit;
     stage.free = free_at_last(done);
+    if (!is_narrow)
+      for (const Parameter& p : facts_.parameters.parameters())
+        if (is_pose_at_rest(p)) std::erase(stage.free, p.name);
     // Where swings may still be out of step, Poisson's ratio and exponents would make up for what others lack.
     if (facts_.swings && !is_last)
       for (const std::string& name : names(shapes_law)) std::erase(stage.free, name);
@@ -383,10 +400,21 @@ std::vector<StageChain> FitPlan::resolution(const Records& done) const {
 
 // What the records say ----------------------------------------------------------------------------------------------
 
+VectorX FitPlan::beginning(const Records& done) const {
+  const StageRecord* posed = find_record(done, {StageKind::Pose});
+  return posed ? posed->theta : facts_.parameters.reference();
+}
+
+VectorX FitPlan::with_poses_at_rest(VectorX theta, const Records& done) const {
+  for (const Parameter& p : facts_.parameters.parameters())
+    if (is_pose_at_rest(p)) theta.segment<3>(p.at) = beginning(done).segment<3>(p.at);
+  return theta;
+}
+
 VectorX FitPlan::before_starts(const Records& done) const {
   const StageRecord* swung = find_record(done, {StageKind::Swing});
   const bool has_swung = swung && swung->converged;
-  VectorX theta = has_swung ? without_pulls(swung->theta) : facts_.parameters.reference();
+  VectorX theta = has_swung ? without_pulls(swung->theta) : beginning(done);
   for (const int number : has_swung ? std::array{2, 3} : std::array{0, 1})
     if (const StageRecord* motion = find_record(done, {StageKind::Motion, 0, number})) theta = motion->theta;
   return theta;
@@ -668,12 +696,18 @@ double FitPlan::work(const Spacing& s) const {
 std::vector<std::string> FitPlan::names(const std::function<bool(const Parameter&)>& matches) const {
   std::vector<std::string> all;
   for (const Parameter& p : facts_.parameters.parameters())
-    if (p.estimated && matches(p)) all.push_back(p.name);
+    if (p.estimated && !is_pose_at_rest(p) && matches(p)) all.push_back(p.name);
   return all;
 }
 
+bool FitPlan::is_pose_at_rest(const Parameter& p) const {
+  return p.role == Role::Sensor && std::ranges::find(facts_.told_at_rest, p.name) != facts_.told_at_rest.end();
+}
+
 std::vector<std::string> FitPlan::free_at_last(const Records& done) const {
-  std::vector<std::string> all = names([](const Parameter&) { return true; });
+  std::vector<std::string> all;
+  for (const Parameter& p : facts_.parameters.parameters())
+    if (p.estimated) all.push_back(p.name);
   for (const std::string& name : needed_corrections(done)) all.push_back(name);
   return all;
 }

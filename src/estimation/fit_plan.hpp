@@ -15,6 +15,7 @@ struct PlanFacts {
   ParameterHandle density, gravity;       ///< of the first recording
   double size = 0.0;                      ///< of the object [m]
   VectorX relative_moduli;                ///< of scan and starts, the first one's being one
+  std::vector<std::string> told_at_rest;  ///< see `Recordings`
   bool is_scanned = true;                 ///< Young's modulus is looked for
   double softest = 0.0;                   ///< Young's modulus that is tried [Pa]; 0: the stress under its own weight
   bool swings = false;                    ///< some object is let go
@@ -25,11 +26,12 @@ struct PlanFacts {
   std::vector<Alternative> alternatives;  ///< models that are tried at the last estimate
 };
 
-/// The stages of a fit of motions and equilibria: how the object moves at first; the swing that was seen, or a scan
-/// over decades of Young's modulus; the best values followed on the coarse grid, wide band, horizon growing as the
-/// early frames match; the best of them on the full grid, first in the wide band; a test of which corrections the
-/// residuals ask for, and the estimate with them; repetitions on finer grids; a few steps under each of some
-/// alternative models; where these show that the mesh matters, repetitions on finer ones within the budget.
+/// The stages of a fit of motions and equilibria: where sensors stand, by an object that still is as it was scanned;
+/// how it moves at first; the swing that was seen, or a scan over decades of Young's modulus; the best values followed
+/// on the coarse grid, wide band, horizon growing as the early frames match; the best of them on the full grid, first
+/// in the wide band; a test of which corrections the residuals ask for, and the estimate with them; repetitions on
+/// finer grids; a few steps under each of some alternative models; where these show that the mesh matters, repetitions
+/// on finer ones within the budget.
 class FitPlan {
  public:
   explicit FitPlan(PlanFacts facts) : facts_(std::move(facts)) {}
@@ -69,6 +71,7 @@ class FitPlan {
  private:
   using Records = std::vector<StageRecord>;
 
+  Stage pose() const;
   StageChain motion(int first, const VectorX& from) const;
   Stage swing(const VectorX& from) const;
   Stage scan(const VectorX& from) const;
@@ -83,6 +86,11 @@ class FitPlan {
   /// A look at whether the next repetition is needed; none where they are not by need, or one has failed.
   std::vector<StageChain> resolution(const Records& done) const;
 
+  /// Whether a parameter is of a pose that is told at rest.
+  bool is_pose_at_rest(const Parameter& p) const;
+  VectorX with_poses_at_rest(VectorX theta, const Records& done) const;
+  /// Where the fit begins, with the poses that are told at rest.
+  VectorX beginning(const Records& done) const;
   /// Where the fit is before any start is followed.
   VectorX before_starts(const Records& done) const;
   std::vector<double> start_moduli(const Records& done) const;
@@ -105,6 +113,7 @@ class FitPlan {
   /// The start that fits best.
   std::pair<VectorX, int> best_start(const Records& done) const;
   VectorX relative_moduli(const Records& done) const;
+  /// Of estimated parameters, without poses that are told at rest.
   std::vector<std::string> names(const std::function<bool(const Parameter&)>& matches) const;
   std::vector<std::string> needed_corrections(const Records& done) const;
   /// The estimate in the narrow band, before any corrections.

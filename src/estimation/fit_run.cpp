@@ -124,6 +124,7 @@ PlanFacts FitRun::facts() {
   f.swings = recordings_.any_released();
   f.coarse = coarse_spacing();
   f.is_scanned = !given_start("youngs_modulus");
+  f.told_at_rest = recordings_.told_at_rest();
   // Moduli of regions and control points begin where the object's own does, but for those that the user has given.
   VectorX theta = f.parameters.reference();
   const double own = theta[f.moduli.front()];
@@ -588,7 +589,7 @@ StageRecord FitRun::look_at_resolution(const Stage& stage) {
   if (!e.succeeded || !mesh) return record;
   const VectorX all =
       uncertainty_of(e, shifts_in(state_.done, own), floor(parameters, theta), int(recordings_.all().size())).std;
-  const VectorX noise = uncertainty_of(e, {}, {}).std;
+  const VectorX noise = noise_covariance(e).diagonal().cwiseMax(0.0).cwiseSqrt();
   const std::vector<const Parameter*> of = parameters.coordinate_parameters();
   double share = 0.0, statistical = 0.0, whole = 0.0;
   for (std::size_t i = 0; i < of.size(); ++i) {

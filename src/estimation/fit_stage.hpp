@@ -16,6 +16,7 @@ namespace pliant {
 
 /// What a stage of a fit is for.
 enum class StageKind {
+  Pose,           ///< the poses of sensors, by an object that stands as it was scanned
   Motion,         ///< the motion or pose at the start
   Swing,          ///< the stiffness of the swing that was seen; no iterations
   Scan,           ///< a trial of each of several Young's moduli: no iteration
@@ -34,6 +35,9 @@ enum class StageKind {
   ControlPoints,  ///< a field of control points, and what a step promises of it; no iterations
   Sample,         ///< the stiffness of each element that a few presses show, each by itself
 };
+
+/// Whether a stage only finds where others begin: they go on without it where it fails.
+bool is_help(StageKind kind);
 
 /// Whether a stage makes the estimate, on the full grid or a finer one.
 bool is_on_full_grid(StageKind kind);

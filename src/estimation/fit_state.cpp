@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/17";
+constexpr const char* format = "fit-state/18";
 
 Json from_vector(const VectorX& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
 VectorX to_vector(const Json& json) {
@@ -252,8 +252,11 @@ PassState to_pass(const Json& json) {
 }
 
 Json from_span(const FitState::SpanSearch& span) {
-  Json json = {
-      {"has_whole", span.has_whole}, {"is_ended", span.is_ended}, {"part", span.part}, {"next_part", span.next_part}};
+  Json json = {{"has_whole", span.has_whole},
+               {"is_ended", span.is_ended},
+               {"part", span.part},
+               {"next_part", span.next_part},
+               {"has_parts", span.has_parts}};
   if (span.state) json["state"] = from_pass(*span.state);
   return json;
 }
@@ -262,6 +265,7 @@ FitState::SpanSearch to_span(const Json& json) {
   FitState::SpanSearch span;
   span.has_whole = json.at("has_whole").get<bool>(), span.is_ended = json.at("is_ended").get<bool>();
   span.part = json.at("part").get<double>(), span.next_part = json.at("next_part").get<double>();
+  span.has_parts = json.at("has_parts").get<bool>();
   if (json.contains("state")) span.state = to_pass(json["state"]);
   return span;
 }

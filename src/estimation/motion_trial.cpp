@@ -48,18 +48,34 @@ class MotionTrial::Comparison {
   /// The sensors' corrections at a theta, and how they change along directions.
   struct Sensors {
     std::vector<SensorCorrection> corrections;
-    std::vector<MatrixX> changes;  // 7 x directions, of each
+    std::vector<MatrixX> changes;                     // 7 x directions, of each
+    std::vector<Eigen::Matrix<double, 6, 1>> planes;  // where they are: point and normal of each
+    std::vector<MatrixX> plane_changes;               // 6 x directions, of each
     bool correct = false, change = false;
   };
   Sensors sensors_at(const VectorX& theta, const MatrixX& directions) const;
   const Sensors& sensors() const { return sensors_; }
   double frame_weight(const FrameObservations& seen) const {
-    return std::min(1.0, motion_.options.independent_points / double(seen.points.size()));
+    return std::min(1.0, independent_points(seen) / double(seen.points.size()));
+  }
+  double independent_points(const FrameObservations& seen) const {
+    return seen.at_rest > 0 ? seen.at_rest * motion_.options.independent_points_at_rest
+                            : motion_.options.independent_points;
   }
   std::vector<SurfaceObservation> corrected(const std::vector<SurfaceObservation>& points) const;
   std::vector<TrackObservation> corrected(const std::vector<TrackObservation>& tracks) const;
   bool is_corrected(int sensor) const { return sensor < int(sensors_.corrections.size()); }
   const SensorBlocks& sensor_blocks(int sensor) const { return motion_.mismatch.sensors[std::size_t(sensor)]; }
+
+  /// Residuals of a plane that was seen: the height of its point above the scene's plane, and the two tilts of its
+  /// normal against that plane's, over their deviations; and their derivatives by the values of its sensor's correction
+  /// and by the plane's point and normal.
+  struct PlaneResidual {
+    Vector3 value;
+    Eigen::Matrix<double, 3, SensorCorrection::size> by_sensor;
+    Eigen::Matrix<double, 3, 6> by_plane;
+  };
+  PlaneResidual plane_residual(const PlaneObservation& seen) const;
 
   /// How positions change along those of all directions that move the body; sensors alone change along the others.
   struct Tangents {
@@ -72,6 +88,7 @@ class MotionTrial::Comparison {
                    FrameFit& fit) const;
   void fit_tracks(const FrameObservations& seen, const Points& positions, const Tangents& tangents,
                   FrameFit& fit) const;
+  void fit_planes(const FrameObservations& seen, const Tangents& tangents, FrameFit& fit) const;
   /// Cotangents of positions and of the sensors' corrections for the cost of a frame.
   void add_cotangents(const FrameObservations& seen, const Points& positions, Points& x_bar, VectorX& theta_bar) const;
 
@@ -134,6 +151,10 @@ MotionTrial::Comparison::Sensors MotionTrial::Comparison::sensors_at(const Vecto
     s.correct = s.correct || !values.isZero();
     s.change = s.change || !s.changes.back().isZero();
   }
+  for (const PlaneBlock& plane : motion_.simulation.blocks.planes) {
+    s.planes.emplace_back(theta.segment<6>(plane.whole()));
+    s.plane_changes.emplace_back(directions.middleRows<6>(plane.whole()));
+  }
   return s;
 }
 
@@ -160,7 +181,7 @@ void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const P
   const SurfaceConstraints& surface = *motion_.mismatch.surface;
   const double outlier_scale = motion_.options.outlier_scale;
   fit.points = int(seen.points.size());
-  fit.independent += std::min(double(fit.points), motion_.options.independent_points);
+  fit.independent += std::min(double(fit.points), independent_points(seen));
   const auto matches = surface.match(corrected(seen.points), positions);
   const RobustLoss loss{outlier_scale};
   const double share = frame_weight(seen);
@@ -227,6 +248,39 @@ void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Po
   fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
 }
 
+MotionTrial::Comparison::PlaneResidual MotionTrial::Comparison::plane_residual(const PlaneObservation& seen) const {
+  const Eigen::Matrix<double, 6, 1>& there = sensors_.planes[std::size_t(seen.plane)];
+  const Vector3 point = there.head<3>(), normal = there.tail<3>();
+  const SensorCorrection& sensor = sensors_.corrections[std::size_t(seen.sensor)];
+  const Vector3 at = sensor.apply(seen.point, seen.view);
+  // The normal turns as the way to a point one metre along it does.
+  const Vector3 end = seen.point + seen.normal, turned = sensor.apply(end, seen.view) - at;
+  const SensorCorrection::Jacobian at_changes = sensor.jacobian(seen.point, seen.view),
+                                   turns = sensor.jacobian(end, seen.view) - at_changes;
+  Eigen::Matrix<double, 2, 3> across;
+  across.row(0) = seen.normal.unitOrthogonal().transpose() / seen.tilt_std;
+  across.row(1) = seen.normal.cross(seen.normal.unitOrthogonal()).transpose() / seen.tilt_std;
+  PlaneResidual r;
+  r.value << normal.dot(at - point) / seen.height_std, across * (turned - normal);
+  r.by_sensor << normal.transpose() * at_changes / seen.height_std, across * turns;
+  r.by_plane << -normal.transpose() / seen.height_std, (at - point).transpose() / seen.height_std,
+      Eigen::Matrix<double, 2, 3>::Zero(), -across;
+  return r;
+}
+
+void MotionTrial::Comparison::fit_planes(const FrameObservations& seen, const Tangents& tangents, FrameFit& fit) const {
+  for (const PlaneObservation& o : seen.planes) {
+    const PlaneResidual r = plane_residual(o);
+    fit.cost += 0.5 * r.value.squaredNorm();
+    fit.independent += 3.0;
+    if (tangents.directions == 0) continue;
+    const MatrixX J = r.by_sensor * sensors_.changes[std::size_t(o.sensor)] +
+                      r.by_plane * sensors_.plane_changes[std::size_t(o.plane)];
+    fit.gradient += J.transpose() * r.value;
+    fit.gauss_newton += J.transpose() * J;
+  }
+}
+
 FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const Points& positions,
                                             const Tangents& tangents) const {
   const Timed timed(Activity::Mismatch);
@@ -240,6 +294,7 @@ FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const
   }
   if (!seen.points.empty()) fit_surface(seen, positions, tangents, fit);
   if (!seen.tracks.empty()) fit_tracks(seen, positions, tangents, fit);
+  fit_planes(seen, tangents, fit);
   return fit;
 }
 
@@ -324,6 +379,12 @@ void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, cons
             theta_bar);
     }
     motion_.mismatch.tracks->add_adjoint(seen.tracks, bar, x_bar);
+  }
+  for (const PlaneObservation& o : seen.planes) {
+    const PlaneResidual r = plane_residual(o);
+    sensor_blocks(o.sensor).add(r.by_sensor.transpose() * r.value, theta_bar);
+    theta_bar.segment<6>(motion_.simulation.blocks.planes[std::size_t(o.plane)].whole()) +=
+        r.by_plane.transpose() * r.value;
   }
 }
 

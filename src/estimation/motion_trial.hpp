@@ -12,12 +12,24 @@
 
 namespace pliant {
 
+/// A plane of the scene as a sensor saw it.
+struct PlaneObservation {
+  int plane = 0;                            ///< of the motion's blocks
+  int sensor = 0;                           ///< whose correction applies
+  Vector3 point = Vector3::Zero();          ///< [m] on it, by the sensor's stated pose
+  Vector3 normal = Vector3::UnitY();        ///< unit length, likewise
+  Vector3 view = Vector3::Zero();           ///< unit direction from the sensor to the point
+  double tilt_std = 0.0, height_std = 0.0;  ///< [rad], [m] of its normal, and of the point along it; > 0
+};
+
 /// What was seen in one frame of the simulation.
 struct FrameObservations {
   int frame = 0;                                ///< of the simulation: 0 is when the object is let go
   std::vector<SurfaceObservation> points = {};  ///< somewhere on the surface
   std::vector<TrackObservation> tracks = {};    ///< known points of the object
   double after = 0.0;                           ///< [s] since that frame, and before the next
+  int at_rest = 0;                            ///< of an object that stands still as it was scanned: frames that show it
+  std::vector<PlaneObservation> planes = {};  ///< of the scene
 };
 
 struct ObjectiveOptions {
@@ -25,6 +37,8 @@ struct ObjectiveOptions {
   int last_frame = 0;          ///< horizon, inclusive
   /// Neighbouring pixels err together: a frame counts as at most so many independent points.
   double independent_points = 50.0;
+  /// Of an object that stands still as it was scanned there is no model to err.
+  double independent_points_at_rest = 200.0;
   /// Asked at each frame whether the work is to end; may be empty.
   std::function<bool()> interrupted = {};
 };
@@ -48,7 +62,8 @@ struct ObservedMotion {
 
 /// A motion, or an equilibrium, compared with points on its surface and points of the object that were followed: the
 /// sum over frames and points of a robust loss of the pulled-back distance, or of the distance from where a followed
-/// point was seen, over its noise. The comparison of a frame is evaluated beside the simulation of the next.
+/// point was seen, over its noise; and half the squares of how far planes were seen from where they are, over theirs.
+/// The comparison of a frame is evaluated beside the simulation of the next.
 /// Runs throw Interrupted at the frame where `ObjectiveOptions::interrupted` says so.
 class MotionTrial : public Trial {
  public:

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numbers>
+
+#include "estimation/sensor_poses.hpp"
 
 namespace pliant {
 
@@ -43,7 +46,8 @@ void say_what_is_inseparable(FitOutcome& outcome) {
   const auto parameters = outcome.parameters.coordinate_parameters();
   for (std::size_t i = 0; i < names.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      if (parameters[i]->is_auxiliary || parameters[j]->is_auxiliary) continue;
+      const auto is_aside = [](const Parameter& p) { return p.is_auxiliary || p.role == Role::Sensor; };
+      if (is_aside(*parameters[i]) || is_aside(*parameters[j])) continue;
       const double r = outcome.correlation(Eigen::Index(i), Eigen::Index(j));
       if (std::abs(r) < 0.9) continue;
       char text[64];
@@ -62,6 +66,37 @@ void say_what_is_assumed(FitOutcome& outcome) {
       outcome.notes.push_back("The recording says little about " + spoken(p.name) +
                               ": what was assumed beforehand weighs as much, or more.");
     at += p.dimension();
+  }
+}
+
+/// Where sensors stand against what their captures state.
+void say_poses(FitOutcome& outcome, const std::vector<const Capture*>& captures) {
+  constexpr double doubtful = 3.0, degree = std::numbers::pi / 180.0;
+  for (std::size_t r = 0; r < outcome.recordings.size(); ++r) {
+    const std::vector<std::string> names = sensor_names(*captures[r]);
+    const std::vector<PoseStd> stds = pose_stds(*captures[r]);
+    const std::vector<SensorBlocks>& sensors = outcome.recordings[r].discretisation.mismatch.sensors;
+    for (std::size_t k = 0; k < sensors.size(); ++k) {
+      if (stds[k].turn == 0.0 && stds[k].shift == 0.0) continue;
+      const Vector3 turn = sensors[k].turn.vector(outcome.theta), shift = sensors[k].shift.vector(outcome.theta);
+      if (turn.isZero() && shift.isZero()) continue;  // a tracker took it as exact
+      std::string text =
+          fmt::format("The pose of {}{} was found {:.2f} degrees and {:.1f} mm from where the capture has it", names[k],
+                      outcome.recordings.size() > 1 ? " in recording " + std::to_string(r + 1) : "",
+                      turn.norm() / degree, 1e3 * shift.norm());
+      const auto deviations = [](const Vector3& v, double std) {
+        return std > 0.0 ? v.cwiseAbs().maxCoeff() / std : 0.0;
+      };
+      const double off = std::max(deviations(turn, stds[k].turn), deviations(shift, stds[k].shift));
+      text += fmt::format(" (known there to {:.2f} degrees and {:.1f} mm about each axis).", stds[k].turn / degree,
+                          1e3 * stds[k].shift);
+      if (off > doubtful)
+        text += fmt::format(
+            " That is {:.1f} deviations: look at camera_to_world, where the scan stands, and planes that are known; or "
+            "state a greater pose_std.",
+            off);
+      outcome.notes.push_back(std::move(text));
+    }
   }
 }
 
@@ -165,6 +200,7 @@ void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures)
     say_what_is_assumed(outcome);
   }
   say_if_starts_disagree(outcome);
+  say_poses(outcome, captures);
   say_what_shape(outcome);
   if (outcome.evaluation.succeeded && outcome.evaluation.matched_fraction() < 0.9)
     outcome.notes.push_back(

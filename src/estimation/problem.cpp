@@ -10,6 +10,7 @@
 #include "capture/markers.hpp"
 #include "estimation/press_law.hpp"
 #include "estimation/pull_places.hpp"
+#include "estimation/sensor_poses.hpp"
 
 namespace pliant {
 
@@ -215,13 +216,18 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     p.push_back(vector(layout, m.pulls[k], 1.0, Vector3::Zero(), pull_std, true));
     p.back().is_auxiliary = true;
   }
+  constexpr double pose_correction_std = 0.05;  // [rad], and times the size: where a pose said to be exact shows wrong
+  const std::vector<PoseStd> stds = pose_stds(capture);
+  const auto pose = [&](const ParameterHandle& at, double scale, double std) {
+    p.push_back(vector(layout, at, scale, Vector3::Zero(), std > 0.0 ? std / scale : pose_correction_std, std > 0.0));
+  };
   for (std::size_t k = 0; k < blocks.sensors.size(); ++k) {
     const SensorBlocks& sensor = blocks.sensors[k];
     if (k < capture.depth.size())
       p.push_back(
           scalar(layout, sensor.range_error, Transform::Shift, -0.2, 0.2, 0.0, range_error_std / size, false, size));
-    p.push_back(vector(layout, sensor.turn, 1.0, Vector3::Zero(), 0.05, false));
-    p.push_back(vector(layout, sensor.shift, size, Vector3::Zero(), 0.05, false));
+    pose(sensor.turn, 1.0, stds[k].turn);
+    pose(sensor.shift, size, stds[k].shift);
   }
   for (const ParameterHandle& correction : m.scan_corrections) {
     p.push_back(vector(layout, correction, 1.0, Vector3::Zero(), 1.0, true));
@@ -249,7 +255,7 @@ TrackedPoints tracked_points(const Capture& capture) {
 }
 
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
-                                                  const TrackedPoints& tracked) {
+                                                  const TrackedPoints& tracked, int first_at_rest) {
   const Timing& timing = capture.scene.timing;
   using Instant = std::pair<int, double>;  // frame of the simulation, and time after it
   const auto instant_of = [&](int recorded, double offset) -> Instant {
@@ -263,12 +269,15 @@ std::vector<FrameObservations> frame_observations(const Capture& capture, const 
       if (after < same_instant) after = 0.0;
     }
     frame -= timing.start_frame;
-    if (capture.scene.initial.released && frame < 0) return {0, 0.0};  // it is still held as it is let go
+    const bool is_held = capture.scene.initial.released || (first_at_rest >= 0 && recorded >= first_at_rest);
+    if (is_held && frame < 0) return {0, 0.0};  // as it is let go
     return {frame, after};
   };
   const int cameras = int(capture.depth.size());
   std::map<Instant, FrameObservations> frames;
   for (const ObservedFrame& seen : observed) {
+    if (first_at_rest >= 0 && seen.frame >= first_at_rest && seen.frame <= timing.start_frame)
+      ++frames[{0, 0.0}].at_rest;
     if (seen.points.empty()) frames[instant_of(seen.frame, 0.0)];  // seen without a point
     for (std::size_t i = 0; i < seen.points.size(); ++i) {
       const int camera = i < seen.camera.size() ? seen.camera[i] : -1;

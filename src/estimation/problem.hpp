@@ -59,8 +59,8 @@ struct CaptureParameters {
 /// All parameters of a capture with their start values, bounds and priors. What the capture leaves unknown is
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
 /// it does not give; density only where it is unknown and the object is released from under a known weight.
-/// Corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") are there and not
-/// estimated.
+/// Of the corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") those of poses are
+/// estimated where the capture does not take the pose as exact (`PoseStd`), under a prior as wide as that says.
 /// @param volume    of the object [m^3], for the density that belongs to a mass
 /// @param controls  control moduli of the body: `modulus_names` tells what they are called
 /// @param pulls     that hold a released object: "pull@1", ... (see `Pull`)
@@ -88,7 +88,9 @@ TrackedPoints tracked_points(const Capture& capture);
 
 /// Observations of the frames from the start on, numbered from it. Frames before a release show the pose from which the
 /// object is released, and count as looks at its first frame.
+/// @param first_at_rest  from that frame on, to the start, the object stands still as it was scanned: all are looks at
+///                       the first frame; negative: it does not
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
-                                                  const TrackedPoints& tracked = {});
+                                                  const TrackedPoints& tracked = {}, int first_at_rest = -1);
 
 }  // namespace pliant

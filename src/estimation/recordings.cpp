@@ -12,6 +12,7 @@
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/press_objective.hpp"
+#include "estimation/sensor_poses.hpp"
 #include "geometry/random_field.hpp"
 
 namespace pliant {
@@ -127,16 +128,18 @@ std::vector<int> take_planes_from_images(Capture& capture) {
   return found;
 }
 
-/// Thousands of readings fix a visible plane; what is left is the sensor's bias and the softness of contact, about this
-/// part of the object's size, and as many radians.
-constexpr double seen_plane_std = 0.003;
-
 void trust_planes_seen(CaptureParameters& parameters, const std::vector<int>& planes) {
   std::vector<Parameter> list = parameters.set.parameters();
   for (Parameter& p : list)
     for (const int plane : planes)
       if (p.at == parameters.blocks.motion.planes[std::size_t(plane)].whole()) p.prior_std = seen_plane_std;
   parameters.set = ParameterSet(parameters.set.layout(), std::move(list), parameters.set.reference());
+}
+
+void take_poses_as_exact(CaptureParameters& parameters) {
+  for (const SensorBlocks& sensor : parameters.blocks.sensors)
+    for (const ParameterHandle& block : {sensor.turn, sensor.shift})
+      parameters.set.set_estimated(parameters.set.layout().block_of(block).name, false);
 }
 
 bool is_shared(const ParameterBlock& block, bool shares_density) {
@@ -283,15 +286,22 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
   require_fittable(capture, options_);
   for (const Load& load : capture.loads)
     if (is_fitted(load.role)) recording.loads.push_back(load_case(capture, load, options_.points_per_frame));
-  const std::vector<int> planes_seen = take_planes_from_images(capture);
-  for (const int plane : planes_seen)
+  const std::vector<int> planes_found = take_planes_from_images(capture);
+  for (const int plane : planes_found)
     notes.push_back("Plane " + std::to_string(plane + 1) +
                     " is visible in the depth images; the fit starts from, and trusts, where it is seen there.");
   recording.tracked = recorded.followed ? std::move(*recorded.followed) : tracked_points(capture);
   recording.pose = std::move(recorded.pose);
   recording.common_error = weigh_by_scatter(capture, recorded.observed, notes);
-  recording.observations = std::make_shared<std::vector<FrameObservations>>(
-      frame_observations(capture, recorded.observed, recording.tracked));
+  recording.distance = capture_distance(capture, widest_band());
+  // The tracker takes poses as they are, and so are the points that it followed.
+  const bool has_poses = !recorded.followed && estimates_poses(capture);
+  const bool stands = has_poses && starts_as_scanned(capture.scene);
+  std::vector<FrameObservations> observations =
+      frame_observations(capture, recorded.observed, recording.tracked,
+                         stands ? first_frame_at_rest(capture, recorded.observed, *recording.distance) : -1);
+  if (has_poses && !observations.empty()) observations.front().planes = planes_seen(capture, notes);
+  recording.observations = std::make_shared<std::vector<FrameObservations>>(std::move(observations));
   if (recording.observations->empty() && recording.loads.empty())
     throw InputError({{capture.file},
                       "no frame shows any point of the object",
@@ -310,11 +320,11 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                                     recording.observations->back().frame);
   recording.last_seen = recording.last_frame;
   if (options_.span > 0.0) recording.last_frame = std::max(1, int(options_.span * recording.last_frame));
-  recording.distance = capture_distance(capture, widest_band());
   CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
                                                     pull_count(capture.scene, resolution(0.0, options_.steps)),
                                                     options_.scan_points, options_.law_of_motion());
-  trust_planes_seen(parameters, planes_seen);
+  if (!has_poses) trust_planes_seen(parameters, planes_found);
+  if (recorded.followed) take_poses_as_exact(parameters);
   return parameters;
 }
 
@@ -471,6 +481,26 @@ ParameterSet Recordings::with_field_prior(ParameterSet parameters, const Grid& g
     parameters.set_joint_prior(modulus_names(front().capture, controls_),
                                field_precision(points, front().size, options_.modulus_variation));
   return parameters;
+}
+
+std::vector<std::string> Recordings::told_at_rest() const {
+  constexpr int fewest = 50;  // points of the object that a sensor sees
+  std::vector<std::string> names;
+  for (const Recording& r : all_) {
+    const bool stands = starts_as_scanned(r.capture.scene) && estimates_poses(r.capture) && !r.observations->empty() &&
+                        r.observations->front().frame == 0;
+    if (!stands) continue;
+    std::vector<int> seen(r.blocks.sensors.size(), 0);
+    for (const SurfaceObservation& o : r.observations->front().points) ++seen[std::size_t(o.sensor)];
+    std::vector<ParameterHandle> told;
+    for (std::size_t k = 0; k < seen.size(); ++k)
+      if (seen[k] >= fewest) told.insert(told.end(), {r.blocks.sensors[k].turn, r.blocks.sensors[k].shift});
+    if (told.empty()) continue;
+    for (const PlaneBlock& plane : r.blocks.motion.planes) told.push_back(plane.whole());
+    for (const Parameter& p : parameters_.parameters())
+      if (p.estimated && std::ranges::find(told, p.at) != told.end()) names.push_back(p.name);
+  }
+  return names;
 }
 
 void Recordings::set_moduli(VectorX& theta, const VectorX& moduli) const {

@@ -49,7 +49,7 @@ void StageLoop::run_chain(const StageChain& chain) {
       profile->add({stage.name, stage.id.start, record.iterations, record.elements, record.work,
                     std::chrono::duration<double>(Clock::now() - begin).count()});
     theta = record.theta, counted += counted_iterations(record);
-    const bool ends = !record.succeeded && stage.id.kind != StageKind::Motion;
+    const bool ends = !record.succeeded && !is_help(stage.id.kind);
     keep(std::move(record));
     if (ends) return;
   }

@@ -37,17 +37,35 @@ MatrixX noise_covariance(const CostEvaluation& evaluation) {
   return sandwich + inverse;
 }
 
-std::optional<MatrixX> covariance_between_recordings(const CostEvaluation& evaluation, int recordings) {
-  constexpr double shared = 1e-6;  // of a coordinate's curvature, in the other recordings: else it is one's own
-  if (recordings < 3) return std::nullopt;
+FrameGroups frame_groups(const CostEvaluation& evaluation, int recordings) {
+  constexpr int parts = 4, fewest = 2;  // of a motion; frames of each
+  FrameGroups groups;
+  groups.of.assign(evaluation.frames.size(), -1);
+  groups.cause = recordings < 3 ? "what parts of the motion differ by" : "what the recordings differ by";
+  for (int r = 0; r < recordings; ++r) {
+    std::vector<std::size_t> own;
+    for (std::size_t i = 0; i < evaluation.frames.size(); ++i)
+      if (evaluation.frames[i].recording == r) own.push_back(i);
+    const int of_this = recordings < 3 ? parts : 1;
+    if (recordings < 3 && int(own.size()) < parts * fewest) continue;
+    for (std::size_t k = 0; k < own.size(); ++k)
+      groups.of[own[k]] = groups.count + int(k * std::size_t(of_this) / own.size());
+    groups.count += of_this;
+  }
+  return groups;
+}
+
+std::optional<MatrixX> covariance_between(const CostEvaluation& evaluation, const FrameGroups& groups) {
+  constexpr double shared = 1e-6;  // of a coordinate's curvature, in the other groups: else it is one's own
+  if (groups.count < 3) return std::nullopt;
   const MatrixX& H = evaluation.gauss_newton;
   const Eigen::Index n = H.rows();
-  MatrixX without = MatrixX::Zero(n, recordings);  // the estimates of all but one, from that of all
-  for (int r = 0; r < recordings; ++r) {
+  MatrixX without = MatrixX::Zero(n, groups.count);  // the estimates of all but one, from that of all
+  for (int r = 0; r < groups.count; ++r) {
     MatrixX others = H;
     VectorX pull = VectorX::Zero(n);
-    for (const FrameFit& frame : evaluation.frames)
-      if (frame.recording == r) others -= frame.gauss_newton, pull += frame.gradient;
+    for (std::size_t i = 0; i < evaluation.frames.size(); ++i)
+      if (groups.of[i] == r) others -= evaluation.frames[i].gauss_newton, pull += evaluation.frames[i].gradient;
     std::vector<Eigen::Index> kept;
     for (Eigen::Index i = 0; i < n; ++i)
       if (others(i, i) > shared * H(i, i)) kept.push_back(i);
@@ -57,7 +75,7 @@ std::optional<MatrixX> covariance_between_recordings(const CostEvaluation& evalu
     without.col(r)(kept) = scale.cwiseProduct(solve_symmetric(scaled, VectorX(scale.cwiseProduct(pull(kept)))));
   }
   const MatrixX about_mean = without.colwise() - without.rowwise().mean();
-  return MatrixX((recordings - 1.0) / recordings * about_mean * about_mean.transpose());
+  return MatrixX((groups.count - 1.0) / groups.count * about_mean * about_mean.transpose());
 }
 
 double t_quantile_90(double v) {
@@ -73,16 +91,17 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
   const Eigen::Index n = evaluation.gauss_newton.rows();
   Uncertainty u;
   u.covariance = noise_covariance(evaluation);
-  VectorX of_noise = u.covariance.diagonal().cwiseMax(0.0), of_recordings = VectorX::Zero(n);  // variances
-  if (const std::optional<MatrixX> between = covariance_between_recordings(evaluation, recordings)) {
+  VectorX of_noise = u.covariance.diagonal().cwiseMax(0.0), of_groups = VectorX::Zero(n);  // variances
+  const FrameGroups groups = frame_groups(evaluation, recordings);
+  if (const std::optional<MatrixX> between = covariance_between(evaluation, groups)) {
     const VectorX of_curvature =
         solve_symmetric(evaluation.gauss_newton, MatrixX(MatrixX::Identity(n, n))).diagonal().cwiseMax(0.0);
     for (Eigen::Index i = 0; i < n; ++i) {
-      // Frames of one recording err together: what noise they seemed to have beyond their sensor's is counted here.
+      // Frames of one group err together: what noise they seemed to have beyond their sensor's is counted here.
       if ((*between)(i, i) <= of_noise[i]) continue;
       u.covariance(i, i) = (*between)(i, i);
       of_noise[i] = of_curvature[i];
-      of_recordings[i] = (*between)(i, i) - of_curvature[i];
+      of_groups[i] = (*between)(i, i) - of_curvature[i];
     }
   }
   u.std_noise = of_noise.cwiseSqrt();
@@ -105,7 +124,7 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
     u.covariance.diagonal() += floor.cwiseAbs2();
     add("law and damping", floor.cwiseAbs2(), freedom_of_floor);
   }
-  if (of_recordings.maxCoeff() > 0.0) add("what the recordings differ by", of_recordings, recordings - 1.0);
+  if (n > 0 && of_groups.maxCoeff() > 0.0) add(groups.cause, of_groups, groups.count - 1.0);
   u.std_model = of_models.cwiseSqrt();
   u.std = u.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   u.low.resize(n), u.high.resize(n);

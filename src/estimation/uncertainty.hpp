@@ -34,13 +34,25 @@ struct Uncertainty {
 /// and West 1987), never below what the curvature alone gives.
 MatrixX noise_covariance(const CostEvaluation& evaluation);
 
-/// Covariance of the estimate as the recordings of one object tell it by where each pulls: the jackknife over
-/// recordings (Quenouille; Efron 1982), each left out by one Gauss-Newton step of the others. What only the one left
-/// out tells, as its throw, stays where it is.
-/// @param recordings  how many: the trials before that number are one each, those after it (loads, presses) are taken
-///                    along in all
-/// @return            none for fewer than three
-std::optional<MatrixX> covariance_between_recordings(const CostEvaluation& evaluation, int recordings);
+/// Groups of an evaluation's frames that ought to tell the same of one object.
+struct FrameGroups {
+  std::vector<int> of;  ///< the group of each frame; negative: it is taken along in all
+  int count = 0;        ///< fewer than three: they tell nothing
+  std::string cause;    ///< for people: what they differ by
+};
+
+/// From three recordings on, each of them; else the quarters of each motion: where an object is not what the model
+/// says, flight, first touch and rest ask for other parameters, and frames beside each other err together for longer
+/// than any correlation of neighbours tells.
+/// @param recordings  how many: the trials before that number are one each, those after it (loads, presses) are in no
+///                    group
+FrameGroups frame_groups(const CostEvaluation& evaluation, int recordings);
+
+/// Covariance of the estimate as groups of frames tell it by where each pulls: the jackknife over groups (Quenouille;
+/// Efron 1982), each left out by one Gauss-Newton step of the others. What only the one left out tells, as a
+/// recording's own throw, stays where it is.
+/// @return  none for fewer than three groups
+std::optional<MatrixX> covariance_between(const CostEvaluation& evaluation, const FrameGroups& groups);
 
 /// Puts together what noise and models leave open: covariances add, each alternative model as if the truth lay as
 /// likely as not beyond it (GUM, type B); the interval is Student's, with the degrees of freedom of Welch and
@@ -48,7 +60,9 @@ std::optional<MatrixX> covariance_between_recordings(const CostEvaluation& evalu
 /// @param evaluation  at the estimate, with derivatives
 /// @param shifts      of alternative models and of what is taken as given, one standard deviation each
 /// @param floor       deviation of each coordinate that no alternative here accounts for; empty: none
-/// @param recordings  of the object; from three on, what they differ by beyond their noise is a cause of its own
+/// @param recordings  of the object; what they, or the parts of one's motion, differ by beyond their noise is a cause
+/// of
+///                    its own
 Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<ModelShift>& shifts,
                            const VectorX& floor, int recordings = 1);
 

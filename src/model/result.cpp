@@ -41,10 +41,12 @@ Json parameter_json(const ParameterResult& parameter) {
   if (parameter.step_error) json["step_error"] = value_json(*parameter.step_error);
   if (parameter.extrapolated) json["extrapolated"] = value_json(*parameter.extrapolated);
   if (parameter.start) json["start"] = value_json(*parameter.start);
-  if (parameter.prior)
-    json["prior"] = {
-        {"median", number(parameter.prior->median)},
-        {"interval_90", {number(parameter.prior->interval_90.first), number(parameter.prior->interval_90.second)}}};
+  if (const auto& prior = parameter.prior) {
+    json["prior"] = {{"median", value_json(prior->median)}};
+    if (prior->interval_90)
+      json["prior"]["interval_90"] = {number(prior->interval_90->first), number(prior->interval_90->second)};
+    if (prior->std) json["prior"]["std"] = vector(*prior->std);
+  }
   json["estimated"] = parameter.estimated;
   return json;
 }
@@ -264,8 +266,9 @@ std::optional<PriorResult> read_prior(const Member& parameter) {
   if (!parameter.has("prior")) return std::nullopt;
   const Member prior = parameter["prior"];
   const auto interval = read_interval(prior);
-  if (!interval) prior.fail("a `median` and an `interval_90`");
-  return PriorResult{prior["median"].number(), *interval};
+  const auto std = optional_value(prior, "std");
+  if (!interval && !std) prior.fail("a `median` and an `interval_90`, or a `std`");
+  return PriorResult{prior["median"].value(), interval, std ? std::optional(std::get<Vector3>(*std)) : std::nullopt};
 }
 
 ParameterResult read_parameter(const std::string& name, const Member& member) {

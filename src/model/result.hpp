@@ -24,10 +24,11 @@ struct PlaneValue {
 
 using ParameterValue = std::variant<double, Vector3, PlaneValue>;
 
-/// What was held likely of a scalar before the recording was seen.
+/// What was held likely of a parameter before the recording was seen.
 struct PriorResult {
-  double median = 0.0;
-  std::pair<double, double> interval_90;
+  ParameterValue median = 0.0;
+  std::optional<std::pair<double, double>> interval_90 = {};  ///< of a scalar
+  std::optional<Vector3> std = {};                            ///< of a vector, along each axis
   bool operator==(const PriorResult&) const = default;
 };
 
@@ -45,7 +46,7 @@ struct ParameterResult {
   /// What `std` is made of, where models other than the fit's were tried, and the 90 % interval of a scalar.
   std::optional<ParameterValue> std_noise = {}, std_model = {};
   std::optional<std::pair<double, double>> interval_90 = {};
-  std::optional<PriorResult> prior = {};  ///< of an estimated scalar that has one, in its unit
+  std::optional<PriorResult> prior = {};  ///< of an estimated scalar or vector that has one, in its unit
 };
 
 /// A control point of a field of values.

@@ -69,7 +69,7 @@ Quantiles prior_of(const Result& result, std::size_t k, const std::filesystem::p
                       "a fit that chose one, by a program that states it",
                       std::string("fit with `--set ") + names[k] + ".start=VALUE --set " + names[k] +
                           ".prior_std=0.5`, or draw from `posterior`, or from a CSV file of your own"});
-  return quantiles_of(k, p->prior->median, p->prior->interval_90);
+  return quantiles_of(k, std::get<double>(p->prior->median), *p->prior->interval_90);
 }
 
 /// Of the numbers that are drawn, by name.

@@ -306,16 +306,20 @@ void add_uncertainty_of(ParameterResult& r, const Parameter& p, const FitOutcome
   r.interval_90 = std::pair(within_bounds(low), within_bounds(high));
 }
 
-/// The prior of an estimated scalar whose unconstrained number is that at `at`; nothing where it has none.
+/// The prior of an estimated scalar or vector whose first unconstrained number is that at `at`; nothing where it has
+/// none.
 std::optional<PriorResult> prior_of(const Parameter& p, const FitOutcome& outcome, int at) {
-  if (!p.is_scalar() || p.is_auxiliary || !std::isfinite(p.prior_std)) return std::nullopt;
+  if (p.is_auxiliary || !std::isfinite(p.prior_std)) return std::nullopt;
+  if (p.transform == Transform::Vector && p.prior_shape.size() == 0)
+    return PriorResult{Vector3(p.scale * p.prior_mean), {}, Vector3::Constant(p.scale * p.prior_std)};
+  if (!p.is_scalar()) return std::nullopt;
   constexpr double of_90_percent = 1.6449;
   const auto value = [&](double deviations) {
     VectorX there = outcome.parameters.to_unconstrained(outcome.theta);
     there[at] = p.prior_mean[0] + deviations * p.prior_std;
     return outcome.parameters.to_theta(outcome.parameters.clamp(there))[p.at];
   };
-  return PriorResult{value(0.0), {value(-of_90_percent), value(of_90_percent)}};
+  return PriorResult{value(0.0), std::pair(value(-of_90_percent), value(of_90_percent))};
 }
 
 void add_verdict(Result& result, const FitOutcome& outcome, const MatrixX& jacobian) {

@@ -184,7 +184,8 @@ std::string largest_share_sentence(const Result& result) {
       {"range of", "a calibration of the sensor's range"},
       {"friction", "a coefficient of friction that is measured"},
       {"law and damping", "a second recording of the object in another situation"},
-      {"what the recordings differ by", "more recordings of the object"}};
+      {"what the recordings differ by", "more recordings of the object"},
+      {"what parts of the motion differ by", "other recordings of the object, in which it moves less wildly"}};
   const UncertaintyResult* largest = nullptr;
   for (const UncertaintyResult& u : result.uncertainty) {
     const auto own = u.std.find("youngs_modulus");

@@ -219,14 +219,25 @@ std::string convergence(const ReportData& data) {
 
 // ---- tables
 
+/// What was held likely beforehand: the 90 % interval of a scalar, a vector with its deviations.
+std::string prior_text(const ParameterResult& p) {
+  if (!p.prior) return "";
+  if (const auto& interval = p.prior->interval_90)
+    return value_text(interval->first, std::nullopt, p.unit) + " to " +
+           value_text(interval->second, std::nullopt, p.unit);
+  return value_text(p.prior->median, p.prior->std, p.unit);
+}
+
 std::string parameter_table(const Result& result) {
   std::string body;
   for (const ParameterResult& p : result.parameters)
     body += fmt::format(
-        "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", p.estimated ? "" : " class=\"given\"",
-        escape_html(spoken_name(p.name)), escape_html(value_text(p.value, p.std, p.unit)),
+        "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", p.estimated ? "" : " class=\"given\"",
+        escape_html(spoken_name(p.name)), escape_html(value_text(p.value, p.std, p.unit)), escape_html(prior_text(p)),
         p.start ? escape_html(value_text(*p.start, std::nullopt, p.unit)) : "", p.estimated ? "estimated" : "given");
-  return body.empty() ? "" : table("<th>parameter</th><th>value</th><th>start</th><th></th>", body);
+  return body.empty()
+             ? ""
+             : table("<th>parameter</th><th>value</th><th>held likely before</th><th>start</th><th></th>", body);
 }
 
 /// Deviations of the scalars by cause, in per cent of the values, and what would narrow the moduli's most.

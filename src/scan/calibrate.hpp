@@ -50,7 +50,8 @@ struct CalibrationOptions {
 [[nodiscard]] std::vector<SensorCalibration> calibrate_by_object(const Capture& capture,
                                                                  const CalibrationOptions& options = {});
 
-/// A capture with calibrated cameras in the place of those of the same names.
+/// A capture with calibrated cameras in the place of those of the same names, their poses known as well as was found:
+/// those of a ball against the reference's, whose own against the scan stays as it was stated.
 /// Throws InputError where a name is not in the capture.
 [[nodiscard]] Capture with_calibration(Capture capture, const std::vector<SensorCalibration>& sensors);
 

@@ -254,6 +254,10 @@ std::vector<SensorCalibration> calibrate_by_object(const Capture& capture, const
 }
 
 Capture with_calibration(Capture capture, const std::vector<SensorCalibration>& sensors) {
+  PoseStd of_reference{0.0, 0.0};
+  for (const SensorCalibration& sensor : sensors)
+    for (const DepthCamera& depth : capture.depth)
+      if (sensor.is_reference && sensor.name == depth.name) of_reference = depth.pose_std;
   for (const SensorCalibration& sensor : sensors) {
     const auto at = std::ranges::find(capture.depth, sensor.name, &DepthCamera::name);
     if (at == capture.depth.end())
@@ -267,6 +271,7 @@ Capture with_calibration(Capture capture, const std::vector<SensorCalibration>& 
                         "a camera that stands, whose pose can be replaced",
                         "leave --apply out"});
     at->camera.camera_to_world = sensor.camera_to_world;
+    at->pose_std = {std::hypot(sensor.turn_std, of_reference.turn), std::hypot(sensor.shift_std, of_reference.shift)};
     at->camera.lens = sensor.lens;
     at->time_offset = sensor.time_offset;
   }

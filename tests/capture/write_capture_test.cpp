@@ -76,6 +76,7 @@ void fill(SmallCapture& small) {
   small.edit("mass = 0.8", "density = 100.0\nsurface_noise = 0.0002\nshape_is = \"static\"");
   small.edit("noise = 0.002",
              "background = \"front/background.png\"\nevery = 1\nnoise = 0.002\ntime_offset = -0.004\n"
+             "pose_std = { turn = 0.002, shift = 0.0 }\n"
              "distortion = [-0.1, 0.02, 0.001, -0.002, 0.003]");
   small.append(R"([initial]
 linear_velocity = [0, 0.5, 0]
@@ -113,6 +114,7 @@ force = [0, 1, 0]
 points = "clouds/%06d.ply"
 every = 2
 noise = 0.003
+pose_std = { turn = 0.01, shift = 0.002 }
 background = "clouds/000000.ply"
 [[markers]]
 rest = "markers_rest.csv"

@@ -22,6 +22,7 @@ CostEvaluation measured(const MatrixX& curvature, int frames = 40) {
     frame.points = frame.matched = 100;
     frame.sum_noise_squares = 100e-6, frame.sum_squares = 100e-6;
     frame.gradient = VectorX::Zero(curvature.rows());
+    frame.gauss_newton = curvature / double(frames);
     e.frames.push_back(std::move(frame));
   }
   return e;
@@ -185,30 +186,46 @@ TEST(FormsOfTheLaw, ThatAreNotRuledOutWidenTheModulus) {
   EXPECT_EQ(shifts[0].shift[1], 0.0);
 }
 
-TEST(CovarianceBetweenRecordings, TakesThreeRecordings) {
-  const std::vector<Eigen::Vector2d> two = {{0.1, 0.0}, {-0.1, 0.0}};
-  EXPECT_FALSE(covariance_between_recordings(recordings_about(two, curvature()), 2));
-  EXPECT_FALSE(covariance_between_recordings(measured(curvature()), 1));
+TEST(FrameGroups, AreTheRecordingsFromThreeOn) {
+  const FrameGroups groups = frame_groups(recordings_about(std::vector<Eigen::Vector2d>(3), curvature()), 3);
+  EXPECT_EQ(groups.count, 3);
+  EXPECT_EQ(groups.of.front(), 0);
+  EXPECT_EQ(groups.of.back(), 2);
+  EXPECT_EQ(groups.cause, "what the recordings differ by");
 }
 
-TEST(CovarianceBetweenRecordings, IsTheScatterOfTheirMeanWhereTheyAreAlike) {
+TEST(FrameGroups, OfFewerAreTheQuartersOfEachMotion) {
+  CostEvaluation two = recordings_about(std::vector<Eigen::Vector2d>(2), curvature());
+  const FrameGroups groups = frame_groups(two, 2);
+  EXPECT_EQ(groups.count, 8);
+  for (std::size_t i = 0; i < two.frames.size(); ++i) EXPECT_EQ(groups.of[i], int(i / 10)) << "of forty frames apiece";
+  EXPECT_EQ(groups.cause, "what parts of the motion differ by");
+  const FrameGroups of_first = frame_groups(two, 1);
+  EXPECT_EQ(of_first.count, 4);
+  EXPECT_EQ(of_first.of.back(), -1) << "a load beside the motion is taken along in all";
+  EXPECT_EQ(frame_groups(measured(curvature(), 7), 1).count, 0) << "too few frames to be split";
+  EXPECT_FALSE(covariance_between(measured(curvature(), 7), frame_groups(measured(curvature(), 7), 1)));
+}
+
+TEST(CovarianceBetweenGroups, IsTheScatterOfTheirMeanWhereTheyAreAlike) {
   const std::vector<Eigen::Vector2d> least = {{0.1, 0.02}, {-0.05, 0.3}, {0.0, -0.1}, {0.2, 0.04}};
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& l : least) mean += l / 4.0;
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (const Eigen::Vector2d& l : least) scatter += (l - mean) * (l - mean).transpose() / (3.0 * 4.0);
-  const MatrixX between = *covariance_between_recordings(recordings_about(least, curvature()), 4);
+  const CostEvaluation e = recordings_about(least, curvature());
+  const MatrixX between = *covariance_between(e, frame_groups(e, 4));
   EXPECT_LT((between.topLeftCorner(2, 2) - scatter).norm(), 1e-12);
   EXPECT_LT(between.bottomRightCorner(4, 4).norm(), 1e-20) << "what each has of its own does not move";
 }
 
-TEST(CovarianceBetweenRecordings, WidensNothingThatNoiseAccountsFor) {
+TEST(CovarianceBetweenGroups, WidensNothingThatNoiseAccountsFor) {
   const std::vector<Eigen::Vector2d> alike(3, Eigen::Vector2d(0.2, 0.1));
   const Uncertainty u = uncertainty_of(recordings_about(alike, curvature()), {}, {}, 3);
   EXPECT_EQ(u.std, u.std_noise);
 }
 
-TEST(CovarianceBetweenRecordings, MakesTheIntervalHoldWhatRecordingsScatterAbout) {
+TEST(CovarianceBetweenGroups, MakesTheIntervalHoldWhatRecordingsScatterAbout) {
   constexpr int count = 5, draws = 2000;
   constexpr double scatter = 0.3;  // of one recording, six times what its noise makes
   std::mt19937 random(7);
@@ -224,10 +241,24 @@ TEST(CovarianceBetweenRecordings, MakesTheIntervalHoldWhatRecordingsScatterAbout
     const CostEvaluation e = recordings_about(least, curvature());
     const auto holds_zero = [&](const Uncertainty& u) { return mean + u.low[0] < 0.0 && 0.0 < mean + u.high[0]; };
     held += holds_zero(uncertainty_of(e, {}, {}, count));
-    held_by_noise += holds_zero(uncertainty_of(e, {}, {}));
+    held_by_noise += holds_zero(uncertainty_of(e, {}, {}, 0));
   }
   EXPECT_NEAR(held / double(draws), 0.9, 0.03);
   EXPECT_LT(held_by_noise / double(draws), 0.7) << "recordings that do not differ would show nothing";
+}
+
+/// A motion whose beginning asks for another value than its end is known no better than the two differ.
+TEST(CovarianceBetweenGroups, WidensWhatPartsOfAMotionDisagreeAbout) {
+  CostEvaluation e = measured(MatrixX::Zero(2, 2), 40);
+  for (FrameFit& frame : e.frames) {
+    frame.gauss_newton = curvature() / 40.0;
+    frame.gradient = curvature() * Eigen::Vector2d(frame.frame < 20 ? 0.3 : -0.3, 0.0) / 40.0;
+    e.gauss_newton += frame.gauss_newton;
+  }
+  const Uncertainty u = uncertainty_of(e, {}, {}, 1);
+  EXPECT_NEAR(u.std[0], 0.3 / std::sqrt(3.0), 1e-9) << "four quarters at +-0.3: their scatter over the root of four";
+  EXPECT_EQ(u.budget.back().cause, "what parts of the motion differ by");
+  EXPECT_LT(u.std[1], 1.01 * u.std_noise[1]) << "of which they tell the same";
 }
 
 TEST(Verdicts, AreGoodWhereResidualsAreNoise) {

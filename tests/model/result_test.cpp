@@ -140,7 +140,7 @@ TEST(Result, IntervalsVerdictAndBudgetComeBack) {
   Result result = full_result();
   result.parameters[0].interval_90 = std::pair(553.0, 629.0);
   result.parameters[0].std_noise = 9.0, result.parameters[0].std_model = 19.0;
-  result.parameters[0].prior = PriorResult{500.0, {200.0, 1250.0}};
+  result.parameters[0].prior = PriorResult{500.0, std::pair(200.0, 1250.0)};
   result.verdict = "unexplained", result.reasons = {"The distances are 3.0 times the noise."};
   result.uncertainty = {{"noise", {{"youngs_modulus", 9.0}}}, {"mesh", {{"youngs_modulus", std::nan("")}}}};
   write_result(folder / "result.json", result);

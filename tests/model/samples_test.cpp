@@ -86,9 +86,9 @@ TEST(PosteriorSamples, TheFirstOnesAreTheSameForEveryCount) {
 
 Result with_priors() {
   Result r = result();
-  r.parameters[0].prior = PriorResult{1e5, {5e4, 4e5}};
-  r.parameters[1].prior = PriorResult{0.35, {0.25, 0.45}};
-  r.parameters[2].prior = PriorResult{0.2, {0.01, 2.0}};
+  r.parameters[0].prior = PriorResult{1e5, std::pair(5e4, 4e5)};
+  r.parameters[1].prior = PriorResult{0.35, std::pair(0.25, 0.45)};
+  r.parameters[2].prior = PriorResult{0.2, std::pair(0.01, 2.0)};
   return r;
 }
 

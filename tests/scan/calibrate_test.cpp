@@ -225,11 +225,14 @@ TEST(Calibrate, WritesTheCaptureWithMendedCameras) {
   std::vector<SensorCalibration> sensors(1);
   sensors[0].name = "top", sensors[0].camera_to_world = s.cameras[2].camera.camera_to_world;
   sensors[0].lens = LensDistortion({0.01, 0, 0, 0, 0}), sensors[0].time_offset = 0.004;
+  sensors[0].turn_std = 3e-4, sensors[0].shift_std = 4e-4;
   write_capture(out, as_seen_from(with_calibration(capture, sensors), out));
   const Capture again = read_capture(out);
   EXPECT_TRUE(again.depth[2].camera.camera_to_world.rotation.isApprox(sensors[0].camera_to_world.rotation, 1e-12));
   EXPECT_EQ(again.depth[2].camera.lens, sensors[0].lens);
   EXPECT_EQ(again.depth[2].time_offset, 0.004);
+  EXPECT_EQ(again.depth[2].pose_std, (PoseStd{3e-4, 4e-4})) << "the next fit begins with what was found";
+  EXPECT_EQ(again.depth[0].pose_std, PoseStd());
   DepthCamera same = capture.depth[0];
   same.images = again.depth[0].images;
   same.masks = again.depth[0].masks;
@@ -237,6 +240,13 @@ TEST(Calibrate, WritesTheCaptureWithMendedCameras) {
   same.camera.camera_to_world = again.depth[0].camera.camera_to_world;  // but for its rounding
   EXPECT_TRUE(again.depth[0] == same);
   EXPECT_EQ(observe(again).front().points.size(), observe(capture).front().points.size());
+  sensors.push_back(sensors[0]);  // by a ball: against the reference, whose pose is as it was stated
+  sensors[1].name = capture.depth[0].name, sensors[1].is_reference = true;
+  sensors[1].turn_std = sensors[1].shift_std = 0.0;
+  const Capture by_ball = with_calibration(capture, sensors);
+  EXPECT_EQ(by_ball.depth[0].pose_std, PoseStd());
+  EXPECT_NEAR(by_ball.depth[2].pose_std.turn, std::hypot(PoseStd().turn, 3e-4), 1e-15);
+  sensors.pop_back();
   sensors[0].name = "bottom";
   EXPECT_THAT(complaint_of([&] { (void)with_calibration(capture, sensors); }), HasSubstr("no depth camera \"bottom\""));
 }
