@@ -15,7 +15,7 @@ struct PlanFacts {
   ParameterHandle density, gravity;       ///< of the first recording
   double size = 0.0;                      ///< of the object [m]
   VectorX relative_moduli;                ///< of scan and starts, the first one's being one
-  std::vector<std::string> told_at_rest;  ///< see `Recordings`
+  std::vector<std::string> told_at_rest;  ///< parameters that show before anything moves: poses of sensors, planes
   bool is_scanned = true;                 ///< Young's modulus is looked for
   double softest = 0.0;                   ///< Young's modulus that is tried [Pa]; 0: the stress under its own weight
   bool swings = false;                    ///< some object is let go

@@ -45,7 +45,7 @@ class MotionTrial::Comparison {
   CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar);
 
  private:
-  /// The sensors' corrections at a theta, and how they change along directions.
+  /// The sensors' corrections and the planes that they see at a theta, and how both change along directions.
   struct Sensors {
     std::vector<SensorCorrection> corrections;
     std::vector<MatrixX> changes;                     // 7 x directions, of each

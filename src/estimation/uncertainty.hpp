@@ -60,9 +60,7 @@ std::optional<MatrixX> covariance_between(const CostEvaluation& evaluation, cons
 /// @param evaluation  at the estimate, with derivatives
 /// @param shifts      of alternative models and of what is taken as given, one standard deviation each
 /// @param floor       deviation of each coordinate that no alternative here accounts for; empty: none
-/// @param recordings  of the object; what they, or the parts of one's motion, differ by beyond their noise is a cause
-/// of
-///                    its own
+/// @param recordings  of the object: `frame_groups` says of what the differences beyond noise are a cause of their own
 Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<ModelShift>& shifts,
                            const VectorX& floor, int recordings = 1);
 

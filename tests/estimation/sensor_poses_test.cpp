@@ -177,7 +177,6 @@ TEST(PlanesSeen, DerivativesMatchCentralDifferences) {
     EXPECT_LT(test::best_relative_error(along, VectorX::Constant(1, g), 0.02), tolerance(1e-5))
         << names[std::size_t(i)];
   }
-  // Beside no points at all the plane's residuals are all there is: Gauss-Newton's matrix is exact to first order.
   EXPECT_GT(by_tangents.cost, objective.evaluate(parameters.to_unconstrained(theta)).cost);
 }
 
@@ -247,7 +246,7 @@ TEST(PoseOfASensor, ThatIsRightChangesNothing) {
     EXPECT_NEAR(of_asked[i], p[i], asked.std[i] / 3.0) << exact.parameters.coordinate_names()[std::size_t(i)];
 }
 
-/// A pose that is taken as exact is a fit without it, to the last bit: whether the capture says so or the user.
+/// Deviations of zero leave a pose out of a fit, to the last bit: as of clouds that state none.
 TEST(PoseOfASensor, ThatIsExactIsNoUnknown) {
   const RecordedCapture straight = held_and_dropped();
   FitOptions options = quick();
