@@ -38,8 +38,7 @@ RecordedCapture seen_askew(RecordedCapture recorded, const Vector3& turn, const 
   return recorded;
 }
 
-/// On the mesh that the motion was made on: an inverse crime. A model that errs would be made up for by the pose in
-/// part. A block that somebody holds still for a while, and drops.
+/// A block that somebody holds still for a while, and drops.
 RecordedCapture held_and_dropped() {
   constexpr int held = 20;
   test::Dropped block;
@@ -71,6 +70,7 @@ RecordedCapture held_and_dropped() {
   return recorded;
 }
 
+/// On the mesh that the motion was made on: an inverse crime. A pose makes up in part for a model that errs.
 FitOptions quick() {
   FitOptions options;
   options.cells = 9.0, options.coarse_cells = 6.0;
