@@ -86,6 +86,18 @@ TEST(ExplainedSpan, EndsBeforeWhatNoParametersExplain) {
   EXPECT_LT(off(part), off(whole));
 }
 
+/// A mesh that is too coarse explains no whole motion; on the finer one of its parts the whole is explained, too.
+TEST(ExplainedSpan, ReachesTheWholeAgainFromItsParts) {
+  FitOptions options = quick();
+  options.cells = options.coarse_cells = 6.0;
+  const FitOutcome outcome = fit({test::Dropped{}.record()}, options);
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  EXPECT_EQ(outcome.verdict.kind, Verdict::Kind::Explained);
+  EXPECT_EQ(last_frame(outcome), 29);
+  EXPECT_DOUBLE_EQ(outcome.cells, 1.5 * options.cells) << "it went by parts";
+  EXPECT_THAT(outcome.notes, ::testing::Not(::testing::Contains(::testing::HasSubstr("whole motion"))));
+}
+
 TEST(ExplainedSpan, OfWhatTouchesNothingIsTheWholeWithItsAlternatives) {
   RecordedCapture block = kicked_block();
   for (Plane& plane : block.capture.scene.planes) plane.point = Vector3(0.0, -5.0, 0.0);  // far below
