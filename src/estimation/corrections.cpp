@@ -5,12 +5,11 @@
 #include <map>
 
 #include "base/dense.hpp"
+#include "estimation/judgement.hpp"
 
 namespace pliant {
 
 namespace {
-
-constexpr double tolerated = 1.0;  // of what noise explains
 
 /// Rows of the unconstrained vector that belong to parameters of these names.
 std::vector<Eigen::Index> rows_of(const ParameterSet& parameters, const std::vector<std::string>& names) {
@@ -60,7 +59,9 @@ std::vector<Correction> possible_corrections(const ParameterSet& parameters, con
   return corrections;
 }
 
-bool may_need_correction(double cost, double observations) { return cost > (1.0 + tolerated) * 0.5 * observations; }
+bool may_need_correction(double cost, double observations) {
+  return cost > (1.0 + judgement.tolerated_excess) * 0.5 * observations;
+}
 
 std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluation, const ParameterSet& parameters,
                                                  const std::vector<Correction>& corrections, double observations) {
@@ -75,7 +76,7 @@ std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluatio
   std::vector<Correction> left = corrections;
   std::vector<NeededCorrection> needed;
   double excess = evaluation.cost - explained;
-  while (excess > tolerated * explained && !left.empty()) {
+  while (excess > judgement.tolerated_excess * explained && !left.empty()) {
     NeededCorrection best;
     for (const Correction& c : left) {
       const std::vector<Eigen::Index> rows = rows_of(parameters, c.parameters);

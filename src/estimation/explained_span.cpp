@@ -5,16 +5,15 @@
 #include <algorithm>
 
 #include "estimation/fit_plan.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/verdict.hpp"
 
 namespace pliant {
 
 namespace {
 
-constexpr double least_part = 0.15;     // of a recording
-constexpr double after_touch = 1.25;    // times the part until the obstacle is touched
-constexpr double growth = 1.2;          // of the part, from one that is explained
-constexpr double as_good_as_all = 0.9;  // a part in whose place the whole is tried
+constexpr double after_touch = 1.25;  // times the part until the obstacle is touched
+constexpr double growth = 1.2;        // of the part, from one that is explained
 constexpr double whole = 1.0;
 
 bool meets_obstacles(const RecordedCapture& r) {
@@ -40,7 +39,7 @@ double part_until_touch(const RecordingOutcome& r, int frames) {
 }
 
 /// A part as it is tried; nearly all is all.
-double up_to_whole(double part) { return part > as_good_as_all ? whole : part; }
+double up_to_whole(double part) { return part > judgement.nearly_whole ? whole : part; }
 
 int last_seen(const CostEvaluation& evaluation) {
   return evaluation.frames.empty() ? 0 : evaluation.frames.back().frame;
@@ -95,7 +94,7 @@ bool ExplainedSpan::take(FitOutcome outcome, PassState reached) {
         const RecordingOutcome& r = outcome.recordings[i];
         part = std::max(part, part_until_touch(r, last_seen(r.evaluation)));
       }
-    search_.next_part = search_.part = up_to_whole(std::max(least_part, after_touch * part));
+    search_.next_part = search_.part = up_to_whole(std::max(judgement.least_part.value, after_touch * part));
     search_.has_parts = search_.part < whole;
   }
   if (has_failed || is_last_ || (was_whole && fits)) {

@@ -11,6 +11,7 @@
 #include "estimation/bounded_step.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_plan.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/recordings.hpp"
 
 namespace pliant {
@@ -19,15 +20,17 @@ namespace {
 
 constexpr std::array numbers = {1, 2, 3, 4, 6, 8, 12, 16};
 constexpr double impossible = -std::numeric_limits<double>::infinity();
-/// What a field must take off the cost at the least. What a mesh lacks is no noise, and many points make evidence of
-/// little: a second modulus took 4 % off for an even bar of another simulator, 18 % for one of two stiffnesses.
-double least_gain(int best_control_points) { return best_control_points == 1 ? 0.10 : 0.03; }
+/// What a field must take off the cost at the least: what a mesh lacks is no noise, and many points make evidence of
+/// little.
+double least_gain(int best_control_points) {
+  return best_control_points == 1 ? judgement.gain_of_second_modulus : judgement.gain_of_further_moduli;
+}
 /// Of that gain, what one step shows, or the wide band, where dampings and others made up for it.
 constexpr double share_on_the_way = 0.3;
 
 /// Whether a field that was fitted is kept beside the best one before.
 bool is_worth_it(const TriedField& tried, const TriedField& best) {
-  return tried.estimated && tried.log_bayes_factor > strong_evidence &&
+  return tried.estimated && tried.log_bayes_factor > judgement.strong_evidence &&
          tried.cost < (1.0 - least_gain(best.control_points)) * best.cost;
 }
 
@@ -234,7 +237,7 @@ FitOutcome FieldChoice::with_history(FitOutcome outcome) {
 bool is_worth_a_fit(const TriedField& promised, const TriedField& best) {
   // From moduli that vary one step tells less than there is: Poisson's ratio stands where it makes up for what they
   // lack.
-  const double least_evidence = best.control_points == 1 ? strong_evidence : 0.0;
+  const double least_evidence = best.control_points == 1 ? judgement.strong_evidence : 0.0;
   return promised.log_bayes_factor > least_evidence &&
          promised.cost < (1.0 - share_on_the_way * least_gain(best.control_points)) * best.cost;
 }
@@ -253,8 +256,8 @@ std::string explained(const std::vector<TriedField>& tried) {
   }
   return "Young's modulus was given " + points(best.control_points) +
          ", as many as the recordings support. Logarithm of the evidence" + evidence + ". More points need more than " +
-         text_of(strong_evidence, "%.0f") + ", and " + text_of(100.0 * least_gain(best.control_points), "%.0f") +
-         " % off the cost.";
+         text_of(judgement.strong_evidence, "%.0f") + ", and " +
+         text_of(100.0 * least_gain(best.control_points), "%.0f") + " % off the cost.";
 }
 
 MatrixX carried_over(const Body& body, const ModulusField& from, const ModulusField& to) {

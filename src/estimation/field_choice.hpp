@@ -11,8 +11,8 @@ namespace pliant {
 /// fitted first; then fields of 2, 3, 4, 6, 8, ... points, each from the best one so far and only where one step of
 /// Gauss and Newton promises enough (`is_worth_a_fit`), and to its end only where the stage in the wide band takes off
 /// as large a part of the best one's cost there. A field of more points is kept where there is strong evidence
-/// of what it has beyond the best one before (`log_bayes_factor` above `strong_evidence`); two numbers in a row without
-/// it end the search, and the best one is repeated where the options ask for that.
+/// of what it has beyond the best one before (`log_bayes_factor` above `Judgement::strong_evidence`); two numbers in a
+/// row without it end the search, and the best one is repeated where the options ask for that.
 class FieldChoice : public PassPlanner {
  public:
   /// @param resume  the state of an interrupted choice goes on with the field that was under way
@@ -56,9 +56,6 @@ class FieldChoice : public PassPlanner {
   std::vector<std::pair<int, std::vector<FitEvent>>> histories_;  // by number of control points
   long long forward_steps_ = 0;
 };
-
-/// ln of the Bayes factor B above which evidence is called strong: 2 ln B > 6 (Kass and Raftery 1995).
-inline constexpr double strong_evidence = 3.0;
 
 /// Whether a field of which one step of Gauss and Newton promises so much is fitted. Beside an even object it must
 /// promise strong evidence, beside a field any, and a part of what a field must take off the cost.

@@ -50,15 +50,34 @@ const std::vector<std::pair<std::string, FieldOptions::Weights>> control_weights
     {"linear", FieldOptions::Weights::Linear},
     {"harmonic", FieldOptions::Weights::Harmonic},
     {"inverse_distance", FieldOptions::Weights::InverseDistance}};
-const std::set<std::string> parameter_names = {"youngs_modulus",    "poissons_ratio",    "mass_damping",
-                                               "stiffness_damping", "density",           "gravity",
-                                               "linear_velocity",   "angular_velocity",  "plane",
-                                               "plane_2",           "plane_3",           "plane_4",
-                                               "friction",          "friction_2",        "friction_3",
-                                               "friction_4",        "contact_stiffness", "pull",
-                                               "range_error",       "sensor_turn",       "sensor_shift",
-                                               "scan_correction",   "exponent_1",        "exponent_2",
-                                               "exponent_3",        "stiffness_ratio_2", "stiffness_ratio_3"};
+const std::set<std::string> parameter_names = {"youngs_modulus",
+                                               "poissons_ratio",
+                                               "mass_damping",
+                                               "stiffness_damping",
+                                               "density",
+                                               "gravity",
+                                               "linear_velocity",
+                                               "angular_velocity",
+                                               "plane",
+                                               "friction",
+                                               "wind",
+                                               "strength",
+                                               "pull",
+                                               "range_error",
+                                               "sensor_turn",
+                                               "sensor_shift",
+                                               "scan_correction",
+                                               "contact_stiffness"};
+/// Of planes from the second on, and of an Ogden law's terms.
+const std::set<std::string> numbered_names = {"plane", "friction", "exponent", "stiffness_ratio", "poissons_ratio"};
+
+/// Whether a fit may have a parameter of that name, without what stands behind "@" or "[".
+bool is_parameter_name(const std::string& base) {
+  if (parameter_names.contains(base)) return true;
+  const std::size_t at = base.rfind('_');
+  return at != std::string::npos && numbered_names.contains(base.substr(0, at)) && at + 1 < base.size() &&
+         base.find_first_not_of("0123456789", at + 1) == std::string::npos;
+}
 
 std::string text_of(double value) {
   std::ostringstream out;
@@ -399,8 +418,7 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
     name = key.substr(0, dot);
     part = dot == std::string::npos ? "" : key.substr(dot + 1);
   }
-  if (const std::string base = name.substr(0, name.find_first_of("@[")); !parameter_names.contains(base))
-    reject_unknown(base);
+  if (const std::string base = name.substr(0, name.find_first_of("@[")); !is_parameter_name(base)) reject_unknown(base);
   set_parameter(options, name, part, value);
 }
 

@@ -12,6 +12,7 @@
 #include "estimation/corrections.hpp"
 #include "estimation/fit_starts.hpp"
 #include "estimation/given_quantities.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/notes.hpp"
 #include "estimation/verdict.hpp"
@@ -50,11 +51,6 @@ const std::string cause_scan = "errors of the scan";
 constexpr int draws_of_scan = 4;
 constexpr double promise_of_alternative = 0.1, promise_to_trust = 0.5;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
-// From what a mesh or a step changes to what is left of the fit's own error, at second order and, of steps, a little
-// less than that. A finer mesh is affordable at rest; of a motion the coarser one tells.
-constexpr double size_of_finer_mesh = 1.8, size_of_coarser_mesh = 0.8, size_of_longer_step = 0.6;
-// Of what a law that is linear in the strain changes, the share by which another law at large strain may differ.
-constexpr double size_of_small_strain = 0.5;
 
 }  // namespace
 
@@ -166,12 +162,19 @@ std::vector<Alternative> FitRun::alternatives() const {
   // Of motions, what another law changes is seen on the coarser mesh as well, for a third of the work.
   const bool has_coarser = recordings_.any_meshed_here() && !is_static;
   const double cells = has_coarser ? 1.0 / ratio : 1.0;
-  if (has_coarser) all.push_back({cause_mesh, cells, 1.0, {}, false, size_of_coarser_mesh, false, many_iterations});
+  if (has_coarser)
+    all.push_back({cause_mesh, cells, 1.0, {}, false, judgement.size_of_coarser_mesh, false, many_iterations});
   if (recordings_.any_meshed_here() && is_static)
-    all.push_back({cause_mesh, ratio, 1.0, {}, false, size_of_finer_mesh});
+    all.push_back({cause_mesh, ratio, 1.0, {}, false, judgement.size_of_finer_mesh});
   if (!is_static)
-    all.push_back(
-        {"time step", 1.0, 1.0 / Refinement::step_ratio, {}, false, size_of_longer_step, false, few_iterations});
+    all.push_back({"time step",
+                   1.0,
+                   1.0 / Refinement::step_ratio,
+                   {},
+                   false,
+                   judgement.size_of_longer_step,
+                   false,
+                   few_iterations});
   for (int draw = 1; recordings_.any_scan_errs() && draw <= draws_of_scan; ++draw) {
     const double size = std::sqrt(1.0 / draws_of_scan) / part_of_scan_error;  // so that their variances add to one
     all.push_back({cause_scan, cells, 1.0, {.scan_error = draw}, false, size, has_coarser, many_iterations});
@@ -185,7 +188,7 @@ std::vector<Alternative> FitRun::alternatives() const {
                      1.0,
                      {.small_strain = true},
                      false,
-                     size_of_small_strain,
+                     judgement.size_of_small_strain,
                      has_coarser,
                      has_coarser ? many_iterations : few_iterations});
     else if (recordings_.are_tetrahedra()) {
@@ -619,7 +622,7 @@ std::optional<VectorX> FitRun::mesh_shift(const std::vector<StageRecord>& done, 
   if (!finer.empty()) {
     const ParameterSet parameters = plan_.estimated(done);
     const StageRecord& before = finer.size() > 1 ? *finer[finer.size() - 2] : *plan_.estimate(done);
-    return size_of_coarser_mesh *
+    return judgement.size_of_coarser_mesh *
            (parameters.to_unconstrained(before.theta) - parameters.to_unconstrained(finer.back()->theta));
   }
   for (const StageRecord& r : done) {

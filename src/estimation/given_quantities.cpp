@@ -2,16 +2,11 @@
 
 #include <algorithm>
 
+#include "estimation/judgement.hpp"
+
 namespace pliant {
 
 namespace {
-
-constexpr double turned = 0.002;      // [rad] of a sensor that was calibrated
-constexpr double moved = 0.001;       // times the object's size, of a sensor along each axis, and of its range
-constexpr double tilted = 0.003;      // [rad] of gravity, by a level
-constexpr double weighed = 0.01;      // of ln density: a kitchen scale, and the volume of a scan
-constexpr double coefficient = 0.05;  // of friction
-constexpr double hardness = 0.3;      // of ln stiffness of contact, where it was chosen
 
 std::string sensor_of(const std::string& name) { return name.substr(name.find('@') + 1); }
 
@@ -30,18 +25,19 @@ std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters,
   for (const Parameter& p : parameters.parameters()) {
     if (p.estimated) continue;
     if (p.role == Role::Sensor && p.is_scalar())
-      given.push_back({p.name, "range of " + sensor_of(p.name), moved});
+      given.push_back({p.name, "range of " + sensor_of(p.name), judgement.given_shift.value});
     else if (p.role == Role::Sensor)
       given.push_back({p.name, "pose of " + sensor_of(p.name),
-                       p.unit == "rad" ? std::max(turned, 2.0 * error_of(p)) : std::max(moved, error_of(p))});
+                       p.unit == "rad" ? std::max(judgement.given_turn.value, 2.0 * error_of(p))
+                                       : std::max(judgement.given_shift.value, error_of(p))});
     else if (p.transform == Transform::Direction)
-      given.push_back({p.name, "direction of gravity", std::max(tilted, 2.0 * worst_error)});
+      given.push_back({p.name, "direction of gravity", std::max(judgement.given_gravity.value, 2.0 * worst_error)});
     else if (p.role == Role::Inertia && p.transform == Transform::Logarithm)
-      given.push_back({p.name, "mass", weighed});
+      given.push_back({p.name, "mass", judgement.given_density.value});
     else if (p.role == Role::Obstacle && p.transform == Transform::Shift)
-      given.push_back({p.name, "friction", coefficient});
+      given.push_back({p.name, "friction", judgement.given_friction.value});
     else if (p.role == Role::Obstacle && p.transform == Transform::Logarithm)
-      given.push_back({p.name, "stiffness of contact", hardness});
+      given.push_back({p.name, "stiffness of contact", judgement.given_contact.value});
   }
   return given;
 }

@@ -14,7 +14,7 @@ namespace {
 constexpr double trust = 10.0;         // times the spread of neighbouring differences: what they cannot tell
 constexpr double least_digits = 0.05;  // of the derivative: differences less certain than this decide nothing
 
-using Judgement = CheckedDerivative::Verdict;
+using Outcome = CheckedDerivative::Verdict;
 
 double difference(CostFunction& cost, const VectorX& p, Eigen::Index i, double h) {
   const VectorX step = h * VectorX::Unit(p.size(), i);
@@ -36,23 +36,23 @@ void take_best_step(CheckedDerivative& d) {
   }
 }
 
-Judgement judge(const CheckedDerivative& d, double cost, double tolerance) {
+Outcome judge(const CheckedDerivative& d, double cost, double tolerance) {
   const double size = std::max({std::abs(d.by_tangents), std::abs(d.by_adjoint), d.scale});
-  if (!(std::abs(d.by_tangents - d.by_adjoint) <= tolerance * size)) return Judgement::Disagree;
-  if (!std::isfinite(d.by_difference)) return Judgement::Undecided;
+  if (!(std::abs(d.by_tangents - d.by_adjoint) <= tolerance * size)) return Outcome::Disagree;
+  if (!std::isfinite(d.by_difference)) return Outcome::Undecided;
   const double rounding = std::numeric_limits<double>::epsilon() * std::abs(cost) / d.step;
   const double unknown = trust * (d.uncertainty + rounding) + tolerance * size;
-  if (std::abs(d.by_tangents - d.by_difference) > unknown) return Judgement::Disagree;
-  return unknown > least_digits * size && unknown > 0.0 && size > 0.0 ? Judgement::Undecided : Judgement::Agree;
+  if (std::abs(d.by_tangents - d.by_difference) > unknown) return Outcome::Disagree;
+  return unknown > least_digits * size && unknown > 0.0 && size > 0.0 ? Outcome::Undecided : Outcome::Agree;
 }
 
-const char* word(Judgement verdict) {
+const char* word(Outcome verdict) {
   switch (verdict) {
-    case Judgement::Agree:
+    case Outcome::Agree:
       return "agree";
-    case Judgement::Disagree:
+    case Outcome::Disagree:
       return "DISAGREE";
-    case Judgement::Undecided:
+    case Outcome::Undecided:
       return "undecided";
   }
   return "";
@@ -61,7 +61,7 @@ const char* word(Judgement verdict) {
 }  // namespace
 
 bool GradientCheck::agrees() const {
-  return std::ranges::none_of(derivatives, [](const auto& d) { return d.verdict == Judgement::Disagree; });
+  return std::ranges::none_of(derivatives, [](const auto& d) { return d.verdict == Outcome::Disagree; });
 }
 
 namespace {
@@ -112,15 +112,15 @@ std::string describe(const GradientCheck& check) {
   for (const CheckedDerivative& d : check.derivatives)
     text += fmt::format("{:{}}  {:14.7g}  {:14.7g}  {:14.7g}  {:9.2g}  {:8.1e}  {}\n", d.name, width, d.by_tangents,
                         d.by_adjoint, d.by_difference, d.uncertainty, d.step, word(d.verdict));
-  const auto count = [&](Judgement verdict) {
+  const auto count = [&](Outcome verdict) {
     return std::ranges::count(check.derivatives, verdict, &CheckedDerivative::verdict);
   };
-  if (const auto wrong = count(Judgement::Disagree); wrong > 0)
+  if (const auto wrong = count(Outcome::Disagree); wrong > 0)
     text += fmt::format("{} of {} derivatives disagree beyond what the differences can tell\n", wrong,
                         check.derivatives.size());
   else
     text += "tangents, adjoint and differences agree as far as the differences can tell\n";
-  if (const auto open = count(Judgement::Undecided); open > 0)
+  if (const auto open = count(Outcome::Undecided); open > 0)
     text += fmt::format("of {} derivatives no step size gives differences to compare with\n", open);
   return text;
 }

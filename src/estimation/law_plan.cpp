@@ -6,6 +6,7 @@
 
 #include "base/error.hpp"
 #include "estimation/field_evidence.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/press_fit.hpp"
 
 namespace pliant {
@@ -13,9 +14,7 @@ namespace pliant {
 namespace {
 
 constexpr std::array field_sizes = {4, 8, 16, 32};
-constexpr double needed_evidence = 3.0;  // e^3 to 1
 constexpr int most_zones = 8, most_passes = 4, brief_iterations = 8;
-constexpr double least_gain = 0.03;  // by a zone or a field more, of the squares of the residuals
 constexpr int most_rounds = 4;
 constexpr double least_round_gain = 0.05;  // of the cost, for which another round is worth its time
 
@@ -207,8 +206,8 @@ class LawPlan::Replay {
       const auto more = double(next->found.dimension - best().found.dimension);
       tried.evidence = 0.5 * n * std::log(best().found.squares(deviation) / next->found.squares(deviation)) -
                        0.5 * more * std::log(n);
-      tried.kept =
-          (options().law_terms > 0 && form.terms > best().shape.form.terms) || tried.evidence > needed_evidence;
+      tried.kept = (options().law_terms > 0 && form.terms > best().shape.form.terms) ||
+                   tried.evidence > judgement.strong_evidence;
     }
     conclude(std::move(next), tried, noise);
     return tried.kept && !is_pending();
@@ -242,7 +241,7 @@ class LawPlan::Replay {
     LawShape shape{{zones, best().shape.form.terms, zones, best().shape.form.own_ratios}, {}, best().shape.cuts};
     const StageRecord* promised = ask(task_stage(StageKind::Cut, best().shape, best().theta, name));
     if (!promised) return false;
-    if (!promised->succeeded || (!is_chosen && promised->law->evidence < needed_evidence)) {
+    if (!promised->succeeded || (!is_chosen && promised->law->evidence < judgement.strong_evidence)) {
       conclude({}, {shape.form, infinite, promised->succeeded ? promised->law->evidence : -infinite, false},
                now_.noise);
       return false;
@@ -258,7 +257,7 @@ class LawPlan::Replay {
       move_cuts(*next, from, name);
       tried.cost = next->cost;
       tried.evidence = next->found.evidence;
-      tried.kept = is_chosen || (tried.evidence > needed_evidence && gains_enough(*next));
+      tried.kept = is_chosen || (tried.evidence > judgement.strong_evidence && gains_enough(*next));
       // While its cuts move, it is the best already where it will be kept as it is.
       if (is_pending() && tried.kept) now_.best = next;
     }
@@ -277,12 +276,12 @@ class LawPlan::Replay {
         stage.law->cut = int(c);
         const StageRecord* move = ask(std::move(stage));
         if (!move) return;
-        if (!move->succeeded || move->law->evidence < needed_evidence) continue;
+        if (!move->succeeded || move->law->evidence < judgement.strong_evidence) continue;
         LawShape shape = e.shape;
         shape.cuts[c].at = move->law->cut->at;
         std::optional<Estimate> moved = estimate(shape, e.theta, name, LawTask::Evidence::Zone, split, true);
         if (is_pending()) return;
-        if (!moved || moved->cost > e.cost - needed_evidence) continue;
+        if (!moved || moved->cost > e.cost - judgement.strong_evidence) continue;
         e = std::move(*moved);
         e.start_cost = start_cost;
         ++gained;
@@ -310,7 +309,7 @@ class LawPlan::Replay {
     if (next) {
       tried.cost = next->cost;
       tried.evidence = next->found.evidence;
-      tried.kept = options().law_zones > 1 || tried.evidence > needed_evidence;
+      tried.kept = options().law_zones > 1 || tried.evidence > judgement.strong_evidence;
     }
     conclude(std::move(next), tried, noise);
   }
@@ -343,7 +342,7 @@ class LawPlan::Replay {
       if (next) {
         tried.cost = next->cost;
         tried.evidence = next->found.evidence;
-        tried.kept = is_chosen || (tried.evidence > needed_evidence && gains_enough(*next));
+        tried.kept = is_chosen || (tried.evidence > judgement.strong_evidence && gains_enough(*next));
       }
     }
     conclude(std::move(next), tried, noise);
@@ -353,7 +352,7 @@ class LawPlan::Replay {
   /// lacks is no noise, and many markers make evidence of little.
   bool gains_enough(const Estimate& next) {
     const double deviation = best().found.deviation;
-    return next.found.squares(deviation) < (1.0 - least_gain) * best().found.squares(deviation);
+    return next.found.squares(deviation) < (1.0 - judgement.gain_of_zone) * best().found.squares(deviation);
   }
 
   const LawFacts& facts_;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "estimation/judgement.hpp"
 #include "estimation/trial.hpp"
 #include "mismatch/point_tracks.hpp"
 #include "mismatch/sensor_correction.hpp"
@@ -36,9 +37,9 @@ struct ObjectiveOptions {
   double outlier_scale = 0.0;  ///< c of the robust loss [m], > 0, within the band
   int last_frame = 0;          ///< horizon, inclusive
   /// Neighbouring pixels err together: a frame counts as at most so many independent points.
-  double independent_points = 50.0;
+  double independent_points = judgement.independent_points;
   /// Of an object that stands still as it was scanned there is no model to err.
-  double independent_points_at_rest = 200.0;
+  double independent_points_at_rest = judgement.independent_points_at_rest;
   /// Asked at each frame whether the work is to end; may be empty.
   std::function<bool()> interrupted = {};
 };

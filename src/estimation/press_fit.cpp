@@ -14,6 +14,7 @@
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/law_plan.hpp"
 #include "estimation/law_zones.hpp"
 #include "estimation/notes.hpp"
@@ -24,8 +25,6 @@
 namespace pliant {
 
 namespace {
-
-constexpr double outlier_scale = 6.0;  // deviations
 
 std::shared_ptr<const Body> with_field(const Body& body, ModulusField field) {
   auto copy = std::make_shared<Body>(body);
@@ -150,7 +149,7 @@ class LawRun : StageLoop {
     return form;
   }
   PressObjective objective_of(const Form& form, const MarkerNoise& noise) const {
-    return {form.scene, fitted_, form.layout, form.parameters, {noise, outlier_scale}, placements_};
+    return {form.scene, fitted_, form.layout, form.parameters, {noise, judgement.press_outlier}, placements_};
   }
   MatrixX carried(const LawShape& before, const PressScene& scene) const {
     return carried_over(*scene.body, scene_of(before)->body->modulus, scene.body->modulus);
@@ -195,7 +194,7 @@ class LawRun : StageLoop {
       if (!s.succeeded) break;
       form.parameters.set_reference(form.parameters.to_theta(s.p));
       if (!task.is_brief && options_.marker_noise <= 0.0) noise = objective->own_noise(1e-6 * scene_->body->size());
-      objective->set_options({noise, outlier_scale});
+      objective->set_options({noise, judgement.press_outlier});
       from = {0, s.p, {}};
     }
     record.reason = s.reason;
@@ -446,10 +445,9 @@ void require_known(const Capture& capture, const FitOptions& options) {
 
 std::vector<ModelShift> shifts_of_forms(const ParameterSet& parameters, double youngs_modulus,
                                         const std::vector<TriedLaw>& tried) {
-  constexpr double ruled_out = -3.0;
   double farthest = 0.0;
   for (const TriedLaw& t : tried)
-    if (!t.kept && t.evidence > ruled_out && t.youngs_modulus > 0.0)
+    if (!t.kept && t.evidence > -judgement.strong_evidence && t.youngs_modulus > 0.0)
       if (const double shift = std::log(t.youngs_modulus / youngs_modulus); std::abs(shift) > std::abs(farthest))
         farthest = shift;
   if (farthest == 0.0) return {};

@@ -6,12 +6,12 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "estimation/judgement.hpp"
 
 namespace pliant {
 
 namespace {
 
-constexpr double outlier_scale = 6.0;  // deviations
 /// No marker is followed closer than this share of a press' greatest displacement: the last of a misfit is bought by
 /// wild fields.
 constexpr double least_share = 5e-4;
@@ -101,7 +101,7 @@ MarkerNoise PressSampling::own_noise(const std::vector<Pressed>& presses) const 
 }
 
 double PressSampling::cost_of(const std::vector<Pressed>& presses, const MarkerNoise& noise) const {
-  constexpr double c = outlier_scale;
+  constexpr double c = judgement.press_outlier;
   double cost = 0.0;
   for (std::size_t i = 0; i < presses.size(); ++i) {
     if (!presses[i].succeeded) return std::numeric_limits<double>::infinity();

@@ -11,6 +11,7 @@
 #include "capture/pixel_scatter.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/press_objective.hpp"
 #include "estimation/sensor_poses.hpp"
 #include "geometry/random_field.hpp"
@@ -460,7 +461,7 @@ void Recordings::add_loads(const Recording& recording, const Discretisation& d, 
 
 void Recordings::add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
                              const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const {
-  constexpr double outlier_scale = 6.0, least_noise = 1e-4;  // deviations; times the object's size
+  constexpr double least_noise = 1e-4;  // times the object's size
   const LawLayout law = recording.blocks.law.value_or(LawLayout::linear(recording.blocks.motion));
   const auto material = std::make_shared<PressedMaterial>(scene->body, law);
   for (std::size_t i = 0; i < scene->presses.size(); ++i) {
@@ -469,7 +470,8 @@ void Recordings::add_presses(const Recording& recording, const std::shared_ptr<c
     const double noise = options_.marker_noise > 0.0 ? options_.marker_noise
                                                      : std::max(marker_noise(seen), least_noise * recording.size);
     trials.push_back(std::make_unique<PressTrial>(scene, int(i), material, parameters.reference(),
-                                                  PressTrialOptions{noise, outlier_scale}, int(trials.size())));
+                                                  PressTrialOptions{noise, judgement.press_outlier},
+                                                  int(trials.size())));
   }
   for (std::unique_ptr<Trial>& test : static_test_trials(scene, material, parameters, int(trials.size())))
     trials.push_back(std::move(test));

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "estimation/judgement.hpp"
+
 namespace pliant {
 
 namespace {
 
 constexpr double least_order = 0.5;
-constexpr double safety_of_two = 3.0, safety_of_three = 1.25;  // Roache (1994)
 
 /// The estimates that differ from the first in one of the two spacings alone, the first among them.
 template <class Same>
@@ -47,12 +48,12 @@ Limit limit_of(std::span<const double> values, double ratio, double order) {
     const double rest = change / (std::pow(ratio, observed) - 1.0);
     return Limit{last + rest, safety * std::abs(rest)};
   };
-  if (values.size() == 2) return from(order, safety_of_two);
+  if (values.size() == 2) return from(order, judgement.safety_of_two);
   const double before = values[1] - values[0];
   if (change == 0.0) return {last, 0.0};
   const double observed = std::log(before / change) / std::log(ratio);  // NaN where they swing
-  if (!(observed > 0.0)) return {last, safety_of_three * std::max(std::abs(change), std::abs(before))};
-  return from(std::clamp(observed, least_order, order), safety_of_three);
+  if (!(observed > 0.0)) return {last, judgement.safety_of_three * std::max(std::abs(change), std::abs(before))};
+  return from(std::clamp(observed, least_order, order), judgement.safety_of_three);
 }
 
 std::vector<Spacing> refined_spacings(Spacing first, int count, bool meshes, bool steps) {

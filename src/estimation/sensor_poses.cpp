@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "capture/find_plane.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/problem.hpp"
 
 namespace pliant {
@@ -26,14 +27,11 @@ Capture with_one_sensor(Capture capture, std::size_t sensor) {
   return capture;
 }
 
-/// How far a plane that is seen may lie from where it is known to be, and be that one: so many deviations of both.
-constexpr double farthest = 4.0;
-
 bool is_where_known(const Plane& known, const PlaneObservation& seen, const PoseStd& pose) {
   const double tilt = std::acos(std::clamp(known.normal.dot(seen.normal), -1.0, 1.0));
   const double height = std::abs(known.normal.dot(seen.point - known.point));
-  return tilt < farthest * std::hypot(pose.turn, seen.tilt_std) &&
-         height < farthest * std::hypot(pose.shift, seen.height_std);
+  return tilt < judgement.plane_deviations * std::hypot(pose.turn, seen.tilt_std) &&
+         height < judgement.plane_deviations * std::hypot(pose.shift, seen.height_std);
 }
 
 using Motion6 = Eigen::Matrix<double, 6, 1>;

@@ -1,14 +1,13 @@
 #include "estimation/start_objective.hpp"
 
 #include "base/error.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/recordings.hpp"
 
 namespace pliant {
 
 namespace {
-
-constexpr double outlier_scale = 6.0;  // standard deviations of a press's coordinate
 
 StartObjective of_static_tests(const Capture& capture, const FitOptions& options) {
   Resolution resolution;
@@ -27,8 +26,8 @@ StartObjective of_static_tests(const Capture& capture, const FitOptions& options
                          controls > 1 ? modulus_names(capture, controls) : std::vector<std::string>{});
   const ParameterSet parameters = law_parameters(layout, (fitted.empty() ? 1.0 : 2.0) * punch_modulus(*scene, 0.3));
   const double noise = options.marker_noise > 0.0 ? options.marker_noise : scene->noise;
-  const auto objective =
-      std::make_shared<PressObjective>(scene, fitted, layout, parameters, PressTrialOptions{noise, outlier_scale});
+  const auto objective = std::make_shared<PressObjective>(scene, fitted, layout, parameters,
+                                                          PressTrialOptions{noise, judgement.press_outlier});
   return {{objective, &objective->cost()}, parameters.to_unconstrained(parameters.reference())};
 }
 

@@ -5,14 +5,13 @@
 
 #include "base/dense.hpp"
 #include "estimation/field_evidence.hpp"
+#include "estimation/judgement.hpp"
 
 namespace pliant {
 
 namespace {
 
 constexpr double normal_90 = 1.6448536269514722;
-constexpr double freedom_of_alternative = 4.0;  // how well a declared alternative's size is known
-constexpr double freedom_of_floor = 20.0;
 
 /// Its deviations by name and whether the object meets obstacles: of ln E, nu, and of the dampings' unconstrained
 /// numbers, a share of their values, or of what is usual where they are less than that.
@@ -20,10 +19,11 @@ struct Unmodelled {
   const char* name;
   double in_flight_and_contact, at_rest_or_swinging;
 };
-constexpr Unmodelled unmodelled[] = {{"youngs_modulus", 0.05, 0.015},
-                                     {"poissons_ratio", 0.047, 0.016},
-                                     {"mass_damping", 0.06, 0.10},
-                                     {"stiffness_damping", 0.16, 0.08}};
+constexpr Unmodelled unmodelled[] = {
+    {"youngs_modulus", judgement.floor_youngs_modulus, judgement.free_floor_youngs_modulus},
+    {"poissons_ratio", judgement.floor_poissons_ratio, judgement.free_floor_poissons_ratio},
+    {"mass_damping", judgement.floor_mass_damping, judgement.free_floor_mass_damping},
+    {"stiffness_damping", judgement.floor_stiffness_damping, judgement.free_floor_stiffness_damping}};
 
 }  // namespace
 
@@ -38,7 +38,7 @@ MatrixX noise_covariance(const CostEvaluation& evaluation) {
 }
 
 FrameGroups frame_groups(const CostEvaluation& evaluation, int recordings) {
-  constexpr int parts = 4, fewest = 2;  // of a motion; frames of each
+  constexpr int parts = int(judgement.parts_of_motion.value), fewest = 2;  // frames of each
   FrameGroups groups;
   groups.of.assign(evaluation.frames.size(), -1);
   groups.cause = recordings < 3 ? "what parts of the motion differ by" : "what the recordings differ by";
@@ -118,11 +118,11 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
   };
   for (const ModelShift& s : shifts) {
     u.covariance += s.shift * s.shift.transpose();
-    add(s.cause, s.shift.cwiseAbs2(), freedom_of_alternative);
+    add(s.cause, s.shift.cwiseAbs2(), judgement.freedom_of_alternative);
   }
   if (floor.size() > 0) {
     u.covariance.diagonal() += floor.cwiseAbs2();
-    add("law and damping", floor.cwiseAbs2(), freedom_of_floor);
+    add("law and damping", floor.cwiseAbs2(), judgement.freedom_of_floor);
   }
   if (n > 0 && of_groups.maxCoeff() > 0.0) add(groups.cause, of_groups, groups.count - 1.0);
   u.std_model = of_models.cwiseSqrt();

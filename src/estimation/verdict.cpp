@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/judgement.hpp"
+
 namespace pliant {
 
 namespace {
@@ -14,12 +16,8 @@ struct ResidualLimits {
   double overall;
   double for_a_while;  // over a tenth of the frames and three at least
 };
-constexpr ResidualLimits far_above_noise{1.6, 2.2};
-// Of a part of a recording that is chosen for being explained: what is between was seen to put moduli off by a third.
-constexpr ResidualLimits above_noise{1.4, 1.7};
-constexpr double least_matched = 0.85;    // of the points
-constexpr double poorly_known = 0.25;     // deviation of ln E
-constexpr double beyond_tolerance = 0.3;  // of the model's part in ln E
+constexpr ResidualLimits far_above_noise{judgement.residual, judgement.residual_for_a_while};
+constexpr ResidualLimits above_noise{judgement.residual_of_part, judgement.residual_of_part_for_a_while};
 
 double median(std::vector<double> values) {
   std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
@@ -45,7 +43,7 @@ void look_at_residuals(const CostEvaluation& evaluation, const ResidualLimits& l
   if (ratio > limits.overall)
     unexplained(
         fmt::format("The distances between what was seen and the simulated object are {:.1f} times the noise.", ratio));
-  if (const double matched = evaluation.matched_fraction(); matched < least_matched)
+  if (const double matched = evaluation.matched_fraction(); matched < judgement.least_matched)
     unexplained(fmt::format("{:.0f} % of the observed points lie too far from the simulated object to be matched.",
                             100.0 * (1.0 - matched)));
   const std::vector<double> over_time = residuals_over_noise(evaluation);
@@ -58,11 +56,11 @@ void look_at_residuals(const CostEvaluation& evaluation, const ResidualLimits& l
 /// Of control points the mean of ln E counts: a field has places that hardly bend, and what is stated there says so.
 void look_at_moduli(const Uncertainty& uncertainty, const ParameterSet& parameters, Verdict& verdict) {
   const auto look_at = [&](const std::string& name, double std, double std_model) {
-    if (!(std > poorly_known)) return;
+    if (!(std > judgement.poorly_known)) return;
     if (verdict.kind == Verdict::Kind::Explained) verdict.kind = Verdict::Kind::Undetermined;
     verdict.reasons.push_back(
         fmt::format("{} is known to {:.0f} % only{}.", name, 100.0 * std,
-                    std_model > beyond_tolerance ? ": other models of the same object differ by as much" : ""));
+                    std_model > judgement.model_share ? ": other models of the same object differ by as much" : ""));
   };
   const std::vector<Eigen::Index> field = parameters.joint_coordinates();
   const std::vector<const Parameter*> of = parameters.coordinate_parameters();
@@ -91,7 +89,7 @@ std::string name_of(Verdict::Kind kind) {
 double misfit_of(const CostEvaluation& evaluation) {
   const double ratio = residual_over_noise(evaluation);
   const bool sees_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
-  return sees_surface ? ratio / std::min(1.0, evaluation.matched_fraction() / least_matched) : ratio;
+  return sees_surface ? ratio / std::min(1.0, evaluation.matched_fraction() / judgement.least_matched) : ratio;
 }
 
 bool is_explained(const CostEvaluation& evaluation) {

@@ -446,6 +446,7 @@ Result read_all(const Member& top) {
   if (top.has("curves")) top["curves"].each_item([&](const Member& m) { result.curves.push_back(read_curve(m)); });
   if (top.has("time")) result.time = read_time(top["time"]);
   result.verdict = optional_string(top, "verdict");
+  if (top.has("judgement")) result.judgement = read_values(top, "judgement");
   if (top.has("reasons")) top["reasons"].each_item([&](const Member& m) { result.reasons.push_back(m.string()); });
   if (top.has("uncertainty"))
     top["uncertainty"].each_item([&](const Member& m) {
@@ -498,6 +499,7 @@ std::string to_json(const Result& result) {
     json["verdict"] = result.verdict;
     json["reasons"] = result.reasons;
   }
+  if (!result.judgement.empty()) json["judgement"] = result.judgement;
   json["parameters"] = Json::object();
   for (const ParameterResult& parameter : result.parameters)
     for (const std::string& name : {parameter.name, former_name(parameter.name)})

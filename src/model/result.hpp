@@ -181,8 +181,9 @@ struct Result {
   std::optional<RecordingResult> held_out;  ///< predicted, with its own start, planes and sensors alone estimated
   CostResult cost;
   std::vector<CorrelationResult> identifiability;
-  std::string verdict;               ///< "explained", "unexplained" or "undetermined"; empty: none was made
-  std::vector<std::string> reasons;  ///< of the verdict, plain sentences
+  std::string verdict;                      ///< "explained", "unexplained" or "undetermined"; empty: none was made
+  std::vector<std::string> reasons;         ///< of the verdict, plain sentences
+  std::map<std::string, double> judgement;  ///< numbers set by hand that intervals, verdict and model rest on, by name
   std::vector<UncertaintyResult> uncertainty;
   std::vector<StartResult> starts;
   std::vector<ResolutionResult> resolutions;  ///< where there are several, in the order in which they were used

@@ -13,6 +13,7 @@
 #include "base/files.hpp"
 #include "elasticity/element_moduli.hpp"
 #include "elasticity/law_elasticity.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/load_free.hpp"
 #include "live/live_page.hpp"
 #include "output/field_pictures.hpp"
@@ -369,6 +370,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   }
   add_modulus_field(result, outcome);
   add_verdict(result, outcome, jacobian);
+  for (const Judged& number : all_judged()) result.judgement[number.name] = number;
   result.error = surface_errors(outcome.evaluation);
   for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
     result.recordings.push_back(

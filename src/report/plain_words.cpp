@@ -177,7 +177,7 @@ std::string largest_share_sentence(const Result& result) {
       {"errors of the scan", "a scan that errs less (surface_noise of [object])"},
       {"stiffness of contact", "a hard floor, or less of it in the recording"},
       {"form of the law", "presses of other sizes and at other places"},
-      {"elastic law", "smaller strains, or the law of the object's material (--set material)"},
+      {"law at large strain", "smaller strains, or the law of the object's material (--set material)"},
       {"mass", "weighing the object more exactly"},
       {"direction of gravity", "a level: the direction of gravity in the capture"},
       {"pose of", "a calibration of the sensor's pose"},

@@ -275,7 +275,7 @@ TEST(FieldChoice, AHomogeneousBarNeedsOneControlPoint) {
   ASSERT_TRUE(outcome.converged) << outcome.reason;
   EXPECT_EQ(controls(outcome), 1);
   ASSERT_EQ(outcome.fields.size(), 3u) << "two numbers that are not worth it end the search";
-  for (std::size_t i = 1; i < 3; ++i) EXPECT_LT(outcome.fields[i].log_bayes_factor, strong_evidence);
+  for (std::size_t i = 1; i < 3; ++i) EXPECT_LT(outcome.fields[i].log_bayes_factor, judgement.strong_evidence);
   EXPECT_THAT(outcome.notes.front(), ::testing::HasSubstr("was given 1 control point,"));
   EXPECT_NEAR(modulus(outcome, 0) / stiff, 1.0, 0.05);
 }
@@ -285,7 +285,7 @@ TEST(FieldChoice, ABarOfTwoZonesNeedsMore) {
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
   const int count = controls(outcome);
   ASSERT_GT(count, 1);
-  EXPECT_GT(outcome.fields[1].log_bayes_factor, strong_evidence);
+  EXPECT_GT(outcome.fields[1].log_bayes_factor, judgement.strong_evidence);
   EXPECT_LT(outcome.final_cost, 0.5 * outcome.fields[0].cost);
   // Moduli that vary evenly in the logarithm cannot step, and nothing bends at the free end: zones in the mean.
   EXPECT_NEAR(std::log(mean_beyond(outcome, -1.0) / stiff), 0.0, std::log(1.6));

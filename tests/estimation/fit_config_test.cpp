@@ -94,6 +94,19 @@ TEST(FitConfig, ChoicesThatAreNotUsedAreNamed) {
   EXPECT_THAT(both[0], HasSubstr("law_terms = 2"));
 }
 
+TEST(FitConfig, KnowsTheNamesOfAllParameters) {
+  for (const char* name : {"wind", "strength@1", "plane_7", "friction_12", "exponent_1", "poissons_ratio_2", "pull@3",
+                           "youngs_modulus@top", "linear_velocity[2]"}) {
+    FitOptions options;
+    EXPECT_NO_THROW(set_fit_option(options, std::string(name) + ".estimate=false")) << name;
+    EXPECT_TRUE(options.parameters.contains(name)) << name;
+  }
+  for (const char* name : {"plane_", "plane_x", "wind_2", "youngs_moduli", "exponent"}) {
+    FitOptions options;
+    EXPECT_THROW(set_fit_option(options, std::string(name) + ".estimate=false"), InputError) << name;
+  }
+}
+
 TEST(FitConfig, TheMaterialOfAMotionIsALawOfItsForm) {
   FitOptions options;
   EXPECT_FALSE(options.law_of_motion());

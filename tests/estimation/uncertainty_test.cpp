@@ -2,8 +2,11 @@
 
 #include <cmath>
 #include <random>
+#include <set>
+#include <string>
 
 #include "estimation/given_quantities.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/verdict.hpp"
 
@@ -322,6 +325,18 @@ TEST(Verdicts, JudgeAFieldByItsMean) {
   EXPECT_EQ(name_of(unknown.kind), "undetermined");
   ASSERT_EQ(unknown.reasons.size(), 1u);
   EXPECT_NE(unknown.reasons[0].find("The mean of Young's modulus"), std::string::npos) << unknown.reasons[0];
+}
+
+/// What a result repeats is all there is, each by a name of its own.
+TEST(Judgement, EveryNumberHasANameAValueAndAMeaning) {
+  std::set<std::string> names;
+  for (const Judged& number : all_judged()) {
+    EXPECT_TRUE(names.insert(number.name).second) << number.name;
+    EXPECT_GT(number.value, 0.0) << number.name;
+    EXPECT_GT(std::string(number.meaning).size(), 5u) << number.name;
+  }
+  EXPECT_EQ(names.count("verdict.residual"), 1u);
+  EXPECT_EQ(names.count("hypothesis.press_outlier"), 1u) << "the last";
 }
 
 }  // namespace
