@@ -14,11 +14,11 @@ struct Judged {
   constexpr operator double() const { return value; }
 };
 
-/// All numbers set by hand that widen an interval, set a verdict, or decide between hypotheses: that one place says
-/// what a stated uncertainty rests on, and every `result.json` repeats the values. What only steers a search (starts,
-/// iterations, horizons) is not among them. "Second physics" is an independent simulator with neo-Hookean elasticity
-/// and Kelvin-Voigt damping; recordings by it that judge pliant in the documentation are not those that set numbers
-/// unless it is said.
+/// Numbers set by hand that widen an interval, set a verdict, or decide between hypotheses, so that one place says what
+/// a stated uncertainty rests on; every `result.json` repeats the values. Priors are those of `default_parameters`.
+/// What only steers a search (starts, iterations, horizons) is not among them. "Second physics" is an independent
+/// simulator with neo-Hookean elasticity and Kelvin-Voigt damping, whose recordings set the numbers of which it is
+/// said.
 struct Judgement {
   // Verdict: is the recording explained, and are moduli determined?
   Judged residual{"verdict.residual", 1.6,
