@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "geometry/raw_cells.hpp"
-#include "mesh/tet_shape.hpp"
+#include "geometry/tetrahedron.hpp"
 
 namespace pliant {
 

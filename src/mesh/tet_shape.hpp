@@ -4,18 +4,12 @@
 #include <span>
 
 #include "base/types.hpp"
+#include "geometry/tetrahedron.hpp"
 
 namespace pliant {
 
 /// Barycentric coordinates of a point in a tetrahedron, one a corner; they sum to one.
 using Barycentric = Eigen::Vector4d;
-
-/// Edges of a tetrahedron in the order of its mid nodes.
-inline constexpr std::array<std::array<int, 2>, 6> tet_edges = {{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
-
-/// Corners of the face opposite each corner, counter-clockwise seen from outside a positively oriented tetrahedron:
-/// det(x1 - x0, x2 - x0, x3 - x0) > 0.
-inline constexpr std::array<std::array<int, 3>, 4> tet_faces = {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
 /// Lagrange shape functions of the linear (N = 4) and the quadratic (N = 10: corners, then mid nodes) tetrahedron;
 /// valid as polynomials outside the element too.
