@@ -26,9 +26,11 @@ if(PLIANT_NATIVE)
   target_compile_options(pliant_options INTERFACE ${pliant_native_flags})
 endif()
 
-# ccache takes objects compiled with precompiled headers only where it is told that macros and times in them do not matter.
+# ccache takes objects compiled with precompiled headers only where it is told that macros and times in them do not matter, and
+# those of another clone of these sources only where paths are taken from the clone's root on.
 if(CMAKE_CXX_COMPILER_LAUNCHER MATCHES "(^|/)ccache$")
-  set(CMAKE_CXX_COMPILER_LAUNCHER env CCACHE_SLOPPINESS=pch_defines,time_macros ${CMAKE_CXX_COMPILER_LAUNCHER})
+  set(CMAKE_CXX_COMPILER_LAUNCHER env CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_BASEDIR=${PROJECT_SOURCE_DIR} CCACHE_NOHASHDIR=1
+    ${CMAKE_CXX_COMPILER_LAUNCHER})
 endif()
 
 # Headers that nearly every source reads, compiled once for all targets that take them by pliant_reuse: a target without
