@@ -5,7 +5,7 @@
 #include "base/error.hpp"
 #include "command_line.hpp"
 #include "commands.hpp"
-#include "output/situation_output.hpp"
+#include "pictures/situation_output.hpp"
 
 namespace pliant::apps {
 

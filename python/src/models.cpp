@@ -8,7 +8,7 @@
 #include "exports/formats.hpp"
 #include "model/samples.hpp"
 #include "interruption.hpp"
-#include "output/situation_output.hpp"
+#include "pictures/situation_output.hpp"
 #include "simulation/model_simulation.hpp"
 
 namespace pliant::python {

@@ -16,7 +16,7 @@
 #include "estimation/judgement.hpp"
 #include "estimation/load_free.hpp"
 #include "live/live_page.hpp"
-#include "output/field_pictures.hpp"
+#include "pictures/field_pictures.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
 #include "output/track_output.hpp"

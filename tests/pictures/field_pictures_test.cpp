@@ -1,4 +1,4 @@
-#include "output/field_pictures.hpp"
+#include "pictures/field_pictures.hpp"
 
 #include <gmock/gmock.h>
 

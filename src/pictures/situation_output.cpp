@@ -1,4 +1,4 @@
-#include "output/situation_output.hpp"
+#include "pictures/situation_output.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
-#include "output/field_pictures.hpp"
+#include "pictures/field_pictures.hpp"
 #include "report/picture.hpp"
 #include "report/report.hpp"
 #include "simulation/model_simulation.hpp"
