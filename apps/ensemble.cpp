@@ -254,7 +254,8 @@ void add_ensemble(CommandLine& line, int& exit_code) {
       .option("--points", arguments->points,
               "points of the object (CSV: id,x,y,z at rest) whose paths are told, too: points.csv")
       .type_name("FILE");
-  command.flag("--no-surface", arguments->no_surface, "keep no paths of the surface's vertices: less room on the disk");
+  command.flag("--no-surface", arguments->no_surface,
+               "do not write the trajectories of the surface's vertices: uses less disk space");
   command.option("--seed", arguments->seed, "of what is drawn; 1 where left out").type_name("N");
   command.option("--workers", arguments->workers, "processes at once on this machine; one a processor where left out")
       .positive()

@@ -262,7 +262,7 @@ void add_fit(CommandLine& line, int& exit_code) {
       .type_name("CAPTURE...");
   command
       .option("--hold-out", arguments->held_out,
-              "a recording that takes no part in the fit; how well it is predicted stands in the result")
+              "a recording that takes no part in the fit; its prediction error is reported in the result")
       .type_name("CAPTURE");
   command.option("--out,-o", arguments->out, "folder for the result").required().type_name("DIR");
   command.option("--config", arguments->config, "choices (TOML); none is needed").type_name("FILE");
@@ -276,12 +276,11 @@ void add_fit(CommandLine& line, int& exit_code) {
       .range(1, 3)
       .type_name("N");
   command
-      .option(
-          "--budget", arguments->budget,
-          "about as long as the fit may take on two cores of a laptop with repetitions on finer meshes, which are "
-          "made as long as the mesh contributes to the uncertainty of a modulus more than half of what the noise "
-          "does; counted in steps, so that a busy machine gives the same answer, and a tenth dearer where the mesh is "
-          "not what contributes most; 0: none")
+      .option("--budget", arguments->budget,
+              "about as long as the fit may take on two cores of a laptop with repetitions on finer meshes, which are "
+              "made as long as the mesh contributes to the uncertainty of a modulus more than half of what the noise "
+              "does; counted in steps, so that a busy machine gives the same answer, and 10 % slower where the mesh is "
+              "not what contributes most; 0: none")
       .type_name("MINUTES");
   command
       .option("--threads", arguments->threads,

@@ -63,9 +63,8 @@ FitOptions options_at(const SyntheticScene& scene, bool finds_start) {
     options.law_zones = scene.law ? scene.law->laws : 1;
     if (named_moduli(scene.scene).empty()) options.control_points = 1;
   }
-  if (!scene.law) options.material = MaterialKind::Linear;
-  if (scene.law && scene.law->terms == 0 && scene.law->two_numbers == TwoNumberLaw::NeoHookean)
-    options.material = MaterialKind::NeoHookean;
+  options.material =
+      scene.material.of_mean_strain() == ElasticLaw::Corotated ? MaterialKind::Linear : MaterialKind::NeoHookean;
   if (scene.law && scene.law->terms > 0) options.material = MaterialKind::Ogden, options.law_terms = scene.law->terms;
   options.starts = options.most_starts = 1;
   options.budget = 0.0;

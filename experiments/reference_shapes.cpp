@@ -80,6 +80,7 @@ Points sagged(const TetMesh& mesh, const std::vector<double>& mass, const std::v
   SimulationOptions options;
   options.times = {0.0};
   options.is_static = true;
+  options.material.elastic = ElasticLaw::Corotated;
   options.blocks = layout;
   options.newton.tolerance = 1e-12;
   const Points nodes = body.nodes;
@@ -198,7 +199,7 @@ class Experiment {
     VectorX theta = weighed_;
     if (text("task") == "refuse") layout.scale_moduli(theta, 1.0 / real("softer"));
     double begin = processor_seconds();
-    ReferenceShapeSolver solver(scanned_, held_, layout, options);
+    ReferenceShapeSolver solver(scanned_, held_, Material{ElasticLaw::Corotated}, layout, options);
     const ReferenceShape shape = solver.find(theta, load);
     json row = {{"found", shape.found},
                 {"residual", shape.residual},

@@ -36,6 +36,7 @@ Scan sagging_box(const Vector3& extent, Eigen::Vector3i cells, bool is_quadratic
   options.blocks = layout;
   options.times = {0.0};
   options.is_static = true;
+  options.material.elastic = ElasticLaw::Corotated;
   options.newton.tolerance = 1e-10;
   options.holds = {{[](const Vector3& p) { return p.x() < 1e-9; }}};
   scan.held = held_nodes(*scan.known, options.holds);
@@ -74,7 +75,7 @@ void find(benchmark::State& state, MakeScan make, ReferenceScheme scheme, bool i
   const Points load = scan_load(*scan.scanned, layout, scan.theta, {});
   ReferenceShape shape;
   for (auto _ : state) {
-    ReferenceShapeSolver solver(scan.scanned, scan.held, layout, options);
+    ReferenceShapeSolver solver(scan.scanned, scan.held, Material{ElasticLaw::Corotated}, layout, options);
     shape = solver.find(scan.theta, load);
     benchmark::DoNotOptimize(shape.X.data());
   }

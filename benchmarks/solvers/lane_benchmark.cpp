@@ -1,6 +1,6 @@
 // What members that share a mesh gain in the lanes of wide registers: four or eight matrices of one pattern, the copy
 // index fastest, against the program's own solver one by one. Preconditioner and conjugate gradients are those of
-// `ConjugateGradients` (single-precision incomplete Cholesky of 3 x 3 blocks, the same order of operations in each
+// `IterativeSolver` (single-precision incomplete Cholesky of 3 x 3 blocks, the same order of operations in each
 // lane), so that a member's solution is the same to the last bit where its iterations are as many; members that have
 // converged stay as they are while others go on.
 
@@ -215,7 +215,7 @@ constexpr double residual = 1e-8;
 template <int width>
 void one_by_one(benchmark::State& state, std::shared_ptr<const Body> (*make)(), double mass) {
   const Members<width> members(make(), mass);
-  ConjugateGradients solver(members.matrices.front().shared_pattern(), {SolverKind::Iterative, residual, 500});
+  IterativeSolver solver(members.matrices.front().shared_pattern(), {SolverKind::Iterative, residual, 500});
   VectorX x;
   int iterations = 0;
   for (auto _ : state) {
@@ -245,7 +245,7 @@ void in_lanes(benchmark::State& state, std::shared_ptr<const Body> (*make)(), do
     solver.factorise();
     iterations = solver.solve(residual);
   }
-  ConjugateGradients alone(members.matrices.front().shared_pattern(), {SolverKind::Iterative, residual, 500});
+  IterativeSolver alone(members.matrices.front().shared_pattern(), {SolverKind::Iterative, residual, 500});
   VectorX x = VectorX::Zero(members.b.size());
   if (!alone.factorise(members.matrices.front())) std::abort();
   (void)alone.solve(members.b, x);

@@ -166,7 +166,7 @@ class Motion:
         :param values: parameters by name where they are others than the motion's, or a vector of all
         :param start: nodes x 3, where the nodes start [m]; left out: where they rest, or in the equilibrium that they are let go from
         :param start_velocities: nodes x 3 [m/s], beside the velocity of the whole
-        :param reference: nodes x 3, where the nodes are stress-free [m]; tetrahedra with law="corotated"
+        :param reference: nodes x 3, where the nodes are stress-free [m]; tetrahedra
         :param frames: how many, from the first
         :raises SimulationError: where there is no such motion
         """

@@ -109,8 +109,8 @@ std::unique_ptr<Motion> motion_of_body(const std::shared_ptr<Body>& body, const 
   set_planes(scene.planes, blocks, made.theta);
   set_loads(scene, blocks, made.theta);
   SimulationOptions settings;
-  if (corotated) settings.elastic_law = ElasticLaw::Corotated;
-  if (rayleigh) settings.stiffness_damping = StiffnessDamping::Rayleigh;
+  if (corotated) settings.material.elastic = ElasticLaw::Corotated;
+  if (rayleigh) settings.material.damping = StiffnessDamping::Rayleigh;
   if (newton) settings.integrator = Integrator::Newton;
   Resolution resolution;
   resolution.element = body->kind;

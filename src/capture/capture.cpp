@@ -47,7 +47,7 @@ void require_standing_cameras(const Capture& capture, const std::string& what) {
     if (!camera.moved.empty())
       throw InputError(Problem{{capture.file},
                                "camera \"" + camera.name + "\" moves while it records",
-                               "a camera that stands, for " + what,
+                               "a stationary camera, for " + what,
                                "put the sensor on a tripod; fits take cameras that move"});
 }
 

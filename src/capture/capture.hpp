@@ -184,7 +184,7 @@ bool has_time_offsets(const Capture& capture);
 /// Whether a depth camera moves while it records.
 bool has_moving_cameras(const Capture& capture);
 
-/// Throws InputError where a depth camera moves, for what needs cameras that stand.
+/// Throws InputError where a depth camera moves, for what needs stationary cameras.
 /// @param what  that needs them, such as "pliant scan"
 void require_standing_cameras(const Capture& capture, const std::string& what);
 

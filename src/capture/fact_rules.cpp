@@ -338,7 +338,7 @@ void check_moving_cameras(RuleContext& context) {
     for (std::size_t k = 0; k < capture.loads.size(); ++k)
       if (capture.loads[k].images.contains(camera.name))
         context.toml.complain(item("load", k, "images"), "an image of camera \"" + camera.name + "\", which moves",
-                              "a camera that stands", "give the load a `cloud` in world coordinates");
+                              "a stationary camera", "give the load a `cloud` in world coordinates");
   }
 }
 

@@ -153,7 +153,7 @@ class Reader {
     const std::string key = block.key_of("poses");
     if (block.has("camera_to_world"))
       context_.reject(key, "both `poses` and `camera_to_world`", "one of the two",
-                      "a camera that stands has `camera_to_world`");
+                      "a stationary camera has `camera_to_world`");
     if (!depth.poses || capture_.frame_count() == 0) return;
     try {
       depth.moved = read_camera_poses(*depth.poses, capture_.frame_count(), depth.every);

@@ -141,14 +141,13 @@ double CorotatedElasticity<N>::tangent_modulus(int e) const {
 
 template <int N>
 void CorotatedElasticity<N>::set_reference(const std::shared_ptr<const Body>& body) {
-  if (is_corrected()) throw std::invalid_argument("a corrected law has no derivatives by the reference");
   has_strained_ = false;
   body_ = body;
   stiffness_ = LocalStiffness<N>(body_);
   poissons_ratio_ = -2.0;
   gradients_ = MeanGradients<N>(body_);
   reference_ = RelativePositions<N>(body_);
-  if (!by_reference_) by_reference_ = ReferenceForces::make(body_, material_);
+  if (!by_reference_) by_reference_ = ReferenceForces::make(body_, material_, law_);
 }
 
 template <int N>

@@ -41,8 +41,7 @@ class Elasticity : public ForceTerm {
 /// element's mean deformation at the lag point is that law's, and what its deformation departs from the mean stays
 /// linear in the turning frame,
 ///   f(z | p) = - sum_e R_e(p) K_e (R_e(p)^T z - X) + V_e P_e(F_e(p), F_e(z) - F_e(p)) g_a,
-/// with P_e of `MeanStrainCorrection`; the term's matrix is symmetric and positive. There are no derivatives by the
-/// reference then.
+/// with P_e of `MeanStrainCorrection`; the term's matrix is symmetric and positive.
 /// Throws std::invalid_argument where there is not one block for each control of the body's field of moduli.
 std::unique_ptr<Elasticity> make_elasticity(std::shared_ptr<const Body> body, const MaterialBlocks& blocks,
                                             ElasticLaw law = ElasticLaw::Corotated);

@@ -86,9 +86,9 @@ void LawLayout::add_laws(ParameterLayout& layout, const ParameterHandle& first_r
   }
 }
 
-LawLayout LawLayout::linear(const MaterialBlocks& blocks) {
+LawLayout LawLayout::of_moduli(const MaterialBlocks& blocks, ElasticLaw law) {
   ParameterLayout nothing;
-  return of_motion(nothing, blocks, {1, 0});
+  return of_motion(nothing, blocks, {1, 0, 1, false, law});
 }
 
 LawLayout LawLayout::of_motion(ParameterLayout& layout, const MaterialBlocks& blocks, LawForm form) {
@@ -200,7 +200,7 @@ std::vector<NumberShare> number_shares(const Body& body, const LawLayout& layout
 
 MatrixX law_parameter_derivatives(const LawForm& form, const VectorX& own) {
   const int terms = form.terms;
-  if (terms == 0 && form.two_numbers == TwoNumberLaw::NeoHookean) {
+  if (terms == 0 && form.two_numbers == ElasticLaw::NeoHookean) {
     const double E = own[Numbers::modulus], nu = own[Numbers::poissons_ratio(0)];
     const UnitLame lame = unit_lame(nu);
     MatrixX by = MatrixX::Zero(2, Numbers::count(terms));
@@ -247,7 +247,7 @@ MatrixX law_parameters_by_theta(const Body& body, const LawLayout& layout, const
 
 std::shared_ptr<const TabulatedLaw> law_at(const Body& body, const LawLayout& layout, const VectorX& theta) {
   const int terms = layout.form().terms;
-  const bool neo_hookean = terms == 0 && layout.form().two_numbers == TwoNumberLaw::NeoHookean;
+  const bool neo_hookean = terms == 0 && layout.form().two_numbers == ElasticLaw::NeoHookean;
   MatrixX table(body.element_count(), terms == 0 ? 2 : 3 * terms);
   for (int e = 0; e < body.element_count(); ++e) {
     const VectorX own = element_numbers(body, layout, theta, e);

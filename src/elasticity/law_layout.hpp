@@ -6,21 +6,19 @@
 #include <vector>
 
 #include "elasticity/body.hpp"
+#include "elasticity/lame.hpp"
 #include "elasticity/material_law.hpp"
 #include "parameters/motion_blocks.hpp"
 
 namespace pliant {
 
-/// A law that Young's modulus and Poisson's ratio say completely.
-enum class TwoNumberLaw { Linear, NeoHookean };
-
 /// The form of an object's law: how many numbers it has. One law may serve all control moduli, or each has its own.
 struct LawForm {
-  int controls = 1;                                 ///< control moduli of the body's `ModulusField`
-  int terms = 1;                                    ///< of Ogden's law; 0: a law of two numbers
-  int laws = 1;                                     ///< 1, or as many as controls
-  bool own_ratios = false;                          ///< whether each term has a Poisson's ratio, or all have the same
-  TwoNumberLaw two_numbers = TwoNumberLaw::Linear;  ///< which, where there are no terms
+  int controls = 1;                                ///< control moduli of the body's `ModulusField`
+  int terms = 1;                                   ///< of Ogden's law; 0: a law of two numbers
+  int laws = 1;                                    ///< 1, or as many as controls
+  bool own_ratios = false;                         ///< whether each term has a Poisson's ratio, or all have the same
+  ElasticLaw two_numbers = ElasticLaw::Corotated;  ///< which, where there are no terms
   bool operator==(const LawForm&) const = default;
 };
 
@@ -34,8 +32,8 @@ class LawLayout {
   /// control.
   explicit LawLayout(const LawForm& form = {}, std::vector<std::string> modulus_names = {});
 
-  /// The linear law of a body in motion, its blocks those of the motion: `layout()` is empty, `size()` zero.
-  static LawLayout linear(const MaterialBlocks& blocks);
+  /// The law of two numbers of a body in motion, its blocks those of the motion: `layout()` is empty, `size()` zero.
+  static LawLayout of_moduli(const MaterialBlocks& blocks, ElasticLaw law);
   /// The law of a body in motion. Its moduli and its first Poisson's ratio are blocks of the motion, all others are
   /// appended to `layout` under the names above; `layout()` of what is returned is empty.
   /// @param form  `controls` is ignored: the blocks say how many there are

@@ -39,27 +39,35 @@ class LawReferenceForces : public ReferenceForces {
 
 }  // namespace
 
-std::vector<ParameterHandle> BodyMaterial::parameters() const {
-  if (const auto* layout = std::get_if<LawLayout>(&kind_)) return layout->all();
-  const auto* blocks = std::get_if<MaterialBlocks>(&kind_);
-  if (!blocks) return {};
-  std::vector<ParameterHandle> all = blocks->youngs_moduli;
-  all.push_back(blocks->poissons_ratio);
+std::optional<ElasticLaw> Material::of_mean_strain() const {
+  const auto* law = std::get_if<ElasticLaw>(&elastic);
+  return law ? std::optional(*law) : std::nullopt;
+}
+
+std::shared_ptr<const MaterialLaw> Material::law() const {
+  const auto* law = std::get_if<std::shared_ptr<const MaterialLaw>>(&elastic);
+  return law ? *law : nullptr;
+}
+
+std::vector<ParameterHandle> Material::parameters(const MaterialBlocks& blocks) const {
+  if (law_layout()) return law_layout()->all();
+  if (!of_mean_strain()) return {};
+  std::vector<ParameterHandle> all = blocks.youngs_moduli;
+  all.push_back(blocks.poissons_ratio);
   return all;
 }
 
-std::unique_ptr<Elasticity> BodyMaterial::make_elasticity(const std::shared_ptr<const Body>& body) const {
-  if (const auto* blocks = std::get_if<MaterialBlocks>(&kind_)) return pliant::make_elasticity(body, *blocks);
-  if (const auto* layout = std::get_if<LawLayout>(&kind_)) return LawElasticity::make(body, *layout);
-  return LawElasticity::make(body, std::get<std::shared_ptr<const MaterialLaw>>(kind_));
+std::unique_ptr<Elasticity> Material::make_elasticity(const std::shared_ptr<const Body>& body,
+                                                      const MaterialBlocks& blocks) const {
+  if (const auto of_mean = of_mean_strain()) return pliant::make_elasticity(body, blocks, *of_mean);
+  return law_layout() ? LawElasticity::make(body, *law_layout()) : LawElasticity::make(body, law());
 }
 
-std::unique_ptr<ReferenceForces> BodyMaterial::make_reference_forces(const std::shared_ptr<const Body>& body) const {
-  if (const auto* blocks = std::get_if<MaterialBlocks>(&kind_)) return ReferenceForces::make(body, *blocks);
-  if (const auto* layout = std::get_if<LawLayout>(&kind_))
-    return std::make_unique<LawReferenceForces>(LawElasticity::make(body, *layout));
-  return std::make_unique<LawReferenceForces>(
-      LawElasticity::make(body, std::get<std::shared_ptr<const MaterialLaw>>(kind_)));
+std::unique_ptr<ReferenceForces> Material::make_reference_forces(const std::shared_ptr<const Body>& body,
+                                                                 const MaterialBlocks& blocks) const {
+  if (const auto of_mean = of_mean_strain()) return ReferenceForces::make(body, blocks, *of_mean);
+  return std::make_unique<LawReferenceForces>(law_layout() ? LawElasticity::make(body, *law_layout())
+                                                           : LawElasticity::make(body, law()));
 }
 
 }  // namespace pliant

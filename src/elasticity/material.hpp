@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -9,29 +10,40 @@
 
 namespace pliant {
 
-/// What a body is made of: linearly elastic in one turning frame an element, the fast special case, or of any material
-/// law. It makes the body's forces, and the same as a function of where the body is stress-free.
-class BodyMaterial {
- public:
-  /// Corotated linear elasticity, its moduli and Poisson's ratio in these blocks of a parameter vector.
-  explicit BodyMaterial(MaterialBlocks blocks) : kind_(std::move(blocks)) {}
-  /// A law out of a parameter vector.
-  explicit BodyMaterial(LawLayout layout) : kind_(std::move(layout)) {}
-  /// A law as it is: it depends on no parameters.
-  explicit BodyMaterial(std::shared_ptr<const MaterialLaw> law) : kind_(std::move(law)) {}
+/// How stiffness damping acts at large strain; at small strain both are Rayleigh's beta K v.
+enum class StiffnessDamping {
+  Rayleigh,     ///< beta times the turned stiffness times v
+  KelvinVoigt,  ///< on the rate of the Green strain, a force term of its own (`make_viscous_forces`)
+};
 
-  bool is_corotated() const { return std::holds_alternative<MaterialBlocks>(kind_); }
-  /// The blocks of a parameter vector that it depends on.
-  std::vector<ParameterHandle> parameters() const;
+/// What an object is made of: its elastic law and how it damps. The numbers of both stand in parameter vectors.
+/// Whatever moves, rests, is pressed, is scanned sagging or is exported has its elastic forces from here.
+struct Material {
+  /// Of the elements' mean strain, by Young's moduli and Poisson's ratio of the parameter vector; or, at every
+  /// quadrature point of tetrahedra, by a law's numbers in the parameter vector, or by a law that depends on no
+  /// parameters.
+  using Elastic = std::variant<ElasticLaw, LawLayout, std::shared_ptr<const MaterialLaw>>;
+  Elastic elastic = ElasticLaw::NeoHookean;
+  StiffnessDamping damping = StiffnessDamping::KelvinVoigt;
 
+  /// The law of the elements' mean strain; nothing where there is one at every quadrature point.
+  std::optional<ElasticLaw> of_mean_strain() const;
+  /// Where the law's numbers stand in a parameter vector; null where they do not.
+  const LawLayout* law_layout() const { return std::get_if<LawLayout>(&elastic); }
+  /// The law that depends on no parameters; null where it does.
+  std::shared_ptr<const MaterialLaw> law() const;
+
+  /// The blocks of a parameter vector that elastic forces depend on.
+  /// @param blocks  of moduli and Poisson's ratio
+  std::vector<ParameterHandle> parameters(const MaterialBlocks& blocks) const;
   /// Throws std::invalid_argument where the body's field has another number of control moduli, or its elements do not
-  /// suit: laws are for tetrahedra.
-  std::unique_ptr<Elasticity> make_elasticity(const std::shared_ptr<const Body>& body) const;
-  /// Throws std::invalid_argument as above, and for any body of hexahedra.
-  std::unique_ptr<ReferenceForces> make_reference_forces(const std::shared_ptr<const Body>& body) const;
-
- private:
-  std::variant<MaterialBlocks, LawLayout, std::shared_ptr<const MaterialLaw>> kind_;
+  /// suit: laws at quadrature points are for tetrahedra.
+  std::unique_ptr<Elasticity> make_elasticity(const std::shared_ptr<const Body>& body,
+                                              const MaterialBlocks& blocks) const;
+  /// The same forces as functions of where the body is stress-free. Throws std::invalid_argument as above, and for any
+  /// body of hexahedra.
+  std::unique_ptr<ReferenceForces> make_reference_forces(const std::shared_ptr<const Body>& body,
+                                                         const MaterialBlocks& blocks) const;
 };
 
 }  // namespace pliant

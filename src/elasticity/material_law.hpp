@@ -172,12 +172,11 @@ class OgdenLaw : public TabulatedLaw {
   void stress_of(int element, const PrincipalStretches& p, bool with_tangent, PointStress& out) const;
 };
 
-/// The compressible neo-Hookean law (Bonet & Wood 2008, eq. 6.27): with J = det F and Lame's constants at rest,
-///   W = mu / 2 (|F|^2 - 3) - mu ln J + lambda / 2 (ln J)^2.
-/// Its moduli at rest are exactly mu and lambda, and no element can be turned inside out: the energy grows beyond all
-/// bounds as J falls to 0. (The form of Smith et al. 2018, which allows that, is no law of rest moduli without a change
-/// of its constants, and nothing here needs inverted elements.) All of it, its third derivative too, is in closed form.
-/// q = (mu, lambda) [Pa].
+/// The compressible neo-Hookean law (Smith, de Goes, Kim 2018 without their barrier at the origin), at every point what
+/// `MeanStrainCorrection` is in the mean of an element: with J = det F and Lame's constants at rest,
+///   W = mu / 2 (|F|^2 - 3) - mu (J - 1) + (lambda + mu) / 2 (J - 1)^2.
+/// Its moduli at rest are exactly mu and lambda. It is smooth at all deformations, those that turn the material inside
+/// out among them. All of it, its third derivative too, is in closed form. q = (mu, lambda) [Pa].
 class NeoHookeanLaw : public TabulatedLaw {
  public:
   explicit NeoHookeanLaw(MatrixX table) { set_table(std::move(table)); }

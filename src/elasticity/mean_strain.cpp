@@ -1,27 +1,12 @@
 #include "elasticity/mean_strain.hpp"
 
-#include <Eigen/Geometry>
 #include <cmath>
+
+#include "elasticity/third_derivatives.hpp"
 
 namespace pliant {
 
 namespace {
-
-/// The derivative of det F by F.
-Matrix3 cofactors_of(const Matrix3& F) {
-  Matrix3 C;
-  C << F.col(1).cross(F.col(2)), F.col(2).cross(F.col(0)), F.col(0).cross(F.col(1));
-  return C;
-}
-
-Matrix3 cofactor_change(const Matrix3& F, const Matrix3& dF) {
-  Matrix3 dC;
-  for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3;
-    dC.col(i) = dF.col(j).cross(F.col(k)) + F.col(j).cross(dF.col(k));
-  }
-  return dC;
-}
 
 Matrix3 linear_stress(double lambda, double mu, const Matrix3& strain) {
   Matrix3 stress = 2.0 * mu * strain;
@@ -32,7 +17,7 @@ Matrix3 linear_stress(double lambda, double mu, const Matrix3& strain) {
 }  // namespace
 
 MeanStrainCorrection::MeanStrainCorrection(const Matrix3& F, const Polar& polar, const UnitLame& lame)
-    : F_(F), polar_(&polar), lame_(lame), cofactors_(cofactors_of(F)), strain_(polar.S - Matrix3::Identity()) {
+    : F_(F), polar_(&polar), lame_(lame), cofactors_(pliant::cofactors(F)), strain_(polar.S - Matrix3::Identity()) {
   constexpr double rounding = 0.05;  // e
   J_ = F.col(0).dot(cofactors_.col(0));
   const double root = std::hypot(J_ - 1.0, rounding);

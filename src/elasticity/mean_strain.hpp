@@ -5,14 +5,6 @@
 
 namespace pliant {
 
-/// Which law an element of linear elasticity in a turning frame follows in its mean deformation.
-enum class ElasticLaw {
-  Corotated,   ///< stress linear in S - I, F = R S
-  NeoHookean,  ///< W = mu/2 (|F|^2 - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2 (Smith, de Goes, Kim 2018 without
-               ///< their barrier at the origin, by whose constants at rest are mu and lambda exactly): stiffens under
-               ///< compression, softens under tension, and is smooth also where an element is turned inside out
-};
-
 /// What the neo-Hookean law adds to the stress of the corotated one, for a unit Young's modulus, made affine about F:
 /// at F + H
 ///   P = mu F + ((lambda + mu)(J - 1) - mu) cof F - R (2 mu (S - I) + lambda tr(S - I) I)

@@ -1,6 +1,4 @@
 #include <Eigen/LU>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "elasticity/third_derivatives.hpp"
@@ -14,44 +12,43 @@ void NeoHookeanLaw::check(const MatrixX& table) const {
       throw std::invalid_argument("the neo-Hookean law needs mu > 0 and lambda > -2 mu / 3");
 }
 
-/// P = mu (F - G) + lambda ln J G,  G = F^-T,  dG = -G dF^T G.
+/// With C the cofactors of F, the derivative of J: P = mu F + ((lambda + mu) (J - 1) - mu) C.
 void NeoHookeanLaw::stress(int e, const Matrix3& F, bool with_tangent, PointStress& out) const {
-  const double mu = table_(e, 0), lambda = table_(e, 1), J = F.determinant();
-  if (!(J > 0.0)) {
-    out.energy = std::numeric_limits<double>::infinity();
-    return;
-  }
-  const double log_J = std::log(J);
-  const Matrix3 G = F.inverse().transpose();
-  out.energy = 0.5 * mu * (F.squaredNorm() - 3.0) - mu * log_J + 0.5 * lambda * log_J * log_J;
-  out.P = mu * (F - G) + lambda * log_J * G;
+  const double mu = table_(e, 0), sum = table_(e, 1) + mu, growth = F.determinant() - 1.0;
+  const Matrix3 C = cofactors(F);
+  const double pressure = sum * growth - mu;
+  out.energy = 0.5 * mu * (F.squaredNorm() - 3.0) - mu * growth + 0.5 * sum * growth * growth;
+  out.P = mu * F + pressure * C;
   if (!with_tangent) return;
   out.left.setIdentity();
   out.right.setIdentity();
-  out.tangent = mu * Matrix9::Identity() + lambda * vec(G) * vec(G).transpose();
-  add_crossed(mu - lambda * log_J, G, G, out.tangent);
+  out.tangent = mu * Matrix9::Identity() + sum * vec(C) * vec(C).transpose();
+  add_cofactor_derivative(pressure, F, out.tangent);
 }
 
 void NeoHookeanLaw::parameter_derivatives(int, const Matrix3& F, std::span<Matrix3> out) const {
-  const double J = F.determinant();
-  for (Matrix3& derivative : out) derivative.setZero();
-  if (!(J > 0.0)) return;
-  const Matrix3 G = F.inverse().transpose();
-  out[0] = F - G;
-  out[1] = std::log(J) * G;
+  const double growth = F.determinant() - 1.0;
+  const Matrix3 C = cofactors(F);
+  out[0] = F + (growth - 1.0) * C;
+  out[1] = growth * C;
 }
 
 Matrix9 NeoHookeanLaw::tangent_derivative(int e, const Matrix3& F, const Matrix3& dF) const {
-  const double mu = table_(e, 0), lambda = table_(e, 1), J = F.determinant();
-  if (!(J > 0.0)) return Matrix9::Constant(std::numeric_limits<double>::quiet_NaN());
-  return volumetric_tangent_change(lambda * std::log(J) - mu, lambda, 0.0, F, dF);
+  const double mu = table_(e, 0), sum = table_(e, 1) + mu, growth = F.determinant() - 1.0;
+  const Matrix3 C = cofactors(F), dC = cofactor_change(F, dF);
+  Matrix9 change = sum * (vec(dC) * vec(C).transpose() + vec(C) * vec(dC).transpose());
+  add_cofactor_derivative(sum * C.cwiseProduct(dF).sum(), F, change);
+  add_cofactor_derivative(sum * growth - mu, dF, change);
+  return change;
 }
 
 void NeoHookeanLaw::parameter_derivative_changes(int, const Matrix3& F, const Matrix3& dF,
                                                  std::span<Matrix3> out) const {
-  const Matrix3 G = F.inverse().transpose(), dG = -G * dF.transpose() * G;
-  out[0] = dF - dG;
-  out[1] = G.cwiseProduct(dF).sum() * G + std::log(F.determinant()) * dG;
+  const double growth = F.determinant() - 1.0;
+  const Matrix3 C = cofactors(F), dC = cofactor_change(F, dF);
+  const double d_growth = C.cwiseProduct(dF).sum();
+  out[0] = dF + d_growth * C + (growth - 1.0) * dC;
+  out[1] = d_growth * C + growth * dC;
 }
 
 SmallStrainModuli NeoHookeanLaw::small_strain(int e) const {

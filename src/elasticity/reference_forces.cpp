@@ -26,8 +26,9 @@ enum class Frame {
 template <int N, Frame kind>
 class TetReferenceForces : public ReferenceForces {
  public:
+  /// @param law      of the mean strain
   /// @param damping  what E is multiplied by, where there is one
-  TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material,
+  TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material, ElasticLaw law,
                      std::optional<ParameterHandle> damping = {});
 
   void set_parameters(const VectorX& theta) override;
@@ -43,6 +44,14 @@ class TetReferenceForces : public ReferenceForces {
   using Nodes = Eigen::Matrix<double, N, 3>;
   static constexpr int points = N == 4 ? 1 : 14;
 
+  /// What a neo-Hookean law adds to the stress of the mean strain.
+  struct MeanStrain {
+    MeanStrainCorrection law;
+    Matrix3 ahead, z;  // H = F_z - F_p, and F_z
+    Matrix3 stress;    // E P(F_p, H)
+    Nodes gradient;    // integral of g_a
+  };
+
   struct Element {
     double volume = 0.0;
     Polar polar;                         // of the frame of rotation
@@ -55,6 +64,7 @@ class TetReferenceForces : public ReferenceForces {
     Matrix3 mean;                        // of those, times the volume
     std::array<Matrix3, points> stress;  // E C : (A^T grad z - B), in the element's own frame
     Nodes force;                         // integral of stress g_a
+    std::optional<MeanStrain> mean_strain;
   };
 
   const int* nodes_of(int e) const { return body_->connectivity.data() + std::size_t(e) * N; }
@@ -69,11 +79,19 @@ class TetReferenceForces : public ReferenceForces {
     return modulus(e) * sigma;
   }
   double modulus(int e) const { return factor_ * modulus_[e]; }
+  void set_mean_strain(int e, const Matrix3& F, Element& element) const;
   /// Changes of the forces for four changes of the element's nodes X, lane by lane.
   void tangent(int e, const ElementLanes<N>& d_reference, ElementLanes<N>& change) const;
+  /// change += that of the forces of the mean strain's law.
+  /// @param G    of each point, and d_F of F_p, as `tangent` has them
+  void add_mean_tangent(int e, const std::array<MatrixLanes, points>& G, const MatrixLanes& d_F,
+                        const Wide<double>& d_volume, ElementLanes<N>& change) const;
+  /// Cotangent of F_p, and those of each point's G and of the volume are added, for that of the forces.
+  Matrix3 mean_adjoint(int e, const Nodes& w, std::array<Matrix3, points>& G_bar, double& volume_bar) const;
 
   std::shared_ptr<const Body> body_;
   ParameterHandle poissons_ratio_;
+  ElasticLaw law_;
   std::optional<ParameterHandle> damping_;
   double factor_ = 1.0;
   ElementModuli modulus_;
@@ -87,8 +105,12 @@ class TetReferenceForces : public ReferenceForces {
 
 template <int N, Frame kind>
 TetReferenceForces<N, kind>::TetReferenceForces(std::shared_ptr<const Body> body, const MaterialBlocks& material,
-                                                std::optional<ParameterHandle> damping)
-    : body_(std::move(body)), poissons_ratio_(material.poissons_ratio), damping_(damping), modulus_(body_, material) {
+                                                ElasticLaw law, std::optional<ParameterHandle> damping)
+    : body_(std::move(body)),
+      poissons_ratio_(material.poissons_ratio),
+      law_(law),
+      damping_(damping),
+      modulus_(body_, material) {
   // Mid nodes move on their own: curved elements need the rule that integrates their gradients exactly.
   const auto rule = tet_quadrature(N == 4 ? 0 : 5);
   for (int q = 0; q < points; ++q) {
@@ -134,8 +156,10 @@ bool TetReferenceForces<N, kind>::linearise(const Points& X, const Points& p, co
     if (!(least_volume_ratio_ > 0.0)) return false;
     element.frame = element.mean / element.volume;
     if (kind == Frame::Rotation) {
-      element.polar = polar_decomposition(element.frame, element.polar.quaternion);
+      const Matrix3 F = element.frame;
+      element.polar = polar_decomposition(F, element.polar.quaternion);
       element.frame = element.polar.R;
+      if (law_ == ElasticLaw::NeoHookean) set_mean_strain(e, F, element);
     }
     element.force.setZero();
     for (int q = 0; q < points; ++q) {
@@ -151,11 +175,27 @@ bool TetReferenceForces<N, kind>::linearise(const Points& X, const Points& p, co
 }
 
 template <int N, Frame kind>
+void TetReferenceForces<N, kind>::set_mean_strain(int e, const Matrix3& F, Element& element) const {
+  Nodes gradient = Nodes::Zero();
+  Matrix3 z = Matrix3::Zero();
+  for (std::size_t q = 0; q < points; ++q) {
+    gradient += element.part[q] * element.gradient[q];
+    z += element.part[q] * element.F[q];
+  }
+  z /= element.volume;
+  const MeanStrainCorrection law(F, element.polar, lame_);
+  element.mean_strain = MeanStrain{law, z - F, z, modulus(e) * law.stress(z - F), gradient};
+}
+
+template <int N, Frame kind>
 void TetReferenceForces<N, kind>::add_force(Points& force) const {
   for (int e = 0; e < body_->element_count(); ++e) {
     const Element& element = elements_[std::size_t(e)];
     for (int a = 0; a < N; ++a)
       force.row(nodes_of(e)[a]) -= (element.frame * element.force.row(a).transpose()).transpose();
+    if (!element.mean_strain) continue;
+    const Nodes own = element.mean_strain->gradient * element.mean_strain->stress.transpose();
+    for (int a = 0; a < N; ++a) force.row(nodes_of(e)[a]) -= own.row(a);
   }
 }
 
@@ -186,6 +226,7 @@ void TetReferenceForces<N, kind>::tangent(int e, const ElementLanes<N>& d_refere
       Wide<double>& own = d_mean[entry(i, j)];
       own = (own - (element.mean(i, j) / element.volume) * d_volume) * (1.0 / element.volume);
     }
+  change.fill(Wide<double>{});
   MatrixLanes dA = d_mean;
   if (kind == Frame::Rotation) {
     const std::array<Wide<double>, 3> w = rotation_rate_lanes(element.polar, d_mean);
@@ -195,7 +236,6 @@ void TetReferenceForces<N, kind>::tangent(int e, const ElementLanes<N>& d_refere
         dA[entry(i, j)] = w[std::size_t(l)] * A(i, k) - w[std::size_t(k)] * A(i, l);
       }
   }
-  change.fill(Wide<double>{});
   for (std::size_t q = 0; q < points; ++q) {
     const Matrix3 &F = element.F[q], &own_F = element.own_F[q], &sigma = element.stress[q];
     const MatrixLanes& own = G[q];
@@ -229,6 +269,38 @@ void TetReferenceForces<N, kind>::tangent(int e, const ElementLanes<N>& d_refere
     for (int i = 0; i < 3; ++i)
       change[entry(int(a), i)] = A(i, 0) * local[0] + A(i, 1) * local[1] + A(i, 2) * local[2] -
                                  (dA[entry(i, 0)] * y[0] + dA[entry(i, 1)] * y[1] + dA[entry(i, 2)] * y[2]);
+  }
+  if (element.mean_strain) add_mean_tangent(e, G, d_mean, d_volume, change);
+}
+
+/// With M_a the integral of g_a: df_a = -(E dP M_a + E P dM_a), dM_a = sum over points of V (tr(G) I - G^T) g_a.
+template <int N, Frame kind>
+void TetReferenceForces<N, kind>::add_mean_tangent(int e, const std::array<MatrixLanes, points>& G,
+                                                   const MatrixLanes& d_F, const Wide<double>& d_volume,
+                                                   ElementLanes<N>& change) const {
+  const Element& element = elements_[std::size_t(e)];
+  const MeanStrain& own = *element.mean_strain;
+  const auto matrix_of = [](const MatrixLanes& lanes, int l) {
+    Matrix3 matrix;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) matrix(i, j) = lanes[entry(i, j)][l];
+    return matrix;
+  };
+  for (int l = 0; l < 4; ++l) {
+    Matrix3 d_z = -d_volume[l] * own.z;
+    Nodes d_gradient = Nodes::Zero();
+    for (std::size_t q = 0; q < points; ++q) {
+      const Matrix3 of_point = matrix_of(G[q], l);
+      const Matrix3 d_part = element.part[q] * (of_point.trace() * Matrix3::Identity() - of_point);
+      d_z += element.F[q] * d_part;
+      d_gradient += element.gradient[q] * d_part;
+    }
+    d_z /= element.volume;
+    const Matrix3 dF = matrix_of(d_F, l);
+    const Matrix3 d_stress = modulus(e) * own.law.tangent(own.ahead, dF, d_z - dF);
+    const Nodes d_force = own.gradient * d_stress.transpose() + d_gradient * own.stress.transpose();
+    for (int a = 0; a < N; ++a)
+      for (int i = 0; i < 3; ++i) change[entry(a, i)][l] -= d_force(a, i);
   }
 }
 
@@ -269,6 +341,24 @@ void TetReferenceForces<N, kind>::add_tangents(std::span<const Points* const> d_
     }
 }
 
+/// The transpose of `add_mean_tangent`.
+template <int N, Frame kind>
+Matrix3 TetReferenceForces<N, kind>::mean_adjoint(int e, const Nodes& w, std::array<Matrix3, points>& G_bar,
+                                                  double& volume_bar) const {
+  const Element& element = elements_[std::size_t(e)];
+  const MeanStrain& own = *element.mean_strain;
+  const Matrix3 stress_bar = -modulus(e) * w.transpose() * own.gradient;
+  const MeanStrainCorrection::Cotangents bar = own.law.adjoint(own.ahead, stress_bar);
+  const Matrix3 z_bar = bar.H / element.volume;
+  volume_bar -= z_bar.cwiseProduct(own.z).sum();
+  for (std::size_t q = 0; q < points; ++q) {
+    // of V (tr(G) I - G), by which F_z and the integral of g^T are multiplied
+    const Matrix3 part_bar = element.F[q].transpose() * z_bar - element.gradient[q].transpose() * w * own.stress;
+    G_bar[q] += element.part[q] * (part_bar.trace() * Matrix3::Identity() - part_bar);
+  }
+  return bar.F - bar.H;
+}
+
 /// The transpose of `tangent`, line by line.
 template <int N, Frame kind>
 void TetReferenceForces<N, kind>::add_adjoint(const Points& w, Points& reference_bar) const {
@@ -292,7 +382,9 @@ void TetReferenceForces<N, kind>::add_adjoint(const Points& w, Points& reference
       const Vector3 w_bar(W(2, 1) - W(1, 2), W(0, 2) - W(2, 0), W(1, 0) - W(0, 1));
       mean_bar = rotation_rate_adjoint(element.polar, w_bar) / element.volume;
     }
-    const double volume_bar = -mean_bar.cwiseProduct(element.mean).sum() / element.volume;
+    double volume_bar = 0.0;
+    if (element.mean_strain) mean_bar += mean_adjoint(e, own_w, G_bar, volume_bar) / element.volume;
+    volume_bar -= mean_bar.cwiseProduct(element.mean).sum() / element.volume;
     for (std::size_t q = 0; q < points; ++q) {
       const double growth_bar = element.part[q] * (mean_bar.cwiseProduct(element.lag_F[q]).sum() + volume_bar);
       G_bar[q] += growth_bar * Matrix3::Identity() - element.part[q] * element.lag_F[q].transpose() * mean_bar;
@@ -317,14 +409,15 @@ std::unique_ptr<ReferenceForces> make_for(std::shared_ptr<const Body> body, Argu
 
 }  // namespace
 
-std::unique_ptr<ReferenceForces> ReferenceForces::make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks) {
-  return make_for<Frame::Rotation>(std::move(body), blocks);
+std::unique_ptr<ReferenceForces> ReferenceForces::make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks,
+                                                       ElasticLaw law) {
+  return make_for<Frame::Rotation>(std::move(body), blocks, law);
 }
 
 std::unique_ptr<ReferenceForces> ReferenceForces::make_viscous(std::shared_ptr<const Body> body,
                                                                const MaterialBlocks& blocks,
                                                                ParameterHandle stiffness_damping) {
-  return make_for<Frame::Deformation>(std::move(body), blocks, stiffness_damping);
+  return make_for<Frame::Deformation>(std::move(body), blocks, ElasticLaw::Corotated, stiffness_damping);
 }
 
 }  // namespace pliant

@@ -3,20 +3,24 @@
 #include <span>
 
 #include "elasticity/element_moduli.hpp"
+#include "elasticity/mean_strain.hpp"
 #include "elasticity/polar.hpp"
 
 namespace pliant {
 
 /// Elastic forces of tetrahedra as a function of where their nodes are stress-free, the deformed positions z and the
-/// lag point p of those forces being known. Those of a material law are `LawElasticity`'s (`BodyMaterial`), corotated
+/// lag point p of those forces being known. Those of a material law are `LawElasticity`'s (`Material`), corotated
 /// ones (Wang 2015, eq. 1 and appendix)
-///   f_a = -E_e R integral of C : (R^T F - I) g_a,   F = sum_b z_b g_b^T,  R the rotation of sum_b p_b (mean g_b)^T,
-/// where volumes, gradients g and rotations all follow from X. Hexahedra do not take part: their grid is regular when
-/// it is stress-free. Positions and forces are n x 3 [m], [N].
+///   f_a = -E_e R integral of C : (R^T F - I) g_a,   F = sum_b z_b g_b^T,  R the rotation of F_p = sum_b p_b (mean
+///   g_b)^T,
+/// of a neo-Hookean mean strain also -E_e V P(F_p, F_z - F_p) mean g_a (`MeanStrainCorrection`), where volumes,
+/// gradients g and rotations all follow from X. Hexahedra do not take part: their grid is regular when it is
+/// stress-free. Positions and forces are n x 3 [m], [N].
 class ReferenceForces {
  public:
-  /// Corotated ones. Throws std::invalid_argument for a body of hexahedra.
-  static std::unique_ptr<ReferenceForces> make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks);
+  /// Corotated ones, and those of the law of the mean strain. Throws std::invalid_argument for a body of hexahedra.
+  static std::unique_ptr<ReferenceForces> make(std::shared_ptr<const Body> body, const MaterialBlocks& blocks,
+                                               ElasticLaw law);
   /// Kelvin-Voigt damping (`make_viscous_forces`), z being velocities [m/s]:
   ///   f_a = -beta E_e F integral of C : (F^T D) g_a,   D = sum_b z_b g_b^T,  F = sum_b p_b (mean g_b)^T.
   /// Throws as the one above.

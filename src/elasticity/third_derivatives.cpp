@@ -18,6 +18,32 @@ double taylor_coefficient(double p, int order, double m) {
 
 }  // namespace
 
+Matrix3 cofactors(const Matrix3& F) {
+  Matrix3 C;
+  C << F.col(1).cross(F.col(2)), F.col(2).cross(F.col(0)), F.col(0).cross(F.col(1));
+  return C;
+}
+
+Matrix3 cofactor_change(const Matrix3& F, const Matrix3& dF) {
+  Matrix3 dC;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    dC.col(i) = dF.col(j).cross(F.col(k)) + F.col(j).cross(dF.col(k));
+  }
+  return dC;
+}
+
+/// d C(i, j) / d F(k, l) = sum of e(i, k, m) e(j, l, n) F(m, n), e the permutation symbol.
+void add_cofactor_derivative(double factor, const Matrix3& F, Matrix9& tangent) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (const int s : {1, 2})
+        for (const int t : {1, 2}) {
+          const int k = (i + s) % 3, m = (i + 3 - s) % 3, l = (j + t) % 3, n = (j + 3 - t) % 3;
+          tangent(i + 3 * j, k + 3 * l) += (s == t ? factor : -factor) * F(m, n);
+        }
+}
+
 void add_crossed(double factor, const Matrix3& A, const Matrix3& B, Matrix9& tangent) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)

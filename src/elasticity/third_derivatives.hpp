@@ -4,10 +4,16 @@
 
 #include "elasticity/material_law.hpp"
 
-// Third derivatives of isotropic energies, in closed form: how a tangent dP/dF, columns of F first, in the frame of the
-// world, changes with F.
+// Second and third derivatives of isotropic energies, in closed form: a tangent dP/dF, columns of F first, in the frame
+// of the world, and how it changes with F.
 
 namespace pliant {
+
+/// Cofactors of F, the derivative of det F by F; and their change for a change of F.
+Matrix3 cofactors(const Matrix3& F);
+Matrix3 cofactor_change(const Matrix3& F, const Matrix3& dF);
+/// tangent += factor times the derivative of the cofactors by F.
+void add_cofactor_derivative(double factor, const Matrix3& F, Matrix9& tangent);
 
 /// tangent += factor A(i, l) B(k, j) at (ij, kl): with A = B = G = F^-T, minus the derivative of G.
 void add_crossed(double factor, const Matrix3& A, const Matrix3& B, Matrix9& tangent);

@@ -84,7 +84,7 @@ FitOutcome fit_material_curves(const Capture& capture, const FitOptions& options
   outcome.cells = options.cells;
   outcome.recordings.push_back(as_recording(law.scene->body, law.layout, outcome));
   for (std::string& note : unused_choices(options, false, false)) outcome.notes.push_back(std::move(note));
-  add_law_notes(outcome.notes, law, capture);
+  add_law_notes(outcome, law, capture);
   outcome.law = std::move(law);
   return outcome;
 }

@@ -34,9 +34,9 @@ enum class TrackingUse {
 
 /// What an object is taken to be made of.
 enum class MaterialKind {
-  Automatic,   ///< linear where it moves or hangs, Ogden's law where it is pressed alone
+  Automatic,   ///< neo-Hookean where it moves or hangs, Ogden's law where it is pressed alone
   Linear,      ///< one E and nu for all strains
-  NeoHookean,  ///< the same two numbers, for great strains
+  NeoHookean,  ///< neo-Hookean by Young's modulus and Poisson's ratio
   Ogden,       ///< one smooth law of a few terms, its modulus a field: fitted to all that was seen at once
   Sampled,     ///< presses alone: the stiffness of each, interpolated in strain space (Bickel 2009)
 };
@@ -268,6 +268,7 @@ struct FitOutcome {
   MatrixX covariance, correlation;
   Uncertainty uncertainty;  ///< what these are made of; empty where nothing is estimated
   Verdict verdict;          ///< whether the estimate can be quoted
+  std::string material;     ///< elastic law and stiffness damping, in words; empty where nothing could be fitted
   double start_cost = 0.0, final_cost = 0.0;
   CostEvaluation evaluation;  ///< at the solution, all points of the fit
   std::vector<RecordingOutcome> recordings;

@@ -191,7 +191,7 @@ const std::vector<Entry>& entries() {
           "budget", "minutes", "0 and more",
           "about how long the fit may take on two cores of a laptop, counted in steps, with repetitions on finer "
           "meshes, made as long as the mesh's part in the uncertainty of a modulus is more than half of the "
-          "noise's; a tenth dearer where the mesh is not what contributes most; 0: never",
+          "noise's; 10 % slower where the mesh is not what contributes most; 0: never",
           &FitOptions::budget),
       real_entry("span", "", "0..1",
                  "part of each recording that is compared, from where it begins; 0: all of it, or the part that the "
@@ -277,15 +277,13 @@ const std::vector<Entry>& entries() {
       choice_entry(
           "damping",
           "law of stiffness damping at large strain: kelvin_voigt, on the rate of the Green strain, or rayleigh, "
-          "by the turned stiffness; rayleigh where the scan was taken sagging or may err and no other material is "
-          "chosen",
+          "by the corotated stiffness",
           dampings, &FitOptions::damping),
       choice_entry(
           "material",
-          "material law; automatic: neo-Hookean in the mean strain of each element for motions, linear elasticity for "
-          "equilibria, Ogden's law where static "
-          "tests are all "
-          "there is; sampled: the stiffness of each press interpolated in strain space, for presses alone",
+          "material law of whatever moves, rests and is pressed; automatic: neo-Hookean, or Ogden's law where static "
+          "tests are all there is; linear: corotated linear elasticity; sampled: the stiffness of each press "
+          "interpolated in strain space, for presses alone",
           materials, &FitOptions::material),
       integer_entry("law_terms", "0..3",
                     "number of terms of Ogden's law; 0: one for motions and equilibria, else as many as the static "
@@ -393,7 +391,7 @@ void set_fit_option(FitOptions& options, const std::string& assignment) {
   const std::string key = assignment.substr(0, equals), value = assignment.substr(equals + 1);
   if (key == "seed") {  // older programs wrote it into fit.toml
     if (value == "0") return;
-    throw InputError({{}, "seed is \"" + value + "\"", "no seed: nothing in a fit is random", "leave it out"});
+    throw InputError({{}, "seed is \"" + value + "\"", "no seed: a fit is deterministic", "leave it out"});
   }
   if (const std::string present = present_value(key, value); present != value) {
     note_former_word(value, present, key);
@@ -590,7 +588,6 @@ std::string FitOptions::validate() const {
 }
 
 std::optional<LawForm> FitOptions::law_of_motion() const {
-  if (material == MaterialKind::NeoHookean) return LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean};
   if (material == MaterialKind::Ogden) return LawForm{1, std::max(1, law_terms)};
   return std::nullopt;
 }

@@ -49,7 +49,6 @@ constexpr double most_cells = 64.0;  // along the object's longest axis
 constexpr int few_iterations = 2, many_iterations = 5;
 const std::string cause_scan = "errors of the scan";
 constexpr int draws_of_scan = 4;
-constexpr double promise_of_alternative = 0.1, promise_to_trust = 0.5;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 
 }  // namespace
@@ -179,23 +178,15 @@ std::vector<Alternative> FitRun::alternatives() const {
     const double size = std::sqrt(1.0 / draws_of_scan) / part_of_scan_error;  // so that their variances add to one
     all.push_back({cause_scan, cells, 1.0, {.scan_error = draw}, false, size, has_coarser, many_iterations});
   }
-  if (!options_.law_of_motion()) {
-    const bool has_large_strain =
-        !is_static && !recordings_.moves_reference() && options_.material != MaterialKind::Linear;
-    if (has_large_strain)
-      all.push_back({"law at large strain",
-                     cells,
-                     1.0,
-                     {.small_strain = true},
-                     false,
-                     judgement.size_of_small_strain,
-                     has_coarser,
-                     has_coarser ? many_iterations : few_iterations});
-    else if (recordings_.are_tetrahedra()) {
-      all.push_back({"law at large strain", cells, 1.0, {.neo_hookean = true}, false, 1.0, has_coarser});
-      if (!is_static) all.back().iterations = few_iterations;  // from where the first one ends
-    }
-  }
+  if (!options_.law_of_motion() && options_.material != MaterialKind::Linear)
+    all.push_back({"law at large strain",
+                   cells,
+                   1.0,
+                   {.small_strain = true},
+                   false,
+                   is_static ? judgement.size_of_small_strain_at_rest : judgement.size_of_small_strain,
+                   has_coarser,
+                   has_coarser ? many_iterations : few_iterations});
   all.push_back({"what is given", cells, 1.0, {}, true, 1.0});
   return all;
 }
@@ -541,20 +532,16 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
     return record;
   }
   Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
-  OptimiserOptions o;
-  o.max_iterations = alternative.iterations;
-  o.promise_tolerance = promise_of_alternative;
-  const OptimiserSummary s =
-      minimise(objective, start_of(parameters), o, [&](const Iteration&) { return !is_interrupted(); });
+  const MovedEstimate moved =
+      move_estimate(objective, parameters, alternative.iterations, [&] { return !is_interrupted(); });
+  const OptimiserSummary& s = moved.summary;
   is_cut = s.interrupted;
   record.cost = s.succeeded ? s.evaluation.cost : infinite;
   record.iterations = s.iterations, record.work = s.work;
   if (!s.succeeded) record.reason = s.reason;
   if (s.succeeded) {
-    const VectorX rest = gauss_newton_shift(s.evaluation, largest_shift);
-    const double promised = -(s.evaluation.gradient + 0.5 * s.evaluation.gauss_newton * rest).dot(rest);
-    record.converged = promised < promise_to_trust;
-    const VectorX end = parameters.to_theta(parameters.clamp(record.converged ? VectorX(s.p + rest) : s.p));
+    record.converged = moved.converged;
+    const VectorX end = parameters.to_theta(moved.p);
     if (record.converged) record.theta = end;
     const ParameterSet all = plan_.estimated(ended_before_);
     const VectorX shift = all.to_unconstrained(end) - all.to_unconstrained(estimate);

@@ -7,14 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "estimation/alternative.hpp"
 #include "estimation/fit_plan.hpp"
 #include "estimation/recordings.hpp"
 #include "estimation/stage_loop.hpp"
 
 namespace pliant {
 
-inline constexpr const char* cause_mesh = "mesh";
-inline constexpr double largest_shift = 1.0;     ///< of an unconstrained coordinate, by a few steps
 inline constexpr double work_of_a_minute = 4e7;  ///< see `CostEvaluation::work`: of a laptop's two cores
 
 /// Carries out a `FitPlan` on recordings of motions and equilibria. Internal to `fit`.

@@ -67,8 +67,7 @@ inline constexpr double part_of_scan_error = 0.25;
 
 /// In what a model differs from the one that is fitted.
 struct ModelChange {
-  bool neo_hookean = false;   ///< at every quadrature point, in the place of linear elasticity in turning frames
-  bool small_strain = false;  ///< linear elasticity in turning frames, and Rayleigh's damping
+  bool small_strain = false;  ///< corotated linear elasticity, and Rayleigh's damping
   int scan_error = 0;         ///< the object's surface lies beside its scan, as part of that errs: which draw; 0: on it
   bool operator==(const ModelChange&) const = default;
 };

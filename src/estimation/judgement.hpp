@@ -65,6 +65,7 @@ struct Judgement {
   Judged size_of_small_strain{"interval.size.small_strain", 0.5,
                               "share of what corotated linear elasticity changes, by which the law of a motion may "
                               "differ at large strain"};
+  Judged size_of_small_strain_at_rest{"interval.size.small_strain_at_rest", 1.0, "the same of an equilibrium"};
   Judged safety_of_two{"interval.safety_of_two_spacings", 3.0, "factor of a refinement of two spacings (Roache 1994)"};
   Judged safety_of_three{"interval.safety_of_three_spacings", 1.25, "the same of three"};
   Judged given_turn{"interval.given.turn", 0.002, "deviation [rad] of a given sensor's direction"};

@@ -63,6 +63,7 @@ class LawPlan::Replay {
 
   Standing run() {
     search();
+    if (now_.best && !is_pending() && options().alternatives && facts_.is_meshed_here) try_coarser_mesh();
     return std::move(now_);
   }
 
@@ -99,6 +100,13 @@ class LawPlan::Replay {
       }
       if (!record || !record->converged || record->cost > (1.0 - least_round_gain) * record->start_cost) return;
     }
+  }
+
+  void try_coarser_mesh() {
+    const StageRecord* moved = ask(task_stage(StageKind::Alternative, best().shape, best().theta, "coarser mesh"));
+    if (!moved) return;
+    now_.shifts = moved->shifts;
+    now_.untried = moved->reason;
   }
 
   /// The record of a stage; null where it is next, or another is.
@@ -160,7 +168,7 @@ class LawPlan::Replay {
   bool fit_first(int terms) {
     const bool is_neo_hookean = options().material == MaterialKind::NeoHookean;
     const LawShape shape{
-        {facts_.controls(), terms, 1, false, is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear}};
+        {facts_.controls(), terms, 1, false, is_neo_hookean ? ElasticLaw::NeoHookean : ElasticLaw::Corotated}};
     const char* const name = terms > 0 ? "1 term" : is_neo_hookean ? "neo-Hookean" : "linear";
     VectorX start = facts_.parameters(shape).reference();
     std::optional<Estimate> first = estimate(shape, scaled(shape, start, name), name);

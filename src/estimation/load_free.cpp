@@ -61,7 +61,7 @@ double carrying_modulus(const std::shared_ptr<const Body>& body, const Simulatio
   ReferenceShapeOptions options;
   options.by_parts = false;
   options.max_iterations = 30;
-  ReferenceShapeSolver shape(body, held, scene_material(scene), scene.blocks, options);
+  ReferenceShapeSolver shape(body, held, scene.material, scene.blocks, options);
   const Points load = scan_load(*body, scene.blocks, theta, scene.weights);
   const auto scale = [&](double factor) { scene.blocks.scale_moduli(theta, factor); };
   const LinearStatics statics(body, held, scene.blocks, theta);
@@ -91,7 +91,8 @@ LoadFree find_load_free(const Capture& capture, const Resolution& resolution, co
   const Discretisation scanned = discretise(still, distance, resolution, blocks, theta);
   const Body& body = *scanned.body;
   LoadFree found;
-  ReferenceShapeSolver solver(scanned.body, held_nodes(body, scanned.simulation.holds), blocks.motion, options);
+  ReferenceShapeSolver solver(scanned.body, held_nodes(body, scanned.simulation.holds), scanned.simulation.material,
+                              blocks.motion, options);
   found.shape = solver.find(theta, scan_load(body, blocks.motion, theta, scanned.simulation.weights));
   const Points& scan = body.scanned_positions();
   const auto free = std::make_shared<Body>(with_reference(body, found.shape.X));

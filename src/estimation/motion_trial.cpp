@@ -25,7 +25,7 @@ class MotionTrial::Comparison {
         least_size_ = std::max(least_size_, Eigen::Index(block.first + block.size));
     };
     add(blocks_of_motion_, motion_.simulation.blocks.all());
-    if (motion_.simulation.law_layout) add(blocks_of_motion_, motion_.simulation.law_layout->all());
+    if (const LawLayout* law = motion_.simulation.material.law_layout()) add(blocks_of_motion_, law->all());
     for (const SensorBlocks& sensor : motion_.mismatch.sensors) add(blocks_of_sensors_, sensor.all());
   }
 

@@ -42,19 +42,26 @@ void say_what_anchors(FitOutcome& outcome, const Capture& capture) {
 }
 
 void say_what_is_inseparable(FitOutcome& outcome) {
+  constexpr double strong = 0.9;
+  constexpr std::size_t most = 6;  // pairs; the result has them all
   const auto names = outcome.parameters.coordinate_names();
   const auto parameters = outcome.parameters.coordinate_parameters();
+  std::vector<std::pair<double, std::string>> pairs;
   for (std::size_t i = 0; i < names.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       const auto is_aside = [](const Parameter& p) { return p.is_auxiliary || p.role == Role::Sensor; };
       if (is_aside(*parameters[i]) || is_aside(*parameters[j])) continue;
       const double r = outcome.correlation(Eigen::Index(i), Eigen::Index(j));
-      if (std::abs(r) < 0.9) continue;
-      char text[64];
-      std::snprintf(text, sizeof text, " (rho = %.2f).", r);
-      outcome.notes.push_back("The estimates of " + spoken(names[j]) + " and " + spoken(names[i]) +
-                              " are strongly correlated" + text);
+      if (std::abs(r) >= strong)
+        pairs.emplace_back(-std::abs(r),
+                           fmt::format("The estimates of {} and {} are strongly correlated (rho = {:.2f}): an error in "
+                                       "one is made up by {} error in the other.",
+                                       spoken(names[j]), spoken(names[i]), r, r > 0.0 ? "a like" : "an opposite"));
     }
+  std::ranges::stable_sort(pairs, {}, [](const auto& pair) { return pair.first; });
+  for (std::size_t k = 0; k < std::min(most, pairs.size()); ++k) outcome.notes.push_back(std::move(pairs[k].second));
+  if (pairs.size() > most)
+    outcome.notes.push_back(fmt::format("{} more pairs of parameters are strongly correlated.", pairs.size() - most));
 }
 
 void say_what_is_assumed(FitOutcome& outcome) {
@@ -100,23 +107,25 @@ void say_poses(FitOutcome& outcome, const std::vector<const Capture*>& captures)
   }
 }
 
-void say_if_starts_disagree(FitOutcome& outcome) {
+void say_where_starts_ended(FitOutcome& outcome) {
+  constexpr double same = 1.02, rival = 1.5;  // times the lowest cost: a start that fits far worse is no rival
+  if (outcome.starts.size() < 2) return;
   double low = INFINITY, high = 0.0, least = INFINITY;
+  std::size_t reached = 0, given_up = 0;
   for (const FitStart& s : outcome.starts) least = std::min(least, s.cost);
   for (const FitStart& s : outcome.starts) {
-    if (!(s.cost < 1.5 * least)) continue;  // a start that fits far worse is no rival
+    if (!std::isfinite(s.cost)) ++given_up;
+    if (s.cost <= same * least) ++reached;
+    if (!(s.cost < rival * least)) continue;
     const double modulus = s.final[outcome.recordings.front().discretisation.simulation.blocks.youngs_moduli.front()];
     low = std::min(low, modulus);
     high = std::max(high, modulus);
   }
-  if (high > 1.25 * low) {
-    char text[160];
-    std::snprintf(
-        text, sizeof text,
-        "Starts ended at different stiffness, from %.3g to %.3g Pa; the one with the lowest cost was followed.", low,
-        high);
-    outcome.notes.push_back(text);
-  }
+  std::string told = fmt::format("{} of {} starts ended at the lowest cost", reached, outcome.starts.size());
+  if (given_up > 0) told += fmt::format(", {} {} given up", given_up, given_up == 1 ? "was" : "were");
+  if (high > 1.25 * low)
+    told += fmt::format("; Young's modulus of those that fit nearly as well runs from {:.3g} to {:.3g} Pa", low, high);
+  outcome.notes.push_back(told + ".");
 }
 
 /// The stress-free reference shape is another one than the scan's.
@@ -137,16 +146,27 @@ void say_what_shape(FitOutcome& outcome) {
 }
 
 std::string spoken_law(const LawForm& form) {
-  if (form.terms == 0) return form.two_numbers == TwoNumberLaw::NeoHookean ? "a neo-Hookean law" : "a linear law";
+  if (form.terms == 0) return form.two_numbers == ElasticLaw::NeoHookean ? "a neo-Hookean law" : "a linear law";
   return fmt::format("Ogden's law of {} term{}{}", form.terms, form.terms == 1 ? "" : "s",
                      form.own_ratios ? " with Poisson's ratios of their own" : "");
 }
 
+/// Which elastic law, and which stiffness damping where something moves.
+std::string spoken_material(const Discretisation& d) {
+  const Material& material = d.simulation.material;
+  const LawLayout* law = material.law_layout();
+  std::string words = law ? spoken_law(law->form())
+                      : material.of_mean_strain() == ElasticLaw::NeoHookean
+                          ? "a neo-Hookean law of each element's mean strain"
+                          : "corotated linear elasticity";
+  if (d.simulation.is_static) return words;
+  return words + ", " + (material.damping == StiffnessDamping::KelvinVoigt ? "Kelvin-Voigt" : "Rayleigh") + " damping";
+}
+
 void say_what_law(FitOutcome& outcome) {
-  const std::optional<LawLayout>& law = outcome.recordings.front().discretisation.simulation.law_layout;
-  if (law)
-    outcome.notes.push_back("The material is " + spoken_law(law->form()) +
-                            "; Young's modulus and Poisson's ratio are those of small strains.");
+  outcome.material = spoken_material(outcome.recordings.front().discretisation);
+  outcome.notes.push_back("The material is " + outcome.material +
+                          "; Young's modulus and Poisson's ratio are those of small strains.");
 }
 
 std::string form_of(const LawForm& form, const Capture& capture) {
@@ -178,7 +198,9 @@ std::string told(const SampledMaterial& sampled, const std::vector<PressSample>&
 
 }  // namespace
 
-void add_law_notes(std::vector<std::string>& notes, const LawOutcome& law, const Capture& capture) {
+void add_law_notes(FitOutcome& outcome, const LawOutcome& law, const Capture& capture) {
+  std::vector<std::string>& notes = outcome.notes;
+  outcome.material = form_of(law.layout.form(), capture);
   for (const TriedLaw& tried : law.tried)
     notes.push_back(fmt::format("{}: {}", form_of(tried.form, capture), verdict_on(tried)));
   for (std::size_t c = 0; c < law.cuts.size(); ++c)
@@ -189,7 +211,9 @@ void add_law_notes(std::vector<std::string>& notes, const LawOutcome& law, const
                                       "{:.2g} % of how far the marker moves.",
                                       1e3 * law.noise.at_rest, 100.0 * law.noise.growth)
                         : fmt::format("A marker's coordinate is taken to err by {:.3g} mm.", 1e3 * law.noise.at_rest));
-  if (law.sampled) notes.push_back(told(*law.sampled, law.samples));
+  if (!law.sampled) return;
+  outcome.material += ", and what presses show of each element, interpolated in strain space";
+  notes.push_back(told(*law.sampled, law.samples));
 }
 
 void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures) {
@@ -199,7 +223,7 @@ void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures)
     say_what_is_inseparable(outcome);
     say_what_is_assumed(outcome);
   }
-  say_if_starts_disagree(outcome);
+  say_where_starts_ended(outcome);
   say_poses(outcome, captures);
   say_what_shape(outcome);
   if (outcome.evaluation.succeeded && outcome.evaluation.matched_fraction() < 0.9)

@@ -11,6 +11,6 @@ std::string in_three_digits(double value);
 void add_notes(FitOutcome& outcome, const std::vector<const Capture*>& captures);
 
 /// What forms of a law were tried, its zones and its noise, in plain sentences.
-void add_law_notes(std::vector<std::string>& notes, const LawOutcome& law, const Capture& capture);
+void add_law_notes(FitOutcome& outcome, const LawOutcome& law, const Capture& capture);
 
 }  // namespace pliant

@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
+#include "estimation/alternative.hpp"
 #include "estimation/curve_fit.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
@@ -20,6 +21,7 @@
 #include "estimation/notes.hpp"
 #include "estimation/press_objective.hpp"
 #include "estimation/problem.hpp"
+#include "estimation/refinement.hpp"
 #include "estimation/stage_loop.hpp"
 
 namespace pliant {
@@ -52,18 +54,22 @@ class LawRun : StageLoop {
   }
 
  private:
+  /// The object on its mesh, and all its tests.
+  PressScene scene_at(double cells) const {
+    Resolution resolution;
+    resolution.cells = cells;
+    resolution.element = options_.element.value_or(ElementKind::Tetrahedron);
+    std::vector<Vector3> control_points;
+    return make_press_scene(capture_, make_body_of(capture_.scene, SignedDistance(), resolution, control_points));
+  }
+
   std::shared_ptr<const PressScene> scene_to_fit() {
     if (!capture_.scene.object.surface)
       throw InputError({{capture_.file},
                         "there is no scan of the object at rest ([object] surface)",
                         "a closed triangle mesh",
                         "scan the object and name the mesh in capture.toml"});
-    Resolution resolution;
-    resolution.cells = options_.cells;
-    resolution.element = options_.element.value_or(ElementKind::Tetrahedron);
-    std::vector<Vector3> control_points;
-    const auto body = make_body_of(capture_.scene, SignedDistance(), resolution, control_points);
-    auto scene = std::make_shared<PressScene>(make_press_scene(capture_, body));
+    auto scene = std::make_shared<PressScene>(scene_at(options_.cells));
     for (int i = 0; i < int(scene->presses.size()); ++i)
       if (is_fitted(scene->presses[std::size_t(i)].role)) fitted_.push_back(i);
     if (fitted_.empty() && !scene->static_tests().any_to_fit())
@@ -89,6 +95,7 @@ class LawRun : StageLoop {
     f.size = scene_->body->size();
     f.presses = int(fitted_.size());
     f.has_curves = scene_->static_tests().any_to_fit();
+    f.is_meshed_here = !capture_.scene.object.volume;
     f.is_specimen = !scene_->static_tests().curves.empty();
     return f;
   }
@@ -118,6 +125,8 @@ class LawRun : StageLoop {
         return find_points(stage);
       case StageKind::Sample:
         return sample(stage);
+      case StageKind::Alternative:
+        return try_coarser_mesh(stage, is_cut);
       default:
         return minimise_law(stage, is_cut);
     }
@@ -125,15 +134,16 @@ class LawRun : StageLoop {
 
   // A form of the law on the object --------------------------------------------------------------------------------
 
-  std::shared_ptr<const PressScene> scene_of(const LawShape& shape) const {
-    if (shape.points.empty() && shape.cuts.empty()) return scene_;
-    auto scene = std::make_shared<PressScene>(*scene_);
-    if (!shape.points.empty())
-      scene->body = with_field(*scene_->body, harmonic_field(*scene_->body, shape.points).field);
-    else
-      scene->body = with_field(
-          *scene_->body, zone_field(scene_->body->modulus, zones_after(zone_coordinates(*scene_->body), shape.cuts),
-                                    int(shape.cuts.size()) + 1));
+  std::shared_ptr<const PressScene> scene_of(const LawShape& shape) const { return scene_of(shape, scene_); }
+  static std::shared_ptr<const PressScene> scene_of(const LawShape& shape,
+                                                    const std::shared_ptr<const PressScene>& on) {
+    if (shape.points.empty() && shape.cuts.empty()) return on;
+    auto scene = std::make_shared<PressScene>(*on);
+    const Body& body = *on->body;
+    scene->body = with_field(body, shape.points.empty()
+                                       ? zone_field(body.modulus, zones_after(zone_coordinates(body), shape.cuts),
+                                                    int(shape.cuts.size()) + 1)
+                                       : harmonic_field(body, shape.points).field);
     return scene;
   }
 
@@ -334,6 +344,32 @@ class LawRun : StageLoop {
     return record;
   }
 
+  /// Where the estimate goes on a coarser mesh, contacts and noise as they are.
+  StageRecord try_coarser_mesh(const Stage& stage, bool& is_cut) const {
+    constexpr int iterations = 3;
+    StageRecord record = begun(stage);
+    record.succeeded = true;
+    const LawTask& task = *stage.law;
+    Form form = form_at(task.shape, record.from);
+    try {
+      form.scene =
+          scene_of(task.shape, std::make_shared<PressScene>(scene_at(options_.cells / Refinement::mesh_ratio)));
+    } catch (const InputError& error) {  // too coarse for the object, or for what is pressed of it
+      record.reason = error.what();
+      return record;
+    }
+    PressObjective objective(form.scene, fitted_, form.layout, form.parameters, {task.noise, judgement.press_outlier});
+    const MovedEstimate moved =
+        move_estimate(objective.cost(), form.parameters, iterations, [&] { return !is_interrupted(); });
+    is_cut = moved.summary.interrupted;
+    record.iterations = moved.summary.iterations;
+    if (!moved.summary.succeeded)
+      record.reason = moved.summary.reason;
+    else
+      record.shifts = {{cause_mesh, moved.shift(form.parameters.to_unconstrained(record.from))}};
+    return record;
+  }
+
   StageRecord sample(const Stage& stage) {
     StageRecord record = begun(stage);
     record.succeeded = true;
@@ -379,13 +415,20 @@ class LawRun : StageLoop {
           "share: that law stands.");
   }
 
+  /// Why no form of the law could be fitted: the first of those that were tried.
+  std::string why_none_stands() const {
+    const auto failed = std::ranges::find_if(
+        state_.done, [](const StageRecord& r) { return r.id.kind == StageKind::Law && !r.reason.empty(); });
+    return failed == state_.done.end() ? "the start cannot be evaluated" : failed->name + ": " + failed->reason;
+  }
+
   FitOutcome finish(const LawPlan::Standing& standing) {
     outcome_.interrupted = interrupted_;
     outcome_.cells = options_.cells;
-    outcome_.reason = interrupted_             ? "interrupted"
-                      : outcome_.notes.empty() ? "the start cannot be evaluated"
-                                               : outcome_.notes.back();
-    if (!standing.best) return std::move(outcome_);
+    if (!standing.best) {
+      outcome_.reason = interrupted_ ? "interrupted" : why_none_stands();
+      return std::move(outcome_);
+    }
     const LawPlan::Estimate& best = *standing.best;
     const Form form = form_at(best.shape, best.theta);
     LawOutcome law;
@@ -405,13 +448,20 @@ class LawRun : StageLoop {
             : objective_of(form, best.found.noise).linearise(form.parameters.to_unconstrained(best.theta));
     outcome_.start_cost = best.start_cost, outcome_.final_cost = best.cost;
     outcome_.converged = best.converged && !interrupted_;
-    if (!interrupted_) outcome_.reason = best.reason;
-    add_uncertainty(outcome_,
-                    shifts_of_forms(outcome_.parameters, best.layout.mean_modulus(best.theta), standing.tried));
+    outcome_.reason = interrupted_ ? "interrupted" : best.reason;
+    std::vector<ModelShift> shifts =
+        shifts_of_forms(outcome_.parameters, best.layout.mean_modulus(best.theta), standing.tried);
+    const VectorX own = gauss_newton_shift(outcome_.evaluation, largest_shift);
+    for (const ModelShift& s : standing.shifts)
+      shifts.push_back({s.cause, judgement.size_of_coarser_mesh * (s.shift - own)});
+    if (!standing.untried.empty())
+      outcome_.notes.push_back("How much the estimate depends on the mesh could not be seen: " + standing.untried +
+                               ".");
+    add_uncertainty(outcome_, shifts);
     outcome_.recordings.push_back(as_recording(form.scene->body, form.layout, outcome_));
     outcome_.recordings.back().discretisation.control_points = best.shape.points;
     for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
-    add_law_notes(outcome_.notes, law, capture_);
+    add_law_notes(outcome_, law, capture_);
     outcome_.law = std::move(law);
     return std::move(outcome_);
   }

@@ -104,7 +104,7 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
   d.mismatch = make_mismatch(capture, d.distance, d.body, resolution, tracked);
   d.mismatch.sensors = blocks.sensors;
   d.simulation = make_simulation(capture.scene, *d.body, resolution, blocks.motion, parameters, settings);
-  d.simulation.law_layout = blocks.law;
+  if (blocks.law) d.simulation.material.elastic = *blocks.law;
   return d;
 }
 

@@ -16,8 +16,7 @@ constexpr int candidate_count = 48;
 
 /// Without what pulls it. Corotated: of a pose that is no equilibrium other laws' stiffness may be indefinite.
 SimulationOptions held_alone(SimulationOptions options) {
-  options.elastic_law = ElasticLaw::Corotated;
-  options.law.reset(), options.law_layout.reset();
+  options.material.elastic = ElasticLaw::Corotated;
   return options;
 }
 

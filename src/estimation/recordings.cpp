@@ -340,7 +340,7 @@ Resolution Recordings::resolution(double cells, double steps) const {
   if (has_law && r.element == ElementKind::Hexahedron)
     throw InputError({{front().capture.file},
                       "a material law, and element=hexahedra",
-                      "tetrahedra: hexahedra are linear in turning frames",
+                      "tetrahedra: hexahedra have one law in their mean strain",
                       "leave out element, or choose quadratic_tetrahedra; or leave out material"});
   if (moves_reference() && r.element == ElementKind::Hexahedron)
     throw InputError({{front().capture.file},
@@ -377,9 +377,10 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
       1e3 * options_.solver_tolerance;  // derivatives lead to the minimum, they do not move it
   settings.hold_strongly = options_.hold_strongly;
   settings.integrator = options_.integrator;
-  if (options_.material == MaterialKind::Linear || change.small_strain) settings.elastic_law = ElasticLaw::Corotated;
+  if (options_.material == MaterialKind::Linear || change.small_strain)
+    settings.material.elastic = ElasticLaw::Corotated;
   if (options_.damping == StiffnessDamping::Rayleigh || change.small_strain)
-    settings.stiffness_damping = StiffnessDamping::Rayleigh;
+    settings.material.damping = StiffnessDamping::Rayleigh;
   constexpr double alike = 0.1;  // of the object's size: over so far are errors of a scan alike
   Grid grid{cells, steps, change, {}, {}};
   for (const Recording& r : all_) {
@@ -388,11 +389,6 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
       own.offset = RandomField(part_of_scan_error * noise, alike * r.size, std::uint64_t(change.scan_error));
     grid.recording.push_back(
         discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
-    if (change.neo_hookean) {
-      ParameterLayout unchanged = parameters_.layout();  // the law has no numbers beside those of linear elasticity
-      const LawForm form{1, 0, 1, false, TwoNumberLaw::NeoHookean};
-      grid.recording.back().simulation.law_layout = LawLayout::of_motion(unchanged, r.blocks.motion, form);
-    }
     grid.presses.push_back(press_scene(r, grid.recording.back(), own));
   }
   return grid;
@@ -439,7 +435,7 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
   }
   for (std::size_t i = 0; i < all_.size() && has_statics; ++i) {
     add_loads(all_[i], grid.recording[i], options[i], trials);
-    if (grid.presses[i]) add_presses(all_[i], grid.presses[i], parameters, trials);
+    if (grid.presses[i]) add_presses(all_[i], grid.recording[i], grid.presses[i], parameters, trials);
   }
   return {std::move(trials), with_field_prior(parameters, grid), processes};
 }
@@ -459,10 +455,13 @@ void Recordings::add_loads(const Recording& recording, const Discretisation& d, 
   }
 }
 
-void Recordings::add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
-                             const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const {
+void Recordings::add_presses(const Recording& recording, const Discretisation& d,
+                             const std::shared_ptr<const PressScene>& scene, const ParameterSet& parameters,
+                             std::vector<std::unique_ptr<Trial>>& trials) const {
   constexpr double least_noise = 1e-4;  // times the object's size
-  const LawLayout law = recording.blocks.law.value_or(LawLayout::linear(recording.blocks.motion));
+  const LawLayout law = recording.blocks.law
+                            ? *recording.blocks.law
+                            : LawLayout::of_moduli(recording.blocks.motion, *d.simulation.material.of_mean_strain());
   const auto material = std::make_shared<PressedMaterial>(scene->body, law);
   for (std::size_t i = 0; i < scene->presses.size(); ++i) {
     const ObservedPress& seen = scene->presses[i];

@@ -122,7 +122,7 @@ class Recordings {
                                                 const Resolution& resolution) const;
   void add_loads(const Recording& recording, const Discretisation& d, const ObjectiveOptions& options,
                  std::vector<std::unique_ptr<Trial>>& trials) const;
-  void add_presses(const Recording& recording, const std::shared_ptr<const PressScene>& scene,
+  void add_presses(const Recording& recording, const Discretisation& d, const std::shared_ptr<const PressScene>& scene,
                    const ParameterSet& parameters, std::vector<std::unique_ptr<Trial>>& trials) const;
   double widest_band() const;
 

@@ -90,7 +90,7 @@ MatrixX sample_jacobian(PressedBody& body, const Body& mesh, const ChangedLaw& l
 
 /// The linear law that comes closest to a law's stress at one deformation, element by element: least squares over
 /// lambda ((1 - 2 nu) e + nu tr(e) I), held lightly to what the law is at rest.
-/// @param strains  elements x 6: xx, yy, zz, xy, xz, yz, of S - I in the turning frame
+/// @param strains  elements x 6: xx, yy, zz, xy, xz, yz, of S - I in the corotated frame
 std::vector<SmallStrainModuli> secant_moduli(const MaterialLaw& law, const MatrixX& strains);
 
 /// That of one element: of a strain and its stress dW/dS [Pa].

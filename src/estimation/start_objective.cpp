@@ -22,7 +22,7 @@ StartObjective of_static_tests(const Capture& capture, const FitOptions& options
   const int controls = body->modulus.controls;
   const bool is_neo_hookean = options.material == MaterialKind::NeoHookean;
   const int terms = is_neo_hookean || options.material == MaterialKind::Linear ? 0 : 1;
-  const LawLayout layout({controls, terms, 1, false, is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear},
+  const LawLayout layout({controls, terms, 1, false, is_neo_hookean ? ElasticLaw::NeoHookean : ElasticLaw::Corotated},
                          controls > 1 ? modulus_names(capture, controls) : std::vector<std::string>{});
   const ParameterSet parameters = law_parameters(layout, (fitted.empty() ? 1.0 : 2.0) * punch_modulus(*scene, 0.3));
   const double noise = options.marker_noise > 0.0 ? options.marker_noise : scene->noise;

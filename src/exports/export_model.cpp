@@ -201,7 +201,7 @@ ExportModel export_model(const Model& model, ElementKind kind, std::optional<dou
     out.notes.push_back("The model's law (" + model.law->name + ") is told by its moduli of small strains.");
   if (!model.scene.planes.empty()) out.notes.push_back("Planes that the object meets are left out.");
   if (!model.scene.weights.empty()) out.notes.push_back("Weights that hang from the object are left out.");
-  if (!model.is_rayleigh && model.stiffness_damping > 0.0)
+  if (model.material.damping == StiffnessDamping::KelvinVoigt && model.stiffness_damping > 0.0)
     out.notes.push_back("Stiffness damping is that of small motions, on which both of its laws agree.");
   return out;
 }

@@ -17,9 +17,9 @@ constexpr int steps_a_period = 100;
 /// `sag`: at rest under gravity that grows to its whole. Else the motion from the stress-free shape under gravity.
 enum class FebioTask { Sag, Motion };
 
-/// FEBio's neo-Hookean energy is pliant's. Stiffness damping beta is a Newtonian viscous solid beside it, of the bulk
-/// viscosity beta K and the shear viscosity beta G: for small strains beta times the elastic stress of the strain's
-/// rate.
+/// FEBio's neo-Hookean energy has ln J where pliant's has J - 1; both are the same for small strains. Stiffness damping
+/// beta is a Newtonian viscous solid beside it, of the bulk viscosity beta K and the shear viscosity beta G: for small
+/// strains beta times the elastic stress of the strain's rate.
 void write_material(const ExportModel& model, const ModulusGroups& groups, std::size_t g, FebioTask task,
                     std::ostream& out) {
   const double E = groups.moduli[g], nu = model.poissons_ratio, beta = model.stiffness_damping;

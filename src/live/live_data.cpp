@@ -195,14 +195,21 @@ void visit(Archive& archive, std::vector<T>& values) {
 
 template <class Archive>
 void visit(Archive& archive, LiveData& d) {
+  std::shared_ptr<const MaterialLaw> law = d.material.law();
+  ElasticLaw of_mean_strain = d.material.of_mean_strain().value_or(ElasticLaw::NeoHookean);
   visit(archive, d.mesh), visit(archive, d.relative_moduli), visit(archive, d.relative_deviations);
-  visit(archive, d.law), visit(archive, d.is_pressed), visit(archive, d.held), visit(archive, d.tests);
+  visit(archive, law), visit(archive, d.is_pressed), visit(archive, d.held), visit(archive, d.tests);
   visit(archive, d.surface.vertices), visit(archive, d.surface.triangles);
   visit(archive, d.fixed), visit(archive, d.weights), visit(archive, d.planes), visit(archive, d.theta);
   visit(archive, d.max_dt), visit(archive, d.newmark_theta), visit(archive, d.contact_weight);
-  visit(archive, d.rotation_prediction), visit(archive, d.elastic_law), visit(archive, d.stiffness_damping);
+  visit(archive, d.rotation_prediction), visit(archive, of_mean_strain), visit(archive, d.material.damping);
   visit(archive, d.contact.stiffness), visit(archive, d.contact.smoothing), visit(archive, d.contact.onset);
   visit(archive, d.friction_speed), visit(archive, d.up), visit(archive, d.samples);
+  if constexpr (!Archive::reads) return;
+  if (law)
+    d.material.elastic = law;
+  else
+    d.material.elastic = of_mean_strain;
 }
 
 }  // namespace

@@ -32,21 +32,19 @@ struct LiveTest {
 /// itself.
 struct LiveData {
   std::variant<HexGrid, TetMesh> mesh;
-  std::vector<double> relative_moduli;     ///< one an element [-]
-  VectorX relative_deviations;             ///< of Young's modulus, one an element [-]; empty: not known
-  std::shared_ptr<const MaterialLaw> law;  ///< null: neo-Hookean or linear with the moduli of `theta`
-  bool is_pressed = false;                 ///< equilibria, not motion
-  std::vector<int> held;                   ///< nodes of an object that is pressed
-  std::vector<LiveTest> tests;             ///< of an object that is pressed
-  TriangleMesh surface;                    ///< at rest [m]
+  std::vector<double> relative_moduli;  ///< one an element [-]
+  VectorX relative_deviations;          ///< of Young's modulus, one an element [-]; empty: not known
+  Material material;                    ///< of the moduli of `theta`, or a law that depends on no parameters
+  bool is_pressed = false;              ///< equilibria, not motion
+  std::vector<int> held;                ///< nodes of an object that is pressed
+  std::vector<LiveTest> tests;          ///< of an object that is pressed
+  TriangleMesh surface;                 ///< at rest [m]
   std::vector<FixedRegion> fixed;
   std::vector<Weight> weights;
   int planes = 0;
   VectorX theta;  ///< of `live_blocks`
   /// Of the simulation: what is not listed here has its default.
   double max_dt = 0.0, newmark_theta = 0.51, contact_weight = 0.6, rotation_prediction = 0.5;
-  ElasticLaw elastic_law = ElasticLaw::NeoHookean;
-  StiffnessDamping stiffness_damping = StiffnessDamping::KelvinVoigt;
   Penalty contact;
   double friction_speed = 0.0;
   Vector3 up = Vector3::UnitY();

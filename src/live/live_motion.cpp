@@ -44,9 +44,9 @@ class LiveMotion::Slot : public ForceTerm {
 LiveMotion::LiveMotion(LiveData data) : LiveObject(std::move(data)), blocks_(live_blocks(data_.planes)) {
   options_.max_dt = data_.max_dt, options_.newmark_theta = data_.newmark_theta;
   options_.contact_weight = data_.contact_weight, options_.rotation_prediction = data_.rotation_prediction;
-  options_.elastic_law = data_.elastic_law, options_.stiffness_damping = data_.stiffness_damping;
+  options_.material = data_.material;
   options_.contact = data_.contact, options_.friction_speed = data_.friction_speed;
-  options_.blocks = blocks_, options_.law = data_.law;
+  options_.blocks = blocks_;
   for (const FixedRegion& fixed : data_.fixed) {
     Hold hold{is_in_region(data_.surface, fixed.region)};
     if (fixed.displaced_to)
@@ -90,11 +90,11 @@ void LiveMotion::build() {
   rain_slot_ = add(ForceTerm::Lag::Rotation, ForceTerm::At::End);
   probe_slot_ = add(ForceTerm::Lag::Contact, ForceTerm::At::Contact);
   hand_slot_->force = grip_, wind_slot_->force = blowing_, rain_slot_->force = rain_, probe_slot_->force = probe_;
-  stepper_ =
-      std::make_unique<Stepper>(body_, std::move(terms), options_.blocks,
-                                StepOptions{step_length(), options_.newmark_theta, options_.contact_weight,
-                                            options_.rotation_prediction, options_.stiffness_damping, options.solver,
-                                            options_.law ? Integrator::Newton : Integrator::Lagged, options_.newton});
+  stepper_ = std::make_unique<Stepper>(
+      body_, std::move(terms), options_.blocks,
+      StepOptions{step_length(), options_.newmark_theta, options_.contact_weight, options_.rotation_prediction,
+                  options_.material.damping, options.solver,
+                  options_.material.law() ? Integrator::Newton : Integrator::Lagged, options_.newton});
   stepper_->hold(eliminated_nodes(*body_, options_));
   if (!options_.weights.empty()) {
     const PointWeights hung(*body_, options_.weights, options_.blocks.gravity);
@@ -246,9 +246,10 @@ void LiveMotion::set_pace(double factor) {
 }
 
 void LiveMotion::set_law() {
-  if (!data_.law) return apply_parameters();
-  const auto& law = sample_ < 0 ? data_.law : data_.samples[std::size_t(sample_)].law;
-  options_.law = scaled_law(law ? law : data_.law, stiffness_);
+  const auto own = data_.material.law();
+  if (!own) return apply_parameters();
+  const auto law = sample_ < 0 ? own : data_.samples[std::size_t(sample_)].law;
+  options_.material.elastic = scaled_law(law ? law : own, stiffness_);
   build();
 }
 
@@ -272,10 +273,9 @@ double LiveMotion::kinetic_energy() const {
 }
 
 std::shared_ptr<const MaterialLaw> LiveMotion::law() const {
-  if (options_.law) return options_.law;
+  if (auto law = options_.material.law()) return law;
   ParameterLayout layout = blocks_.layout();
-  const bool is_neo_hookean = data_.elastic_law == ElasticLaw::NeoHookean;
-  const LawForm form{.terms = 0, .two_numbers = is_neo_hookean ? TwoNumberLaw::NeoHookean : TwoNumberLaw::Linear};
+  const LawForm form{.terms = 0, .two_numbers = *data_.material.of_mean_strain()};
   return law_at(*body_, LawLayout::of_motion(layout, blocks_, form), theta_);
 }
 

@@ -22,7 +22,7 @@ LiveObject::LiveObject(LiveData data) : data_(std::move(data)) {
   const auto fits = [&](const VectorX& theta, const std::shared_ptr<const MaterialLaw>& law) {
     return theta.size() == blocks.size() && (!law || law->element_count() == body.element_count());
   };
-  bool is_sound = fits(data_.theta, data_.law);
+  bool is_sound = fits(data_.theta, data_.material.law());
   for (const LiveSample& sample : data_.samples) is_sound = is_sound && fits(sample.theta, sample.law);
   if (!is_sound) throw std::runtime_error("the bytes of the object make no sense");
   body_ = std::make_shared<Body>(std::move(body));

@@ -130,10 +130,9 @@ LiveData live_data(const Model& model) {
   const SimulationOptions& s = made.simulation;
   data.max_dt = s.max_dt, data.newmark_theta = s.newmark_theta, data.contact_weight = s.contact_weight;
   data.rotation_prediction = s.rotation_prediction;
-  data.elastic_law = s.law ? ElasticLaw::Corotated : s.elastic_law;  // as `Simulation` has it
-  data.stiffness_damping = s.stiffness_damping, data.contact = s.contact, data.friction_speed = s.friction_speed;
+  data.material = s.material;
+  data.contact = s.contact, data.friction_speed = s.friction_speed;
   data.up = model.scene.world.up;
-  data.law = s.law;
   const ModelVolume& volume = model.volume;
   if (!volume.youngs_modulus_std.empty() && volume.youngs_modulus_std.size() == data.relative_moduli.size()) {
     data.relative_deviations.resize(Eigen::Index(volume.youngs_modulus_std.size()));
@@ -141,7 +140,7 @@ LiveData live_data(const Model& model) {
       data.relative_deviations[Eigen::Index(e)] = volume.youngs_modulus_std[e] / volume.youngs_modulus[e];
   }
   const Timing& timing = model.scene.timing;
-  if (data.law && (timing.is_static || timing.times.empty()) && made.body->kind != ElementKind::Hexahedron)
+  if (data.material.law() && (timing.is_static || timing.times.empty()) && made.body->kind != ElementKind::Hexahedron)
     data.held = held_nodes(*made.body, model.scene);
   data.is_pressed = !data.held.empty();
   // A model of presses that says nothing of gravity has none: it is stress-free as it was scanned.

@@ -7,7 +7,7 @@ namespace pliant {
 
 LivePress::LivePress(LiveData data) : LiveObject(std::move(data)), held_(data_.held) {
   const int nodes = body_->node_count();
-  const bool is_sound = body_->kind != ElementKind::Hexahedron && data_.law &&
+  const bool is_sound = body_->kind != ElementKind::Hexahedron && data_.material.law() &&
                         std::ranges::all_of(held_, [&](int i) { return i >= 0 && i < nodes; });
   if (!is_sound) throw std::runtime_error("the bytes of the object make no sense");
   longest_way_ = mean_edge(*body_);
@@ -17,8 +17,8 @@ LivePress::LivePress(LiveData data) : LiveObject(std::move(data)), held_(data_.h
 }
 
 void LivePress::set_law() {
-  const auto& of_sample = sample_ < 0 ? data_.law : data_.samples[std::size_t(sample_)].law;
-  law_ = scaled_law(of_sample ? of_sample : data_.law, stiffness_);
+  const auto own = data_.material.law(), of_sample = sample_ < 0 ? own : data_.samples[std::size_t(sample_)].law;
+  law_ = scaled_law(of_sample ? of_sample : own, stiffness_);
 }
 
 void LivePress::begin() {

@@ -65,12 +65,12 @@ std::string model_toml(const Model& m) {
   line(out, "mass_damping", m.mass_damping, "Rayleigh, 1/s");
   line(out, "stiffness_damping", m.stiffness_damping, "s");
   out << fmt::format(
-             "mean_strain = \"{}\"        # of an element: neo_hookean, or corotated (linear in its turning frame)\n",
-             m.is_corotated ? corotated : neo_hookean)
+             "mean_strain = \"{}\"        # of an element: neo_hookean, or corotated (linear in its rotated frame)\n",
+             m.material.of_mean_strain() == ElasticLaw::Corotated ? corotated : neo_hookean)
       << fmt::format(
              "damping_law = \"{}\"       # of stiffness_damping: kelvin_voigt (on the rate of the Green strain), or "
              "rayleigh\n",
-             m.is_rayleigh ? rayleigh : kelvin_voigt);
+             m.material.damping == StiffnessDamping::Rayleigh ? rayleigh : kelvin_voigt);
   out << "\n";
   write_toml(out, m.scene.world);
   if (!m.scene.timing.times.empty()) write_toml(out, m.scene.timing);
@@ -78,7 +78,7 @@ std::string model_toml(const Model& m) {
   line(out, "cell_size", m.cell_size, "edge of the hexahedral grid's cells, m");
   out << "grid_origin = " << toml_text(m.grid_origin) << "   # m\n";
   line(out, "substeps", m.substeps, "time steps a frame");
-  line(out, "newmark_theta", m.theta, "weight of a step's end, 0.5 .. 1");
+  line(out, "newmark_theta", m.newmark_theta, "weight of a step's end, 0.5 .. 1");
   line(out, "contact_stiffness", m.contact_stiffness, "pressure by penetration, Pa/m");
   line(out, "contact_smoothing", m.contact_smoothing, "length over which contact sets in, m");
   out << "\n";
@@ -223,8 +223,10 @@ class Reader {
     model_.mass_damping = read_number(material, "mass_damping", {.low = 0.0, .meaning = "Rayleigh's, in 1/s"}, 0.0);
     model_.stiffness_damping = read_number(material, "stiffness_damping", {.low = 0.0, .meaning = "in s"}, 0.0);
     // Models of before there was a choice have neither key.
-    model_.is_corotated = read_choice(material, "mean_strain", {corotated, neo_hookean}) == corotated;
-    model_.is_rayleigh = read_choice(material, "damping_law", {rayleigh, kelvin_voigt}) == rayleigh;
+    if (read_choice(material, "mean_strain", {corotated, neo_hookean}) == corotated)
+      model_.material.elastic = ElasticLaw::Corotated;
+    if (read_choice(material, "damping_law", {rayleigh, kelvin_voigt}) == rayleigh)
+      model_.material.damping = StiffnessDamping::Rayleigh;
   }
 
   void read_simulation(TomlTable& simulation) {
@@ -232,8 +234,8 @@ class Reader {
                                    {.low = 0.0, .low_allowed = false, .meaning = "the cells' edge in metres"});
     model_.grid_origin = simulation.required<Vector3>("grid_origin").value_or(Vector3::Zero());
     model_.substeps = read_count(simulation, "substeps", 1, 100'000, 1);
-    model_.theta = read_number(simulation, "newmark_theta",
-                               {.low = 0.5, .high = 1.0, .meaning = "0.5 does not damp by itself"}, 0.5);
+    model_.newmark_theta = read_number(simulation, "newmark_theta",
+                                       {.low = 0.5, .high = 1.0, .meaning = "0.5 does not damp by itself"}, 0.5);
     model_.contact_stiffness = read_number(simulation, "contact_stiffness", {.low = 0.0, .meaning = "in Pa/m"}, 0.0);
     model_.contact_smoothing = read_number(simulation, "contact_smoothing", {.low = 0.0, .meaning = "in metres"}, 0.0);
   }

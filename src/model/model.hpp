@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "elasticity/material.hpp"
 #include "model/vtu.hpp"
 #include "scene/scene.hpp"
 
@@ -44,6 +45,7 @@ struct Model {
   /// frames: static.
   Scene scene;
 
+  Material material;               ///< of the elements' mean strain, unless `law` is given
   double youngs_modulus = 0.0;     ///< [Pa] > 0; with fields: the volume-weighted mean
   double poissons_ratio = 0.0;     ///< (-1, 0.5)
   double mass_damping = 0.0;       ///< [1/s] >= 0
@@ -52,13 +54,11 @@ struct Model {
   double cell_size = 0.0;                 ///< of the hexahedral grid [m] > 0
   Vector3 grid_origin = Vector3::Zero();  ///< lattice point (0, 0, 0) [m]
   int substeps = 1;                       ///< time steps a frame, >= 1
-  double theta = 0.5;                     ///< weight of a time step's end [0.5, 1]
-  bool is_corotated = false;              ///< the elements' mean strain is linear in the rotated frame, not neo-Hookean
-  bool is_rayleigh = false;               ///< stiffness damping is Rayleigh's, not Kelvin and Voigt's
+  double newmark_theta = 0.5;             ///< weight of a time step's end [0.5, 1]
   double contact_stiffness = 0.0;         ///< pressure by penetration [Pa/m] >= 0
   double contact_smoothing = 0.0;         ///< length over which contact sets in [m] >= 0
 
-  std::optional<ModelLaw> law;  ///< nothing: corotated linear elasticity of the moduli above
+  std::optional<ModelLaw> law;  ///< at every quadrature point of tetrahedra; nothing: that of `material`
   ModelVolume volume;           ///< may be empty: then no `model.vtu` is written
 };
 

@@ -445,6 +445,7 @@ Result read_all(const Member& top) {
   if (top.has("tracking")) result.tracking = read_tracking(top["tracking"]);
   if (top.has("curves")) top["curves"].each_item([&](const Member& m) { result.curves.push_back(read_curve(m)); });
   if (top.has("time")) result.time = read_time(top["time"]);
+  result.material = optional_string(top, "material");
   result.verdict = optional_string(top, "verdict");
   if (top.has("judgement")) result.judgement = read_values(top, "judgement");
   if (top.has("reasons")) top["reasons"].each_item([&](const Member& m) { result.reasons.push_back(m.string()); });
@@ -495,6 +496,7 @@ std::string to_json(const Result& result) {
   json["software"] = {
       {"name", result.software.name}, {"version", result.software.version}, {"commit", result.software.commit}};
   json["capture"] = {{"name", result.capture.name}, {"sha256", result.capture.sha256}};
+  if (!result.material.empty()) json["material"] = result.material;
   if (!result.verdict.empty()) {
     json["verdict"] = result.verdict;
     json["reasons"] = result.reasons;

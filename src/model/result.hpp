@@ -180,6 +180,7 @@ struct Result {
   std::vector<RecordingResult> recordings;  ///< where there are several: the errors of each
   std::optional<RecordingResult> held_out;  ///< predicted, with its own start, planes and sensors alone estimated
   CostResult cost;
+  std::string material;  ///< what law the object was taken to have, and how it damps, in words; empty: it is not known
   std::vector<CorrelationResult> identifiability;
   std::string verdict;                      ///< "explained", "unexplained" or "undetermined"; empty: none was made
   std::vector<std::string> reasons;         ///< of the verdict, plain sentences

@@ -113,7 +113,7 @@ void Pull::add_force_adjoint(const Points&, const Points& w, Points&, Points&, V
 }
 
 std::vector<Vector3> far_points(const std::vector<Vector3>& candidates, const std::vector<Vector3>& held, int count) {
-  if (candidates.empty() || held.empty()) throw std::invalid_argument("far_points: far from what, and which?");
+  if (candidates.empty() || held.empty()) throw std::invalid_argument("far_points: no candidates, or no held points");
   std::vector<double> nearest(candidates.size(), std::numeric_limits<double>::infinity());
   const auto leave = [&](const Vector3& point) {
     for (std::size_t i = 0; i < candidates.size(); ++i)

@@ -35,16 +35,15 @@ std::string percent(double share) {
 
 }  // namespace
 
-ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held,
-                                           BodyMaterial material, const MotionBlocks& blocks,
-                                           const ReferenceShapeOptions& options)
+ReferenceShapeSolver::ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held, Material material,
+                                           const MotionBlocks& blocks, const ReferenceShapeOptions& options)
     : body_(std::move(body)),
       held_(std::move(held)),
       material_(std::move(material)),
       blocks_(blocks),
       scan_(body_->scanned_positions()),
       options_(options),
-      forces_(material_.make_reference_forces(body_)),
+      forces_(material_.make_reference_forces(body_, blocks_)),
       solver_(body_->pattern, options.solver),
       stability_(body_->pattern, options.solver),
       turning_(body_, options.solver),
@@ -195,7 +194,7 @@ auto ReferenceShapeSolver::attempt(const Points& load, const Points& from, doubl
 
 bool ReferenceShapeSolver::holds_still(const VectorX& theta, const Points& X) {
   const auto reference = std::make_shared<Body>(with_reference(*body_, X));
-  const auto elasticity = material_.make_elasticity(reference);
+  const auto elasticity = material_.make_elasticity(reference, blocks_);
   elasticity->set_parameters(theta);
   elasticity->linearise(scan_);
   matrix_.set_zero();

@@ -52,12 +52,8 @@ class ReferenceShapeSolver {
   /// @param material  of the body
   /// @param blocks    of the parameter vectors below; the density is among them
   /// Throws std::invalid_argument for a body of hexahedra, and InputError where fewer nodes are held.
-  ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held, BodyMaterial material,
+  ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held, Material material,
                        const MotionBlocks& blocks, const ReferenceShapeOptions& options = {});
-  /// Of corotated linear elasticity.
-  ReferenceShapeSolver(std::shared_ptr<const Body> body, std::vector<int> held, const MotionBlocks& blocks,
-                       const ReferenceShapeOptions& options = {})
-      : ReferenceShapeSolver(std::move(body), std::move(held), BodyMaterial(blocks), blocks, options) {}
 
   /// Where the nodes truly were when they were scanned, n x 3 [m], if not where the body has them. Held ones are to
   /// stay where they are.
@@ -104,7 +100,7 @@ class ReferenceShapeSolver {
 
   std::shared_ptr<const Body> body_;
   std::vector<int> held_;
-  BodyMaterial material_;
+  Material material_;
   MotionBlocks blocks_;
   Points scan_;
   ReferenceShapeOptions options_;

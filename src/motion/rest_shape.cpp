@@ -64,7 +64,7 @@ MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector
 
 RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
                      const std::vector<PointMass>& weights, MatrixX basis, const MotionBlocks& blocks,
-                     const BodyMaterial& material)
+                     const Material& material)
     : body_(std::move(body)),
       free_(body_),
       held_(held),
@@ -79,12 +79,12 @@ RestShape::RestShape(std::shared_ptr<const Body> body, const std::vector<int>& h
   depends_on_ = blocks_.scan_corrections;
   if (!sags_) return;
   depends_on_.insert(depends_on_.end(), {blocks_.density, blocks_.gravity});
-  for (const ParameterHandle& block : material.parameters()) depends_on_.push_back(block);
+  for (const ParameterHandle& block : material.parameters(blocks_)) depends_on_.push_back(block);
   ReferenceShapeOptions options;
   options.by_parts = false;
   options.max_iterations = most_iterations;
   solver_ = std::make_unique<ReferenceShapeSolver>(body_, held, material, blocks_, options);
-  elasticity_ = material.make_elasticity(body_);
+  elasticity_ = material.make_elasticity(body_, blocks_);
   terms_.push_back(std::make_unique<Gravity>(*body_, blocks_));
   if (!weights.empty()) terms_.push_back(std::make_unique<PointWeights>(*body_, weights, blocks_.gravity));
 }

@@ -35,8 +35,7 @@ class RestShape {
   /// @param blocks  of the correction, one a column of the basis, and of the load
   /// @param material  of the body
   RestShape(std::shared_ptr<const Body> body, const std::vector<int>& held, bool sags,
-            const std::vector<PointMass>& weights, MatrixX basis, const MotionBlocks& blocks,
-            const BodyMaterial& material);
+            const std::vector<PointMass>& weights, MatrixX basis, const MotionBlocks& blocks, const Material& material);
 
   /// Finds them for theta, from those found last; at once where nothing that they depend on has changed. Empty, or
   /// why there are none.

@@ -53,7 +53,7 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   auto elastic = scene_elasticity(body, options);
   elasticity = elastic.get();
   terms.push_back(std::move(elastic));
-  if (options.stiffness_damping == StiffnessDamping::KelvinVoigt && !options.is_static)
+  if (options.material.damping == StiffnessDamping::KelvinVoigt && !options.is_static)
     terms.push_back(make_viscous_forces(body, options.blocks, options.blocks.stiffness_damping));
   terms.push_back(std::make_unique<Gravity>(*body, options.blocks, options.gravity_change));
   for (const PlaneBlock& plane : options.blocks.planes) terms.push_back(plane_contact(*body, plane, options));
@@ -83,24 +83,11 @@ std::vector<std::unique_ptr<ForceTerm>> make_terms(const std::shared_ptr<const B
   return terms;
 }
 
-/// With a law that has derivatives by the stress-free shape where that is unknown.
-SimulationOptions completed(SimulationOptions options) {
-  const bool has_law = options.law || options.law_layout;
-  if (options.scan_sags || !options.shape.points.empty()) {
-    options.elastic_law = ElasticLaw::Corotated;
-    if (!has_law) options.stiffness_damping = StiffnessDamping::Rayleigh;
-  }
-  if (has_law || options.is_static) options.elastic_law = ElasticLaw::Corotated;
-  if (options.law && options.law_layout)
-    throw std::invalid_argument("a material is given as it is or by the parameter vector, not both");
-  return options;
-}
-
 }  // namespace
 
 Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions options)
     : body_(std::move(body)),
-      options_(completed(std::move(options))),
+      options_(std::move(options)),
       stepper_(make_stepper(forces_)),
       statics_(body_, stepper_.terms(), {.newton = options_.newton, .solver = options_.solver.kind}),
       rest_(body_->scanned_positions()) {
@@ -114,8 +101,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
   if (options_.scan_sags || !options_.shape.points.empty()) {
     const std::vector<int> held = held_nodes(*body_, options_.holds);
     shape_ = std::make_unique<RestShape>(body_, held, options_.scan_sags, options_.weights,
-                                         shape_basis(*body_, options_.shape, held), options_.blocks,
-                                         scene_material(options_));
+                                         shape_basis(*body_, options_.shape, held), options_.blocks, options_.material);
   }
   if (!options_.is_static) move_holds(0.0, 1.0, rest_);
   lever_ = body_->scanned_positions().rowwise() - body_->centre_of_mass().transpose();
@@ -134,12 +120,11 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
 }
 
 Stepper Simulation::make_stepper(StepForces& forces) const {
-  Stepper stepper(body_,
-                  make_terms(body_, options_, forces.elasticity, forces.fixed_regions, forces.pull, forces.let_go),
-                  options_.blocks,
-                  {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
-                   options_.rotation_prediction, options_.stiffness_damping, options_.solver, options_.integrator,
-                   options_.newton});
+  Stepper stepper(
+      body_, make_terms(body_, options_, forces.elasticity, forces.fixed_regions, forces.pull, forces.let_go),
+      options_.blocks,
+      {options_.is_static ? 1.0 : options_.max_dt, options_.newmark_theta, options_.contact_weight,
+       options_.rotation_prediction, options_.material.damping, options_.solver, options_.integrator, options_.newton});
   if (holds_strongly(*body_, options_)) stepper.hold(eliminated_nodes(*body_, options_));
   if (const std::vector<PointMass> weights = hung_weights(options_); !weights.empty()) {
     const PointWeights hung(*body_, weights, options_.blocks.gravity);
@@ -178,11 +163,11 @@ void Simulation::set_start(Points positions, Points velocities) {
 }
 
 void Simulation::check_reference() const {
-  const bool has_derivatives = body_->kind != ElementKind::Hexahedron && !options_.law && !options_.law_layout &&
-                               options_.elastic_law == ElasticLaw::Corotated;
+  const bool has_derivatives = body_->kind != ElementKind::Hexahedron && options_.material.of_mean_strain();
   if (!has_derivatives || shape_)
     throw std::invalid_argument(
-        "a stress-free shape that is set wants tetrahedra, the corotated law, and parameters that do not say it");
+        "a stress-free shape that is set wants tetrahedra, moduli in the parameters, and parameters that do not say "
+        "it");
 }
 
 void Simulation::set_reference(Points reference) {
@@ -637,16 +622,9 @@ RolloutSummary Simulation::run_adjoint(const VectorX& parameters, int last_frame
   return summary;
 }
 
-BodyMaterial scene_material(const SimulationOptions& options) {
-  if (options.law_layout) return BodyMaterial(*options.law_layout);
-  if (options.law) return BodyMaterial(options.law);
-  return BodyMaterial(static_cast<const MaterialBlocks&>(options.blocks));
-}
-
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body,
                                              const SimulationOptions& options) {
-  if (options.elastic_law != ElasticLaw::Corotated) return make_elasticity(body, options.blocks, options.elastic_law);
-  return scene_material(options).make_elasticity(body);
+  return options.material.make_elasticity(body, options.blocks);
 }
 
 std::vector<std::unique_ptr<ForceTerm>> scene_forces(const std::shared_ptr<const Body>& body,

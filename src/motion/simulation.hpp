@@ -23,11 +23,7 @@ struct SimulationOptions {
   double max_dt = 0.0;        ///< [s], > 0: each interval is cut into equal steps no longer than this
   double newmark_theta = 0.51;
   double contact_weight = 0.6, rotation_prediction = 0.5;  ///< see StepOptions
-  /// Of the elements' mean strain, and of stiffness damping, at large strain. At rest and where another law is given
-  /// below, the mean strain's is the corotated one; where the scan sags or errs, too, since the neo-Hookean one has no
-  /// derivatives by the stress-free shape, and damping is Rayleigh's there, unless another law is given.
-  ElasticLaw elastic_law = ElasticLaw::NeoHookean;
-  StiffnessDamping stiffness_damping = StiffnessDamping::KelvinVoigt;
+  Material material;
   SolverOptions solver;
   Integrator integrator = Integrator::Lagged;
   NewtonOptions newton;
@@ -55,11 +51,7 @@ struct SimulationOptions {
   Points start;
   /// Velocities of the nodes at the start, n x 3 [m/s], beside those of the parameter vector. Empty: none.
   Points start_velocities;
-  bool is_static = false;  ///< every frame sees the same equilibrium; steps, velocities and damping play no part
-  /// The elements' material in the place of the linear one: as it is, or, where `law_layout` is given, out of the
-  /// parameter vector, with derivatives by its numbers. Tetrahedra only.
-  std::shared_ptr<const MaterialLaw> law;
-  std::optional<LawLayout> law_layout;  ///< with handles of the parameter vectors (`LawLayout::of_motion`)
+  bool is_static = false;      ///< every frame sees the same equilibrium; steps, velocities and damping play no part
   bool hold_strongly = false;  ///< nodes in held regions are eliminated, instead of Nitsche's method; always so for
                                ///< tetrahedra, which follow the shape
   int most_halvings = 5;       ///< of a step that cannot be taken as a whole, >= 0
@@ -127,8 +119,8 @@ class Simulation {
   void set_start(Points positions, Points velocities);
   /// From now on the body is stress-free where its nodes are there [m], n x 3; it still starts where it was scanned,
   /// and mass, surface and the unit of pulls stay those of the body as it was given. Throws std::invalid_argument where
-  /// the elements are not tetrahedra with the corotated law, where the parameters say where the body is
-  /// stress-free, and where an element has no positive volume.
+  /// the elements are not tetrahedra, where a law is given beside the moduli, where the parameters say where the
+  /// body is stress-free, and where an element has no positive volume.
   void set_reference(Points reference);
   /// Bytes of states that the last reverse sweep held at its most.
   std::size_t peak_state_bytes() const { return peak_state_bytes_; }
@@ -223,9 +215,6 @@ class Simulation {
   Points delta_, rest_, lever_;
   std::size_t peak_state_bytes_ = 0;
 };
-
-/// What a scene's body is made of.
-BodyMaterial scene_material(const SimulationOptions& options);
 
 /// The elasticity of a scene's body.
 std::unique_ptr<Elasticity> scene_elasticity(const std::shared_ptr<const Body>& body, const SimulationOptions& options);

@@ -6,6 +6,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/force_term.hpp"
+#include "elasticity/material.hpp"
 #include "motion/newton.hpp"
 #include "parameters/motion_blocks.hpp"
 #include "solvers/general_solver.hpp"
@@ -21,12 +22,6 @@ struct State {
 enum class Integrator {
   Lagged,  ///< rotations, contact and a law's tangent predicted from the start: one linear solve a step (Weiss 2020)
   Newton,  ///< fully implicit with the exact stiffness (Wang 2015)
-};
-
-/// How stiffness damping acts at large strain; at small strain both are Rayleigh's beta K v.
-enum class StiffnessDamping {
-  Rayleigh,     ///< beta times the turned stiffness times v
-  KelvinVoigt,  ///< on the rate of the Green strain, a force term of its own (`make_viscous_forces`)
 };
 
 struct StepOptions {

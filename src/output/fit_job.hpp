@@ -19,7 +19,7 @@ struct FitJob {
   std::filesystem::path out;                      ///< folder for the result
   FitOptions options;
   bool resume = false;          ///< go on with the interrupted fit in the folder
-  bool profile = false;         ///< where the time went stands in the result
+  bool profile = false;         ///< the result reports where the time went
   std::string version, commit;  ///< of the program, for the result
 };
 

@@ -16,10 +16,10 @@
 #include "estimation/judgement.hpp"
 #include "estimation/load_free.hpp"
 #include "live/live_page.hpp"
-#include "pictures/field_pictures.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
 #include "output/track_output.hpp"
+#include "pictures/field_pictures.hpp"
 #include "report/gallery.hpp"
 #include "report/plot.hpp"
 #include "report/report.hpp"
@@ -370,6 +370,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   }
   add_modulus_field(result, outcome);
   add_verdict(result, outcome, jacobian);
+  result.material = outcome.material;
   for (const Judged& number : all_judged()) result.judgement[number.name] = number;
   result.error = surface_errors(outcome.evaluation);
   for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
@@ -478,7 +479,7 @@ std::vector<LiveSample> posterior_samples(const FitOutcome& outcome, const LiveD
       continue;
     }
     const RecordingOutcome& first = outcome.recordings.front();
-    if (const auto& layout = first.discretisation.simulation.law_layout)
+    if (const LawLayout* layout = first.discretisation.simulation.material.law_layout())
       sample.law = law_at(*first.discretisation.body, *layout, drawn);
     blocks.scale_moduli(sample.theta, drawn[modulus->at] / outcome.theta[modulus->at]);
     for (const auto& [name, at] :

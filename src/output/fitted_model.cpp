@@ -83,7 +83,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   TriangleMesh surface = *capture.scene.object.surface;
   model.youngs_modulus = modulus.mean;
   model.poissons_ratio = t[blocks.poissons_ratio];
-  if (d.simulation.law_layout) model.law = model_law(*law_at(*d.body, *d.simulation.law_layout, t));
+  if (const LawLayout* law = d.simulation.material.law_layout()) model.law = model_law(*law_at(*d.body, *law, t));
   model.mass_damping = t[blocks.mass_damping];
   model.stiffness_damping = t[blocks.stiffness_damping];
   const double mass = t[blocks.density] * enclosed_volume(*capture.scene.object.surface);
@@ -126,12 +126,12 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
     scene.timing = evenly_timed(rate, timing.frame_count(), timing.start_frame);
     model.substeps = std::max(1, int(std::ceil(1.0 / (rate * d.simulation.max_dt) - 1e-9)));
   }
-  model.theta = d.simulation.newmark_theta;
+  model.newmark_theta = d.simulation.newmark_theta;
   model.contact_stiffness = d.simulation.contact.stiffness;
   if (blocks.contact_stiffness.exists() && t[blocks.contact_stiffness] > 0.0)
     model.contact_stiffness = t[blocks.contact_stiffness];
-  model.is_corotated = d.simulation.elastic_law == ElasticLaw::Corotated;
-  model.is_rayleigh = d.simulation.stiffness_damping == StiffnessDamping::Rayleigh;
+  model.material.elastic = d.simulation.material.of_mean_strain().value_or(ElasticLaw::NeoHookean);
+  model.material.damping = d.simulation.material.damping;
   model.contact_smoothing = d.simulation.contact.smoothing;
   model.volume.nodes = d.body->reference_positions();
   model.volume.kind = vtu_cell(d.body->kind);

@@ -81,7 +81,7 @@ class PhotoExample {
  public:
   /// The dome. Throws std::invalid_argument where so many dots have no room.
   explicit PhotoExample(const PhotoExampleOptions& options);
-  /// Another object, before cameras that stand as those of the dome do, as far away as it is large.
+  /// Another object, before stationary cameras like those of the dome, as far away as it is large.
   PhotoExample(const PhotoExampleOptions& options, PressedObject object);
 
   /// What is written in its markers.toml; file names as `write` uses them.

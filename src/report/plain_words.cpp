@@ -95,15 +95,6 @@ std::string discretisation_sentence(const ParameterResult& p) {
       spoken_name(p.name), discretisation_words(p));
 }
 
-std::string correlation_sentence(const CorrelationResult& c) {
-  if (!(std::abs(c.correlation) > 0.8)) return "";
-  return fmt::format(
-      "{} and {} are hard to tell apart in this recording (correlation {}): an error in one is made up by {} error in "
-      "the other.",
-      spoken_name(c.parameters.first), within_sentence(c.parameters.second), readable(c.correlation, 2),
-      c.correlation > 0 ? "a like" : "an opposite");
-}
-
 std::string given_sentence(const Result& result) {
   std::string names;
   for (const ParameterResult& p : result.parameters)
@@ -111,19 +102,6 @@ std::string given_sentence(const Result& result) {
       names += (names.empty() ? "" : ", ") + within_sentence(p.name) + " (" +
                value_with_uncertainty(std::get<double>(p.value), std::nullopt, p.unit) + ")";
   return names.empty() ? "" : "Taken as given, not estimated: " + names + ".";
-}
-
-std::string starts_sentence(const Result& result) {
-  if (result.starts.size() < 2) return "";
-  double best = HUGE_VAL;
-  for (const StartResult& s : result.starts) best = std::min(best, s.cost.value_or(HUGE_VAL));
-  const auto same = std::count_if(result.starts.begin(), result.starts.end(),
-                                  [&](const StartResult& s) { return s.cost.value_or(HUGE_VAL) <= 1.02 * best; });
-  const auto given_up = std::ranges::count_if(result.starts, [](const StartResult& s) { return !s.cost.has_value(); });
-  std::string words = fmt::format("{} of {} starts led to the best cost", same, result.starts.size());
-  if (given_up > 0) words += fmt::format(", {} {} given up", given_up, given_up == 1 ? "was" : "were");
-  const bool is_alone = same == 1 && given_up + 1 < std::ssize(result.starts);
-  return words + (is_alone ? ", so look at the other starts before trusting it." : ".");
 }
 
 }  // namespace
@@ -205,15 +183,6 @@ std::vector<std::string> plain_sentences(const ReportData& data) {
   std::vector<std::string> sentences{agreement_sentence(data)};
   for (const ParameterResult& p : data.result.parameters) sentences.push_back(trust_sentence(p));
   for (const ParameterResult& p : data.result.parameters) sentences.push_back(discretisation_sentence(p));
-  constexpr int most_pairs = 6;  // the strongest come first, and the page has them all in a table
-  int pairs = 0;
-  for (const CorrelationResult& c : data.result.identifiability) {
-    const std::string sentence = correlation_sentence(c);
-    if (!sentence.empty() && pairs++ < most_pairs) sentences.push_back(sentence);
-  }
-  if (pairs > most_pairs)
-    sentences.push_back(fmt::format("{} more pairs of parameters are hard to tell apart.", pairs - most_pairs));
-  sentences.push_back(starts_sentence(data.result));
   sentences.push_back(given_sentence(data.result));
   for (const std::string& note : data.result.notes) sentences.push_back(note);
   std::erase(sentences, "");

@@ -268,7 +268,7 @@ Capture with_calibration(Capture capture, const std::vector<SensorCalibration>& 
     if (!at->moved.empty())
       throw InputError({{capture.file},
                         "camera \"" + sensor.name + "\" moves while it records",
-                        "a camera that stands, whose pose can be replaced",
+                        "a stationary camera, whose pose can be replaced",
                         "leave --apply out"});
     at->camera.camera_to_world = sensor.camera_to_world;
     at->pose_std = {std::hypot(sensor.turn_std, of_reference.turn), std::hypot(sensor.shift_std, of_reference.shift)};

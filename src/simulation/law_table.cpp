@@ -93,7 +93,7 @@ std::shared_ptr<const MaterialLaw> make_law(const ModelLaw& law, int elements) {
 std::shared_ptr<const MaterialLaw> law_of(const Model& model, const Body& body) {
   if (model.law) return make_law(*model.law, body.element_count());
   MatrixX table(body.element_count(), 2);
-  const bool is_neo_hookean = model.volume.kind == VtuCell::Hexahedron && !model.is_corotated;
+  const bool is_neo_hookean = model.material.of_mean_strain() == ElasticLaw::NeoHookean;
   for (int e = 0; e < body.element_count(); ++e) {
     const auto i = std::size_t(e);
     const bool has_field = model.volume.poissons_ratio.size() == std::size_t(body.element_count());

@@ -13,8 +13,7 @@ namespace pliant {
 ModelLaw model_law(const MaterialLaw& law);
 std::shared_ptr<const MaterialLaw> make_law(const ModelLaw& table, int elements);
 
-/// The law of a model, made of its own moduli where it names none: a linear one, or, where the model is of hexahedra
-/// that move by the neo-Hookean law, that one.
+/// The law of a model, made of its own moduli where it names none: that by which it moves.
 /// @param body  see `model_body`
 std::shared_ptr<const MaterialLaw> law_of(const Model& model, const Body& body);
 

@@ -166,6 +166,13 @@ ModelScene make_scene(const Model& model) {
   return make_scene(model, situation, scene_distance(situation, Resolution{}.band), {});
 }
 
+RolloutSummary simulate(const Model& model, const std::function<bool(double, const State&)>& on_frame) {
+  const ModelScene scene = make_scene(model);
+  return Simulation(scene.body, scene.simulation).run(scene.theta, [&](int frame, const State& state, auto) {
+    return on_frame(scene.simulation.times[std::size_t(frame)], state);
+  });
+}
+
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
                       const std::filesystem::path& file, bool has_wind) {
   Scene scene = situation;
@@ -187,15 +194,14 @@ ModelScene make_scene(const Model& model, const Scene& situation, std::shared_pt
   made.layout = blocks.layout();
   made.theta = model_theta(model, scene, gravity, blocks);
   SimulationOptions settings;
-  settings.newmark_theta = model.theta;
-  if (model.is_corotated) settings.elastic_law = ElasticLaw::Corotated;
-  if (model.is_rayleigh) settings.stiffness_damping = StiffnessDamping::Rayleigh;
+  settings.newmark_theta = model.newmark_theta;
+  settings.material = model.material;
   Resolution resolution;
   resolution.cells = object_size(scene) / model.cell_size;
   resolution.pulls = int(scene.initial.pulls.size());
   made.body = body_of(model, scene, distance.get());
   made.distance = std::move(distance);
-  if (model.law) settings.law = make_law(*model.law, made.body->element_count());
+  if (model.law) settings.material.elastic = make_law(*model.law, made.body->element_count());
   resolution.element = made.body->kind;
   made.simulation = make_simulation(scene, *made.body, resolution, blocks, made.theta, settings);
   if (model.contact_stiffness > 0.0) made.simulation.contact = {model.contact_stiffness, model.contact_smoothing};

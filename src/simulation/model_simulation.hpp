@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -28,6 +29,11 @@ ModelScene make_scene(const Model& model);
 /// Throws InputError where the object is released from a pose that neither knows.
 ModelScene make_scene(const Model& model, const Scene& situation, std::shared_ptr<const SignedDistance> distance,
                       const std::filesystem::path& file, bool has_wind = false);
+
+/// Moves a model in its own situation.
+/// @param on_frame  called with each frame's time [s] and state; false stops
+/// Returns the steps taken and why the simulation ended early, if it did. Throws as `make_scene` does.
+RolloutSummary simulate(const Model& model, const std::function<bool(double, const State&)>& on_frame);
 
 /// What is seen of a model: the object's surface, or, where it has none, the boundary of its tetrahedra over all of
 /// their nodes.

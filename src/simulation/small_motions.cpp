@@ -63,8 +63,7 @@ SimulationOptions elastic_alone(SimulationOptions options) {
   options.times = {0.0};
   options.blocks.planes.clear(), options.blocks.pulls.clear(), options.blocks.strengths.clear();
   options.further_forces.clear(), options.weights.clear(), options.loads.clear(), options.released_weights.clear();
-  options.law.reset(), options.law_layout.reset();
-  options.elastic_law = ElasticLaw::NeoHookean;
+  options.material.elastic = ElasticLaw::Corotated;
   for (Hold& hold : options.holds) hold.rotation.setIdentity(), hold.translation.setZero();
   return options;
 }

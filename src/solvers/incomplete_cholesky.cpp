@@ -219,24 +219,24 @@ void IncompleteCholesky::sweep_lanes(const double* r, double* z, float* w, int f
   }
 }
 
-ConjugateGradients::ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
+IterativeSolver::IterativeSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options)
     : pattern_(std::move(pattern)), options_(options), preconditioner_(*pattern_), parts_(std::size_t(pattern_->rows)) {
   if (options_.derivative_tolerance <= 0.0) options_.derivative_tolerance = options_.tolerance;
   const std::size_t size = 4 * std::size_t(pattern_->rows);
   for (auto* v : {&x_, &r_, &z_, &p_, &ap_}) v->assign(size, 0.0);
 }
 
-std::unique_ptr<LinearSolver> ConjugateGradients::clone() const {
-  return std::make_unique<ConjugateGradients>(pattern_, options_);
+std::unique_ptr<LinearSolver> IterativeSolver::clone() const {
+  return std::make_unique<IterativeSolver>(pattern_, options_);
 }
 
-bool ConjugateGradients::factorise(const BlockMatrix& matrix) {
+bool IterativeSolver::factorise(const BlockMatrix& matrix) {
   matrix_ = &matrix;
   return preconditioner_.factorise(matrix);
 }
 
 /// ap = A p; returns p . ap.
-double ConjugateGradients::multiply(const std::vector<double>& p, std::vector<double>& ap) const {
+double IterativeSolver::multiply(const std::vector<double>& p, std::vector<double>& ap) const {
   const BlockPattern& pattern = *pattern_;
   const int* column = pattern.column.data();
   return sum_parts(parts_, [&](std::size_t first, std::size_t last) {
@@ -256,9 +256,9 @@ double ConjugateGradients::multiply(const std::vector<double>& p, std::vector<do
   });
 }
 
-SolveSummary ConjugateGradients::solve(const VectorX& b, VectorX& x) { return solve(b, x, options_.tolerance); }
+SolveSummary IterativeSolver::solve(const VectorX& b, VectorX& x) { return solve(b, x, options_.tolerance); }
 
-SolveSummary ConjugateGradients::solve(const Eigen::Ref<const VectorX>& b, Eigen::Ref<VectorX> x, double tolerance) {
+SolveSummary IterativeSolver::solve(const Eigen::Ref<const VectorX>& b, Eigen::Ref<VectorX> x, double tolerance) {
   const int n = pattern_->rows;
   for (int i = 0; i < n; ++i)
     for (int d = 0; d < 3; ++d) x_[4 * std::size_t(i) + d] = x[3 * Eigen::Index(i) + d];
@@ -322,7 +322,7 @@ Wide<double> sum_lanes(const Parts& parts, const Body& body) {
 
 }  // namespace
 
-auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vector<double>& ap) const
+auto IterativeSolver::multiply_lanes(const std::vector<double>& p, std::vector<double>& ap) const
     -> std::array<double, lanes> {
   const int *const column = pattern_->column.data(), *const row_start = pattern_->row_start.data();
   const double* const from = p.data();
@@ -348,7 +348,7 @@ auto ConjugateGradients::multiply_lanes(const std::vector<double>& p, std::vecto
   return {dot[0], dot[1], dot[2], dot[3]};
 }
 
-SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
+SolveSummary IterativeSolver::solve_lanes(Lanes& own) {
   const double* const b = own.b.data();
   double *const x = own.x.data(), *const r = own.r.data(), *const z = own.z.data(), *const p = own.p.data(),
                 *const ap = own.ap.data();
@@ -417,7 +417,7 @@ SolveSummary ConjugateGradients::solve_lanes(Lanes& own) {
   return summary;
 }
 
-SolveSummary ConjugateGradients::solve_lanes(const Columns& B, Solutions X, Lanes& own) {
+SolveSummary IterativeSolver::solve_lanes(const Columns& B, Solutions X, Lanes& own) {
   const std::size_t size = lanes * std::size_t(B.rows());
   for (auto* v : {&own.b, &own.x, &own.r, &own.z, &own.ap}) v->resize(size);
   own.p.assign(size, 0.0);
@@ -433,7 +433,7 @@ SolveSummary ConjugateGradients::solve_lanes(const Columns& B, Solutions X, Lane
   return summary;
 }
 
-SolveSummary ConjugateGradients::solve_columns(const MatrixX& B, MatrixX& X) {
+SolveSummary IterativeSolver::solve_columns(const MatrixX& B, MatrixX& X) {
   const std::size_t columns = std::size_t(B.cols()), count = (columns + lanes - 1) / lanes;
   if (lanes_.size() < count) lanes_.resize(count);
   summaries_.assign(count, {});

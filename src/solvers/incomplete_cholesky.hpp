@@ -43,9 +43,9 @@ class IncompleteCholesky {
 };
 
 /// Conjugate gradients with that preconditioner.
-class ConjugateGradients : public LinearSolver {
+class IterativeSolver : public LinearSolver {
  public:
-  ConjugateGradients(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options);
+  IterativeSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options);
   [[nodiscard]] bool factorise(const BlockMatrix& matrix) override;
   SolveSummary solve(const VectorX& b, VectorX& x) override;
   /// Four at a time, in the lanes of wide registers: the matrix is read once for them. Fours go beside each other where

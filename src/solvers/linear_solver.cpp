@@ -139,7 +139,7 @@ class AutomaticSolver : public LinearSolver {
 
   std::shared_ptr<const BlockPattern> pattern_;
   SolverOptions options_;
-  ConjugateGradients iterative_;
+  IterativeSolver iterative_;
   std::unique_ptr<LinearSolver> other_;
   Points positions_;  // of large bodies
   const BlockMatrix* matrix_ = nullptr;
@@ -186,7 +186,7 @@ std::unique_ptr<LinearSolver> make_linear_solver(std::shared_ptr<const BlockPatt
     case SolverKind::Automatic:
       return std::make_unique<AutomaticSolver>(std::move(pattern), options);
     case SolverKind::Iterative:
-      return std::make_unique<ConjugateGradients>(std::move(pattern), options);
+      return std::make_unique<IterativeSolver>(std::move(pattern), options);
     case SolverKind::Multigrid:
       return std::make_unique<MultigridSolver>(std::move(pattern), options);
     case SolverKind::Simplicial:

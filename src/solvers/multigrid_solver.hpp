@@ -8,7 +8,7 @@ namespace pliant {
 /// Conjugate gradients with an incomplete Cholesky factor for what is local and rigid motions of aggregates, on coarser
 /// and coarser levels, for what is not: the iterations hardly grow as a mesh is refined. The two are added: one product
 /// with the matrix an iteration, and positive definite whatever the factor leaves out.
-class MultigridSolver : public ConjugateGradients {
+class MultigridSolver : public IterativeSolver {
  public:
   MultigridSolver(std::shared_ptr<const BlockPattern> pattern, const SolverOptions& options);
   void set_positions(const Points& positions) override { coarse_.set_positions(positions); }

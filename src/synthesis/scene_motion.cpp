@@ -102,15 +102,14 @@ class Simulated {
     options.times = {0.0};
     options.max_dt = 1.0;
     options.newmark_theta = synthetic_.newmark_theta;
-    if (synthetic_.is_corotated) options.elastic_law = ElasticLaw::Corotated;
-    if (synthetic_.is_rayleigh) options.stiffness_damping = StiffnessDamping::Rayleigh;
+    options.material = synthetic_.material;
     options.contact = default_contact(*body_, synthetic_.true_density() * body_->volume(), gravity);
     options.friction_speed = default_friction_speed(*body_, gravity);
     if (synthetic_.contact_stiffness > 0.0) options.contact.stiffness = synthetic_.contact_stiffness;
     if (synthetic_.contact_smoothing > 0.0) options.contact.smoothing = synthetic_.contact_smoothing;
     options.blocks = blocks;
     options.holds = held_regions(facts);
-    options.law = law_;
+    if (law_) options.material.elastic = law_;
     for (const Weight& weight : facts.weights) options.weights.push_back({weight.at, weight.mass});
     add_loads(facts, options);
     return options;
@@ -264,7 +263,7 @@ class Simulated {
   std::shared_ptr<const Body> body_;
   Embedding vertices_, markers_;
   std::vector<std::shared_ptr<const RigidShape>> sliding_;
-  std::shared_ptr<const MaterialLaw> law_;  // null: linear elasticity
+  std::shared_ptr<const MaterialLaw> law_;  // null: the scene's elastic law
   std::vector<std::vector<TrueShape>> camera_frames_;
   Points start_;  // where nodes are at the start; empty: where they rest
   int done_ = 0, total_ = 0;

@@ -174,12 +174,14 @@ class Reader {
   void read_material(TomlTable& t) {
     if (!has_controls_) scene_.youngs_modulus = read_number(t, "youngs_modulus", positive("in pascals"));
     if (!t.has("poissons_ratios")) scene_.poissons_ratio = read_number(t, "poissons_ratio", ratio_rule);
-    law_name_ = read_choice(t, "law", {"linear", "neo_hookean", "ogden"});
+    law_name_ = read_choice(t, "law", {"neo_hookean", "linear", "ogden"});
+    const bool is_corotated = read_choice(t, "mean_strain", {"neo_hookean", "corotated"}) == "corotated";
+    if (law_name_ == "linear" || is_corotated) scene_.material.elastic = ElasticLaw::Corotated;
     own_numbers_.push_back(read_law_numbers(t, {scene_.poissons_ratio, {}, {}, {}}));
     scene_.mass_damping = read_number(t, "mass_damping", at_least_zero("Rayleigh's, in 1/s"), 0.0);
     scene_.stiffness_damping = read_number(t, "stiffness_damping", at_least_zero("in s"), 0.0);
-    scene_.is_corotated = read_choice(t, "mean_strain", {"neo_hookean", "corotated"}) == "corotated";
-    scene_.is_rayleigh = read_choice(t, "damping_law", {"kelvin_voigt", "rayleigh"}) == "rayleigh";
+    if (read_choice(t, "damping_law", {"kelvin_voigt", "rayleigh"}) == "rayleigh")
+      scene_.material.damping = StiffnessDamping::Rayleigh;
   }
 
   void read_gravity(TomlTable& t) { scene_.scene.world = read_world(t, true); }
@@ -225,13 +227,13 @@ class Reader {
   void settle_law(TomlTable& root) {
     const bool has_own = std::ranges::find(part_has_own_, true) != part_has_own_.end();
     const bool is_tested = root.has("press") || root.has("indentation");
-    if (has_own || law_name_ != "linear") {
+    if (has_own || law_name_ == "ogden") {
       LawForm form;
       form.controls = int(scene_.youngs_moduli().size());
       form.terms = int(own_numbers_.front().exponents.size());
       form.laws = has_own ? form.controls : 1;
       form.own_ratios = !own_numbers_.front().poissons_ratios.empty();
-      if (law_name_ == "neo_hookean") form.two_numbers = TwoNumberLaw::NeoHookean;
+      if (form.terms == 0) form.two_numbers = *scene_.material.of_mean_strain();
       scene_.law = form;
       scene_.law_numbers = own_numbers_;
       if (!has_own) scene_.law_numbers.resize(1);
@@ -597,7 +599,7 @@ class Reader {
   TomlContext& context_;
   SyntheticScene scene_;
   bool has_controls_ = false, has_tests_ = false, has_element_ = false;
-  std::string law_name_ = "linear";
+  std::string law_name_ = "neo_hookean";
   std::vector<SyntheticNumbers> own_numbers_;  // of the object's own material, then of each region or control point
   std::vector<bool> part_has_own_;             // of each of the latter
 };
@@ -624,8 +626,8 @@ SyntheticScene read_synthetic_scene(const fs::path& path) {
 }
 
 LawLayout SyntheticScene::law_layout() const {
-  const LawForm linear{int(youngs_moduli().size()), 0};
-  return LawLayout(law.value_or(linear), named_moduli(scene));
+  const LawForm own{int(youngs_moduli().size()), 0, 1, false, *material.of_mean_strain()};
+  return LawLayout(law.value_or(own), named_moduli(scene));
 }
 
 VectorX SyntheticScene::law_parameters(const LawLayout& layout) const {

@@ -9,6 +9,7 @@
 
 #include "elasticity/body.hpp"
 #include "elasticity/law_layout.hpp"
+#include "elasticity/material.hpp"
 #include "synthesis/synthesis.hpp"
 
 namespace pliant {
@@ -64,9 +65,9 @@ struct SyntheticScene {
   double poissons_ratio = 0.0;
   double mass_damping = 0.0;       ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;  ///< [s]
-  bool is_corotated = false;       ///< the elements' mean strain is linear in the rotated frame, not neo-Hookean
-  bool is_rayleigh = false;        ///< stiffness damping is Rayleigh's, not Kelvin and Voigt's
-  /// Form of a law of its own, of tetrahedra; nothing: linear elasticity.
+  /// Of all that moves, rests and is pressed, but for `law`.
+  Material material;
+  /// Form of a law of its own at every quadrature point, of tetrahedra; nothing: that of `material`.
   std::optional<LawForm> law;
   std::vector<SyntheticNumbers> law_numbers;  ///< of each law of the form
 

@@ -106,6 +106,7 @@ TEST_F(Session, ResultHoldsWhatTheFormatPromises) {
   for (const char* key : {"software", "capture", "parameters", "error", "cost", "identifiability", "starts", "time"})
     EXPECT_TRUE(found.contains(key)) << key;
   EXPECT_EQ(found["software"]["name"], "pliant");
+  EXPECT_THAT(found["material"].get<std::string>(), testing::StartsWith("a neo-Hookean law"));
   EXPECT_EQ(found["capture"]["sha256"].get<std::string>().size(), 64U);
   for (const char* name : {"youngs_modulus", "poissons_ratio", "mass_damping", "stiffness_damping", "density",
                            "gravity", "plane", "linear_velocity", "angular_velocity"}) {

@@ -40,8 +40,8 @@ struct BatchScene {
     o.newmark_theta = options.newmark_theta;
     o.contact_weight = options.contact_weight;
     o.rotation_prediction = options.rotation_prediction;
-    o.elastic_law = ElasticLaw::Corotated;
-    o.stiffness_damping = StiffnessDamping::Rayleigh;
+    o.material.elastic = ElasticLaw::Corotated;
+    o.material.damping = StiffnessDamping::Rayleigh;
     o.solver = {SolverKind::Iterative, tolerance, 2000};
     o.contact = options.contact;
     o.friction_speed = options.friction_speed;

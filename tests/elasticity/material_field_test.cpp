@@ -93,20 +93,20 @@ TEST_P(Fields, AreComputedAnewWhereTheLawsNumbersChange) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Forms, Fields,
-                         ::testing::Values(LawForm{1, 0}, LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean},
-                                           LawForm{3, 0, 3, false, TwoNumberLaw::NeoHookean}, LawForm{1, 1},
+                         ::testing::Values(LawForm{1, 0}, LawForm{1, 0, 1, false, ElasticLaw::NeoHookean},
+                                           LawForm{3, 0, 3, false, ElasticLaw::NeoHookean}, LawForm{1, 1},
                                            LawForm{3, 2}, LawForm{2, 2, 2, true}),
                          [](const auto& c) {
                            const LawForm& f = c.param;
-                           return (f.terms > 0                             ? "Ogden" + std::to_string(f.terms)
-                                   : f.two_numbers == TwoNumberLaw::Linear ? "Linear"
-                                                                           : "NeoHookean") +
+                           return (f.terms > 0                              ? "Ogden" + std::to_string(f.terms)
+                                   : f.two_numbers == ElasticLaw::Corotated ? "Linear"
+                                                                            : "NeoHookean") +
                                   "Of" + std::to_string(f.controls) + "Controls" + std::to_string(f.laws) + "Laws";
                          });
 
 TEST(MaterialField, OfTheNeoHookeanLawHasItsModuliAtRest) {
   const auto body = mixed_body(1);
-  const LawLayout layout({1, 0, 1, false, TwoNumberLaw::NeoHookean});
+  const LawLayout layout({1, 0, 1, false, ElasticLaw::NeoHookean});
   VectorX theta(2);
   theta[layout.modulus(0)] = 4000.0;
   theta[layout.poissons_ratio()] = 0.4;

@@ -17,12 +17,14 @@ using test::tolerance;
 
 struct Of {
   std::string name;
-  std::optional<LawForm> law;  ///< none: corotated
+  std::optional<LawForm> law;  ///< none: of the mean strain
+  ElasticLaw mean_strain = ElasticLaw::Corotated;
   friend void PrintTo(const Of& of, std::ostream* out) { *out << of.name; }
 };
 const std::vector<Of> materials = {{"Corotated", std::nullopt},
+                                   {"NeoHookeanMean", std::nullopt, ElasticLaw::NeoHookean},
                                    {"LinearLaw", LawForm{1, 0}},
-                                   {"NeoHookean", LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean}},
+                                   {"NeoHookean", LawForm{1, 0, 1, false, ElasticLaw::NeoHookean}},
                                    {"Ogden", LawForm{1, 2, 1, true}}};
 
 /// Linear and quadratic tetrahedra of every material, half of them three times as stiff, bent in the world and free of
@@ -33,17 +35,16 @@ struct Reference : ::testing::TestWithParam<std::tuple<Of, bool>> {
     for (std::size_t e = 0; e < made.modulus.relative.size(); e += 2) made.modulus.relative[e] = 3.0;
     body = std::make_shared<Body>(std::move(made));
     ParameterLayout layout;
-    const MotionBlocks blocks = add_motion_blocks(layout, {});
-    material = BodyMaterial(static_cast<const MaterialBlocks&>(blocks));
-    if (const auto& form = std::get<Of>(GetParam()).law)
-      material = BodyMaterial(LawLayout::of_motion(layout, blocks, *form));
+    blocks = add_motion_blocks(layout, {});
+    material.elastic = std::get<Of>(GetParam()).mean_strain;
+    if (const auto& form = std::get<Of>(GetParam()).law) material.elastic = LawLayout::of_motion(layout, blocks, *form);
     theta = VectorX::Zero(layout.size());
     blocks.set_moduli(theta, 3000.0);
     theta[blocks.poissons_ratio] = 0.35;
     for (const auto& [name, value] : std::initializer_list<std::pair<std::string, double>>{
              {"exponent_1", 5.0}, {"exponent_2", -4.0}, {"stiffness_ratio_2", 0.6}, {"poissons_ratio_2", 0.2}})
       if (layout.contains(name)) theta[layout.at(name)] = value;
-    forces = material.make_reference_forces(body);
+    forces = material.make_reference_forces(body, blocks);
     forces->set_parameters(theta);
     X = test::deformed(body->nodes, 0.1, 0.2);
     x = test::deformed(body->nodes, 0.25, 1.7);
@@ -55,7 +56,8 @@ struct Reference : ::testing::TestWithParam<std::tuple<Of, bool>> {
     forces->add_force(f);
     return f;
   }
-  BodyMaterial material{MaterialBlocks{}};
+  Material material;
+  MotionBlocks blocks;
   std::shared_ptr<const Body> body;
   VectorX theta;
   std::unique_ptr<ReferenceForces> forces;
@@ -65,7 +67,7 @@ struct Reference : ::testing::TestWithParam<std::tuple<Of, bool>> {
 /// The same law as that of the moving body, by other formulas.
 TEST_P(Reference, ForcesAreThoseOfABodyWithThatReference) {
   for (const Points& reference : {body->nodes, X}) {
-    const auto elasticity = material.make_elasticity(std::make_shared<Body>(with_reference(*body, reference)));
+    const auto elasticity = material.make_elasticity(std::make_shared<Body>(with_reference(*body, reference)), blocks);
     elasticity->set_parameters(theta);
     elasticity->linearise(x);
     Points expected = Points::Zero(x.rows(), 3);
@@ -130,20 +132,20 @@ INSTANTIATE_TEST_SUITE_P(Tetrahedra, Reference, ::testing::Combine(::testing::Va
 
 TEST(ReferenceForces, HexahedraTakeNoPart) {
   const auto body = test::box_body(Vector3(0.4, 0.2, 0.2), 0.1);
-  EXPECT_THROW((void)ReferenceForces::make(body, MotionLayout()), std::invalid_argument);
+  EXPECT_THROW((void)ReferenceForces::make(body, MotionLayout(), ElasticLaw::NeoHookean), std::invalid_argument);
   const LawLayout law({1, 1});
-  EXPECT_THROW((void)BodyMaterial(law).make_reference_forces(body), std::invalid_argument);
+  EXPECT_THROW((void)Material{law}.make_reference_forces(body, MotionLayout()), std::invalid_argument);
   EXPECT_THROW((void)with_reference(*body, body->nodes), std::invalid_argument);
 }
 
 /// Where p is not z the affine force counts: what stiffness damping makes of a step.
 TEST(LawReferenceForces, TheMatrixIsTheTangentWhereTheLagPointIsElsewhere) {
   const auto body = test::tet_body({0.2, 0.1, 0.12}, {2, 1, 1}, true);
-  const LawLayout law({1, 0, 1, false, TwoNumberLaw::NeoHookean});
+  const LawLayout law({1, 0, 1, false, ElasticLaw::NeoHookean});
   VectorX theta(law.size());
   theta[law.modulus(0)] = 3000.0;
   theta[law.poissons_ratio()] = 0.35;
-  const auto forces = BodyMaterial(law).make_reference_forces(body);
+  const auto forces = Material{law}.make_reference_forces(body, MotionLayout());
   forces->set_parameters(theta);
   ASSERT_TRUE(forces->linearise(test::deformed(body->nodes, 0.1, 0.2), test::deformed(body->nodes, 0.3, 1.7),
                                 test::deformed(body->nodes, 0.28, 1.75)));
@@ -155,18 +157,53 @@ TEST(LawReferenceForces, TheMatrixIsTheTangentWhereTheLagPointIsElsewhere) {
   EXPECT_LT((test::dense(matrix) * flat(direction) - flat(tangent)).norm(), tolerance(1e-12) * tangent.norm());
 }
 
-TEST(BodyMaterial, NamesTheParametersThatItDependsOn) {
+/// The affine force of a step is that of the moving body with that reference, and its derivatives are exact.
+TEST(MeanStrainReferenceForces, AreTheAffineForcesWhereTheLagPointIsElsewhere) {
+  for (const bool quadratic : {false, true}) {
+    const auto body = test::tet_body({0.2, 0.1, 0.12}, {2, 1, 1}, quadratic);
+    const MotionLayout blocks;
+    VectorX theta = blocks.zero();
+    blocks.set_moduli(theta, 3000.0);
+    theta[blocks.poissons_ratio] = 0.35;
+    const Points X = test::deformed(body->nodes, 0.1, 0.2), p = test::deformed(body->nodes, 0.3, 1.7),
+                 z = test::deformed(body->nodes, 0.28, 1.75), direction = test::deformed(body->nodes, 0.3, -0.4),
+                 w = test::deformed(body->nodes, 0.5, 2.9);
+    const Material material{ElasticLaw::NeoHookean};
+    const auto forces = material.make_reference_forces(body, blocks);
+    forces->set_parameters(theta);
+    const auto force = [&](const Points& reference) {
+      EXPECT_TRUE(forces->linearise(reference, p, z));
+      Points f = Points::Zero(p.rows(), 3);
+      forces->add_force(f);
+      return f;
+    };
+    const auto elasticity = material.make_elasticity(std::make_shared<Body>(with_reference(*body, X)), blocks);
+    elasticity->set_parameters(theta);
+    elasticity->linearise(p);
+    Points expected = Points::Zero(p.rows(), 3);
+    elasticity->add_force(z, expected);
+    EXPECT_LT((force(X) - expected).norm(), tolerance(1e-11) * expected.norm());
+    Points tangent = Points::Zero(p.rows(), 3), adjoint = Points::Zero(p.rows(), 3);
+    forces->add_tangent(direction, tangent);
+    forces->add_adjoint(w, adjoint);
+    EXPECT_NEAR(adjoint.cwiseProduct(direction).sum(), w.cwiseProduct(tangent).sum(),
+                tolerance(1e-12) * w.norm() * tangent.norm());
+    const VectorX exact = flat(tangent);
+    const auto along = [&](double step) -> VectorX { return flat(force(X + step * direction)); };
+    EXPECT_LT(test::best_relative_error(along, exact, 0.1), tolerance(1e-8));
+  }
+}
+
+TEST(Material, NamesTheParametersThatItDependsOn) {
   ParameterLayout layout;
   const MotionBlocks blocks = add_motion_blocks(layout, {});
   const LawLayout law = LawLayout::of_motion(layout, blocks, {1, 1});
-  const BodyMaterial corotated(static_cast<const MaterialBlocks&>(blocks)), ogden(law),
-      given(law_at(*test::tet_body({0.2, 0.1, 0.1}, {1, 1, 1}, false), LawLayout({1, 0}), Eigen::Vector2d(1e3, 0.3)));
-  EXPECT_TRUE(corotated.is_corotated());
-  EXPECT_EQ(corotated.parameters(), (std::vector<ParameterHandle>{blocks.youngs_moduli[0], blocks.poissons_ratio}));
-  EXPECT_FALSE(ogden.is_corotated());
-  EXPECT_EQ(ogden.parameters(),
+  const Material own{ElasticLaw::NeoHookean}, ogden{law},
+      given{law_at(*test::tet_body({0.2, 0.1, 0.1}, {1, 1, 1}, false), LawLayout({1, 0}), Eigen::Vector2d(1e3, 0.3))};
+  EXPECT_EQ(own.parameters(blocks), (std::vector<ParameterHandle>{blocks.youngs_moduli[0], blocks.poissons_ratio}));
+  EXPECT_EQ(ogden.parameters(blocks),
             (std::vector<ParameterHandle>{blocks.youngs_moduli[0], blocks.poissons_ratio, layout.at("exponent_1")}));
-  EXPECT_TRUE(given.parameters().empty());
+  EXPECT_TRUE(given.parameters(blocks).empty());
 }
 
 }  // namespace

@@ -113,7 +113,7 @@ TEST(FitConfig, TheMaterialOfAMotionIsALawOfItsForm) {
   set_fit_option(options, "material=linear");
   EXPECT_FALSE(options.law_of_motion());
   set_fit_option(options, "material=neo_hookean");
-  EXPECT_EQ(options.law_of_motion(), (LawForm{1, 0, 1, false, TwoNumberLaw::NeoHookean}));
+  EXPECT_FALSE(options.law_of_motion()) << "that of the mean strain of elements";
   set_fit_option(options, "material=ogden");
   EXPECT_EQ(options.law_of_motion(), (LawForm{1, 1}));
   set_fit_option(options, "law_terms=2");

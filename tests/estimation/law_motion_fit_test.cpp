@@ -25,7 +25,7 @@ struct SwingingLaw {
     const MotionBlocks blocks = add_motion_blocks(layout, {});
     law = LawLayout::of_motion(layout, blocks, {1, 1});
     options.blocks = blocks;
-    options.law_layout = law;
+    options.material.elastic = law;
     theta = VectorX::Zero(layout.size());
     theta[law.modulus(0)] = modulus;
     theta[law.poissons_ratio()] = nu;

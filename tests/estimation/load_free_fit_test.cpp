@@ -29,8 +29,8 @@ struct StruckBar {
     options.times = {0.0};
     options.is_static = true;
     // As of what moves where its stress-free shape is unknown.
-    options.elastic_law = ElasticLaw::Corotated;
-    options.stiffness_damping = StiffnessDamping::Rayleigh;
+    options.material.elastic = ElasticLaw::Corotated;
+    options.material.damping = StiffnessDamping::Rayleigh;
     options.max_dt = 1.0 / 120.0 + 1e-9;
     options.blocks = layout;
     set_moduli(truth, stiff, soft);

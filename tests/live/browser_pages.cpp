@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
     Model other = pressed;
     for (std::vector<double>& row : other.law->rows) row[1] *= factor;
     const LiveData sample_data = live_data(other);
-    with_laws.samples.push_back({sample_data.theta, sample_data.law});
+    with_laws.samples.push_back({sample_data.theta, sample_data.material.law()});
   }
   write_file(folder / "pressed.html", live_page(pressed, with_laws, presses));
   Model one = test::block(false);

@@ -53,7 +53,7 @@ TEST(LiveData, LawsComeBackToo) {
   LiveData data = live_data(test::pressed_block());
   ASSERT_TRUE(data.is_pressed);
   data.tests = {{{0.05, 0.025, 0.0}, 0.01, {0.0, -1.0, 0.0}}};
-  const int elements = data.law->element_count();
+  const int elements = data.material.law()->element_count();
   const MatrixX numbers = Eigen::RowVector2d(3.0, 1.0).replicate(elements, 1);
   data.samples = {{data.theta, std::make_shared<LinearLaw>(numbers)},
                   {data.theta, std::make_shared<NeoHookeanLaw>(numbers)},
@@ -62,12 +62,13 @@ TEST(LiveData, LawsComeBackToo) {
   const std::string bytes = encode(data);
   EXPECT_EQ(encode(decode(bytes)), bytes);
   const LiveData back = decode(bytes);
-  EXPECT_EQ(back.law->name(), "ogden");
+  EXPECT_EQ(back.material.law()->name(), "ogden");
   EXPECT_EQ(back.samples[0].law->name(), "linear");
   EXPECT_EQ(back.samples[1].law->name(), "neo_hookean");
   EXPECT_EQ(back.samples[2].law->name(), "sampled");
-  EXPECT_NEAR(back.law->small_strain(3).youngs_modulus, data.law->small_strain(3).youngs_modulus, 1e-6);
-  data.law = std::make_shared<LinearLaw>(numbers.topRows(2));
+  EXPECT_NEAR(back.material.law()->small_strain(3).youngs_modulus, data.material.law()->small_strain(3).youngs_modulus,
+              1e-6);
+  data.material.elastic = std::make_shared<LinearLaw>(numbers.topRows(2));
   EXPECT_THROW(LivePress(decode(encode(data))), std::runtime_error) << "a law of another number of elements";
 }
 
@@ -320,7 +321,7 @@ TEST(LivePress, FieldsTellDeviationAndStiffening) {
 
 TEST(LivePress, SamplesHaveTheirOwnLaw) {
   LiveData data = live_data(test::pressed_block());
-  data.samples = {{data.theta, scaled_law(data.law, 0.5)}};
+  data.samples = {{data.theta, scaled_law(data.material.law(), 0.5)}};
   LivePress live(std::move(data));
   const double E = live.law()->small_strain(0).youngs_modulus;
   live.set_sample(0);

@@ -255,7 +255,7 @@ Conditioning conditioning_of(HexGrid grid) {
   VectorX column;
   for (int c = 0; c < A.rows(); ++c) A.multiply(VectorX::Unit(A.rows(), c), column), dense.col(c) = column;
   const VectorX eigenvalues = test::eigenvalues(dense);
-  ConjugateGradients solver(body->pattern, {SolverKind::Iterative, 1e-8, 2000});
+  IterativeSolver solver(body->pattern, {SolverKind::Iterative, 1e-8, 2000});
   VectorX x = VectorX::Zero(A.rows());
   int iterations = 2000;
   if (solver.factorise(A)) iterations = solver.solve(VectorX::LinSpaced(A.rows(), -1.0, 2.0), x).iterations;

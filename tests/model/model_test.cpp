@@ -32,7 +32,7 @@ Model full_model() {
   m.scene.initial = {{0, -2.1, 0}, {0.1, 0.2, 0.3}, false, true, {}, {}, Weight{0.02, {0.1, 1.0 / 3.0, 0}}};
   m.scene.timing = evenly_timed(60.0, 80, 4);
   m.cell_size = 0.0243, m.grid_origin = {-0.3, -0.1, 0.7};
-  m.substeps = 4, m.theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;
+  m.substeps = 4, m.newmark_theta = 0.55, m.contact_stiffness = 1e6, m.contact_smoothing = 1e-3;
   m.volume.nodes = Points::Random(12, 3);
   m.volume.connectivity = {0, 1, 2, 3, 4, 5, 6, 7, 4, 5, 6, 7, 8, 9, 10, 11};
   m.volume.youngs_modulus = {500, 680}, m.volume.poissons_ratio = {0.3, 0.4}, m.volume.fill = {1.0, 0.25};
@@ -60,7 +60,7 @@ TEST(Model, ComesBackAsItWasSaved) {
   EXPECT_EQ(read.cell_size, m.cell_size);
   EXPECT_EQ(read.grid_origin, m.grid_origin);
   EXPECT_EQ(read.substeps, 4);
-  EXPECT_EQ(read.theta, 0.55);
+  EXPECT_EQ(read.newmark_theta, 0.55);
   EXPECT_EQ(read.contact_stiffness, 1e6);
   EXPECT_EQ(read.contact_smoothing, 1e-3);
   EXPECT_EQ(read.volume.nodes, m.volume.nodes);

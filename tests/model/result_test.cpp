@@ -141,6 +141,7 @@ TEST(Result, IntervalsVerdictAndBudgetComeBack) {
   result.parameters[0].interval_90 = std::pair(553.0, 629.0);
   result.parameters[0].std_noise = 9.0, result.parameters[0].std_model = 19.0;
   result.parameters[0].prior = PriorResult{500.0, std::pair(200.0, 1250.0)};
+  result.material = "neo-Hookean";
   result.verdict = "unexplained", result.reasons = {"The distances are 3.0 times the noise."};
   result.judgement = {{"verdict.residual", 1.6}, {"interval.floor.youngs_modulus", 0.05}};
   result.uncertainty = {{"noise", {{"youngs_modulus", 9.0}}}, {"mesh", {{"youngs_modulus", std::nan("")}}}};
@@ -151,6 +152,7 @@ TEST(Result, IntervalsVerdictAndBudgetComeBack) {
   EXPECT_EQ(read.parameters[0].std_model, result.parameters[0].std_model);
   EXPECT_EQ(read.parameters[0].prior, result.parameters[0].prior);
   EXPECT_FALSE(read.parameters[1].prior);
+  EXPECT_EQ(read.material, result.material);
   EXPECT_EQ(read.verdict, result.verdict);
   EXPECT_EQ(read.judgement, result.judgement);
   EXPECT_EQ(read.reasons, result.reasons);

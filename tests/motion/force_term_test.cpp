@@ -72,10 +72,10 @@ void add_laws(std::vector<Family>& list) {
     LawForm form;
   };
   const std::vector<Form> forms = {{"LinearLaw", 1, {1, 0}},
-                                   {"NeoHookeanLaw", 1, {1, 0, 1, false, TwoNumberLaw::NeoHookean}},
+                                   {"NeoHookeanLaw", 1, {1, 0, 1, false, ElasticLaw::NeoHookean}},
                                    {"OgdenLaw", 1, {1, 1}},
                                    {"OgdenLawOfTwoTerms", 1, {1, 2, 1, true}},
-                                   {"NeoHookeanLawOfThreeModuli", 3, {3, 0, 1, false, TwoNumberLaw::NeoHookean}},
+                                   {"NeoHookeanLawOfThreeModuli", 3, {3, 0, 1, false, ElasticLaw::NeoHookean}},
                                    {"OgdenLawOfThreeModuli", 3, {3, 2}}};
   for (const bool quadratic : {false, true}) {
     const std::string elements = quadratic ? "OfQuadraticTetrahedra" : "OfTetrahedra";
@@ -193,7 +193,7 @@ std::vector<Family> families() {
     list.push_back(
         {"NeoHookeanMeanOf" + kind.name, kind.make,
          [](auto of, const MotionBlocks& blocks) { return make_elasticity(of, blocks, ElasticLaw::NeoHookean); }, true,
-         true, of_material, true});
+         true, of_material, true, kind.name.ends_with("Tetrahedra")});
     const auto viscous = [](auto of, const MotionBlocks& blocks) {
       return make_viscous_forces(of, blocks, blocks.stiffness_damping);
     };

@@ -44,7 +44,7 @@ LetGo let_go(const std::shared_ptr<const Body>& body, const std::shared_ptr<cons
   for (int f = 0; f <= 20; ++f) options.times.push_back(5e-3 * f);
   options.max_dt = dt;
   options.newmark_theta = 0.5;
-  options.law = law;
+  if (law) options.material.elastic = law;
   options.integrator = integrator;
   options.newton.tolerance = 1e-10;
   options.holds = {Hold{[](const Vector3& p) { return p.x() < -0.199; }}};
@@ -126,7 +126,7 @@ TEST(LawAtRest, IsFoundHoweverStiffTheBodyIs) {
   const auto sag = [&](double stiffer) {
     MatrixX q(body->element_count(), 3);
     q.rowwise() = (Eigen::RowVectorXd(3) << stiffer * modulus / (2.0 * (1.0 + nu)), 2.0, nu).finished();
-    options.law = std::make_shared<OgdenLaw>(q);
+    options.material.elastic = std::make_shared<OgdenLaw>(q);
     VectorX theta = layout.zero();
     layout.set_moduli(theta, stiffer * modulus);
     theta[layout.poissons_ratio] = nu;

@@ -141,7 +141,7 @@ TEST(Shape, FollowsWhatItDependsOnAndNothingElse) {
   const Shaped scene(ElementKind::QuadraticTetrahedron, Integrator::Lagged, Unknown::Both);
   const std::vector<int> held = held_nodes(*scene.body, scene.options.holds);
   RestShape shape(scene.body, held, true, {}, shape_basis(*scene.body, scene.options.shape, held), scene.layout,
-                  scene_material(scene.options));
+                  scene.options.material);
   ASSERT_EQ(shape.find(scene.theta), "");
   ASSERT_TRUE(shape.prepare_derivatives());
   const std::shared_ptr<const Body> found = shape.body();

@@ -202,7 +202,6 @@ TEST_F(Predictions, AReleaseFromUnderAKnownWeightStartsAtItsEquilibrium) {
   first.times = {0.0};
   at_rest.times = {0.0};
   at_rest.is_static = true;
-  first.elastic_law = ElasticLaw::Corotated;  // as at rest
   at_rest.weights = {{tip, 0.1}};
   EXPECT_LT((tip_of(first, scene) - tip_of(at_rest, scene)).norm(), 1e-9);
   at_rest.weights.clear();

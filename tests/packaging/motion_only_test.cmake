@@ -21,7 +21,7 @@ find_package(pliant REQUIRED)
 add_executable(consumer main.cpp)
 target_link_libraries(consumer PRIVATE pliant::motion)
 ]])
-file(READ ${SOURCE}/examples/consumer/main.cpp program)
+file(READ ${SOURCE}/tests/packaging/motion_only.cpp program)
 string(REPLACE "frame <= 30" "frame <= 3" program "${program}")
 file(WRITE ${WORK}/consumer/main.cpp "${program}")
 must_run(${CMAKE_COMMAND} -S ${WORK}/consumer -B ${WORK}/consumer/build -G ${GENERATOR} -DCMAKE_BUILD_TYPE=None

@@ -132,9 +132,6 @@ TEST(PlainSentences, SayHowFarTheFitCanBeTrusted) {
   EXPECT_THAT(words, Contains(HasSubstr("2.3\u00a0mm (root mean square) from the 48\u202f211 observed points")));
   EXPECT_THAT(words, Contains(HasSubstr("explains the recording down to its noise")));
   EXPECT_THAT(words, Contains(HasSubstr("Mass damping is known poorly (± 46 %)")));
-  EXPECT_THAT(words, Contains(HasSubstr("Young's modulus and stiffness damping are hard to tell apart")));
-  EXPECT_THAT(words, Not(Contains(HasSubstr("correlation 0.10"))));
-  EXPECT_THAT(words, Contains(HasSubstr("2 of 3 starts")));
   EXPECT_THAT(words, Contains(HasSubstr("Taken as given, not estimated: Poisson's ratio (0.35), density (95")));
   EXPECT_THAT(words, Contains("The floor was taken as known."));
   for (ParameterResult& p : data.result.parameters)

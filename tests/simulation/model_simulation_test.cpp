@@ -29,7 +29,7 @@ Model bar() {
   model.scene.planes = {{{0, 0, -0.3}, Vector3::UnitZ(), true}};
   model.scene.weights = {{0.1, {0.5 * length, 0, 0}}};
   model.youngs_modulus = 2e5, model.poissons_ratio = 0.3, model.stiffness_damping = 2e-3;
-  model.cell_size = edge, model.substeps = substeps, model.theta = 0.6;
+  model.cell_size = edge, model.substeps = substeps, model.newmark_theta = 0.6;
   return model;
 }
 

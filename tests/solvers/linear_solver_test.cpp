@@ -266,7 +266,7 @@ TEST(IncompleteCholesky, IsExactWithoutFill) {
 
 TEST(IncompleteCholesky, RaisesTheDiagonalWhereItBreaksDown) {
   const BlockMatrix A = step_matrix(10.0);  // almost the stiffness alone
-  ConjugateGradients solver(A.shared_pattern(), {SolverKind::Iterative, 1e-10, 2000});
+  IterativeSolver solver(A.shared_pattern(), {SolverKind::Iterative, 1e-10, 2000});
   ASSERT_TRUE(solver.factorise(A));
   const VectorX b = random_vector(A.rows(), 8);
   VectorX x = VectorX::Zero(A.rows());
@@ -274,10 +274,10 @@ TEST(IncompleteCholesky, RaisesTheDiagonalWhereItBreaksDown) {
   EXPECT_LT((test::dense(A) * x - b).norm(), tolerance(1e-9) * b.norm());
 }
 
-TEST(ConjugateGradients, TakesFewIterationsAndReportsItsResidual) {
+TEST(IterativeSolver, TakesFewIterationsAndReportsItsResidual) {
   const BlockMatrix A = step_matrix();
   const VectorX b = random_vector(A.rows(), 9);
-  ConjugateGradients solver(A.shared_pattern(), {SolverKind::Iterative, 1e-8, 500});
+  IterativeSolver solver(A.shared_pattern(), {SolverKind::Iterative, 1e-8, 500});
   ASSERT_TRUE(solver.factorise(A));
   VectorX x = VectorX::Zero(A.rows());
   const SolveSummary summary = solver.solve(b, x);
@@ -287,16 +287,16 @@ TEST(ConjugateGradients, TakesFewIterationsAndReportsItsResidual) {
   EXPECT_LE(summary.residual, 1e-8);
   EXPECT_EQ(solver.solve(b, x).iterations, 0) << "the solution as a guess needs nothing more";
   x.setZero();
-  ConjugateGradients hasty(A.shared_pattern(), {SolverKind::Iterative, 1e-8, 3});
+  IterativeSolver hasty(A.shared_pattern(), {SolverKind::Iterative, 1e-8, 3});
   ASSERT_TRUE(hasty.factorise(A));
   const SolveSummary unfinished = hasty.solve(b, x);
   EXPECT_FALSE(unfinished.converged);
   EXPECT_EQ(unfinished.iterations, 3);
 }
 
-TEST(ConjugateGradients, ColumnsThatDoNotConvergeAreToldOf) {
+TEST(IterativeSolver, ColumnsThatDoNotConvergeAreToldOf) {
   const BlockMatrix A = step_matrix();
-  ConjugateGradients hasty(A.shared_pattern(), {SolverKind::Iterative, 1e-8, 3});
+  IterativeSolver hasty(A.shared_pattern(), {SolverKind::Iterative, 1e-8, 3});
   ASSERT_TRUE(hasty.factorise(A));
   MatrixX B = MatrixX::Zero(A.rows(), 3), X = B;
   B.col(1) = random_vector(A.rows(), 9);
@@ -307,9 +307,9 @@ TEST(ConjugateGradients, ColumnsThatDoNotConvergeAreToldOf) {
   EXPECT_EQ(X.col(0).norm() + X.col(2).norm(), 0.0);
 }
 
-TEST(ConjugateGradients, NothingToSolve) {
+TEST(IterativeSolver, NothingToSolve) {
   const BlockMatrix A = chain(4);
-  ConjugateGradients solver(A.shared_pattern(), {});
+  IterativeSolver solver(A.shared_pattern(), {});
   ASSERT_TRUE(solver.factorise(A));
   VectorX x = VectorX::Zero(A.rows());
   const SolveSummary summary = solver.solve(VectorX::Zero(A.rows()), x);

@@ -19,7 +19,7 @@ inline Model block(bool held) {
   if (held) model.scene.fixed = {{RegionHalfSpace{{-0.07, 0, 0}, {-1, 0, 0}}, std::nullopt}};
   model.scene.planes = {{{0, -0.1, 0}, Vector3::UnitY(), true, 0.5}};
   model.youngs_modulus = 2e5, model.poissons_ratio = 0.3, model.stiffness_damping = 2e-3, model.mass_damping = 0.5;
-  model.cell_size = block_edge, model.substeps = 8, model.theta = 0.51;
+  model.cell_size = block_edge, model.substeps = 8, model.newmark_theta = 0.51;
   return model;
 }
 

@@ -282,7 +282,7 @@ TEST_F(Recorded, RegionsMayHaveLawsOfTheirOwn) {
   const std::string rest = world + timing + simulation + held + camera;
   const SyntheticScene one = read(head + object + material + law + region + rest);
   ASSERT_TRUE(one.law);
-  EXPECT_EQ(*one.law, (LawForm{2, 2, 1, false, TwoNumberLaw::Linear}));
+  EXPECT_EQ(*one.law, (LawForm{2, 2, 1, false, ElasticLaw::Corotated}));
   EXPECT_EQ(one.element, ElementKind::QuadraticTetrahedron);
   const Made two = made(head + object + material + law + region + "exponents = [8.0, -3.0]\n" + rest);
   EXPECT_EQ(two.scene.law->laws, 2);
