@@ -274,6 +274,23 @@ MarkerSet read_markers(const MarkerTrack& files, int frame_count) {
   return set;
 }
 
+std::optional<double> track_noise(const MarkerSet& markers) {
+  constexpr int least = 12;
+  const double of_one = std::sqrt(20.0);  // 1, 3, 3, 1: the deviation of a third difference of independent readings
+  std::vector<double> sizes;
+  for (std::size_t f = 3; f < markers.frames.size(); ++f)
+    for (Eigen::Index m = 0; m < markers.rest.rows(); ++m) {
+      const auto at = [&](std::size_t back) -> Vector3 { return markers.frames[f - back].row(m).transpose(); };
+      const Vector3 third = at(0) - 3.0 * at(1) + 3.0 * at(2) - at(3);
+      for (int d = 0; d < 3; ++d)
+        if (std::isfinite(third[d])) sizes.push_back(std::abs(third[d]) / of_one);
+    }
+  if (int(sizes.size()) < least) return std::nullopt;
+  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
+  std::ranges::nth_element(sizes, middle);
+  return *middle / 0.67449;  // of a normal deviation's median size
+}
+
 void write_marker_positions(const fs::path& path, const MarkerPositions& markers) {
   write_file(path, [&](std::ostream& stream) {
     stream << header_of_positions << '\n';

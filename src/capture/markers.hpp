@@ -54,6 +54,10 @@ Points read_marker_deviations(const std::filesystem::path& path, std::span<const
 /// appear twice in a frame or have no trajectory, frames beyond the last.
 MarkerSet read_markers(const MarkerTrack& files, int frame_count);
 
+/// Standard deviation of a coordinate [m] that a track shows by itself, frame by frame: of third differences in time,
+/// which leave little of a smooth motion, the median over all. Nothing where fewer than a dozen of them were seen.
+std::optional<double> track_noise(const MarkerSet& markers);
+
 /// Writes the same CSV formats; whole or not at all. Positions keep nine digits; rows of NaN are not written.
 /// Throws std::invalid_argument for an id that is empty or has a comma, a quote or a line's end in it.
 void write_marker_positions(const std::filesystem::path& path, const MarkerPositions& markers);

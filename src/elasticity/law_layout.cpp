@@ -73,7 +73,8 @@ void LawLayout::add_laws(ParameterLayout& layout, const ParameterHandle& first_r
         form_.laws == 1 || owner.find('@') == std::string::npos ? "" : owner.substr(owner.find('@'));
     const auto add = [&](const std::string& name) { return layout.add({name + place, "1", 1, Role::Material}); };
     Blocks blocks;
-    blocks.poissons_ratios = {law == 0 && first_ratio.exists() ? first_ratio : add("poissons_ratio")};
+    const char* const ratio = form_.own_ratios ? "poissons_ratio_1" : "poissons_ratio";
+    blocks.poissons_ratios = {law == 0 && first_ratio.exists() ? first_ratio : add(ratio)};
     for (int i = 0; i < form_.terms; ++i) {
       const std::string number = "_" + std::to_string(i + 1);
       blocks.exponents.push_back(add("exponent" + number));

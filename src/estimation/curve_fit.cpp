@@ -7,6 +7,8 @@
 #include "estimation/fit_config.hpp"
 #include "estimation/material_tests.hpp"
 #include "estimation/notes.hpp"
+#include "estimation/press_fit.hpp"
+#include "estimation/press_objective.hpp"
 #include "estimation/problem.hpp"
 
 namespace pliant {
@@ -15,11 +17,9 @@ namespace {
 
 std::shared_ptr<const PressScene> scene_of(const Capture& capture, const FitOptions& options) {
   if (capture.scene.object.surface) {
-    Resolution resolution;
-    resolution.cells = options.cells;
-    resolution.element = options.element.value_or(ElementKind::Tetrahedron);
     std::vector<Vector3> control_points;
-    auto body = std::make_shared<Body>(*make_body_of(capture.scene, SignedDistance(), resolution, control_points));
+    auto body = std::make_shared<Body>(
+        *make_body_of(capture.scene, SignedDistance(), resolution_of_tests(capture, options), control_points));
     body->modulus = unit_element()->modulus;  // a specimen tells of one material
     body->modulus.relative.assign(std::size_t(body->element_count()), 1.0);
     return std::make_shared<PressScene>(make_press_scene(capture, std::move(body)));
@@ -79,7 +79,7 @@ FitOutcome fit_material_curves(const Capture& capture, const FitOptions& options
   outcome.evaluation = objective.linearise(outcome.parameters.to_unconstrained(fit.theta));
   outcome.start_cost = fit.tried.front().cost, outcome.final_cost = outcome.evaluation.cost;
   law.law = press_law(*law.scene->body, fit.layout, fit.theta);
-  if (outcome.evaluation.succeeded) add_uncertainty(outcome);
+  if (outcome.evaluation.succeeded) add_uncertainty(outcome, {}, {}, agreements_of(*law.scene, {}, outcome.evaluation));
   outcome.converged = fit.converged;
   outcome.cells = options.cells;
   outcome.recordings.push_back(as_recording(law.scene->body, law.layout, outcome));

@@ -12,11 +12,13 @@
 
 namespace pliant {
 
-void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts, const VectorX& floor) {
+void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts, const VectorX& floor,
+                     const std::optional<std::vector<Agreement>>& tests) {
   outcome.uncertainty = uncertainty_of(outcome.evaluation, shifts, floor, int(outcome.recordings.size()));
   outcome.covariance = outcome.uncertainty.covariance;
   outcome.std = outcome.uncertainty.std;
-  outcome.verdict = verdict_of(outcome.evaluation, outcome.uncertainty, outcome.parameters);
+  outcome.verdict = tests ? verdict_of(*tests, outcome.uncertainty, outcome.parameters)
+                          : verdict_of(outcome.evaluation, outcome.uncertainty, outcome.parameters);
   const VectorX inverse = outcome.std.cwiseMax(1e-300).cwiseInverse();
   outcome.correlation = inverse.asDiagonal() * outcome.covariance * inverse.asDiagonal();
 }

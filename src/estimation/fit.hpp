@@ -325,6 +325,8 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
 /// Takes covariance, standard deviations and correlation from an outcome's evaluation, which has derivatives, and what
 /// is known about its models.
 /// @param shifts, floor  as in `uncertainty_of`
-void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts = {}, const VectorX& floor = {});
+/// @param tests          of static tests how well they are met, by which they are judged; nothing: by the evaluation
+void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts = {}, const VectorX& floor = {},
+                     const std::optional<std::vector<Agreement>>& tests = std::nullopt);
 
 }  // namespace pliant

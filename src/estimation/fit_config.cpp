@@ -181,7 +181,10 @@ Entry control_points_entry() {
 
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = {
-      real_entry("cells", "", "4..64", "elements along the object's longest axis; more is finer and slower",
+      real_entry("cells", "", "4..64",
+                 "elements along the object's longest axis, of presses and pulls two thirds as many quadratic ones; "
+                 "more is finer and "
+                 "slower",
                  &FitOptions::cells),
       real_entry("steps", "", "0..16", "time steps per default step; 2 halves the step", &FitOptions::steps),
       integer_entry("refine", "1..3",
@@ -220,8 +223,8 @@ const std::vector<Entry>& entries() {
       real_entry("fine_band", "object sizes", "0..0.5",
                  "outlier scale of the robust loss (Tukey's biweight) in the last stage", &FitOptions::fine_band),
       choice_entry("element",
-                   "finite elements; automatic: hexahedra, or quadratic_tetrahedra where the stress-free reference "
-                   "shape is unknown",
+                   "finite elements; automatic: hexahedra, or quadratic_tetrahedra of what is pressed or pulled and "
+                   "where the stress-free reference shape is unknown",
                    element_names, &FitOptions::element),
       choice_entry("tracking",
                    "alternate model-based tracking with the fit of the tracked motion (loop), fit the observed surface "

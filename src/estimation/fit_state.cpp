@@ -149,7 +149,7 @@ PressSampling::State to_sampled(const Json& json) {
 Json from_finding(const LawFinding& law) {
   Json json = {
       {"noise", law.noise.at_rest},         {"noise_growth", law.noise.growth},    {"deviation", law.deviation},
-      {"track_squares", law.track_squares}, {"curve_cost", law.curve_cost},        {"observations", law.observations},
+      {"track_squares", law.track_squares}, {"stated_cost", law.stated_cost},      {"observations", law.observations},
       {"dimension", law.dimension},         {"against", from_cost(-law.evidence)}, {"points", Json::array()}};
   if (law.cut) json["cut"] = {law.cut->zone, int(law.cut->by), law.cut->at};
   for (const Vector3& p : law.points) json["points"].push_back({p.x(), p.y(), p.z()});
@@ -160,7 +160,7 @@ LawFinding to_finding(const Json& json) {
   law.noise = {json.at("noise").get<double>(), json.at("noise_growth").get<double>()};
   law.deviation = json.at("deviation").get<double>();
   law.track_squares = json.at("track_squares").get<double>();
-  law.curve_cost = json.at("curve_cost").get<double>();
+  law.stated_cost = json.at("stated_cost").get<double>();
   law.observations = json.at("observations").get<double>();
   law.dimension = json.at("dimension").get<int>();
   law.evidence = -to_cost(json.at("against"));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "estimation/alternative.hpp"
 #include "estimation/judgement.hpp"
 
 namespace pliant {
@@ -33,7 +34,7 @@ std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters,
     else if (p.transform == Transform::Direction)
       given.push_back({p.name, "direction of gravity", std::max(judgement.given_gravity.value, 2.0 * worst_error)});
     else if (p.role == Role::Inertia && p.transform == Transform::Logarithm)
-      given.push_back({p.name, "mass", judgement.given_density.value});
+      given.push_back({p.name, cause_mass, judgement.given_density.value});
     else if (p.role == Role::Obstacle && p.transform == Transform::Shift)
       given.push_back({p.name, "friction", judgement.given_friction.value});
     else if (p.role == Role::Obstacle && p.transform == Transform::Logarithm)

@@ -41,6 +41,25 @@ void GrippedBody::set_law(const std::shared_ptr<const MaterialLaw>& law) {
   forces_->set_law(law);
 }
 
+Points GrippedBody::stiffness_times(const Points& nodes, const Points& change) {
+  (void)forces_->evaluate(nodes, true);
+  BlockMatrix stiffness(body_->pattern);
+  stiffness.set_zero();
+  forces_->add_stiffness(LawElasticity::Stiffness::Exact, 1.0, stiffness);
+  VectorX product;
+  stiffness.multiply(flat(change), product);
+  return Eigen::Map<const Points>(product.data(), body_->node_count(), 3);
+}
+
+Points GrippedBody::linear_way() {
+  const Placement rest = equilibrium_.rest();
+  Points way = Points::Zero(body_->node_count(), 3);
+  for (const int n : test_.nodes) way.row(n) = test_.displacement.transpose();
+  if (!equilibrium_.prepare_derivatives(rest)) return way;
+  const Points forces = -stiffness_times(rest.nodes, way);
+  return way + response(forces);
+}
+
 bool GrippedBody::lead(double part) {
   for (const int n : test_.nodes) placement_.nodes.row(n) = body_->nodes.row(n) + part * test_.displacement.transpose();
   return equilibrium_.solve(placement_).converged;
@@ -48,10 +67,17 @@ bool GrippedBody::lead(double part) {
 
 bool GrippedBody::solve() {
   if (placement_.nodes.size() > 0 && lead(1.0)) return true;
+  const Points way = linear_way();
   for (int parts = 1; parts <= most_parts; parts *= 4) {
     placement_ = equilibrium_.rest();
+    Points step = way / parts;
     bool follows = true;
-    for (int k = 1; k <= parts && follows; ++k) follows = lead(double(k) / parts);
+    for (int k = 1; k <= parts && follows; ++k) {
+      const Points before = placement_.nodes;
+      placement_.nodes += step;  // to first order at first, and then as the part before went
+      follows = lead(double(k) / parts);
+      step = placement_.nodes - before;
+    }
     if (follows) return true;
   }
   placement_ = {};
@@ -72,24 +98,25 @@ Points GrippedBody::internal_forces() const {
   return forces;
 }
 
-Points GrippedBody::response(const Points& forces) {
-  if (equilibrium_.contact_count() == 0) return equilibrium_.response(forces);
-  Points all = Points::Zero(forces.rows() + equilibrium_.contact_count(), 3);
-  all.topRows(forces.rows()) = forces;
-  return equilibrium_.response(all).topRows(forces.rows());
+Points GrippedBody::response(const Points& forces) { return responses({-forces}).front(); }
+
+std::vector<Points> GrippedBody::responses(const std::vector<Points>& gradients) {
+  const Eigen::Index nodes = body_->node_count();
+  std::vector<Points> changes;
+  for (const Points& gradient : gradients) {
+    changes.emplace_back(Points::Zero(nodes + equilibrium_.contact_count(), 3));
+    changes.back().topRows(nodes) = -gradient;
+  }
+  equilibrium_.respond(changes);
+  for (Points& change : changes) change.conservativeResize(nodes, 3);
+  return changes;
 }
 
 double GrippedBody::force() const { return (internal_forces() - dead_load_).cwiseProduct(direction_).sum(); }
 
 bool GrippedBody::prepare_derivatives() {
   if (!equilibrium_.prepare_derivatives(placement_)) return false;
-  (void)forces_->evaluate(placement_.nodes, true);
-  BlockMatrix stiffness(body_->pattern);
-  stiffness.set_zero();
-  forces_->add_stiffness(LawElasticity::Stiffness::Exact, 1.0, stiffness);
-  VectorX product;
-  stiffness.multiply(flat(direction_), product);
-  force_by_nodes_ = Eigen::Map<const Points>(product.data(), body_->node_count(), 3);
+  force_by_nodes_ = stiffness_times(placement_.nodes, direction_);
   for (int c = 0; c < equilibrium_.contact_count(); ++c) {
     const RigidContact& contact = equilibrium_.contact(c);
     for (int i = 0; i < contact.points().point_count(); ++i) {
@@ -155,8 +182,9 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
                           change.row(nodes[a]) += share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
                       });
   MatrixX by_parameters(off.size() + 1, Eigen::Index(numbers.count()));
+  const std::vector<Points> moves = body_.responses(changes);
   for (std::size_t k = 0; k < numbers.count(); ++k) {
-    const Points moved = body_.response(-changes[k]);
+    const Points& moved = moves[k];
     Points there = body_.embedding().positions(moved);
     there = (there * seen.seen / seen.markers_std).eval();
     by_parameters.col(Eigen::Index(k)).head(off.size()) = flat(there);

@@ -14,6 +14,9 @@ class GrippedBody {
   /// To equilibrium, from where it was last or else from rest by steps of the displacement. False: `failure` says why.
   bool solve();
   const std::string& failure() const { return equilibrium_.failure(); }
+  /// Without nodes where none was found.
+  const Placement& placement() const { return placement_; }
+  void begin_from(const Placement& placement) { placement_ = placement; }
   /// Force of the grip on the object along the test's direction [N], at the last equilibrium.
   double force() const;
   /// Simulated places of the test's markers [m], one row each.
@@ -24,6 +27,8 @@ class GrippedBody {
   [[nodiscard]] bool prepare_derivatives();
   /// Change of the nodes for a change of the forces on them: see `Equilibrium::response`.
   [[nodiscard]] Points response(const Points& forces);
+  /// The same for several changes of the energy's gradient [N].
+  [[nodiscard]] std::vector<Points> responses(const std::vector<Points>& gradients);
   /// Change of the measured force for a change of the nodes that are free [N/m], one row a node.
   const Points& force_by_nodes() const { return force_by_nodes_; }
   /// The measured force's direction at the nodes that are moved, zero elsewhere.
@@ -32,6 +37,10 @@ class GrippedBody {
 
  private:
   bool lead(double part);
+  /// Where the grip takes all nodes, to first order [m].
+  Points linear_way();
+  /// The elastic energy's Hessian at nodes [N/m], times a change of them.
+  Points stiffness_times(const Points& nodes, const Points& change);
   Points internal_forces() const;
 
   std::shared_ptr<const Body> body_;
@@ -46,7 +55,7 @@ class GrippedBody {
 /// Measurement between grips: half the squares of the grip's simulated less measured force, and of the markers' places
 /// in the directions in which they were measured, over their standard deviations. Derivatives are those of the
 /// equilibrium: a back-substitution a parameter, or one for all by the adjoint.
-class GripTrial : public Trial {
+class GripTrial : public EquilibriumTrial {
  public:
   /// @param number  what its frame calls it (`FrameFit::recording`)
   GripTrial(std::shared_ptr<const PressScene> scene, int grip, std::shared_ptr<PressedMaterial> material,
@@ -55,6 +64,8 @@ class GripTrial : public Trial {
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
   [[nodiscard]] double expected_work() const override;
+  [[nodiscard]] std::vector<Placement> placements() const override { return {body_.placement()}; }
+  void begin_from(const std::vector<Placement>& placements) override { body_.begin_from(placements.front()); }
 
  private:
   const ObservedGrip& test() const;

@@ -16,6 +16,9 @@ class IndentedBody {
   /// To equilibrium at one depth, from where it was last or from the depth before. False: `failure` says why.
   bool solve(std::size_t depth);
   const std::string& failure() const { return equilibrium_.failure(); }
+  /// One a depth; without nodes where none was found.
+  const std::vector<Placement>& placements() const { return placements_; }
+  void begin_from(const std::vector<Placement>& placements) { placements_ = placements; }
   /// Force of the probe on the object along its axis [N].
   double force(std::size_t depth) const;
   /// Derivative of that force by theta at a depth that was solved. False where the equilibrium is not stable.
@@ -30,7 +33,7 @@ class IndentedBody {
 
 /// Force-depth curve: half the squares of simulated less measured force over its standard deviation, one frame a depth.
 /// Derivatives are those of the equilibrium, by one back-substitution a depth for any number of parameters.
-class IndentationTrial : public Trial {
+class IndentationTrial : public EquilibriumTrial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is
   /// @param number     what its frames call it (`FrameFit::recording`)
@@ -40,6 +43,8 @@ class IndentationTrial : public Trial {
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
   [[nodiscard]] double expected_work() const override;
+  [[nodiscard]] std::vector<Placement> placements() const override { return body_.placements(); }
+  void begin_from(const std::vector<Placement>& placements) override { body_.begin_from(placements); }
 
  private:
   const ObservedIndentation& test() const;

@@ -30,6 +30,10 @@ struct Judgement {
                           "explained: what lay between was seen to put moduli off by a third (second physics)"};
   Judged residual_of_part_for_a_while{"verdict.residual_of_part_for_a_while", 1.7,
                                       "the same over a tenth of the frames, three at least"};
+  Judged relative_residual{
+      "verdict.relative_residual", 0.05,
+      "rms residual of static tests over the greatest measured of its kind, above which, and above "
+      "the noise, they are unexplained"};
   Judged least_matched{"verdict.least_matched", 0.85, "share of observed points that a model must match"};
   Judged poorly_known{"verdict.poorly_known", 0.25,
                       "standard deviation of the logarithm of Young's modulus, above which it is undetermined"};
@@ -58,6 +62,10 @@ struct Judgement {
   Judged free_floor_mass_damping{"interval.free_floor.mass_damping", 0.10, "the same of mass damping, a share"};
   Judged free_floor_stiffness_damping{"interval.free_floor.stiffness_damping", 0.08,
                                       "the same of stiffness damping, a share"};
+  Judged test_floor_youngs_modulus{"interval.test_floor.youngs_modulus", 0.06,
+                                   "deviation of ln E at small strain by the form of the law, of objects that are "
+                                   "pressed or pulled: errors of fits to second physics are 1 to 10 %"};
+  Judged test_floor_poissons_ratio{"interval.test_floor.poissons_ratio", 0.016, "the same of Poisson's ratio"};
   Judged size_of_finer_mesh{"interval.size.finer_mesh", 1.8,
                             "error of the fit's mesh over what a finer one changes: second order"};
   Judged size_of_coarser_mesh{"interval.size.coarser_mesh", 0.8, "the same over what a coarser one changes"};

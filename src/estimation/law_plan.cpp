@@ -26,12 +26,11 @@ std::vector<int> as_they_are(const LawForm& form) {
 }
 
 /// The estimate with one term more in each law, which begins small.
-VectorX with_term(const LawLayout& from, const VectorX& theta, const LawLayout& to) {
+VectorX with_term(const LawLayout& from, const VectorX& theta, const LawLayout& to, double exponent) {
   VectorX more = carry_law(from, theta, to, as_they_are(to.form()));
   const int added = to.form().terms - 1;
   for (int law = 0; law < to.form().laws; ++law) {
-    // The second term has the other sign, the third stiffens more than the first.
-    more[to.exponent(added, law)] = added == 1 ? -6.0 : 10.0;
+    more[to.exponent(added, law)] = exponent;
     more[to.stiffness_ratio(added, law)] = 0.2;
     more[to.poissons_ratio(added, law)] = theta[from.poissons_ratio(0, law)];
   }
@@ -63,7 +62,7 @@ class LawPlan::Replay {
 
   Standing run() {
     search();
-    if (now_.best && !is_pending() && options().alternatives && facts_.is_meshed_here) try_coarser_mesh();
+    if (now_.best && !is_pending() && options().alternatives) try_alternatives();
     return std::move(now_);
   }
 
@@ -102,8 +101,8 @@ class LawPlan::Replay {
     }
   }
 
-  void try_coarser_mesh() {
-    const StageRecord* moved = ask(task_stage(StageKind::Alternative, best().shape, best().theta, "coarser mesh"));
+  void try_alternatives() {
+    const StageRecord* moved = ask(task_stage(StageKind::Alternative, best().shape, best().theta, "alternatives"));
     if (!moved) return;
     now_.shifts = moved->shifts;
     now_.untried = moved->reason;
@@ -200,12 +199,33 @@ class LawPlan::Replay {
     return record && record->succeeded ? record->theta : start;
   }
 
+  /// From each of the starts, each in a valley of its own; that with the least squares. Nothing where the next one is
+  /// not known yet.
+  std::optional<Estimate> estimate_from(const LawShape& shape, const std::vector<VectorX>& starts,
+                                        const std::string& name) {
+    std::optional<Estimate> found;
+    for (const VectorX& start : starts) {
+      const MarkerNoise noise = now_.noise;
+      std::optional<Estimate> next = estimate(shape, start, name);
+      if (is_pending()) return std::nullopt;
+      if (next && (!found || squares_below(*next, *found)))
+        found = std::move(next);
+      else
+        now_.noise = noise;
+    }
+    return found;
+  }
+
+  static bool squares_below(const Estimate& a, const Estimate& b) {
+    return a.found.squares(b.found.deviation) < b.found.squares(b.found.deviation);
+  }
+
   /// More terms, or Poisson's ratios of their own for them. False where that is not kept.
-  bool fit_freer(const LawForm& form, const VectorX& start, const std::string& name) {
+  bool fit_freer(const LawForm& form, const std::vector<VectorX>& starts, const std::string& name) {
     const MarkerNoise noise = now_.noise;
     LawShape shape = best().shape;
     shape.form = form;
-    std::optional<Estimate> next = estimate(shape, start, name);
+    std::optional<Estimate> next = estimate_from(shape, starts, name);
     TriedLaw tried{form, next ? next->cost : infinite, -infinite, false};
     if (next) {
       // Half the BIC by residuals whose deviation is unknown: n/2 ln(sum r^2) + k/2 ln n.
@@ -228,11 +248,23 @@ class LawPlan::Replay {
       ++form.terms;
       if (std::ranges::find(now_.tried, form, &TriedLaw::form) != now_.tried.end()) break;
       const std::string name = std::to_string(form.terms) + " terms";
-      if (!fit_freer(form, with_term(best().layout, best().theta, facts_.layout(form)), name)) break;
+      std::vector<VectorX> starts;
+      for (const double exponent : exponents_of_more(form.terms))
+        starts.push_back(with_term(best().layout, best().theta, facts_.layout(form), exponent));
+      if (!fit_freer(form, starts, name)) break;
       if (form.own_ratios || known_poissons_ratio(options())) continue;
       form.own_ratios = true;
-      fit_freer(form, carry_law(best().layout, best().theta, facts_.layout(form), as_they_are(form)), name + " apart");
+      fit_freer(form, {carry_law(best().layout, best().theta, facts_.layout(form), as_they_are(form))},
+                name + " apart");
     }
+  }
+
+  /// Where the exponent of one term more begins. The second has the other sign, or, where forces at given depths tell
+  /// how an object stiffens, is steeper than the first; the third stiffens more than the first.
+  std::vector<double> exponents_of_more(int terms) const {
+    if (terms > 2) return {10.0};
+    if (facts_.has_curves) return {-6.0, 14.0};
+    return {-6.0};
   }
 
   void fit_zones() {
@@ -360,7 +392,8 @@ class LawPlan::Replay {
   /// lacks is no noise, and many markers make evidence of little.
   bool gains_enough(const Estimate& next) {
     const double deviation = best().found.deviation;
-    return next.found.squares(deviation) < (1.0 - judgement.gain_of_zone) * best().found.squares(deviation);
+    const double gain = best().shape.form.controls > 1 ? judgement.gain_of_zone : judgement.gain_of_second_modulus;
+    return next.found.squares(deviation) < (1.0 - gain) * best().found.squares(deviation);
   }
 
   const LawFacts& facts_;

@@ -16,7 +16,6 @@ struct LawFacts {
   double size = 0.0;                       ///< of the object [m]
   int presses = 0;                         ///< to be fitted
   bool has_curves = false;                 ///< forces at given depths or stresses are to be fitted
-  bool is_meshed_here = false;             ///< the object's mesh is made of its surface, as fine as is chosen
   bool is_specimen = false;                ///< stresses at given strains are: the object is of one material
 
   int controls() const { return modulus_names.empty() ? 1 : int(modulus_names.size()); }
@@ -29,7 +28,8 @@ struct LawFacts {
 /// Poisson's ratios of their own for them, by half the BIC; zones with a law of their own, one after the other where
 /// one is promised most, their cuts moved to where they fit better, or a law for each region; where there is one law
 /// for all, a field of more and more control points; and the stiffness that each press shows of itself, where the
-/// material is sampled; at last a few steps on a coarser mesh. Every decision follows from the records of the stages
+/// material is sampled; at last a few steps on a coarser mesh and
+/// with another weight. Every decision follows from the records of the stages
 /// before it: the plan replays them.
 class LawPlan {
  public:

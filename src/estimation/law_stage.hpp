@@ -31,15 +31,15 @@ struct LawFinding {
   MarkerNoise noise = {};      ///< after it
   double deviation = 0.0;      ///< geometric mean of the coordinates' deviations by that noise [m]
   double track_squares = 0.0;  ///< of the residuals of markers, each by that mean over its own deviation [m^2]
-  double curve_cost = 0.0;     ///< of curves and grips [-]
+  double stated_cost = 0.0;    ///< of curves and grips, whose deviations are stated [-]
   double observations = 0.0;   ///< independent ones
   int dimension = 0;           ///< numbers that were estimated
   double evidence = 0.0;       ///< ln of a Bayes factor; of a move the gain that is promised
   std::optional<ZoneCut> cut = {};
   std::vector<Vector3> points = {};  ///< [m] of a field
 
-  /// Sum of the squares of all residuals [m^2], those of curves times the square of a deviation [m].
-  double squares(double unit) const { return track_squares + 2.0 * curve_cost * unit * unit; }
+  /// Sum of the squares of all residuals [m^2], those of curves and grips times the square of a deviation [m].
+  double squares(double unit) const { return track_squares + 2.0 * stated_cost * unit * unit; }
 };
 
 }  // namespace pliant

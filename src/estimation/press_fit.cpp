@@ -41,6 +41,7 @@ class LawRun : StageLoop {
   LawRun(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState state)
       : StageLoop(options, monitor, std::move(state.pass)),
         capture_(capture),
+        cells_(resolution_of_tests(capture, options).cells),
         scene_(scene_to_fit()),
         sampled_(state.sampled ? std::move(*state.sampled) : PressSampling::State()),
         plan_(facts()) {}
@@ -56,9 +57,8 @@ class LawRun : StageLoop {
  private:
   /// The object on its mesh, and all its tests.
   PressScene scene_at(double cells) const {
-    Resolution resolution;
+    Resolution resolution = resolution_of_tests(capture_, options_);
     resolution.cells = cells;
-    resolution.element = options_.element.value_or(ElementKind::Tetrahedron);
     std::vector<Vector3> control_points;
     return make_press_scene(capture_, make_body_of(capture_.scene, SignedDistance(), resolution, control_points));
   }
@@ -69,7 +69,7 @@ class LawRun : StageLoop {
                         "there is no scan of the object at rest ([object] surface)",
                         "a closed triangle mesh",
                         "scan the object and name the mesh in capture.toml"});
-    auto scene = std::make_shared<PressScene>(scene_at(options_.cells));
+    auto scene = std::make_shared<PressScene>(scene_at(cells_));
     for (int i = 0; i < int(scene->presses.size()); ++i)
       if (is_fitted(scene->presses[std::size_t(i)].role)) fitted_.push_back(i);
     if (fitted_.empty() && !scene->static_tests().any_to_fit())
@@ -95,7 +95,6 @@ class LawRun : StageLoop {
     f.size = scene_->body->size();
     f.presses = int(fitted_.size());
     f.has_curves = scene_->static_tests().any_to_fit();
-    f.is_meshed_here = !capture_.scene.object.volume;
     f.is_specimen = !scene_->static_tests().curves.empty();
     return f;
   }
@@ -126,7 +125,7 @@ class LawRun : StageLoop {
       case StageKind::Sample:
         return sample(stage);
       case StageKind::Alternative:
-        return try_coarser_mesh(stage, is_cut);
+        return try_alternatives(stage, is_cut);
       default:
         return minimise_law(stage, is_cut);
     }
@@ -229,8 +228,8 @@ class LawRun : StageLoop {
   void find_out(StageRecord& record, const LawTask& task, const Form& form, const PressObjective& objective,
                 const CostEvaluation& evaluation) const {
     LawFinding& found = *record.law;
-    for (const FrameFit& f : evaluation.frames)
-      if (f.tracks == 0) found.curve_cost += f.cost;
+    for (std::size_t f = fitted_.size(); f < evaluation.frames.size(); ++f)  // presses come first, a frame each
+      found.stated_cost += evaluation.frames[f].cost;
     found.track_squares = objective.weighed_squares();
     found.deviation = fitted_.empty() ? found.noise.at_rest : objective.typical_deviation();
     found.observations = evaluation.independent_observations();
@@ -278,6 +277,7 @@ class LawRun : StageLoop {
     const OptimiserSummary s = minimise(objective.cost(), {0, form.parameters.to_unconstrained(record.from), {}}, o,
                                         [&](const Iteration&) { return !is_interrupted(); });
     is_cut = s.interrupted;
+    placements_ = objective.placements();
     record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
     record.iterations = s.iterations;
     if (s.succeeded) record.theta = form.parameters.to_theta(s.p), record.cost = s.evaluation.cost;
@@ -344,16 +344,25 @@ class LawRun : StageLoop {
     return record;
   }
 
-  /// Where the estimate goes on a coarser mesh, contacts and noise as they are.
-  StageRecord try_coarser_mesh(const Stage& stage, bool& is_cut) const {
+  /// Where the estimate goes on a coarser mesh, and as the object weighs more than was given; contacts and noise as
+  /// they are.
+  StageRecord try_alternatives(const Stage& stage, bool& is_cut) const {
     constexpr int iterations = 3;
     StageRecord record = begun(stage);
     record.succeeded = true;
     const LawTask& task = *stage.law;
     Form form = form_at(task.shape, record.from);
+    const VectorX p = form.parameters.to_unconstrained(record.from);
+    if (form.scene->dead_load().cwiseAbs().maxCoeff() > 0.0) {
+      auto heavier = std::make_shared<PressScene>(*form.scene);
+      heavier->density *= 1.0 + judgement.given_density;
+      const CostEvaluation e =
+          objective_of({form.layout, std::move(heavier), form.parameters}, task.noise).linearise(p);
+      if (e.succeeded) record.shifts.push_back({cause_mass, gauss_newton_shift(e, largest_shift)});
+    }
+    if (capture_.scene.object.volume) return record;  // its mesh is as it was given
     try {
-      form.scene =
-          scene_of(task.shape, std::make_shared<PressScene>(scene_at(options_.cells / Refinement::mesh_ratio)));
+      form.scene = scene_of(task.shape, std::make_shared<PressScene>(scene_at(cells_ / Refinement::mesh_ratio)));
     } catch (const InputError& error) {  // too coarse for the object, or for what is pressed of it
       record.reason = error.what();
       return record;
@@ -366,7 +375,7 @@ class LawRun : StageLoop {
     if (!moved.summary.succeeded)
       record.reason = moved.summary.reason;
     else
-      record.shifts = {{cause_mesh, moved.shift(form.parameters.to_unconstrained(record.from))}};
+      record.shifts.push_back({cause_mesh, moved.shift(p)});
     return record;
   }
 
@@ -424,7 +433,7 @@ class LawRun : StageLoop {
 
   FitOutcome finish(const LawPlan::Standing& standing) {
     outcome_.interrupted = interrupted_;
-    outcome_.cells = options_.cells;
+    outcome_.cells = cells_;
     if (!standing.best) {
       outcome_.reason = interrupted_ ? "interrupted" : why_none_stands();
       return std::move(outcome_);
@@ -453,11 +462,15 @@ class LawRun : StageLoop {
         shifts_of_forms(outcome_.parameters, best.layout.mean_modulus(best.theta), standing.tried);
     const VectorX own = gauss_newton_shift(outcome_.evaluation, largest_shift);
     for (const ModelShift& s : standing.shifts)
-      shifts.push_back({s.cause, judgement.size_of_coarser_mesh * (s.shift - own)});
+      shifts.push_back(
+          {s.cause, (s.cause == cause_mesh ? judgement.size_of_coarser_mesh.value : 1.0) * (s.shift - own)});
     if (!standing.untried.empty())
       outcome_.notes.push_back("How much the estimate depends on the mesh could not be seen: " + standing.untried +
                                ".");
-    add_uncertainty(outcome_, shifts);
+    add_uncertainty(
+        outcome_, shifts,
+        options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, SeenAs::Tested) : VectorX(),
+        agreements_of(*form.scene, fitted_, outcome_.evaluation, options_.marker_noise));
     outcome_.recordings.push_back(as_recording(form.scene->body, form.layout, outcome_));
     outcome_.recordings.back().discretisation.control_points = best.shape.points;
     for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
@@ -467,6 +480,7 @@ class LawRun : StageLoop {
   }
 
   const Capture& capture_;
+  double cells_;
   std::vector<int> fitted_;  // numbers of presses
   std::shared_ptr<const PressScene> scene_;
   PressSampling::State sampled_;  // of a fit that was interrupted, until it goes on
@@ -506,6 +520,15 @@ std::vector<ModelShift> shifts_of_forms(const ParameterSet& parameters, double y
   for (std::size_t i = 0; i < of.size(); ++i)
     if (of[i]->unit == "Pa" && of[i]->transform == Transform::Logarithm) shift[Eigen::Index(i)] = farthest;
   return {{"form of the law", shift}};
+}
+
+Resolution resolution_of_tests(const Capture& capture, const FitOptions& options) {
+  const bool is_chosen = options.element || capture.scene.object.volume;
+  Resolution resolution;
+  resolution.cells = is_chosen ? options.cells : options.cells / Refinement::mesh_ratio;
+  resolution.element =
+      options.element.value_or(is_chosen ? ElementKind::Tetrahedron : ElementKind::QuadraticTetrahedron);
+  return resolution;
 }
 
 std::optional<double> known_poissons_ratio(const FitOptions& options) {

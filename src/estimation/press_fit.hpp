@@ -9,6 +9,11 @@ namespace pliant {
 RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const LawLayout& layout,
                               const FitOutcome& outcome);
 
+/// Quadratic tetrahedra, which do not lock where the material hardly changes its volume, unless others are chosen; they
+/// follow as much as half as many linear ones again along each axis, so they are so much longer. A volume that the
+/// capture gives keeps its nodes.
+Resolution resolution_of_tests(const Capture& capture, const FitOptions& options);
+
 /// Poisson's ratio where the choices give it and keep it; nothing: it is estimated.
 std::optional<double> known_poissons_ratio(const FitOptions& options);
 

@@ -1,6 +1,8 @@
 #include "estimation/press_objective.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "estimation/grip_trial.hpp"
 #include "estimation/indentation_trial.hpp"
@@ -16,7 +18,7 @@ std::vector<std::unique_ptr<PressTrial>> trials_of(const std::shared_ptr<const P
                                                    const PressObjective::Placements& begin) {
   std::vector<std::unique_ptr<PressTrial>> trials;
   for (std::size_t i = 0; i < presses.size(); ++i) {
-    const Placement* from = i < begin.size() && begin[i] ? &*begin[i] : nullptr;
+    const Placement* from = i < begin.size() && begin[i].front().nodes.size() > 0 ? &begin[i].front() : nullptr;
     trials.push_back(std::make_unique<PressTrial>(scene, presses[i], material, reference, options, 0, from));
   }
   return trials;
@@ -59,6 +61,77 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
   return trials;
 }
 
+namespace {
+
+/// Residuals of one kind of measurement.
+struct Residuals {
+  double squares = 0.0, over_noise_squares = 0.0, count = 0.0, greatest = 0.0;
+
+  void add(double square, double noise, double coordinates, double measured) {
+    squares += square, count += coordinates;
+    over_noise_squares += noise > 0.0 ? square / (noise * noise) : std::numeric_limits<double>::infinity();
+    greatest = std::max(greatest, std::abs(measured));
+  }
+  /// @param of_each  numbers of a measurement whose size is told: three of a marker's displacement
+  void conclude(const std::string& what, double of_each, std::vector<Agreement>& agreements) const {
+    if (count > 0.0 && greatest > 0.0)
+      agreements.push_back(
+          {what, std::sqrt(over_noise_squares / count), std::sqrt(of_each * squares / count) / greatest});
+  }
+};
+
+double own_scatter(const PressScene& scene, const std::vector<int>& presses) {
+  double squares = 0.0;
+  for (const int i : presses) squares += std::pow(marker_noise(scene.presses[std::size_t(i)]), 2);
+  return presses.empty() ? 0.0 : std::sqrt(squares / double(presses.size()));
+}
+
+}  // namespace
+
+std::vector<Agreement> agreements_of(const PressScene& scene, const std::vector<int>& presses,
+                                     const CostEvaluation& evaluation, double marker_noise) {
+  const StaticTests& tests = scene.static_tests();
+  std::vector<Agreement> agreements;
+  auto frame = evaluation.frames.begin();  // in the order of the objective's trials
+  Residuals pressed, gripped, forces;
+  const double noise = marker_noise > 0.0 ? marker_noise : own_scatter(scene, presses);
+  for (const int i : presses) {
+    pressed.add(frame->track_sum_squares, noise, 3.0 * frame->tracks,
+                scene.presses[std::size_t(i)].greatest_displacement);
+    ++frame;
+  }
+  pressed.conclude("the markers under presses", 3.0, agreements);
+  for (const ObservedIndentation& test : tests.indentations) {
+    if (!is_fitted(test.role)) continue;
+    Residuals curve;
+    for (std::size_t d = 0; d < test.curve.depths.size(); ++d, ++frame)
+      curve.add(2.0 * frame->cost * std::pow(test.curve.stds[d], 2), test.curve.stds[d], 1.0, test.curve.forces[d]);
+    curve.conclude("the force of " + test.name, 1.0, agreements);
+  }
+  for (const ObservedGrip& test : tests.grips) {
+    if (!is_fitted(test.role)) continue;
+    const double numbers = test.seen.trace(), own = frame->track_sum_squares;
+    if (frame->tracks > 0) gripped.add(own, test.markers_std, numbers * frame->tracks, test.displacement.norm());
+    const double of_markers = frame->tracks > 0 ? own / (test.markers_std * test.markers_std) : 0.0;
+    if (test.has_force)
+      forces.add((2.0 * frame->cost - of_markers) * test.force_std * test.force_std, test.force_std, 1.0, test.force);
+    ++frame;
+  }
+  gripped.conclude("the markers between grips", 3.0, agreements);
+  forces.conclude("the forces of grips", 1.0, agreements);
+  for (const ObservedCurve& curve : tests.curves) {
+    if (!is_fitted(curve.role)) continue;
+    const double over_noise = std::sqrt(2.0 * frame->cost / double(curve.test.stress.size()));
+    double squares = 0.0;
+    for (const double s : curve.test.std) squares += s * s;
+    const double std = std::sqrt(squares / double(curve.test.std.size()));
+    agreements.push_back(
+        {"the stress of " + curve.test.name, over_noise, over_noise * std / curve.test.greatest_stress()});
+    ++frame;
+  }
+  return agreements;
+}
+
 PressObjective::PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
                                const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options,
                                const Placements& begin)
@@ -66,9 +139,14 @@ PressObjective::PressObjective(const std::shared_ptr<const PressScene>& scene, c
       objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {
   auto trials = trials_of(scene, presses, material_, parameters.reference(), options, begin);
   trials_ = pointers(trials);
+  at_rest_.assign(trials_.begin(), trials_.end());
   std::vector<std::unique_ptr<Trial>> all = as_trials(std::move(trials));
   for (std::unique_ptr<Trial>& test : static_test_trials(scene, material_, parameters, 0)) {
     if (auto* curve = dynamic_cast<CurveTrial*>(test.get())) curves_.push_back(curve);
+    if (auto* at_rest = dynamic_cast<EquilibriumTrial*>(test.get())) {
+      if (at_rest_.size() < begin.size()) at_rest->begin_from(begin[at_rest_.size()]);
+      at_rest_.push_back(at_rest);
+    }
     all.push_back(std::move(test));
   }
   objective_ = Objective(std::move(all), std::move(parameters));
@@ -86,7 +164,7 @@ void PressObjective::set_options(const PressTrialOptions& options) {
 
 PressObjective::Placements PressObjective::placements() const {
   Placements all;
-  for (const PressTrial* trial : trials_) all.push_back(trial->placement());
+  for (const EquilibriumTrial* trial : at_rest_) all.push_back(trial->placements());
   return all;
 }
 

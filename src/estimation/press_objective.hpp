@@ -2,6 +2,7 @@
 
 #include "estimation/objective.hpp"
 #include "estimation/press_trial.hpp"
+#include "estimation/verdict.hpp"
 
 namespace pliant {
 
@@ -11,14 +12,21 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
                                                        const std::shared_ptr<PressedMaterial>& material,
                                                        const ParameterSet& parameters, int recording);
 
+/// How well each kind of measurement of the static tests to fit is met.
+/// @param evaluation    of a `PressObjective` of the scene, or of a `curve_objective` of its curves
+/// @param presses       numbers of those that take part
+/// @param marker_noise  of a coordinate of presses' markers [m]; 0: what neighbouring markers scatter
+std::vector<Agreement> agreements_of(const PressScene& scene, const std::vector<int>& presses,
+                                     const CostEvaluation& evaluation, double marker_noise = 0.0);
+
 /// The objective of an object's presses, and of the curves and grips to fit of its scene: one trial each, all of one
 /// material, whose form can change.
 class PressObjective {
  public:
-  /// Where presses are in equilibrium; nothing for those that have not been solved.
-  using Placements = std::vector<std::optional<Placement>>;
+  /// Equilibria of all trials that have any.
+  using Placements = std::vector<std::vector<Placement>>;
   /// @param presses  numbers of those that take part
-  /// @param begin    one a press, of another objective of the same presses, that equilibria set out from; or none
+  /// @param begin    of another objective of the same presses, curves and grips, that equilibria set out from; or none
   PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
                  const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options,
                  const Placements& begin = {});
@@ -31,7 +39,7 @@ class PressObjective {
   /// @param body  the same but for its modulus field
   void set_form(std::shared_ptr<const Body> body, const LawLayout& layout, ParameterSet parameters);
   void set_options(const PressTrialOptions& options);
-  /// Of the last evaluation, one a press.
+  /// Of the last evaluation.
   Placements placements() const;
   /// All residuals of the presses' points at the last evaluation [m], three a point.
   std::vector<double> residuals() const;
@@ -45,8 +53,9 @@ class PressObjective {
 
  private:
   std::shared_ptr<PressedMaterial> material_;
-  std::vector<PressTrial*> trials_;  // the objective's
-  std::vector<CurveTrial*> curves_;  // likewise
+  std::vector<PressTrial*> trials_;         // the objective's
+  std::vector<EquilibriumTrial*> at_rest_;  // these, and those of curves and grips
+  std::vector<CurveTrial*> curves_;         // likewise
   Objective objective_;
 };
 

@@ -70,6 +70,8 @@ void PressTrial::set_options(const PressTrialOptions& options) {
     deviations_.data()[k] = options.noise.deviation(seen().weight(std::size_t(k)), moved[k / 3]);
 }
 
+std::vector<Placement> PressTrial::placements() const { return {is_placed_ ? body_.placement() : Placement()}; }
+
 std::unique_ptr<Trial> PressTrial::anew() const {
   const auto material = std::make_shared<PressedMaterial>(material_->shared_body(), material_->layout());
   std::unique_ptr<PressTrial> trial(

@@ -36,6 +36,15 @@ class PressedMaterial {
   std::shared_ptr<const MaterialLaw> law_;
 };
 
+/// A trial of a body at rest under one load or several, whose equilibria a trial of the same may set out from.
+class EquilibriumTrial : public Trial {
+ public:
+  /// Of the last run, one a load; without nodes where none was found.
+  [[nodiscard]] virtual std::vector<Placement> placements() const = 0;
+  /// The next run sets out from those of another trial of the same.
+  virtual void begin_from(const std::vector<Placement>& placements) = 0;
+};
+
 struct PressTrialOptions {
   MarkerNoise noise;           ///< of a coordinate, > 0
   double outlier_scale = 0.0;  ///< residuals beyond this many deviations count less (pseudo-Huber), > 0
@@ -47,7 +56,7 @@ struct PressTrialOptions {
 /// would weigh those markers most that noise has moved least. Derivatives are those of the equilibrium, by its
 /// exact Hessian: a back-substitution a parameter, or one for all by the adjoint. Each run sets out from where the last
 /// derivatives lead from their equilibrium, or from the last equilibrium where there are none.
-class PressTrial : public Trial {
+class PressTrial : public EquilibriumTrial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is
   /// @param number     what its frame calls it (`FrameFit::recording`)
@@ -65,8 +74,8 @@ class PressTrial : public Trial {
   /// Residuals of the last run [m], and deviations they are weighed by [m], n x 3.
   const Points& residuals() const { return residuals_; }
   const Points& deviations() const { return deviations_; }
-  /// The last run's; nothing where it has failed, or none was.
-  std::optional<Placement> placement() const { return is_placed_ ? std::optional(body_.placement()) : std::nullopt; }
+  [[nodiscard]] std::vector<Placement> placements() const override;
+  void begin_from(const std::vector<Placement>& placements) override { body_.begin_from(placements.front()); }
   const ObservedPress& seen() const { return scene_->presses[std::size_t(press_)]; }
   /// Newton's iterations of the last run.
   int iterations() const { return iterations_; }

@@ -238,10 +238,12 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
 }
 
 TrackedPoints tracked_points(const Capture& capture) {
+  constexpr double unknown_noise = 1e-3, least_noise = 1e-4;  // over the object's size
   TrackedPoints tracked;
-  const double noise = capture.scene.object.surface ? 1e-3 * object_size(capture.scene) : 1e-3;
+  const double size = capture.scene.object.surface ? object_size(capture.scene) : 1.0;
   for (const MarkerTrack& block : capture.markers) {
     const MarkerSet set = read_markers(block, capture.scene.timing.frame_count());
+    const double noise = std::max(least_noise * size, track_noise(set).value_or(unknown_noise * size));
     const int sensor = int(sensor_names(capture).size()) - 1;
     const int first = int(tracked.rest.size());
     for (int m = 0; m < set.marker_count(); ++m) tracked.rest.push_back(set.rest.row(m).transpose());

@@ -83,7 +83,8 @@ struct TrackedPoints {
   std::map<int, std::vector<TrackObservation>> frames;  ///< by the recording's frame
 };
 
-/// Reads them. Where the capture does not say how noisy they are, a thousandth of the object's size stands in.
+/// Reads them, each block as noisy as its track shows (`track_noise`); where too few frames tell, a thousandth of the
+/// object's size stands in.
 TrackedPoints tracked_points(const Capture& capture);
 
 /// Observations of the frames from the start on, numbered from it. Frames before a release show the pose from which the

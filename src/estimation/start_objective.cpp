@@ -10,11 +10,9 @@ namespace pliant {
 namespace {
 
 StartObjective of_static_tests(const Capture& capture, const FitOptions& options) {
-  Resolution resolution;
-  resolution.cells = options.cells;
-  resolution.element = options.element.value_or(ElementKind::Tetrahedron);
   std::vector<Vector3> control_points;
-  const auto body = make_body_of(capture.scene, SignedDistance(), resolution, control_points);
+  const auto body =
+      make_body_of(capture.scene, SignedDistance(), resolution_of_tests(capture, options), control_points);
   const auto scene = std::make_shared<PressScene>(make_press_scene(capture, body));
   std::vector<int> fitted;
   for (int i = 0; i < int(scene->presses.size()); ++i)

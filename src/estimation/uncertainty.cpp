@@ -17,13 +17,15 @@ constexpr double normal_90 = 1.6448536269514722;
 /// numbers, a share of their values, or of what is usual where they are less than that.
 struct Unmodelled {
   const char* name;
-  double in_flight_and_contact, at_rest_or_swinging;
+  double meeting_obstacles, free, tested;
 };
 constexpr Unmodelled unmodelled[] = {
-    {"youngs_modulus", judgement.floor_youngs_modulus, judgement.free_floor_youngs_modulus},
-    {"poissons_ratio", judgement.floor_poissons_ratio, judgement.free_floor_poissons_ratio},
-    {"mass_damping", judgement.floor_mass_damping, judgement.free_floor_mass_damping},
-    {"stiffness_damping", judgement.floor_stiffness_damping, judgement.free_floor_stiffness_damping}};
+    {"youngs_modulus", judgement.floor_youngs_modulus, judgement.free_floor_youngs_modulus,
+     judgement.test_floor_youngs_modulus},
+    {"poissons_ratio", judgement.floor_poissons_ratio, judgement.free_floor_poissons_ratio,
+     judgement.test_floor_poissons_ratio},
+    {"mass_damping", judgement.floor_mass_damping, judgement.free_floor_mass_damping, 0.0},
+    {"stiffness_damping", judgement.floor_stiffness_damping, judgement.free_floor_stiffness_damping, 0.0}};
 
 }  // namespace
 
@@ -136,13 +138,16 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
   return u;
 }
 
-VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, bool meets_obstacles) {
+VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, SeenAs object) {
   VectorX floor = VectorX::Zero(parameters.dimension());
   const std::vector<const Parameter*> of = parameters.coordinate_parameters();
   for (std::size_t i = 0; i < of.size(); ++i) {
     const std::string base = of[i]->name.substr(0, of[i]->name.find('@'));
     for (const Unmodelled& u : unmodelled)
-      if (base == u.name) floor[Eigen::Index(i)] = meets_obstacles ? u.in_flight_and_contact : u.at_rest_or_swinging;
+      if (base == u.name || base.starts_with(std::string(u.name) + "_"))
+        floor[Eigen::Index(i)] = object == SeenAs::MeetingObstacles ? u.meeting_obstacles
+                                 : object == SeenAs::Free           ? u.free
+                                                                    : u.tested;
     if (of[i]->transform != Transform::LogitHalf) continue;
     const double nu = theta[of[i]->at];  // whose logit ln(2 nu / (1 - 2 nu)) has the derivative 1 / (nu (1 - 2 nu))
     floor[Eigen::Index(i)] /= std::max(1e-3, nu * (1.0 - 2.0 * nu));

@@ -68,9 +68,13 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
 /// set by the errors of fits to recordings of an independent simulator with neo-Hookean elasticity and Kelvin-Voigt
 /// damping of the Green strain; not judged on others yet.
 /// Of Poisson's ratio it is the same number whatever its value: near one half it is the more in the logit.
-/// @param theta            the estimate
-/// @param meets_obstacles  whether the object moves and meets planes; else it swings or hangs
-VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, bool meets_obstacles);
+/// @param theta  the estimate
+enum class SeenAs {
+  MeetingObstacles,  ///< it moves and meets planes
+  Free,              ///< it swings or hangs
+  Tested,            ///< it is pressed or pulled with known force
+};
+VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, SeenAs object);
 
 /// Two-sided 90 % quantile of Student's t, by its expansion about the normal one; within 1 % from two degrees of
 /// freedom on.

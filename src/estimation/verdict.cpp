@@ -43,7 +43,8 @@ void look_at_residuals(const CostEvaluation& evaluation, const ResidualLimits& l
   if (ratio > limits.overall)
     unexplained(
         fmt::format("The distances between what was seen and the simulated object are {:.1f} times the noise.", ratio));
-  if (const double matched = evaluation.matched_fraction(); matched < judgement.least_matched)
+  const bool sees_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
+  if (const double matched = evaluation.matched_fraction(); sees_surface && matched < judgement.least_matched)
     unexplained(fmt::format("{:.0f} % of the observed points lie too far from the simulated object to be matched.",
                             100.0 * (1.0 - matched)));
   const std::vector<double> over_time = residuals_over_noise(evaluation);
@@ -117,6 +118,21 @@ std::vector<double> residuals_over_noise(const CostEvaluation& evaluation) {
 Verdict verdict_of(const CostEvaluation& evaluation, const Uncertainty& uncertainty, const ParameterSet& parameters) {
   Verdict verdict;
   look_at_residuals(evaluation, far_above_noise, verdict);
+  if (uncertainty.std.size() == parameters.dimension()) look_at_moduli(uncertainty, parameters, verdict);
+  return verdict;
+}
+
+Verdict verdict_of(const std::vector<Agreement>& agreements, const Uncertainty& uncertainty,
+                   const ParameterSet& parameters) {
+  Verdict verdict;
+  for (const Agreement& a : agreements) {
+    if (!(a.over_noise > judgement.residual && a.relative > judgement.relative_residual)) continue;
+    verdict.kind = Verdict::Kind::Unexplained;
+    const std::string over_noise =
+        std::isfinite(a.over_noise) ? fmt::format(", {:.1f} times the noise", a.over_noise) : "";
+    verdict.reasons.push_back(fmt::format("The model misses {} by {:.0f} % of the greatest measured{}.", a.what,
+                                          100.0 * a.relative, over_noise));
+  }
   if (uncertainty.std.size() == parameters.dimension()) look_at_moduli(uncertainty, parameters, verdict);
   return verdict;
 }

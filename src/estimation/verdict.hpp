@@ -35,6 +35,18 @@ double misfit_of(const CostEvaluation& evaluation);
 /// closer limits than those of a verdict, for choosing what is fitted.
 bool is_explained(const CostEvaluation& evaluation);
 
+/// How far one kind of measurement of static tests is from what the estimate has there.
+struct Agreement {
+  std::string what;         ///< for people: "the markers under presses"
+  double over_noise = 0.0;  ///< root mean square residual over the measurement's noise; infinite where that is unknown
+  double relative = 0.0;    ///< the same over the greatest that was measured of its kind
+};
+
+/// Static tests are unexplained where a kind of measurement is missed by more than its noise and by more than a small
+/// part of what was measured: a law of few numbers need not meet a load cell to its last digit.
+Verdict verdict_of(const std::vector<Agreement>& agreements, const Uncertainty& uncertainty,
+                   const ParameterSet& parameters);
+
 /// @param evaluation   at the estimate
 /// @param uncertainty  of the estimate; empty where nothing was estimated
 Verdict verdict_of(const CostEvaluation& evaluation, const Uncertainty& uncertainty, const ParameterSet& parameters);

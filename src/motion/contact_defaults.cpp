@@ -11,6 +11,7 @@ namespace pliant {
 namespace {
 
 constexpr double bond = 10.0;              // stiffness of a bonded disc and of a punch, in layers of elements
+constexpr double quadratic_bond = 50.0;    // of a disc bonded to quadratic elements, whose faces bend at its edge
 constexpr double ball_stiffness = 100.0;   // of a ball, which touches a small part of an element
 constexpr double punch_smoothing = 0.005;  // over which pressure sets in, in radii
 constexpr double ball_smoothing = 0.01;    // likewise
@@ -33,7 +34,8 @@ RigidContact bonded_disc(const Body& body, const ProbeOptions& probe, double you
                       "a contact whose centre lies on the surface at rest",
                       "correct where the probe touches the object"});
   }
-  return RigidContact::bonded(body, disc, bond_stiffness(youngs_modulus, mean_edge(body)));
+  const double layers = body.kind == ElementKind::QuadraticTetrahedron ? quadratic_bond / bond : 1.0;
+  return RigidContact::bonded(body, disc, layers * bond_stiffness(youngs_modulus, mean_edge(body)));
 }
 
 }  // namespace

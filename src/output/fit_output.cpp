@@ -13,6 +13,7 @@
 #include "base/files.hpp"
 #include "elasticity/element_moduli.hpp"
 #include "elasticity/law_elasticity.hpp"
+#include "elasticity/law_layout.hpp"
 #include "estimation/judgement.hpp"
 #include "estimation/load_free.hpp"
 #include "live/live_page.hpp"
@@ -207,6 +208,14 @@ ConvergenceHistory drawn_history(const FitOutcome& outcome) {
   return history;
 }
 
+/// Of what follows from several coordinates: half of a 90 % interval over the deviation, the greatest of them.
+double largest_quantile(const Uncertainty& u) {
+  double most = 1.6449;
+  for (Eigen::Index i = 0; i < u.std.size(); ++i)
+    if (u.std[i] > 0.0) most = std::max(most, u.high[i] / u.std[i]);
+  return most;
+}
+
 /// The field over the object, and its mean where the control points' parameters leave that out.
 void add_modulus_field(Result& result, const FitOutcome& outcome) {
   const RecordingOutcome& first = outcome.recordings.front();
@@ -231,8 +240,43 @@ void add_modulus_field(Result& result, const FitOutcome& outcome) {
   if (result.find("youngs_modulus")) return;
   const ModulusStatistics statistics = modulus_statistics(outcome);
   ParameterResult mean{"youngs_modulus", statistics.mean, "Pa", {}, {}, true};
-  if (covariance.size() > 0) mean.std = statistics.mean_std;
+  if (covariance.size() > 0) {
+    mean.std = statistics.mean_std;
+    const double factor = std::exp(largest_quantile(outcome.uncertainty) * statistics.mean_std / statistics.mean);
+    mean.interval_90 = std::pair(statistics.mean / factor, statistics.mean * factor);
+  }
   result.parameters.insert(result.parameters.begin(), std::move(mean));
+}
+
+/// Poisson's ratio at small strain, the mean over the object, where terms or zones of a law have their own.
+void add_mean_ratio(Result& result, const FitOutcome& outcome) {
+  if (!outcome.law || outcome.law->sampled || result.find("poissons_ratio")) return;
+  const Body& body = *outcome.law->scene->body;
+  const auto mean_at = [&](const VectorX& theta) {
+    const auto law = law_at(body, outcome.law->layout, theta);
+    double sum = 0.0;
+    for (int e = 0; e < body.element_count(); ++e)
+      sum += body.element_volume[std::size_t(e)] / body.volume() * law->small_strain(e).poissons_ratio;
+    return sum;
+  };
+  ParameterResult mean{"poissons_ratio", mean_at(outcome.theta), "1", {}, {}, true};
+  if (outcome.covariance.size() > 0) {
+    const VectorX here = outcome.parameters.to_unconstrained(outcome.theta);
+    VectorX by(here.size());
+    for (Eigen::Index i = 0; i < here.size(); ++i) {
+      constexpr double step = 1e-4;
+      const VectorX to = step * VectorX::Unit(here.size(), i);
+      by[i] = (mean_at(outcome.parameters.to_theta(here + to)) - mean_at(outcome.parameters.to_theta(here - to))) /
+              (2.0 * step);
+    }
+    const double std = std::sqrt(std::max(0.0, by.dot(outcome.covariance * by)));
+    const double nu = std::get<double>(mean.value), logit = std::log(2.0 * nu / (1.0 - 2.0 * nu));
+    const double half = largest_quantile(outcome.uncertainty) * std / std::max(1e-9, nu * (1.0 - 2.0 * nu));
+    const auto at = [](double x) { return 0.5 / (1.0 + std::exp(-x)); };
+    mean.std = std;
+    mean.interval_90 = std::pair(at(logit - half), at(logit + half));
+  }
+  result.parameters.push_back(std::move(mean));
 }
 
 }  // namespace
@@ -325,10 +369,8 @@ std::optional<PriorResult> prior_of(const Parameter& p, const FitOutcome& outcom
 
 void add_verdict(Result& result, const FitOutcome& outcome, const MatrixX& jacobian) {
   if (outcome.uncertainty.std.size() == 0) return;
-  if (!outcome.law) {  // the noise of presses is what their residuals say
-    result.verdict = name_of(outcome.verdict.kind);
-    result.reasons = outcome.verdict.reasons;
-  }
+  result.verdict = name_of(outcome.verdict.kind);
+  result.reasons = outcome.verdict.reasons;
   for (const UncertaintyShare& share : outcome.uncertainty.budget) {
     UncertaintyResult of_cause{share.cause, {}};
     int at = 0;
@@ -369,6 +411,7 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
     result.parameters.push_back(std::move(r));
   }
   add_modulus_field(result, outcome);
+  add_mean_ratio(result, outcome);
   add_verdict(result, outcome, jacobian);
   result.material = outcome.material;
   for (const Judged& number : all_judged()) result.judgement[number.name] = number;

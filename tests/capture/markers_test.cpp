@@ -1,5 +1,9 @@
 #include "capture/markers.hpp"
 
+#include <cmath>
+#include <limits>
+#include <random>
+
 #include "input_errors.hpp"
 #include "support/c3d_writer.hpp"
 #include "temporary_folder.hpp"
@@ -158,6 +162,24 @@ TEST_F(MarkerFiles, C3dSlipsAreTold) {
   file.labels.assign(3, "");
   file.units = "m";
   EXPECT_THAT(said(file), HasSubstr("expected labels in POINT:LABELS"));
+}
+
+TEST(TrackNoise, IsThatOfTheReadingsNotOfASmoothMotion) {
+  constexpr double noise = 2e-4;
+  std::mt19937 random(7);
+  std::normal_distribution<double> error(0.0, noise);
+  MarkerSet set;
+  set.rest = Points::Zero(5, 3);
+  for (int f = 0; f < 100; ++f) {
+    Points at(5, 3);
+    for (Eigen::Index k = 0; k < at.size(); ++k) at.data()[k] = 0.03 * std::sin(0.2 * f + double(k)) + error(random);
+    if (f == 40) at.row(2).setConstant(std::numeric_limits<double>::quiet_NaN());  // not seen
+    set.frames.push_back(at);
+  }
+  ASSERT_TRUE(track_noise(set));
+  EXPECT_NEAR(*track_noise(set), noise, 0.1 * noise);
+  set.frames.resize(3);
+  EXPECT_FALSE(track_noise(set)) << "no third difference";
 }
 
 TEST_F(MarkerFiles, DeviationsAreMatchedById) {

@@ -330,7 +330,7 @@ TEST(FitState, RoundTripsToTheLastBit) {
   EXPECT_EQ(found.noise, found_written.noise);
   EXPECT_EQ(found.track_squares, found_written.track_squares);
   EXPECT_EQ(found.deviation, found_written.deviation);
-  EXPECT_EQ(found.curve_cost, found_written.curve_cost);
+  EXPECT_EQ(found.stated_cost, found_written.stated_cost);
   EXPECT_EQ(found.observations, found_written.observations);
   EXPECT_EQ(found.dimension, found_written.dimension);
   EXPECT_EQ(found.evidence, found_written.evidence);

@@ -1,5 +1,6 @@
 #include "estimation/static_tests.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "estimation/curve_fit.hpp"
@@ -117,6 +118,33 @@ TEST(StaticTests, AGivenPoissonsRatioStays) {
   ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
   EXPECT_EQ(found.theta[found.law->layout.poissons_ratio()], ratio);
   EXPECT_EQ(found.parameters.dimension(), 2);
+}
+
+TEST(StaticTests, ALawThatMissesForcesLeavesThemUnexplained) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.002, CurveKinds{});
+  FitOptions options;
+  options.law_zones = 1, options.control_points = 1, options.alternatives = false;
+  options.law_terms = 1;
+  EXPECT_EQ(fit_presses(capture, options).verdict.kind, Verdict::Kind::Explained);
+  options.material = MaterialKind::Linear;
+  const FitOutcome linear = fit_presses(capture, options);
+  EXPECT_EQ(linear.verdict.kind, Verdict::Kind::Unexplained);
+  EXPECT_THAT(linear.verdict.reasons, ::testing::Contains(::testing::HasSubstr("The model misses")));
+}
+
+TEST(StaticTests, ForcesOfGripsCountForTheChoiceOfALaw) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.01, {.indentations = false, .curves = false});
+  FitOptions options;
+  options.law_zones = 1, options.control_points = 1, options.alternatives = false;
+  const FitOutcome found = fit_presses(capture, options);
+  ASSERT_TRUE(found.law) << found.reason;
+  ASSERT_EQ(found.law->tried.size(), 2U);
+  const TriedLaw& two_terms = found.law->tried.back();
+  EXPECT_EQ(two_terms.form.terms, 2);
+  EXPECT_TRUE(std::isfinite(two_terms.evidence)) << two_terms.evidence;
+  EXPECT_FALSE(two_terms.kept) << "one term made them";
 }
 
 TEST(StaticTests, GuessesComeNearWhereTheFormulaHolds) {
