@@ -66,9 +66,11 @@ std::string inner(const char* contact) {
   return std::string("[[inner]]\nsurface = \"core.obj\"\ncontact = \"") + contact + "\"\n";
 }
 
+/// By the elements that made the recording, so that the truth's own error is the fit's.
 ProgramRun fit(const std::string& capture, const std::string& out, const std::vector<std::string>& more = {}) {
   std::vector<std::string> arguments = {"fit", capture, "--out", out};
-  for (const char* choice : {"cells=6", "material=neo_hookean", "law_zones=1", "control_points=1"})
+  for (const char* choice :
+       {"element=tetrahedra", "cells=6", "material=neo_hookean", "law_zones=1", "control_points=1"})
     arguments.insert(arguments.end(), {"--set", choice});
   arguments.insert(arguments.end(), more.begin(), more.end());
   return run_pliant(arguments);

@@ -137,7 +137,8 @@ TEST_F(Fitted, PressesOfAStiffeningBlock) {
   for (const char* force : {"[0, -4, 0]", "[0, -8, 0]", "[3, -6, 0]", "[0, 5, 2]"})
     presses += std::string("[[press]]\nat = [0, 0.025, 0]\nradius = 0.012\nforce = ") + force + "\n";
   const auto result =
-      fitted(block + presses + markers, {"cells=4", "material=ogden", "law_terms=1", "law_zones=1", "control_points=1"},
+      fitted(block + presses + markers,
+             {"element=tetrahedra", "cells=4", "material=ogden", "law_terms=1", "law_zones=1", "control_points=1"},
              {{"MATERIAL", "law = \"ogden\"\nexponents = [5.0]"}, {"ELEMENT", "element = \"tetrahedra\""}});
   expect_found(result, "youngs_modulus", of_tetrahedra);
   expect_found(result, "exponent_1", 0.25);
