@@ -95,6 +95,7 @@ double misfit_of(const CostEvaluation& evaluation) {
 
 bool is_explained(const CostEvaluation& evaluation) {
   Verdict verdict;
+  if (std::ranges::none_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; })) return false;
   look_at_residuals(evaluation, above_noise, verdict);
   return verdict.kind == Verdict::Kind::Explained;
 }

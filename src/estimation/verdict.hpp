@@ -32,7 +32,8 @@ std::vector<double> residuals_over_noise(const CostEvaluation& evaluation);
 double misfit_of(const CostEvaluation& evaluation);
 
 /// Whether residuals are near the noise, over all frames and for every while, and most points are matched: within
-/// closer limits than those of a verdict, for choosing what is fitted.
+/// closer limits than those of a verdict, for choosing what is fitted. Never where followed points alone were seen: a
+/// tracker's noise is a guess.
 bool is_explained(const CostEvaluation& evaluation);
 
 /// How far one kind of measurement of static tests is from what the estimate has there.
