@@ -183,8 +183,9 @@ VectorX FitRun::floor(const ParameterSet& parameters, const VectorX& theta) cons
   const bool meets = std::ranges::any_of(recordings_.all(), [](const Recording& r) {
     return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static;
   });
-  return options_.alternatives ? unmodelled_std(parameters, theta, meets ? SeenAs::MeetingObstacles : SeenAs::Free)
-                               : VectorX();
+  return options_.alternatives
+             ? unmodelled_std(parameters, theta, meets ? MeasuredAs::MeetingObstacles : MeasuredAs::Free)
+             : VectorX();
 }
 
 /// The estimate on the finest mesh; that at all resolutions goes into the outcome.

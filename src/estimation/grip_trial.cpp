@@ -98,18 +98,17 @@ Points GrippedBody::internal_forces() const {
   return forces;
 }
 
-Points GrippedBody::response(const Points& forces) { return responses({-forces}).front(); }
+Points GrippedBody::response(const Points& forces) { return responses({forces}).front(); }
 
-std::vector<Points> GrippedBody::responses(const std::vector<Points>& gradients) {
+std::vector<Points> GrippedBody::responses(std::vector<Points> forces) {
   const Eigen::Index nodes = body_->node_count();
-  std::vector<Points> changes;
-  for (const Points& gradient : gradients) {
-    changes.emplace_back(Points::Zero(nodes + equilibrium_.contact_count(), 3));
-    changes.back().topRows(nodes) = -gradient;
+  for (Points& of : forces) {
+    of.conservativeResize(nodes + equilibrium_.contact_count(), 3);
+    of.bottomRows(equilibrium_.contact_count()).setZero();
   }
-  equilibrium_.respond(changes);
-  for (Points& change : changes) change.conservativeResize(nodes, 3);
-  return changes;
+  equilibrium_.respond(forces);
+  for (Points& change : forces) change.conservativeResize(nodes, 3);
+  return forces;
 }
 
 double GrippedBody::force() const { return (internal_forces() - dead_load_).cwiseProduct(direction_).sum(); }
@@ -182,7 +181,9 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
                           change.row(nodes[a]) += share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
                       });
   MatrixX by_parameters(off.size() + 1, Eigen::Index(numbers.count()));
-  const std::vector<Points> moves = body_.responses(changes);
+  std::vector<Points> forces;
+  for (const Points& change : changes) forces.emplace_back(-change);
+  const std::vector<Points> moves = body_.responses(std::move(forces));
   for (std::size_t k = 0; k < numbers.count(); ++k) {
     const Points& moved = moves[k];
     Points there = body_.embedding().positions(moved);

@@ -27,8 +27,8 @@ class GrippedBody {
   [[nodiscard]] bool prepare_derivatives();
   /// Change of the nodes for a change of the forces on them: see `Equilibrium::response`.
   [[nodiscard]] Points response(const Points& forces);
-  /// The same for several changes of the energy's gradient [N].
-  [[nodiscard]] std::vector<Points> responses(const std::vector<Points>& gradients);
+  /// The same of several changes together, which costs less than one by one.
+  [[nodiscard]] std::vector<Points> responses(std::vector<Points> forces);
   /// Change of the measured force for a change of the nodes that are free [N/m], one row a node.
   const Points& force_by_nodes() const { return force_by_nodes_; }
   /// The measured force's direction at the nodes that are moved, zero elsewhere.

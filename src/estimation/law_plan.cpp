@@ -169,20 +169,12 @@ class LawPlan::Replay {
     const LawShape shape{
         {facts_.controls(), terms, 1, false, is_neo_hookean ? ElasticLaw::NeoHookean : ElasticLaw::Corotated}};
     const char* const name = terms > 0 ? "1 term" : is_neo_hookean ? "neo-Hookean" : "linear";
-    VectorX start = facts_.parameters(shape).reference();
-    std::optional<Estimate> first = estimate(shape, scaled(shape, start, name), name);
-    // Curves of growing load fit exponents of either sign, each in a valley of its own: the better is kept.
-    if (terms == 1 && facts_.has_curves && !is_pending()) {
-      const MarkerNoise noise = now_.noise;
-      start[facts_.layout(shape.form).exponent(0)] *= -2.0;
-      std::optional<Estimate> other = estimate(shape, scaled(shape, start, name), name);
-      if (other &&
-          (!first || other->found.squares(first->found.deviation) < first->found.squares(first->found.deviation)))
-        first = std::move(other);
-      else
-        now_.noise = noise;
-      if (is_pending()) now_.best = first;  // until the other one is known
+    std::vector<VectorX> starts = {facts_.parameters(shape).reference()};
+    if (terms == 1 && facts_.has_curves) {  // curves of growing load fit exponents of either sign
+      starts.push_back(starts.front());
+      starts.back()[facts_.layout(shape.form).exponent(0)] *= -2.0;
     }
+    std::optional<Estimate> first = estimate_from(shape, starts, name);
     if (!first) return false;
     const TriedLaw tried{shape.form, first->cost, infinite, true};
     conclude(std::move(first), tried, now_.noise);
@@ -200,14 +192,17 @@ class LawPlan::Replay {
   }
 
   /// From each of the starts, each in a valley of its own; that with the least squares. Nothing where the next one is
-  /// not known yet.
+  /// not known yet: the first form of all is the best that there is until then.
   std::optional<Estimate> estimate_from(const LawShape& shape, const std::vector<VectorX>& starts,
                                         const std::string& name) {
     std::optional<Estimate> found;
     for (const VectorX& start : starts) {
       const MarkerNoise noise = now_.noise;
-      std::optional<Estimate> next = estimate(shape, start, name);
-      if (is_pending()) return std::nullopt;
+      std::optional<Estimate> next = estimate(shape, now_.best ? start : scaled(shape, start, name), name);
+      if (is_pending()) {
+        if (!now_.best) now_.best = std::move(found);
+        return std::nullopt;
+      }
       if (next && (!found || squares_below(*next, *found)))
         found = std::move(next);
       else

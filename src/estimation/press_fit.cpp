@@ -469,7 +469,7 @@ class LawRun : StageLoop {
                                ".");
     add_uncertainty(
         outcome_, shifts,
-        options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, SeenAs::Tested) : VectorX(),
+        options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, MeasuredAs::Tested) : VectorX(),
         agreements_of(*form.scene, fitted_, outcome_.evaluation, options_.marker_noise));
     outcome_.recordings.push_back(as_recording(form.scene->body, form.layout, outcome_));
     outcome_.recordings.back().discretisation.control_points = best.shape.points;

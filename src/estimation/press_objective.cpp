@@ -92,6 +92,7 @@ std::vector<Agreement> agreements_of(const PressScene& scene, const std::vector<
                                      const CostEvaluation& evaluation, double marker_noise) {
   const StaticTests& tests = scene.static_tests();
   std::vector<Agreement> agreements;
+  if (!evaluation.succeeded) return agreements;
   auto frame = evaluation.frames.begin();  // in the order of the objective's trials
   Residuals pressed, gripped, forces;
   const double noise = marker_noise > 0.0 ? marker_noise : own_scatter(scene, presses);

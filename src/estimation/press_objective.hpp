@@ -12,7 +12,7 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
                                                        const std::shared_ptr<PressedMaterial>& material,
                                                        const ParameterSet& parameters, int recording);
 
-/// How well each kind of measurement of the static tests to fit is met.
+/// How well each kind of measurement of the static tests to fit is met; nothing where the evaluation failed.
 /// @param evaluation    of a `PressObjective` of the scene, or of a `curve_objective` of its curves
 /// @param presses       numbers of those that take part
 /// @param marker_noise  of a coordinate of presses' markers [m]; 0: what neighbouring markers scatter

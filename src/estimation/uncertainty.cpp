@@ -138,16 +138,16 @@ Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<M
   return u;
 }
 
-VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, SeenAs object) {
+VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, MeasuredAs object) {
   VectorX floor = VectorX::Zero(parameters.dimension());
   const std::vector<const Parameter*> of = parameters.coordinate_parameters();
   for (std::size_t i = 0; i < of.size(); ++i) {
     const std::string base = of[i]->name.substr(0, of[i]->name.find('@'));
     for (const Unmodelled& u : unmodelled)
       if (base == u.name || base.starts_with(std::string(u.name) + "_"))
-        floor[Eigen::Index(i)] = object == SeenAs::MeetingObstacles ? u.meeting_obstacles
-                                 : object == SeenAs::Free           ? u.free
-                                                                    : u.tested;
+        floor[Eigen::Index(i)] = object == MeasuredAs::MeetingObstacles ? u.meeting_obstacles
+                                 : object == MeasuredAs::Free           ? u.free
+                                                                        : u.tested;
     if (of[i]->transform != Transform::LogitHalf) continue;
     const double nu = theta[of[i]->at];  // whose logit ln(2 nu / (1 - 2 nu)) has the derivative 1 / (nu (1 - 2 nu))
     floor[Eigen::Index(i)] /= std::max(1e-3, nu * (1.0 - 2.0 * nu));

@@ -64,17 +64,19 @@ std::optional<MatrixX> covariance_between(const CostEvaluation& evaluation, cons
 Uncertainty uncertainty_of(const CostEvaluation& evaluation, const std::vector<ModelShift>& shifts,
                            const VectorX& floor, int recordings = 1);
 
+/// The situation in which an object was measured.
+enum class MeasuredAs {
+  MeetingObstacles,  ///< it moves and meets planes
+  Free,              ///< it swings or hangs
+  Tested,            ///< it is pressed or pulled with known force
+};
+
 /// What remains of models whose law and damping are not those of the object, for each unconstrained coordinate:
 /// set by the errors of fits to recordings of an independent simulator with neo-Hookean elasticity and Kelvin-Voigt
 /// damping of the Green strain; not judged on others yet.
 /// Of Poisson's ratio it is the same number whatever its value: near one half it is the more in the logit.
 /// @param theta  the estimate
-enum class SeenAs {
-  MeetingObstacles,  ///< it moves and meets planes
-  Free,              ///< it swings or hangs
-  Tested,            ///< it is pressed or pulled with known force
-};
-VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, SeenAs object);
+VectorX unmodelled_std(const ParameterSet& parameters, const VectorX& theta, MeasuredAs object);
 
 /// Two-sided 90 % quantile of Student's t, by its expansion about the normal one; within 1 % from two degrees of
 /// freedom on.

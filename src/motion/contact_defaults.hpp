@@ -61,7 +61,7 @@ RigidContact inner_contact(const Body& body, std::shared_ptr<const RigidShape> s
 
 /// Stiffness [Pa/m] of a disc's bond on elements of some edge [m]. Faces that a disc covers in part would follow it as
 /// a whole were it much stiffer, as if it were wider by about half an edge, or held what is held; softer by much, the
-/// disc would sink in. At ten times the stiffness of a layer of elements both are small.
+/// disc would sink in. At ten times the stiffness of a layer both are small, of linear elements: see `probe_contact`.
 double bond_stiffness(double youngs_modulus, double edge);
 
 /// Mean edge of a body's tetrahedra [m], as if they were regular.

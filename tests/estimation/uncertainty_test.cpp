@@ -61,7 +61,7 @@ TEST(UnmodelledStd, IsAShareOfADampingOrOfWhatIsUsualWhereItIsLess) {
   for (const double value : {1e-4, 4e-3, 0.2}) {
     const VectorX theta = VectorX::Constant(1, value);
     const ParameterSet set(layout, {damping}, theta);
-    const VectorX p = set.to_unconstrained(theta), floor = unmodelled_std(set, theta, SeenAs::MeetingObstacles);
+    const VectorX p = set.to_unconstrained(theta), floor = unmodelled_std(set, theta, MeasuredAs::MeetingObstacles);
     EXPECT_NEAR(set.jacobian(p)(0, 0) * floor[0], 0.16 * std::hypot(value, 0.004), 1e-12) << value;
   }
 }
