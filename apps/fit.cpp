@@ -88,6 +88,7 @@ void print_parameter(const ParameterResult& p) {
 }
 
 void print_error(const RecordingResult& r, const char* what) {
+  if (!r.error.surface_rms && !r.error.marker_rms) return;  // of curves alone, which have lines of their own
   std::cout << "  " << what << r.name << ": ";
   if (r.error.surface_rms) std::cout << 1e3 * *r.error.surface_rms << " mm rms of the surface ";
   if (r.error.marker_rms) std::cout << 1e3 * *r.error.marker_rms << " mm rms of the markers ";
@@ -95,9 +96,14 @@ void print_error(const RecordingResult& r, const char* what) {
 }
 
 void print_agreement(const Result& result, const FitOutcome& outcome, double seconds) {
-  if (outcome.law)
-    for (const StaticError& press : press_errors(*outcome.law->scene, outcome.law->predictions))
+  const auto print_tests = [](const PressScene& scene, const std::vector<PressPrediction>& predictions) {
+    for (const StaticError& press : press_errors(scene, predictions))
       if (press.role == "test") std::cout << "  " << press_sentence(press) << "\n";
+  };
+  if (outcome.law) {
+    print_tests(*outcome.law->scene, outcome.law->predictions);
+    for (const TestedObject& other : outcome.law->others) print_tests(*other.scene, other.predictions);
+  }
   for (const CurvePrediction& curve : result.curves) std::cout << "  " << curve_sentence(curve) << "\n";
   char line[200] = "  ";
   if (outcome.law && result.error.marker_rms)

@@ -9,34 +9,12 @@
 #include "estimation/notes.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/press_objective.hpp"
-#include "estimation/problem.hpp"
+#include "estimation/specimens.hpp"
 
 namespace pliant {
 
-namespace {
-
-std::shared_ptr<const PressScene> scene_of(const Capture& capture, const FitOptions& options) {
-  if (capture.scene.object.surface) {
-    std::vector<Vector3> control_points;
-    auto body = std::make_shared<Body>(
-        *make_body_of(capture.scene, SignedDistance(), resolution_of_tests(capture, options), control_points));
-    body->modulus = unit_element()->modulus;  // a specimen tells of one material
-    body->modulus.relative.assign(std::size_t(body->element_count()), 1.0);
-    return std::make_shared<PressScene>(make_press_scene(capture, std::move(body)));
-  }
-  PressScene scene;
-  scene.body = unit_element();
-  scene.unit_weight = Points::Zero(scene.body->node_count(), 3);
-  scene.density = capture.scene.object.density.value_or(0.0);
-  StaticTests tests;
-  tests.curves = observed_curves(capture);
-  scene.tests = std::make_shared<StaticTests>(std::move(tests));
-  return std::make_shared<PressScene>(std::move(scene));
-}
-
-}  // namespace
-
-FitOutcome fit_material_curves(const Capture& capture, const FitOptions& options) {
+FitOutcome fit_material_curves(const std::vector<const Capture*>& captures, const FitOptions& options) {
+  const Capture& capture = *captures.front();
   if (options.material == MaterialKind::Sampled)
     throw InputError({{capture.file},
                       "material=sampled and no press to fit",
@@ -44,10 +22,13 @@ FitOutcome fit_material_curves(const Capture& capture, const FitOptions& options
                       "leave out material, or choose ogden or linear"});
   FitOutcome outcome;
   LawOutcome law;
-  law.scene = scene_of(capture, options);
+  const std::vector<TestedSpecimen> specimens = specimens_of(captures, options);
   std::vector<MaterialTest> fitted;
-  for (const ObservedCurve& curve : law.scene->static_tests().curves)
-    if (curve.role == "fit") fitted.push_back(curve.test);
+  std::vector<int> of;  // the number of each one's specimen
+  for (std::size_t i = 0; i < specimens.size(); ++i)
+    for (const ObservedCurve& curve : specimens[i].scene->static_tests().curves)
+      if (curve.role == "fit") fitted.push_back(curve.test), of.push_back(int(i));
+  law.scene = specimens.front().scene;
   CurveFitOptions choices;
   choices.poissons_ratio = known_poissons_ratio(options);
   if (options.law_terms > 0) choices.max_terms = options.law_terms;
@@ -79,10 +60,15 @@ FitOutcome fit_material_curves(const Capture& capture, const FitOptions& options
   outcome.evaluation = objective.linearise(outcome.parameters.to_unconstrained(fit.theta));
   outcome.start_cost = fit.tried.front().cost, outcome.final_cost = outcome.evaluation.cost;
   law.law = press_law(*law.scene->body, fit.layout, fit.theta);
-  if (outcome.evaluation.succeeded) add_uncertainty(outcome, {}, {}, agreements_of(*law.scene, {}, outcome.evaluation));
+  for (std::size_t f = 0; f < outcome.evaluation.frames.size(); ++f) outcome.evaluation.frames[f].recording = of[f];
+  for (std::size_t i = 0; i < specimens.size(); ++i) {
+    const std::shared_ptr<const PressScene>& scene = specimens[i].scene;
+    if (i > 0) law.others.push_back({scene, press_law(*scene->body, fit.layout, fit.theta), {}});
+    outcome.recordings.push_back(as_recording(scene->body, law.layout, outcome, int(i)));
+  }
+  if (outcome.evaluation.succeeded) add_uncertainty(outcome, {}, {}, agreements_of(specimens, outcome.evaluation));
   outcome.converged = fit.converged;
   outcome.cells = options.cells;
-  outcome.recordings.push_back(as_recording(law.scene->body, law.layout, outcome));
   for (std::string& note : unused_choices(options, false, false)) outcome.notes.push_back(std::move(note));
   add_law_notes(outcome, law, capture);
   outcome.law = std::move(law);

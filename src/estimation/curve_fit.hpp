@@ -4,9 +4,9 @@
 
 namespace pliant {
 
-/// Estimates a material from stress-strain curves alone: `fit_curves`, told as a fit of static tests. Where the capture
-/// has a shape the scene's body is that of the object; else it is one tetrahedron.
+/// Estimates a material from stress-strain curves alone: `fit_curves`, told as a fit of static tests.
+/// @param captures  one at least
 /// Throws InputError where no stress of the curves has the sign of its strain.
-FitOutcome fit_material_curves(const Capture& capture, const FitOptions& options);
+FitOutcome fit_material_curves(const std::vector<const Capture*>& captures, const FitOptions& options);
 
 }  // namespace pliant

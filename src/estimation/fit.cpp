@@ -14,7 +14,9 @@ namespace pliant {
 
 void add_uncertainty(FitOutcome& outcome, const std::vector<ModelShift>& shifts, const VectorX& floor,
                      const std::optional<std::vector<Agreement>>& tests) {
-  outcome.uncertainty = uncertainty_of(outcome.evaluation, shifts, floor, int(outcome.recordings.size()));
+  const int recordings = int(outcome.recordings.size());
+  const bool differ = !tests || recordings > 2;  // one specimen under tests has no parts of a motion
+  outcome.uncertainty = uncertainty_of(outcome.evaluation, shifts, floor, differ ? recordings : 0);
   outcome.covariance = outcome.uncertainty.covariance;
   outcome.std = outcome.uncertainty.std;
   outcome.verdict = tests ? verdict_of(*tests, outcome.uncertainty, outcome.parameters)
@@ -48,18 +50,16 @@ std::unique_ptr<PassPlanner> planner_of(std::vector<RecordedCapture> recordings,
   return planner_of_points(std::move(recordings), options, std::move(resume), monitor.processes);
 }
 
-/// The capture whose presses are all that there is to fit; null where more than presses is fitted.
-/// Throws InputError where they stand beside what they cannot be fitted with.
-const Capture* presses_alone(const std::vector<RecordedCapture>& recordings,
-                             const std::optional<RecordedCapture>& held_out) {
-  const auto it = std::ranges::find_if(recordings, is_of_static_tests, &RecordedCapture::capture);
-  if (it == recordings.end()) return nullptr;
-  const auto refuse = [&](const char* what, const char* advice) {
-    throw InputError({{it->capture.file}, what, "a fit of one capture's presses", advice});
-  };
-  if (recordings.size() > 1) refuse("presses beside other recordings", "put all presses into one capture");
-  if (held_out) refuse("presses and --hold-out", "give a press role = \"test\"");
-  return &it->capture;
+/// Whether static tests are all that there is to fit.
+/// Throws InputError where a motion is held out of them.
+bool tests_alone(const std::vector<RecordedCapture>& recordings, const std::optional<RecordedCapture>& held_out) {
+  if (!std::ranges::all_of(recordings, is_of_static_tests, &RecordedCapture::capture)) return false;
+  if (held_out && !is_of_static_tests(held_out->capture))
+    throw InputError({{held_out->capture.file},
+                      "a motion, held out of a fit of static tests",
+                      "static tests of the same material",
+                      "`pliant evaluate MODEL CAPTURE` says how well the fitted model predicts a motion"});
+  return true;
 }
 
 }  // namespace
@@ -69,8 +69,11 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
   if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
-  if (const Capture* capture = presses_alone(recordings, held_out))
-    return fit_presses(*capture, options, monitor, std::move(resume));
+  if (tests_alone(recordings, held_out)) {
+    std::vector<const Capture*> captures;
+    for (const RecordedCapture& r : recordings) captures.push_back(&r.capture);
+    return fit_presses(captures, options, monitor, std::move(resume), held_out ? &held_out->capture : nullptr);
+  }
   const bool has_presses =
       std::ranges::any_of(recordings, [](const RecordedCapture& r) { return !r.capture.presses.empty(); });
   const auto stops = [&] { return monitor.agrees_to_stop(); };

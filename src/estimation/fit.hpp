@@ -240,7 +240,14 @@ struct RecordingOutcome {
   std::shared_ptr<const Body> rest_body;  ///< the body where it is stress-free
 };
 
-/// The law that was fitted to an object's presses, and what it predicts of them.
+/// An object under static tests, and what a law predicts of its presses.
+struct TestedObject {
+  std::shared_ptr<const PressScene> scene;
+  std::shared_ptr<const MaterialLaw> law;    ///< of its elements
+  std::vector<PressPrediction> predictions;  ///< of all presses, tests too; empty where the fit was interrupted
+};
+
+/// The law that was fitted to static tests, and what it predicts of those of the first capture.
 struct LawOutcome {
   std::shared_ptr<const PressScene> scene;
   std::shared_ptr<const MaterialLaw> law;
@@ -251,6 +258,7 @@ struct LawOutcome {
   std::optional<SampledMaterial> sampled;  ///< with `samples`, one a press that was fitted
   std::vector<PressSample> samples;
   std::vector<PressPrediction> predictions;  ///< of all presses, tests too; empty where it was interrupted
+  std::vector<TestedObject> others;          ///< of further captures, and of the one that was held out, last
 };
 
 /// A recording that took no part in the fit, as the estimate predicts it: only its own start, planes and sensors were
@@ -301,8 +309,8 @@ struct FitMonitor {
   std::function<void(const FitState&)> on_state;  ///< something is done that a resumed fit need not do again
   std::function<bool()> interrupted;  ///< asked of this process alone; not with `processes`, which ask it themselves
   /// Processes that carry out the fit together: each is given the same recordings, options and state, and returns the
-  /// same outcome, to the last bit that of one process; null: this one alone. Fits of presses alone are not shared out:
-  /// one process is to make them.
+  /// same outcome, to the last bit that of one process; null: this one alone. Fits of static tests alone are not shared
+  /// out: one process is to make them.
   std::shared_ptr<ProcessGroup> processes;
 };
 
@@ -315,7 +323,7 @@ struct FitMonitor {
 /// it is estimated, density); each has its own start, planes and sensors, named with "[2]" and so on from the second
 /// recording.
 ///
-/// Presses alone, of one recording: the law of the object (`fit_presses`).
+/// Static tests alone: the law of their one material (`fit_presses`).
 /// @param resume    what an interrupted fit of the same recordings and options had done
 /// @param held_out  a recording that takes no part in the fit, and is predicted by the estimate
 /// Throws InputError where a recording cannot be fitted, or not together with the others, with the reason.

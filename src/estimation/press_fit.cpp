@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <numeric>
 #include <utility>
 
 #include "base/error.hpp"
@@ -22,6 +23,7 @@
 #include "estimation/press_objective.hpp"
 #include "estimation/problem.hpp"
 #include "estimation/refinement.hpp"
+#include "estimation/specimens.hpp"
 #include "estimation/stage_loop.hpp"
 
 namespace pliant {
@@ -34,14 +36,15 @@ std::shared_ptr<const Body> with_field(const Body& body, ModulusField field) {
   return copy;
 }
 
-/// Carries out a `LawPlan` on the static tests of one capture.
+/// Carries out a `LawPlan` on the static tests of captures.
 class LawRun : StageLoop {
  public:
-  /// Throws InputError where the capture cannot be fitted, with the reason.
-  LawRun(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState state)
+  /// Throws InputError where a capture cannot be fitted, with the reason.
+  LawRun(const std::vector<const Capture*>& captures, const FitOptions& options, const FitMonitor& monitor,
+         FitState state)
       : StageLoop(options, monitor, std::move(state.pass)),
-        capture_(capture),
-        cells_(resolution_of_tests(capture, options).cells),
+        captures_(captures),
+        specimens_(specimens_of(captures, options)),
         scene_(scene_to_fit()),
         sampled_(state.sampled ? std::move(*state.sampled) : PressSampling::State()),
         plan_(facts()) {}
@@ -55,48 +58,57 @@ class LawRun : StageLoop {
   }
 
  private:
-  /// The object on its mesh, and all its tests.
-  PressScene scene_at(double cells) const {
-    Resolution resolution = resolution_of_tests(capture_, options_);
-    resolution.cells = cells;
-    std::vector<Vector3> control_points;
-    return make_press_scene(capture_, make_body_of(capture_.scene, SignedDistance(), resolution, control_points));
-  }
+  const Capture& first() const { return *captures_.front(); }
 
-  std::shared_ptr<const PressScene> scene_to_fit() {
-    if (!capture_.scene.object.surface)
-      throw InputError({{capture_.file},
-                        "there is no scan of the object at rest ([object] surface)",
-                        "a closed triangle mesh",
-                        "scan the object and name the mesh in capture.toml"});
-    auto scene = std::make_shared<PressScene>(scene_at(cells_));
-    for (int i = 0; i < int(scene->presses.size()); ++i)
-      if (is_fitted(scene->presses[std::size_t(i)].role)) fitted_.push_back(i);
-    if (fitted_.empty() && !scene->static_tests().any_to_fit())
-      throw InputError({{capture_.file},
-                        "no static test is to be fitted",
-                        "a block [[press]], [[indentation]], [[grip]] or [[material_curve]] whose role is \"fit\"",
-                        ""});
-    if (fitted_.empty() && options_.material == MaterialKind::Sampled)
-      throw InputError({{capture_.file},
+  std::shared_ptr<const PressScene> scene_to_fit() const {
+    for (std::size_t i = 0; i < captures_.size(); ++i) {
+      const TestedSpecimen& s = specimens_[i];
+      if (s.presses.empty() && !s.scene->static_tests().any_to_fit())
+        throw InputError({{captures_[i]->file},
+                          "no static test is to be fitted",
+                          "a block [[press]], [[indentation]], [[grip]] or [[material_curve]] whose role is \"fit\"",
+                          ""});
+      if (s.scene->body->modulus.controls != specimens_.front().scene->body->modulus.controls)
+        throw InputError(
+            {{captures_[i]->file},
+             fmt::format("the object has {} moduli, by its regions", s.scene->body->modulus.controls),
+             fmt::format("those of the first capture, {}", specimens_.front().scene->body->modulus.controls),
+             "name the same materials in every capture"});
+    }
+    if (options_.material == MaterialKind::Sampled && specimens_.size() > 1)
+      throw InputError({{captures_[1]->file},
+                        "material=sampled and several captures",
+                        "the presses of one object",
+                        "fit one of them, or choose ogden, neo_hookean or linear"});
+    if (options_.material == MaterialKind::Sampled && specimens_.front().presses.empty())
+      throw InputError({{first().file},
                         "material=sampled and no press to fit",
                         "blocks [[press]], whose markers show where the object is how stiff",
                         "leave out material, or choose ogden, neo_hookean or linear"});
-    return scene;
+    return specimens_.front().scene;
   }
 
   LawFacts facts() const {
     LawFacts f;
     f.options = options_;
     const int controls = scene_->body->modulus.controls;
-    if (controls > 1) f.modulus_names = modulus_names(capture_, controls);
-    f.start_modulus = (fitted_.empty() ? 1.0 : 2.0) * punch_modulus(*scene_, 0.3);
+    if (controls > 1) f.modulus_names = modulus_names(first(), controls);
+    f.start_modulus = (specimens_.front().presses.empty() ? 1.0 : 2.0) * punch_modulus(*scene_, 0.3);
     f.noise = options_.marker_noise > 0.0 ? options_.marker_noise : scene_->noise;
     f.size = scene_->body->size();
-    f.presses = int(fitted_.size());
-    f.has_curves = scene_->static_tests().any_to_fit();
-    f.is_specimen = !scene_->static_tests().curves.empty();
+    f.presses = press_count();
+    f.is_specimen = specimens_.size() > 1;
+    for (const TestedSpecimen& s : specimens_) {
+      f.has_curves = f.has_curves || s.scene->static_tests().any_to_fit();
+      f.is_specimen = f.is_specimen || !s.scene->static_tests().curves.empty();
+    }
     return f;
+  }
+
+  int press_count() const {
+    int count = 0;
+    for (const TestedSpecimen& s : specimens_) count += int(s.presses.size());
+    return count;
   }
 
   std::vector<StageChain> next() override {
@@ -157,8 +169,13 @@ class LawRun : StageLoop {
     form.parameters.set_reference(theta);
     return form;
   }
+  std::vector<TestedSpecimen> specimens(const Form& form) const {
+    std::vector<TestedSpecimen> all = specimens_;
+    all.front().scene = form.scene;
+    return all;
+  }
   PressObjective objective_of(const Form& form, const MarkerNoise& noise) const {
-    return {form.scene, fitted_, form.layout, form.parameters, {noise, judgement.press_outlier}, placements_};
+    return {specimens(form), form.layout, form.parameters, {noise, judgement.press_outlier}, placements_};
   }
   MatrixX carried(const LawShape& before, const PressScene& scene) const {
     return carried_over(*scene.body, scene_of(before)->body->modulus, scene.body->modulus);
@@ -228,10 +245,11 @@ class LawRun : StageLoop {
   void find_out(StageRecord& record, const LawTask& task, const Form& form, const PressObjective& objective,
                 const CostEvaluation& evaluation) const {
     LawFinding& found = *record.law;
-    for (std::size_t f = fitted_.size(); f < evaluation.frames.size(); ++f)  // presses come first, a frame each
+    const int presses = press_count();
+    for (std::size_t f = std::size_t(presses); f < evaluation.frames.size(); ++f)  // presses come first, a frame each
       found.stated_cost += evaluation.frames[f].cost;
     found.track_squares = objective.weighed_squares();
-    found.deviation = fitted_.empty() ? found.noise.at_rest : objective.typical_deviation();
+    found.deviation = presses == 0 ? found.noise.at_rest : objective.typical_deviation();
     found.observations = evaluation.independent_observations();
     found.dimension = form.parameters.dimension();
     const VectorX p = form.parameters.to_unconstrained(record.theta);
@@ -353,21 +371,31 @@ class LawRun : StageLoop {
     const LawTask& task = *stage.law;
     Form form = form_at(task.shape, record.from);
     const VectorX p = form.parameters.to_unconstrained(record.from);
-    if (form.scene->dead_load().cwiseAbs().maxCoeff() > 0.0) {
-      auto heavier = std::make_shared<PressScene>(*form.scene);
-      heavier->density *= 1.0 + judgement.given_density;
-      const CostEvaluation e =
-          objective_of({form.layout, std::move(heavier), form.parameters}, task.noise).linearise(p);
+    std::vector<TestedSpecimen> heavier = specimens(form);
+    bool has_weight = false;
+    for (TestedSpecimen& specimen : heavier) {
+      has_weight = has_weight || specimen.scene->dead_load().cwiseAbs().maxCoeff() > 0.0;
+      auto scene = std::make_shared<PressScene>(*specimen.scene);
+      scene->density *= 1.0 + judgement.given_density;
+      specimen.scene = std::move(scene);
+    }
+    const PressTrialOptions as_found{task.noise, judgement.press_outlier};
+    if (has_weight) {
+      PressObjective objective(heavier, form.layout, form.parameters, as_found, placements_);
+      const CostEvaluation e = objective.linearise(p);
       if (e.succeeded) record.shifts.push_back({cause_mass, gauss_newton_shift(e, largest_shift)});
     }
-    if (capture_.scene.object.volume) return record;  // its mesh is as it was given
+    const auto has_own_mesh = [](const Capture* c) { return c->scene.object.volume.has_value(); };
+    if (std::ranges::all_of(captures_, has_own_mesh)) return record;  // each is as it was given
+    std::vector<TestedSpecimen> coarser;
     try {
-      form.scene = scene_of(task.shape, std::make_shared<PressScene>(scene_at(cells_ / Refinement::mesh_ratio)));
+      coarser = specimens_of(captures_, options_, 1.0 / Refinement::mesh_ratio);
+      coarser.front().scene = scene_of(task.shape, coarser.front().scene);
     } catch (const InputError& error) {  // too coarse for the object, or for what is pressed of it
       record.reason = error.what();
       return record;
     }
-    PressObjective objective(form.scene, fitted_, form.layout, form.parameters, {task.noise, judgement.press_outlier});
+    PressObjective objective(coarser, form.layout, form.parameters, as_found);
     const MovedEstimate moved =
         move_estimate(objective.cost(), form.parameters, iterations, [&] { return !is_interrupted(); });
     is_cut = moved.summary.interrupted;
@@ -403,8 +431,9 @@ class LawRun : StageLoop {
 
   PressSampling& sampling() {
     if (!sampling_)
-      sampling_.emplace(scene_, fitted_, BasisOptions{options_.basis_tolerance, options_.basis_samples},
-                        options_.marker_noise > 0.0, std::move(sampled_));
+      sampling_.emplace(scene_, specimens_.front().presses,
+                        BasisOptions{options_.basis_tolerance, options_.basis_samples}, options_.marker_noise > 0.0,
+                        std::move(sampled_));
     return *sampling_;
   }
 
@@ -417,7 +446,8 @@ class LawRun : StageLoop {
     for (std::size_t i = 0; i < law.samples.size(); ++i)
       if (!law.samples[i].succeeded)
         outcome_.notes.push_back(fmt::format("{} takes no part in the sampled material: {}",
-                                             scene_->presses[std::size_t(fitted_[i])].name, law.samples[i].failure));
+                                             scene_->presses[std::size_t(specimens_.front().presses[i])].name,
+                                             law.samples[i].failure));
     if (!law.sampled && !interrupted_)
       outcome_.notes.emplace_back(
           "No material that is interpolated between the presses comes closer to their markers than the law that they "
@@ -433,7 +463,7 @@ class LawRun : StageLoop {
 
   FitOutcome finish(const LawPlan::Standing& standing) {
     outcome_.interrupted = interrupted_;
-    outcome_.cells = cells_;
+    outcome_.cells = resolution_of_tests(first(), options_).cells;
     if (!standing.best) {
       outcome_.reason = interrupted_ ? "interrupted" : why_none_stands();
       return std::move(outcome_);
@@ -448,6 +478,11 @@ class LawRun : StageLoop {
     law.law = shared;
     if (law.sampled) law.law = law.sampled->law;
     if (!interrupted_) law.predictions = predict_presses(*form.scene, law.law);
+    for (std::size_t i = 1; i < specimens_.size(); ++i) {
+      const std::shared_ptr<const PressScene>& scene = specimens_[i].scene;
+      law.others.push_back({scene, press_law(*scene->body, form.layout, best.theta), {}});
+      if (!interrupted_) law.others.back().predictions = predict_presses(*scene, law.others.back().law);
+    }
     outcome_.theta = best.theta;
     outcome_.parameters = form.parameters;
     const auto ended = ended_.find(best.id.number);
@@ -467,23 +502,24 @@ class LawRun : StageLoop {
     if (!standing.untried.empty())
       outcome_.notes.push_back("How much the estimate depends on the mesh could not be seen: " + standing.untried +
                                ".");
+    const std::vector<TestedSpecimen> all = specimens(form);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      outcome_.recordings.push_back(as_recording(all[i].scene->body, form.layout, outcome_, int(i)));
+    outcome_.recordings.front().discretisation.control_points = best.shape.points;
     add_uncertainty(
         outcome_, shifts,
         options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, MeasuredAs::Tested) : VectorX(),
-        agreements_of(*form.scene, fitted_, outcome_.evaluation, options_.marker_noise));
-    outcome_.recordings.push_back(as_recording(form.scene->body, form.layout, outcome_));
-    outcome_.recordings.back().discretisation.control_points = best.shape.points;
+        agreements_of(all, outcome_.evaluation, options_.marker_noise));
     for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
-    add_law_notes(outcome_, law, capture_);
+    add_law_notes(outcome_, law, first());
     outcome_.law = std::move(law);
     return std::move(outcome_);
   }
 
-  const Capture& capture_;
-  double cells_;
-  std::vector<int> fitted_;  // numbers of presses
-  std::shared_ptr<const PressScene> scene_;
-  PressSampling::State sampled_;  // of a fit that was interrupted, until it goes on
+  std::vector<const Capture*> captures_;
+  std::vector<TestedSpecimen> specimens_;    // of each capture
+  std::shared_ptr<const PressScene> scene_;  // of the first
+  PressSampling::State sampled_;             // of a fit that was interrupted, until it goes on
   std::optional<PressSampling> sampling_;
   LawPlan plan_;
   std::map<int, CostEvaluation> ended_;    // of this run, by the stage's number
@@ -493,7 +529,7 @@ class LawRun : StageLoop {
 /// What presses do not know is refused; what they merely do not use is told (`unused_choices`).
 void require_known(const Capture& capture, const FitOptions& options) {
   const auto refuse = [&](const char* what, const char* advice) {
-    throw InputError({{capture.file}, what, "a fit of one capture's presses", advice});
+    throw InputError({{capture.file}, what, "a fit of static tests", advice});
   };
   if (options.element == ElementKind::Hexahedron)
     refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
@@ -522,15 +558,6 @@ std::vector<ModelShift> shifts_of_forms(const ParameterSet& parameters, double y
   return {{"form of the law", shift}};
 }
 
-Resolution resolution_of_tests(const Capture& capture, const FitOptions& options) {
-  const bool is_chosen = options.element || capture.scene.object.volume;
-  Resolution resolution;
-  resolution.cells = is_chosen ? options.cells : options.cells / Refinement::mesh_ratio;
-  resolution.element =
-      options.element.value_or(is_chosen ? ElementKind::Tetrahedron : ElementKind::QuadraticTetrahedron);
-  return resolution;
-}
-
 std::optional<double> known_poissons_ratio(const FitOptions& options) {
   const auto known = options.parameters.find("poissons_ratio");
   if (known == options.parameters.end() || !known->second.start || known->second.estimated != false)
@@ -539,7 +566,7 @@ std::optional<double> known_poissons_ratio(const FitOptions& options) {
 }
 
 RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const LawLayout& layout,
-                              const FitOutcome& outcome) {
+                              const FitOutcome& outcome, int specimen) {
   RecordingOutcome recording;
   recording.discretisation.body = recording.rest_body = body;
   MaterialBlocks& material = recording.discretisation.simulation.blocks;
@@ -547,15 +574,55 @@ RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const Law
   for (int k = 0; k < layout.form().controls; ++k) material.youngs_moduli.push_back(layout.modulus(k));
   recording.theta = outcome.theta;
   recording.evaluation = outcome.evaluation;
+  std::erase_if(recording.evaluation.frames, [&](const FrameFit& f) { return f.recording != specimen; });
   return recording;
 }
 
-FitOutcome fit_presses(const Capture& capture, const FitOptions& options, const FitMonitor& monitor, FitState resume) {
+namespace {
+
+/// What a fitted law predicts of static tests that took no part.
+/// Throws InputError where the capture cannot be read, or its object is of other materials.
+void predict_held_out(const Capture& capture, const FitOptions& options, FitOutcome& outcome) {
+  const LawLayout& layout = outcome.law->layout;
+  if (outcome.law->sampled || layout.form().controls > 1 || layout.form().laws > 1)
+    throw InputError({{capture.file},
+                      "a material that differs over the fitted object, and --hold-out",
+                      "a law for all of it, which another object can have",
+                      "leave out --hold-out, or choose material=ogden and law_zones=1"});
+  const auto scene = std::make_shared<PressScene>(*specimens_of({&capture}, options, 1.0, true).front().scene);
+  std::vector<int> all(scene->presses.size());
+  std::iota(all.begin(), all.end(), 0);
+  StaticTests tests = scene->static_tests();
+  const auto set_roles = [&](const char* role) {
+    for (ObservedPress& press : scene->presses) press.role = role;
+    for (ObservedIndentation& test : tests.indentations) test.role = role;
+    for (ObservedGrip& test : tests.grips) test.role = role;
+    for (ObservedCurve& curve : tests.curves) curve.role = role;
+    scene->tests = std::make_shared<StaticTests>(tests);
+  };
+  set_roles("fit");
+  PressObjective objective({{scene, all}}, layout, outcome.parameters, {outcome.law->noise, judgement.press_outlier});
+  outcome.held_out = {capture.name, capture.sha256,
+                      objective.evaluate(outcome.parameters.to_unconstrained(outcome.theta))};
+  set_roles("test");
+  TestedObject object{scene, press_law(*scene->body, layout, outcome.theta), {}};
+  object.predictions = predict_presses(*scene, object.law);
+  outcome.law->others.push_back(std::move(object));
+}
+
+}  // namespace
+
+FitOutcome fit_presses(const std::vector<const Capture*>& captures, const FitOptions& options,
+                       const FitMonitor& monitor, FitState resume, const Capture* held_out) {
   if (const std::string wrong = options.validate(); !wrong.empty())
-    throw InputError({{capture.file}, wrong, "", "see `pliant fit --help`"});
-  require_known(capture, options);
-  if (is_of_material_curves(capture)) return fit_material_curves(capture, options);
-  return LawRun(capture, options, monitor, std::move(resume)).run();
+    throw InputError({{captures.front()->file}, wrong, "", "see `pliant fit --help`"});
+  require_known(*captures.front(), options);
+  const bool are_curves =
+      std::ranges::all_of(captures, [](const Capture* capture) { return is_of_material_curves(*capture); });
+  FitOutcome outcome =
+      are_curves ? fit_material_curves(captures, options) : LawRun(captures, options, monitor, std::move(resume)).run();
+  if (held_out && outcome.law && !outcome.interrupted) predict_held_out(*held_out, options, outcome);
+  return outcome;
 }
 
 }  // namespace pliant

@@ -5,31 +5,31 @@
 namespace pliant {
 
 /// Static tests as the recording of a fit that they are.
-/// @param layout  of the law in the outcome's theta
+/// @param layout    of the law in the outcome's theta
+/// @param specimen  whose frames the evaluation is to have (`FrameFit::recording`)
 RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const LawLayout& layout,
-                              const FitOutcome& outcome);
-
-/// Quadratic tetrahedra, which do not lock where the material hardly changes its volume, unless others are chosen; they
-/// follow as much as half as many linear ones again along each axis, so they are so much longer. A volume that the
-/// capture gives keeps its nodes.
-Resolution resolution_of_tests(const Capture& capture, const FitOptions& options);
+                              const FitOutcome& outcome, int specimen = 0);
 
 /// Poisson's ratio where the choices give it and keep it; nothing: it is estimated.
 std::optional<double> known_poissons_ratio(const FitOptions& options);
 
-/// Estimates an object's material from static tests with known forces (presses, force-depth curves, measurements
-/// between grips, stress-strain curves): Ogden's law of one term from the stiffness of a punch on a half space, more
-/// terms, and Poisson's ratios of their own for them, as long as the Bayesian information criterion falls; then zones
-/// of laws of their own, cut one after the other where that promises most, as long as the evidence supports them
+/// Estimates a material from static tests with known forces of one object or several (presses, force-depth curves,
+/// measurements between grips, stress-strain curves): Ogden's law of one term from the stiffness of a punch on a half
+/// space, more terms, and Poisson's ratios of their own for them, as long as the Bayesian information criterion falls;
+/// then zones of laws of their own, cut one after the other where that promises most, as long as the evidence supports
+/// them
 /// (`log_bayes_factor`) and each takes three per cent off the squares of the residuals, or, where a capture names
 /// regions, a law for each of them; and where no zone is kept, control points of Young's modulus by the same rule. The
 /// noise, and how it grows with displacement, is what the residuals say, robustly (`robust_noise`). A sampled material
-/// (`PressSampling`) begins with one law of one or two terms.
+/// (`PressSampling`) begins with one law of one or two terms. Several objects are of one material: they have neither
+/// zones nor control points.
+/// @param captures  one at least; they stay where they are as long as this runs
+/// @param held_out  static tests that take no part and are predicted; null: none
 /// @return  with `FitOutcome::law`
-/// Throws InputError where the capture has no static test to fit or cannot be fitted, or where options are chosen that
+/// Throws InputError where a capture has no static test to fit or cannot be fitted, or where options are chosen that
 /// static tests do not know.
-FitOutcome fit_presses(const Capture& capture, const FitOptions& options, const FitMonitor& monitor = {},
-                       FitState resume = {});
+FitOutcome fit_presses(const std::vector<const Capture*>& captures, const FitOptions& options,
+                       const FitMonitor& monitor = {}, FitState resume = {}, const Capture* held_out = nullptr);
 
 /// By how much Young's moduli would differ in a form of the law that was tried and left although the evidence does not
 /// rule it out (ln of the Bayes factor above -3): of those forms the one that is farthest. None where there is none.

@@ -9,35 +9,6 @@
 
 namespace pliant {
 
-namespace {
-
-std::vector<std::unique_ptr<PressTrial>> trials_of(const std::shared_ptr<const PressScene>& scene,
-                                                   const std::vector<int>& presses,
-                                                   const std::shared_ptr<PressedMaterial>& material,
-                                                   const VectorX& reference, const PressTrialOptions& options,
-                                                   const PressObjective::Placements& begin) {
-  std::vector<std::unique_ptr<PressTrial>> trials;
-  for (std::size_t i = 0; i < presses.size(); ++i) {
-    const Placement* from = i < begin.size() && begin[i].front().nodes.size() > 0 ? &begin[i].front() : nullptr;
-    trials.push_back(std::make_unique<PressTrial>(scene, presses[i], material, reference, options, 0, from));
-  }
-  return trials;
-}
-
-std::vector<PressTrial*> pointers(const std::vector<std::unique_ptr<PressTrial>>& trials) {
-  std::vector<PressTrial*> all;
-  for (const auto& trial : trials) all.push_back(trial.get());
-  return all;
-}
-
-std::vector<std::unique_ptr<Trial>> as_trials(std::vector<std::unique_ptr<PressTrial>> presses) {
-  std::vector<std::unique_ptr<Trial>> trials;
-  for (auto& press : presses) trials.push_back(std::move(press));
-  return trials;
-}
-
-}  // namespace
-
 std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<const PressScene>& scene,
                                                        const std::shared_ptr<PressedMaterial>& material,
                                                        const ParameterSet& parameters, int recording) {
@@ -80,28 +51,17 @@ struct Residuals {
   }
 };
 
-double own_scatter(const PressScene& scene, const std::vector<int>& presses) {
-  double squares = 0.0;
-  for (const int i : presses) squares += std::pow(marker_noise(scene.presses[std::size_t(i)]), 2);
-  return presses.empty() ? 0.0 : std::sqrt(squares / double(presses.size()));
+double own_scatter(const std::vector<TestedSpecimen>& specimens) {
+  double squares = 0.0, count = 0.0;
+  for (const TestedSpecimen& specimen : specimens)
+    for (const int i : specimen.presses)
+      squares += std::pow(marker_noise(specimen.scene->presses[std::size_t(i)]), 2), count += 1.0;
+  return count > 0.0 ? std::sqrt(squares / count) : 0.0;
 }
 
-}  // namespace
-
-std::vector<Agreement> agreements_of(const PressScene& scene, const std::vector<int>& presses,
-                                     const CostEvaluation& evaluation, double marker_noise) {
-  const StaticTests& tests = scene.static_tests();
-  std::vector<Agreement> agreements;
-  if (!evaluation.succeeded) return agreements;
-  auto frame = evaluation.frames.begin();  // in the order of the objective's trials
-  Residuals pressed, gripped, forces;
-  const double noise = marker_noise > 0.0 ? marker_noise : own_scatter(scene, presses);
-  for (const int i : presses) {
-    pressed.add(frame->track_sum_squares, noise, 3.0 * frame->tracks,
-                scene.presses[std::size_t(i)].greatest_displacement);
-    ++frame;
-  }
-  pressed.conclude("the markers under presses", 3.0, agreements);
+/// Goes through the frames of a specimen's curves and grips.
+void add_tests(const StaticTests& tests, std::vector<FrameFit>::const_iterator& frame, Residuals& gripped,
+               Residuals& forces, std::vector<Agreement>& agreements) {
   for (const ObservedIndentation& test : tests.indentations) {
     if (!is_fitted(test.role)) continue;
     Residuals curve;
@@ -118,8 +78,6 @@ std::vector<Agreement> agreements_of(const PressScene& scene, const std::vector<
       forces.add((2.0 * frame->cost - of_markers) * test.force_std * test.force_std, test.force_std, 1.0, test.force);
     ++frame;
   }
-  gripped.conclude("the markers between grips", 3.0, agreements);
-  forces.conclude("the forces of grips", 1.0, agreements);
   for (const ObservedCurve& curve : tests.curves) {
     if (!is_fitted(curve.role)) continue;
     const double over_noise = std::sqrt(2.0 * frame->cost / double(curve.test.stress.size()));
@@ -130,31 +88,66 @@ std::vector<Agreement> agreements_of(const PressScene& scene, const std::vector<
         {"the stress of " + curve.test.name, over_noise, over_noise * std / curve.test.greatest_stress()});
     ++frame;
   }
+}
+
+}  // namespace
+
+std::vector<Agreement> agreements_of(const std::vector<TestedSpecimen>& specimens, const CostEvaluation& evaluation,
+                                     double marker_noise) {
+  std::vector<Agreement> agreements;
+  if (!evaluation.succeeded) return agreements;
+  auto frame = evaluation.frames.begin();  // in the order of the objective's trials
+  Residuals pressed, gripped, forces;
+  const double noise = marker_noise > 0.0 ? marker_noise : own_scatter(specimens);
+  for (const TestedSpecimen& specimen : specimens)
+    for (const int i : specimen.presses) {
+      pressed.add(frame->track_sum_squares, noise, 3.0 * frame->tracks,
+                  specimen.scene->presses[std::size_t(i)].greatest_displacement);
+      ++frame;
+    }
+  pressed.conclude("the markers under presses", 3.0, agreements);
+  for (const TestedSpecimen& specimen : specimens)
+    add_tests(specimen.scene->static_tests(), frame, gripped, forces, agreements);
+  gripped.conclude("the markers between grips", 3.0, agreements);
+  forces.conclude("the forces of grips", 1.0, agreements);
   return agreements;
 }
 
-PressObjective::PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
-                               const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options,
-                               const Placements& begin)
-    : material_(std::make_shared<PressedMaterial>(scene->body, layout)),
-      objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {
-  auto trials = trials_of(scene, presses, material_, parameters.reference(), options, begin);
-  trials_ = pointers(trials);
-  at_rest_.assign(trials_.begin(), trials_.end());
-  std::vector<std::unique_ptr<Trial>> all = as_trials(std::move(trials));
-  for (std::unique_ptr<Trial>& test : static_test_trials(scene, material_, parameters, 0)) {
-    if (auto* curve = dynamic_cast<CurveTrial*>(test.get())) curves_.push_back(curve);
-    if (auto* at_rest = dynamic_cast<EquilibriumTrial*>(test.get())) {
+PressObjective::PressObjective(const std::vector<TestedSpecimen>& specimens, const LawLayout& layout,
+                               ParameterSet parameters, const PressTrialOptions& options, const Placements& begin)
+    : objective_(std::vector<std::unique_ptr<Trial>>{}, ParameterSet{}) {
+  std::vector<std::unique_ptr<Trial>> all;
+  const auto add = [&](std::unique_ptr<Trial> trial) {
+    if (auto* curve = dynamic_cast<CurveTrial*>(trial.get())) curves_.push_back(curve);
+    if (auto* at_rest = dynamic_cast<EquilibriumTrial*>(trial.get())) {
       if (at_rest_.size() < begin.size()) at_rest->begin_from(begin[at_rest_.size()]);
       at_rest_.push_back(at_rest);
     }
-    all.push_back(std::move(test));
+    all.push_back(std::move(trial));
+  };
+  for (std::size_t s = 0; s < specimens.size(); ++s) {
+    const TestedSpecimen& specimen = specimens[s];
+    materials_.push_back(std::make_shared<PressedMaterial>(specimen.scene->body, layout));
+    for (const int press : specimen.presses) {
+      const Placement* from = nullptr;  // noise that grows with displacement goes by it from the first
+      if (at_rest_.size() < begin.size() && begin[at_rest_.size()].front().nodes.size() > 0)
+        from = &begin[at_rest_.size()].front();
+      auto trial = std::make_unique<PressTrial>(specimen.scene, press, materials_.back(), parameters.reference(),
+                                                options, int(s), from);
+      trials_.push_back(trial.get());
+      at_rest_.push_back(trial.get());
+      all.push_back(std::move(trial));
+    }
   }
+  for (std::size_t s = 0; s < specimens.size(); ++s)
+    for (std::unique_ptr<Trial>& test : static_test_trials(specimens[s].scene, materials_[s], parameters, int(s)))
+      add(std::move(test));
   objective_ = Objective(std::move(all), std::move(parameters));
 }
 
 void PressObjective::set_form(std::shared_ptr<const Body> body, const LawLayout& layout, ParameterSet parameters) {
-  material_->set_form(std::move(body), layout);
+  materials_.front()->set_form(std::move(body), layout);
+  for (std::size_t s = 1; s < materials_.size(); ++s) materials_[s]->set_form(materials_[s]->shared_body(), layout);
   for (CurveTrial* curve : curves_) curve->set_layout(layout, parameters);
   objective_.set_parameters(std::move(parameters));
 }

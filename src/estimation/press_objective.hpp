@@ -12,31 +12,40 @@ std::vector<std::unique_ptr<Trial>> static_test_trials(const std::shared_ptr<con
                                                        const std::shared_ptr<PressedMaterial>& material,
                                                        const ParameterSet& parameters, int recording);
 
-/// How well each kind of measurement of the static tests to fit is met; nothing where the evaluation failed.
-/// @param evaluation    of a `PressObjective` of the scene, or of a `curve_objective` of its curves
-/// @param presses       numbers of those that take part
-/// @param marker_noise  of a coordinate of presses' markers [m]; 0: what neighbouring markers scatter
-std::vector<Agreement> agreements_of(const PressScene& scene, const std::vector<int>& presses,
-                                     const CostEvaluation& evaluation, double marker_noise = 0.0);
+/// An object under static tests, those of its presses that take part, by their numbers, and its curves and grips to
+/// fit.
+struct TestedSpecimen {
+  std::shared_ptr<const PressScene> scene;
+  std::vector<int> presses;
+};
 
-/// The objective of an object's presses, and of the curves and grips to fit of its scene: one trial each, all of one
-/// material, whose form can change.
+/// How well each kind of measurement of the static tests to fit is met; nothing where the evaluation failed.
+/// @param evaluation    of a `PressObjective` of the specimens, or of a `curve_objective` of their curves
+/// @param marker_noise  of a coordinate of presses' markers [m]; 0: what neighbouring markers scatter
+std::vector<Agreement> agreements_of(const std::vector<TestedSpecimen>& specimens, const CostEvaluation& evaluation,
+                                     double marker_noise = 0.0);
+
+/// The objective of presses, and of the curves and grips to fit, of one object or several: one trial each, presses
+/// first, all of one material, whose form can change. Frames have the number of their specimen
+/// (`FrameFit::recording`).
 class PressObjective {
  public:
   /// Equilibria of all trials that have any.
   using Placements = std::vector<std::vector<Placement>>;
-  /// @param presses  numbers of those that take part
-  /// @param begin    of another objective of the same presses, curves and grips, that equilibria set out from; or none
+  /// @param begin  of another objective of the same presses, curves and grips, that equilibria set out from; or none
+  PressObjective(const std::vector<TestedSpecimen>& specimens, const LawLayout& layout, ParameterSet parameters,
+                 const PressTrialOptions& options, const Placements& begin = {});
+  /// Of one specimen.
   PressObjective(const std::shared_ptr<const PressScene>& scene, const std::vector<int>& presses,
-                 const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options,
-                 const Placements& begin = {});
+                 const LawLayout& layout, ParameterSet parameters, const PressTrialOptions& options)
+      : PressObjective({{scene, presses}}, layout, std::move(parameters), options) {}
 
   Objective& cost() { return objective_; }
   [[nodiscard]] CostEvaluation evaluate(const VectorX& p) { return objective_.evaluate(p); }
   [[nodiscard]] CostEvaluation linearise(const VectorX& p) { return objective_.linearise(p); }
 
   /// Goes on with another form of the law, from the equilibria where it is.
-  /// @param body  the same but for its modulus field
+  /// @param body  that of the first specimen, but for its modulus field
   void set_form(std::shared_ptr<const Body> body, const LawLayout& layout, ParameterSet parameters);
   void set_options(const PressTrialOptions& options);
   /// Of the last evaluation.
@@ -52,10 +61,10 @@ class PressObjective {
   double weighed_squares() const;
 
  private:
-  std::shared_ptr<PressedMaterial> material_;
-  std::vector<PressTrial*> trials_;         // the objective's
-  std::vector<EquilibriumTrial*> at_rest_;  // these, and those of curves and grips
-  std::vector<CurveTrial*> curves_;         // likewise
+  std::vector<std::shared_ptr<PressedMaterial>> materials_;  // of each specimen
+  std::vector<PressTrial*> trials_;                          // the objective's
+  std::vector<EquilibriumTrial*> at_rest_;                   // these, and those of curves and grips
+  std::vector<CurveTrial*> curves_;                          // likewise
   Objective objective_;
 };
 

@@ -98,6 +98,16 @@ PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> 
   return scene;
 }
 
+void put_in_front(const std::string& name, PressScene& scene) {
+  for (ObservedPress& press : scene.presses) press.name = name + ": " + press.name;
+  if (!scene.tests) return;
+  StaticTests tests = *scene.tests;
+  for (ObservedIndentation& test : tests.indentations) test.name = name + ": " + test.name;
+  for (ObservedGrip& test : tests.grips) test.name = name + ": " + test.name;
+  for (ObservedCurve& curve : tests.curves) curve.test.name = name + ": " + curve.test.name;
+  scene.tests = std::make_shared<StaticTests>(std::move(tests));
+}
+
 void weigh_by_stated_deviations(std::vector<ObservedPress>& presses) {
   std::vector<double> stated;
   for (const ObservedPress& press : presses)

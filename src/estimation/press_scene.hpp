@@ -57,6 +57,9 @@ struct PressScene {
 /// are too few, or its disc covers nothing.
 PressScene make_press_scene(const Capture& capture, std::shared_ptr<const Body> body);
 
+/// Puts a name in front of those of all tests, so that tests of several captures are told apart.
+void put_in_front(const std::string& name, PressScene& scene);
+
 /// Rigid bodies of an equilibrium from this one on stay where they are.
 void keep_inner_bodies(Equilibrium& equilibrium, int first);
 

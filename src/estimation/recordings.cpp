@@ -24,6 +24,12 @@ bool has_fitted_loads(const Capture& capture) {
   return std::ranges::any_of(capture.loads, [](const Load& load) { return is_fitted(load.role); });
 }
 
+/// Whether presses, curves or grips of a capture are to be fitted.
+bool has_pressed(const Capture& capture) {
+  return has_static_tests_to_fit(capture) ||
+         std::ranges::any_of(capture.presses, [](const Press& press) { return is_fitted(press.role); });
+}
+
 void require_fittable(const Capture& capture, const FitOptions& options) {
   const auto refuse = [&](const std::string& found, const std::string& advice) {
     throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
@@ -34,7 +40,8 @@ void require_fittable(const Capture& capture, const FitOptions& options) {
                       "material=linear, neo_hookean or ogden: stiffness is sampled under presses alone",
                       "leave out material, or fit a capture that has nothing but presses"});
   if (!capture.scene.object.surface) refuse("there is no scan of the object at rest", "add [object] surface");
-  if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty() && !has_fitted_loads(capture))
+  if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty() && !has_fitted_loads(capture) &&
+      !has_pressed(capture))
     refuse("there are no depth cameras, no clouds and no markers", "");
   if (has_fitted_loads(capture) && capture.scene.fixed.empty() && capture.scene.planes.empty())
     refuse("weights hang from the object, but nothing holds it",
@@ -170,7 +177,11 @@ ParameterSet joined(const std::vector<CaptureParameters>& recordings, const Join
   }
   for (std::size_t r = 0; r < recordings.size(); ++r)
     for (Parameter p : recordings[r].set.parameters()) {
-      if (r > 0 && is_of_object(p)) continue;
+      if (r > 0 && is_of_object(p)) {  // what one recording tells is estimated
+        Parameter& shared = *std::ranges::find(list, joint.name_of(p.name, r), &Parameter::name);
+        shared.estimated = shared.estimated || p.estimated;
+        continue;
+      }
       p.name = joint.name_of(p.name, r);
       p.at = joint.layout.at(p.name);
       list.push_back(std::move(p));
@@ -303,7 +314,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                          stands ? first_frame_at_rest(capture, recorded.observed, *recording.distance) : -1);
   if (has_poses && !observations.empty()) observations.front().planes = planes_seen(capture, notes);
   recording.observations = std::make_shared<std::vector<FrameObservations>>(std::move(observations));
-  if (recording.observations->empty() && recording.loads.empty())
+  if (recording.observations->empty() && recording.loads.empty() && !has_pressed(capture))
     throw InputError({{capture.file},
                       "no frame shows any point of the object",
                       "depth images or clouds that see it",
@@ -398,9 +409,7 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
 std::shared_ptr<const PressScene> Recordings::press_scene(const Recording& recording, const Discretisation& d,
                                                           const Resolution& resolution) const {
   const Capture& capture = recording.capture;
-  if (!std::ranges::any_of(capture.presses, [](const Press& p) { return is_fitted(p.role); }) &&
-      !has_static_tests_to_fit(capture))
-    return nullptr;
+  if (!has_pressed(capture)) return nullptr;
   auto body = d.body;
   if (body->kind == ElementKind::Hexahedron) {
     Resolution tetrahedra = resolution;

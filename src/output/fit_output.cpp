@@ -441,7 +441,11 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   if (outcome.ms_per_forward_step > 0.0) result.time.ms_per_forward_step = outcome.ms_per_forward_step;
   if (outcome.ms_per_adjoint_step > 0.0) result.time.ms_per_adjoint_step = outcome.ms_per_adjoint_step;
   result.notes = outcome.notes;
-  if (outcome.law) result.curves = predict_curves(*outcome.law->scene, outcome.law->law);
+  if (outcome.law) {
+    result.curves = predict_curves(*outcome.law->scene, outcome.law->law);
+    for (const TestedObject& other : outcome.law->others)
+      std::ranges::move(predict_curves(*other.scene, other.law), std::back_inserter(result.curves));
+  }
   if (outcome.tracking)
     result.tracking = tracking_result(*outcome.tracking, outcome.recordings.front().discretisation.simulation.blocks);
   return result;
@@ -587,8 +591,12 @@ void write_law(const fs::path& folder, const Capture& capture, const LawOutcome&
     if (fields) fields->add(press, nodes, of);
   });
   if (fields) report.fields = fields->draw(gallery_of(capture));
-  report.presses = press_errors(*law.scene, law.predictions);
-  for (const ObservedPress& press : law.scene->presses) report.press_forces.push_back(press.force.norm());
+  const auto add_presses = [&](const PressScene& scene, const std::vector<PressPrediction>& predictions) {
+    std::ranges::move(press_errors(scene, predictions), std::back_inserter(report.presses));
+    for (const ObservedPress& press : scene.presses) report.press_forces.push_back(press.force.norm());
+  };
+  add_presses(*law.scene, law.predictions);
+  for (const TestedObject& other : law.others) add_presses(*other.scene, other.predictions);
   if (law.sampled) report.basis_errors = law.sampled->error_by_size;
 }
 

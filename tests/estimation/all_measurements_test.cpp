@@ -294,6 +294,31 @@ TEST_F(SeenInEveryWay, ResidualsOfAllMeasurementsOfOneMaterialAreZeroAtTheTruth)
   }
 }
 
+/// Whichever is named first, what the motion alone tells is estimated, and both take part.
+TEST_F(SeenInEveryWay, StaticTestsOfACaptureOfTheirOwnAreFittedBesideAMotion) {
+  record({});
+  const RecordedCapture moving = recorded({true, false, false, false, false, false});
+  RecordedCapture pressed = recorded({false, false, false, true, true, true});
+  pressed.capture.scene.timing = {};
+  pressed.capture.depth.clear();
+  pressed.observed.clear();
+  FitOptions options;
+  options.cells = options.coarse_cells = 6.0, options.starts = options.most_starts = 1, options.budget = 0.0;
+  options.alternatives = false;
+  for (const auto& both : {std::vector{moving, pressed}, std::vector{pressed, moving}}) {
+    const FitOutcome outcome = fit(both, options);
+    ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+    EXPECT_FALSE(outcome.law);
+    EXPECT_EQ(outcome.recordings.size(), 2u);
+    EXPECT_TRUE(outcome.parameters.find("stiffness_damping")->estimated);
+    EXPECT_NEAR(outcome.theta[outcome.parameters.find("youngs_modulus")->at] / modulus, 1.0, tolerance(0.1));
+    int of_motion = 0, of_tests = 0;
+    for (const FrameFit& frame : outcome.evaluation.frames) ++(frame.points > 0 ? of_motion : of_tests);
+    EXPECT_EQ(of_motion, frames);
+    EXPECT_GE(of_tests, 3);
+  }
+}
+
 TEST_F(SeenInEveryWay, OneMaterialIsFoundByAllMeasurementsTogetherAndByEach) {
   record({});
   EXPECT_NEAR(estimate({}) / modulus, 1.0, tolerance(0.03));

@@ -154,15 +154,64 @@ TEST(PressFit, RefusesACaptureWithoutPressesToFit) {
   EXPECT_THAT(options.validate(), HasSubstr("cannot both"));
 }
 
+/// Blocks of one material, each in a capture of its own; mesh and law are those of the fit.
+struct PressedBlocks : ::testing::Test {
+  Capture pressed(const char* name, const Eigen::Vector3i& cells, std::pair<int, int> presses, unsigned seed) const {
+    const PressedBlock block(cells);
+    const LawLayout layout({1, 1});
+    const auto law = press_law(*block.body, layout, law_parameters(layout, modulus).reference());
+    std::filesystem::create_directories(folder / name);
+    const auto all = PressedBlock::presses();
+    return read_capture(write_press_capture(
+        folder / name, block.scene({all.begin() + presses.first, all.begin() + presses.second}, law, noise, seed), 0));
+  }
+
+  static constexpr double modulus = 9000.0, noise = 2e-4;
+  TemporaryFolder folder;
+  const RecordedCapture first{pressed("first", {5, 3, 5}, {0, 2}, 1), {}},
+      second{pressed("second", {4, 3, 4}, {1, 3}, 2), {}}, third{pressed("third", {5, 4, 4}, {2, 4}, 3), {}};
+};
+
+TEST_F(PressedBlocks, OfOneMaterialAreFittedTogetherAndPredictOneThatIsHeldOut) {
+  FitOptions options;
+  options.law_terms = 1;
+  const FitOutcome alone = fit({first}, options), both = fit({first, second}, options, {}, {}, third);
+  ASSERT_TRUE(both.evaluation.succeeded) << both.reason;
+  EXPECT_EQ(both.verdict.kind, Verdict::Kind::Explained);
+  const auto at = [](const FitOutcome& o) { return o.theta[o.parameters.find("youngs_modulus")->at]; };
+  EXPECT_NEAR(at(both) / modulus, 1.0, 0.02);
+  EXPECT_LT(both.uncertainty.std_noise[0], 0.9 * alone.uncertainty.std_noise[0]) << "twice as many presses";
+  ASSERT_EQ(both.recordings.size(), 2u);
+  for (const RecordingOutcome& r : both.recordings) EXPECT_EQ(r.evaluation.frames.size(), 2u);
+  EXPECT_NE(both.recordings[0].rest_body, both.recordings[1].rest_body);
+  ASSERT_EQ(both.law->others.size(), 2u);
+  EXPECT_EQ(both.law->scene->presses.front().name, "first: press 1");
+  EXPECT_EQ(both.law->others.front().scene->presses.back().name, "second: press 2");
+  const TestedObject& unseen = both.law->others.back();
+  EXPECT_EQ(unseen.scene->presses.front().role, "test");
+  ASSERT_EQ(unseen.predictions.size(), 2u);
+  for (const PressPrediction& p : unseen.predictions) EXPECT_LT(p.marker_rms, 1.2 * std::sqrt(3.0) * noise);
+  ASSERT_TRUE(both.held_out && both.held_out->evaluation.succeeded);
+  EXPECT_EQ(both.held_out->evaluation.frames.size(), 2u);
+  EXPECT_LT(both.held_out->evaluation.track_rms(), 1.2 * std::sqrt(3.0) * noise);
+}
+
 TEST_F(PressedLayers, AreRefusedBesideWhatTheyCannotBeFittedWith) {
-  const auto refusal = [&](const FitOptions& options, int captures = 1, bool holds_out = false) {
+  const auto refusal = [&](const FitOptions& options, int captures = 1) {
     const std::vector<RecordedCapture> all(std::size_t(captures), RecordedCapture{capture, {}});
-    return complaint_of([&] {
-      (void)fit(all, options, {}, {}, holds_out ? std::optional(RecordedCapture{capture, {}}) : std::nullopt);
-    });
+    return complaint_of([&] { (void)fit(all, options); });
   };
-  EXPECT_THAT(refusal({}, 2), HasSubstr("presses beside other recordings"));
-  EXPECT_THAT(refusal({}, 1, true), HasSubstr("--hold-out"));
+  const auto holding_out = [&](const Capture& held_out, const FitOptions& options) {
+    return complaint_of([&] { (void)fit({{capture, {}}}, options, {}, {}, RecordedCapture{held_out, {}}); });
+  };
+  FitOptions sampled;
+  sampled.material = MaterialKind::Sampled;
+  EXPECT_THAT(refusal(sampled, 2), HasSubstr("several captures"));
+  Capture moving = capture;
+  moving.presses.clear();
+  moving.scene.timing.times = {0.0, 0.1, 0.2};
+  EXPECT_THAT(holding_out(moving, {}), HasSubstr("a motion, held out"));
+  EXPECT_THAT(holding_out(capture, two_zones), HasSubstr("differs over the fitted object"));
   FitOptions hexahedra, refined, given;
   hexahedra.element = ElementKind::Hexahedron;
   EXPECT_THAT(refusal(hexahedra), HasSubstr("element=hexahedra"));

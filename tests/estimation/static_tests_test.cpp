@@ -64,7 +64,7 @@ TEST_P(OfEachKind, KnownTruthIsFoundWithinWhatIsStated) {
   const Capture capture = written(folder, 0.01, GetParam());
   FitOptions options;
   options.law_terms = 1, options.law_zones = 1, options.control_points = 1;
-  const FitOutcome found = fit_presses(capture, options);
+  const FitOutcome found = fit_presses({&capture}, options);
   ASSERT_TRUE(found.law) << found.reason;
   ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
   EXPECT_TRUE(found.converged) << found.reason;
@@ -95,7 +95,7 @@ TEST(StaticTests, CurvesAloneNeedNoShape) {
   const test::TemporaryFolder folder;
   const Capture capture = written(folder, 0.005, {.indentations = false, .grips = false, .has_shape = false});
   EXPECT_TRUE(is_of_material_curves(capture));
-  const FitOutcome found = fit_presses(capture, {});
+  const FitOutcome found = fit_presses({&capture}, {});
   ASSERT_TRUE(found.law) << found.reason;
   ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
   EXPECT_NEAR(found.law->law->small_strain(0).youngs_modulus / modulus, 1.0, tolerance(0.03));
@@ -113,7 +113,7 @@ TEST(StaticTests, AGivenPoissonsRatioStays) {
   FitOptions options;
   options.law_terms = 1, options.law_zones = 1, options.control_points = 1;
   options.parameters["poissons_ratio"] = {VectorX::Constant(1, ratio), false, {}};
-  const FitOutcome found = fit_presses(capture, options);
+  const FitOutcome found = fit_presses({&capture}, options);
   ASSERT_TRUE(found.law) << found.reason;
   ASSERT_TRUE(found.evaluation.succeeded) << found.reason;
   EXPECT_EQ(found.theta[found.law->layout.poissons_ratio()], ratio);
@@ -126,9 +126,9 @@ TEST(StaticTests, ALawThatMissesForcesLeavesThemUnexplained) {
   FitOptions options;
   options.law_zones = 1, options.control_points = 1, options.alternatives = false;
   options.law_terms = 1;
-  EXPECT_EQ(fit_presses(capture, options).verdict.kind, Verdict::Kind::Explained);
+  EXPECT_EQ(fit_presses({&capture}, options).verdict.kind, Verdict::Kind::Explained);
   options.material = MaterialKind::Linear;
-  const FitOutcome linear = fit_presses(capture, options);
+  const FitOutcome linear = fit_presses({&capture}, options);
   EXPECT_EQ(linear.verdict.kind, Verdict::Kind::Unexplained);
   EXPECT_THAT(linear.verdict.reasons, ::testing::Contains(::testing::HasSubstr("The model misses")));
 }
@@ -138,7 +138,7 @@ TEST(StaticTests, ForcesOfGripsCountForTheChoiceOfALaw) {
   const Capture capture = written(folder, 0.01, {.indentations = false, .curves = false});
   FitOptions options;
   options.law_zones = 1, options.control_points = 1, options.alternatives = false;
-  const FitOutcome found = fit_presses(capture, options);
+  const FitOutcome found = fit_presses({&capture}, options);
   ASSERT_TRUE(found.law) << found.reason;
   ASSERT_EQ(found.law->tried.size(), 2U);
   const TriedLaw& two_terms = found.law->tried.back();
@@ -166,7 +166,7 @@ TEST(StaticTests, ACaptureWithNothingToFitIsRefused) {
   const test::TemporaryFolder folder;
   Capture capture = written(folder, 0.01, {.grips = false, .curves = false});
   for (Indentation& test : capture.indentations) test.role = "test";
-  EXPECT_THROW((void)fit_presses(capture, {}), InputError);
+  EXPECT_THROW((void)fit_presses({&capture}, {}), InputError);
 }
 
 }  // namespace
