@@ -101,8 +101,9 @@ std::vector<Agreement> agreements_of(const std::vector<TestedSpecimen>& specimen
   const double noise = marker_noise > 0.0 ? marker_noise : own_scatter(specimens);
   for (const TestedSpecimen& specimen : specimens)
     for (const int i : specimen.presses) {
-      pressed.add(frame->track_sum_squares, noise, 3.0 * frame->tracks,
-                  specimen.scene->presses[std::size_t(i)].greatest_displacement);
+      // Each over its own greatest: a light press tells of the material as a heavy one does.
+      const double own = specimen.scene->presses[std::size_t(i)].greatest_displacement;
+      if (own > 0.0) pressed.add(frame->track_sum_squares / (own * own), noise / own, 3.0 * frame->tracks, 1.0);
       ++frame;
     }
   pressed.conclude("the markers under presses", 3.0, agreements);

@@ -19,7 +19,8 @@ struct TestedSpecimen {
   std::vector<int> presses;
 };
 
-/// How well each kind of measurement of the static tests to fit is met; nothing where the evaluation failed.
+/// How well each kind of measurement of the static tests to fit is met; nothing where the evaluation failed. A press'
+/// residuals count over its own greatest displacement, those of grips over the greatest of their kind.
 /// @param evaluation    of a `PressObjective` of the specimens, or of a `curve_objective` of their curves
 /// @param marker_noise  of a coordinate of presses' markers [m]; 0: what neighbouring markers scatter
 std::vector<Agreement> agreements_of(const std::vector<TestedSpecimen>& specimens, const CostEvaluation& evaluation,

@@ -196,6 +196,14 @@ TEST_F(PressedBlocks, OfOneMaterialAreFittedTogetherAndPredictOneThatIsHeldOut) 
   EXPECT_LT(both.held_out->evaluation.track_rms(), 1.2 * std::sqrt(3.0) * noise);
 }
 
+TEST_F(PressedBlocks, OfTwoMaterialsAreNotExplainedByOne) {
+  RecordedCapture heavy = second;
+  for (Press& press : heavy.capture.presses) press.force *= 2.0;  // as if twice as stiff
+  FitOptions options;
+  options.law_terms = 1;
+  EXPECT_EQ(fit({first, heavy}, options).verdict.kind, Verdict::Kind::Unexplained);
+}
+
 TEST_F(PressedLayers, AreRefusedBesideWhatTheyCannotBeFittedWith) {
   const auto refusal = [&](const FitOptions& options, int captures = 1) {
     const std::vector<RecordedCapture> all(std::size_t(captures), RecordedCapture{capture, {}});
