@@ -580,16 +580,26 @@ RecordingOutcome as_recording(const std::shared_ptr<const Body>& body, const Law
 
 namespace {
 
-/// What a fitted law predicts of static tests that took no part.
-/// Throws InputError where the capture cannot be read, or its object is of other materials.
-void predict_held_out(const Capture& capture, const FitOptions& options, FitOutcome& outcome) {
-  const LawLayout& layout = outcome.law->layout;
-  if (outcome.law->sampled || layout.form().controls > 1 || layout.form().laws > 1)
+/// Static tests that are to be predicted, read before the fit that this might else lose.
+/// Throws InputError where the capture cannot be read, or the choices ask for a material that differs over an object.
+std::shared_ptr<PressScene> scene_held_out(const Capture& capture, const FitOptions& options) {
+  if (options.material == MaterialKind::Sampled || options.law_zones > 1 || options.control_points > 1)
     throw InputError({{capture.file},
                       "a material that differs over the fitted object, and --hold-out",
                       "a law for all of it, which another object can have",
                       "leave out --hold-out, or choose material=ogden and law_zones=1"});
-  const auto scene = std::make_shared<PressScene>(*specimens_of({&capture}, options, 1.0, true).front().scene);
+  return std::make_shared<PressScene>(*specimens_of({&capture}, options, 1.0, true).front().scene);
+}
+
+/// What a fitted law predicts of static tests that took no part; a note where it differs over its object.
+void predict_held_out(const Capture& capture, const std::shared_ptr<PressScene>& scene, FitOutcome& outcome) {
+  const LawLayout& layout = outcome.law->layout;
+  if (layout.form().controls > 1 || layout.form().laws > 1) {
+    outcome.notes.push_back(
+        "What was held out is not predicted: the material differs over the fitted object; `law_zones=1` and "
+        "`control_points=1` keep it even.");
+    return;
+  }
   std::vector<int> all(scene->presses.size());
   std::iota(all.begin(), all.end(), 0);
   StaticTests tests = scene->static_tests();
@@ -619,9 +629,10 @@ FitOutcome fit_presses(const std::vector<const Capture*>& captures, const FitOpt
   require_known(*captures.front(), options);
   const bool are_curves =
       std::ranges::all_of(captures, [](const Capture* capture) { return is_of_material_curves(*capture); });
+  const std::shared_ptr<PressScene> unseen = held_out ? scene_held_out(*held_out, options) : nullptr;
   FitOutcome outcome =
       are_curves ? fit_material_curves(captures, options) : LawRun(captures, options, monitor, std::move(resume)).run();
-  if (held_out && outcome.law && !outcome.interrupted) predict_held_out(*held_out, options, outcome);
+  if (unseen && outcome.law && !outcome.interrupted) predict_held_out(*held_out, unseen, outcome);
   return outcome;
 }
 
