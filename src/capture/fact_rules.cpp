@@ -123,7 +123,7 @@ void check_object_size(RuleContext& context) {
 void check_surface_noise(RuleContext& context) {
   constexpr double most = 0.02;  // of the object's size: beyond that it is another object's
   const Object& object = context.capture.scene.object;
-  const double noise = object.surface_noise;
+  const double noise = object.surface_noise.value_or(0.0);
   const double size = object.surface && object.scale_is_known ? size_of(*object.surface) : infinite;
   if (noise < 0.0 || noise > most * size)
     context.toml.complain("object.surface_noise", "a surface that errs by " + text_of(noise, "m"),

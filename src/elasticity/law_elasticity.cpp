@@ -702,6 +702,7 @@ std::unique_ptr<LawElasticity> make_for(const std::shared_ptr<const Body>& body,
 std::unique_ptr<LawElasticity> LawElasticity::make(const std::shared_ptr<const Body>& body,
                                                    std::shared_ptr<const MaterialLaw> law,
                                                    const std::shared_ptr<const BlockPattern>& pattern) {
+  if (!law) throw std::invalid_argument("a material at quadrature points needs a law");
   if (law->element_count() != body->element_count())
     throw std::invalid_argument("the material has another number of elements than the body");
   return make_for(body, std::move(law), pattern);

@@ -69,6 +69,7 @@ FitOutcome fit_material_curves(const std::vector<const Capture*>& captures, cons
   if (outcome.evaluation.succeeded) add_uncertainty(outcome, {}, {}, agreements_of(specimens, outcome.evaluation));
   outcome.converged = fit.converged;
   outcome.cells = options.cells;
+  outcome.used = with_law(options, fit.layout.form(), false);
   for (std::string& note : unused_choices(options, false, false)) outcome.notes.push_back(std::move(note));
   add_law_notes(outcome, law, capture);
   outcome.law = std::move(law);

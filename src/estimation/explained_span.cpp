@@ -64,7 +64,7 @@ std::optional<Pass> ExplainedSpan::next() {
   Pass pass;
   pass.recordings = recordings_;
   pass.options = options_;
-  pass.options.ends_if_unexplained = !search_.has_whole;
+  pass.limits.ends_if_unexplained = !search_.has_whole;
   is_last_ = is_decided();
   if (search_.has_whole) {
     pass.options.span = is_last_ ? search_.part : search_.next_part;

@@ -209,7 +209,7 @@ Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double d
   pass.options = with_controls(options_, count);
   pass.options.refine = refine;
   pass.options.alternatives = options_.alternatives && is_last_;
-  if (count > 1 && !is_last_) pass.options.wide_band_limit = wide_band_limit();
+  if (count > 1 && !is_last_) pass.limits.wide_band_cost = wide_band_limit();
   pass.begin = from;
   if (count > 1) pass.stage = points(count);
   pass.done_from = done_from, pass.done_to = done_to;

@@ -62,10 +62,8 @@ bool tests_alone(const std::vector<RecordedCapture>& recordings, const std::opti
   return true;
 }
 
-}  // namespace
-
-FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
-               FitState resume, std::optional<RecordedCapture> held_out) {
+FitOutcome fit_all(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
+                   FitState resume, std::optional<RecordedCapture> held_out) {
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
   if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
@@ -94,6 +92,18 @@ FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& option
     OnePass pass = pass_of_held_out(std::move(*held_out), outcome, options);
     outcome.held_out->evaluation = carry_out(pass, of_another_fit).evaluation;
   }
+  return outcome;
+}
+
+}  // namespace
+
+FitOutcome fit(std::vector<RecordedCapture> recordings, const FitOptions& options, const FitMonitor& monitor,
+               FitState resume, std::optional<RecordedCapture> held_out) {
+  FitOutcome outcome = fit_all(std::move(recordings), options, monitor, std::move(resume), std::move(held_out));
+  outcome.given = options;
+  outcome.used.parameters = options.parameters;            // passes begin elsewhere, from one another
+  static_cast<JudgementOptions&>(outcome.used) = options;  // and only the last one is judged
+  outcome.used.tracking = outcome.tracking && outcome.tracking->keeps_loop ? TrackingUse::Loop : TrackingUse::Off;
   return outcome;
 }
 

@@ -106,8 +106,8 @@ std::optional<double> number(const std::string& text) {
   return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
-Entry real_entry(const char* name, const char* unit, const char* range, const char* sentence,
-                 double FitOptions::*member) {
+template <class Part>
+Entry real_entry(const char* name, const char* unit, const char* range, const char* sentence, double Part::*member) {
   return {{name, "number", unit, text_of(FitOptions{}.*member), range, sentence},
           [=](const FitOptions& o) { return text_of(o.*member); },
           [=](FitOptions& o, const std::string& text) -> std::optional<std::string> {
@@ -118,21 +118,21 @@ Entry real_entry(const char* name, const char* unit, const char* range, const ch
           }};
 }
 
-template <class Integer>
-Entry integer_entry(const char* name, const char* range, const char* sentence, Integer FitOptions::*member) {
+template <class Part>
+Entry integer_entry(const char* name, const char* range, const char* sentence, int Part::*member) {
   return {{name, "whole number", "", std::to_string(FitOptions{}.*member), range, sentence},
           [=](const FitOptions& o) { return std::to_string(o.*member); },
           [=](FitOptions& o, const std::string& text) -> std::optional<std::string> {
             const auto value = number(text);
-            if (!value || *value != double(Integer(*value)) || *value < 0) return "a whole number, not negative";
-            o.*member = Integer(*value);
+            if (!value || *value != double(int(*value)) || *value < 0) return "a whole number, not negative";
+            o.*member = int(*value);
             return std::nullopt;
           }};
 }
 
-template <class Kind>
+template <class Kind, class Part>
 Entry choice_entry(const char* name, const char* sentence, const std::vector<std::pair<std::string, Kind>>& names,
-                   Kind FitOptions::*member) {
+                   Kind Part::*member) {
   std::string range;
   for (const auto& [text, kind] : names) range += (range.empty() ? "" : ", ") + text;
   return {{name, "name", "", name_of(names, FitOptions{}.*member), range, sentence},
@@ -147,7 +147,8 @@ Entry choice_entry(const char* name, const char* sentence, const std::vector<std
           }};
 }
 
-Entry flag_entry(const char* name, const char* sentence, bool FitOptions::*member) {
+template <class Part>
+Entry flag_entry(const char* name, const char* sentence, bool Part::*member) {
   return {{name, "true or false", "", FitOptions{}.*member ? "true" : "false", "", sentence},
           [=](const FitOptions& o) { return std::string(o.*member ? "true" : "false"); },
           [=](FitOptions& o, const std::string& text) -> std::optional<std::string> {
@@ -466,6 +467,33 @@ void read_fit_options(const std::filesystem::path& path, FitOptions& options) {
   if (!problems.empty()) throw InputError(std::move(problems));
 }
 
+namespace {
+
+/// What is chosen of a parameter, by the last part of its key.
+std::vector<std::pair<std::string, std::string>> written(const FitOptions::Override& change) {
+  std::vector<std::pair<std::string, std::string>> parts;
+  if (change.start) {
+    const VectorX& start = *change.start;
+    std::string text = text_of(start[0]);
+    if (start.size() == 3) text = "[" + text + ", " + text_of(start[1]) + ", " + text_of(start[2]) + "]";
+    parts.emplace_back("start", text);
+  }
+  if (change.estimated) parts.emplace_back("estimate", *change.estimated ? "true" : "false");
+  if (change.prior_std) parts.emplace_back("prior_std", text_of(*change.prior_std));
+  return parts;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> written_choices(const FitOptions& options, bool standard_too) {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const Entry& e : entries())
+    if (standard_too || e.write(options) != e.write({})) all.emplace_back(e.key.name, e.write(options));
+  for (const auto& [name, change] : options.parameters)
+    for (const auto& [part, text] : written(change)) all.emplace_back(name + (part == "start" ? "" : "." + part), text);
+  return all;
+}
+
 std::vector<std::string> unused_choices(const FitOptions& options, bool has_motion, bool has_presses) {
   static const std::set<std::string> of_pressed_laws = {"law_zones", "basis_tolerance", "basis_samples"};
   static const std::set<std::string> of_tracking = {"tracking", "tracking_rounds"};
@@ -473,10 +501,9 @@ std::vector<std::string> unused_choices(const FitOptions& options, bool has_moti
       "cells",        "element",   "control_points", "modulus_variation", "material",     "max_iterations",
       "marker_noise", "law_terms", "law_zones",      "basis_tolerance",   "basis_samples"};
   std::vector<std::string> notes;
-  const FitOptions standard;
-  for (const Entry& e : entries()) {
-    const std::string& name = e.key.name;
-    if (e.write(options) == e.write(standard)) continue;
+  FitOptions keys = options;
+  keys.parameters.clear();
+  for (const auto& [name, text] : written_choices(keys, false)) {
     const char* why = nullptr;
     if (has_motion && of_pressed_laws.contains(name))
       why = has_presses ? "it concerns objects that are pressed alone" : "it concerns presses with known force";
@@ -489,7 +516,7 @@ std::vector<std::string> unused_choices(const FitOptions& options, bool has_moti
       why = "it concerns presses with known force";
     else if (!has_motion && !of_presses.contains(name))
       why = "it concerns objects that move or hang";
-    if (why) notes.push_back("The choice " + name + " = " + e.write(options) + " was not used: " + why + ".");
+    if (why) notes.push_back("The choice " + name + " = " + text + " was not used: " + why + ".");
   }
   return notes;
 }
@@ -504,18 +531,7 @@ std::string to_toml(const FitOptions& options) {
   }
   for (const auto& [name, change] : options.parameters) {
     out << "\n[parameters.\"" << name << "\"]\n";
-    if (change.start) {
-      out << "start = ";
-      if (change.start->size() == 1) {
-        out << text_of((*change.start)[0]);
-      } else {
-        for (int d = 0; d < 3; ++d) out << (d == 0 ? "[" : ", ") << text_of((*change.start)[d]);
-        out << "]";
-      }
-      out << "\n";
-    }
-    if (change.estimated) out << "estimate = " << (*change.estimated ? "true" : "false") << "\n";
-    if (change.prior_std) out << "prior_std = " << text_of(*change.prior_std) << "\n";
+    for (const auto& [part, text] : written(change)) out << part << " = " << text << "\n";
   }
   return out.str();
 }
@@ -590,7 +606,7 @@ std::string FitOptions::validate() const {
   return "";
 }
 
-std::optional<LawForm> FitOptions::law_of_motion() const {
+std::optional<LawForm> HypothesisOptions::law_of_motion() const {
   if (material == MaterialKind::Ogden) return LawForm{1, std::max(1, law_terms)};
   return std::nullopt;
 }

@@ -35,6 +35,10 @@ void read_fit_options(const std::filesystem::path& path, FitOptions& options);
 /// @param has_presses  whether it compares presses with known force
 std::vector<std::string> unused_choices(const FitOptions& options, bool has_motion, bool has_presses);
 
+/// Key by key what `--set` would be given, the values as JSON and TOML write them: of all keys or of those alone that
+/// differ from the standard, and of what is chosen of parameters.
+std::vector<std::pair<std::string, std::string>> written_choices(const FitOptions& options, bool standard_too);
+
 /// The options as TOML that `read_fit_options` reads back.
 std::string to_toml(const FitOptions& options);
 

@@ -38,7 +38,7 @@ FitOutcome carry_out(PassPlanner& planner, const FitMonitor& monitor) {
       state.pass = s.pass;
       save();
     };
-    FitOutcome outcome = FitRun(pass->recordings, pass->options, of_pass, pass->begin).run();
+    FitOutcome outcome = FitRun(pass->recordings, pass->options, of_pass, pass->begin, pass->limits).run();
     for (FitEvent& event : outcome.history) rename(*pass, event);
     const bool was_interrupted = outcome.interrupted;
     if (!planner.take(std::move(outcome), std::move(reached)) || was_interrupted) continue;

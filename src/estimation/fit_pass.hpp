@@ -14,6 +14,7 @@ struct Pass {
   std::vector<RecordedCapture> recordings;
   FitOptions options;  ///< with a number of control points, and without tracking
   PassState begin;
+  PassLimits limits = {};
   std::string name;   ///< stands before those of its stages: "round 2: "
   std::string stage;  ///< stands for those of its stages but repetitions: "2 control points"; empty: their own
   double done_from = 0.0, done_to = 1.0;  ///< how much of the whole is done before and after it

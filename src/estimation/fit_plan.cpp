@@ -129,7 +129,7 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
   if (first && facts_.options.correct && !find_record(done, {StageKind::Test})) return {{test(*first)}};
   if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Corrected)) return {};
-  if (const StageRecord* at = estimate(done); at && facts_.options.ends_if_unexplained && !at->is_explained) return {};
+  if (const StageRecord* at = estimate(done); at && facts_.limits.ends_if_unexplained && !at->is_explained) return {};
   if (StageChain chain = finer(done); !chain.empty()) return {chain};
   if (std::vector<StageChain> left = alternatives(done); !left.empty()) return left;
   return resolution(done);
@@ -287,7 +287,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
     stage.band = is_narrow ? options.fine_band : options.wide_band;
     stage.iterations = is_narrow ? options.max_iterations : std::max(1, options.max_iterations / 4);
     if (!is_narrow) is_intermediate(stage);
-    if (is_last_wide) stage.give_up_above = options.wide_band_limit;
+    if (is_last_wide) stage.give_up_above = facts_.limits.wide_band_cost;
     stage.free = free_at_last(done);
     if (!is_narrow)
       for (const Parameter& p : facts_.parameters.parameters())

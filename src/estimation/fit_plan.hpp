@@ -10,6 +10,7 @@ namespace pliant {
 /// What the plan of a fit depends on, beside what was done: facts about the recordings, and the choices.
 struct PlanFacts {
   FitOptions options;
+  PassLimits limits;
   ParameterSet parameters;                ///< where the fit begins, with the choices
   std::vector<ParameterHandle> moduli;    ///< of the object
   ParameterHandle density, gravity;       ///< of the first recording

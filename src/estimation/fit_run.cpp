@@ -48,17 +48,17 @@ constexpr double most_cells = 64.0;  // along the object's longest axis
 // where they cost little.
 constexpr int few_iterations = 2, many_iterations = 5;
 const std::string cause_scan = "errors of the scan";
-constexpr int draws_of_scan = 4;
+constexpr int smooth_scan_errors = 2;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 
 }  // namespace
 
 FitRun::FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor,
-               PassState state)
+               PassState state, const PassLimits& limits)
     : StageLoop(options, monitor, std::move(state)),
       recordings_(std::move(recorded), options_, outcome_.notes),
       layout_(std::make_shared<ParameterLayout>(recordings_.parameters().layout())),
-      plan_(facts()) {
+      plan_(facts(limits)) {
   state_.controls = recordings_.controls();
 }
 
@@ -108,9 +108,9 @@ FitRun::Carrying FitRun::carrying(const VectorX& theta) {
   return found;
 }
 
-PlanFacts FitRun::facts() {
+PlanFacts FitRun::facts(const PassLimits& limits) {
   PlanFacts f;
-  f.options = options_;
+  f.options = options_, f.limits = limits;
   f.parameters = recordings_.parameters();
   f.moduli = recordings_.material().youngs_moduli;
   const Recording& first = recordings_.front();
@@ -174,9 +174,14 @@ std::vector<Alternative> FitRun::alternatives() const {
                    judgement.size_of_longer_step,
                    false,
                    few_iterations});
-  for (int draw = 1; recordings_.any_scan_errs() && draw <= draws_of_scan; ++draw) {
-    const double size = std::sqrt(1.0 / draws_of_scan) / part_of_scan_error;  // so that their variances add to one
-    all.push_back({cause_scan, cells, 1.0, {.scan_error = draw}, false, size, has_coarser, many_iterations});
+  if (recordings_.any_scan_errs()) {
+    const auto add = [&](int realisation, double share_of_variance) {
+      const double size = std::sqrt(share_of_variance) / part_of_scan_error;
+      all.push_back({cause_scan, cells, 1.0, {.scan_error = realisation}, false, size, has_coarser, many_iterations});
+    };
+    add(common_scan_error, 0.5);
+    for (int realisation = 1; realisation <= smooth_scan_errors; ++realisation)
+      add(realisation, 0.5 / smooth_scan_errors);
   }
   if (!options_.law_of_motion() && options_.material != MaterialKind::Linear)
     all.push_back({"law at large strain",

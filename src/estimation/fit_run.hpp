@@ -20,7 +20,8 @@ inline constexpr double work_of_a_minute = 4e7;  ///< see `CostEvaluation::work`
 class FitRun : StageLoop {
  public:
   /// Throws InputError where a recording cannot be fitted, with the reason.
-  FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, PassState state);
+  FitRun(std::vector<RecordedCapture> recorded, const FitOptions& options, const FitMonitor& monitor, PassState state,
+         const PassLimits& limits);
 
   /// To the end of the plan, or until it is interrupted, and what came out.
   /// Throws InputError where no stiffness can be simulated.
@@ -58,7 +59,7 @@ class FitRun : StageLoop {
 
   void tell(FitEvent event);
 
-  PlanFacts facts();
+  PlanFacts facts(const PassLimits& limits);
   Spacing coarse_spacing() const;
   /// A Young's modulus that holds up every object that is held, and the softest one that is worth a trial [Pa]; 0:
   /// none is held.
@@ -73,6 +74,8 @@ class FitRun : StageLoop {
   PassState reached() const;
 
   void finish(const std::vector<StageRecord>& done);
+  /// The choices, with what they left to the fit as it was decided.
+  FitOptions used_options(const Grid& at) const;
   CostEvaluation evaluation_of(const StageRecord& record, const Stage& narrow, const ParameterSet& parameters);
   /// At an estimate, with derivatives by these parameters: what its optimiser found where the record has it, else anew.
   /// @param stage  of the same grid and band as the estimate's

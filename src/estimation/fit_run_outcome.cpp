@@ -91,6 +91,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   outcome_.starts = plan_.starts(done);
   outcome_.start_theta = plan_.start_theta(done);
   outcome_.cells = at.cells;
+  outcome_.used = used_options(at);
   outcome_.interrupted = interrupted_;
   outcome_.converged = last.converged && !interrupted_;
   outcome_.reason = interrupted_ && last.succeeded ? "interrupted" : last.reason;
@@ -119,6 +120,17 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   std::vector<const Capture*> captures;
   for (const Recording& r : recordings_.all()) captures.push_back(&r.capture);
   add_notes(outcome_, captures);
+}
+
+FitOptions FitRun::used_options(const Grid& at) const {
+  FitOptions used = options_;
+  used.cells = at.cells, used.steps = at.steps;
+  used.element = recordings_.resolution(at.cells, at.steps).element;
+  used.control_points = recordings_.controls();
+  if (used.span == 0.0) used.span = 1.0;
+  if (used.material == MaterialKind::Automatic) used.material = MaterialKind::NeoHookean;
+  if (const auto law = used.law_of_motion()) used.law_terms = law->terms;
+  return used;
 }
 
 /// With derivatives, but for a last look; that of the optimiser where it ran here.

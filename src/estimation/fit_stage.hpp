@@ -1,6 +1,7 @@
 #pragma once
 
 #include <compare>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -64,11 +65,21 @@ struct Horizon {
 /// Of a scan's standard deviation, how far an object's surface lies beside it where that is tried: what follows is to
 /// first order as much larger, and an optimiser finds back from there at once.
 inline constexpr double part_of_scan_error = 0.25;
+inline constexpr int common_scan_error = -1;
+
+/// Where a pass of a search among several ends early.
+struct PassLimits {
+  bool ends_if_unexplained = false;  ///< after its estimate
+  /// What the cost of the last stage in the wide band must come below.
+  double wide_band_cost = std::numeric_limits<double>::infinity();
+};
 
 /// In what a model differs from the one that is fitted.
 struct ModelChange {
   bool small_strain = false;  ///< corotated linear elasticity, and Rayleigh's damping
-  int scan_error = 0;         ///< the object's surface lies beside its scan, as part of that errs: which draw; 0: on it
+  /// The object's surface lies beside its scan, by a part of what that errs: `common_scan_error` everywhere, from 1 on
+  /// a smooth realisation; 0: on it.
+  int scan_error = 0;
   bool operator==(const ModelChange&) const = default;
 };
 

@@ -82,6 +82,12 @@ struct Judgement {
   Judged given_gravity{"interval.given.gravity", 0.003, "deviation [rad] of gravity's given direction: a level"};
   Judged given_density{"interval.given.density", 0.01,
                        "deviation of the logarithm of a given density: a kitchen scale, and the volume of a scan"};
+  Judged scan_error{
+      "interval.given.scan_error", 0.0025,
+      "deviation of a scan along its normals where `surface_noise` is not stated, over the object's size: "
+      "hand-held scanners and photogrammetry"};
+  Judged scan_error_of_thickness{"interval.given.scan_error_of_thickness", 0.03,
+                                 "the most of that over the object's thickness: what a scan shows at all"};
   Judged given_friction{"interval.given.friction", 0.05, "deviation of a given coefficient of friction"};
   Judged given_contact{"interval.given.contact_stiffness", 0.3,
                        "deviation of the logarithm of the stiffness of contact, where it was chosen"};

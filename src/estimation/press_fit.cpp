@@ -463,7 +463,8 @@ class LawRun : StageLoop {
 
   FitOutcome finish(const LawPlan::Standing& standing) {
     outcome_.interrupted = interrupted_;
-    outcome_.cells = resolution_of_tests(first(), options_).cells;
+    const Resolution resolution = resolution_of_tests(first(), options_);
+    outcome_.cells = resolution.cells;
     if (!standing.best) {
       outcome_.reason = interrupted_ ? "interrupted" : why_none_stands();
       return std::move(outcome_);
@@ -483,6 +484,9 @@ class LawRun : StageLoop {
       law.others.push_back({scene, press_law(*scene->body, form.layout, best.theta), {}});
       if (!interrupted_) law.others.back().predictions = predict_presses(*scene, law.others.back().law);
     }
+    outcome_.used = with_law(options_, form.layout.form(), !best.shape.points.empty());
+    outcome_.used.cells = resolution.cells, outcome_.used.element = resolution.element;
+    if (law.sampled) outcome_.used.material = MaterialKind::Sampled;
     outcome_.theta = best.theta;
     outcome_.parameters = form.parameters;
     const auto ended = ended_.find(best.id.number);
@@ -542,6 +546,16 @@ void require_known(const Capture& capture, const FitOptions& options) {
 }
 
 }  // namespace
+
+FitOptions with_law(FitOptions options, const LawForm& form, bool is_field) {
+  options.material = form.terms > 0                               ? MaterialKind::Ogden
+                     : form.two_numbers == ElasticLaw::NeoHookean ? MaterialKind::NeoHookean
+                                                                  : MaterialKind::Linear;
+  options.law_terms = form.terms;
+  options.law_zones = is_field ? 1 : form.controls;
+  options.control_points = is_field ? form.controls : 1;
+  return options;
+}
 
 std::vector<ModelShift> shifts_of_forms(const ParameterSet& parameters, double youngs_modulus,
                                         const std::vector<TriedLaw>& tried) {

@@ -31,6 +31,9 @@ std::optional<double> known_poissons_ratio(const FitOptions& options);
 FitOutcome fit_presses(const std::vector<const Capture*>& captures, const FitOptions& options,
                        const FitMonitor& monitor = {}, FitState resume = {}, const Capture* held_out = nullptr);
 
+/// The choices of a fit of static tests as they were used: the law that was kept, of regions or zones or of a field.
+FitOptions with_law(FitOptions options, const LawForm& form, bool is_field);
+
 /// By how much Young's moduli would differ in a form of the law that was tried and left although the evidence does not
 /// rule it out (ln of the Bayes factor above -3): of those forms the one that is farthest. None where there is none.
 /// @param youngs_modulus  of the form that was kept [Pa]

@@ -59,6 +59,22 @@ void require_fittable(const Capture& capture, const FitOptions& options) {
     refuse("fewer than two frames follow start_frame", "record longer");
 }
 
+/// Standard deviation of a scan along its normals [m]: what the capture states or, where it states nothing and the fit
+/// does not estimate it, what scanners leave.
+double scan_error(const Scene& scene, const SignedDistance& distance, bool is_estimated) {
+  if (const auto stated = scene.object.surface_noise) return *stated;
+  if (is_estimated) return 0.0;
+  return std::min(judgement.scan_error * object_size(scene),
+                  judgement.scan_error_of_thickness * thickness(scene, distance));
+}
+
+/// A realisation of a scan's error along its normals [m]: one that the whole surface has in common, or a smooth one.
+std::function<double(const Vector3&)> scan_error(double deviation, double size, int realisation) {
+  constexpr double alike = 0.1;  // of the object's size: over so far are smooth errors alike
+  if (realisation == common_scan_error) return [deviation](const Vector3&) { return deviation; };
+  return RandomField(deviation, alike * size, std::uint64_t(realisation));
+}
+
 /// What was seen under a load, as the one frame of a recording.
 LoadCase load_case(const Capture& capture, const Load& load, int points) {
   LoadCase one{load, {}, {}};
@@ -327,6 +343,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                       "name the same materials in every recording of the object"});
   controls_ = controls;
   recording.size = object_size(capture.scene);
+  recording.scan_error = scan_error(capture.scene, *recording.distance, options_.scan_points > 0);
   if (!recording.observations->empty())
     recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
                                     recording.observations->back().frame);
@@ -392,12 +409,11 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
     settings.material.elastic = ElasticLaw::Corotated;
   if (options_.damping == StiffnessDamping::Rayleigh || change.small_strain)
     settings.material.damping = StiffnessDamping::Rayleigh;
-  constexpr double alike = 0.1;  // of the object's size: over so far are errors of a scan alike
   Grid grid{cells, steps, change, {}, {}};
   for (const Recording& r : all_) {
     Resolution own = resolution(cells, steps);
-    if (const double noise = r.capture.scene.object.surface_noise; change.scan_error > 0 && noise > 0.0)
-      own.offset = RandomField(part_of_scan_error * noise, alike * r.size, std::uint64_t(change.scan_error));
+    if (change.scan_error != 0 && r.scan_error > 0.0)
+      own.offset = scan_error(part_of_scan_error * r.scan_error, r.size, change.scan_error);
     grid.recording.push_back(
         discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
     grid.presses.push_back(press_scene(r, grid.recording.back(), own));

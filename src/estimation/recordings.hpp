@@ -27,6 +27,7 @@ struct Recording {
   std::optional<TrackedPoints> pose;  ///< from which it is released, where it was registered
   std::shared_ptr<const SignedDistance> distance;
   double size = 0.0;                 ///< of the object [m]
+  double scan_error = 0.0;           ///< standard deviation of its scan along the normals [m]; 0: exact
   int last_frame = 0;                ///< that is compared
   int last_seen = 0;                 ///< of the whole recording
   std::vector<double> common_error;  ///< of each depth camera, what all its readings err by together [m]
@@ -79,9 +80,8 @@ class Recordings {
     return std::ranges::any_of(all_,
                                [](const Recording& r) { return r.capture.scene.object.shape_is == ShapeIs::Static; });
   }
-  /// Whether a capture states how far its scan errs.
   bool any_scan_errs() const {
-    return std::ranges::any_of(all_, [](const Recording& r) { return r.capture.scene.object.surface_noise > 0.0; });
+    return std::ranges::any_of(all_, [](const Recording& r) { return r.scan_error > 0.0; });
   }
   bool any_meshed_here() const {
     return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.scene.object.volume; });
@@ -115,9 +115,11 @@ class Recordings {
   /// Sets the moduli [Pa], as many as controls.
   void set_moduli(VectorX& theta, const VectorX& moduli) const;
 
+  /// In what elements the object is simulated.
+  Resolution resolution(double cells, double steps) const;
+
  private:
   CaptureParameters make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes);
-  Resolution resolution(double cells, double steps) const;
   std::shared_ptr<const PressScene> press_scene(const Recording& recording, const Discretisation& d,
                                                 const Resolution& resolution) const;
   void add_loads(const Recording& recording, const Discretisation& d, const ObjectiveOptions& options,

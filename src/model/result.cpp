@@ -78,6 +78,12 @@ Json error_json(const ErrorResult& error) {
   return json;
 }
 
+Json choices_json(const std::map<std::string, std::string>& choices) {
+  Json json = Json::object();
+  for (const auto& [name, text] : choices) json[name] = Json::parse(text);
+  return json;
+}
+
 Json values_json(const std::map<std::string, double>& values) {
   Json json = Json::object();
   for (const auto& [name, value] : values) json[name] = number(value);
@@ -448,6 +454,14 @@ Result read_all(const Member& top) {
   result.material = optional_string(top, "material");
   result.verdict = optional_string(top, "verdict");
   if (top.has("judgement")) result.judgement = read_values(top, "judgement");
+  if (top.has("options")) {
+    const auto read = [](const Member& choices) {
+      std::map<std::string, std::string> all;
+      choices.each_key([&](const std::string& name, const Member& m) { all[name] = m.json().dump(); });
+      return all;
+    };
+    result.options_given = read(top["options"]["given"]), result.options_used = read(top["options"]["used"]);
+  }
   if (top.has("reasons")) top["reasons"].each_item([&](const Member& m) { result.reasons.push_back(m.string()); });
   if (top.has("uncertainty"))
     top["uncertainty"].each_item([&](const Member& m) {
@@ -502,6 +516,8 @@ std::string to_json(const Result& result) {
     json["reasons"] = result.reasons;
   }
   if (!result.judgement.empty()) json["judgement"] = result.judgement;
+  if (!result.options_used.empty())
+    json["options"] = {{"given", choices_json(result.options_given)}, {"used", choices_json(result.options_used)}};
   json["parameters"] = Json::object();
   for (const ParameterResult& parameter : result.parameters)
     for (const std::string& name : {parameter.name, former_name(parameter.name)})

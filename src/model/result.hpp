@@ -182,8 +182,10 @@ struct Result {
   CostResult cost;
   std::string material;  ///< what law the object was taken to have, and how it damps, in words; empty: it is not known
   std::vector<CorrelationResult> identifiability;
-  std::string verdict;                      ///< "explained", "unexplained" or "undetermined"; empty: none was made
-  std::vector<std::string> reasons;         ///< of the verdict, plain sentences
+  std::string verdict;               ///< "explained", "unexplained" or "undetermined"; empty: none was made
+  std::vector<std::string> reasons;  ///< of the verdict, plain sentences
+  /// Choices of the fit, values as JSON writes them: those that differ from the standard, and all as they were used.
+  std::map<std::string, std::string> options_given, options_used;
   std::map<std::string, double> judgement;  ///< numbers set by hand that intervals, verdict and model rest on, by name
   std::vector<UncertaintyResult> uncertainty;
   std::vector<StartResult> starts;

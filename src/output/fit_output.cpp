@@ -14,6 +14,7 @@
 #include "elasticity/element_moduli.hpp"
 #include "elasticity/law_elasticity.hpp"
 #include "elasticity/law_layout.hpp"
+#include "estimation/fit_config.hpp"
 #include "estimation/judgement.hpp"
 #include "estimation/load_free.hpp"
 #include "live/live_page.hpp"
@@ -415,6 +416,8 @@ Result make_result(const std::vector<RecordedCapture>& recordings, const FitOutc
   add_verdict(result, outcome, jacobian);
   result.material = outcome.material;
   for (const Judged& number : all_judged()) result.judgement[number.name] = number;
+  for (const auto& [name, text] : written_choices(outcome.given, false)) result.options_given[name] = text;
+  for (const auto& [name, text] : written_choices(outcome.used, true)) result.options_used[name] = text;
   result.error = surface_errors(outcome.evaluation);
   for (std::size_t r = 0; r < recordings.size() && recordings.size() > 1; ++r)
     result.recordings.push_back(

@@ -141,9 +141,9 @@ struct Object {
   std::optional<double> mass;        ///< [kg]
   std::optional<double> density;     ///< [kg/m^3]
   ShapeIs shape_is = ShapeIs::Reference;
-  double surface_noise = 0.0;  ///< standard deviation of the surface along its normals [m]; 0: it is exact
-  bool pose_is_known = true;   ///< false: the surface stands anywhere, and is to be placed in the start frame
-  bool scale_is_known = true;  ///< false: the surface is in any unit; its pose is unknown then too
+  std::optional<double> surface_noise;  ///< standard deviation of the surface along its normals [m]; 0: it is exact
+  bool pose_is_known = true;            ///< false: the surface stands anywhere, and is to be placed in the start frame
+  bool scale_is_known = true;           ///< false: the surface is in any unit; its pose is unknown then too
 
   /// Mass [kg], from the density where that is given. Nothing: neither is known.
   std::optional<double> total_mass() const;

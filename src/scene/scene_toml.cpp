@@ -163,7 +163,7 @@ void read_object_facts(TomlTable& table, Object& object) {
                            "\"reference\" or \"static\"",
                            "\"static\" means that the scan was taken sagging under gravity");
   object.shape_is = shape_is == "static" ? ShapeIs::Static : ShapeIs::Reference;
-  object.surface_noise = table.optional<double>("surface_noise").value_or(0.0);
+  object.surface_noise = table.optional<double>("surface_noise");
 }
 
 void read_object_shape(TomlTable& table, const NamedFiles& files, Object& object) {
@@ -450,7 +450,7 @@ void write_toml(std::ostream& out, const Object& object, const std::string& file
   if (!object.pose_is_known) out << "pose = \"unknown\"   # of the scan: found in the start frame\n";
   if (!object.scale_is_known) out << "scale = \"unknown\"   # of the scan: any unit\n";
   if (object.shape_is == ShapeIs::Static) out << "shape_is = \"static\"   # taken as it sagged under gravity\n";
-  if (object.surface_noise > 0.0) out << "surface_noise = " << toml_text(object.surface_noise) << "   # m\n";
+  if (object.surface_noise) out << "surface_noise = " << toml_text(*object.surface_noise) << "   # m\n";
   out << "\n";
 }
 

@@ -141,6 +141,7 @@ Capture capture_of(const Synthesis& s, const fs::path& folder) {
   capture.name = s.name;
   capture.scene = s.scene;
   capture.scene.object.file = folder / "rest.ply";
+  capture.scene.object.surface_noise = 0.0;  // it is the surface of the simulated body
   if (has_images(s))
     for (const SyntheticCamera& camera : s.cameras) {
       capture.depth.push_back({camera.name,

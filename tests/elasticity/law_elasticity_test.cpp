@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "elasticity/material.hpp"
 #include "support/bodies.hpp"
 #include "support/dense.hpp"
 #include "support/derivatives.hpp"
@@ -204,6 +205,9 @@ TEST(LawElasticity, RefusesOtherBodies) {
   const auto hexahedra = test::box_body({0.1, 0.1, 0.1}, 0.05);
   MatrixX q(hexahedra->element_count(), 2);
   q.rowwise() = Eigen::RowVector2d(1000.0, 100.0);
+  EXPECT_THROW(Material{std::shared_ptr<const MaterialLaw>()}.make_elasticity(
+                   test::tet_body({0.2, 0.1, 0.1}, {1, 1, 1}, false), {}),
+               std::invalid_argument);
   EXPECT_THROW(LawElasticity::make(hexahedra, std::make_shared<LinearLaw>(q)), std::invalid_argument);
   EXPECT_THROW(LawElasticity::make(test::tet_body({0.2, 0.1, 0.1}, {1, 1, 1}, false), std::make_shared<LinearLaw>(q)),
                std::invalid_argument);

@@ -47,6 +47,7 @@ class SeenInEveryWay : public ::testing::Test {
     capture_.name = "bar";
     capture_.file = folder_.path() / "capture.toml";
     capture_.scene.object.surface = make_box(Vector3(length, edge, edge), 0.0125);
+    capture_.scene.object.surface_noise = 0.0;
     capture_.scene.object.density = 300.0;
     capture_.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
     for (int f = 0; f < frames; ++f) capture_.scene.timing.times.push_back(f / 30.0);

@@ -96,6 +96,7 @@ TEST(CutString, AnchorsModulusAndDensity) {
 struct ReleasedCapture : ::testing::Test {
   ReleasedCapture() {
     capture.scene.object.surface = make_box(Vector3(2 * length, 2 * edge, 2 * edge), edge);
+    capture.scene.object.surface_noise = 0.0;
     capture.scene.world.gravity = Vector3(0, -9.81, 0);
     capture.scene.fixed = {{RegionHalfSpace{{-0.9 * length, 0, 0}, {-1, 0, 0}}, std::nullopt}};
     capture.scene.timing.times = {0.0, 0.1};

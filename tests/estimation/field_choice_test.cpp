@@ -12,6 +12,7 @@
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
 #include "estimation/fit_pass.hpp"
+#include "estimation/fit_run.hpp"
 #include "geometry/primitives.hpp"
 #include "input_errors.hpp"
 #include "support/bodies.hpp"
@@ -359,8 +360,7 @@ TEST(FieldChoice, AFitEndsInTheWideBandWhereItGainsTooLittle) {
   FitOptions options = quick();
   options.control_points = 1;
   options.cells = 12.0;  // finer than the starts: stages in the wide band come first
-  options.wide_band_limit = 1e-9;
-  const FitOutcome outcome = fit({sagging_bar(soft)}, options);
+  const FitOutcome outcome = FitRun({sagging_bar(soft)}, options, {}, {}, {.wide_band_cost = 1e-9}).run();
   EXPECT_FALSE(outcome.evaluation.succeeded);
   EXPECT_FALSE(outcome.converged);
   EXPECT_TRUE(std::isfinite(outcome.final_cost));

@@ -49,6 +49,24 @@ FitOptions changed() {
   return o;
 }
 
+TEST(FitConfig, ChoicesAreWrittenAsTheyAreSet) {
+  EXPECT_TRUE(written_choices({}, false).empty());
+  EXPECT_EQ(written_choices({}, true).size(), fit_keys().size());
+  const auto written = written_choices(changed(), false);
+  EXPECT_THAT(written, ::testing::Contains(::testing::Pair("cells", "17.5")));
+  EXPECT_THAT(written, ::testing::Contains(::testing::Pair("solver", "\"cholmod\"")));
+  EXPECT_THAT(written, ::testing::Contains(::testing::Pair("hold_strongly", "true")));
+  EXPECT_THAT(written, ::testing::Contains(::testing::Pair("poissons_ratio.estimate", "false")));
+  EXPECT_THAT(written, ::testing::Contains(::testing::Pair("gravity", "[0, -9.5, 0.25]")));
+  EXPECT_THAT(written, ::testing::Not(::testing::Contains(::testing::Key("refine"))));
+  FitOptions set;
+  for (auto [key, value] : written) {
+    std::erase(value, '"');
+    set_fit_option(set, key + "=" + value);
+  }
+  EXPECT_EQ(to_toml(set), to_toml(changed()));
+}
+
 TEST(FitConfig, RoundTripsEveryKey) {
   const test::TemporaryFolder folder;
   const FitOptions written = changed();

@@ -432,7 +432,7 @@ TEST_F(Plans, EndWhereTheEstimateFails) {
 /// The last stage in the wide band must gain enough, and not the one in the narrow band; where it does not, nothing
 /// follows.
 TEST_F(Plans, EndInTheWideBandWhereTheLimitIsNotReached) {
-  facts.options.wide_band_limit = 1.7;
+  facts.limits.wide_band_cost = 1.7;
   has_followed();
   const std::vector<StageChain> chains = next();
   ASSERT_EQ(chains.size(), 1u);

@@ -23,6 +23,7 @@ Capture thrown_bar() {
   Capture capture;
   capture.name = "bar";
   capture.scene.object.surface = make_box(Vector3(length, edge, edge), 0.025);
+  capture.scene.object.surface_noise = 0.0;
   capture.scene.object.density = 100.0;
   capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
   for (int f = 0; f < frames; ++f) capture.scene.timing.times.push_back(0.008 * f);

@@ -21,6 +21,7 @@ struct BlownPlate {
   BlownPlate() {
     Scene& scene = capture.scene;
     scene.object.surface = make_box({0.2, 0.02, 0.1}, 0.05);
+    scene.object.surface_noise = 0.0;
     scene.object.mass = 0.03;
     scene.world.gravity = Vector3(0.0, -9.81, 0.0);
     scene.timing = evenly_timed(60.0, 16);

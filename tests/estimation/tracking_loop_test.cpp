@@ -27,6 +27,7 @@ RecordedCapture swinging_bar(int frames_seen = frames, double beyond = modulus) 
   Capture& capture = recorded.capture;
   capture.name = "bar";
   capture.scene.object.surface = make_box(Vector3(length, edge, edge), 0.0125);
+  capture.scene.object.surface_noise = 0.0;
   capture.scene.object.density = 300.0;
   capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
   for (int f = 0; f < frames_seen; ++f) capture.scene.timing.times.push_back(f / 30.0);

@@ -144,6 +144,8 @@ TEST(Result, IntervalsVerdictAndBudgetComeBack) {
   result.material = "neo-Hookean";
   result.verdict = "unexplained", result.reasons = {"The distances are 3.0 times the noise."};
   result.judgement = {{"verdict.residual", 1.6}, {"interval.floor.youngs_modulus", 0.05}};
+  result.options_given = {{"cells", "16.5"}};
+  result.options_used = {{"cells", "16.5"}, {"element", "\"hexahedra\""}, {"gravity", "[0.0,-9.5,0.25]"}};
   result.uncertainty = {{"noise", {{"youngs_modulus", 9.0}}}, {"mesh", {{"youngs_modulus", std::nan("")}}}};
   write_result(folder / "result.json", result);
   const Result read = read_result(folder / "result.json");
@@ -155,6 +157,8 @@ TEST(Result, IntervalsVerdictAndBudgetComeBack) {
   EXPECT_EQ(read.material, result.material);
   EXPECT_EQ(read.verdict, result.verdict);
   EXPECT_EQ(read.judgement, result.judgement);
+  EXPECT_EQ(read.options_given, result.options_given);
+  EXPECT_EQ(read.options_used, result.options_used);
   EXPECT_EQ(read.reasons, result.reasons);
   ASSERT_EQ(read.uncertainty.size(), 2u);
   EXPECT_EQ(read.uncertainty[0].cause, "noise");

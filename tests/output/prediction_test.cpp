@@ -23,6 +23,7 @@ struct Predictions : ::testing::Test {
   Predictions() {
     capture.file = "capture.toml";
     capture.scene.object.surface = make_box(Vector3(length, edge, edge), edge);
+    capture.scene.object.surface_noise = 0.0;
     capture.scene.object.density = 1000.0;
     capture.scene.world.gravity = Vector3(0.0, 0.0, -9.81);
     capture.scene.world.up = Vector3::UnitZ();

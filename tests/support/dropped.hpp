@@ -26,6 +26,7 @@ struct Dropped {
     const Matrix3 turn = Eigen::AngleAxisd(0.5, Vector3(0.3, 0.2, 1.0).normalized()).toRotationMatrix();
     for (Vector3& v : block.vertices) v = turn * v + Vector3(0.0, 0.19, 0.0);
     capture.scene.object.surface = block;
+    capture.scene.object.surface_noise = 0.0;
     capture.scene.object.density = 100.0;
     capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
     for (int frame = 0; frame < frames; ++frame) capture.scene.timing.times.push_back(frame / 60.0);

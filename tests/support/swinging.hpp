@@ -204,6 +204,7 @@ struct SwingRecording {
   SwingRecording(const Swing& swing, const Sensors& sensors) {
     capture.name = "swing";
     capture.scene.object.surface = swing.surface;
+    capture.scene.object.surface_noise = 0.0;
     capture.scene.timing.start_frame = swing.options.held - 1;
     capture.scene.initial.released = true;
     for (int f = 0; f < swing.frame_count(); ++f) {
