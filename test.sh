@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds everything and runs the tests. Arguments go to ctest: ./test.sh -L motion, ./test.sh -R Newmark
-# ./test.sh quick: the cases of a second at most, each program of them once, without installing anything.
+# ./test.sh quick: the cases of 0.3 s at most, each program of them once, without installing anything.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 

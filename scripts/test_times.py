@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """What the tests took, by CTest's --output-junit: the sum of each module and the longest. --slow FILE: writes the names of those that
-took a second or more, which `./test.sh quick` leaves out."""
+took 0.3 s or more, which `./test.sh quick` leaves out."""
 import argparse
 import collections
 import pathlib
 import xml.etree.ElementTree as xml
 
 LONGEST = 15
-SLOW = 1.0  # [s]
+SLOW = 0.3  # [s]
 
 
 def times_of(path):

@@ -48,7 +48,7 @@ FitOutcome fit_material_curves(const std::vector<const Capture*>& captures, cons
     const double evidence = is_first ? std::numeric_limits<double>::infinity() : 0.5 * (before - tried.bic);
     before = tried.bic;
     const bool kept = fit.succeeded && tried.terms <= fit.layout.form().terms;
-    law.tried.push_back({{1, tried.terms}, tried.cost, evidence, kept});
+    law.tried.push_back({{1, tried.terms}, tried.cost, evidence, kept, tried.youngs_modulus});
   }
   outcome.reason = fit.succeeded ? fit.reason : fit.failure;
   if (!fit.succeeded) return outcome;
@@ -66,7 +66,9 @@ FitOutcome fit_material_curves(const std::vector<const Capture*>& captures, cons
     if (i > 0) law.others.push_back({scene, press_law(*scene->body, fit.layout, fit.theta), {}});
     outcome.recordings.push_back(as_recording(scene->body, law.layout, outcome, int(i)));
   }
-  if (outcome.evaluation.succeeded) add_uncertainty(outcome, {}, {}, agreements_of(specimens, outcome.evaluation));
+  if (outcome.evaluation.succeeded)
+    add_uncertainty(outcome, shifts_of_forms(outcome.parameters, law.layout.mean_modulus(outcome.theta), law.tried),
+                    floor_of_tests(outcome, options), agreements_of(specimens, outcome.evaluation));
   outcome.converged = fit.converged;
   outcome.cells = options.cells;
   outcome.used = with_law(options, fit.layout.form(), false);

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
-#include <numeric>
-#include <random>
 
 #include "estimation/notes.hpp"
 
@@ -15,8 +12,6 @@ namespace {
 
 bool is_pull(const Parameter& p) { return p.role == Role::Initial && p.is_auxiliary; }
 bool is_of_start(const Parameter& p) { return p.role == Role::Initial || p.role == Role::Load; }
-/// Poisson's ratios and exponents: what shapes a law, where moduli scale it.
-bool shapes_law(const Parameter& p) { return p.role == Role::Material && p.unit != "Pa"; }
 
 /// A stage that another one follows ends a standard deviation from its minimum, or where that gains little.
 void is_intermediate(Stage& stage) { stage.promise_tolerance = 0.5, stage.cost_tolerance = 2e-3; }
@@ -52,6 +47,8 @@ StageChain left_of(StageChain chain, const std::vector<StageRecord>& done) {
 
 }  // namespace
 
+bool shapes_law(const Parameter& p) { return p.role == Role::Material && p.unit != "Pa"; }
+
 bool is_help(StageKind kind) { return kind == StageKind::Pose || kind == StageKind::Motion; }
 
 bool is_on_full_grid(StageKind kind) {
@@ -83,28 +80,6 @@ PassState begun_from(const PassState& state) {
            r.id.kind == StageKind::Resolution;
   });
   return begun;
-}
-
-std::vector<double> best_of_scan(const std::vector<std::pair<double, double>>& trials, int most) {
-  constexpr double hopeless = 4.0;  // times the lowest cost
-  std::vector<int> order(trials.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto cost = [&](int i) { return trials[std::size_t(i)].second; };
-  const auto is_valley = [&](int i) {
-    return (i == 0 || cost(i) <= cost(i - 1)) && (i + 1 == int(order.size()) || cost(i) <= cost(i + 1));
-  };
-  std::ranges::stable_sort(order, [&](int a, int b) {
-    if (is_valley(a) != is_valley(b)) return is_valley(a);
-    return cost(a) < cost(b);
-  });
-  double least = infinite;
-  for (const auto& trial : trials) least = std::min(least, trial.second);
-  std::vector<double> best;
-  for (const int i : order) {
-    if (int(best.size()) >= most || !std::isfinite(cost(i))) break;
-    if (cost(i) <= hopeless * least) best.push_back(trials[std::size_t(i)].first);
-  }
-  return best;
 }
 
 std::vector<StageChain> FitPlan::next(const PassState& state) const {
@@ -420,85 +395,12 @@ VectorX FitPlan::before_starts(const Records& done) const {
   return theta;
 }
 
-std::vector<double> FitPlan::start_moduli(const Records& done) const {
-  const StageRecord* swung = find_record(done, {StageKind::Swing});
-  if (!facts_.is_scanned || (swung && swung->converged)) return {before_starts(done)[facts_.moduli.front()]};
-  const StageRecord* scan = find_record(done, {StageKind::Scan});
-  return scan ? best_of_scan(scan->trials, facts_.options.starts) : std::vector<double>{};
-}
-
 const StageRecord* FitPlan::first_of_start(int index, const Records& done) const {
   return find_record(done, {StageKind::Coarse, index, 0});
 }
 
 const StageRecord* FitPlan::end_of_start(int index, const Records& done) const {
   return find_record(done, {StageKind::Coarse, index, int(growing_horizon(facts_).size()) - 1});
-}
-
-/// Starts are followed over the first frames, and on if one leads about as far down as the best one, elsewhere.
-std::string FitPlan::why_given_up(int index, const Records& done) const {
-  // Times the least cost over the first frames. Where the best start explains all that was seen, nothing else can
-  // explain it much better.
-  constexpr double hopeless = 4.0, hopeless_if_drawn = 2.0, hopeless_if_explained = 1.5;
-  for (const StageRecord& r : done)
-    if (r.id.kind == StageKind::Coarse && r.id.start == index && !r.succeeded) return r.reason;
-  const StageRecord* first = first_of_start(index, done);
-  if (!first) return {};
-  const int given = int(start_moduli(done).size());
-  double least = infinite;
-  bool is_explained = false;
-  for (int i = 0; i < given; ++i) {
-    if (const StageRecord* r = first_of_start(i, done); r && r->succeeded) least = std::min(least, r->cost);
-    const StageRecord* end = i == index || facts_.swings ? nullptr : end_of_start(i, done);
-    is_explained = is_explained || (end && end->succeeded && end->misfit < good_misfit);
-  }
-  const double most = index >= given ? hopeless_if_drawn : is_explained ? hopeless_if_explained : hopeless;
-  if (!end_of_start(index, done) && first->cost > most * least)
-    return "given up: over the first frames its cost was " + in_three_digits(first->cost / least) +
-           " times that of the best start";
-  if (const auto same = joined(index, done))
-    return "given up: over the first frames it led to where start " + std::to_string(*same + 1) + " led";
-  return {};
-}
-
-/// Whether a fit at theta is in the valley of another one: near it, and not much above.
-bool FitPlan::is_in_valley(const VectorX& theta, double cost, const StageRecord& of) const {
-  // Of unconstrained numbers, logarithms of moduli and dampings among them, and of costs. Swings that fall out of step
-  // make valleys beside each other.
-  constexpr double same_place = 0.4, same_cost = 2.0, same_cost_of_swings = 1.02;
-  const VectorX way = facts_.parameters.to_unconstrained(theta) - facts_.parameters.to_unconstrained(of.theta);
-  // What it meets and how sensors err is told too weakly to tell valleys apart.
-  const std::vector<const Parameter*> parameters = facts_.parameters.coordinate_parameters();
-  double farthest = 0.0;
-  for (std::size_t i = 0; i < parameters.size(); ++i)
-    if (parameters[i]->role != Role::Obstacle && parameters[i]->role != Role::Sensor)
-      farthest = std::max(farthest, std::abs(way[Eigen::Index(i)]));
-  return farthest <= same_place &&
-         std::max(cost, of.cost) <= (facts_.swings ? same_cost_of_swings : same_cost) * std::min(cost, of.cost);
-}
-
-std::optional<int> FitPlan::joined_on_the_way(const Stage& stage, const VectorX& theta, double cost,
-                                              const Records& done) const {
-  if (stage.id.kind != StageKind::Coarse || stage.horizon.part < 1.0) return std::nullopt;
-  for (int i = 0; i < facts_.options.most_starts; ++i) {
-    const StageRecord* end = i == stage.id.start ? nullptr : end_of_start(i, done);
-    if (end && end->succeeded && !end->joined && cost >= end->cost && is_in_valley(theta, cost, *end)) return i;
-  }
-  return std::nullopt;
-}
-
-/// Of two in one place, that with the lower cost is followed, or that which was followed already.
-std::optional<int> FitPlan::joined(int index, const Records& done) const {
-  if (const StageRecord* end = end_of_start(index, done)) return end->joined;
-  const StageRecord* first = first_of_start(index, done);
-  if (!first || !first->succeeded) return std::nullopt;
-  for (int i = 0; i < facts_.options.most_starts; ++i) {
-    const StageRecord* r = first_of_start(i, done);
-    if (i == index || !r || !r->succeeded) continue;
-    const bool is_better = r->cost < first->cost || (r->cost == first->cost && i < index);
-    if ((is_better || end_of_start(i, done)) && is_in_valley(first->theta, first->cost, *r)) return i;
-  }
-  return std::nullopt;
 }
 
 /// All over the first frames; then the best of them to its end, and those that are not given up, which stop where they
@@ -527,61 +429,6 @@ std::vector<StageChain> FitPlan::starts_left(const Records& done) const {
   return {*std::ranges::min_element(rest, {}, cost_of_first)};
 }
 
-int FitPlan::start_count(const Records& done) const {
-  constexpr double good = 3.0;  // misfit on the coarse grid, in the wide band
-  constexpr int at_once = 2;
-  int count = int(start_moduli(done).size());
-  if (!facts_.is_scanned || count == 0) return count;
-  double least = infinite;
-  for (int i = 0; i < facts_.options.most_starts; ++i) {
-    if (i == count) {  // all before are done, and none is good
-      if (!(least > good)) return count;
-      count = std::min(count + at_once, facts_.options.most_starts);
-    }
-    const StageRecord* end = end_of_start(i, done);
-    if (!end && why_given_up(i, done).empty()) return count;
-    if (end && end->succeeded) least = std::min(least, end->misfit);
-  }
-  return count;
-}
-
-VectorX FitPlan::drawn_start(int index, const Records& done) const {
-  constexpr double decades = 0.7;  // to either side of what scan or swing showed
-  std::mt19937_64 bits{std::uint64_t(index)};
-  const auto uniform = [&] { return (double(bits() >> 11) + 0.5) * 0x1p-53; };
-  const auto normal = [&] {
-    return std::sqrt(-2.0 * std::log(uniform())) * std::cos(2.0 * std::numbers::pi * uniform());
-  };
-  const std::vector<double> moduli = start_moduli(done);
-  const auto [least, most] = std::ranges::minmax(moduli);
-  const double log_least = std::log10(least) - decades, log_most = std::log10(most) + decades;
-  const double modulus = std::pow(10.0, log_least + (log_most - log_least) * uniform());
-  VectorX theta = with_modulus(before_starts(done), modulus, done);
-  ParameterSet drawn = facts_.parameters;
-  // The throw is told by the first frames, better than by its prior.
-  const auto is_drawn = [](const Parameter& p) {
-    return std::isfinite(p.prior_std) && !p.is_auxiliary &&
-           (p.role == Role::Damping || p.role == Role::Load || p.role == Role::Obstacle || shapes_law(p));
-  };
-  for (const Parameter& p : facts_.parameters.parameters()) drawn.set_estimated(p.name, p.estimated && is_drawn(p));
-  drawn.set_reference(theta);
-  VectorX p = drawn.to_unconstrained(theta);
-  const std::vector<const Parameter*> of = drawn.coordinate_parameters();
-  Eigen::Index first = 0;  // coordinate of the parameter
-  for (Eigen::Index i = 0; i < p.size(); ++i) {
-    const Parameter& parameter = *of[std::size_t(i)];
-    if (i > 0 && of[std::size_t(i) - 1] != &parameter) first = i;
-    p[i] = parameter.prior_mean[i - first] + parameter.prior_std * normal();
-    if (parameter.transform == Transform::InverseSinh) p[i] = std::abs(p[i]);
-    const bool is_last = i - first == parameter.dimension() - 1;
-    if (is_last && parameter.prior_shape.size() > 0) {
-      auto drawn_at = p.segment(first, parameter.dimension());
-      drawn_at = parameter.prior_mean + parameter.prior_shape * (drawn_at - parameter.prior_mean);
-    }
-  }
-  return drawn.to_theta(drawn.clamp(p));
-}
-
 VectorX FitPlan::relative_moduli(const Records& done) const {
   const StageRecord* swung = find_record(done, {StageKind::Swing});
   if (!swung || !swung->converged) return facts_.relative_moduli;
@@ -601,40 +448,6 @@ VectorX FitPlan::without_pulls(VectorX theta) const {
   for (const Parameter& p : facts_.parameters.parameters())
     if (p.estimated && is_pull(p)) theta.segment<3>(p.at) = p.scale * p.prior_mean;
   return theta;
-}
-
-VectorX FitPlan::start_theta(const Records& done) const {
-  const std::vector<double> moduli = start_moduli(done);
-  const VectorX& theta = facts_.parameters.reference();
-  return facts_.is_scanned && !moduli.empty() ? with_modulus(theta, moduli.front(), done) : theta;
-}
-
-std::vector<FitStart> FitPlan::starts(const Records& done) const {
-  std::vector<FitStart> all;
-  const int count = start_count(done);
-  for (int i = 0; i < count; ++i) {
-    const StageChain chain = start(i, done);
-    FitStart one;
-    one.start = one.final = chain.front().from.front();
-    one.cost = infinite;
-    one.reason = "not begun";
-    for (const Stage& stage : chain) {
-      const StageRecord* r = find_record(done, stage.id);
-      if (!r) break;
-      if (stage.id.number == 0) one.start_cost = r->start_cost;
-      one.iterations += r->iterations, one.converged = r->converged, one.reason = r->reason;
-      one.cost = r->succeeded ? r->cost : infinite;
-      one.final = r->theta;
-    }
-    if (!end_of_start(i, done)) {  // costs over the first frames are not those over all
-      one.cost = infinite;
-      if (const std::string why = why_given_up(i, done); !why.empty()) one.reason = why;
-    }
-    if (const auto same = joined(i, done))
-      if (const StageRecord* r = end_of_start(*same, done); r && r->succeeded) one.cost = r->cost, one.final = r->theta;
-    all.push_back(std::move(one));
-  }
-  return all;
 }
 
 std::pair<VectorX, int> FitPlan::best_start(const Records& done) const {

@@ -125,6 +125,9 @@ class FitPlan {
   PlanFacts facts_;
 };
 
+/// Whether it is one of Poisson's ratios and exponents: what shapes a law, where moduli scale it.
+bool shapes_law(const Parameter& p);
+
 /// The record of a stage; null where it is not done.
 const StageRecord* find_record(const std::vector<StageRecord>& done, const StageId& id);
 

@@ -175,9 +175,16 @@ std::vector<Alternative> FitRun::alternatives() const {
                    false,
                    few_iterations});
   if (recordings_.any_scan_errs()) {
+    // Stiffness goes at most with the fourth power of a thickness, of which both sides err. A few steps to where an
+    // impact is another one tell less well than that.
+    double most = 0.0;
+    for (const Recording& r : recordings_.all()) most = std::max(most, 4.0 * 2.0 * r.scan_error / r.thickness);
     const auto add = [&](int realisation, double share_of_variance) {
-      const double size = std::sqrt(share_of_variance) / part_of_scan_error;
-      all.push_back({cause_scan, cells, 1.0, {.scan_error = realisation}, false, size, has_coarser, many_iterations});
+      Alternative errs{cause_scan, cells, 1.0, {.scan_error = realisation}};
+      errs.size = std::sqrt(share_of_variance) / part_of_scan_error;
+      errs.most = std::sqrt(share_of_variance) * most;
+      errs.beside_the_first = has_coarser, errs.iterations = many_iterations;
+      all.push_back(std::move(errs));
     };
     add(common_scan_error, 0.5);
     for (int realisation = 1; realisation <= smooth_scan_errors; ++realisation)

@@ -165,6 +165,8 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done, 
                        [](const StageRecord& r) { return r.id.kind == StageKind::Alternative; });
   std::ranges::sort(tried, {}, [](const StageRecord& r) { return r.id.number; });
   const auto first = std::ranges::find(tried, 0, [](const StageRecord& r) { return r.id.number; });
+  const ParameterSet estimated = plan_.estimated(done);
+  const std::vector<const Parameter*> coordinates = estimated.coordinate_parameters();
   for (const StageRecord& r : tried) {
     const Alternative& a = plan_.facts().alternatives[std::size_t(r.id.number)];
     const bool has_first = first != tried.end() && !first->shifts.empty();
@@ -176,7 +178,13 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done, 
         shifts.push_back({s.cause, *mesh_shift(done, own)});
         continue;
       }
-      shifts.push_back({s.cause, a.given ? s.shift : VectorX(a.size * (s.shift - reference))});
+      VectorX shift = a.given ? s.shift : VectorX(a.size * (s.shift - reference));
+      double of_modulus = 0.0;
+      for (std::size_t i = 0; i < coordinates.size(); ++i)
+        if (coordinates[i]->role == Role::Material && coordinates[i]->unit == "Pa")
+          of_modulus = std::max(of_modulus, std::abs(shift[Eigen::Index(i)]));
+      if (of_modulus > a.most) shift *= a.most / of_modulus;
+      shifts.push_back({s.cause, std::move(shift)});
     }
   }
   return shifts;
@@ -185,8 +193,7 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done, 
 void FitRun::say_untried(const std::vector<StageRecord>& done) {
   std::vector<std::string> untried;
   for (const StageRecord& r : done)
-    if (r.id.kind == StageKind::Alternative && !r.reason.empty())
-      untried.push_back("How much the estimate depends on the " + r.name + " could not be seen: " + r.reason + ".");
+    if (r.id.kind == StageKind::Alternative && !r.reason.empty()) untried.push_back(note_of_untried(r.name, r.reason));
   std::ranges::sort(untried);  // side by side: told in an order that does not depend on who was faster
   outcome_.notes.insert(outcome_.notes.end(), untried.begin(), untried.end());
 }

@@ -93,6 +93,8 @@ struct Alternative {
   /// What its estimate is compared with: the fit's own model, or the first alternative, whose mesh it shares.
   bool beside_the_first = false;
   int iterations = 3;  ///< before a last, short Gauss-Newton step, which is not evaluated
+  /// Deviation of the logarithm of a modulus, at most: what a few steps say beyond that is taken for it, in proportion.
+  double most = std::numeric_limits<double>::infinity();
 };
 
 /// A stage of a fit, as data: what is simulated and compared, what is estimated, and from where.

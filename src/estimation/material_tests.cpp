@@ -366,7 +366,7 @@ CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOption
     fit.bic = n * std::log(mean) + objective.parameters().dimension() * std::log(n);
     fit.law = press_law(*unit_element(), fit.layout, fit.theta);
     std::vector<CurveFit::Tried> tried = best.tried;
-    tried.push_back({terms, fit.bic, std::sqrt(mean), at.cost});
+    tried.push_back({terms, fit.bic, std::sqrt(mean), at.cost, fit.layout.mean_modulus(fit.theta)});
     falls = fit.bic < best.bic;
     if (falls) best = fit;
     best.tried = std::move(tried);

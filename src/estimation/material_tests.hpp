@@ -122,8 +122,9 @@ struct CurveFit {
   double bic = 0.0;                         ///< n ln(sum of squares / n) + k ln n
   struct Tried {
     int terms;
-    double bic, rms;  ///< rms of all residuals, over each curve's greatest stress
-    double cost;      ///< with the priors
+    double bic, rms;        ///< rms of all residuals, over each curve's greatest stress
+    double cost;            ///< with the priors
+    double youngs_modulus;  ///< [Pa] at no strain
   };
   std::vector<Tried> tried;  ///< of each number of terms, the best of its starts
 };

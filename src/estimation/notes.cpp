@@ -14,6 +14,10 @@ namespace pliant {
 
 std::string in_three_digits(double value) { return fmt::format("{:.3g}", value); }
 
+std::string note_of_untried(const std::string& cause, const std::string& why) {
+  return "How much the estimate depends on the " + cause + " could not be seen: " + why + ".";
+}
+
 namespace {
 
 std::string spoken(std::string name) {

@@ -503,17 +503,13 @@ class LawRun : StageLoop {
     for (const ModelShift& s : standing.shifts)
       shifts.push_back(
           {s.cause, (s.cause == cause_mesh ? judgement.size_of_coarser_mesh.value : 1.0) * (s.shift - own)});
-    if (!standing.untried.empty())
-      outcome_.notes.push_back("How much the estimate depends on the mesh could not be seen: " + standing.untried +
-                               ".");
+    if (!standing.untried.empty()) outcome_.notes.push_back(note_of_untried("mesh", standing.untried));
     const std::vector<TestedSpecimen> all = specimens(form);
     for (std::size_t i = 0; i < all.size(); ++i)
       outcome_.recordings.push_back(as_recording(all[i].scene->body, form.layout, outcome_, int(i)));
     outcome_.recordings.front().discretisation.control_points = best.shape.points;
-    add_uncertainty(
-        outcome_, shifts,
-        options_.alternatives ? unmodelled_std(outcome_.parameters, outcome_.theta, MeasuredAs::Tested) : VectorX(),
-        agreements_of(all, outcome_.evaluation, options_.marker_noise));
+    add_uncertainty(outcome_, shifts, floor_of_tests(outcome_, options_),
+                    agreements_of(all, outcome_.evaluation, options_.marker_noise));
     for (std::string& note : unused_choices(options_, false, true)) outcome_.notes.push_back(std::move(note));
     add_law_notes(outcome_, law, first());
     outcome_.law = std::move(law);
@@ -555,6 +551,10 @@ FitOptions with_law(FitOptions options, const LawForm& form, bool is_field) {
   options.law_zones = is_field ? 1 : form.controls;
   options.control_points = is_field ? form.controls : 1;
   return options;
+}
+
+VectorX floor_of_tests(const FitOutcome& outcome, const JudgementOptions& options) {
+  return options.alternatives ? unmodelled_std(outcome.parameters, outcome.theta, MeasuredAs::Tested) : VectorX();
 }
 
 std::vector<ModelShift> shifts_of_forms(const ParameterSet& parameters, double youngs_modulus,

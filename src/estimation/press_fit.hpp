@@ -34,6 +34,10 @@ FitOutcome fit_presses(const std::vector<const Capture*>& captures, const FitOpt
 /// The choices of a fit of static tests as they were used: the law that was kept, of regions or zones or of a field.
 FitOptions with_law(FitOptions options, const LawForm& form, bool is_field);
 
+/// The floor of the deviations of what static tests tell, as `uncertainty_of` takes it; empty where alternatives are
+/// switched off.
+VectorX floor_of_tests(const FitOutcome& outcome, const JudgementOptions& options);
+
 /// By how much Young's moduli would differ in a form of the law that was tried and left although the evidence does not
 /// rule it out (ln of the Bayes factor above -3): of those forms the one that is farthest. None where there is none.
 /// @param youngs_modulus  of the form that was kept [Pa]

@@ -61,11 +61,10 @@ void require_fittable(const Capture& capture, const FitOptions& options) {
 
 /// Standard deviation of a scan along its normals [m]: what the capture states or, where it states nothing and the fit
 /// does not estimate it, what scanners leave.
-double scan_error(const Scene& scene, const SignedDistance& distance, bool is_estimated) {
-  if (const auto stated = scene.object.surface_noise) return *stated;
+double scan_error(const Recording& recording, bool is_estimated) {
+  if (const auto stated = recording.capture.scene.object.surface_noise) return *stated;
   if (is_estimated) return 0.0;
-  return std::min(judgement.scan_error * object_size(scene),
-                  judgement.scan_error_of_thickness * thickness(scene, distance));
+  return std::min(judgement.scan_error * recording.size, judgement.scan_error_of_thickness * recording.thickness);
 }
 
 /// A realisation of a scan's error along its normals [m]: one that the whole surface has in common, or a smooth one.
@@ -343,7 +342,8 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
                       "name the same materials in every recording of the object"});
   controls_ = controls;
   recording.size = object_size(capture.scene);
-  recording.scan_error = scan_error(capture.scene, *recording.distance, options_.scan_points > 0);
+  recording.thickness = thickness(capture.scene, *recording.distance);
+  recording.scan_error = scan_error(recording, options_.scan_points > 0);
   if (!recording.observations->empty())
     recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
                                     recording.observations->back().frame);

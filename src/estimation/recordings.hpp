@@ -27,6 +27,7 @@ struct Recording {
   std::optional<TrackedPoints> pose;  ///< from which it is released, where it was registered
   std::shared_ptr<const SignedDistance> distance;
   double size = 0.0;                 ///< of the object [m]
+  double thickness = 0.0;            ///< of the object [m], as `thickness` has it
   double scan_error = 0.0;           ///< standard deviation of its scan along the normals [m]; 0: exact
   int last_frame = 0;                ///< that is compared
   int last_seen = 0;                 ///< of the whole recording

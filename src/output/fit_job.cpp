@@ -39,8 +39,8 @@ std::string describe(const FitEvent& event, double seconds) {
   if (event.kind == StageKind::Sample)
     text = fmt::format("{:<18} {:2} iterations  rms {:6.2f} mm", event.stage, event.iteration, rms);
   else if (event.kind == StageKind::Law)
-    text = fmt::format("{:<18} iteration {:2}  cost {:10.4g}  rms {:6.2f} mm", event.stage, event.iteration, event.cost,
-                       rms);
+    text = fmt::format("{:<18} iteration {:2}  cost {:10.4g}", event.stage, event.iteration, event.cost) +
+           (rms > 0.0 ? fmt::format("  rms {:6.2f} mm", rms) : "");
   else
     text = fmt::format("{:<15} start {}  iteration {:2}  cost {:10.4g}  rms {:6.2f} mm", event.stage, event.start + 1,
                        event.iteration, event.cost, rms);

@@ -96,11 +96,15 @@ void add_correlations(Result& result, const FitOutcome& outcome) {
                    [](const auto& a, const auto& b) { return std::abs(a.correlation) > std::abs(b.correlation); });
 }
 
-/// Forms of a law have numbers of their own each: what they have in common.
+/// Forms of a law have numbers of their own each: what they have in common, and how far markers under presses lie off.
 ConvergenceHistory law_history(const FitOutcome& outcome) {
-  ConvergenceHistory history{{"youngs_modulus", "marker_rms"}, {"Pa", "m"}, {}};
-  for (const FitEvent& e : outcome.history)
-    history.rows.push_back({e.start, e.iteration, e.stage, e.cost, e.damping, {e.youngs_modulus, e.marker_rms}});
+  const bool has_markers = std::ranges::any_of(outcome.history, [](const FitEvent& e) { return e.marker_rms > 0.0; });
+  ConvergenceHistory history{{"youngs_modulus"}, {"Pa"}, {}};
+  if (has_markers) history.parameters.emplace_back("marker_rms"), history.units.emplace_back("m");
+  for (const FitEvent& e : outcome.history) {
+    history.rows.push_back({e.start, e.iteration, e.stage, e.cost, e.damping, {e.youngs_modulus}});
+    if (has_markers) history.rows.back().parameters.push_back(e.marker_rms);
+  }
   return history;
 }
 

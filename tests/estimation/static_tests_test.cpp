@@ -5,6 +5,7 @@
 
 #include "estimation/curve_fit.hpp"
 #include "estimation/gradient_check.hpp"
+#include "estimation/judgement.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/start_objective.hpp"
 #include "support/curve_capture.hpp"
@@ -105,6 +106,23 @@ TEST(StaticTests, CurvesAloneNeedNoShape) {
   EXPECT_EQ(predicted[2].role, "test");
   EXPECT_EQ(predicted[2].abscissa, "shear");
   EXPECT_LT(predicted[2].relative_rms(), tolerance(0.05));
+  EXPECT_EQ(found.used.material, MaterialKind::Ogden);
+  EXPECT_EQ(found.used.law_terms, found.law->layout.form().terms);
+}
+
+/// As those of presses do: the same law is wrong by as much, however it is loaded.
+TEST(StaticTests, IntervalsOfCurvesCountTheFormOfTheLaw) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.005, {.indentations = false, .grips = false, .has_shape = false});
+  FitOptions options;
+  const FitOutcome with = fit_presses({&capture}, options);
+  options.alternatives = false;
+  const FitOutcome without = fit_presses({&capture}, options);
+  ASSERT_TRUE(with.law && without.law);
+  EXPECT_EQ(with.theta, without.theta);
+  const int at = with.parameters.coordinate(with.law->layout.modulus(0));
+  EXPECT_GE(with.std[at], judgement.test_floor_youngs_modulus);
+  EXPECT_LT(without.std[at], judgement.test_floor_youngs_modulus);
 }
 
 TEST(StaticTests, AGivenPoissonsRatioStays) {
