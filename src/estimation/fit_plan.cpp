@@ -16,8 +16,6 @@ bool is_of_start(const Parameter& p) { return p.role == Role::Initial || p.role 
 /// A stage that another one follows ends a standard deviation from its minimum, or where that gains little.
 void is_intermediate(Stage& stage) { stage.promise_tolerance = 0.5, stage.cost_tolerance = 2e-3; }
 
-constexpr double good_misfit = 2.0;  // on the coarse grid, in the wide band: what is left is noise and the mesh
-
 bool ends_at_failure(const StageRecord& record) { return !record.succeeded && !is_help(record.id.kind); }
 
 /// Failed, and nothing can follow.

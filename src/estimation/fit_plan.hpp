@@ -125,6 +125,9 @@ class FitPlan {
   PlanFacts facts_;
 };
 
+/// On the coarse grid, in the wide band: what is left is noise and the mesh.
+inline constexpr double good_misfit = 2.0;
+
 /// Whether it is one of Poisson's ratios and exponents: what shapes a law, where moduli scale it.
 bool shapes_law(const Parameter& p);
 
