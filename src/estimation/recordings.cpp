@@ -68,7 +68,7 @@ double scan_error(const Recording& recording, bool is_estimated) {
 }
 
 /// A realisation of a scan's error along its normals [m]: one that the whole surface has in common, or a smooth one.
-std::function<double(const Vector3&)> scan_error(double deviation, double size, int realisation) {
+std::function<double(const Vector3&)> scan_error_field(double deviation, double size, int realisation) {
   constexpr double alike = 0.1;  // of the object's size: over so far are smooth errors alike
   if (realisation == common_scan_error) return [deviation](const Vector3&) { return deviation; };
   return RandomField(deviation, alike * size, std::uint64_t(realisation));
@@ -413,7 +413,7 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
   for (const Recording& r : all_) {
     Resolution own = resolution(cells, steps);
     if (change.scan_error != 0 && r.scan_error > 0.0)
-      own.offset = scan_error(part_of_scan_error * r.scan_error, r.size, change.scan_error);
+      own.offset = scan_error_field(part_of_scan_error * r.scan_error, r.size, change.scan_error);
     grid.recording.push_back(
         discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
     grid.presses.push_back(press_scene(r, grid.recording.back(), own));
