@@ -1,5 +1,8 @@
 #include "estimation/alternative.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "estimation/uncertainty.hpp"
 
 namespace pliant {
@@ -10,6 +13,13 @@ namespace {
 constexpr double promise_of_alternative = 0.1, promise_to_trust = 0.5;
 
 }  // namespace
+
+double share_within(const VectorX& shift, const std::vector<const Parameter*>& coordinates, double most) {
+  double of_modulus = 0.0;
+  for (std::size_t i = 0; i < coordinates.size(); ++i)
+    if (is_modulus(*coordinates[i])) of_modulus = std::max(of_modulus, std::abs(shift[Eigen::Index(i)]));
+  return of_modulus > most ? most / of_modulus : 1.0;
+}
 
 MovedEstimate move_estimate(Objective& objective, const ParameterSet& parameters, int iterations,
                             const std::function<bool()>& goes_on) {

@@ -20,6 +20,11 @@ struct MovedEstimate {
   VectorX shift(const VectorX& from) const { return (p - from).cwiseMax(-largest_shift).cwiseMin(largest_shift); }
 };
 
+/// How much of a shift of unconstrained coordinates is taken for it where none of the moduli moves by more than `most`:
+/// at most all of it, 1.
+/// @param coordinates  the parameter of each
+double share_within(const VectorX& shift, const std::vector<const Parameter*>& coordinates, double most);
+
 /// At most so many iterations from the reference of the parameters, and a last step.
 /// @param goes_on  asked at each
 MovedEstimate move_estimate(Objective& objective, const ParameterSet& parameters, int iterations,

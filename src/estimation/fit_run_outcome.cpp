@@ -179,11 +179,7 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done, 
         continue;
       }
       VectorX shift = a.given ? s.shift : VectorX(a.size * (s.shift - reference));
-      double of_modulus = 0.0;
-      for (std::size_t i = 0; i < coordinates.size(); ++i)
-        if (coordinates[i]->role == Role::Material && coordinates[i]->unit == "Pa")
-          of_modulus = std::max(of_modulus, std::abs(shift[Eigen::Index(i)]));
-      if (of_modulus > a.most) shift *= a.most / of_modulus;
+      shift *= share_within(shift, coordinates, a.most);
       shifts.push_back({s.cause, std::move(shift)});
     }
   }

@@ -66,6 +66,7 @@ TEST(Alternatives, CountWhatAScanMayErrBy) {
   EXPECT_GT(std[1], 0.9 * std::sqrt(0.5) * 0.047);
   EXPECT_LT(std[1], 0.08);
   EXPECT_NEAR(std[1], 2.0 * std[0], 0.2 * std[1]) << "to first order";
+  EXPECT_LT(std[1], 8.0 * 0.001 / 0.05) << "both sides of 50 mm err, by the fourth power of the thickness at most";
   bar.capture.scene.object.surface_noise.reset();
   const FitOutcome unsaid = fit({bar}, options);
   ASSERT_NE(share(unsaid, scan), nullptr);

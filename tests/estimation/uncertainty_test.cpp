@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "estimation/alternative.hpp"
 #include "estimation/given_quantities.hpp"
 #include "estimation/judgement.hpp"
 #include "estimation/press_fit.hpp"
@@ -173,6 +174,14 @@ CostEvaluation recordings_about(const std::vector<Eigen::Vector2d>& least, const
     }
   }
   return e;
+}
+
+TEST(ShareWithin, IsAllWhereNoModulusMovesFurther) {
+  const ParameterSet set = young_and_poisson();
+  const std::vector<const Parameter*> coordinates = set.coordinate_parameters();
+  EXPECT_EQ(share_within(VectorX{{-0.2, 0.9}}, coordinates, 0.25), 1.0) << "Poisson's ratio is not bounded";
+  EXPECT_EQ(share_within(VectorX{{0.0, 0.9}}, coordinates, 0.0), 1.0);
+  EXPECT_DOUBLE_EQ(share_within(VectorX{{-0.5, 0.9}}, coordinates, 0.25), 0.5);
 }
 
 TEST(FormsOfTheLaw, ThatAreNotRuledOutWidenTheModulus) {
