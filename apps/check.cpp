@@ -199,6 +199,45 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
   if (seen.first_contact) json["first_contact"] = *seen.first_contact;
 }
 
+/// How the object flies, against the gravity and the velocity that are stated: it tells of a wrong direction, clock or
+/// unit before a fit.
+void describe_flight(const Capture& capture, const std::vector<ObservedFrame>& frames, Json& json) {
+  // Of gravity: damping by the air takes a tenth, and turns it where the object was thrown.
+  constexpr double least = 0.75, greatest = 1.1, across = 0.15;
+  constexpr double fast = 0.1, certain = 5.0;  // [m/s] of velocities; standard deviations
+  const std::optional<Flight> flight = free_flight(capture, frames);
+  if (!flight) return;
+  const Vector3& flown = flight->acceleration;
+  say("flight", formatted("%d frames, from %s m/s (+- %.2g) accelerated by %s m/s^2 (+- %.2g)", flight->frames,
+                          vector_text(flight->velocity).c_str(), flight->velocity_std, vector_text(flown).c_str(),
+                          flight->acceleration_std));
+  json["flight"] = {{"frames", flight->frames},
+                    {"velocity", vector_json(flight->velocity)},
+                    {"velocity_std", flight->velocity_std},
+                    {"acceleration", vector_json(flown)},
+                    {"acceleration_std", flight->acceleration_std}};
+  const Initial& initial = capture.scene.initial;
+  if (initial.known && (flight->velocity - initial.linear_velocity).norm() > fast + certain * flight->velocity_std)
+    say("", "note: `linear_velocity` of [initial] is stated as " + vector_text(initial.linear_velocity) +
+                " and `known`; `known = false` has it estimated");
+  const World& world = capture.scene.world;
+  const Vector3 down = world.gravity ? Vector3(world.gravity->normalized()) : Vector3(-world.up);
+  const double strength = world.gravity ? world.gravity->norm() : flown.norm(),
+               doubt = certain * flight->acceleration_std;
+  if (strength == 0.0) return;
+  const double along = flown.dot(down);
+  if (along < 0.0 || (flown - along * down).norm() > across * std::max(along, strength) + doubt)
+    say("",
+        formatted("note: %.0f degrees from the direction of gravity that is stated: `%s` of [world], or where the "
+                  "sensor stands, is wrong",
+                  degrees(std::acos(std::clamp(along / flown.norm(), -1.0, 1.0))), world.gravity ? "gravity" : "up"));
+  else if (along < least * strength - doubt || along > greatest * strength + doubt)
+    say("",
+        formatted("note: %.2g times the gravity that is stated: frames %.2g times as far apart in time would agree, "
+                  "or readings %.2g times as long",
+                  along / strength, std::sqrt(along / strength), strength / along));
+}
+
 void describe_planes(const Capture& capture, const Survey& seen, Json& json) {
   for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
     const PlaneSurvey& plane = seen.planes[i];
@@ -409,6 +448,7 @@ void check(const Arguments& arguments) {
   describe_sensors(capture);
   describe_markers(capture, seen, json);
   describe_observations(capture, seen, json);
+  describe_flight(capture, frames, json);
   describe_cleaning(frames, json);
   describe_planes(capture, seen, json);
   describe_poses(capture, json);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <stdexcept>
 
 #include "base/error.hpp"
@@ -51,6 +52,34 @@ std::vector<Vector3> thinned(const std::vector<Vector3>& points, int most) {
   const double every = std::max(1.0, double(points.size()) / most);
   for (double i = 0.0; i < double(points.size()); i += every) kept.push_back(points[std::size_t(i)]);
   return kept;
+}
+
+/// Gauss-Newton steps to the least of sum c^2 r^2 / (c^2 + r^2), r the points' distances in the scan.
+/// @param about  the scale, which is found between half and 1.6 times that; 0: it stays
+void follow(const SignedDistance& distance, Guess& guess, std::span<const Vector3> points, double c, int steps,
+            double about = 0.0) {
+  const int unknowns = about > 0.0 ? 7 : 6;
+  for (int step = 0; step < steps; ++step) {
+    Eigen::Matrix<double, 7, 7> A = Eigen::Matrix<double, 7, 7>::Zero();
+    Eigen::Matrix<double, 7, 1> b = Eigen::Matrix<double, 7, 1>::Zero(), row;
+    for (const Vector3& p : points) {
+      const Vector3 arm = guess.scale * (guess.rotation * p);
+      const SignedDistance::Sample s = distance.sample(arm + guess.place);
+      const double w = std::pow(c * c / (c * c + s.value * s.value), 2);
+      row << arm.cross(s.gradient), s.gradient, s.gradient.dot(arm) - s.value;  // of distances in the world
+      A += w * row * row.transpose(), b -= w * s.value * row;
+    }
+    // A little damping: along what nothing tells, such as a ball's turn, it stays.
+    const double mean = A.topLeftCorner(unknowns, unknowns).trace() / unknowns;
+    if (!(mean > 0.0)) return;
+    for (int i = 0; i < unknowns; ++i) A(i, i) += 1e-4 * (A(i, i) + mean);
+    const VectorX d = A.topLeftCorner(unknowns, unknowns).ldlt().solve(b.head(unknowns));
+    guess.rotation = turned(d.head<3>()) * guess.rotation;
+    guess.place += d.segment<3>(3);
+    if (unknowns == 7)
+      guess.scale = std::clamp(guess.scale * std::exp(std::clamp(d[6], -0.1, 0.1)), 0.5 * about, 1.6 * about);
+    if (d.head<3>().norm() < 1e-6 && d.segment<3>(3).norm() < 1e-6) return;
+  }
 }
 
 /// A depth camera's frame as it is compared with the scan: every so many pixels.
@@ -179,30 +208,8 @@ class PoseSearch {
     return std::sqrt(own / extent);
   }
 
-  /// Gauss-Newton steps to the least of sum c^2 r^2 / (c^2 + r^2), r the points' distances in the scan.
   void follow(Guess& guess, const std::vector<Vector3>& points, double c, int steps) const {
-    const int unknowns = options_.finds_scale ? 7 : 6;
-    for (int step = 0; step < steps; ++step) {
-      Eigen::Matrix<double, 7, 7> A = Eigen::Matrix<double, 7, 7>::Zero();
-      Eigen::Matrix<double, 7, 1> b = Eigen::Matrix<double, 7, 1>::Zero(), row;
-      for (const Vector3& p : points) {
-        const Vector3 arm = guess.scale * (guess.rotation * p);
-        const SignedDistance::Sample s = distance_.sample(arm + guess.place);
-        const double w = std::pow(c * c / (c * c + s.value * s.value), 2);
-        row << arm.cross(s.gradient), s.gradient, s.gradient.dot(arm) - s.value;  // of distances in the world
-        A += w * row * row.transpose(), b -= w * s.value * row;
-      }
-      // A little damping: along what nothing tells, such as a ball's turn, it stays.
-      const double mean = A.topLeftCorner(unknowns, unknowns).trace() / unknowns;
-      if (!(mean > 0.0)) return;
-      for (int i = 0; i < unknowns; ++i) A(i, i) += 1e-4 * (A(i, i) + mean);
-      const VectorX d = A.topLeftCorner(unknowns, unknowns).ldlt().solve(b.head(unknowns));
-      guess.rotation = turned(d.head<3>()) * guess.rotation;
-      guess.place += d.segment<3>(3);
-      if (unknowns == 7)
-        guess.scale = std::clamp(guess.scale * std::exp(std::clamp(d[6], -0.1, 0.1)), 0.5 * about_, 1.6 * about_);
-      if (d.head<3>().norm() < 1e-6 && d.segment<3>(3).norm() < 1e-6) return;
-    }
+    pliant::follow(distance_, guess, points, c, steps, options_.finds_scale ? about_ : 0.0);
   }
 
   /// Mean of the points' squared distances over the object's size, cut off.
@@ -326,6 +333,25 @@ class PoseSearch {
 };
 
 }  // namespace
+
+ScanFollower::ScanFollower(const TriangleMesh& scan)
+    : scan_(scan),
+      unit_(bounding_box(scan).extent().maxCoeff()),
+      distance_(signed_distance(scan, unit_ / 64.0, 0.5 * unit_)) {}
+
+std::optional<RigidMotion> ScanFollower::follow(const std::vector<Vector3>& seen, const RigidMotion& guess) const {
+  if (seen.size() < fewest_points) return std::nullopt;
+  const std::vector<Vector3> points = thinned(seen, compared_points / 4);
+  Vector3 middle = Vector3::Zero();
+  for (const Vector3& p : points) middle += p / double(points.size());
+  std::vector<Vector3> from_middle;
+  for (const Vector3& p : points) from_middle.push_back(p - middle);
+  const RigidMotion to_scan = guess.inverse();
+  Guess pose{to_scan.rotation, to_scan(middle)};
+  for (const double c : {0.1, 0.03}) pliant::follow(distance_, pose, from_middle, c * unit_, 20);
+  if (!pose.place.allFinite() || !pose.rotation.allFinite()) return std::nullopt;
+  return RigidMotion{pose.rotation, pose.place - pose.rotation * middle}.inverse();
+}
 
 ScanPose find_scan_pose(const TriangleMesh& scan, const Capture& capture, const ObservedFrame& seen,
                         const ScanPoseOptions& options) {

@@ -2,11 +2,13 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "capture/capture.hpp"
 #include "capture/observe.hpp"
 #include "geometry/camera.hpp"
+#include "geometry/signed_distance.hpp"
 
 namespace pliant {
 
@@ -37,6 +39,38 @@ struct ScanPose {
 /// Throws InputError where the frame shows fewer than 50 points, std::invalid_argument for a scan without triangles.
 ScanPose find_scan_pose(const TriangleMesh& scan, const Capture& capture, const ObservedFrame& seen,
                         const ScanPoseOptions& options = {});
+
+/// Follows a rigid scan from frame to frame.
+class ScanFollower {
+ public:
+  /// @param scan  closed [m]. Throws InputError where it encloses nothing
+  explicit ScanFollower(const TriangleMesh& scan);
+  const TriangleMesh& scan() const { return scan_; }
+
+  /// The pose, from the scan to the world, of least squares to points on the object's surface nearest to a guess: Gauss
+  /// and Newton on the signed distance, robust. Nothing where there are fewer than 50 points.
+  [[nodiscard]] std::optional<RigidMotion> follow(const std::vector<Vector3>& seen, const RigidMotion& guess) const;
+
+ private:
+  TriangleMesh scan_;
+  double unit_;  // its greatest extent [m]
+  SignedDistance distance_;
+};
+
+/// How an object moves before it meets anything: the parabola that the centre of its volume follows.
+struct Flight {
+  int frames = 0;                          ///< from `start_frame` on
+  Vector3 velocity = Vector3::Zero();      ///< [m/s] at `start_frame`
+  Vector3 acceleration = Vector3::Zero();  ///< [m/s^2]
+  /// Standard deviations of their coordinates, by how far the centres lie from the parabola.
+  double velocity_std = 0.0, acceleration_std = 0.0;
+};
+
+/// The flight of a scanned object that nothing holds: its rigid scan is followed from `start_frame`, where it stands as
+/// it was scanned, until it comes near a plane of the scene (2 % of its size), is not found, or leaves the parabola of
+/// the frames before by as much. Nothing where that are fewer than six frames.
+/// @param frames  as `observe` gives them
+std::optional<Flight> free_flight(const Capture& capture, std::span<const ObservedFrame> frames);
 
 /// Everything of an object that stands in its scan's frame, moved by the scan's pose: surface, regions, weights,
 /// forces. Throws std::invalid_argument for boxes, which cannot be turned.

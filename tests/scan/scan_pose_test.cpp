@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include "base/files.hpp"
@@ -170,6 +171,90 @@ TEST(ScanPose, WhatCannotBePlacedIsRefused) {
   held.folder.write("capture.toml", read_file(held.folder.path() / "capture.toml") +
                                         "[[fixed]]\nbox = { min = [-1, -1, -1], max = [-0.08, 1, 1] }\n");
   EXPECT_THAT(complaint_of([&] { (void)held.read(); }), HasSubstr("a box cannot be turned"));
+}
+
+/// A lump that spins while it flies, and what a sensor sees of the side that faces +z.
+struct Flown {
+  TriangleMesh scan = lump();
+  Vector3 centre = enclosed_centroid(scan), velocity{0.4, 0.3, -0.1}, gravity{0.0, -9.81, 0.0};
+  Vector3 spin{1.0, -3.0, 2.0};  // [rad/s]
+  double noise = 0.001;          // [m]
+  Capture capture;
+  std::vector<ObservedFrame> frames;
+
+  explicit Flown(int count, const std::function<Vector3(double)>& moved_too = {}) {
+    capture.scene.object.surface = scan;
+    capture.scene.world.gravity = gravity;
+    capture.scene.timing.start_frame = 2;
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    for (int f = 0; f < count + 2; ++f) {
+      capture.scene.timing.times.push_back(0.5 + f / 60.0);
+      const double t = std::max(0, f - 2) / 60.0;  // held before
+      const Matrix3 turn = Eigen::AngleAxisd(spin.norm() * t, spin.normalized()).toRotationMatrix();
+      Vector3 at = centre + t * velocity + 0.5 * t * t * gravity;
+      if (moved_too) at += moved_too(t);
+      ObservedFrame& seen = frames.emplace_back();
+      seen.frame = f;
+      for (const auto& face : scan.triangles) {
+        const Vector3 &a = scan.vertices[std::size_t(face[0])], &b = scan.vertices[std::size_t(face[1])],
+                      &c = scan.vertices[std::size_t(face[2])];
+        const Vector3 normal_there = turn * (b - a).cross(c - a).normalized();
+        if (normal_there.z() < 0.2) continue;
+        seen.points.push_back(turn * ((a + b + c) / 3.0 - centre) + at + noise * normal(random) * normal_there);
+      }
+    }
+  }
+};
+
+TEST(FreeFlight, IsTheParabolaOfASpinningScan) {
+  const Flown flown(12);
+  const std::optional<Flight> flight = free_flight(flown.capture, flown.frames);
+  ASSERT_TRUE(flight);
+  EXPECT_EQ(flight->frames, 12);
+  EXPECT_LT((flight->acceleration - flown.gravity).norm(), 0.2);
+  EXPECT_LT((flight->velocity - flown.velocity).norm(), 0.02);
+  EXPECT_GT(flight->acceleration_std, 0.0);
+  EXPECT_LT(flight->acceleration_std, 0.1);
+}
+
+TEST(FreeFlight, EndsWhereItComesNearAPlane) {
+  Flown flown(16);
+  double lowest = infinite;
+  for (const Vector3& v : flown.scan.vertices) lowest = std::min(lowest, v.y());
+  Plane floor;
+  floor.normal = Vector3::UnitY(), floor.point = Vector3(0.0, lowest - 0.1, 0.0);
+  flown.capture.scene.planes = {floor};
+  const std::optional<Flight> flight = free_flight(flown.capture, flown.frames);
+  ASSERT_TRUE(flight);
+  // It rises first: 0.1 m below are met after 0.177 s, were it not turned.
+  EXPECT_LT(flight->frames, 13);
+  EXPECT_GT(flight->frames, 8);
+  EXPECT_LT((flight->acceleration - flown.gravity).norm(), 0.3);
+}
+
+TEST(FreeFlight, EndsWhereItLeavesTheParabola) {
+  // A floor that nobody has stated throws it up with 2 m/s after 0.15 s, nine frames.
+  const Flown flown(16, [](double t) { return Vector3(0.0, 2.0 * std::max(0.0, t - 0.151), 0.0); });
+  const std::optional<Flight> flight = free_flight(flown.capture, flown.frames);
+  ASSERT_TRUE(flight);
+  EXPECT_EQ(flight->frames, 10);
+  EXPECT_LT((flight->acceleration - flown.gravity).norm(), 0.3);
+}
+
+TEST(FreeFlight, TakesSixFramesOfWhatNothingHolds) {
+  Flown flown(5);
+  EXPECT_FALSE(free_flight(flown.capture, flown.frames));
+  flown = Flown(6);
+  EXPECT_TRUE(free_flight(flown.capture, flown.frames));
+  flown.frames[5].points.resize(20);
+  EXPECT_FALSE(free_flight(flown.capture, flown.frames)) << "too few points in one of them";
+  flown = Flown(6);
+  flown.capture.scene.initial.released = true;
+  EXPECT_FALSE(free_flight(flown.capture, flown.frames));
+  flown.capture.scene.initial.released = false;
+  flown.capture.scene.fixed.emplace_back();
+  EXPECT_FALSE(free_flight(flown.capture, flown.frames));
 }
 
 }  // namespace
