@@ -203,7 +203,7 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
 /// unit before a fit.
 void describe_flight(const Capture& capture, const std::vector<ObservedFrame>& frames, Json& json) {
   // Of gravity: damping by the air takes a tenth, and turns it where the object was thrown.
-  constexpr double least = 0.75, greatest = 1.1, across = 0.15;
+  constexpr double least = 0.75, greatest = 1.1, across = 0.15, held = 0.5;
   constexpr double fast = 0.1, certain = 5.0;  // [m/s] of velocities; standard deviations
   const std::optional<Flight> flight = free_flight(capture, frames);
   if (!flight) return;
@@ -216,26 +216,30 @@ void describe_flight(const Capture& capture, const std::vector<ObservedFrame>& f
                     {"velocity_std", flight->velocity_std},
                     {"acceleration", vector_json(flown)},
                     {"acceleration_std", flight->acceleration_std}};
-  const Initial& initial = capture.scene.initial;
-  if (initial.known && (flight->velocity - initial.linear_velocity).norm() > fast + certain * flight->velocity_std)
-    say("", "note: `linear_velocity` of [initial] is stated as " + vector_text(initial.linear_velocity) +
-                " and `known`; `known = false` has it estimated");
   const World& world = capture.scene.world;
   const Vector3 down = world.gravity ? Vector3(world.gravity->normalized()) : Vector3(-world.up);
   const double strength = world.gravity ? world.gravity->norm() : flown.norm(),
                doubt = certain * flight->acceleration_std;
-  if (strength == 0.0) return;
   const double along = flown.dot(down);
-  if (along < 0.0 || (flown - along * down).norm() > across * std::max(along, strength) + doubt)
+  if (flown.norm() < held * strength)
+    say("",
+        "note: it does not fall freely: it is let go after `start_frame`, or what holds it is not stated ([[fixed]], "
+        "[[plane]])");
+  else if (strength > 0.0 &&
+           (along < 0.0 || (flown - along * down).norm() > across * std::max(along, strength) + doubt))
     say("",
         formatted("note: %.0f degrees from the direction of gravity that is stated: `%s` of [world], or where the "
                   "sensor stands, is wrong",
                   degrees(std::acos(std::clamp(along / flown.norm(), -1.0, 1.0))), world.gravity ? "gravity" : "up"));
-  else if (along < least * strength - doubt || along > greatest * strength + doubt)
+  else if (strength > 0.0 && (along < least * strength - doubt || along > greatest * strength + doubt))
     say("",
         formatted("note: %.2g times the gravity that is stated: frames %.2g times as far apart in time would agree, "
                   "or readings %.2g times as long",
                   along / strength, std::sqrt(along / strength), strength / along));
+  const Initial& initial = capture.scene.initial;
+  if (initial.known && (flight->velocity - initial.linear_velocity).norm() > fast + certain * flight->velocity_std)
+    say("", "note: `linear_velocity` of [initial] is stated as " + vector_text(initial.linear_velocity) +
+                " and `known`; `known = false` has it estimated");
 }
 
 void describe_planes(const Capture& capture, const Survey& seen, Json& json) {

@@ -193,9 +193,9 @@ ParameterSet joined(const std::vector<CaptureParameters>& recordings, const Join
   for (std::size_t r = 0; r < recordings.size(); ++r)
     for (Parameter p : recordings[r].set.parameters()) {
       if (r > 0 && is_of_object(p)) {  // what one recording tells is estimated
-        Parameter& shared = *std::ranges::find(list, joint.name_of(p.name, r), &Parameter::name);
-        shared.estimated = shared.estimated || p.estimated;
-        continue;
+        const auto shared = std::ranges::find(list, joint.name_of(p.name, r), &Parameter::name);
+        if (shared != list.end()) shared->estimated = shared->estimated || p.estimated;
+        continue;  // a density of its own follows from its capture's mass, and stays
       }
       p.name = joint.name_of(p.name, r);
       p.at = joint.layout.at(p.name);
