@@ -203,7 +203,7 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
 /// unit before a fit.
 void describe_flight(const Capture& capture, const std::vector<ObservedFrame>& frames, Json& json) {
   // Of gravity: damping by the air takes a tenth, and turns it where the object was thrown.
-  constexpr double least = 0.75, greatest = 1.1, across = 0.15, held = 0.5;
+  constexpr double least = 0.75, greatest = 1.1, across = 0.15, held = 0.05;
   constexpr double fast = 0.1, certain = 5.0;  // [m/s] of velocities; standard deviations
   const std::optional<Flight> flight = free_flight(capture, frames);
   if (!flight) return;

@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 
 #include "apps/program.hpp"
+#include "base/files.hpp"
 #include "temporary_folder.hpp"
 
 namespace pliant::test::usage_test {
@@ -124,6 +126,32 @@ TEST(Usage, ABrokenCaptureIsToldWithItsPlace) {
     EXPECT_THAT(run.err, HasSubstr("capture.toml:3:8"));
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "out"));
   }
+}
+
+/// What `check` says of the shipped drop of a ring where something in its capture is stated otherwise.
+std::string checked(const std::string& from, const std::string& to) {
+  const std::filesystem::path shipped = PLIANT_SOURCE_DIR "/examples/oracle-bounce-a";
+  const TemporaryFolder folder;
+  std::filesystem::copy(shipped, folder.path(), std::filesystem::copy_options::recursive);
+  std::string text = read_file(shipped / "capture.toml");
+  text.replace(text.find(from), from.size(), to);
+  folder.write("capture.toml", text);
+  const ProgramRun run = run_pliant({"check", folder.path().string()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  return run.out;
+}
+
+TEST(Check, TellsWhatTheFlightContradicts) {
+  const std::string gravity = "gravity = [0.0, -9.81, 0.0]";
+  const std::string as_it_is = checked(gravity, gravity);
+  EXPECT_THAT(as_it_is, HasSubstr("flight"));
+  EXPECT_THAT(as_it_is, Not(HasSubstr("note: ")));
+  EXPECT_THAT(checked(gravity, "gravity = [-9.81, 0.0, 0.0]"), HasSubstr("90 degrees from the direction of gravity"));
+  EXPECT_THAT(checked(gravity, "up = [0.0, 0.0, 1.0]"), HasSubstr("`up` of [world]"));
+  EXPECT_THAT(checked("frame_rate = 60.0", "frame_rate = 30.0"),
+              HasSubstr("frames 0.49 times as far apart in time would agree"));
+  EXPECT_THAT(checked("[[depth]]", "[initial]\nlinear_velocity = [1.0, 0.0, 0.0]\n\n[[depth]]"),
+              HasSubstr("`linear_velocity` of [initial] is stated as [1, 0, 0] and `known`"));
 }
 
 TEST(Usage, AnUnknownChoiceSuggestsTheNearest) {
