@@ -205,7 +205,11 @@ void describe_flight(const Capture& capture, const std::vector<ObservedFrame>& f
   // Of gravity: damping by the air takes a tenth, and turns it where the object was thrown.
   constexpr double least = 0.75, greatest = 1.1, across = 0.15, held = 0.05;
   constexpr double fast = 0.1, certain = 5.0;  // [m/s] of velocities; standard deviations
-  const std::optional<Flight> flight = free_flight(capture, frames);
+  std::optional<Flight> flight;
+  try {
+    flight = free_flight(capture, frames);
+  } catch (const InputError&) {  // too thin for a grid of distances
+  }
   if (!flight) return;
   const Vector3& flown = flight->acceleration;
   say("flight", formatted("%d frames, from %s m/s (+- %.2g) accelerated by %s m/s^2 (+- %.2g)", flight->frames,
