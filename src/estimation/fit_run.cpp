@@ -554,7 +554,8 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   if (s.succeeded) {
     record.converged = moved.converged;
     const VectorX end = parameters.to_theta(moved.p);
-    if (record.converged) record.theta = end;
+    // The next one of the chain begins where the first one ended, not where this one did.
+    if (record.converged && !alternative.beside_the_first) record.theta = end;
     const ParameterSet all = plan_.estimated(ended_before_);
     const VectorX shift = all.to_unconstrained(end) - all.to_unconstrained(estimate);
     record.shifts = {{alternative.cause, shift.cwiseMax(-largest_shift).cwiseMin(largest_shift)}};
