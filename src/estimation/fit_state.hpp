@@ -14,7 +14,4 @@ void write_fit_state(const std::filesystem::path& path, const FitState& state, c
 /// other options.
 FitState to_fit_state(const std::string& text, const std::filesystem::path& path, const std::string& key);
 
-/// Reads it back. Throws InputError where the file is damaged or belongs to another capture or other options.
-FitState read_fit_state(const std::filesystem::path& path, const std::string& key);
-
 }  // namespace pliant

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "base/files.hpp"
 #include "estimation/fit.hpp"
 #include "estimation/fit_state.hpp"
 
@@ -46,7 +47,7 @@ class Interruption {
   FitState left() const {
     const auto file = std::filesystem::temp_directory_path() / ("pliant.state." + std::to_string(::getpid()) + ".json");
     write_fit_state(file, left_, "key");
-    FitState read = read_fit_state(file, "key");
+    FitState read = to_fit_state(read_file(file), file, "key");
     std::filesystem::remove(file);
     return read;
   }
