@@ -178,6 +178,12 @@ void describe_cleaning(const std::vector<ObservedFrame>& frames, Json& json) {
                              {"isolated", all.isolated}};
 }
 
+/// Whether the first frames show the scanned object where its scan stands, as far as that can be told.
+bool shows_the_scan(const Survey& seen) {
+  constexpr double least = 0.05;  // of the surface; one camera sees a quarter to a half
+  return !seen.seen_share || *seen.seen_share >= least;
+}
+
 void describe_observations(const Capture& capture, const Survey& seen, Json& json) {
   if (!capture.scene.object.surface || seen.points.greatest == 0) return;
   const std::string count = seen.points.least == seen.points.greatest
@@ -187,6 +193,11 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
   if (!seen.points.empty_frames.empty())
     say("", "note: no point on the object in frames " + ranges_text(seen.points.empty_frames));
   if (seen.seen_share) say("", formatted("%.0f %% of the surface is seen at the start", 100.0 * *seen.seen_share));
+  if (!shows_the_scan(seen))
+    say("",
+        "note: the scan is not where the object is seen at the start: it is of another object, in another unit or "
+        "place "
+        "(`pliant place` finds both), or the camera stands elsewhere (`camera_to_world`, `depth_scale`)");
   if (!capture.scene.timing.is_static)
     say("motion",
         (seen.moves ? formatted("the seen points move by up to %.3g m", seen.travel) : std::string("none seen")) +
@@ -456,7 +467,7 @@ void check(const Arguments& arguments) {
   describe_sensors(capture);
   describe_markers(capture, seen, json);
   describe_observations(capture, seen, json);
-  describe_flight(capture, frames, json);
+  if (shows_the_scan(seen)) describe_flight(capture, frames, json);
   describe_cleaning(frames, json);
   describe_planes(capture, seen, json);
   describe_poses(capture, json);

@@ -77,8 +77,10 @@ std::string trust_sentence(const ParameterResult& p) {
   if (!p.std || !std::isfinite(std::get<double>(*p.std)))
     return fmt::format("{} has no uncertainty: the fit did not come to its end, or the recording hardly depends on it.",
                        spoken_name(p.name));
+  constexpr double usual_friction = 0.3;  // beside which that of a smooth floor is known though it is nearly none
   const double std = std::get<double>(*p.std), relative = std / std::abs(*value);
-  if (relative < 0.3) return "";
+  const double usual = p.name.starts_with("friction") ? usual_friction : 0.0;
+  if (std < 0.3 * std::max(std::abs(*value), usual)) return "";
   return fmt::format("{} is known poorly (± {}): the recording depends little on it.", spoken_name(p.name),
                      std::isfinite(relative) ? readable(100.0 * relative, 2) + " %" : in_unit(std, 2, p));
 }

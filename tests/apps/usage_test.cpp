@@ -154,6 +154,12 @@ TEST(Check, TellsWhatTheFlightContradicts) {
               HasSubstr("`linear_velocity` of [initial] is stated as [1, 0, 0] and `known`"));
 }
 
+TEST(Check, TellsThatTheScanIsNotWhereTheObjectIsSeen) {
+  const std::string elsewhere = checked("0.52], [-0.29", "0.92], [-0.29");  // 0.4 m too high
+  EXPECT_THAT(elsewhere, HasSubstr("the scan is not where the object is seen"));
+  EXPECT_THAT(elsewhere, Not(HasSubstr("flight"))) << "of nothing that was scanned";
+}
+
 TEST(Usage, AnUnknownChoiceSuggestsTheNearest) {
   const TemporaryFolder folder;
   const std::vector<std::string> fit = {"fit", folder.path().string(), "--out", (folder.path() / "out").string(),

@@ -138,6 +138,12 @@ TEST(PlainSentences, SayHowFarTheFitCanBeTrusted) {
     if (p.name == "mass_damping") p.value = 0.0, p.std = 0.12;
   EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("Mass damping is known poorly (± 0.12\u00a01/s)")))
       << "no percentage of nothing";
+  ParameterResult friction = data.result.parameters.front();
+  friction.name = "friction", friction.unit = "1", friction.value = 1e-4, friction.std = 6e-4;
+  data.result.parameters.push_back(friction);
+  EXPECT_THAT(plain_sentences(data), Not(Contains(HasSubstr("Friction is known poorly")))) << "there is none";
+  data.result.parameters.back().std = 0.12;
+  EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("Friction is known poorly")));
   data.result.error.surface_rms = 0.00201;
   EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("lies 2.0\u00a0mm")));
   data.result.error.surface_rms = 0.0063;
