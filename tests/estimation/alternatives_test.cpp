@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "estimation/fit.hpp"
+#include "support/dropped.hpp"
 #include "support/interruption.hpp"
 #include "support/sagging_bar.hpp"
 
@@ -71,6 +72,24 @@ TEST(Alternatives, CountWhatAScanMayErrBy) {
   const FitOutcome unsaid = fit({bar}, options);
   ASSERT_NE(share(unsaid, scan), nullptr);
   EXPECT_NEAR(share(unsaid, scan)->std[0], std[1], 1e-6) << "0.25 % of 0.4 m are a millimetre";
+}
+
+TEST(Alternatives, OfAMotionAreEachTriedFromTheSamePlace) {
+  const std::string law = "law at large strain";
+  RecordedCapture block = test::Dropped{}.record();
+  FitOptions options;
+  options.span = 1.0, options.cells = options.coarse_cells = 6.0, options.control_points = 1, options.budget = 0.0;
+  options.tracking = TrackingUse::Off;
+  for (const char* name : {"poissons_ratio", "mass_damping", "stiffness_damping", "contact_stiffness"})
+    options.parameters[name].estimated = false;
+  const FitOutcome exact = fit({block}, options);
+  block.capture.scene.object.surface_noise = 0.004;
+  const FitOutcome errs = fit({block}, options);
+  EXPECT_EQ(errs.theta, exact.theta);
+  ASSERT_NE(share(errs, "errors of the scan"), nullptr) << ::testing::PrintToString(errs.notes);
+  EXPECT_GT(share(errs, "errors of the scan")->std[0], 0.01);
+  ASSERT_NE(share(exact, law), nullptr) << ::testing::PrintToString(exact.notes);
+  EXPECT_EQ(share(errs, law)->std, share(exact, law)->std) << "wherever the scan's errors led before";
 }
 
 /// A hexahedron high: the bar is far too stiff for its mesh, and the noise is small beside that.
