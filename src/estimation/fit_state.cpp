@@ -207,7 +207,7 @@ void read(const Json& json, std::vector<T>& list) {
 template <class T>
 void read(const Json& json, std::optional<T>& value) {
   value.reset();
-  if (!json.is_null()) read(json, value.emplace());
+  if (!json.is_null()) read(json, value.emplace(T{}));
 }
 
 }  // namespace
