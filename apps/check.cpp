@@ -196,8 +196,7 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
   if (!shows_the_scan(seen))
     say("",
         "note: the scan is not where the object is seen at the start: it is of another object, in another unit or "
-        "place "
-        "(`pliant place` finds both), or the camera stands elsewhere (`camera_to_world`, `depth_scale`)");
+        "place (`pliant place` finds both), or the camera stands elsewhere (`camera_to_world`, `depth_scale`)");
   if (!capture.scene.timing.is_static)
     say("motion",
         (seen.moves ? formatted("the seen points move by up to %.3g m", seen.travel) : std::string("none seen")) +

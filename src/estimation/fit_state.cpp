@@ -17,8 +17,7 @@ constexpr const char* format = "fit-state/19";
 template <class T, class Of>
 concept Is = std::same_as<std::remove_const_t<T>, Of>;
 
-// What is kept of each, by name: calls each(name, member)
-// --------------------------------------------------------------
+// Members that are kept: calls each(name, member) ---------------------------------------------------------------------
 
 template <class Each>
 void members(Is<StageId> auto& id, const Each& each) {
@@ -161,7 +160,7 @@ Json json_of(const std::optional<T>& value) {
 }
 
 void read(const Json& json, double& value) {
-  value = !json.is_string() ? json.get<double>() : json == "-infinite" ? -infinite : infinite;
+  value = json == "infinite" ? infinite : json == "-infinite" ? -infinite : json.get<double>();
 }
 void read(const Json& json, bool& value) { value = json.get<bool>(); }
 void read(const Json& json, int& value) { value = json.get<int>(); }
