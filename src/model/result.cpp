@@ -220,9 +220,7 @@ class Member {
     for (size_t i = 0; i < json_.size(); ++i) each(Member(json_[i], path_ + "[" + std::to_string(i) + "]", file_));
   }
 
-  bool is_null() const { return json_.is_null(); }
   double number() const { return json_.is_number() ? json_.get<double>() : (fail("a number"), 0.0); }
-  long long count() const { return json_.is_number_integer() ? json_.get<long long>() : (fail("a whole number"), 0); }
   bool boolean() const { return json_.is_boolean() ? json_.get<bool>() : (fail("true or false"), false); }
   std::string string() const { return json_.is_string() ? json_.get<std::string>() : (fail("a text"), ""); }
   Vector3 vector() const {
@@ -237,7 +235,6 @@ class Member {
     if (json_.is_object()) return PlaneValue{(*this)["point"].vector(), (*this)["normal"].vector()};
     fail("a number, three numbers or a plane");
   }
-  size_t size() const { return json_.size(); }
   const Json& json() const { return json_; }
 
  private:
@@ -278,59 +275,15 @@ std::optional<PriorResult> read_prior(const Member& parameter) {
 }
 
 ParameterResult read_parameter(const std::string& name, const Member& member) {
-  return {name,
-          member["value"].value(),
-          optional_string(member, "unit"),
-          optional_value(member, "std"),
-          optional_value(member, "start"),
-          member["estimated"].boolean(),
-          optional_value(member, "mesh_error"),
-          optional_value(member, "step_error"),
-          optional_value(member, "extrapolated"),
-          optional_value(member, "std_noise"),
-          optional_value(member, "std_model"),
-          read_interval(member),
-          read_prior(member)};
-}
-
-ControlPoint read_control_point(const Member& member) {
-  std::vector<double> numbers;
-  member.each_item([&](const Member& item) { numbers.push_back(item.json().is_null() ? NAN : item.number()); });
-  if (numbers.size() < 4 || numbers.size() > 5) member.fail("[x, y, z, value, std]");
-  for (int k = 0; k < 4; ++k)
-    if (!std::isfinite(numbers[k])) member.fail("[x, y, z, value, std] with finite numbers");
-  ControlPoint point{{numbers[0], numbers[1], numbers[2]}, numbers[3], std::nullopt};
-  if (numbers.size() == 5 && std::isfinite(numbers[4])) point.std = numbers[4];
-  return point;
-}
-
-FieldResult read_field(const std::string& name, const Member& member) {
-  FieldResult field{name, {}, optional_string(member, "per_element")};
-  if (member.has("control_points"))
-    member["control_points"].each_item(
-        [&](const Member& item) { field.control_points.push_back(read_control_point(item)); });
-  if (member.has("tried"))
-    member["tried"].each_item([&](const Member& item) {
-      field.tried.push_back({int(item["control_points"].count()), item["estimated"].boolean(),
-                             optional_number(item, "cost"), optional_number(item, "log_bayes_factor")});
-    });
-  return field;
-}
-
-ErrorResult read_error(const Member& member) {
-  ErrorResult error{optional_number(member, "surface_rms"), optional_number(member, "surface_median"),
-                    optional_number(member, "surface_max"), optional_number(member, "marker_rms"),
-                    member.has("points") ? member["points"].count() : 0};
-  if (member.has("frames"))
-    member["frames"].each_item([&](const Member& f) {
-      error.frames.push_back(
-          {int(f["frame"].count()), f["rms"].number(), f["noise"].number(), int(f["points"].count())});
-    });
-  return error;
-}
-
-RecordingResult read_recording(const Member& member) {
-  return {optional_string(member, "name"), optional_string(member, "sha256"), read_error(member["error"])};
+  ParameterResult parameter;
+  parameter.name = name;
+  parameter.value = member["value"].value();
+  parameter.unit = optional_string(member, "unit");
+  parameter.std = optional_value(member, "std");
+  parameter.estimated = member["estimated"].boolean();
+  parameter.interval_90 = read_interval(member);
+  parameter.prior = read_prior(member);
+  return parameter;
 }
 
 CorrelationResult read_correlation(const Member& member) {
@@ -338,77 +291,6 @@ CorrelationResult read_correlation(const Member& member) {
   member["parameters"].each_item([&](const Member& item) { names.push_back(item.string()); });
   if (names.size() != 2) member["parameters"].fail("two names");
   return {{names[0], names[1]}, member["correlation"].number()};
-}
-
-std::map<std::string, double> read_values(const Member& parent, const char* key) {
-  std::map<std::string, double> values;
-  if (parent.has(key))
-    parent[key].each_key(
-        [&](const std::string& name, const Member& m) { values[name] = m.json().is_null() ? NAN : m.number(); });
-  return values;
-}
-
-StartResult read_start(const Member& member) {
-  return {read_values(member, "start"),      read_values(member, "final"),  optional_number(member, "cost"),
-          int(member["iterations"].count()), member["converged"].boolean(), optional_string(member, "reason")};
-}
-
-ResolutionResult read_resolution(const Member& member) {
-  return {member["cells"].number(),         member["steps"].number(),        member["elements"].count(),
-          read_values(member, "values"),    optional_number(member, "cost"), member["converged"].boolean(),
-          optional_string(member, "reason")};
-}
-
-std::optional<HeldOutFramesResult> read_held_out(const Member& member, const char* key) {
-  if (!member.has(key)) return std::nullopt;
-  return HeldOutFramesResult{int(member[key]["frames"].count()), optional_number(member[key], "cost"),
-                             optional_number(member[key], "surface_rms")};
-}
-
-CurvePrediction read_curve(const Member& member) {
-  const auto numbers = [&](const char* key) {
-    std::vector<double> values;
-    member[key].each_item([&](const Member& item) { values.push_back(item.is_null() ? NAN : item.number()); });
-    return values;
-  };
-  return {member["name"].string(), member["kind"].string(),
-          member["role"].string(), member["abscissa"].string(),
-          member["unit"].string(), numbers("at"),
-          numbers("measured"),     numbers("std"),
-          numbers("predicted"),    optional_string(member, "failure")};
-}
-
-TrackingResult read_tracking(const Member& member) {
-  TrackingResult tracking{member["kept"].string(), optional_string(member, "why"), {}, {}, {}};
-  member["rounds"].each_item([&](const Member& m) {
-    tracking.rounds.push_back({m["tracked_with"].number(), m["youngs_modulus"].number(),
-                               optional_number(m, "surface_rms"), optional_number(m, "fit_rms"),
-                               m["confidence"].number(), m["lost"].boolean()});
-  });
-  if (member.has("held_out_frames")) {
-    tracking.loop = read_held_out(member["held_out_frames"], "tracked motion");
-    tracking.direct = read_held_out(member["held_out_frames"], "points");
-  }
-  return tracking;
-}
-
-TimeResult read_time(const Member& member) {
-  TimeResult time{optional_number(member, "wall_seconds").value_or(NAN),
-                  member.has("forward_steps") ? member["forward_steps"].count() : 0,
-                  optional_number(member, "ms_per_forward_step"),
-                  optional_number(member, "ms_per_adjoint_step"),
-                  {},
-                  {}};
-  if (member.has("activities"))
-    member["activities"].each_item([&](const Member& m) {
-      time.activities.push_back({m["name"].string(), m["count"].count(), m["seconds"].number()});
-    });
-  if (member.has("stages"))
-    member["stages"].each_item([&](const Member& m) {
-      time.stages.push_back({m["name"].string(), int(m["start"].count()), int(m["iterations"].count()),
-                             int(m["elements"].count()), m["work"].number(), m["seconds"].number()});
-    });
-  return time;
 }
 
 Json parse(const fs::path& path) {
@@ -423,51 +305,17 @@ Json parse(const fs::path& path) {
   }
 }
 
-Result read_all(const Member& top) {
+Result read_needed(const Member& top) {
   if (const std::string format = top["format"].string(); format != "result/1") top["format"].fail("\"result/1\"");
   Result result;
-  const Member software = top["software"], capture = top["capture"];
-  result.software = {optional_string(software, "name"), optional_string(software, "version"),
-                     optional_string(software, "commit")};
-  result.capture = {optional_string(capture, "name"), optional_string(capture, "sha256")};
   top["parameters"].each_key([&](const std::string& name, const Member& m) {
     const std::string present = present_name(name);  // a former name may stand alone, or beside the present one
     if (!result.find(present)) result.parameters.push_back(read_parameter(present, m));
   });
-  if (top.has("fields"))
-    top["fields"].each_key(
-        [&](const std::string& name, const Member& m) { result.fields.push_back(read_field(name, m)); });
-  result.error = read_error(top["error"]);
-  if (top.has("recordings"))
-    top["recordings"].each_item([&](const Member& m) { result.recordings.push_back(read_recording(m)); });
-  if (top.has("held_out")) result.held_out = read_recording(top["held_out"]);
-  result.cost = {optional_number(top["cost"], "start").value_or(NAN),
-                 optional_number(top["cost"], "final").value_or(NAN)};
+  result.error.surface_rms = optional_number(top["error"], "surface_rms");
   if (top.has("identifiability"))
     top["identifiability"].each_item([&](const Member& m) { result.identifiability.push_back(read_correlation(m)); });
-  if (top.has("starts")) top["starts"].each_item([&](const Member& m) { result.starts.push_back(read_start(m)); });
-  if (top.has("resolutions"))
-    top["resolutions"].each_item([&](const Member& m) { result.resolutions.push_back(read_resolution(m)); });
-  if (top.has("tracking")) result.tracking = read_tracking(top["tracking"]);
-  if (top.has("curves")) top["curves"].each_item([&](const Member& m) { result.curves.push_back(read_curve(m)); });
-  if (top.has("time")) result.time = read_time(top["time"]);
-  result.material = optional_string(top, "material");
   result.verdict = optional_string(top, "verdict");
-  if (top.has("judgement")) result.judgement = read_values(top, "judgement");
-  if (top.has("options")) {
-    const auto read = [](const Member& choices) {
-      std::map<std::string, std::string> all;
-      choices.each_key([&](const std::string& name, const Member& m) { all[name] = m.json().dump(); });
-      return all;
-    };
-    result.options_given = read(top["options"]["given"]), result.options_used = read(top["options"]["used"]);
-  }
-  if (top.has("reasons")) top["reasons"].each_item([&](const Member& m) { result.reasons.push_back(m.string()); });
-  if (top.has("uncertainty"))
-    top["uncertainty"].each_item([&](const Member& m) {
-      result.uncertainty.push_back({m["cause"].string(), read_values(m, "std")});
-    });
-  if (top.has("notes")) top["notes"].each_item([&](const Member& m) { result.notes.push_back(m.string()); });
   return result;
 }
 
@@ -548,7 +396,7 @@ void write_result(const fs::path& path, const Result& result) { write_file(path,
 
 Result read_result(const fs::path& path) {
   const Json json = parse(path);
-  return read_all(Member(json, "", path));
+  return read_needed(Member(json, "", path));
 }
 
 void write_convergence(const fs::path& path, const ConvergenceHistory& history) {

@@ -206,9 +206,10 @@ std::string to_json(const Result& result);
 /// Writes `result.json`, whole or not at all. Throws InputError where it cannot be written.
 void write_result(const std::filesystem::path& path, const Result& result);
 
-/// Reads a `result.json`; keys that it does not know are passed over. Throws InputError naming the place: line and
-/// column where the text is not JSON, the member ("parameters.density.value") where something is missing or of
-/// another kind.
+/// Reads of a `result.json` what is asked of an earlier fit: of each parameter its value, unit, deviation, interval and
+/// prior and whether it was estimated, and the correlations, the verdict and the error's surface_rms; the rest of the
+/// result stays empty. Throws InputError naming the place: line and column where the text is not JSON, the member
+/// ("parameters.density.value") where something of this is missing or of another kind.
 Result read_result(const std::filesystem::path& path);
 
 /// One iteration of one start of an optimisation.
