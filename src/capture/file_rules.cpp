@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "base/files.hpp"
+#include "base/median.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/curves.hpp"
 #include "capture/depth_frame.hpp"
@@ -216,11 +217,9 @@ void check_marker_unit(RuleContext& context, const std::string& key, const Marke
   for (const Points& frame : markers.frames)
     for (Eigen::Index i = 0; i < frame.rows(); ++i)
       if (const double way = (frame.row(i) - markers.rest.row(i)).norm(); std::isfinite(way)) ways.push_back(way);
-  if (ways.empty()) return;
-  const auto middle = ways.begin() + std::ptrdiff_t(ways.size() / 2);
-  std::nth_element(ways.begin(), middle, ways.end());
-  if (*middle > std::max(farthest_markers * size, 2.0))
-    context.toml.complain(key, "markers " + text_of(*middle, "m") + " away from where they rest (median)",
+  const double way = median(std::move(ways));
+  if (way > std::max(farthest_markers * size, 2.0))
+    context.toml.complain(key, "markers " + text_of(way, "m") + " away from where they rest (median)",
                           "positions near the object", "give markers in metres, in the surface's coordinates");
 }
 
@@ -389,10 +388,9 @@ void check_depth_scale(RuleContext& context) {
                             "depth readings", "0 means no reading");
         continue;
       }
-      const auto middle = readings.begin() + std::ptrdiff_t(readings.size() / 2);
-      std::nth_element(readings.begin(), middle, readings.end());
-      if (*middle < nearest_scene || *middle > farthest_scene)
-        context.toml.reject(item("depth", i, "depth_scale"), "a scene " + text_of(*middle, "m") + " away (median)",
+      const float distance = median(std::move(readings));
+      if (distance < nearest_scene || distance > farthest_scene)
+        context.toml.reject(item("depth", i, "depth_scale"), "a scene " + text_of(distance, "m") + " away (median)",
                             "0.02 to 50 m", "depth_scale is raw units per metre: 1000 for millimetres");
     } catch (const InputError& error) {
       add_problems(context, item("depth", i), error);

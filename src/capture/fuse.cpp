@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/median.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/observe.hpp"
 #include "capture/point_cloud.hpp"
@@ -21,12 +22,6 @@ int nearest_frame(const std::vector<double>& times, double time) {
   if (next == times.begin()) return 0;
   const int before = int(next - times.begin()) - 1;
   return next != times.end() && *next - time < time - times[std::size_t(before)] ? before + 1 : before;
-}
-
-double median(std::vector<float>& values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return double(*middle);
 }
 
 /// The least number of frames between clouds with which each has a point.
@@ -71,7 +66,8 @@ class Fusion {
       write_points(folder / fmt::format("clouds/{:06}.ply", frame), clouds_[std::size_t(frame)]);
       result.points += clouds_[std::size_t(frame)].size();
     }
-    result.capture.clouds = {{{"clouds/%06d.ply"}, result.every, std::stod(fmt::format("{:.3g}", median(noise_)))}};
+    result.capture.clouds = {
+        {{"clouds/%06d.ply"}, result.every, std::stod(fmt::format("{:.3g}", double(median(noise_))))}};
   }
 
  private:

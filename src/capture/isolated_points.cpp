@@ -1,7 +1,6 @@
 #include "capture/isolated_points.hpp"
 
-#include <algorithm>
-
+#include "base/median.hpp"
 #include "capture/point_tree.hpp"
 
 namespace pliant {
@@ -19,11 +18,8 @@ std::vector<bool> isolated_points(std::span<const Vector3> points) {
   const PointTree tree(points);
   std::vector<double> distances;  // squared, to the sixth nearest
   for (const Vector3& p : points) distances.push_back(tree.squared_distance(p, neighbours + 1));  // itself among them
-  std::vector<double> sorted = distances;
-  const auto middle = sorted.begin() + std::ptrdiff_t(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  for (std::size_t i = 0; i < points.size(); ++i)
-    isolated[i] = distances[i] > isolated_reach * isolated_reach * *middle;
+  const double farthest = isolated_reach * isolated_reach * median(distances);
+  for (std::size_t i = 0; i < points.size(); ++i) isolated[i] = distances[i] > farthest;
   return isolated;
 }
 

@@ -14,6 +14,7 @@
 
 #include "base/csv.hpp"
 #include "base/files.hpp"
+#include "base/median.hpp"
 #include "capture/c3d.hpp"
 #include "scene/toml_table.hpp"
 
@@ -286,9 +287,7 @@ std::optional<double> track_noise(const MarkerSet& markers) {
         if (std::isfinite(third[d])) sizes.push_back(std::abs(third[d]) / of_one);
     }
   if (int(sizes.size()) < least) return std::nullopt;
-  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
-  std::ranges::nth_element(sizes, middle);
-  return *middle / 0.67449;  // of a normal deviation's median size
+  return median(std::move(sizes)) / 0.67449;  // of a normal deviation's median size
 }
 
 void write_marker_positions(const fs::path& path, const MarkerPositions& markers) {

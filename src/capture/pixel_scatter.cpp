@@ -3,17 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.hpp"
+
 namespace pliant {
-
-namespace {
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
-}  // namespace
 
 double pixel_scatter(const DepthImage& depth, const Image<PixelKind>& kinds, const PinholeCamera& camera,
                      const DepthNoise& noise) {
@@ -36,7 +28,9 @@ double pixel_scatter(const DepthImage& depth, const Image<PixelKind>& kinds, con
   if (squares.size() < fewest) return 0.0;
   constexpr double of_median = 0.4549;  // of the square of a normal deviate
   const double rounded = 1e-3;
-  const double farthest = 16.0 * (median(squares) / of_median + rounded);
+  const auto middle = squares.begin() + std::ptrdiff_t(squares.size() / 2);
+  std::ranges::nth_element(squares, middle);
+  const double farthest = 16.0 * (*middle / of_median + rounded);
   double sum = 0.0;
   int count = 0;
   for (const double square : squares)
@@ -50,7 +44,7 @@ std::vector<double> median_scatter(const std::vector<ObservedFrame>& frames, std
     std::vector<double> told;
     for (const ObservedFrame& f : frames)
       if (c < f.scatter.size() && f.scatter[c] > 0.0) told.push_back(f.scatter[c]);
-    if (!told.empty()) scatter[c] = median(told);
+    if (!told.empty()) scatter[c] = median(std::move(told));
   }
   return scatter;
 }

@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "base/median.hpp"
+
 namespace pliant {
 
 namespace {
@@ -84,10 +86,8 @@ double relative_scatter(const PlaneFit& plane, std::span<const Vector3> points, 
     if (is_on(plane, points[i], noise[i], reach))
       ratios.push_back(std::abs(plane.height(points[i])) / double(noise[i]));
   if (ratios.empty()) return 1.0;
-  const auto middle = ratios.begin() + std::ptrdiff_t(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
   constexpr double median_to_deviation = 1.4826;  // of a normal distribution
-  return std::clamp(median_to_deviation * *middle, 1.0 / 3.0, 1.0);
+  return std::clamp(median_to_deviation * median(std::move(ratios)), 1.0 / 3.0, 1.0);
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "base/median.hpp"
+
 namespace pliant {
 
 namespace {
@@ -46,9 +48,7 @@ double typical_spacing(std::span<const Vector3> points, const PointTree& tree) {
   if (points.size() <= std::size_t(neighbours)) return 0.0;
   std::vector<double> distances;
   for (const Vector3& p : points) distances.push_back(tree.squared_distance(p, neighbours + 1));
-  const auto middle = distances.begin() + std::ptrdiff_t(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return std::sqrt(*middle);
+  return std::sqrt(median(std::move(distances)));
 }
 
 }  // namespace pliant

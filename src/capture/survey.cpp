@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/median.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
 #include "capture/markers.hpp"
@@ -18,14 +19,6 @@ constexpr double moving = 4.0;          // standard deviations of a point; the c
 constexpr double moving_markers = 8.0;  // the same of markers: they are few
 constexpr double contact_gap = 0.02;    // of the object's size: how near a plane counts as touching it
 
-template <class T>
-T median_of(std::vector<T> values) {
-  if (values.empty()) return T{};
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 PointCounts count_points(std::span<const ObservedFrame> frames) {
   PointCounts counts;
   std::vector<int> all;
@@ -36,15 +29,15 @@ PointCounts count_points(std::span<const ObservedFrame> frames) {
   if (all.empty()) return counts;
   counts.least = *std::ranges::min_element(all);
   counts.greatest = *std::ranges::max_element(all);
-  counts.median = median_of(all);
+  counts.median = median(all);
   return counts;
 }
 
 double median_noise(std::span<const ObservedFrame> frames) {
   std::vector<float> noise;
   for (const ObservedFrame& frame : frames)
-    if (!frame.noise.empty()) noise.push_back(median_of(frame.noise));
-  return double(median_of(noise));
+    if (!frame.noise.empty()) noise.push_back(median(frame.noise));
+  return double(median(noise));
 }
 
 Vector3 centroid_of(const std::vector<Vector3>& points) {
@@ -180,7 +173,7 @@ std::optional<double> marker_noise(const MarkerSet& markers) {
       if (std::isfinite(d)) differences.push_back(std::abs(d));
   }
   if (differences.empty()) return std::nullopt;
-  return deviation_per_median * median_of(std::move(differences)) / std::sqrt(6.0);
+  return deviation_per_median * median(std::move(differences)) / std::sqrt(6.0);
 }
 
 // The greatest way over all frames, of the frame's median marker.
@@ -195,7 +188,7 @@ double median_travel(const MarkerSet& markers) {
       if (std::isnan(first(i, 0))) first.row(i) = frame.row(i);
       ways.push_back((frame.row(i) - first.row(i)).norm());
     }
-    travel = std::max(travel, median_of(std::move(ways)));
+    travel = std::max(travel, median(std::move(ways)));
   }
   return travel;
 }

@@ -1,7 +1,8 @@
 #include "estimation/cost.hpp"
 
-#include <algorithm>
 #include <cmath>
+
+#include "base/median.hpp"
 
 namespace pliant {
 
@@ -15,10 +16,7 @@ double CostEvaluation::surface_rms() const {
 double CostEvaluation::surface_median() const {
   std::vector<float> all;
   for (const FrameFit& f : frames) all.insert(all.end(), f.distances.begin(), f.distances.end());
-  if (all.empty()) return 0.0;
-  const auto middle = all.begin() + std::ptrdiff_t(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  return double(*middle);
+  return double(median(std::move(all)));
 }
 
 double CostEvaluation::track_rms() const {

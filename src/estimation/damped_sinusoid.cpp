@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/median.hpp"
+
 namespace pliant {
 
 namespace {
@@ -126,9 +128,8 @@ FrequencyBand resolvable_band(const std::vector<double>& times) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < times.size(); ++i) intervals.push_back(times[i] - times[i - 1]);
   if (intervals.empty()) return {1.0, 0.0};
-  std::ranges::nth_element(intervals, intervals.begin() + std::ptrdiff_t(intervals.size() / 2));
-  const double median = intervals[intervals.size() / 2];
-  return {2.0 * std::numbers::pi / (times.back() - times.front()), nyquist_share * std::numbers::pi / median};
+  const double usual = median(std::move(intervals));
+  return {2.0 * std::numbers::pi / (times.back() - times.front()), nyquist_share * std::numbers::pi / usual};
 }
 
 std::optional<DampedSinusoid> dominant_sinusoid(const std::vector<double>& times, const VectorX& signal,

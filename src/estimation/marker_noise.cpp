@@ -5,6 +5,8 @@
 #include <numbers>
 #include <vector>
 
+#include "base/median.hpp"
+
 namespace pliant {
 
 namespace {
@@ -54,10 +56,7 @@ MarkerNoise robust_noise(std::span<const double> residuals, std::span<const doub
     return {a / scale_of_normal, std::log(a) + logs / double(count) + loss};
   };
   const Scaled constant = scaled(0.0);
-  std::vector<double> moved(displacements.begin(), displacements.end());
-  const auto middle = moved.begin() + std::ptrdiff_t(count / 2);
-  std::ranges::nth_element(moved, middle);
-  const double unit = *middle;
+  const double unit = median(std::vector(displacements.begin(), displacements.end()));
   if (!(unit > 0.0)) return constant.at_rest;
   // The ratio, as how much more than at rest a marker errs that has moved as far as the middle one.
   const auto at = [&](double log_ratio) { return scaled(std::exp(log_ratio) / unit); };

@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "base/median.hpp"
+
 namespace pliant {
 
 namespace {
@@ -303,8 +305,7 @@ double secant_modulus(const std::vector<MaterialTest>& tests) {
   for (const MaterialTest& test : tests)
     for (const double secant : secant_moduli(test)) secants.push_back(secant);
   if (secants.empty()) throw std::invalid_argument("no stress of the curves has the sign of its strain");
-  std::ranges::nth_element(secants, secants.begin() + std::ptrdiff_t(secants.size() / 2));
-  return secants[secants.size() / 2];
+  return median(std::move(secants));
 }
 
 /// Starts of a law with so many terms, from the one with fewer, which may be empty.

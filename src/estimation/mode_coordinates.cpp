@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "base/dense.hpp"
+#include "base/median.hpp"
 #include "elasticity/polar.hpp"
 
 namespace pliant {
@@ -33,12 +34,6 @@ void sort_by_distance(std::vector<int>& order, const std::vector<Vector3>& point
   order.resize(std::size_t(count));
 }
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
-  return values[values.size() / 2];
-}
-
 }  // namespace
 
 TrackedMotion::TrackedMotion(const Body& body, const std::vector<Vector3>& rest, std::vector<SeenInstant> instants,
@@ -49,7 +44,7 @@ TrackedMotion::TrackedMotion(const Body& body, const std::vector<Vector3>& rest,
     if (!instant.seen.empty()) counts.push_back(double(instant.seen.size()));
     for (const TrackObservation& seen : instant.seen) noises.push_back(seen.noise);
   }
-  const double usual = median_of(std::move(counts)), noise = median_of(std::move(noises));
+  const double usual = median(std::move(counts)), noise = median(std::move(noises));
   neighbours_.resize(rest.size());
   for (std::size_t p = 0; p < rest.size(); ++p) {
     neighbours_[p].resize(rest.size());

@@ -8,6 +8,7 @@
 
 #include "base/dense.hpp"
 #include "base/error.hpp"
+#include "base/median.hpp"
 #include "base/parallel.hpp"
 #include "estimation/problem.hpp"
 #include "motion/press_session.hpp"
@@ -113,11 +114,10 @@ void weigh_by_stated_deviations(std::vector<ObservedPress>& presses) {
   for (const ObservedPress& press : presses)
     std::ranges::copy_if(press.weights, std::back_inserter(stated), [](double s) { return std::isfinite(s); });
   if (stated.empty()) return;
-  const auto middle = stated.begin() + std::ptrdiff_t(stated.size() / 2);
-  std::ranges::nth_element(stated, middle);
+  const double usual = median(std::move(stated));
   for (ObservedPress& press : presses) {
     if (press.weights.empty()) continue;
-    for (double& w : press.weights) w = std::isfinite(w) ? w / *middle : 1.0;
+    for (double& w : press.weights) w = std::isfinite(w) ? w / usual : 1.0;
     press.weights.resize(3 * press.rest.size(), 1.0);  // the probe's
   }
 }
@@ -245,11 +245,8 @@ double marker_noise(const ObservedPress& press) {
   LocalResiduals local;
   local.add(press);
   std::vector<double>& sizes = local.residuals;
-  if (sizes.empty()) return 0.0;
   for (double& r : sizes) r = std::abs(r);
-  const auto middle = sizes.begin() + std::ptrdiff_t(sizes.size() / 2);
-  std::ranges::nth_element(sizes, middle);
-  return 1.4826 * *middle;
+  return 1.4826 * median(std::move(sizes));
 }
 
 double punch_modulus(const PressScene& scene, double poissons_ratio) {
@@ -263,8 +260,7 @@ double punch_modulus(const PressScene& scene, double poissons_ratio) {
   for (const double modulus : guessed_moduli(scene.static_tests(), *scene.body, poissons_ratio))
     moduli.push_back(modulus);
   if (moduli.empty()) return 1e4;
-  std::ranges::nth_element(moduli, moduli.begin() + std::ptrdiff_t(moduli.size() / 2));
-  return moduli[moduli.size() / 2];
+  return median(std::move(moduli));
 }
 
 }  // namespace pliant

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/median.hpp"
 #include "estimation/damped_sinusoid.hpp"
 
 namespace pliant {
@@ -17,9 +18,7 @@ Vector3 middle(const Points& points) {
   std::vector<double> values(std::size_t(points.rows()));
   for (int d = 0; d < 3; ++d) {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = points(Eigen::Index(i), d);
-    const auto half = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), half, values.end());
-    m[d] = *half;
+    m[d] = median(values);
   }
   return m;
 }

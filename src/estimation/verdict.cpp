@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.hpp"
 #include "estimation/judgement.hpp"
 
 namespace pliant {
@@ -18,11 +19,6 @@ struct ResidualLimits {
 };
 constexpr ResidualLimits far_above_noise{judgement.residual, judgement.residual_for_a_while};
 constexpr ResidualLimits above_noise{judgement.residual_of_part, judgement.residual_of_part_for_a_while};
-
-double median(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
-  return values[values.size() / 2];
-}
 
 /// Root mean square residual over the noise; 0 where there is neither.
 double residual_over_noise(const CostEvaluation& evaluation) {
@@ -111,7 +107,7 @@ std::vector<double> residuals_over_noise(const CostEvaluation& evaluation) {
   std::vector<double> smooth;
   for (int i = 0; i < int(ratios.size()); ++i) {
     const int first = std::clamp(i - window / 2, 0, int(ratios.size()) - window);
-    smooth.push_back(median({ratios.begin() + first, ratios.begin() + first + window}));
+    smooth.push_back(median(std::vector(ratios.begin() + first, ratios.begin() + first + window)));
   }
   return smooth;
 }

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "base/files.hpp"
+#include "base/median.hpp"
 
 namespace pliant {
 
@@ -158,10 +159,7 @@ double level_of(const cv::Mat1b& image, const cv::Mat1b& own) {
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x)
       if (depth(y + 1, x + 1) > std::min(2.0, 0.6 * deepest)) levels.push_back(image(y, x));
-  if (levels.empty()) return 0.0;
-  const auto middle = levels.begin() + long(levels.size() / 2);
-  std::nth_element(levels.begin(), middle, levels.end());
-  return *middle;
+  return median(std::move(levels));
 }
 
 struct Moments {

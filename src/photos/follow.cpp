@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/median.hpp"
+
 namespace pliant {
 
 namespace {
@@ -252,10 +254,7 @@ double spacing_of(const Points& points) {
   for (int i = 0; i < int(points.rows()); ++i)
     for (const int j : nearest(points, points.row(i), 1, i))
       distances.push_back((points.row(i) - points.row(j)).norm());
-  if (distances.empty()) return 0.0;
-  const auto middle = distances.begin() + long(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return median(std::move(distances));
 }
 
 }  // namespace pliant

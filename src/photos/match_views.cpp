@@ -9,6 +9,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "base/median.hpp"
+
 namespace pliant {
 
 namespace {
@@ -178,10 +180,7 @@ ResolvedSightings resolve_below(const std::vector<Sighting>& all, double limit, 
 double median_rms(std::span<const Sighting> sightings) {
   std::vector<double> all;
   for (const Sighting& s : sightings) all.push_back(s.rms);
-  if (all.empty()) return infinite;
-  const auto middle = all.begin() + long(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  return *middle;
+  return all.empty() ? infinite : median(std::move(all));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "base/median.hpp"
 #include "geometry/surface_distance.hpp"
 #include "photos/follow.hpp"
 #include "photos/match_views.hpp"
@@ -29,13 +30,6 @@ constexpr int fewest_markers = 4;
 constexpr int normal_neighbours = 8;
 
 double size_of(const TriangleMesh& surface) { return bounding_box(surface).extent().maxCoeff(); }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + long(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Points positions_of(const std::vector<Sighting>& sightings) {
   Points out(Eigen::Index(sightings.size()), 3);

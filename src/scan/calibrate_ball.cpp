@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/median.hpp"
 #include "base/parallel.hpp"
 #include "capture/capture_rules.hpp"
 #include "geometry/whole_picture.hpp"
@@ -95,12 +96,6 @@ RigidMotion kabsch(const std::vector<Vector3>& from, const std::vector<Vector3>&
   Vector3 sign(1, 1, (svd.matrixV() * svd.matrixU().transpose()).determinant() < 0 ? -1.0 : 1.0);
   const Matrix3 R = svd.matrixV() * sign.asDiagonal() * svd.matrixU().transpose();
   return {R, b - R * a};
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 Matrix3 rotation_by(const Vector3& turn) {
@@ -362,7 +357,7 @@ class BallCalibration {
       for (const Residual& r : residuals) rows.push_back(row_of(r, n, lenses));
       std::vector<double> sizes;
       for (const Residual& r : residuals) sizes.push_back(r.value.norm() / r.noise);
-      solution.scale = std::max(1e-6, median_of(sizes) / 1.538);  // the median length of three normal deviates
+      solution.scale = std::max(1e-6, median(sizes) / 1.538);  // the median length of three normal deviates
       MatrixX A = MatrixX::Zero(n, n);
       VectorX b = VectorX::Zero(n);
       solution.cost = solution.rows = 0.0;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <unordered_map>
 
+#include "base/median.hpp"
 #include "scan/even_mesh.hpp"
 #include "scan/rest_scan.hpp"
 
@@ -63,9 +64,7 @@ double typical_reach(const std::vector<Vector3>& points) {
     std::ranges::nth_element(squares, eighth);
     reaches.push_back(std::sqrt(*eighth));
   }
-  const auto middle = reaches.begin() + std::ssize(reaches) / 2;
-  std::ranges::nth_element(reaches, middle);
-  return *middle;
+  return median(std::move(reaches));
 }
 
 // The largest set of points that hang together within the reach, without those that have few neighbours.
