@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
-#include <numeric>
 
+#include "base/disjoint_sets.hpp"
 #include "geometry/mesh_io.hpp"
 
 namespace pliant {
@@ -89,18 +89,10 @@ void examine_triangles(const TriangleMesh& mesh, MeshReport& report) {
 }
 
 int count_components(const TriangleMesh& mesh) {
-  std::vector<int> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const auto& [a, b, c] : mesh.triangles) {
-    parent[root(b)] = root(a);
-    parent[root(c)] = root(a);
-  }
+  DisjointSets components(mesh.vertices.size());
+  for (const auto& [a, b, c] : mesh.triangles) components.join(a, b), components.join(a, c);
   std::vector<bool> is_root(mesh.vertices.size(), false);
-  for (const auto& triangle : mesh.triangles) is_root[root(triangle[0])] = true;
+  for (const auto& triangle : mesh.triangles) is_root[components.root(triangle[0])] = true;
   return int(std::ranges::count(is_root, true));
 }
 

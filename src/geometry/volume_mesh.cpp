@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 
+#include "base/disjoint_sets.hpp"
 #include "geometry/raw_cells.hpp"
 #include "geometry/tetrahedron.hpp"
 
@@ -123,22 +123,12 @@ void refuse_coincident(const RawCells& raw, const std::vector<int>& number, cons
 }
 
 int count_pieces(const VolumeMesh& mesh) {
-  std::vector<int> parent(std::size_t(mesh.nodes.rows()));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int n) {
-    while (parent[std::size_t(n)] != n) n = parent[std::size_t(n)] = parent[std::size_t(parent[std::size_t(n)])];
-    return n;
-  };
-  int pieces = int(parent.size());
-  const auto join = [&](int a, int b) {
-    a = root(a), b = root(b);
-    if (a != b) parent[std::size_t(a)] = b, --pieces;
-  };
+  DisjointSets pieces(std::size_t(mesh.nodes.rows()));
   for (const auto& tet : mesh.tets)
-    for (int k = 1; k < 4; ++k) join(tet[0], tet[std::size_t(k)]);
+    for (int k = 1; k < 4; ++k) pieces.join(tet[0], tet[std::size_t(k)]);
   for (std::size_t e = 0; e < mesh.mid_nodes.size(); ++e)
-    for (const int m : mesh.mid_nodes[e]) join(mesh.tets[e][0], m);
-  return pieces;
+    for (const int m : mesh.mid_nodes[e]) pieces.join(mesh.tets[e][0], m);
+  return pieces.count();
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 
+#include "base/disjoint_sets.hpp"
 #include "base/error.hpp"
 
 namespace pliant {
@@ -333,14 +333,7 @@ HexGrid make_hex_grid(const SignedDistance& distance, const Box& object, double 
 int face_connected_parts(const HexGrid& grid) {
   // Nodes with bit d of their number clear, then set: the two faces of a cell across axis d.
   std::map<std::array<int, 4>, int> first_cell;
-  std::vector<int> parent(grid.cells.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int cell) {
-    while (parent[std::size_t(cell)] != cell)
-      cell = parent[std::size_t(cell)] = parent[std::size_t(parent[std::size_t(cell)])];
-    return cell;
-  };
-  int parts = grid.cell_count();
+  DisjointSets parts(grid.cells.size());
   for (int cell = 0; cell < grid.cell_count(); ++cell)
     for (int axis = 0; axis < 3; ++axis)
       for (const int side : {0, 1}) {
@@ -349,12 +342,9 @@ int face_connected_parts(const HexGrid& grid) {
         for (int a = 0; a < 8; ++a)
           if ((a >> axis & 1) == side) face[std::size_t(k++)] = grid.cells[std::size_t(cell)][std::size_t(a)];
         std::ranges::sort(face);
-        const auto [at, is_new] = first_cell.emplace(face, cell);
-        if (is_new || root(at->second) == root(cell)) continue;
-        parent[std::size_t(root(cell))] = root(at->second);
-        --parts;
+        parts.join(first_cell.emplace(face, cell).first->second, cell);
       }
-  return parts;
+  return parts.count();
 }
 
 }  // namespace pliant

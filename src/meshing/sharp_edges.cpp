@@ -4,8 +4,9 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <set>
+
+#include "base/disjoint_sets.hpp"
 
 namespace pliant {
 
@@ -93,20 +94,15 @@ class SharpEdges {
 
   /// Patches are what sharp edges bound. Returns true where something was dropped.
   bool drop_small_patches(double least_area) {
-    std::vector<int> parent(surface_.triangles.size());
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto root = [&](int t) {
-      while (parent[std::size_t(t)] != t) t = parent[std::size_t(t)] = parent[std::size_t(parent[std::size_t(t)])];
-      return std::size_t(t);
-    };
+    DisjointSets patches(surface_.triangles.size());
     for (const auto& [ends, edge] : edges_)
-      if (!edge.is_sharp) parent[root(edge.triangles[0])] = int(root(edge.triangles[1]));
-    std::vector<double> area(parent.size(), 0.0);
-    for (int t = 0; t < int(parent.size()); ++t) area[root(t)] += area_vector(t).norm();
+      if (!edge.is_sharp) patches.join(edge.triangles[1], edge.triangles[0]);
+    std::vector<double> areas(surface_.triangles.size(), 0.0);
+    const auto area = [&](int t) -> double& { return areas[std::size_t(patches.root(t))]; };
+    for (int t = 0; t < int(areas.size()); ++t) area(t) += area_vector(t).norm();
     bool dropped = false;
     for (auto& [ends, edge] : edges_) {
-      if (!edge.is_sharp || std::min(area[root(edge.triangles[0])], area[root(edge.triangles[1])]) >= least_area)
-        continue;
+      if (!edge.is_sharp || std::min(area(edge.triangles[0]), area(edge.triangles[1])) >= least_area) continue;
       edge.is_sharp = false;
       dropped = true;
     }

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/disjoint_sets.hpp"
 #include "base/error.hpp"
 #include "geometry/mesh_io.hpp"
 #include "mesh/tet_mesh.hpp"
@@ -23,7 +24,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <utility>
 
 #include "meshing/part_boundary.hpp"
@@ -148,19 +148,11 @@ Polyhedron polyhedron_of(const TriangleMesh& surface) {
 
 /// One vertex of each connected part of a surface: its shells, outer ones and those of cavities.
 std::vector<Vector3> vertex_of_each_shell(const TriangleMesh& surface) {
-  std::vector<int> parent(surface.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int v) {
-    while (parent[std::size_t(v)] != v) v = parent[std::size_t(v)] = parent[std::size_t(parent[std::size_t(v)])];
-    return v;
-  };
-  for (const auto& [a, b, c] : surface.triangles) {
-    parent[std::size_t(root(b))] = root(a);
-    parent[std::size_t(root(c))] = root(a);
-  }
+  DisjointSets parts(surface.vertices.size());
+  for (const auto& [a, b, c] : surface.triangles) parts.join(a, b), parts.join(a, c);
   std::map<int, Vector3> shells;
   for (const auto& triangle : surface.triangles)
-    shells.try_emplace(root(triangle[0]), surface.vertices[std::size_t(triangle[0])]);
+    shells.try_emplace(parts.root(triangle[0]), surface.vertices[std::size_t(triangle[0])]);
   std::vector<Vector3> vertices;
   for (const auto& [shell, vertex] : shells) vertices.push_back(vertex);
   return vertices;

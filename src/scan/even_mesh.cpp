@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
+#include "base/disjoint_sets.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
 #include "meshing/level_mesh.hpp"
@@ -31,25 +31,17 @@ double smoothed(const SignedDistance& distance, const Vector3& p, double spacing
 }  // namespace
 
 TriangleMesh largest_part(const TriangleMesh& mesh) {
-  std::vector<int> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[std::size_t(i)] != i) i = parent[std::size_t(i)] = parent[std::size_t(parent[std::size_t(i)])];
-    return i;
-  };
-  for (const auto& [a, b, c] : mesh.triangles) {
-    parent[std::size_t(root(b))] = root(a);
-    parent[std::size_t(root(c))] = root(a);
-  }
+  DisjointSets parts(mesh.vertices.size());
+  for (const auto& [a, b, c] : mesh.triangles) parts.join(a, b), parts.join(a, c);
   std::vector<double> volume(mesh.vertices.size(), 0.0);
   for (const auto& [a, b, c] : mesh.triangles)
-    volume[std::size_t(root(a))] +=
+    volume[std::size_t(parts.root(a))] +=
         mesh.vertices[std::size_t(a)].dot(mesh.vertices[std::size_t(b)].cross(mesh.vertices[std::size_t(c)]));
   const int largest = int(std::ranges::max_element(volume) - volume.begin());
   TriangleMesh result;
   std::vector<int> number(mesh.vertices.size(), -1);
   for (const auto& triangle : mesh.triangles) {
-    if (root(triangle[0]) != largest) continue;
+    if (parts.root(triangle[0]) != largest) continue;
     auto& own = result.triangles.emplace_back();
     for (int k = 0; k < 3; ++k) {
       int& vertex = number[std::size_t(triangle[std::size_t(k)])];
