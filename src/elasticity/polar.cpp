@@ -167,10 +167,6 @@ Vector3 rotation_rate(const Polar& polar, const Matrix3& dF) {
   return polar.rate_inverse * twice_axial(A);
 }
 
-Matrix3 rotation_derivative(const Polar& polar, const Matrix3& dF) {
-  return polar.R * cross_matrix(rotation_rate(polar, dF));
-}
-
 Matrix3 rotation_rate_adjoint(const Polar& polar, const Vector3& w_bar) {
   const Vector3 v_bar = polar.rate_inverse.transpose() * w_bar;
   return polar.R * cross_matrix(v_bar);

@@ -31,9 +31,6 @@ void polar_decompositions(std::span<const Matrix3> gradients, std::span<Polar> p
 /// Where the system is singular it is damped (`polar.is_degenerate`).
 [[nodiscard]] Vector3 rotation_rate(const Polar& polar, const Matrix3& dF);
 
-/// Change of R for a change of F [-], 3 x 3.
-[[nodiscard]] Matrix3 rotation_derivative(const Polar& polar, const Matrix3& dF);
-
 /// Adjoint of `rotation_rate`: the cotangent of F for a cotangent of w.
 [[nodiscard]] Matrix3 rotation_rate_adjoint(const Polar& polar, const Vector3& w_bar);
 

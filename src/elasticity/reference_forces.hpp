@@ -40,12 +40,6 @@ class ReferenceForces {
   virtual void add_matrix(double scale, BlockMatrix& matrix) const = 0;
   /// force += df for changes of X, each into its own force; as many of the one as of the other
   virtual void add_tangents(std::span<const Points* const> d_references, std::span<Points* const> forces) const = 0;
-  /// The same for one change.
-  void add_tangent(const Points& d_reference, Points& force) const {
-    const Points* along = &d_reference;
-    Points* into = &force;
-    add_tangents({&along, 1}, {&into, 1});
-  }
   /// The cotangent of X for the cotangent `w` of f is added.
   virtual void add_adjoint(const Points& w, Points& reference_bar) const = 0;
   /// From the reference to p, of an element as a whole; not of viscous ones.

@@ -88,8 +88,6 @@ class Recordings {
     return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.scene.object.volume; });
   }
 
-  /// Whether bodies are of tetrahedra, on whose points laws work.
-  bool are_tetrahedra() const { return resolution(1.0, 1.0).element != ElementKind::Hexahedron; }
   /// Whether where the body is stress-free follows from the parameters.
   bool moves_reference() const { return any_sags() || options_.scan_points > 0; }
 

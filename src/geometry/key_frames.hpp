@@ -34,7 +34,6 @@ class KeyFrames {
   }
 
   const std::vector<Key>& keys() const { return keys_; }
-  bool is_constant() const { return keys_.size() == 1; }
 
   /// @param time  [s]
   Value at(double time) const {
@@ -77,7 +76,6 @@ class KeyedMotion {
   /// @param keys    shift [m], then rotation vector [rad]: turns of any number of revolutions about one axis are exact
   KeyedMotion(const Vector3& centre, KeyFrames<6> keys) : centre_(centre), keys_(std::move(keys)) {}
 
-  bool stands_still() const { return keys_.is_constant(); }
   /// From where points are for a zero shift and turn to where they are at a time [s].
   RigidMotion at(double time) const {
     const Eigen::Matrix<double, 6, 1> value = keys_.at(time);

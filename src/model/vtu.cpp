@@ -1,7 +1,6 @@
 #include "model/vtu.hpp"
 
 #include <bit>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <pugixml.hpp>
@@ -223,12 +222,6 @@ class GridReader {
   fs::path path_;
 };
 
-const VtuArray* find(const std::vector<VtuArray>& arrays, const std::string& name) {
-  for (const VtuArray& array : arrays)
-    if (array.name == name) return &array;
-  return nullptr;
-}
-
 }  // namespace
 
 int corner_count(VtuCell kind) {
@@ -245,8 +238,11 @@ int corner_count(VtuCell kind) {
   return 8;
 }
 
-const VtuArray* VtuGrid::find_point_data(const std::string& name) const { return find(point_data, name); }
-const VtuArray* VtuGrid::find_cell_data(const std::string& name) const { return find(cell_data, name); }
+const VtuArray* VtuGrid::find_cell_data(const std::string& name) const {
+  for (const VtuArray& array : cell_data)
+    if (array.name == name) return &array;
+  return nullptr;
+}
 
 namespace {
 /// Which of our points stands at each place of VTK's order; nothing: the orders agree.
@@ -311,21 +307,6 @@ void write_pvd(const fs::path& path, const std::vector<PvdEntry>& entries) {
     node.append_attribute("file") = entry.file.generic_string().c_str();
   }
   save(path, document);
-}
-
-std::vector<PvdEntry> read_pvd(const fs::path& path) {
-  pugi::xml_document document;
-  const pugi::xml_node root = load_root(path, document, "Collection");
-  std::vector<PvdEntry> entries;
-  for (const pugi::xml_node node : root.child("Collection").children("DataSet")) {
-    const double time = node.attribute("timestep").as_double(NAN);
-    const std::string file = node.attribute("file").value();
-    if (!std::isfinite(time) || file.empty())
-      fail(path, "an entry without time or file (number " + std::to_string(entries.size() + 1) + ")",
-           "timestep=\"seconds\" file=\"name\"");
-    entries.push_back({time, file});
-  }
-  return entries;
 }
 
 }  // namespace pliant

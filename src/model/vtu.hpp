@@ -36,8 +36,7 @@ struct VtuGrid {
   std::vector<VtuArray> point_data, cell_data;
 
   int cell_count() const { return int(connectivity.size()) / corner_count(kind); }
-  /// The array of that name, or null.
-  const VtuArray* find_point_data(const std::string& name) const;
+  /// The array of the cells of that name, or null.
   const VtuArray* find_cell_data(const std::string& name) const;
 };
 
@@ -67,8 +66,5 @@ struct PvdEntry {
 
 /// Writes `.pvd`: the list of files of a motion with their times.
 void write_pvd(const std::filesystem::path& path, const std::vector<PvdEntry>& entries);
-
-/// Reads a `.pvd`. Throws InputError where it is not one.
-std::vector<PvdEntry> read_pvd(const std::filesystem::path& path);
 
 }  // namespace pliant

@@ -47,8 +47,6 @@ class FixedRegions : public ForceTerm {
   /// Moves the regions to where these hold them; they contain what they contained.
   void move_to(const std::vector<Hold>& holds) { holds_ = holds; }
 
-  int held_cell_count() const { return int(cells_.size()); }
-
  private:
   struct HeldCell {
     int cell;

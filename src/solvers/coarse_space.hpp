@@ -52,7 +52,6 @@ class CoarseSpace {
   };
   /// z += T C T^T r
   void add_correction(const std::vector<double>& r, std::vector<double>& z, const Layout& layout);
-  int aggregate_count() const { return aggregates_.count; }
 
  private:
   struct Level;

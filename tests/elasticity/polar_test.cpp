@@ -27,6 +27,11 @@ Matrix3 with_stretches(const Vector3& s, std::mt19937& random) {
   return random_rotation(random).toRotationMatrix() * V * s.asDiagonal() * V.transpose();
 }
 
+/// Change of R for a change of F [-], 3 x 3.
+Matrix3 rotation_derivative(const Polar& polar, const Matrix3& dF) {
+  return polar.R * cross_matrix(rotation_rate(polar, dF));
+}
+
 /// Stretches of generic poses: near rest, large, squeezed, nearly inverted, inverted, inverted and large.
 const std::vector<Vector3> stretches = {{1.0, 1.1, 0.9},  {3.0, 1.2, 0.4},  {0.9, 0.5, 0.05},   {1.2, 0.8, 0.001},
                                         {1.3, 0.8, -0.2}, {2.0, 1.5, -0.9}, {0.02, 0.03, 0.01}, {50.0, 30.0, 4.0}};

@@ -15,6 +15,15 @@ namespace {
 
 using test::tolerance;
 
+/// Change of the forces for a change of X.
+Points tangent_of(const ReferenceForces& forces, const Points& direction) {
+  Points tangent = Points::Zero(direction.rows(), 3);
+  const Points* along = &direction;
+  Points* into = &tangent;
+  forces.add_tangents({&along, 1}, {&into, 1});
+  return tangent;
+}
+
 struct Of {
   std::string name;
   std::optional<LawForm> law;  ///< none: of the mean strain
@@ -80,8 +89,7 @@ TEST_P(Reference, ForcesAreThoseOfABodyWithThatReference) {
 
 TEST_P(Reference, TangentIsTheDerivativeAndMatrixAndAdjointAreIt) {
   (void)force(X);
-  Points tangent = Points::Zero(x.rows(), 3);
-  forces->add_tangent(direction, tangent);
+  const Points tangent = tangent_of(*forces, direction);
   BlockMatrix matrix(body->pattern);
   forces->add_matrix(2.0, matrix);
   const Points w = test::deformed(body->nodes, 0.5, 2.9);
@@ -150,8 +158,7 @@ TEST(LawReferenceForces, TheMatrixIsTheTangentWhereTheLagPointIsElsewhere) {
   ASSERT_TRUE(forces->linearise(test::deformed(body->nodes, 0.1, 0.2), test::deformed(body->nodes, 0.3, 1.7),
                                 test::deformed(body->nodes, 0.28, 1.75)));
   const Points direction = test::deformed(body->nodes, 0.3, -0.4);
-  Points tangent = Points::Zero(direction.rows(), 3);
-  forces->add_tangent(direction, tangent);
+  const Points tangent = tangent_of(*forces, direction);
   BlockMatrix matrix(body->pattern);
   forces->add_matrix(1.0, matrix);
   EXPECT_LT((test::dense(matrix) * flat(direction) - flat(tangent)).norm(), tolerance(1e-12) * tangent.norm());
@@ -183,8 +190,8 @@ TEST(MeanStrainReferenceForces, AreTheAffineForcesWhereTheLagPointIsElsewhere) {
     Points expected = Points::Zero(p.rows(), 3);
     elasticity->add_force(z, expected);
     EXPECT_LT((force(X) - expected).norm(), tolerance(1e-11) * expected.norm());
-    Points tangent = Points::Zero(p.rows(), 3), adjoint = Points::Zero(p.rows(), 3);
-    forces->add_tangent(direction, tangent);
+    const Points tangent = tangent_of(*forces, direction);
+    Points adjoint = Points::Zero(p.rows(), 3);
     forces->add_adjoint(w, adjoint);
     EXPECT_NEAR(adjoint.cwiseProduct(direction).sum(), w.cwiseProduct(tangent).sum(),
                 tolerance(1e-12) * w.norm() * tangent.norm());

@@ -18,6 +18,7 @@
 #include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
 #include "support/models.hpp"
+#include "support/pvd.hpp"
 
 namespace pliant::export_formats_test {
 namespace {
@@ -397,12 +398,12 @@ TEST_F(Formats, OfSequencesAreReadAgain) {
       for (const auto& point : grid.points.rowwise()) mesh->vertices.push_back(point.transpose());
       for (std::size_t i = 0; i + 2 < grid.connectivity.size(); i += 3)
         mesh->triangles.push_back({grid.connectivity[i], grid.connectivity[i + 1], grid.connectivity[i + 2]});
-      ASSERT_NE(grid.find_point_data("displacement [m]"), nullptr);
+      EXPECT_EQ(std::ranges::count(grid.point_data, "displacement [m]", &VtuArray::name), 1);
     }
     EXPECT_EQ(first.triangles, model.scene.object.surface->triangles);
     expect_that_the_free_end_falls(first, last);
   }
-  const std::vector<PvdEntry> entries = read_pvd(folder / "vtu" / "motion.pvd");
+  const std::vector<PvdEntry> entries = test::read_pvd(folder / "vtu" / "motion.pvd");
   ASSERT_EQ(entries.size(), 5u);
   EXPECT_NEAR(entries[3].time, 0.06, 1e-9);
 }
