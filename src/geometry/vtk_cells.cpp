@@ -19,15 +19,6 @@ namespace fs = std::filesystem;
 
 static_assert(std::endian::native == std::endian::little);
 
-/// Numbers of a type by VTK's names, legacy or XML, widened to double. Nothing where the type is unknown.
-std::optional<std::size_t> size_of_type(const std::string& type) {
-  static const std::map<std::string, std::size_t> sizes = {{"Float64", 8}, {"Float32", 4}, {"Int64", 8}, {"UInt64", 8},
-                                                           {"Int32", 4},   {"UInt32", 4},  {"Int16", 2}, {"UInt16", 2},
-                                                           {"Int8", 1},    {"UInt8", 1}};
-  const auto found = sizes.find(type);
-  return found == sizes.end() ? std::nullopt : std::optional(found->second);
-}
-
 template <class T>
 double value_at(const char* bytes, bool big_endian) {
   char raw[sizeof(T)];
@@ -38,18 +29,20 @@ double value_at(const char* bytes, bool big_endian) {
   return double(value);
 }
 
-std::vector<double> values_of(std::string_view bytes, const std::string& type, bool big_endian) {
-  static const std::map<std::string, double (*)(const char*, bool)> readers = {
-      {"Float64", value_at<double>},       {"Float32", value_at<float>},        {"Int64", value_at<std::int64_t>},
-      {"UInt64", value_at<std::uint64_t>}, {"Int32", value_at<std::int32_t>},   {"UInt32", value_at<std::uint32_t>},
-      {"Int16", value_at<std::int16_t>},   {"UInt16", value_at<std::uint16_t>}, {"Int8", value_at<std::int8_t>},
-      {"UInt8", value_at<std::uint8_t>}};
-  const auto read = readers.at(type);
-  const std::size_t size = *size_of_type(type);
-  std::vector<double> values;
-  for (std::size_t i = 0; i + size <= bytes.size(); i += size) values.push_back(read(bytes.data() + i, big_endian));
-  return values;
-}
+struct NumberType {
+  std::size_t size;
+  double (*value_at)(const char* bytes, bool big_endian);
+};
+
+template <class T>
+constexpr NumberType number_type = {sizeof(T), value_at<T>};
+
+const std::map<std::string, NumberType> number_types = {
+    {"Float64", number_type<double>},     {"Float32", number_type<float>},
+    {"Int64", number_type<std::int64_t>}, {"UInt64", number_type<std::uint64_t>},
+    {"Int32", number_type<std::int32_t>}, {"UInt32", number_type<std::uint32_t>},
+    {"Int16", number_type<std::int16_t>}, {"UInt16", number_type<std::uint16_t>},
+    {"Int8", number_type<std::int8_t>},   {"UInt8", number_type<std::uint8_t>}};
 
 /// Values with the line that each came from; 0 where there are no lines.
 struct Values {
@@ -197,7 +190,7 @@ class LegacyReader {
     Values values;
     if (is_binary_) {
       text_.rest_of_line();
-      values.of = values_of(text_.bytes(count * *size_of_type(type), what), type, true);
+      values.of = *vtk_values(text_.bytes(count * number_types.at(type).size, what), type, true);
       return values;
     }
     const std::string expected = "a number of " + std::string(what);
@@ -272,7 +265,7 @@ class XmlReader {
     if (!node) fail(0, "there is no array of " + name, "points, connectivity, offsets and types");
     const std::string format = node.attribute("format").value(), type = node.attribute("type").value();
     const int line = line_of(node);
-    if (!size_of_type(type)) fail(line, "an array of type \"" + type + "\"", "numbers");
+    if (!number_types.contains(type)) fail(line, "an array of type \"" + type + "\"", "numbers");
     Values values;
     if (format == "ascii") {
       const pugi::xml_node text = node.first_child();
@@ -285,7 +278,7 @@ class XmlReader {
       const std::optional<std::string> bytes = decode_base64(node.text().get());
       const std::size_t header = wide_header_ ? 8 : 4;
       if (!bytes || bytes->size() < header) fail(line, "an array of " + name + " that is not base64", "base64");
-      values.of = values_of(std::string_view(*bytes).substr(header), type, big_endian_);
+      values.of = *vtk_values(std::string_view(*bytes).substr(header), type, big_endian_);
     } else {
       fail(line, "an array in the encoding \"" + format + "\"", "\"ascii\" or \"binary\"");
     }
@@ -301,6 +294,15 @@ class XmlReader {
 };
 
 }  // namespace
+
+std::optional<std::vector<double>> vtk_values(std::string_view bytes, const std::string& type, bool big_endian) {
+  const auto found = number_types.find(type);
+  if (found == number_types.end()) return std::nullopt;
+  const auto [size, value_at] = found->second;
+  std::vector<double> values;
+  for (std::size_t i = 0; i + size <= bytes.size(); i += size) values.push_back(value_at(bytes.data() + i, big_endian));
+  return values;
+}
 
 VtkKind vtk_kind(int type, const Place& place) {
   static const std::map<int, VtkKind> kinds = {{1, {RawCell::Flat, 1, "vertex"}},

@@ -11,6 +11,7 @@
 #include "base/base64.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "geometry/raw_cells.hpp"
 
 namespace pliant {
 
@@ -152,7 +153,6 @@ class GridReader {
     return result;
   }
 
-  // rows < 0: any number
   VtuArray array(pugi::xml_node node, int rows) const {
     VtuArray array{node.attribute("Name").value(), node.attribute("NumberOfComponents").as_int(1), {}};
     const std::string label = "array \"" + array.name + "\"", type = node.attribute("type").value();
@@ -160,9 +160,10 @@ class GridReader {
     if (std::string(node.attribute("format").value()) != "binary")
       fail(path_, label + " in another encoding", "format=\"binary\"");
     if (array.components < 1) fail(path_, label + " without components", "at least one");
-    const std::string raw = bytes(node, label);
-    array.values = convert(raw, type, label);
-    if (rows >= 0 && array.values.size() != size_t(rows) * size_t(array.components))
+    auto values = vtk_values(bytes(node, label), type, false);
+    if (!values) fail(path_, label + " of type \"" + type + "\"", "numbers, like Float64");
+    array.values = std::move(*values);
+    if (array.values.size() != size_t(rows) * size_t(array.components))
       fail(path_, label + " of " + std::to_string(array.values.size()) + " values",
            std::to_string(size_t(rows) * size_t(array.components)));
     return array;
@@ -177,23 +178,6 @@ class GridReader {
       fail(path_, label + " of " + std::to_string(raw->size() - sizeof announced) + " bytes",
            std::to_string(announced) + " bytes");
     return raw->substr(sizeof announced);
-  }
-
-  template <class T>
-  std::vector<double> as_doubles(const std::string& raw, const std::string& label) const {
-    if (raw.size() % sizeof(T) != 0) fail(path_, label + " that ends within a value", "whole values");
-    std::vector<T> values(raw.size() / sizeof(T));
-    if (!values.empty()) std::memcpy(values.data(), raw.data(), raw.size());
-    return {values.begin(), values.end()};
-  }
-
-  std::vector<double> convert(const std::string& raw, const std::string& type, const std::string& label) const {
-    if (type == "Float64") return as_doubles<double>(raw, label);
-    if (type == "Float32") return as_doubles<float>(raw, label);
-    if (type == "Int64") return as_doubles<int64_t>(raw, label);
-    if (type == "Int32") return as_doubles<int32_t>(raw, label);
-    if (type == "UInt8") return as_doubles<uint8_t>(raw, label);
-    fail(path_, label + " of type \"" + type + "\"", "Float64, Float32, Int64, Int32 or UInt8");
   }
 
   VtuArray named(pugi::xml_node parent, const char* name, int rows) const {
