@@ -9,6 +9,7 @@
 #include "base/csv.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "base/html.hpp"
 #include "model/result.hpp"
 
 namespace pliant {
@@ -38,12 +39,6 @@ std::string state_of(const Row& row) { return row.status ? name_of(row.status->s
 std::string number(const std::optional<ParameterValue>& value) {
   const double* scalar = value ? std::get_if<double>(&*value) : nullptr;
   return scalar ? fmt::format("{:.9g}", *scalar) : "";
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return out;
 }
 
 /// Where a parameter stands in the table: the material first.
@@ -108,13 +103,13 @@ std::string page(const std::vector<Row>& rows, const BatchSummary& summary) {
   text += fmt::format("<h1>{} recordings</h1><p>{} ended, {} of them converged. 90 % intervals beside the values.</p>",
                       summary.jobs, summary.ended, summary.converged);
   text += "<table><tr><th>recording<th>state<th>verdict";
-  for (const auto& [name, unit] : columns) text += "<th>" + escaped(name) + (unit == "1" ? "" : " [" + unit + "]");
+  for (const auto& [name, unit] : columns) text += "<th>" + escape_html(name) + (unit == "1" ? "" : " [" + unit + "]");
   for (const Row& row : rows) {
-    const std::string name = escaped(row.job->capture.filename().string()), state = state_of(row);
+    const std::string name = escape_html(row.job->capture.filename().string()), state = state_of(row);
     const bool has_report = row.result.has_value();
     text += "\n<tr><td>" + (has_report ? "<a href=\"" + row.job->name + "/report.html\">" + name + "</a>" : name);
     text += "<td class=\"" + state.substr(0, state.find(' ')) + "\">" + state;
-    if (row.status && !row.status->reason.empty()) text += "<br><small>" + escaped(row.status->reason) + "</small>";
+    if (row.status && !row.status->reason.empty()) text += "<br><small>" + escape_html(row.status->reason) + "</small>";
     text += "<td>" + (row.result ? row.result->verdict : "");
     for (const auto& [parameter, unit] : columns)
       text += "<td>" + told(row.result ? row.result->find(parameter) : nullptr);

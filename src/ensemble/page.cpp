@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/html.hpp"
 #include "ensemble/quantiles.hpp"
 #include "report/gallery.hpp"
 #include "report/page.hpp"

@@ -9,6 +9,7 @@
 
 #include "base/base64.hpp"
 #include "base/error.hpp"
+#include "base/html.hpp"
 #include "simulation/inner_bodies.hpp"
 #include "simulation/scene_simulation.hpp"
 
@@ -45,19 +46,6 @@ std::string gzip(const std::string& bytes) {
   deflateEnd(&stream);
   if (done != Z_STREAM_END) throw std::runtime_error("the page's object cannot be packed");
   return packed;
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '&')
-      out += "&amp;";
-    else
-      out += c;
-  }
-  return out;
 }
 
 std::string list(const Vector3& v) { return fmt::format("[{},{},{}]", v.x(), v.y(), v.z()); }
@@ -151,8 +139,8 @@ LiveData live_data(const Model& model) {
 std::string live_page(const Model& model, LiveData data, const LiveRecording& recording) {
   if (data.is_pressed) data.tests = recording.presses;
   std::string page(pliant_live_html());
-  replace(page, "@NAME@", escaped(model.name));
-  replace(page, "@NAME@", escaped(model.name));
+  replace(page, "@NAME@", escape_html(model.name));
+  replace(page, "@NAME@", escape_html(model.name));
   replace(page, "@FACTS@", facts(model, data, recording));
   replace(page, "@MODULE@", encode_base64(pliant_live_module()));
   replace(page, "@DATA@", encode_base64(gzip(encode(data))));

@@ -7,13 +7,13 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "base/base64.hpp"
 #include "base/files.hpp"
+#include "base/html.hpp"
 #include "elasticity/corotated.hpp"
 #include "model/vtu.hpp"
 #include "output/fit_output.hpp"
 #include "report/gallery.hpp"
-#include "report/page_style.hpp"
+#include "report/page.hpp"
 #include "report/plot.hpp"
 #include "simulation/trajectory.hpp"
 
@@ -107,30 +107,23 @@ std::string page(const Capture& capture, const Track& track, const std::vector<R
     confidence.x.push_back(f.frame), confidence.y.push_back(f.confidence);
     worst = std::min(worst, f.confidence);
   }
-  std::string html =
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width,initial-scale=1\"><title>" +
-      escape_html(capture.name) + "</title><style>" + page_style + "</style></head><body><main>\n";
-  html += "<h1>" + escape_html(capture.name) + "</h1><p class=\"sub\">" +
-          fmt::format("Tracked through {} frames; {} nodes, {} surface samples. ", track.frames.size(),
-                      track.body->node_count(), track.surface.vertices.size());
+  const std::string name = escape_html(capture.name);
+  std::string html = page_head(name) + "<h1>" + name + "</h1><p class=\"sub\">" +
+                     fmt::format("Tracked through {} frames; {} nodes, {} surface samples. ", track.frames.size(),
+                                 track.body->node_count(), track.surface.vertices.size());
   html += track.lost_at ? fmt::format("<b>Lost in frame {}.</b>", *track.lost_at)
                         : fmt::format("Never lost; least confidence {:.2f}.", worst);
   html += "</p>\n";
   if (!track.note.empty()) html += "<p>" + escape_html(track.note) + "</p>\n";
   PlotOptions errors;
   errors.title = "Agreement over time", errors.x_label = "frame", errors.y_label = "rms [mm]", errors.zero_y = true;
-  html += "<div class=\"panel\">" + plot_svg({rms}, errors) + "</div>\n";
+  html += panel(plot_svg({rms}, errors));
   PlotOptions shares;
   shares.title = "How sure each frame is", shares.x_label = "frame", shares.y_label = "share", shares.zero_y = true;
-  html += "<div class=\"panel\">" + plot_svg({confidence, explained}, shares) + "</div>\n<div class=\"pictures\">\n";
-  for (const int i : spread_frames(0, int(pictures.size()) - 1, 12)) {
-    const ReportPicture& p = pictures[std::size_t(i)];
-    html += "<figure><img alt=\"" + escape_html(p.caption) + "\" src=\"data:image/png;base64," + encode_base64(p.png) +
-            "\"><figcaption>" + escape_html(p.caption) + "</figcaption></figure>\n";
-  }
-  return html +
-         "</div>\n<footer>Grey discs are outliers. All frames are in pictures/, figures in track.json, the motion "
+  std::vector<ReportPicture> shown;
+  for (const int i : spread_frames(0, int(pictures.size()) - 1, 12)) shown.push_back(pictures[std::size_t(i)]);
+  return html + panel(plot_svg({confidence, explained}, shares)) + figures(shown) +
+         "<footer>Grey discs are outliers. All frames are in pictures/, figures in track.json, the motion "
          "in trajectory.pvd.</footer>\n</main></body></html>\n";
 }
 

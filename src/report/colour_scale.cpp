@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/html.hpp"
 #include "report/plot.hpp"
 #include "report/report.hpp"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/base64.hpp"
+#include "base/html.hpp"
 #include "report/image.hpp"
 #include "report/page_style.hpp"
 #include "report/plot.hpp"

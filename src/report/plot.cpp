@@ -8,6 +8,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "base/html.hpp"
+
 namespace pliant {
 
 namespace {
@@ -277,30 +279,6 @@ std::vector<double> axis_ticks(double low, double high, int count, bool logarith
   if (!logarithmic) return linear_ticks(low, high, count);
   const std::vector<double> ticks = logarithmic_ticks(low, high, count);
   return ticks.size() >= 2 ? ticks : linear_ticks(low, high, count);
-}
-
-std::string escape_html(const std::string& text) {
-  std::string out;
-  for (const char c : text) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  return out;
 }
 
 std::string readable(double value, int digits) {

@@ -41,9 +41,6 @@ std::string plot_svg(const std::vector<Series>& series, const PlotOptions& optio
 /// apart (logarithmic: powers of ten, and 2 and 5 times them where there are few decades).
 std::vector<double> axis_ticks(double low, double high, int count, bool logarithmic);
 
-/// Text with &, <, > and quotes replaced for HTML and SVG.
-std::string escape_html(const std::string& text);
-
 /// A number for people with so many significant digits: 0.0021, 590, 12 300, 4.2e-7 written as 4.2×10⁻⁷.
 std::string readable(double value, int digits = 3);
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "base/files.hpp"
+#include "base/html.hpp"
 #include "report/image.hpp"
 #include "report/page.hpp"
 #include "report/plot.hpp"

@@ -51,8 +51,6 @@ TEST(Readable, ShowsTheDigitsThatCount) {
   EXPECT_EQ(readable(1000.0, 4), "1000");
 }
 
-TEST(EscapeHtml, LeavesNoMarkup) { EXPECT_EQ(escape_html("<a b='c\"&>"), "&lt;a b=&#39;c&quot;&amp;&gt;"); }
-
 TEST(Plot, PlacesPointsLinearly) {
   const auto p = circles(plot_svg({{"", {0, 1, 3}, {0, 1, 3}, Mark::Dots, {}, {}, -1}}));
   ASSERT_EQ(p.size(), 3u);
