@@ -130,10 +130,8 @@ bool GrippedBody::prepare_derivatives() {
 
 GripTrial::GripTrial(std::shared_ptr<const PressScene> scene, int grip, std::shared_ptr<PressedMaterial> material,
                      const VectorX& reference, int number)
-    : scene_(std::move(scene)),
+    : EquilibriumTrial(std::move(scene), std::move(material), number),
       grip_(grip),
-      number_(number),
-      material_(std::move(material)),
       body_(*scene_, test(), material_->law(reference)) {}
 
 const ObservedGrip& GripTrial::test() const { return scene_->tests->grips[std::size_t(grip_)]; }
@@ -168,22 +166,12 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
   double pull = 0.0;
   if (!compare(theta, result, off, pull) || directions.cols() == 0) return result;
   const ObservedGrip& seen = test();
-  if (!body_.prepare_derivatives()) {
-    result.succeeded = false;
-    return result.failure = seen.name + ": the equilibrium is not stable", result;
-  }
+  if (!body_.prepare_derivatives()) return unstable(std::move(result), seen.name);
   const LawNumbers numbers(material_->layout(), theta.size());
-  std::vector<Points> changes(numbers.count(), Points::Zero(scene_->body->node_count(), 3));  // of dW/dx
-  for_law_derivatives(body_.elasticity(), *material_, theta,
-                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                        Points& change = changes[numbers[at]];
-                        for (std::size_t a = 0; a < nodes.size(); ++a)
-                          change.row(nodes[a]) += share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
-                      });
+  const std::vector<Points> forces =
+      force_changes(body_.elasticity(), *material_, theta, numbers, scene_->body->node_count());
   MatrixX by_parameters(off.size() + 1, Eigen::Index(numbers.count()));
-  std::vector<Points> forces;
-  for (const Points& change : changes) forces.emplace_back(-change);
-  const std::vector<Points> moves = body_.responses(std::move(forces));
+  const std::vector<Points> moves = body_.responses(forces);
   for (std::size_t k = 0; k < numbers.count(); ++k) {
     const Points& moved = moves[k];
     Points there = body_.embedding().positions(moved);
@@ -191,7 +179,7 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
     by_parameters.col(Eigen::Index(k)).head(off.size()) = flat(there);
     by_parameters(off.size(), Eigen::Index(k)) =
         seen.has_force
-            ? (body_.direction().cwiseProduct(changes[k]).sum() + body_.force_by_nodes().cwiseProduct(moved).sum()) /
+            ? (body_.force_by_nodes().cwiseProduct(moved).sum() - body_.direction().cwiseProduct(forces[k]).sum()) /
                   seen.force_std
             : 0.0;
   }
@@ -204,8 +192,6 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
   return result;
 }
 
-double GripTrial::expected_work() const { return steps_of_an_equilibrium * scene_->body->node_count(); }
-
 CostEvaluation GripTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   CostEvaluation result;
   Points off;
@@ -213,23 +199,14 @@ CostEvaluation GripTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   theta_bar = VectorX::Zero(theta.size());
   if (!compare(theta, result, off, pull)) return result;
   const ObservedGrip& seen = test();
-  if (!body_.prepare_derivatives()) {
-    result.succeeded = false;
-    return result.failure = seen.name + ": the equilibrium is not stable", result;
-  }
+  if (!body_.prepare_derivatives()) return unstable(std::move(result), seen.name);
   // The cotangents of the markers and of the force, back through the equilibrium: its matrix is symmetric.
   const double of_force = seen.has_force ? pull / seen.force_std : 0.0;
   Points bar = of_force * body_.force_by_nodes();
   for (Eigen::Index m = 0; m < off.rows(); ++m)
     body_.embedding().add_transpose(int(m), off.row(m).transpose() / seen.markers_std, bar);
-  const Points on_forces = of_force * body_.direction() - body_.response(bar);
-  for_law_derivatives(body_.elasticity(), *material_, theta,
-                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                        double sum = 0.0;
-                        for (std::size_t a = 0; a < nodes.size(); ++a)
-                          sum += on_forces.row(nodes[a]).dot(by.template segment<3>(3 * Eigen::Index(a)));
-                        theta_bar[at] += share * sum;
-                      });
+  const Points on_forces = body_.response(bar) - of_force * body_.direction();
+  add_force_adjoint(body_.elasticity(), *material_, theta, on_forces, theta_bar);
   return result;
 }
 

@@ -63,7 +63,6 @@ class GripTrial : public EquilibriumTrial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
-  [[nodiscard]] double expected_work() const override;
   [[nodiscard]] std::vector<Placement> placements() const override { return {body_.placement()}; }
   void begin_from(const std::vector<Placement>& placements) override { body_.begin_from(placements.front()); }
 
@@ -72,9 +71,7 @@ class GripTrial : public EquilibriumTrial {
   /// The equilibrium and its cost. `off` are the markers' errors over their standard deviation, `pull` the force's.
   bool compare(const VectorX& theta, CostEvaluation& result, Points& off, double& pull);
 
-  std::shared_ptr<const PressScene> scene_;
-  int grip_, number_;
-  std::shared_ptr<PressedMaterial> material_;
+  int grip_;
   GrippedBody body_;
 };
 

@@ -47,24 +47,15 @@ bool IndentedBody::force_derivative(std::size_t depth, const PressedMaterial& ma
     contact.points().add_transpose(i, -contact.potential(i, y, false).hessian * axis_, of_nodes);
   }
   bar.topRows(n) = of_nodes;
-  const Points adjoint = equilibrium_.response(bar);
   by_theta = VectorX::Zero(theta.size());
-  for_law_derivatives(equilibrium_.elasticity(), material, theta,
-                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                        double sum = 0.0;
-                        for (std::size_t a = 0; a < nodes.size(); ++a)
-                          sum -= adjoint.row(nodes[a]).dot(by.template segment<3>(3 * Eigen::Index(a)));
-                        by_theta[at] += share * sum;
-                      });
+  add_force_adjoint(equilibrium_.elasticity(), material, theta, equilibrium_.response(bar), by_theta);
   return true;
 }
 
 IndentationTrial::IndentationTrial(std::shared_ptr<const PressScene> scene, int indentation,
                                    std::shared_ptr<PressedMaterial> material, const VectorX& reference, int number)
-    : scene_(std::move(scene)),
+    : EquilibriumTrial(std::move(scene), std::move(material), number),
       indentation_(indentation),
-      number_(number),
-      material_(std::move(material)),
       body_(*scene_, test(), material_->law(reference), mean_modulus(material_->body(), *material_->law(reference))) {}
 
 const ObservedIndentation& IndentationTrial::test() const {
@@ -88,8 +79,7 @@ CostEvaluation IndentationTrial::run(const VectorX& theta, const MatrixX& direct
     fit.cost = 0.5 * r * r;
     result.cost += fit.cost;
     if (n > 0) {
-      if (!body_.force_derivative(d, *material_, theta, by_theta))
-        return result.failure = test().name + ": the equilibrium is not stable", result;
+      if (!body_.force_derivative(d, *material_, theta, by_theta)) return unstable(std::move(result), test().name);
       const VectorX J = directions.transpose() * by_theta / curve.stds[d];
       fit.gradient = r * J;
       fit.gauss_newton = J * J.transpose();
@@ -113,10 +103,7 @@ CostEvaluation IndentationTrial::gradient(const VectorX& theta, VectorX& theta_b
   if (!result.succeeded) return result;
   VectorX by_theta;
   for (std::size_t d = 0; d < curve.depths.size(); ++d) {
-    if (!body_.force_derivative(d, *material_, theta, by_theta)) {
-      result.succeeded = false;
-      return result.failure = test().name + ": the equilibrium is not stable", result;
-    }
+    if (!body_.force_derivative(d, *material_, theta, by_theta)) return unstable(std::move(result), test().name);
     theta_bar += (body_.force(d) - curve.forces[d]) / (curve.stds[d] * curve.stds[d]) * by_theta;
   }
   return result;

@@ -49,9 +49,7 @@ class IndentationTrial : public EquilibriumTrial {
  private:
   const ObservedIndentation& test() const;
 
-  std::shared_ptr<const PressScene> scene_;
-  int indentation_, number_;
-  std::shared_ptr<PressedMaterial> material_;
+  int indentation_;
   IndentedBody body_;
 };
 

@@ -4,21 +4,6 @@
 
 namespace pliant {
 
-/// Calls visit(nodes, handle, share, derivative) for the derivatives of the elements' dW/dx by theta, at the last
-/// `evaluate` of the elasticity: share times `derivative` [N], 3 numbers a node, is what the parameter at `handle`
-/// changes of the forces on `nodes`.
-template <class Visit>
-void for_law_derivatives(const LawElasticity& elasticity, const PressedMaterial& material, const VectorX& theta,
-                         const Visit& visit) {
-  const LawLayout& layout = material.layout();
-  elasticity.for_parameter_derivatives([&](int e, std::span<const int> nodes, const Eigen::Ref<const MatrixX>& by_q) {
-    const VectorX own = element_numbers(material.body(), layout, theta, e);
-    const MatrixX by = by_q * law_parameter_derivatives(layout.form(), own);
-    for (const auto& [number, at, share] : number_shares(material.body(), layout, theta, own, e))
-      visit(nodes, at, share, by.col(number));
-  });
-}
-
 /// Numbers of a law among those of a parameter vector, each with its place in the law's order.
 struct LawNumbers {
   /// @param size  of the parameter vector
@@ -34,5 +19,15 @@ struct LawNumbers {
   std::vector<int> place;          ///< of each number of the parameter vector; -1: none of the law's
   std::vector<Eigen::Index> rows;  ///< in the parameter vector, of each number of the law
 };
+
+/// Changes of the elastic forces -dW/dx on the nodes by each of the law's numbers, at the last `evaluate` of the
+/// elasticity.
+/// @param rows  of each: the nodes', and as many zeros below as are wanted
+std::vector<Points> force_changes(const LawElasticity& elasticity, const PressedMaterial& material,
+                                  const VectorX& theta, const LawNumbers& numbers, Eigen::Index rows);
+
+/// Adds to `theta_bar` the cotangent of theta for the cotangent `w` of those forces, which may have more rows.
+void add_force_adjoint(const LawElasticity& elasticity, const PressedMaterial& material, const VectorX& theta,
+                       const Points& w, VectorX& theta_bar);
 
 }  // namespace pliant

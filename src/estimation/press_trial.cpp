@@ -39,10 +39,8 @@ PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press,
 PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press, std::shared_ptr<PressedMaterial> material,
                        const ContactMaterial& contact, const PressTrialOptions& options, int number,
                        const Placement* begin)
-    : scene_(std::move(scene)),
+    : EquilibriumTrial(std::move(scene), std::move(material), number),
       press_(press),
-      number_(number),
-      material_(std::move(material)),
       options_(options),
       contact_(contact),
       body_(*scene_, press, contact_.law, contact_.youngs_modulus) {
@@ -138,20 +136,10 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
   CostEvaluation result;
   VectorX slope, weight;
   if (!compare(theta, result, slope, weight) || directions.cols() == 0) return result;
-  if (!body_.equilibrium().prepare_derivatives(body_.placement())) {
-    result.succeeded = false;
-    return result.failure = scene_->presses[std::size_t(press_)].name + ": the equilibrium is not stable", result;
-  }
-  // Changes of the forces -dW/dx by each of the law's parameters.
+  if (!body_.equilibrium().prepare_derivatives(body_.placement())) return unstable(std::move(result), seen().name);
   const LawNumbers numbers(material_->layout(), theta.size());
   const int n = scene_->body->node_count(), rows = n + body_.equilibrium().contact_count();
-  std::vector<Points> forces(numbers.count(), Points::Zero(rows, 3));
-  for_law_derivatives(body_.equilibrium().elasticity(), *material_, theta,
-                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                        Points& force = forces[numbers[at]];
-                        for (std::size_t a = 0; a < nodes.size(); ++a)
-                          force.row(nodes[a]) -= share * by.template segment<3>(3 * Eigen::Index(a)).transpose();
-                      });
+  std::vector<Points> forces = force_changes(body_.equilibrium().elasticity(), *material_, theta, numbers, rows);
   const bool is_kept = numbers.count() > 0 && numbers.count() <= most_changes_kept;
   linearised_ = {is_kept ? material_->form() : -1, theta, body_.placement(), numbers.rows, {}};
   MatrixX by_parameters(residuals_.size(), Eigen::Index(numbers.count()));
@@ -171,31 +159,20 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
   return result;
 }
 
-double PressTrial::expected_work() const { return steps_of_an_equilibrium * scene_->body->node_count(); }
-
 CostEvaluation PressTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   CostEvaluation result;
   VectorX slope, weight;
   theta_bar = VectorX::Zero(theta.size());
   if (!compare(theta, result, slope, weight)) return result;
-  if (!body_.equilibrium().prepare_derivatives(body_.placement())) {
-    result.succeeded = false;
-    return result.failure = scene_->presses[std::size_t(press_)].name + ": the equilibrium is not stable", result;
-  }
+  if (!body_.equilibrium().prepare_derivatives(body_.placement())) return unstable(std::move(result), seen().name);
   // The cotangent of the points, back through the equilibrium: its matrix is symmetric.
   const int n = scene_->body->node_count(), points = body_.embedding().point_count();
   Points bar = Points::Zero(n + body_.equilibrium().contact_count(), 3), of_nodes = Points::Zero(n, 3);
   for (int m = 0; m < points; ++m) body_.embedding().add_transpose(m, slope.segment<3>(3 * m), of_nodes);
   bar.topRows(n) = of_nodes;
   if (body_.has_probe()) bar.row(n) = slope.tail<3>().transpose();
-  const Points adjoint = body_.equilibrium().response(bar);
-  for_law_derivatives(body_.equilibrium().elasticity(), *material_, theta,
-                      [&](std::span<const int> nodes, const ParameterHandle& at, double share, const auto& by) {
-                        double sum = 0.0;
-                        for (std::size_t a = 0; a < nodes.size(); ++a)
-                          sum -= adjoint.row(nodes[a]).dot(by.template segment<3>(3 * Eigen::Index(a)));
-                        theta_bar[at] += share * sum;
-                      });
+  const Points on_forces = body_.equilibrium().response(bar);
+  add_force_adjoint(body_.equilibrium().elasticity(), *material_, theta, on_forces, theta_bar);
   return result;
 }
 

@@ -43,6 +43,22 @@ class EquilibriumTrial : public Trial {
   [[nodiscard]] virtual std::vector<Placement> placements() const = 0;
   /// The next run sets out from those of another trial of the same.
   virtual void begin_from(const std::vector<Placement>& placements) = 0;
+  [[nodiscard]] double expected_work() const override { return steps_of_an_equilibrium * scene_->body->node_count(); }
+
+ protected:
+  EquilibriumTrial(std::shared_ptr<const PressScene> scene, std::shared_ptr<PressedMaterial> material, int number)
+      : scene_(std::move(scene)), material_(std::move(material)), number_(number) {}
+
+  /// An evaluation that has failed since its equilibrium has no derivatives.
+  static CostEvaluation unstable(CostEvaluation result, const std::string& name) {
+    result.succeeded = false;
+    result.failure = name + ": the equilibrium is not stable";
+    return result;
+  }
+
+  std::shared_ptr<const PressScene> scene_;
+  std::shared_ptr<PressedMaterial> material_;
+  int number_;
 };
 
 struct PressTrialOptions {
@@ -67,7 +83,6 @@ class PressTrial : public EquilibriumTrial {
 
   [[nodiscard]] CostEvaluation run(const VectorX& theta, const MatrixX& directions) override;
   [[nodiscard]] CostEvaluation gradient(const VectorX& theta, VectorX& theta_bar) override;
-  [[nodiscard]] double expected_work() const override;
   [[nodiscard]] std::unique_ptr<Trial> anew() const override;
 
   void set_options(const PressTrialOptions& options);
@@ -105,9 +120,7 @@ class PressTrial : public EquilibriumTrial {
   /// Nothing where there is no linearisation of this form, or where it leads too far to be trusted.
   std::optional<Placement> guess(const VectorX& theta) const;
 
-  std::shared_ptr<const PressScene> scene_;
-  int press_, number_;
-  std::shared_ptr<PressedMaterial> material_;
+  int press_;
   PressTrialOptions options_;
   ContactMaterial contact_;
   PressedBody body_;
