@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "geometry/surface_distance.hpp"
+
 namespace pliant {
 
 namespace {
@@ -40,28 +42,8 @@ void cut(const Face& face, int n, Visit&& visit) {
     }
 }
 
-double squared_distance(const Face& f, const Vector3& p) {  // Ericson 2004, 5.1.5, by its Voronoi regions
-  const Vector3 ab = f.corners[1] - f.corners[0], ac = f.corners[2] - f.corners[0], ap = p - f.corners[0];
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  const auto to = [&](double b1, double b2) { return (p - f.at(b1, b2)).squaredNorm(); };
-  if (d1 <= 0.0 && d2 <= 0.0) return to(0, 0);
-  const Vector3 bp = p - f.corners[1];
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return to(1, 0);
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return to(d1 / (d1 - d3), 0);
-  const Vector3 cp = p - f.corners[2];
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return to(0, 1);
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return to(0, d2 / (d2 - d6));
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return to(1.0 - w, w);
-  }
-  const double sum = va + vb + vc;
-  return to(vb / sum, vc / sum);
+double squared_distance(const Face& f, const Vector3& p) {
+  return (closest_on_triangle(p, f.corners[0], f.corners[1], f.corners[2]) - p).squaredNorm();
 }
 
 }  // namespace
