@@ -15,6 +15,7 @@
 #include "base/csv.hpp"
 #include "base/files.hpp"
 #include "base/median.hpp"
+#include "base/points.hpp"
 #include "capture/c3d.hpp"
 #include "scene/toml_table.hpp"
 
@@ -87,8 +88,7 @@ MarkerPositions read_positions(const fs::path& path, Problems& problems, const c
       positions.push_back(position.value_or(Vector3::Zero()));
     });
   });
-  markers.positions.resize(Eigen::Index(positions.size()), 3);
-  for (std::size_t i = 0; i < positions.size(); ++i) markers.positions.row(Eigen::Index(i)) = positions[i];
+  markers.positions = to_points(positions);
   return markers;
 }
 

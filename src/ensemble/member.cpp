@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.hpp"
+#include "base/points.hpp"
 #include "base/types.hpp"
 #include "elasticity/body_fields.hpp"
 #include "simulation/small_motions.hpp"
@@ -38,12 +39,6 @@ double peak_strain(const Body& body, Elasticity& elasticity, const Points& posit
 }
 
 Points rest_of(const Embedding& points, const Body& body) { return points.positions(body.reference_positions()); }
-
-std::vector<Vector3> rows_of(const Points& points) {
-  std::vector<Vector3> rows;
-  for (Eigen::Index i = 0; i < points.rows(); ++i) rows.push_back(points.row(i).transpose());
-  return rows;
-}
 
 void check_points(const MarkerPositions& points, const TriangleMesh& surface, const std::filesystem::path& file) {
   const Box object = bounding_box(surface);
@@ -133,7 +128,7 @@ EnsembleScene::EnsembleScene(const Model& model, EnsembleQuestion question, cons
   surface_ = surface_of(model, *scene_.body);
   check_points(question_.points, surface_, points_file);
   vertices_ = Embedding(*scene_.body, surface_.vertices);
-  points_ = Embedding(*scene_.body, rows_of(question_.points.positions));
+  points_ = Embedding(*scene_.body, to_vectors(question_.points.positions));
   rest_vertices_ = rest_of(vertices_, *scene_.body), rest_points_ = rest_of(points_, *scene_.body);
   for (const std::string& id : question_.points.ids) {
     for (const char* axis : {"x@", "y@", "z@"}) outputs_.push_back({axis + id, "m"});

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "base/median.hpp"
+#include "base/points.hpp"
 #include "estimation/damped_sinusoid.hpp"
 
 namespace pliant {
@@ -35,8 +36,7 @@ struct Path {
   }
   /// Along which it goes farthest.
   Vector3 direction() const {
-    Points centred(Eigen::Index(points.size()), 3);
-    for (std::size_t i = 0; i < points.size(); ++i) centred.row(Eigen::Index(i)) = points[i].transpose();
+    Points centred = to_points(points);
     centred.rowwise() -= centred.colwise().mean().eval();
     const Matrix3 spread = centred.transpose() * centred;
     return Eigen::SelfAdjointEigenSolver<Matrix3>(spread).eigenvectors().col(2);
@@ -58,10 +58,8 @@ Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<dou
     for (const SurfaceObservation& point : frame.points) there.push_back(point.position);
     for (const TrackObservation& point : frame.tracks) there.push_back(point.position);
     if (there.size() < fewest) continue;
-    Points points(Eigen::Index(there.size()), 3);
-    for (std::size_t i = 0; i < there.size(); ++i) points.row(Eigen::Index(i)) = there[i].transpose();
     path.times.push_back(times[std::size_t(frame.frame)] + frame.after);
-    path.points.push_back(middle(points));
+    path.points.push_back(middle(to_points(there)));
   }
   return path;
 }

@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "base/files.hpp"
+#include "base/points.hpp"
 #include "exports/formats.hpp"
 #include "exports/moving_surface.hpp"
 #include "geometry/mesh_io.hpp"
@@ -75,8 +76,7 @@ std::vector<std::string> write_meshes(const Model& model, const fs::path& folder
   TriangleMesh mesh;
   mesh.triangles = moving.triangles;
   std::vector<std::string> files = write_frames(moving, folder, ending, [&](const fs::path& file, std::size_t frame) {
-    mesh.vertices.clear();
-    for (const auto& vertex : moving.frames[frame].rowwise()) mesh.vertices.push_back(vertex.transpose());
+    mesh.vertices = to_vectors(moving.frames[frame]);
     write_mesh(file, mesh);
   });
   if (files.empty()) return files;

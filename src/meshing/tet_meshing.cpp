@@ -3,6 +3,7 @@
 
 #include "base/disjoint_sets.hpp"
 #include "base/error.hpp"
+#include "base/points.hpp"
 #include "geometry/mesh_io.hpp"
 #include "mesh/tet_mesh.hpp"
 
@@ -189,12 +190,6 @@ struct LocalSizes {
   LocalLength edges, gaps;
 };
 
-Points as_rows(const std::vector<Vector3>& points) {
-  Points rows(Eigen::Index(points.size()), 3);
-  for (std::size_t n = 0; n < points.size(); ++n) rows.row(Eigen::Index(n)) = points[n].transpose();
-  return rows;
-}
-
 /// Refines, takes over the cells inside and makes the worst of them better. Slivers are perturbed, not exuded: CGAL's
 /// exudation depends on addresses.
 /// @param scan  whose volume the elements shall have; none: they enclose it
@@ -247,11 +242,11 @@ TetMesh mesh_of(const Domain& domain, const TetMeshOptions& options, const Local
       return {at.x(), at.y(), at.z()};
     });
   if (options.offset) {
-    const TetMesh moved = with_offset_boundary(make_tet_mesh(as_rows(points), tets), options.offset);
+    const TetMesh moved = with_offset_boundary(make_tet_mesh(to_points(points), tets), options.offset);
     for (std::size_t n = 0; n < points.size(); ++n) points[n] = moved.nodes.row(Eigen::Index(n));
   }
   for (const auto& part : options.parts) follow_part(points, tets, part, 0.2 * facet_tolerance * h);
-  return make_tet_mesh(as_rows(points), std::move(tets));
+  return make_tet_mesh(to_points(points), std::move(tets));
 }
 
 /// Where a scan sticks out of a mesh by more than its faces may lie off, and by how much, farthest first [m].

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/points.hpp"
 #include "geometry/box_tree.hpp"
 
 namespace pliant {
@@ -51,9 +52,7 @@ SurfaceConstraints::SurfaceConstraints(std::shared_ptr<const Body> body, std::sh
       grid_(lattice_of(body_, *distance_, cell_size)),
       extension_(*grid_, *distance_, band) {
   if (body_->kind == ElementKind::Hexahedron) return;
-  std::vector<Vector3> points;
-  for (Eigen::Index n = 0; n < grid_->nodes.rows(); ++n) points.push_back(grid_->nodes.row(n).transpose());
-  lattice_in_body_ = Embedding(*body_, points);
+  lattice_in_body_ = Embedding(*body_, to_vectors(grid_->nodes));
 }
 
 Points SurfaceConstraints::extended(const Points& u) const {

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/points.hpp"
 #include "motion/pull.hpp"
 
 namespace pliant {
@@ -28,12 +29,6 @@ MatrixX with_nugget(MatrixX K) {
   return K;
 }
 
-std::vector<Vector3> points_of(const Points& points) {
-  std::vector<Vector3> all;
-  for (Eigen::Index n = 0; n < points.rows(); ++n) all.push_back(points.row(n).transpose());
-  return all;
-}
-
 }  // namespace
 
 MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector<int>& held) {
@@ -41,7 +36,7 @@ MatrixX shape_basis(const Body& body, const ShapeField& field, const std::vector
   if (count == 0) return MatrixX(body.node_count(), 0);
   if (!(field.standard_deviation > 0.0 && field.length > 0.0))
     throw std::invalid_argument("shape_basis: the field needs a width and a length");
-  const std::vector<Vector3> nodes = points_of(body.scanned_positions());
+  const std::vector<Vector3> nodes = to_vectors(body.scanned_positions());
   MatrixX at_points = covariance(field.points, field.points, field), at_nodes = covariance(nodes, field.points, field);
   if (!held.empty()) {
     std::vector<Vector3> candidates;

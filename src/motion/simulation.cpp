@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
+#include "base/points.hpp"
 #include "base/profile.hpp"
 #include "elasticity/viscous_forces.hpp"
 #include "motion/body_forces.hpp"
@@ -25,8 +26,7 @@ bool holds_strongly(const Body& body, const SimulationOptions& options) {
 }
 
 PullPoints far_nodes(const Body& body, const std::vector<int>& held, int count) {
-  std::vector<Vector3> all, there;
-  for (Eigen::Index n = 0; n < body.nodes.rows(); ++n) all.push_back(body.scanned_positions().row(n).transpose());
+  std::vector<Vector3> all = to_vectors(body.scanned_positions()), there;
   for (const int node : held) there.push_back(all[std::size_t(node)]);
   // Where nothing is held the pull refuses; any nodes will do for that.
   if (there.empty()) all.resize(std::min(all.size(), std::size_t(count)));

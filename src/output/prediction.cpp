@@ -9,18 +9,13 @@
 #include <optional>
 #include <set>
 
+#include "base/points.hpp"
 #include "capture/observe.hpp"
 #include "geometry/surface_distance.hpp"
 
 namespace pliant {
 
 namespace {
-
-std::vector<Vector3> rows_of(const Points& points) {
-  std::vector<Vector3> rows;
-  for (Eigen::Index i = 0; i < points.rows(); ++i) rows.push_back(points.row(i).transpose());
-  return rows;
-}
 
 void set_distances(const std::vector<double>& distances, double size, LoadError& error) {
   error.points = int(distances.size());
@@ -55,7 +50,7 @@ class LoadComparison {
   LoadComparison(const Capture& capture, const Load& load, const Body& body) : size_(object_size(capture.scene)) {
     if (load.markers && load.markers_rest) {
       markers_ = read_marker_pair(*load.markers_rest, *load.markers);
-      embedding_ = Embedding(body, rows_of(markers_->rest));
+      embedding_ = Embedding(body, to_vectors(markers_->rest));
       observed_ = "markers";
       return;
     }
@@ -72,7 +67,7 @@ class LoadComparison {
     const Points predicted = embedding_.positions(nodes);
     error.observed = observed_;
     if (markers_) return compare_markers(*markers_, predicted, size_, error);
-    surface_.vertices = rows_of(predicted);
+    surface_.vertices = to_vectors(predicted);
     error.outliers = outliers_;
     set_distances(distances_to_surface(surface_, points_), size_, error);
   }
@@ -99,7 +94,7 @@ MarkerPrediction predict_markers(const Capture& capture, const CaptureScene& sce
       if (!known.insert(id).second)
         throw InputError({{capture.file}, "two blocks [[markers]] share the id " + id, "ids that differ", ""});
     prediction.ids.insert(prediction.ids.end(), set.ids.begin(), set.ids.end());
-    for (const Vector3& point : rows_of(set.rest)) rest.push_back(point);
+    for (const Vector3& point : to_vectors(set.rest)) rest.push_back(point);
   }
   if (rest.empty()) throw InputError({{capture.file}, "the recording follows no markers", "a block [[markers]]", ""});
   const Discretisation& d = scene.discretisation;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/parallel.hpp"
+#include "base/points.hpp"
 
 namespace pliant {
 
@@ -107,11 +108,7 @@ int RayScene::add(const Points& vertices, std::span<const std::array<int, 3>> tr
   return number;
 }
 
-Points vertex_points(const TriangleMesh& mesh) {
-  Points points(mesh.vertices.size(), 3);
-  for (size_t i = 0; i < mesh.vertices.size(); ++i) points.row(Eigen::Index(i)) = mesh.vertices[i];
-  return points;
-}
+Points vertex_points(const TriangleMesh& mesh) { return to_points(mesh.vertices); }
 
 int RayScene::add(const TriangleMesh& mesh) { return add(vertex_points(mesh), mesh.triangles); }
 

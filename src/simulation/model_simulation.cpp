@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "base/error.hpp"
+#include "base/points.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/scene_simulation.hpp"
 
@@ -154,10 +155,7 @@ std::shared_ptr<const Body> model_body(const Model& model, std::optional<Element
 TriangleMesh surface_of(const Model& model, const Body& body) {
   if (model.scene.object.surface) return *model.scene.object.surface;
   const auto& mesh = std::get<TetMesh>(body.mesh);
-  TriangleMesh surface;
-  for (Eigen::Index n = 0; n < mesh.nodes.rows(); ++n) surface.vertices.push_back(mesh.nodes.row(n).transpose());
-  surface.triangles = mesh.boundary;
-  return surface;
+  return {to_vectors(mesh.nodes), mesh.boundary};
 }
 
 ModelScene make_scene(const Model& model) {

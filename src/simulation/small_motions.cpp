@@ -6,6 +6,7 @@
 #include <random>
 
 #include "base/error.hpp"
+#include "base/points.hpp"
 #include "elasticity/modes.hpp"
 #include "motion/compliance.hpp"
 
@@ -85,10 +86,8 @@ SmallMotions small_motions(const std::shared_ptr<const Body>& body, const Simula
     throw InputError({{}, "the model's stiffness cannot be factorised", "regions that hold the whole object", ""});
   motions.frequencies = frequencies(*body, compliance, density, count);
   const Points gravity = theta.segment<3>(options.blocks.gravity).transpose().replicate(body->node_count(), 1);
-  std::vector<Vector3> places;
-  for (Eigen::Index n = 0; n < points.rows(); ++n) places.push_back(points.row(n).transpose());
   const Points moved =
-      Embedding(*body, places).positions(compliance.displacements(mass_product(*body, density, gravity)));
+      Embedding(*body, to_vectors(points)).positions(compliance.displacements(mass_product(*body, density, gravity)));
   motions.sag = std::sqrt(moved.rowwise().squaredNorm().maxCoeff());
   return motions;
 }

@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "base/points.hpp"
 #include "tracking/neighbours.hpp"
 
 namespace pliant {
@@ -43,12 +44,6 @@ std::vector<double> vertex_areas(const TriangleMesh& mesh) {
   return areas;
 }
 
-Points as_rows(const std::vector<Vector3>& points) {
-  Points rows(Eigen::Index(points.size()), 3);
-  for (std::size_t i = 0; i < points.size(); ++i) rows.row(Eigen::Index(i)) = points[i].transpose();
-  return rows;
-}
-
 /// Vertices in their order, but those too close to one taken before.
 SampleLevel level_of(const Points& vertices, const Neighbours& near, const std::vector<double>& areas, double spacing) {
   SampleLevel level{spacing, {}, {}, {}};
@@ -83,7 +78,7 @@ TriangleMesh subdivided(TriangleMesh mesh, double spacing, int most) {
 
 std::vector<SampleLevel> sample_levels(const TriangleMesh& mesh, int fewest) {
   const std::vector<double> areas = vertex_areas(mesh);
-  const Points vertices = as_rows(mesh.vertices);
+  const Points vertices = to_points(mesh.vertices);
   const Neighbours near(vertices);
   SampleLevel all{0.0, {}, areas, {}};
   for (int v = 0; v < int(areas.size()); ++v) all.vertex.push_back(v), all.sample_of.push_back(v);
