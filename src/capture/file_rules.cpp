@@ -76,10 +76,9 @@ void check_header(RuleContext& context, const std::string& key, const fs::path& 
 }
 
 // The first fault of a sequence, with the number of files that share it.
-void check_sequence(RuleContext& context, std::size_t i, const char* name, const FramePattern& pattern, Kind kind) {
-  const DepthCamera& camera = context.capture.depth[i];
+void check_sequence(RuleContext& context, const DepthCamera& camera, const std::string& key,
+                    const FramePattern& pattern, Kind kind) {
   const std::vector<int> frames = frames_of(context.capture.frame_count(), camera.every);
-  const std::string key = item("depth", i, name);
   if (frames.empty() || complain_missing(context, key, pattern, frames)) return;
   for (const int frame : frames) {
     const fs::path path = context.capture.folder / pattern(frame);
@@ -196,6 +195,23 @@ void add_problems(RuleContext& context, const std::string& key, const InputError
   context.toml.broken.insert(key);
 }
 
+// Reads a file that a block names.
+template <class Read>
+void try_file(RuleContext& context, const std::string& key, const Read& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    add_problems(context, key, error);
+  }
+}
+
+// Visits the blocks of an array of tables in which nothing was found broken, each with its key.
+template <class Block, class Visit>
+void for_each_sound(RuleContext& context, const char* name, const std::vector<Block>& blocks, const Visit& visit) {
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    if (const std::string key = item(name, i); context.toml.is_sound(key)) visit(blocks[i], key);
+}
+
 void check_markers_on_object(RuleContext& context, const std::string& key, const MarkerSet& markers) {
   if (!context.capture.scene.object.surface) return;
   const Box box = bounding_box(*context.capture.scene.object.surface);
@@ -277,135 +293,102 @@ std::string ranges_text(std::span<const int> numbers) {
 }
 
 void check_depth_files(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
-    const DepthCamera& camera = context.capture.depth[i];
-    if (!context.toml.is_sound(item("depth", i))) continue;
-    check_sequence(context, i, "images", camera.images, Kind::Depth);
-    if (camera.masks) check_sequence(context, i, "masks", *camera.masks, Kind::Mask);
-    if (camera.background)
-      check_header(context, item("depth", i, "background"), *camera.background, camera.camera, Kind::Depth);
-  }
+  for_each_sound(context, "depth", context.capture.depth, [&](const DepthCamera& camera, const std::string& key) {
+    check_sequence(context, camera, key + ".images", camera.images, Kind::Depth);
+    if (camera.masks) check_sequence(context, camera, key + ".masks", *camera.masks, Kind::Mask);
+    if (camera.background) check_header(context, key + ".background", *camera.background, camera.camera, Kind::Depth);
+  });
 }
 
 void check_clouds(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.clouds.size(); ++i) {
-    const CloudSequence& cloud = context.capture.clouds[i];
+  for_each_sound(context, "cloud", context.capture.clouds, [&](const CloudSequence& cloud, const std::string& key) {
     const std::vector<int> frames = frames_of(context.capture.frame_count(), cloud.every);
-    if (!context.toml.is_sound(item("cloud", i)) || frames.empty()) continue;
-    if (complain_missing(context, item("cloud", i, "points"), cloud.points, frames)) continue;
-    try {
+    if (frames.empty() || complain_missing(context, key + ".points", cloud.points, frames)) return;
+    try_file(context, key, [&] {
       for (const int frame : frames) (void)read_point_count(context.capture.folder / cloud.points(frame));
       if (cloud.background) (void)read_point_count(*cloud.background);
-    } catch (const InputError& error) {
-      add_problems(context, item("cloud", i), error);
-    }
-  }
+    });
+  });
 }
 
 void check_markers(RuleContext& context) {
   if (context.capture.scene.timing.times.empty()) return;
-  for (std::size_t i = 0; i < context.capture.markers.size(); ++i) {
-    if (!context.toml.is_sound(item("markers", i))) continue;
-    const MarkerTrack& files = context.capture.markers[i];
-    try {
+  for_each_sound(context, "markers", context.capture.markers, [&](const MarkerTrack& files, const std::string& key) {
+    try_file(context, key, [&] {
       const MarkerSet markers = read_markers(files, context.capture.frame_count());
-      check_markers_on_object(context, item("markers", i, "rest"), markers);
-      check_marker_unit(context, item("markers", i, "track"), markers);
-      check_marker_rate(context, item("markers", i, "track"), files.track, markers);
-    } catch (const InputError& error) {
-      add_problems(context, item("markers", i), error);
-    }
-  }
+      check_markers_on_object(context, key + ".rest", markers);
+      check_marker_unit(context, key + ".track", markers);
+      check_marker_rate(context, key + ".track", files.track, markers);
+    });
+  });
 }
 
 void check_press_markers(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.presses.size(); ++i)
-    if (context.toml.is_sound(item("press", i)))
-      check_marker_pair(context, item("press", i), context.capture.presses[i].markers_rest,
-                        context.capture.presses[i].markers, context.capture.presses[i].markers_std);
+  for_each_sound(context, "press", context.capture.presses, [&](const Press& press, const std::string& key) {
+    check_marker_pair(context, key, press.markers_rest, press.markers, press.markers_std);
+  });
 }
 
 void check_load_files(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.loads.size(); ++i) {
-    const Load& load = context.capture.loads[i];
-    if (!context.toml.is_sound(item("load", i))) continue;
-    if (load.markers && load.markers_rest)
-      check_marker_pair(context, item("load", i), *load.markers_rest, *load.markers);
+  for_each_sound(context, "load", context.capture.loads, [&](const Load& load, const std::string& key) {
+    if (load.markers && load.markers_rest) check_marker_pair(context, key, *load.markers_rest, *load.markers);
     for (const DepthCamera& camera : context.capture.depth) {
       if (load.images.contains(camera.name))
-        check_header(context, item("load", i, "images"), load.images.at(camera.name), camera.camera, Kind::Depth);
+        check_header(context, key + ".images", load.images.at(camera.name), camera.camera, Kind::Depth);
       if (load.masks.contains(camera.name))
-        check_header(context, item("load", i, "masks"), load.masks.at(camera.name), camera.camera, Kind::Mask);
+        check_header(context, key + ".masks", load.masks.at(camera.name), camera.camera, Kind::Mask);
     }
-    try {
+    try_file(context, key, [&] {
       if (load.cloud) (void)read_point_count(*load.cloud);
-    } catch (const InputError& error) {
-      add_problems(context, item("load", i), error);
-    }
-  }
+    });
+  });
 }
 
 void check_curve_files(RuleContext& context) {
-  const auto check = [&](const std::string& key, const auto& read) {
-    if (!context.toml.is_sound(key)) return;
-    try {
-      read();
-    } catch (const InputError& error) {
-      add_problems(context, key, error);
-    }
-  };
   const Capture& capture = context.capture;
-  for (std::size_t i = 0; i < capture.indentations.size(); ++i)
-    check(item("indentation", i), [&] { (void)read_force_curve(capture.indentations[i].curve); });
-  for (std::size_t i = 0; i < capture.material_curves.size(); ++i)
-    check(item("material_curve", i), [&] {
-      const MaterialCurve& test = capture.material_curves[i];
+  for_each_sound(context, "indentation", capture.indentations, [&](const Indentation& test, const std::string& key) {
+    try_file(context, key, [&] { (void)read_force_curve(test.curve); });
+  });
+  for_each_sound(context, "material_curve", capture.material_curves, [&](const auto& test, const std::string& key) {
+    try_file(context, key, [&] {
       const StressCurve curve =
           read_stress_curve(test.curve, test.mode == TestMode::Biaxial, test.mode == TestMode::SimpleShear);
       if (std::ranges::all_of(curve.stresses, [](double s) { return s == 0.0; }))
-        context.toml.complain(item("material_curve", i, "curve"), "a curve whose stresses are all zero",
-                              "a measured stress", "stresses are in pascals");
+        context.toml.complain(key + ".curve", "a curve whose stresses are all zero", "a measured stress",
+                              "stresses are in pascals");
     });
+  });
 }
 
 void check_grip_markers(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.grips.size(); ++i) {
-    const Grip& grip = context.capture.grips[i];
-    if (context.toml.is_sound(item("grip", i)) && grip.markers && grip.markers_rest)
-      check_marker_pair(context, item("grip", i), *grip.markers_rest, *grip.markers);
-  }
+  for_each_sound(context, "grip", context.capture.grips, [&](const Grip& grip, const std::string& key) {
+    if (grip.markers && grip.markers_rest) check_marker_pair(context, key, *grip.markers_rest, *grip.markers);
+  });
 }
 
 void check_depth_scale(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
-    const DepthCamera& camera = context.capture.depth[i];
-    if (!context.toml.is_sound(item("depth", i)) || !has_start(context)) continue;
-    try {
+  if (!has_start(context)) return;
+  for_each_sound(context, "depth", context.capture.depth, [&](const DepthCamera& camera, const std::string& key) {
+    try_file(context, key, [&] {
       auto readings = read_depth(context.capture, camera, first_free_frame(context.capture, camera.every)).pixels;
       std::erase_if(readings, [](float z) { return !(z > 0); });
-      if (readings.empty()) {
-        context.toml.reject(item("depth", i, "images"), "the first image of the free object has no reading",
-                            "depth readings", "0 means no reading");
-        continue;
-      }
+      if (readings.empty())
+        return context.toml.reject(key + ".images", "the first image of the free object has no reading",
+                                   "depth readings", "0 means no reading");
       const float distance = median(std::move(readings));
       if (distance < nearest_scene || distance > farthest_scene)
-        context.toml.reject(item("depth", i, "depth_scale"), "a scene " + text_of(distance, "m") + " away (median)",
+        context.toml.reject(key + ".depth_scale", "a scene " + text_of(distance, "m") + " away (median)",
                             "0.02 to 50 m", "depth_scale is raw units per metre: 1000 for millimetres");
-    } catch (const InputError& error) {
-      add_problems(context, item("depth", i), error);
-    }
-  }
+    });
+  });
 }
 
 void check_cameras_see_object(RuleContext& context) {
   const Capture& capture = context.capture;
   if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
-  for (std::size_t i = 0; i < capture.depth.size(); ++i) {
-    const DepthCamera& camera = capture.depth[i];
-    if (!context.toml.is_sound(item("depth", i))) continue;
-    const std::string key = item("depth", i, "camera_to_world");
+  for_each_sound(context, "depth", capture.depth, [&](const DepthCamera& camera, const std::string& block) {
+    const std::string key = block + ".camera_to_world";
     const int last = (capture.frame_count() - 1) / camera.every * camera.every;
     const int first = first_free_frame(capture, camera.every);
     const int middle = (first + last) / 2 / camera.every * camera.every;
@@ -414,42 +397,34 @@ void check_cameras_see_object(RuleContext& context) {
              may_see(camera.at(last), sphere);
     };
     const std::string advice = "the pose maps camera (x right, y down, z forward) to world coordinates, in metres";
-    if (std::ranges::none_of(places, sees)) {
-      context.toml.complain(key, "camera \"" + camera.name + "\" looks past the rest surface", "the object in its view",
-                            advice);
-      continue;
-    }
-    int seen = 0;
-    try {
+    if (std::ranges::none_of(places, sees))
+      return context.toml.complain(key, "camera \"" + camera.name + "\" looks past the rest surface",
+                                   "the object in its view", advice);
+    try_file(context, block, [&] {
+      int seen = 0;
       for (const int frame : {first, middle, last}) seen = std::max(seen, pixels_near(capture, camera, frame, places));
-    } catch (const InputError& error) {
-      add_problems(context, item("depth", i), error);
-      continue;
-    }
-    if (seen < least_pixels)
-      context.toml.complain(key,
-                            "camera \"" + camera.name + "\" has " +
-                                (seen == 0 ? "no" : "only " + std::to_string(seen)) + " readings near the rest surface",
-                            "readings of the object", advice);
-  }
+      if (seen < least_pixels)
+        context.toml.complain(key,
+                              "camera \"" + camera.name + "\" has " +
+                                  (seen == 0 ? "no" : "only " + std::to_string(seen)) +
+                                  " readings near the rest surface",
+                              "readings of the object", advice);
+    });
+  });
 }
 
 void check_clouds_near_object(RuleContext& context) {
   const Capture& capture = context.capture;
   if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
-  for (std::size_t i = 0; i < capture.clouds.size(); ++i) {
-    const CloudSequence& cloud = capture.clouds[i];
-    if (!context.toml.is_sound(item("cloud", i))) continue;
-    try {
+  for_each_sound(context, "cloud", capture.clouds, [&](const CloudSequence& cloud, const std::string& key) {
+    try_file(context, key, [&] {
       const auto points = read_points(capture.folder / cloud.points(first_free_frame(capture, cloud.every)));
       if (std::ranges::none_of(points, [&](const Vector3& p) { return is_near(places, p); }))
-        context.toml.complain(item("cloud", i, "points"), "no point near the rest surface", "points on the object",
+        context.toml.complain(key + ".points", "no point near the rest surface", "points on the object",
                               "clouds are in metres, in world coordinates");
-    } catch (const InputError& error) {
-      add_problems(context, item("cloud", i), error);
-    }
-  }
+    });
+  });
 }
 
 }  // namespace pliant
