@@ -107,6 +107,12 @@ void read_csv(const fs::path& path, std::string_view header, std::vector<Problem
   read_csv(path, is_that, problems, row);
 }
 
+void read_csv(const fs::path& path, std::string_view header, const std::function<void(CsvRow&)>& row) {
+  std::vector<Problem> problems;
+  read_csv(path, header, problems, row);
+  if (!problems.empty()) throw InputError(std::move(problems));
+}
+
 void read_csv(const fs::path& path, const std::function<bool(const std::vector<std::string>&)>& header,
               std::vector<Problem>& problems, const std::function<void(CsvRow&)>& row) {
   const std::string content = read_file(path);

@@ -48,6 +48,9 @@ class CsvRow {
 void read_csv(const std::filesystem::path& path, std::string_view header, std::vector<Problem>& problems,
               const std::function<void(CsvRow&)>& row);
 
+/// The same; throws InputError with all that is wrong.
+void read_csv(const std::filesystem::path& path, std::string_view header, const std::function<void(CsvRow&)>& row);
+
 /// The same for a file whose columns may be of several kinds. A cell that begins with a quote ends with one, and may
 /// have commas.
 /// @param header  called with the names of the columns, none of an empty file; false, with a problem told, where they

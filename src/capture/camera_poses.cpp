@@ -18,9 +18,8 @@ constexpr const char* pose_header = "frame,x,y,z,qx,qy,qz,qw";
 }  // namespace
 
 std::vector<RigidMotion> read_camera_poses(const std::filesystem::path& path, int frame_count, int every) {
-  std::vector<Problem> problems;
   std::vector<std::optional<RigidMotion>> read(static_cast<std::size_t>(frame_count));
-  read_csv(path, pose_header, problems, [&](CsvRow& row) {
+  read_csv(path, pose_header, [&](CsvRow& row) {
     const auto frame = row.index(0);
     double n[7];
     for (std::size_t i = 0; i < 7; ++i) {
@@ -39,14 +38,12 @@ std::vector<RigidMotion> read_camera_poses(const std::filesystem::path& path, in
     pose = RigidMotion{q.toRotationMatrix(), Vector3(n[0], n[1], n[2])};
   });
   std::vector<RigidMotion> poses;
-  for (int frame = 0; frame < frame_count && problems.empty(); ++frame) {
+  for (int frame = 0; frame < frame_count; ++frame) {
     const auto& pose = read[std::size_t(frame)];
     if (!pose && every > 0 && frame % every == 0)
-      problems.push_back({{path}, "no pose of frame " + std::to_string(frame), "one for each image", ""});
-    else
-      poses.push_back(pose ? *pose : poses.back());
+      throw InputError({{path}, "no pose of frame " + std::to_string(frame), "one for each image", ""});
+    poses.push_back(pose ? *pose : poses.back());
   }
-  if (!problems.empty()) throw InputError(std::move(problems));
   return poses;
 }
 

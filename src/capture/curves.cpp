@@ -16,16 +16,11 @@ void complain_unless_positive(CsvRow& row, std::size_t column, const std::option
   if (value && !(*value > 0.0)) row.complain(column, "a value of " + std::to_string(*value), what);
 }
 
-void throw_if_any(std::vector<Problem> problems) {
-  if (!problems.empty()) throw InputError(std::move(problems));
-}
-
 }  // namespace
 
 ForceCurve read_force_curve(const fs::path& path) {
   ForceCurve curve;
-  std::vector<Problem> problems;
-  read_csv(path, "depth,force,std", problems, [&](CsvRow& row) {
+  read_csv(path, "depth,force,std", [&](CsvRow& row) {
     const auto depth = row.number(0), force = row.number(1), std = row.number(2);
     complain_unless_positive(row, 2, std, "the standard deviation of the force in newtons, above 0");
     if (depth && (*depth < 0.0 || (!curve.depths.empty() && *depth <= curve.depths.back())))
@@ -35,15 +30,13 @@ ForceCurve read_force_curve(const fs::path& path) {
     curve.forces.push_back(force.value_or(0.0));
     curve.stds.push_back(std.value_or(1.0));
   });
-  throw_if_any(std::move(problems));
   return curve;
 }
 
 StressCurve read_stress_curve(const fs::path& path, bool is_biaxial, bool is_shear) {
   StressCurve curve;
-  std::vector<Problem> problems;
   const std::size_t stress_column = is_biaxial ? 2 : 1;
-  read_csv(path, is_biaxial ? "stretch,second,stress,std" : "stretch,stress,std", problems, [&](CsvRow& row) {
+  read_csv(path, is_biaxial ? "stretch,second,stress,std" : "stretch,stress,std", [&](CsvRow& row) {
     const auto stretch = row.number(0), stress = row.number(stress_column), std = row.number(stress_column + 1);
     if (!is_shear) complain_unless_positive(row, 0, stretch, "a stretch above 0: 1 is the unloaded length");
     if (is_biaxial) {
@@ -56,7 +49,6 @@ StressCurve read_stress_curve(const fs::path& path, bool is_biaxial, bool is_she
     curve.stresses.push_back(stress.value_or(0.0));
     curve.stds.push_back(std.value_or(1.0));
   });
-  throw_if_any(std::move(problems));
   return curve;
 }
 

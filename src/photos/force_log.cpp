@@ -12,10 +12,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-void throw_if_any(std::vector<Problem> problems) {
-  if (!problems.empty()) throw InputError(std::move(problems));
-}
-
 void subtract_zero(ForceLog& log, double until) {
   const auto end = std::ranges::lower_bound(log.times, until);
   const auto count = end - log.times.begin();
@@ -32,8 +28,7 @@ void subtract_zero(ForceLog& log, double until) {
 
 ForceLog read_force_log(const fs::path& path, const ForceLogOptions& options) {
   ForceLog log{path, {}, {}};
-  std::vector<Problem> problems;
-  read_csv(path, "time,force", problems, [&](CsvRow& row) {
+  read_csv(path, "time,force", [&](CsvRow& row) {
     const auto time = row.number(0), force = row.number(1);
     if (!time || !force) return;
     if (!log.times.empty() && *time <= log.times.back())
@@ -41,7 +36,6 @@ ForceLog read_force_log(const fs::path& path, const ForceLogOptions& options) {
     log.times.push_back(*time);
     log.forces.push_back(options.scale * *force);
   });
-  throw_if_any(std::move(problems));
   if (options.zero_until) subtract_zero(log, *options.zero_until);
   return log;
 }
@@ -66,14 +60,12 @@ std::optional<MeasuredForce> force_at(const ForceLog& log, double time, double w
 
 std::map<int, double> read_photograph_times(const fs::path& path) {
   std::map<int, double> times;
-  std::vector<Problem> problems;
-  read_csv(path, "number,time", problems, [&](CsvRow& row) {
+  read_csv(path, "number,time", [&](CsvRow& row) {
     const auto number = row.index(0);
     const auto time = row.number(1);
     if (number && time && !times.emplace(*number, *time).second)
       row.complain(0, "photograph " + std::to_string(*number) + " a second time", "each number once");
   });
-  throw_if_any(std::move(problems));
   return times;
 }
 
