@@ -24,6 +24,9 @@ std::string read_file(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 
+/// What a file's name ends with, in small letters: ".png"; empty where there is no dot.
+std::string ending_of(const std::filesystem::path& path);
+
 /// Why a path is no file that can be read, to follow the file's name in a complaint: "is not there", "is a folder", "is
 /// a symbolic link that leads in a circle" and so on.
 std::string why_no_file(const std::filesystem::path& path);

@@ -44,11 +44,6 @@ std::optional<NumberedFile> numbered(const fs::path& relative) {
   return file;
 }
 
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return text;
-}
-
 /// Widths of their numbers and the numbers of one kind of name.
 struct Group {
   std::set<int> digits, numbers;
@@ -108,7 +103,7 @@ FolderSurvey survey_folder(const fs::path& folder, bool with_surfaces) {
     std::error_code of_this;
     if (!entry->is_regular_file(of_this)) continue;
     const fs::path relative = entry->path().lexically_relative(folder);
-    const std::string kind = lower(relative.extension().string());
+    const std::string kind = ending_of(relative);
     const bool is_image = kind == ".png" || kind == ".pgm", is_cloud = kind == ".ply" || kind == ".pcd";
     const auto file = numbered(relative);
     if (file && (is_image || is_cloud)) {

@@ -1,7 +1,6 @@
 #include "capture/markers.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -206,12 +205,6 @@ void read_c3d_track(const fs::path& path, MarkerSet& set, Problems& problems) {
       set.frames[f].row(Eigen::Index(i)) = file.frames[f].row(columns[i]);
 }
 
-bool is_c3d(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return ending == ".c3d";
-}
-
 void write_row(std::ostream& stream, const std::string& id, const Eigen::RowVector3d& p) {
   if (id.empty() || id.find_first_of(",\"\n\r") != std::string::npos)
     throw std::invalid_argument("a marker's id must have no comma, quote or line's end: \"" + id + "\"");
@@ -269,7 +262,8 @@ MarkerSet read_markers(const MarkerTrack& files, int frame_count) {
   Problems problems;
   MarkerSet set = begin_set(files.rest, frame_count, problems);
   gather(problems, [&] {
-    is_c3d(files.track) ? read_c3d_track(files.track, set, problems) : read_csv_track(files.track, set, problems);
+    ending_of(files.track) == ".c3d" ? read_c3d_track(files.track, set, problems)
+                                     : read_csv_track(files.track, set, problems);
   });
   throw_problems(problems, files.track);
   return set;

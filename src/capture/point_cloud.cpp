@@ -27,12 +27,6 @@ namespace {
   throw InputError(Problem{std::move(place), std::move(found), std::move(expected), std::move(advice)});
 }
 
-bool has_ending(const fs::path& path, std::string_view ending) {
-  std::string own = path.extension().string();
-  std::ranges::transform(own, own.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return own == ending;
-}
-
 enum class PcdData { Ascii, Binary };
 
 struct PcdField {
@@ -229,9 +223,9 @@ std::size_t ply_point_count(const fs::path& path) {
 
 std::vector<Vector3> read_points(const fs::path& path) {
   std::vector<Vector3> points;
-  if (has_ending(path, ".ply")) {
+  if (ending_of(path) == ".ply") {
     points = ply_positions(path);
-  } else if (has_ending(path, ".pcd")) {
+  } else if (ending_of(path) == ".pcd") {
     const std::string content = read_file(path);
     points = PcdReader(path, content).points();
   } else {
@@ -244,8 +238,8 @@ std::vector<Vector3> read_points(const fs::path& path) {
 }
 
 std::size_t read_point_count(const fs::path& path) {
-  if (has_ending(path, ".ply")) return ply_point_count(path);
-  if (!has_ending(path, ".pcd")) fail_ending(path);
+  if (ending_of(path) == ".ply") return ply_point_count(path);
+  if (ending_of(path) != ".pcd") fail_ending(path);
   const std::string content = read_file(path);
   return PcdReader(path, content).header().points;
 }

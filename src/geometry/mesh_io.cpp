@@ -1,7 +1,6 @@
 #include "geometry/mesh_io.hpp"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstdio>
@@ -18,12 +17,6 @@ namespace fs = std::filesystem;
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary meshes are written as they lie in memory");
-
-std::string ending_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return ending;
-}
 
 [[noreturn]] void fail_ending(const fs::path& path) {
   throw InputError({{path},

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "base/disjoint_sets.hpp"
+#include "base/files.hpp"
 #include "geometry/raw_cells.hpp"
 #include "geometry/tetrahedron.hpp"
 
@@ -14,8 +15,7 @@ namespace fs = std::filesystem;
 namespace {
 
 RawCells read_cells(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const std::string ending = ending_of(path);
   if (ending == ".msh") return read_gmsh(path);
   if (ending == ".vtk") return read_legacy_vtk(path);
   if (ending == ".vtu") return read_xml_vtk(path);

@@ -42,9 +42,8 @@ std::vector<fs::path> image_files(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
-    std::string ending = entry.path().extension().string();
-    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
-    if (ending == ".png" || ending == ".pgm") files.push_back(entry.path());
+    if (const std::string ending = ending_of(entry.path()); ending == ".png" || ending == ".pgm")
+      files.push_back(entry.path());
   }
   std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
     return comes_before(a.filename().string(), b.filename().string());

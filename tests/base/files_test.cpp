@@ -79,6 +79,11 @@ TEST(Files, ReasonsAreToldApart) {
   EXPECT_TRUE(is_file(folder / "link"));
 }
 
+TEST(Files, EndingsAreInSmallLetters) {
+  EXPECT_EQ(ending_of("a.b/scan.old.PLY"), ".ply");
+  EXPECT_EQ(ending_of("a.b/scan"), "");
+}
+
 TEST(Files, FoldersAreMadeOnceAndRemovedFilesAreGone) {
   const TemporaryFolder folder;
   make_folder(folder / "a/b/c");
