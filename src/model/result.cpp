@@ -5,6 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "base/csv.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "base/old_names.hpp"
@@ -326,13 +327,6 @@ std::string csv_number(double value) {
   return out.str();
 }
 
-std::string csv_text(const std::string& value) {
-  if (value.find_first_of(",\"\n") == std::string::npos) return value;
-  std::string quoted = "\"";
-  for (const char c : value) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
 }  // namespace
 
 double CurvePrediction::rms() const {
@@ -404,13 +398,13 @@ void write_convergence(const fs::path& path, const ConvergenceHistory& history) 
     throw std::invalid_argument("write_convergence: as many units as parameters are needed");
   std::string csv = "start,stage,iteration,cost,damping";
   for (size_t i = 0; i < history.parameters.size(); ++i)
-    csv += "," + csv_text(history.parameters[i] + " [" + history.units[i] + "]");
+    csv += "," + csv_cell(history.parameters[i] + " [" + history.units[i] + "]");
   csv += "\n";
   for (const ConvergenceRow& row : history.rows) {
     if (row.parameters.size() != history.parameters.size())
       throw std::invalid_argument("write_convergence: a row of " + std::to_string(row.parameters.size()) +
                                   " parameters under a header of " + std::to_string(history.parameters.size()));
-    csv += std::to_string(row.start) + "," + csv_text(row.stage) + "," + std::to_string(row.iteration) + "," +
+    csv += std::to_string(row.start) + "," + csv_cell(row.stage) + "," + std::to_string(row.iteration) + "," +
            csv_number(row.cost) + "," + csv_number(row.damping);
     for (const double value : row.parameters) csv += "," + csv_number(value);
     csv += "\n";
