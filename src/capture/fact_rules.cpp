@@ -59,8 +59,6 @@ const char* surface_key(const Capture& capture) {
   return capture.scene.object.volume ? "object.volume_mesh" : "object.surface";
 }
 
-}  // namespace
-
 void check_surface_is_solid(RuleContext& context) {
   if (!context.capture.scene.object.surface) return;
   const MeshReport report = examine(*context.capture.scene.object.surface);
@@ -221,10 +219,6 @@ void check_initial_velocity(RuleContext& context) {
     context.toml.complain("initial.angular_velocity", text_of(spin, "rad/s"), "at most 1000 rad/s",
                           "give it in radians per second");
 }
-
-void check_vertex_lists(RuleContext& context) { check_vertex_lists(context.toml, context.capture.scene); }
-
-void check_materials(RuleContext& context) { check_materials(context.toml, context.capture.scene); }
 
 void check_fixed_regions(RuleContext& context) {
   const Capture& capture = context.capture;
@@ -526,6 +520,42 @@ void check_material_curves(RuleContext& context) {
       context.toml.complain(item("material_curve", i, "prestretch"), "`prestretch` of another test than a simple shear",
                             "mode = \"simple_shear\"", "remove it");
   }
+}
+
+}  // namespace
+
+std::vector<Rule> fact_rules() {
+  return {check_surface_is_solid,
+          check_object_size,
+          check_pose,
+          check_surface_noise,
+          check_mass_or_density,
+          check_gravity,
+          check_timing,
+          check_start_frame,
+          check_static,
+          check_initial_velocity,
+          [](RuleContext& context) { check_vertex_lists(context.toml, context.capture.scene); },
+          check_fixed_regions,
+          [](RuleContext& context) { check_materials(context.toml, context.capture.scene); },
+          check_planes,
+          check_camera_names,
+          check_intrinsics,
+          check_lenses,
+          check_time_offsets,
+          check_moving_cameras,
+          check_every,
+          check_noise,
+          check_has_observations,
+          check_presses,
+          check_weights,
+          check_wind,
+          check_applied_forces,
+          check_release,
+          check_loads,
+          check_indentations,
+          check_grips,
+          check_material_curves};
 }
 
 }  // namespace pliant

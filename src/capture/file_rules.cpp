@@ -141,50 +141,6 @@ int pixels_near(const Capture& capture, const DepthCamera& camera, int frame, co
   return count;
 }
 
-std::vector<Rule> make_rules() {
-  return {check_surface_is_solid,
-          check_object_size,
-          check_pose,
-          check_surface_noise,
-          check_mass_or_density,
-          check_gravity,
-          check_timing,
-          check_start_frame,
-          check_static,
-          check_initial_velocity,
-          check_vertex_lists,
-          check_fixed_regions,
-          check_materials,
-          check_planes,
-          check_camera_names,
-          check_intrinsics,
-          check_lenses,
-          check_time_offsets,
-          check_moving_cameras,
-          check_every,
-          check_noise,
-          check_has_observations,
-          check_presses,
-          check_weights,
-          check_wind,
-          check_applied_forces,
-          check_release,
-          check_loads,
-          check_indentations,
-          check_grips,
-          check_material_curves,
-          check_depth_files,
-          check_clouds,
-          check_markers,
-          check_press_markers,
-          check_load_files,
-          check_curve_files,
-          check_grip_markers,
-          check_depth_scale,
-          check_cameras_see_object,
-          check_clouds_near_object};
-}
-
 // What is wrong with a file that several blocks name is told once.
 void add_problems(RuleContext& context, const std::string& key, const InputError& error) {
   std::vector<Problem>& told = context.toml.problems;
@@ -254,22 +210,15 @@ void check_marker_rate(RuleContext& context, const std::string& key, const fs::p
 
 void check_marker_pair(RuleContext& context, const std::string& block, const fs::path& rest, const fs::path& under_load,
                        const std::optional<fs::path>& deviations = {}) {
-  try {
+  try_file(context, block, [&] {
     const MarkerSet markers = read_marker_pair(rest, under_load);
     if (deviations) (void)read_marker_deviations(*deviations, markers.ids);
     check_markers_on_object(context, block + ".markers_rest", markers);
     check_marker_unit(context, block + ".markers", markers);
-  } catch (const InputError& error) {
-    add_problems(context, block, error);
-  }
+  });
 }
 
 }  // namespace
-
-std::span<const Rule> capture_rules() {
-  static const std::vector<Rule> rules = make_rules();
-  return rules;
-}
 
 std::vector<int> frames_of(int frame_count, int every) {
   std::vector<int> frames;
@@ -291,6 +240,8 @@ std::string ranges_text(std::span<const int> numbers) {
   }
   return text;
 }
+
+namespace {
 
 void check_depth_files(RuleContext& context) {
   for_each_sound(context, "depth", context.capture.depth, [&](const DepthCamera& camera, const std::string& key) {
@@ -425,6 +376,19 @@ void check_clouds_near_object(RuleContext& context) {
                               "clouds are in metres, in world coordinates");
     });
   });
+}
+
+}  // namespace
+
+std::span<const Rule> capture_rules() {
+  static const std::vector<Rule> rules = [] {
+    std::vector<Rule> all = fact_rules();
+    all.insert(all.end(), {check_depth_files, check_clouds, check_markers, check_press_markers, check_load_files,
+                           check_curve_files, check_grip_markers, check_depth_scale, check_cameras_see_object,
+                           check_clouds_near_object});
+    return all;
+  }();
+  return rules;
 }
 
 }  // namespace pliant
