@@ -75,6 +75,12 @@ void describe_world(const Capture& capture) {
                             capture.scene.timing.is_static ? ", all of one equilibrium (static)" : ""));
   if (const auto& inner = capture.scene.inner; !inner.empty())
     say("inside", formatted("%zu rigid bod%s", inner.size(), inner.size() == 1 ? "y" : "ies"));
+  if (const auto& obstacles = capture.scene.obstacles; !obstacles.empty())
+    say("obstacles", formatted("%zu beside planes, %zu of them moving", obstacles.size(),
+                               obstacles.size() - std::size_t(std::ranges::count_if(
+                                                      obstacles, [](const auto& o) { return o.motion.empty(); }))));
+  if (const auto& led = capture.scene.led; !led.empty())
+    say("led", formatted("%zu region%s", led.size(), led.size() == 1 ? "" : "s"));
   if (!capture.scene.fixed.empty())
     say("held", formatted("%zu region%s", capture.scene.fixed.size(), capture.scene.fixed.size() == 1 ? "" : "s"));
   if (!capture.scene.weights.empty()) {
@@ -371,7 +377,8 @@ void write_sorted_pictures(const Capture& capture, const Arguments& arguments) {
     for (const int frame : chosen_frames(capture, camera, arguments.pictures)) {
       const DepthImage depth = read_depth(capture, camera, frame);
       const PinholeCamera lens = camera.at(frame);
-      const auto kinds = sorter.sort(depth, read_object_mask(capture, camera, frame), &lens);
+      const auto kinds = sorter.sort(depth, read_object_mask(capture, camera, frame), &lens,
+                                     capture.scene.timing.times[std::size_t(frame)] + camera.time_offset);
       write_png(fs::path(arguments.out) / (frame_name(camera.name, frame) + ".png"), picture(depth, kinds));
     }
   }

@@ -106,7 +106,7 @@ std::unique_ptr<Motion> motion_of_body(const std::shared_ptr<Body>& body, const 
   made.theta.segment<3>(blocks.gravity) = vector_of(gravity, "gravity");
   made.theta.segment<3>(blocks.linear_velocity) = vector_of(linear_velocity, "linear_velocity");
   made.theta.segment<3>(blocks.angular_velocity) = vector_of(angular_velocity, "angular_velocity");
-  set_planes(scene.planes, blocks, made.theta);
+  set_obstacles(scene, blocks, made.theta);
   set_loads(scene, blocks, made.theta);
   SimulationOptions settings;
   if (corotated) settings.material.elastic = ElasticLaw::Corotated;

@@ -63,10 +63,12 @@ void CloudSorter::find_undeclared_planes(const Capture& capture, const CloudSequ
   }
 }
 
-std::vector<Vector3> CloudSorter::sorted(std::vector<Vector3> points, CloudCounts& counts) const {
+std::vector<Vector3> CloudSorter::sorted(std::vector<Vector3> points, CloudCounts& counts, double time) const {
   counts.read += int(points.size());
   counts.out_of_reach += int(std::erase_if(points, [&](const Vector3& p) { return !space_.is_within_reach(p); }));
   counts.on_plane += int(std::erase_if(points, [&](const Vector3& p) { return space_.is_on_plane(p, noise_); }));
+  counts.on_plane +=
+      int(std::erase_if(points, [&](const Vector3& p) { return space_.is_on_obstacle(p, noise_, time); }));
   if (background_)
     counts.background += int(std::erase_if(points, [&](const Vector3& p) {
       return background_->squared_distance(p, 1) < background_reach_ * background_reach_;

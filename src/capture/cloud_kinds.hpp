@@ -19,9 +19,11 @@ class CloudSorter {
   /// Throws InputError where the background or the first cloud cannot be read.
   CloudSorter(const Capture& capture, const CloudSequence* sequence, const ObserveOptions& options);
 
-  /// Points that are within reach, neither on a plane nor as in the background cloud, and do not stand alone
+  /// Points that are within reach, neither on a plane or an obstacle nor as in the background cloud, and do not stand
+  /// alone
   /// (`isolated_points`). Adds what was left out to `counts`.
-  std::vector<Vector3> sorted(std::vector<Vector3> points, CloudCounts& counts) const;
+  /// @param time  of the recording [s], for obstacles that move
+  std::vector<Vector3> sorted(std::vector<Vector3> points, CloudCounts& counts, double time = 0.0) const;
 
   const std::vector<Plane>& planes() const { return space_.planes(); }
 

@@ -9,6 +9,7 @@
 #include "geometry/mesh_io.hpp"
 #include "geometry/surface_distance.hpp"
 #include "geometry/whole_picture.hpp"
+#include "scene/obstacle.hpp"
 #include "scene/region.hpp"
 #include "scene/scene_toml.hpp"
 
@@ -105,6 +106,8 @@ void check_pose(RuleContext& context) {
   };
   for (std::size_t i = 0; i < capture.scene.fixed.size(); ++i)
     complain_of_box(capture.scene.fixed[i].region, item("fixed", i));
+  for (std::size_t i = 0; i < capture.scene.led.size(); ++i)
+    complain_of_box(capture.scene.led[i].region, item("led", i));
   for (std::size_t i = 0; i < capture.scene.regions.size(); ++i)
     complain_of_box(capture.scene.regions[i].region, item("region", i));
 }
@@ -220,23 +223,61 @@ void check_initial_velocity(RuleContext& context) {
                           "give it in radians per second");
 }
 
-void check_fixed_regions(RuleContext& context) {
+void check_held_regions(RuleContext& context) {
   const Capture& capture = context.capture;
   if (!capture.scene.object.surface) return;
-  for (std::size_t i = 0; i < capture.scene.fixed.size(); ++i) {
-    if (!context.toml.is_sound(item("fixed", i))) continue;
-    const Region& region = capture.scene.fixed[i].region;
-    if (!touches_solid(region, *capture.scene.object.surface))
-      context.toml.complain(item("fixed", i), "no point of the object lies in this fixed region",
-                            "a region that holds a part of it",
-                            "the object's box is " + text_of(bounding_box(*capture.scene.object.surface).min) + " to " +
-                                text_of(bounding_box(*capture.scene.object.surface).max));
+  const TriangleMesh& surface = *capture.scene.object.surface;
+  const auto check = [&](const Region& region, const std::string& key, const std::string& kind) {
+    if (!context.toml.is_sound(key)) return;
+    if (!touches_solid(region, surface))
+      context.toml.complain(
+          key, "no point of the object lies in this " + kind + " region", "a region that holds a part of it",
+          "the object's box is " + text_of(bounding_box(surface).min) + " to " + text_of(bounding_box(surface).max));
     bool holds_all = true;
-    for (int v = 0; holds_all && v < int(capture.scene.object.surface->vertices.size()); ++v)
-      holds_all = contains_vertex(region, *capture.scene.object.surface, v);
+    for (int v = 0; holds_all && v < int(surface.vertices.size()); ++v) holds_all = contains_vertex(region, surface, v);
     if (holds_all)
-      context.toml.complain(item("fixed", i), "the whole object lies in this fixed region", "a part of it",
+      context.toml.complain(key, "the whole object lies in this " + kind + " region", "a part of it",
                             "nothing could move");
+  };
+  for (std::size_t i = 0; i < capture.scene.fixed.size(); ++i)
+    check(capture.scene.fixed[i].region, item("fixed", i), "fixed");
+  for (std::size_t i = 0; i < capture.scene.led.size(); ++i) check(capture.scene.led[i].region, item("led", i), "led");
+  if (!capture.scene.led.empty() &&
+      (capture.scene.object.shape_is == ShapeIs::Static || capture.scene.initial.released))
+    context.toml.complain("led[0]", "a led region of an object that was scanned as it sags, or that is released",
+                          "[[fixed]] regions alone", "load-free shapes and held poses know what is fixed");
+  for (std::size_t i = 0; i < capture.scene.inner.size(); ++i)
+    if (capture.scene.object.shape_is == ShapeIs::Static &&
+        capture.scene.inner[i].contact == InnerBody::Contact::Sliding)
+      context.toml.complain(item("inner", i), "a rigid body on which an object slides that was scanned as it sags",
+                            "contact = \"glued\", or shape_is = \"reference\"", "load-free shapes know what is fixed");
+  const bool is_of_tests_alone = capture.scene.timing.times.empty();
+  if (is_of_tests_alone && (!capture.scene.led.empty() || !capture.scene.obstacles.empty()))
+    context.toml.complain(capture.scene.led.empty() ? "obstacle[0]" : "led[0]",
+                          "an obstacle or a led region of an object that does not move",
+                          "[[inner]], [[fixed]], [[grip]]", "static tests take no time");
+}
+
+/// An object may touch an obstacle where it starts, as deep as scan errors and a soft sole allow, and lie on it.
+void check_obstacles(RuleContext& context) {
+  constexpr double deepest = 0.1;  // of the object's size
+  const Capture& capture = context.capture;
+  const Timing& timing = capture.scene.timing;
+  if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || capture.scene.initial.released ||
+      timing.is_static || timing.times.empty() || timing.start_frame >= timing.frame_count())
+    return;
+  const TriangleMesh& surface = *capture.scene.object.surface;
+  for (std::size_t i = 0; i < capture.scene.obstacles.size(); ++i) {
+    if (!context.toml.is_sound(item("obstacle", i))) continue;
+    const RigidObstacle& obstacle = capture.scene.obstacles[i];
+    const RigidMotion back = motion_of(obstacle).at(timing.times[std::size_t(timing.start_frame)]).inverse();
+    std::vector<Vector3> points = surface.vertices;
+    for (Vector3& p : points) p = back(p);
+    const double depth = greatest_depth(obstacle, points);
+    if (depth > deepest * size_of(surface))
+      context.toml.complain(item("obstacle", i), "the object starts " + text_of(depth, "m") + " inside this obstacle",
+                            "the two apart, or touching, at the start frame",
+                            "obstacles are in metres, in world coordinates, where their motion is zero");
   }
 }
 
@@ -536,7 +577,8 @@ std::vector<Rule> fact_rules() {
           check_static,
           check_initial_velocity,
           [](RuleContext& context) { check_vertex_lists(context.toml, context.capture.scene); },
-          check_fixed_regions,
+          check_held_regions,
+          check_obstacles,
           [](RuleContext& context) { check_materials(context.toml, context.capture.scene); },
           check_planes,
           check_camera_names,

@@ -110,11 +110,13 @@ std::vector<Sphere> possible_places(const Capture& capture) {
   const double own = 0.5 * box.extent().norm();
   const double radius = (capture.scene.timing.is_static || capture.scene.initial.released ? 3.0 : 1.5) * own;
   std::vector<Sphere> places{{0.5 * (box.min + box.max), radius}};
-  const bool may_fall = capture.scene.fixed.empty() && !capture.scene.timing.is_static;
+  const bool may_fall = !capture.scene.is_held() && !capture.scene.timing.is_static;
   for (double fallen = own; may_fall && fallen < 2.0; fallen += own)
     places.push_back({places[0].centre - fallen * capture.scene.world.up, radius});
   for (const FixedRegion& fixed : capture.scene.fixed)
     if (fixed.displaced_to) places.push_back({(*fixed.displaced_to)(places[0].centre), radius});
+  for (const LedRegion& led : capture.scene.led)
+    for (const auto& key : led.motion) places.push_back({places[0].centre + key.value.head<3>(), radius});
   return places;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "capture/find_plane.hpp"
+#include "scene/obstacle.hpp"
 
 namespace pliant {
 
@@ -35,7 +36,12 @@ std::optional<Box> reachable_box(const Capture& capture, double margin) {
   Box box = rest;
   for (const FixedRegion& fixed : capture.scene.fixed)
     if (fixed.displaced_to) extend(box, moved(rest, *fixed.displaced_to));
-  if (capture.scene.fixed.empty() && !capture.scene.timing.is_static)
+  for (const LedRegion& led : capture.scene.led)
+    for (const auto& key : led.motion) {
+      const KeyedMotion motion(0.5 * (rest.min + rest.max), KeyFrames<6>(led.motion));
+      extend(box, moved(rest, motion.at(key.time)));
+    }
+  if (!capture.scene.is_held() && !capture.scene.timing.is_static)
     extend(box, moved(rest, {Matrix3::Identity(), -fall * capture.scene.world.up}));
   box.min.array() -= margin;
   box.max.array() += margin;
@@ -53,6 +59,14 @@ ObjectSpace::ObjectSpace(const Capture& capture, const ObserveOptions& options) 
     else if (const auto found = find_plane(capture, plane))
       planes_.push_back(*found);
   }
+  for (const RigidObstacle& obstacle : capture.scene.obstacles)
+    obstacles_.push_back({distance_to(obstacle), motion_of(obstacle)});
+}
+
+bool ObjectSpace::is_on_obstacle(const Vector3& point, double sigma, double time) const {
+  return std::ranges::any_of(obstacles_, [&](const SeenObstacle& obstacle) {
+    return obstacle.distance(obstacle.motion.at(time).inverse()(point)) < plane_reach * sigma;
+  });
 }
 
 bool ObjectSpace::is_within_reach(const Vector3& point) const { return !band_ || is_inside(*band_, point); }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,8 +17,8 @@ inline constexpr double plane_reach = 3.0;
 /// may fall. Nothing without a rest surface.
 std::optional<Box> reachable_box(const Capture& capture, double margin);
 
-/// The part of the world in which readings may be the object's: near it, and off the planes. Pixels of depth images and
-/// points of clouds are told apart by the same one.
+/// The part of the world in which readings may be the object's: near it, off the planes and off obstacles. Pixels of
+/// depth images and points of clouds are told apart by the same one.
 class ObjectSpace {
  public:
   /// Known planes, and those that `find_plane` sees near unknown ones.
@@ -28,6 +29,9 @@ class ObjectSpace {
   /// On a plane, or behind it. @param sigma  standard deviation of the reading [m]
   bool is_on_plane(const Vector3& point, double sigma) const;
 
+  /// On the surface of an obstacle. @param time  of the recording [s], at which obstacles are where they are led
+  bool is_on_obstacle(const Vector3& point, double sigma, double time) const;
+
   /// Takes a plane that nobody declared, seen as these points: a table, where less than 30 % of them lie in the
   /// object's own box, so that a flat side of the object is never taken for it.
   /// @param margin  [m] by which that box is grown, against errors of points on its sides
@@ -36,8 +40,13 @@ class ObjectSpace {
   const std::vector<Plane>& planes() const { return planes_; }
 
  private:
+  struct SeenObstacle {
+    std::function<double(const Vector3&)> distance;  // where its motion is zero [m]
+    KeyedMotion motion;
+  };
   double plane_margin_;
   std::vector<Plane> planes_;
+  std::vector<SeenObstacle> obstacles_;
   std::optional<Box> own_box_, band_;
 };
 

@@ -43,7 +43,8 @@ void append_camera(ObservedFrame& frame, const Capture& capture, const PixelSort
   const DepthImage depth = read_depth(capture, camera, frame.frame);
   const auto mask = read_object_mask(capture, camera, frame.frame);
   const PinholeCamera lens = camera.at(frame.frame);
-  append_pixels(frame, sorter, lens, index, depth, sorter.sort(depth, mask, &lens));
+  const double time = capture.scene.timing.times[std::size_t(frame.frame)] + camera.time_offset;
+  append_pixels(frame, sorter, lens, index, depth, sorter.sort(depth, mask, &lens, time));
 }
 
 void append_points(ObservedFrame& frame, const std::vector<Vector3>& points, std::optional<double> noise) {
@@ -102,7 +103,8 @@ std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions&
       const CloudSequence& cloud = capture.clouds[k];
       if (frame.frame % cloud.every == 0)
         append_points(frame,
-                      cloud_sorters[k].sorted(read_points(capture.folder / cloud.points(frame.frame)), frame.cloud),
+                      cloud_sorters[k].sorted(read_points(capture.folder / cloud.points(frame.frame)), frame.cloud,
+                                              capture.scene.timing.times[std::size_t(frame.frame)]),
                       cloud.noise);
     }
     thin_out(frame, options.max_points_per_frame);

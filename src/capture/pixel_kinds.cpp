@@ -36,7 +36,7 @@ void PixelSorter::find_undeclared_planes(const Capture& capture, const DepthCame
 }
 
 Image<PixelKind> PixelSorter::sort(const DepthImage& depth, const std::optional<Image<std::uint8_t>>& mask,
-                                   const PinholeCamera* seen_by) const {
+                                   const PinholeCamera* seen_by, double time) const {
   const PinholeCamera& camera = seen_by ? *seen_by : camera_;
   Image<PixelKind> kinds(depth.width, depth.height, PixelKind::NoReading);
   const Image<std::uint8_t>* own_mask = mask ? &*mask : nullptr;
@@ -45,17 +45,18 @@ Image<PixelKind> PixelSorter::sort(const DepthImage& depth, const std::optional<
       const float z = depth(u, v);
       if (!(z > 0)) continue;
       const Vector3 point = camera.unproject(u, v, z);
-      kinds(u, v) = space_.is_on_plane(point, noise_.axial(z))   ? PixelKind::OnPlane
-                    : !may_show_object(z, u, v, point, own_mask) ? PixelKind::Elsewhere
-                    : is_at_edge(depth, own_mask, u, v)          ? PixelKind::AtEdge
-                                                                 : PixelKind::Object;
+      kinds(u, v) = space_.is_on_plane(point, noise_.axial(z))         ? PixelKind::OnPlane
+                    : !may_show_object(z, u, v, point, own_mask, time) ? PixelKind::Elsewhere
+                    : is_at_edge(depth, own_mask, u, v)                ? PixelKind::AtEdge
+                                                                       : PixelKind::Object;
     }
   return kinds;
 }
 
-bool PixelSorter::may_show_object(float z, int u, int v, const Vector3& point, const Image<std::uint8_t>* mask) const {
+bool PixelSorter::may_show_object(float z, int u, int v, const Vector3& point, const Image<std::uint8_t>* mask,
+                                  double time) const {
   if (mask) return (*mask)(u, v) != 0;
-  if (!space_.is_within_reach(point)) return false;
+  if (!space_.is_within_reach(point) || space_.is_on_obstacle(point, noise_.axial(z), time)) return false;
   if (!background_) return true;
   const float behind = (*background_)(u, v);
   return !(behind > 0) || z < behind - background_reach * std::numbers::sqrt2 * noise_.axial(z);

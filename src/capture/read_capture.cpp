@@ -7,6 +7,7 @@
 #include "capture/capture_rules.hpp"
 #include "capture/folder_survey.hpp"
 #include "scene/inner_body.hpp"
+#include "scene/obstacle.hpp"
 #include "scene/scene_toml.hpp"
 
 namespace pliant {
@@ -65,6 +66,9 @@ class Reader {
     root.each_block("control",
                     [&](TomlTable& block) { scene.controls.push_back(read_material_control(block, files_)); });
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
+    root.each_block("obstacle",
+                    [&](TomlTable& block) { scene.obstacles.push_back(read_obstacle(block, files_, true)); });
+    root.each_block("led", [&](TomlTable& block) { scene.led.push_back(read_led(block, files_)); });
     root.each_block("inner", [&](TomlTable& block) { scene.inner.push_back(read_inner(block, files_)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });
     root.with_table("wind", [&](TomlTable& wind) { scene.wind = read_wind(wind, true); });
@@ -325,6 +329,11 @@ Capture read_capture(const fs::path& path) {
   const fs::path& shape = capture.scene.object.file;
   std::string surfaces = shape.empty() ? std::string() : read_file(shape);
   for (const InnerBody& body : capture.scene.inner) surfaces += read_file(body.file);
+  for (const RigidObstacle& obstacle : capture.scene.obstacles)
+    if (const auto* mesh = std::get_if<ShapeMesh>(&obstacle.shape)) surfaces += read_file(mesh->file);
+  std::ostringstream motions;  // they may stand in files of their own
+  write_obstacle_blocks(motions, capture.scene);
+  surfaces += motions.str();
   capture.sha256 = sha256({content, surfaces});
   return capture;
 }

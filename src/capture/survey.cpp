@@ -312,7 +312,7 @@ void add_scale(const Capture& capture, Identifiability& result) {
 }
 
 void add_stiffness(const Capture& capture, const Survey& seen, Identifiability& result) {
-  const bool is_held = !capture.scene.fixed.empty(), touches = seen.first_contact.has_value();
+  const bool is_held = capture.scene.is_held(), touches = seen.first_contact || !capture.scene.obstacles.empty();
   const bool has_forces = has_forces_to_fit(capture);
   if (has_forces)
     result.possible.push_back("Stiffness, and Poisson's ratio to some degree: from shapes under known forces.");
@@ -329,7 +329,7 @@ void add_stiffness(const Capture& capture, const Survey& seen, Identifiability& 
                               (touches ? "the impact and the motion after it." : "the swinging of the held object."));
   } else if (!has_forces) {
     result.impossible.push_back(
-        "Stiffness is not identifiable: the object neither touches a plane nor is held, and in free fall nothing "
+        "Stiffness is not identifiable: the object touches nothing and is not held, and in free fall nothing "
         "strains "
         "it.");
   }
@@ -340,7 +340,7 @@ void add_damping(const Capture& capture, const Survey& seen, Identifiability& re
     result.impossible.push_back("Damping is not identifiable: in static tests the object is at rest.");
   else if (capture.scene.timing.is_static)
     result.impossible.push_back("Damping is not identifiable: the object is at rest in every frame (`static = true`).");
-  else if (seen.moves && (!capture.scene.fixed.empty() || capture.scene.initial.released || seen.first_contact))
+  else if (seen.moves && (capture.scene.is_held() || capture.scene.initial.released || seen.first_contact))
     result.possible.push_back("Damping: from how the motion dies out.");
 }
 

@@ -17,6 +17,7 @@ struct StepContext {
   const Points* start_velocity = nullptr;  ///< velocities there [m/s]
   double time = 0.0;                       ///< of the step's start [s]
   double dt = 0.0;                         ///< length of the step [s]
+  double contact_weight = 1.0;             ///< where in the step contact acts, times its length
 };
 
 /// Changes of the lag point p, of z and of theta along several directions, some of those that tangents of one step or

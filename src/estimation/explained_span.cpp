@@ -7,6 +7,7 @@
 #include "estimation/fit_plan.hpp"
 #include "estimation/judgement.hpp"
 #include "estimation/verdict.hpp"
+#include "scene/obstacle.hpp"
 
 namespace pliant {
 
@@ -17,12 +18,13 @@ constexpr double growth = 1.2;        // of the part, from one that is explained
 constexpr double whole = 1.0;
 
 bool meets_obstacles(const RecordedCapture& r) {
-  return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static && !r.capture.scene.initial.released;
+  return (!r.capture.scene.planes.empty() || !r.capture.scene.obstacles.empty()) && !r.capture.scene.timing.is_static &&
+         !r.capture.scene.initial.released;
 }
 
 /// The part of a recording until a node comes nearer to an obstacle than a hundredth of the body's size; 1 where none
 /// does.
-double part_until_touch(const RecordingOutcome& r, int frames) {
+double part_until_touch(const RecordingOutcome& r, const std::vector<RigidObstacle>& obstacles, int frames) {
   Simulation simulation(r.discretisation.body, r.discretisation.simulation);
   const MotionBlocks& blocks = r.discretisation.simulation.blocks;
   const Points& rest = r.discretisation.body->nodes;
@@ -32,6 +34,12 @@ double part_until_touch(const RecordingOutcome& r, int frames) {
     for (const PlaneBlock& plane : blocks.planes) {
       const Vector3 point = plane.point.vector(r.theta), normal = plane.normal.vector(r.theta);
       if (((state.x * normal).array() - point.dot(normal)).minCoeff() < near) touched = frame;
+    }
+    for (const RigidObstacle& obstacle : obstacles) {
+      const auto distance = distance_to(obstacle);
+      const RigidMotion back = motion_of(obstacle).at(simulation.options().times[std::size_t(frame)]).inverse();
+      for (Eigen::Index n = 0; n < state.x.rows() && touched < 0; ++n)
+        if (distance(back(state.x.row(n).transpose())) < near) touched = frame;
     }
     return touched < 0 && frame < frames;
   });
@@ -92,7 +100,7 @@ bool ExplainedSpan::take(FitOutcome outcome, PassState reached) {
     for (std::size_t i = 0; i < outcome.recordings.size() && !fits && !has_failed; ++i)
       if (meets_obstacles(recordings_[i])) {
         const RecordingOutcome& r = outcome.recordings[i];
-        part = std::max(part, part_until_touch(r, last_seen(r.evaluation)));
+        part = std::max(part, part_until_touch(r, recordings_[i].capture.scene.obstacles, last_seen(r.evaluation)));
       }
     search_.next_part = search_.part = up_to_whole(std::max(judgement.least_part.value, after_touch * part));
     search_.has_parts = search_.part < whole;

@@ -69,7 +69,7 @@ namespace {
 /// tracked bends where the tracker bent it.
 bool shows_where_it_is_stiff(const RecordedCapture& r) {
   const Scene& scene = r.capture.scene;
-  return !r.followed && !scene.fixed.empty() && scene.planes.empty() && !scene.timing.is_static &&
+  return !r.followed && !scene.fixed.empty() && scene.led.empty() && !scene.is_touched() && !scene.timing.is_static &&
          r.capture.markers.empty() && (!r.capture.clouds.empty() || !r.capture.depth.empty());
 }
 

@@ -83,7 +83,7 @@ std::optional<double> FitRun::given_start(const std::string& name) const {
 Spacing FitRun::coarse_spacing() const {
   constexpr double of_swings = 0.5;  // steps in each of the fit's
   const bool swings = std::ranges::all_of(
-      recordings_.all(), [](const Recording& r) { return r.is_released() && r.capture.scene.planes.empty(); });
+      recordings_.all(), [](const Recording& r) { return r.is_released() && !r.capture.scene.is_touched(); });
   return {options_.coarse_cells, options_.steps * (swings ? of_swings : 1.0)};
 }
 

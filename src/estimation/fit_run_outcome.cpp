@@ -196,7 +196,7 @@ void FitRun::say_untried(const std::vector<StageRecord>& done) {
 
 VectorX FitRun::floor(const ParameterSet& parameters, const VectorX& theta) const {
   const bool meets = std::ranges::any_of(recordings_.all(), [](const Recording& r) {
-    return !r.capture.scene.planes.empty() && !r.capture.scene.timing.is_static;
+    return r.capture.scene.is_touched() && !r.capture.scene.timing.is_static;
   });
   return options_.alternatives
              ? unmodelled_std(parameters, theta, meets ? MeasuredAs::MeetingObstacles : MeasuredAs::Free)

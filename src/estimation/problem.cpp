@@ -186,7 +186,7 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   const bool moves = !capture.scene.initial.known && !capture.scene.timing.is_static;
   p.push_back(vector(layout, m.linear_velocity, speed, m.linear_velocity.vector(theta) / speed, 3.0, moves));
   p.push_back(vector(layout, m.angular_velocity, 1.0 / time, m.angular_velocity.vector(theta) * time, 3.0, moves));
-  set_planes(capture.scene.planes, m, theta);
+  set_obstacles(capture.scene, m, theta);
   for (std::size_t i = 0; i < m.planes.size(); ++i) {
     Parameter plane = vector(layout, m.planes[i].whole(), size, Vector3::Zero(), 0.2, !capture.scene.planes[i].known);
     plane.transform = Transform::PlanePosition;
@@ -194,6 +194,11 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     p.push_back(std::move(plane));
     p.push_back(scalar(layout, m.planes[i].friction, Transform::Shift, 0.0, 5.0, capture.scene.planes[i].friction,
                        friction_std, !capture.scene.planes[i].knows_friction && !capture.scene.timing.is_static));
+  }
+  for (std::size_t i = 0; i < m.obstacles.size(); ++i) {
+    const RigidObstacle& obstacle = capture.scene.obstacles[i];
+    p.push_back(scalar(layout, m.obstacles[i].friction, Transform::Shift, 0.0, 5.0, obstacle.friction, friction_std,
+                       !obstacle.knows_friction && !capture.scene.timing.is_static));
   }
   if (m.contact_stiffness.exists()) {
     theta[m.contact_stiffness] = default_contact_stiffness(density * volume * std::max(gravity, 0.1),

@@ -43,10 +43,10 @@ void require_fittable(const Capture& capture, const FitOptions& options) {
   if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty() && !has_fitted_loads(capture) &&
       !has_pressed(capture))
     refuse("there are no depth cameras, no clouds and no markers", "");
-  if (has_fitted_loads(capture) && capture.scene.fixed.empty() && capture.scene.planes.empty())
+  if (has_fitted_loads(capture) && !capture.scene.is_held() && !capture.scene.is_touched())
     refuse("weights hang from the object, but nothing holds it",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
-  if (capture.scene.timing.is_static && capture.scene.fixed.empty() && capture.scene.planes.empty())
+  if (capture.scene.timing.is_static && !capture.scene.is_held() && !capture.scene.is_touched())
     refuse("the recording is static, but nothing holds the object",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
   if (capture.scene.object.shape_is == ShapeIs::Static && capture.scene.fixed.empty())

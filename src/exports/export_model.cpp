@@ -9,6 +9,7 @@
 
 #include "base/error.hpp"
 #include "exports/flat_elements.hpp"
+#include "simulation/inner_bodies.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/scene_simulation.hpp"
 
@@ -199,7 +200,10 @@ ExportModel export_model(const Model& model, ElementKind kind, std::optional<dou
                     frequencies_told, 100.0 * chosen.off));
   if (model.law)
     out.notes.push_back("The model's law (" + model.law->name + ") is told by its moduli of small strains.");
-  if (!model.scene.planes.empty()) out.notes.push_back("Planes that the object meets are left out.");
+  if (!model.scene.planes.empty() || !model.scene.obstacles.empty())
+    out.notes.push_back("Planes and obstacles that the object meets are left out.");
+  if (!model.scene.led.empty()) out.notes.push_back("Regions that are led are left out: nothing holds them.");
+  if (has_sliding_bodies(model.scene)) out.notes.push_back("Rigid bodies on which the object slides are left out.");
   if (!model.scene.weights.empty()) out.notes.push_back("Weights that hang from the object are left out.");
   if (model.material.damping == StiffnessDamping::KelvinVoigt && model.stiffness_damping > 0.0)
     out.notes.push_back("Stiffness damping is that of small motions, on which both of its laws agree.");

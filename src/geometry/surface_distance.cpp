@@ -39,24 +39,36 @@ Vector3 closest_on_triangle(const Vector3& p, const Vector3& a, const Vector3& b
   return best;
 }
 
-std::vector<double> distances_to_surface(const TriangleMesh& surface, std::span<const Vector3> points) {
+struct SurfaceDistance::Tree {
+  TriangleMesh surface;
+  BoxTree boxes;
+};
+
+SurfaceDistance::SurfaceDistance(TriangleMesh surface) {
   if (surface.triangles.empty()) throw std::invalid_argument("distances to a surface without triangles");
-  const BoxTree tree = triangle_tree(surface);
+  BoxTree boxes = triangle_tree(surface);
+  tree_ = std::make_shared<Tree>(Tree{std::move(surface), std::move(boxes)});
+}
+
+double SurfaceDistance::operator()(const Vector3& point) const {
+  const auto& [surface, boxes] = *tree_;
+  const TreePoint at = tree_point(point);
+  double least = std::numeric_limits<double>::infinity();
+  // Boxes come in the order of their distance, which is never more than that of what they hold.
+  for (auto it = boxes.qbegin(bg::index::nearest(at, unsigned(surface.triangles.size()))); it != boxes.qend(); ++it) {
+    if (bg::comparable_distance(at, it->first) > least) break;
+    const auto& [a, b, c] = surface.triangles[std::size_t(it->second)];
+    const Vector3 closest = closest_on_triangle(point, surface.vertices[a], surface.vertices[b], surface.vertices[c]);
+    least = std::min(least, (closest - point).squaredNorm());
+  }
+  return std::sqrt(least);
+}
+
+std::vector<double> distances_to_surface(const TriangleMesh& surface, std::span<const Vector3> points) {
+  const SurfaceDistance distance(surface);
   std::vector<double> distances;
   distances.reserve(points.size());
-  for (const Vector3& p : points) {
-    const TreePoint at = tree_point(p);
-    double least = std::numeric_limits<double>::infinity();
-    // Boxes come in the order of their distance, which is never more than that of what they hold.
-    for (auto it = tree.qbegin(bg::index::nearest(at, unsigned(surface.triangles.size()))); it != tree.qend(); ++it) {
-      if (bg::comparable_distance(at, it->first) > least) break;
-      const auto& [a, b, c] = surface.triangles[std::size_t(it->second)];
-      least = std::min(
-          least,
-          (closest_on_triangle(p, surface.vertices[a], surface.vertices[b], surface.vertices[c]) - p).squaredNorm());
-    }
-    distances.push_back(std::sqrt(least));
-  }
+  for (const Vector3& point : points) distances.push_back(distance(point));
   return distances;
 }
 

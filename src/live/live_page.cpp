@@ -93,14 +93,22 @@ std::string facts(const Model& model, const LiveData& data, const LiveRecording&
 
 }  // namespace
 
+bool is_known_to_pages(const Model& model) {
+  const Timing& timing = model.scene.timing;
+  const bool is_pressed = model.law && (timing.is_static || timing.times.empty());  // on the bodies that it is glued to
+  return !has_sliding_bodies(model.scene) && model.scene.obstacles.empty() && (model.scene.inner.empty() || is_pressed);
+}
+
 LiveData live_data(const Model& model) {
-  if (has_sliding_bodies(model.scene))
+  if (!is_known_to_pages(model))
     throw InputError({{},
-                      "a model that slides on a rigid body inside it ([[inner]] with contact = \"sliding\")",
-                      "glued bodies, or none",
-                      "pages know no sliding bodies: `pliant press` does"});
+                      "a model that slides on a rigid body inside it, moves with one, or meets an [[obstacle]]",
+                      "planes alone, and bodies that pressed objects are glued to",
+                      "pages know no others: `pliant press` and `pliant simulate` do"});
   Model free = model;
   free.scene.inner.clear();  // what they hold is among the held nodes
+  for (const LedRegion& led : free.scene.led) free.scene.fixed.push_back({led.region, std::nullopt});  // hands lead
+  free.scene.led.clear();
   free.scene.initial.released = false;
   free.scene.initial.release_of.reset(), free.scene.initial.pulls.clear(), free.scene.initial.pulled_at.clear();
   free.scene.wind.reset(), free.scene.forces.clear();  // hands and sliders take their place
@@ -110,7 +118,7 @@ LiveData live_data(const Model& model) {
   data.mesh = made.body->mesh;
   data.relative_moduli = made.body->modulus.relative;
   data.surface = *model.scene.object.surface;
-  data.fixed = model.scene.fixed, data.weights = model.scene.weights;
+  data.fixed = free.scene.fixed, data.weights = model.scene.weights;
   data.planes = int(model.scene.planes.size());
   const MotionLayout blocks = live_blocks(data.planes);
   if (made.theta.size() != blocks.size()) throw std::logic_error("parameters of a model in motion have another layout");

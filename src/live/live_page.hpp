@@ -20,6 +20,8 @@ struct LiveRecording {
 /// Everything that a page needs to move or press a model. What is held, at rest and of a material law is pressed:
 /// nothing is known of its damping. All else moves.
 LiveData live_data(const Model& model);
+/// Whether a page knows all that a model meets: no obstacle beside planes, nothing on which it slides.
+bool is_known_to_pages(const Model& model);
 
 /// A page in which the object can be pulled, poked and blown at: one file that needs neither server nor network. It
 /// holds the simulation as WebAssembly, the object, and what was recorded of it.

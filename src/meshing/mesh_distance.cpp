@@ -3,11 +3,53 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/MeshToVolume.h>
 
+#include <algorithm>
+#include <map>
 #include <string>
+#include <type_traits>
+#include <vector>
 
+#include "base/disjoint_sets.hpp"
 #include "base/error.hpp"
 
 namespace pliant {
+
+namespace {
+
+/// Triangles of a mesh: those of shells that face outwards, and of each cavity, a shell that faces inwards.
+struct Shells {
+  TriangleMesh outer;
+  std::vector<TriangleMesh> cavities;
+};
+
+Shells shells_of(const TriangleMesh& mesh) {
+  DisjointSets parts(mesh.vertices.size());
+  for (const auto& [a, b, c] : mesh.triangles) parts.join(a, b), parts.join(a, c);
+  std::map<int, TriangleMesh> by_root;
+  for (const auto& triangle : mesh.triangles) by_root[parts.root(triangle[0])].triangles.push_back(triangle);
+  Shells shells{{mesh.vertices, {}}, {}};
+  for (auto& [root, shell] : by_root) {
+    shell.vertices = mesh.vertices;
+    if (enclosed_volume(shell) < 0.0)
+      shells.cavities.push_back(std::move(shell));
+    else
+      shells.outer.triangles.insert(shells.outer.triangles.end(), shell.triangles.begin(), shell.triangles.end());
+  }
+  if (shells.outer.triangles.empty()) return {mesh, {}};
+  return shells;
+}
+
+/// Distances in grid spacings, of a mesh whose vertices are in index space. What lies in a closed shell is inside,
+/// whichever way that faces.
+openvdb::FloatGrid::Ptr level_set(const std::vector<openvdb::Vec3s>& points, const TriangleMesh& mesh, float band) {
+  std::vector<openvdb::Vec3I> triangles;
+  for (const auto& [a, b, c] : mesh.triangles) triangles.emplace_back(a, b, c);
+  using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I>;
+  const Adapter adapter(points, triangles);
+  return openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, openvdb::math::Transform(), band, band);
+}
+
+}  // namespace
 
 SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double margin) {
   static const bool initialised = (openvdb::initialize(), true);
@@ -21,28 +63,28 @@ SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double 
   const Vector3 origin = distance.origin_;
 
   std::vector<openvdb::Vec3s> points;
-  std::vector<openvdb::Vec3I> triangles;
   points.reserve(mesh.vertices.size());
-  triangles.reserve(mesh.triangles.size());
   for (const Vector3& v : mesh.vertices) {
     const Vector3 p = (v - origin) / spacing;  // index space: grid point (i, j, k) lies at (i, j, k)
     points.emplace_back(float(p.x()), float(p.y()), float(p.z()));
   }
-  for (const auto& [a, b, c] : mesh.triangles) triangles.emplace_back(a, b, c);
-
-  using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I>;
-  const Adapter adapter(points, triangles);
   const float band = float(margin / spacing) + 3.0f;
-  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter, openvdb::math::Transform(), band, band);
-  auto accessor = grid->getConstAccessor();
+  const Shells shells = shells_of(mesh);
+  const auto fill = [&](const TriangleMesh& shell, const auto& combined) {
+    const auto grid = level_set(points, shell, band);
+    auto accessor = grid->getConstAccessor();
+    for (int k = 0; k < distance.size_.z(); ++k)
+      for (int j = 0; j < distance.size_.y(); ++j)
+        for (int i = 0; i < distance.size_.x(); ++i)
+          distance.at(i, j, k) = combined(distance.at(i, j, k), accessor.getValue({i, j, k}) * float(spacing));
+  };
+  fill(shells.outer, [](auto, auto value) { return value; });
+  for (const TriangleMesh& cavity : shells.cavities)
+    fill(cavity, [](auto before, auto value) { return std::max<std::decay_t<decltype(before)>>(before, -value); });
   bool encloses = false;
   for (int k = 0; k < distance.size_.z(); ++k)
     for (int j = 0; j < distance.size_.y(); ++j)
-      for (int i = 0; i < distance.size_.x(); ++i) {
-        const float value = accessor.getValue({i, j, k});
-        encloses = encloses || value < 0.0f;
-        distance.at(i, j, k) = value * float(spacing);
-      }
+      for (int i = 0; i < distance.size_.x(); ++i) encloses = encloses || distance.at(i, j, k) < 0.0f;
   if (!encloses)
     throw InputError({{},
                       "the surface encloses no volume at a resolution of " + std::to_string(spacing) + " m",

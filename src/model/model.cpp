@@ -12,6 +12,7 @@
 #include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
 #include "scene/inner_body.hpp"
+#include "scene/obstacle.hpp"
 #include "scene/scene_toml.hpp"
 
 namespace pliant {
@@ -166,6 +167,9 @@ class Reader {
     root.with_table("timing", [&](TomlTable& timing) { scene.timing = read_even_timing(timing, 10'000'000); });
     root.with_table("initial", [&](TomlTable& initial) { scene.initial = read_initial(initial, true); });
     root.each_block("plane", [&](TomlTable& block) { scene.planes.push_back(read_plane(block)); });
+    root.each_block("obstacle",
+                    [&](TomlTable& block) { scene.obstacles.push_back(read_obstacle(block, files_, false)); });
+    root.each_block("led", [&](TomlTable& block) { scene.led.push_back(read_led(block, files_)); });
     root.each_block("inner", [&](TomlTable& block) { scene.inner.push_back(read_inner(block, files_)); });
     root.each_block("fixed", [&](TomlTable& block) { scene.fixed.push_back(read_fixed(block, files_)); });
     root.each_block("weight", [&](TomlTable& block) { scene.weights.push_back(read_weight(block)); });

@@ -81,7 +81,8 @@ RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double y
 
 RigidContact inner_contact(const Body& body, std::shared_ptr<const RigidShape> shape, double youngs_modulus) {
   const double edge = mean_edge(body);
-  const ContactSamples all = boundary_samples(body, inner_cuts);
+  const ContactSamples all =
+      body.kind == ElementKind::Hexahedron ? surface_samples(body) : boundary_samples(body, inner_cuts);
   ContactSamples facing;
   for (std::size_t i = 0; i < all.rest.size(); ++i)
     if (shape->sample(all.rest[i]).gradient.dot(all.normal[i]) < 0.0) {
@@ -99,7 +100,10 @@ RigidContact inner_contact(const Body& body, std::shared_ptr<const RigidShape> s
 
 double bond_stiffness(double youngs_modulus, double edge) { return bond * youngs_modulus / edge; }
 
-/// A regular tetrahedron of edge a has the volume a^3 / (6 sqrt 2).
-double mean_edge(const Body& body) { return std::cbrt(6.0 * std::sqrt(2.0) * body.volume() / body.element_count()); }
+double mean_edge(const Body& body) {
+  // A regular tetrahedron of edge a has the volume a^3 / (6 sqrt 2).
+  const double edges = body.kind == ElementKind::Hexahedron ? 1.0 : 6.0 * std::sqrt(2.0);
+  return std::cbrt(edges * body.volume() / body.element_count());
+}
 
 }  // namespace pliant

@@ -53,10 +53,10 @@ Vector3 probe_axis(const Body& body, const ProbeOptions& probe);
 /// Throws InputError where the probe is bonded and covers nothing of the object, std::invalid_argument for hexahedra.
 RigidContact probe_contact(const Body& body, const ProbeOptions& probe, double youngs_modulus);
 
-/// The contact of a body of tetrahedra that slides on a rigid body inside or under it. Only what faces it can touch it,
+/// The contact of a body that slides on a rigid body inside or under it. Only what faces it can touch it,
 /// and what touches it at rest is not pressed there.
 /// @param youngs_modulus  about which the contact is stiff [Pa]: the object's mean
-/// Throws InputError where nothing of the object faces the body, std::invalid_argument for hexahedra.
+/// Throws InputError where nothing of the object faces the body.
 RigidContact inner_contact(const Body& body, std::shared_ptr<const RigidShape> shape, double youngs_modulus);
 
 /// Stiffness [Pa/m] of a disc's bond on elements of some edge [m]. Faces that a disc covers in part would follow it as
@@ -64,7 +64,7 @@ RigidContact inner_contact(const Body& body, std::shared_ptr<const RigidShape> s
 /// disc would sink in. At ten times the stiffness of a layer both are small, of linear elements: see `probe_contact`.
 double bond_stiffness(double youngs_modulus, double edge);
 
-/// Mean edge of a body's tetrahedra [m], as if they were regular.
+/// Mean edge of a body's elements [m], as if they were regular.
 double mean_edge(const Body& body);
 
 }  // namespace pliant

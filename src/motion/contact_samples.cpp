@@ -53,6 +53,7 @@ ContactSamples surface_samples(const Body& body) {
   for (const SurfacePoint& point : body.surface) {
     samples.rest.push_back(point.position);
     samples.area.push_back(point.area);
+    samples.normal.push_back(point.normal);
   }
   return samples;
 }
@@ -66,6 +67,21 @@ ContactSamples boundary_samples(const Body& body, int cuts) {
       samples.area.push_back(area);
       samples.normal.push_back(normal);
     });
+  }
+  return samples;
+}
+
+ContactSamples mesh_samples(const TriangleMesh& surface, double spacing) {
+  ContactSamples samples;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Face face{
+        {surface.vertices[std::size_t(a)], surface.vertices[std::size_t(b)], surface.vertices[std::size_t(c)]}};
+    if (!(face.area() > 0.0)) continue;
+    const Vector3 normal = face.normal();
+    cut(face, std::max(1, int(std::ceil(std::sqrt(2.0 * face.area()) / spacing))),
+        [&](const Vector3& point, double area) {
+          samples.rest.push_back(point), samples.area.push_back(area), samples.normal.push_back(normal);
+        });
   }
   return samples;
 }

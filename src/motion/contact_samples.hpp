@@ -10,11 +10,14 @@ namespace pliant {
 struct ContactSamples {
   std::vector<Vector3> rest;         ///< rest positions [m]
   std::vector<double> area;          ///< area of each [m^2]
-  std::vector<Vector3> normal = {};  ///< outwards, unit, of samples of a boundary's faces; else empty
+  std::vector<Vector3> normal = {};  ///< outwards, unit; of samples of discs empty
 };
 
 /// The samples of the surface that a body of any kind comes with: about one a surface triangle or cell.
 ContactSamples surface_samples(const Body& body);
+
+/// Samples of a surface whose triangles are cut into equal ones with sides of a spacing [m] at most.
+ContactSamples mesh_samples(const TriangleMesh& surface, double spacing);
 
 /// The boundary of a body of tetrahedra, every face cut into n^2 equal triangles, one sample each.
 /// Throws std::invalid_argument for hexahedra.

@@ -23,23 +23,37 @@ Patch surface_patch(const Body& body, const Vector3& centre, double radius) {
   return patch;
 }
 
-Patch node_patch(const Body& body, const std::vector<int>& nodes) {
-  if (nodes.empty()) throw std::invalid_argument("a patch of nodes needs one");
-  Points volume = Points::Zero(body.node_count(), 3);
-  body.add_mass_product(1.0, Points::Ones(body.node_count(), 3), volume);
-  Patch patch;
-  double sum = 0.0;
-  for (const int node : nodes) {
-    patch.rest.push_back(body.scanned_positions().row(node).transpose());
-    patch.share.push_back(std::max(0.0, volume(node, 0)));
-    sum += patch.share.back();
+RegionPatch region_patch(const Body& body, const std::function<bool(const Vector3&)>& contains) {
+  RegionPatch region;
+  const auto add = [&](const Vector3& point, double volume) {
+    if (!contains(point)) return;
+    region.patch.rest.push_back(point), region.patch.share.push_back(volume);
+    region.volume += volume;
+  };
+  if (body.kind == ElementKind::Hexahedron) {
+    constexpr int n = 4;
+    const HexGrid& grid = body.grid();
+    for (int e = 0; e < grid.cell_count(); ++e) {
+      const Vector3 corner = grid.origin + grid.cell_size * grid.cell_index[std::size_t(e)].cast<double>();
+      for (int s = 0; s < n * n * n; ++s)
+        add(corner + grid.cell_size / n * (Vector3(s % n, s / n % n, s / (n * n)).array() + 0.5).matrix(),
+            body.element_volume[std::size_t(e)] / (n * n * n));
+    }
+  } else {
+    Points volume = Points::Zero(body.node_count(), 3);
+    body.add_mass_product(1.0, Points::Ones(body.node_count(), 3), volume);
+    // Corners of quadratic elements have no volume of their own, or less than none.
+    const double least = 0.1 * body.volume() / std::max(1, body.node_count());
+    for (int n = 0; n < body.node_count(); ++n)
+      add(body.scanned_positions().row(n).transpose(), std::max(least, volume(n, 0)));
   }
-  for (double& share : patch.share) share = sum > 0.0 ? share / sum : 1.0 / double(nodes.size());
-  return patch;
+  for (double& share : region.patch.share) share /= region.volume;
+  return region;
 }
 
 LedSprings::LedSprings(const Body& body, const Patch& patch, LedSpringsOptions options)
     : options_(std::move(options)),
+      stiffness_(options_.stiffness),
       points_(body, patch.rest),
       share_(patch.share),
       blocks_(body.blocks),
@@ -49,6 +63,16 @@ LedSprings::LedSprings(const Body& body, const Patch& patch, LedSpringsOptions o
   if (patch.rest.empty() || patch.rest.size() != patch.share.size())
     throw std::invalid_argument("a grip needs points, with a share each");
   if (!(options_.stiffness > 0.0)) throw std::invalid_argument("a grip's stiffness must be positive");
+}
+
+void LedSprings::set_parameters(const VectorX& theta) {
+  moduli_.clear();
+  double log_mean = 0.0;
+  for (const ParameterHandle& modulus : options_.moduli) {
+    moduli_.push_back(theta[modulus]);
+    log_mean += std::log(moduli_.back()) / double(options_.moduli.size());
+  }
+  stiffness_ = options_.stiffness * std::exp(log_mean);
 }
 
 void LedSprings::take_hold(const Points& positions, double time) {
@@ -87,8 +111,7 @@ void LedSprings::begin_step(const StepContext& step) {
 
 Vector3 LedSprings::force(const Points& z) const {
   Vector3 sum = Vector3::Zero();
-  for (int i = 0; i < points_.point_count() && holds_; ++i)
-    sum -= stiffness(i) * (points_.position(i, z) - target_[std::size_t(i)]);
+  for (int i = 0; i < points_.point_count() && holds_; ++i) sum -= stiffness(i) * way(i, z);
   return sum;
 }
 
@@ -113,8 +136,7 @@ Vector3 LedSprings::middle(const Points& z) const {
 }
 
 void LedSprings::add_force(const Points& z, Points& force) {
-  for (int i = 0; i < points_.point_count() && holds_; ++i)
-    points_.add_transpose(i, -stiffness(i) * (points_.position(i, z) - target_[std::size_t(i)]), force);
+  for (int i = 0; i < points_.point_count() && holds_; ++i) points_.add_transpose(i, -stiffness(i) * way(i, z), force);
 }
 
 void LedSprings::add_matrix(double scale, BlockMatrix& matrix) {
@@ -132,19 +154,28 @@ void LedSprings::add_matrix(double scale, BlockMatrix& matrix) {
 
 std::optional<double> LedSprings::potential(const Points& x) {
   double sum = 0.0;
-  for (int i = 0; i < points_.point_count() && holds_; ++i)
-    sum += 0.5 * stiffness(i) * (points_.position(i, x) - target_[std::size_t(i)]).squaredNorm();
+  for (int i = 0; i < points_.point_count() && holds_; ++i) sum += 0.5 * stiffness(i) * way(i, x).squaredNorm();
   return sum;
 }
 
-void LedSprings::add_force_tangent(const Points&, const Points&, const Points& d_z, const VectorX&, Points& force) {
+void LedSprings::add_force_tangent(const Points& z, const Points&, const Points& d_z, const VectorX& d_theta,
+                                   Points& force) {
+  double d_log = 0.0;
+  for (std::size_t k = 0; k < moduli_.size(); ++k)
+    d_log += d_theta[options_.moduli[k]] / moduli_[k] / double(moduli_.size());
   for (int i = 0; i < points_.point_count() && holds_; ++i)
-    points_.add_transpose(i, -stiffness(i) * points_.position(i, d_z), force);
+    points_.add_transpose(i, -stiffness(i) * (points_.position(i, d_z) + d_log * way(i, z)), force);
 }
 
-void LedSprings::add_force_adjoint(const Points&, const Points& w, Points&, Points& z_bar, VectorX&) {
-  for (int i = 0; i < points_.point_count() && holds_; ++i)
-    points_.add_transpose(i, -stiffness(i) * points_.position(i, w), z_bar);
+void LedSprings::add_force_adjoint(const Points& z, const Points& w, Points&, Points& z_bar, VectorX& theta_bar) {
+  double log_bar = 0.0;
+  for (int i = 0; i < points_.point_count() && holds_; ++i) {
+    const Vector3 of_point = points_.position(i, w);
+    log_bar -= stiffness(i) * way(i, z).dot(of_point);
+    points_.add_transpose(i, -stiffness(i) * of_point, z_bar);
+  }
+  for (std::size_t k = 0; k < moduli_.size(); ++k)
+    theta_bar[options_.moduli[k]] += log_bar / moduli_[k] / double(moduli_.size());
 }
 
 PatchLoad::PatchLoad(const Body& body, const Patch& patch, KeyFrames<3> force, const ParameterHandle& strength)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "elasticity/body.hpp"
@@ -18,11 +19,18 @@ struct Patch {
 /// The surface within a radius [m] of a point, by area with a smooth edge; the nearest sample alone where the radius
 /// holds none.
 Patch surface_patch(const Body& body, const Vector3& centre, double radius);
-/// Nodes by the volume about each. Throws std::invalid_argument for none.
-Patch node_patch(const Body& body, const std::vector<int>& nodes);
+
+/// What of the body lies in a region at rest, as points of equal springs: of hexahedra points throughout their part
+/// inside, by its volume; of tetrahedra, which follow the shape, the nodes.
+struct RegionPatch {
+  Patch patch;
+  double volume = 0.0;  ///< [m^3]; 0: nothing of the body lies there, and there are no points
+};
+RegionPatch region_patch(const Body& body, const std::function<bool(const Vector3&)>& contains);
 
 struct LedSpringsOptions {
   double stiffness = 0.0;                     ///< of all springs together [N/m], > 0
+  std::vector<ParameterHandle> moduli = {};   ///< where there are any, the stiffness is times their geometric mean [Pa]
   KeyedMotion motion;                         ///< of what grips
   double from = -infinite, until = infinite;  ///< when it takes hold and lets go [s]
   /// Where springs are without force: where the points are as it takes hold, carried along with the motion from then
@@ -52,7 +60,7 @@ class LedSprings : public ForceTerm {
 
   Lag lag() const override { return Lag::Rotation; }
   At at() const override { return At::End; }
-  void set_parameters(const VectorX&) override {}
+  void set_parameters(const VectorX& theta) override;
   void begin_step(const StepContext& step) override;
   void linearise(const Points&) override {}
   void add_force(const Points& z, Points& force) override;
@@ -64,9 +72,12 @@ class LedSprings : public ForceTerm {
 
  private:
   void take_hold(const Points& positions, double time);
-  double stiffness(int point) const { return options_.stiffness * share_[std::size_t(point)]; }
+  double stiffness(int point) const { return stiffness_ * share_[std::size_t(point)]; }
+  Vector3 way(int point, const Points& z) const { return points_.position(point, z) - target_[std::size_t(point)]; }
 
   LedSpringsOptions options_;
+  double stiffness_ = 0.0;      // for the parameters at hand [N/m]
+  std::vector<double> moduli_;  // the same [Pa]
   Embedding points_;
   std::vector<double> share_;
   std::shared_ptr<const std::vector<int>> blocks_;

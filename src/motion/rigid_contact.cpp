@@ -20,11 +20,13 @@ RigidContact RigidContact::bonded(const Body& body, const ContactSamples& sample
 }
 
 RigidContact RigidContact::sliding(const Body& body, const ContactSamples& samples,
-                                   std::shared_ptr<const RigidShape> shape, const Penalty& penalty) {
+                                   std::shared_ptr<const RigidShape> shape, const Penalty& penalty,
+                                   const ContactBlock& block) {
   if (!(penalty.stiffness > 0.0) || !(penalty.smoothing > 0.0))
     throw std::invalid_argument("contact needs a positive stiffness and smoothing length");
   RigidContact contact(body, samples);
   contact.shape_ = std::move(shape);
+  contact.block_ = block;
   contact.penalty_ = penalty;
   return contact;
 }
@@ -33,6 +35,7 @@ RigidContact RigidContact::sliding(const Body& body, const ContactSamples& sampl
                                    const Penalty& penalty) {
   RigidContact contact = sliding(body, samples, nullptr, penalty);
   contact.plane_ = plane;
+  contact.block_ = {plane.friction, plane.stiffness};
   return contact;
 }
 
@@ -60,12 +63,13 @@ void RigidContact::set_row(const Body& body, int row, const BlockPattern& patter
 }
 
 void RigidContact::set_parameters(const VectorX& theta) {
-  if (!plane_) return;
-  plane_point_ = plane_->point.vector(theta);
-  plane_normal_ = plane_->normal.vector(theta);
-  if (plane_->friction.exists()) friction_ = theta[plane_->friction];
-  follows_stiffness_ = plane_->stiffness.exists() && theta[plane_->stiffness] > 0.0;
-  if (follows_stiffness_) penalty_.stiffness = theta[plane_->stiffness];
+  if (plane_) {
+    plane_point_ = plane_->point.vector(theta);
+    plane_normal_ = plane_->normal.vector(theta);
+  }
+  if (block_.friction.exists()) friction_ = theta[block_.friction];
+  follows_stiffness_ = block_.stiffness.exists() && theta[block_.stiffness] > 0.0;
+  if (follows_stiffness_) penalty_.stiffness = theta[block_.stiffness];
 }
 
 void RigidContact::lead(KeyedMotion motion) {
@@ -91,13 +95,14 @@ void RigidContact::begin_step(const StepContext& step) {
   start_ = step.start;
   threshold_ = friction_speed_ * step.dt;
   if (!led_shape_) return;
-  const RigidMotion end = motion_.at(step.time + step.dt), before = motion_.at(step.time).inverse();
-  shape_ = rigid_moved(led_shape_, end);
-  carried_ = {end.rotation * before.rotation, end(before.translation)};
+  const RigidMotion now = motion_.at(step.time + step.contact_weight * step.dt);
+  const RigidMotion before = motion_.at(step.time).inverse();
+  shape_ = rigid_moved(led_shape_, now);
+  carried_ = {now.rotation * before.rotation, now(before.translation)};
 }
 
 bool RigidContact::may_rub() const {
-  return start_ && friction_speed_ > 0.0 && (friction_ > 0.0 || (plane_ && plane_->friction.exists()));
+  return start_ && friction_speed_ > 0.0 && (friction_ > 0.0 || block_.friction.exists());
 }
 
 void RigidContact::touch_at_rest() {
@@ -274,8 +279,8 @@ void RigidContact::add_force_tangent(const Points& z, const Points& d_lag, const
   if (is_bonded()) for_bonded([&](int i, double k) { scatter(i, -k * relative_change(i, d_z), force); });
   const Vector3 d_point = plane_ ? plane_->point.vector(d_theta) : Vector3::Zero();
   const Vector3 d_plane_normal = plane_ ? plane_->normal.vector(d_theta) : Vector3::Zero();
-  const double d_friction = plane_ && plane_->friction.exists() ? d_theta[plane_->friction] : 0.0;
-  const double d_log_stiffness = follows_stiffness_ ? d_theta[plane_->stiffness] / penalty_.stiffness : 0.0;
+  const double d_friction = block_.friction.exists() ? d_theta[block_.friction] : 0.0;
+  const double d_log_stiffness = follows_stiffness_ ? d_theta[block_.stiffness] / penalty_.stiffness : 0.0;
   const bool has_details = shape_ || rubs() || (d_friction != 0.0 && may_rub());
   const Detail none;
   for (std::size_t i = 0; i < active_.size(); ++i) {
@@ -341,11 +346,12 @@ void RigidContact::add_force_adjoint(const Points& z, const Points& w, Points& l
     scatter(c.point, y_bar, lag_bar);
     scatter(c.point, end_bar, z_bar);
   }
-  if (!plane_) return;
-  theta_bar.segment<3>(plane_->point) += point_bar;
-  theta_bar.segment<3>(plane_->normal) += plane_normal_bar;
-  if (plane_->friction.exists()) theta_bar[plane_->friction] += friction_bar;
-  if (follows_stiffness_) theta_bar[plane_->stiffness] += log_stiffness_bar / penalty_.stiffness;
+  if (plane_) {
+    theta_bar.segment<3>(plane_->point) += point_bar;
+    theta_bar.segment<3>(plane_->normal) += plane_normal_bar;
+  }
+  if (block_.friction.exists()) theta_bar[block_.friction] += friction_bar;
+  if (follows_stiffness_) theta_bar[block_.stiffness] += log_stiffness_bar / penalty_.stiffness;
 }
 
 void RigidContact::add_start_tangent(const Points& z, const Points& d_start, const Points&, Points& force) {

@@ -35,8 +35,9 @@ class RigidContact : public ForceTerm {
   /// @param stiffness  k [Pa/m], > 0
   static RigidContact bonded(const Body& body, const ContactSamples& samples, double stiffness);
   /// Throws std::invalid_argument for a penalty without stiffness or smoothing.
+  /// @param block  of the parameter vector, where friction and stiffness stand in it
   static RigidContact sliding(const Body& body, const ContactSamples& samples, std::shared_ptr<const RigidShape> shape,
-                              const Penalty& penalty);
+                              const Penalty& penalty, const ContactBlock& block = {});
   /// A plane whose place, coefficient of friction and stiffness stand in the parameter vector.
   static RigidContact sliding(const Body& body, const ContactSamples& samples, const PlaneBlock& plane,
                               const Penalty& penalty);
@@ -49,12 +50,12 @@ class RigidContact : public ForceTerm {
   int active_count() const { return is_bonded() ? points_.point_count() : int(active_.size()); }
 
   /// Coulomb friction of a shape that no parameter block describes, and the regularisation of any.
-  /// @param coefficient  mu [-], >= 0; a plane of the parameter vector has its own
+  /// @param coefficient  mu [-], >= 0; where the parameter vector has one, it is that
   /// @param speed        below which friction fades to nothing [m/s], > 0
   void set_friction(double coefficient, double speed);
-  /// The shape moves, and may turn, over time: in a step it is where it is at the end, and friction is with the way
-  /// relative to it. Its translation stays zero. Throws std::invalid_argument for a bond or a plane of the parameter
-  /// vector.
+  /// The shape moves, and may turn, over time: in a step it is where it is when contact acts, and friction is with the
+  /// way relative to it. Its translation stays zero. Throws std::invalid_argument for a bond or a plane of the
+  /// parameter vector.
   void lead(KeyedMotion motion);
   /// The rigid body is turned about a point, which its translation then moves; bonded samples turn along. Throws
   /// std::invalid_argument for a plane of the parameter vector and for a shape that is led.
@@ -148,6 +149,7 @@ class RigidContact : public ForceTerm {
   std::shared_ptr<const std::vector<int>> blocks_;  // where each element's blocks go in the matrix
   std::shared_ptr<const RigidShape> shape_;
   std::optional<PlaneBlock> plane_;
+  ContactBlock block_;
   Penalty penalty_;
   bool follows_stiffness_ = false;                                  // whether the penalty's stiffness is that of theta
   double friction_ = 0.0, friction_speed_ = 0.0, threshold_ = 0.0;  // threshold: s [m]

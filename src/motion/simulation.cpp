@@ -95,6 +95,7 @@ Simulation::Simulation(std::shared_ptr<const Body> body, SimulationOptions optio
     statics_.hold(eliminated_nodes(*body_, options_));
   else
     statics_.anchor(held_nodes(*body_, options_.holds));
+  if (!options_.times.empty()) statics_.set_time(options_.times.front());
   element_edge_ = std::cbrt(body_->volume() / std::max(1, body_->element_count()));
   check_start();
   prepare_holds();

@@ -37,7 +37,7 @@ std::optional<double> Statics::linearise(const Points& x) {
   has_energy_ = true;
   energy_scale_ = 0.0;
   for (ForceTerm* term : terms_) {
-    term->begin_step({});
+    term->begin_step({nullptr, nullptr, time_, 0.0});
     term->linearise(x_);
     if (!has_energy_) continue;
     const std::optional<double> energy = term->potential(x_);

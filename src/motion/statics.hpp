@@ -42,6 +42,8 @@ class Statics : private NewtonProblem {
   void hold(std::vector<int> rows) { held_ = std::move(rows); }
   /// Nodes that hardly move though nothing eliminates them: on the way to an equilibrium parts turn about them.
   void anchor(std::vector<int> nodes) { anchors_ = std::move(nodes); }
+  /// Time [s] of the equilibrium, for forces that change with it.
+  void set_time(double time) { time_ = time; }
   void set_smallest_force(double force) { options_.smallest_force = force; }
 
   /// Positions where the forces balance, from a guess. Not converged: x is the best found, and `failure` says why.
@@ -98,6 +100,7 @@ class Statics : private NewtonProblem {
   StaticsOptions options_;
   std::shared_ptr<const BlockPattern> pattern_;
   std::vector<int> held_, anchors_;
+  double time_ = 0.0;  // [s]
   Newton newton_;
 
   BlockMatrix matrix_, positive_;

@@ -72,7 +72,7 @@ std::vector<ForceTerm*> Stepper::terms() const {
 }
 
 void Stepper::begin(const State& start) {
-  for (auto& term : terms_) term->begin_step({&start.x, &start.v, time_, options_.dt});
+  for (auto& term : terms_) term->begin_step({&start.x, &start.v, time_, options_.dt, options_.contact_weight});
 }
 
 void Stepper::set_points_at(const Scheme& s, const Points& x, const Points& delta) {

@@ -25,7 +25,6 @@
 #include "report/gallery.hpp"
 #include "report/plot.hpp"
 #include "report/report.hpp"
-#include "simulation/inner_bodies.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
@@ -644,8 +643,7 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     const Model model = make_model(capture, outcome);
     save_model(folder, model);
     modulus_std = model.volume.youngs_modulus_std;
-    if (!has_sliding_bodies(model.scene))  // of which pages know nothing
-      report.live_page = write_live_page(folder, recordings.front(), outcome, model);
+    if (is_known_to_pages(model)) report.live_page = write_live_page(folder, recordings.front(), outcome, model);
   }
   if (outcome.law)
     write_law(folder, capture, *outcome.law, modulus_std, report, tell);

@@ -99,6 +99,19 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   scene.planes = planes_at(capture, blocks, t);
   for (Plane& plane : scene.planes) plane.known = true;
   scene.fixed = capture.scene.fixed;
+  scene.inner = capture.scene.inner;
+  scene.obstacles = capture.scene.obstacles, scene.led = capture.scene.led;
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
+    scene.obstacles[i].friction = t[blocks.obstacles[i].friction];
+    scene.obstacles[i].knows_friction = true;
+  }
+  const double begins = capture.scene.timing.times.empty() ? 0.0 : capture.scene.timing.times.front();
+  for (RigidObstacle& obstacle : scene.obstacles)  // a model's first frame is at 0 s
+    for (auto& key : obstacle.motion) key.time -= begins;
+  for (LedRegion& led : scene.led) {
+    led.from -= begins, led.until -= begins;
+    for (auto& key : led.motion) key.time -= begins;
+  }
   scene.weights = capture.scene.weights;
   scene.wind = capture.scene.wind, scene.forces = capture.scene.forces;
   if (scene.wind) {
@@ -155,6 +168,9 @@ CaptureScene make_scene(const Model& model, const Capture& recorded) {
   std::vector<Plane>& planes = capture.scene.planes;  // how they rub the model knows, where nobody said it
   for (std::size_t i = 0; i < std::min(planes.size(), model.scene.planes.size()); ++i)
     if (!planes[i].knows_friction) planes[i].friction = model.scene.planes[i].friction;
+  std::vector<RigidObstacle>& obstacles = capture.scene.obstacles;
+  for (std::size_t i = 0; i < std::min(obstacles.size(), model.scene.obstacles.size()); ++i)
+    if (!obstacles[i].knows_friction) obstacles[i].friction = model.scene.obstacles[i].friction;
   ModelScene made = make_scene(model, capture.scene, capture_distance(capture, Resolution{}.band), capture.file);
   Resolution resolution;
   resolution.cells = object_size(capture.scene) / model.cell_size;

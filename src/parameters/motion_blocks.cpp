@@ -24,6 +24,8 @@ std::vector<ParameterHandle> MotionBlocks::all() const {
     handles.push_back(plane.whole());
     if (plane.friction.exists()) handles.push_back(plane.friction);
   }
+  for (const ContactBlock& obstacle : obstacles)
+    if (obstacle.friction.exists()) handles.push_back(obstacle.friction);
   if (contact_stiffness.exists()) handles.push_back(contact_stiffness);
   handles.insert(handles.end(), pulls.begin(), pulls.end());
   handles.insert(handles.end(), scan_corrections.begin(), scan_corrections.end());
@@ -43,6 +45,7 @@ MotionBlocks MotionBlocks::moved(const std::function<ParameterHandle(const Param
   };
   for (PlaneBlock& plane : other.planes)
     plane = {there(plane.point), there(plane.normal), there_if(plane.friction), there_if(plane.stiffness)};
+  for (ContactBlock& obstacle : other.obstacles) obstacle = {there_if(obstacle.friction), there_if(obstacle.stiffness)};
   other.contact_stiffness = there_if(contact_stiffness);
   for (ParameterHandle& pull : other.pulls) pull = there(pull);
   for (ParameterHandle& correction : other.scan_corrections) correction = there(correction);
@@ -77,8 +80,14 @@ MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& coun
         layout.add({i == 0 ? "friction" : "friction_" + std::to_string(i + 1), "1", 1, Role::Obstacle});
     blocks.planes.push_back({{plane.first, 3}, {plane.first + 3, 3}, friction, {}});
   }
-  if (counts.planes > 0) blocks.contact_stiffness = layout.add({"contact_stiffness", "Pa/m", 1, Role::Obstacle});
+  for (int i = 0; i < counts.obstacles; ++i)
+    blocks.obstacles.push_back({layout.add({i == 0 ? "obstacle_friction" : "obstacle_friction_" + std::to_string(i + 1),
+                                            "1", 1, Role::Obstacle}),
+                                {}});
+  if (counts.planes + counts.obstacles > 0)
+    blocks.contact_stiffness = layout.add({"contact_stiffness", "Pa/m", 1, Role::Obstacle});
   for (PlaneBlock& plane : blocks.planes) plane.stiffness = blocks.contact_stiffness;
+  for (ContactBlock& obstacle : blocks.obstacles) obstacle.stiffness = blocks.contact_stiffness;
   for (int k = 0; k < counts.pulls; ++k)
     blocks.pulls.push_back(layout.add({"pull@" + std::to_string(k + 1), "1", 3, Role::Initial}));
   for (int k = 0; k < counts.scan_corrections; ++k)

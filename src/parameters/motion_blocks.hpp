@@ -32,6 +32,12 @@ struct PlaneBlock {
   ParameterHandle whole() const { return {point.first, point.size + normal.size}; }
 };
 
+/// Blocks of contact with an obstacle whose place is known.
+struct ContactBlock {
+  ParameterHandle friction;   ///< Coulomb's coefficient [-]; may not exist: that which the contact was made with
+  ParameterHandle stiffness;  ///< as of `PlaneBlock`
+};
+
 /// Blocks of everything that the motion of a body depends on.
 struct MotionBlocks : MaterialBlocks {
   ParameterHandle mass_damping;                   ///< Rayleigh, [1/s]
@@ -40,8 +46,9 @@ struct MotionBlocks : MaterialBlocks {
   ParameterHandle gravity;                        ///< 3, [m/s^2]
   ParameterHandle linear_velocity;                ///< 3, of the centre of mass at the start [m/s]
   ParameterHandle angular_velocity;               ///< 3, about the centre of mass at the start [rad/s]
-  std::vector<PlaneBlock> planes;                 ///< obstacles; all have one block of stiffness
-  ParameterHandle contact_stiffness;              ///< that block [Pa/m]; does not exist where there is no plane
+  std::vector<PlaneBlock> planes;                 ///< obstacles; all have one block of stiffness,
+  std::vector<ContactBlock> obstacles;            ///< and so have those of other shapes
+  ParameterHandle contact_stiffness;              ///< that block [Pa/m]; does not exist where there is no obstacle
   std::vector<ParameterHandle> pulls;             ///< 3 each [-], see `Pull`
   std::vector<ParameterHandle> scan_corrections;  ///< 3 each [-], see `ShapeField`
   ParameterHandle wind;                           ///< 3, mean velocity of the air [m/s]; may not exist
@@ -56,14 +63,14 @@ struct MotionBlocks : MaterialBlocks {
 
 /// How many blocks of each kind a motion has.
 struct MotionCounts {
-  int moduli = 1, planes = 0, pulls = 0, scan_corrections = 0;
+  int moduli = 1, planes = 0, obstacles = 0, pulls = 0, scan_corrections = 0;
   bool wind = false;
   int strengths = 0;
 };
 
 /// Appends the blocks of a motion: Young's modulus, Poisson's ratio, dampings, density, gravity and first velocities,
-/// then planes, pulls, corrections of the scan, wind, strengths, and further control moduli. So blocks that every
-/// motion has stand in the same places whatever follows.
+/// then planes, obstacles, pulls, corrections of the scan, wind, strengths, and further control moduli. So blocks that
+/// every motion has stand in the same places whatever follows.
 /// @param moduli_names  of the control moduli; empty: "youngs_modulus", "youngs_modulus@2", ...
 /// Throws std::invalid_argument where a name is taken.
 MotionBlocks add_motion_blocks(ParameterLayout& layout, const MotionCounts& counts,

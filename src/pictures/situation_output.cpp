@@ -16,6 +16,7 @@
 #include "pictures/field_pictures.hpp"
 #include "report/picture.hpp"
 #include "report/report.hpp"
+#include "scene/obstacle.hpp"
 #include "simulation/model_simulation.hpp"
 #include "simulation/trajectory.hpp"
 #include "situation/situation_scene.hpp"
@@ -138,7 +139,9 @@ void draw_pictures(const SituationFiles& files, const Scene& scene, const Situat
                    const std::vector<double>& times, const std::function<bool(int, int)>& progress) {
   constexpr Rgb object{176, 182, 190}, obstacle_colour{214, 170, 110}, drop_colour{70, 130, 200}, hand{190, 60, 110};
   constexpr int some = 7;  // of the vertices frame the picture
-  const std::vector<SeenObstacle> obstacles = seen_obstacles(situation);
+  const std::vector<RigidObstacle> obstacles = obstacles_in(scene, situation);
+  std::vector<TriangleMesh> surfaces;
+  for (const RigidObstacle& obstacle : obstacles) surfaces.push_back(surface_of(obstacle));
   Box box;
   std::vector<Vector3> framing;
   for (const SeenCopy& copy : copies)
@@ -167,19 +170,17 @@ void draw_pictures(const SituationFiles& files, const Scene& scene, const Situat
         if (const auto place = place_of(h, times[frame]))
           drawing.add_mark(*place + copy.shift, scene.world.up, 2.0 * mark, 2.0 * mark, hand);
     }
-    for (const SeenObstacle& obstacle : obstacles) {
-      std::vector<Vector3> points = obstacle.mesh.vertices;
-      const RigidMotion motion = obstacle.motion.at(times[frame]);
-      for (Vector3& p : points) p = motion(p);
-      drawing.add(points, obstacle.mesh.triangles, obstacle_colour);
-    }
     std::vector<Plane> planes = situation.planes.value_or(scene.planes);
-    for (std::size_t o = 0; o < obstacles.size(); ++o)
-      if (const auto* plane = std::get_if<ShapePlane>(&situation.obstacles[o].shape)) {
-        const RigidMotion motion = obstacles[o].motion.at(times[frame]);
+    for (std::size_t o = 0; o < obstacles.size(); ++o) {
+      const RigidMotion motion = motion_of(obstacles[o]).at(times[frame]);
+      std::vector<Vector3> points = surfaces[o].vertices;
+      for (Vector3& p : points) p = motion(p);
+      drawing.add(points, surfaces[o].triangles, obstacle_colour);
+      if (const auto* plane = std::get_if<ShapePlane>(&obstacles[o].shape)) {
         Plane& ground = planes.emplace_back();
         ground.point = motion(plane->point), ground.normal = motion.rotation * plane->normal;
       }
+    }
     const PictureScene seen = drawing.scene(planes, box);
     write_file(files.folder / "pictures" / fmt::format("{:06}.png", frame), encode_png(draw(seen, camera)));
     if (progress && !progress(int(frame) + 1, int(frames))) return;

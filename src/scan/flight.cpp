@@ -41,8 +41,7 @@ std::optional<Flight> free_flight(const Capture& capture, std::span<const Observ
   constexpr std::size_t fewest = 6;  // three of them are the parabola's own
   constexpr double near = 0.02;      // of the object's size
   const Scene& scene = capture.scene;
-  if (!scene.object.surface || scene.timing.is_static || scene.initial.released || !scene.fixed.empty())
-    return std::nullopt;
+  if (!scene.object.surface || scene.timing.is_static || scene.initial.released || scene.is_held()) return std::nullopt;
   const ScanFollower follower(*scene.object.surface);
   const Vector3 centre = enclosed_centroid(follower.scan());
   const double close = near * bounding_box(follower.scan()).extent().maxCoeff();

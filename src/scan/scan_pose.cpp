@@ -369,6 +369,7 @@ void place(Scene& scene, const ScanPose& pose) {
   };
   if (scene.object.surface) scene.object.surface = placed(*scene.object.surface, pose);
   for (FixedRegion& fixed : scene.fixed) move_region(fixed.region);
+  for (LedRegion& led : scene.led) move_region(led.region);
   for (MaterialRegion& part : scene.regions) move_region(part.region);
   for (MaterialControl& control : scene.controls) control.point = moved(control.point);
   for (Weight& weight : scene.weights) weight.at = moved(weight.at);

@@ -1,11 +1,30 @@
 #include "scene/scene.hpp"
 
+#include <algorithm>
+
 namespace pliant {
 
 std::optional<double> Object::total_mass() const {
   if (mass) return mass;
   if (density && surface) return *density * enclosed_volume(*surface);
   return std::nullopt;
+}
+
+namespace {
+
+bool has_inner(const Scene& scene, InnerBody::Contact contact) {
+  return std::ranges::find(scene.inner, contact, &InnerBody::contact) != scene.inner.end();
+}
+
+}  // namespace
+
+bool Scene::is_held() const {
+  const auto always = [](const LedRegion& region) { return region.from == -infinite && region.until == infinite; };
+  return !fixed.empty() || std::ranges::any_of(led, always) || has_inner(*this, InnerBody::Contact::Glued);
+}
+
+bool Scene::is_touched() const {
+  return !planes.empty() || !obstacles.empty() || has_inner(*this, InnerBody::Contact::Sliding);
 }
 
 std::vector<std::string> named_moduli(const Scene& scene) {

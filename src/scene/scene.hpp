@@ -75,6 +75,50 @@ struct Plane {
   bool operator==(const Plane&) const = default;
 };
 
+/// Rigid shapes that the object meets, where they are for a zero motion [m].
+struct ShapeBall {
+  Vector3 centre;
+  double radius;
+  bool operator==(const ShapeBall&) const = default;
+};
+/// A rod with round ends.
+struct ShapeCapsule {
+  Vector3 from, to;
+  double radius;
+  bool operator==(const ShapeCapsule&) const = default;
+};
+struct ShapeBox {
+  Vector3 min, max;
+  bool operator==(const ShapeBox&) const = default;
+};
+/// All that lies behind a plane. @param normal  unit length, to the side where the object may be
+struct ShapePlane {
+  Vector3 point, normal;
+  bool operator==(const ShapePlane&) const = default;
+};
+struct ShapeMesh {
+  std::filesystem::path file;  ///< absolute
+  TriangleMesh mesh;           ///< closed
+  bool operator==(const ShapeMesh& other) const { return file == other.file; }
+};
+
+/// Rigid body of any shape that the object meets, standing still or moving as it is led.
+struct RigidObstacle {
+  std::variant<ShapeBall, ShapeCapsule, ShapeBox, ShapePlane, ShapeMesh> shape;
+  double friction = 0.0;                       ///< Coulomb's coefficient [-], >= 0
+  bool knows_friction = true;                  ///< false: nobody said how large it is; to be estimated
+  std::vector<KeyFrames<6>::Key> motion = {};  ///< shift [m] and rotation vector [rad] about its middle, over the
+                                               ///< frames' time; empty: it stands still
+};
+
+/// Region of the object that a clamp, a gripper or a shaker leads.
+struct LedRegion {
+  Region region;
+  double from = -infinite, until = infinite;   ///< [s] when it takes hold and lets go; without them: in every frame
+  std::vector<KeyFrames<6>::Key> motion = {};  ///< shift [m] and rotation vector [rad] about the region's middle, over
+                                               ///< the frames' time
+};
+
 /// Rigid body inside or under the object that stays where it is: a skull under the skin, a core, a table.
 struct InnerBody {
   enum class Contact {
@@ -175,14 +219,21 @@ struct Scene {
   World world;
   Timing timing;
   std::vector<FixedRegion> fixed;
+  std::vector<LedRegion> led;
   std::vector<MaterialRegion> regions;
   std::vector<MaterialControl> controls;  ///< all with points or all with weights; none where there are regions
   std::vector<Plane> planes;
+  std::vector<RigidObstacle> obstacles;
   std::vector<InnerBody> inner;
   std::vector<Weight> weights;  ///< that hang in every frame
   std::optional<WindFacts> wind;
   std::vector<AppliedForce> forces;
   Initial initial;
+
+  /// Whether something holds the object in every frame: a fixed or a led region, or a rigid body that it is glued to.
+  bool is_held() const;
+  /// Whether it may touch something: a plane, an obstacle, or a rigid body on which it slides.
+  bool is_touched() const;
 };
 
 /// Parameters of the Young's moduli that a scene tells apart: `youngs_modulus`, the object's own, and

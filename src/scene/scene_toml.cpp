@@ -11,6 +11,7 @@
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
 #include "scene/inner_body.hpp"
+#include "scene/obstacle.hpp"
 #include "scene/region.hpp"
 
 namespace pliant {
@@ -256,6 +257,7 @@ void check_vertex_lists(TomlContext& context, const Scene& scene) {
                        "indices count the surface file's vertices from 0");
   };
   for (std::size_t i = 0; i < scene.fixed.size(); ++i) check(scene.fixed[i].region, fmt::format("fixed[{}]", i));
+  for (std::size_t i = 0; i < scene.led.size(); ++i) check(scene.led[i].region, fmt::format("led[{}]", i));
   for (std::size_t i = 0; i < scene.regions.size(); ++i) check(scene.regions[i].region, fmt::format("region[{}]", i));
 }
 
@@ -554,6 +556,7 @@ void write_region_file(const fs::path& file, const Region& region) { write_verti
 void write_toml_blocks(std::ostream& out, const Scene& scene) {
   for (const Plane& plane : scene.planes) write_toml(out, plane);
   write_inner_blocks(out, scene);
+  write_obstacle_blocks(out, scene);
   for (std::size_t i = 0; i < scene.fixed.size(); ++i) {
     const FixedRegion& fixed = scene.fixed[i];
     out << "[[fixed]]\n" << region_text(fixed.region, vertices_name("fixed", i));
@@ -578,6 +581,7 @@ void write_toml_blocks(std::ostream& out, const Scene& scene) {
 
 void write_scene_files(const fs::path& folder, const Scene& scene) {
   write_inner_files(folder, scene);
+  write_obstacle_files(folder, scene);
   for (std::size_t i = 0; i < scene.fixed.size(); ++i)
     write_vertices(folder / vertices_name("fixed", i), scene.fixed[i].region);
   for (std::size_t i = 0; i < scene.regions.size(); ++i)

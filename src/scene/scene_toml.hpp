@@ -31,8 +31,8 @@ Timing read_even_timing(TomlTable& table, int most_frames);
 /// A region: one of `box`, `sphere`, `half_space`, `vertices` (a file with one index a line).
 std::optional<Region> read_region(TomlTable& table, const NamedFiles& files);
 
-/// Complains about vertices in the lists of [[fixed]] and [[region]] that the surface has not; about none without
-/// surface.
+/// Complains about vertices in the lists of [[fixed]], [[led]] and [[region]] that the surface has not; about none
+/// without surface.
 void check_vertex_lists(TomlContext& context, const Scene& scene);
 /// Complains about names in [[region]] and [[control]] that are not their own, regions without a point of the object,
 /// control points together with regions, and weights that do not suit the surface.
@@ -77,13 +77,14 @@ void write_region(std::ostream& out, const Region& region, const std::string& ve
 /// Writes that file where the region is a list of vertices. Throws InputError where it cannot be written.
 void write_region_file(const std::filesystem::path& file, const Region& region);
 
-/// Blocks [[plane]], [[inner]], [[fixed]], [[region]], [[control]], [[weight]] and [[force]], and the table [wind] of a
-/// scene.
+/// Blocks [[plane]], [[inner]], [[obstacle]], [[led]], [[fixed]], [[region]], [[control]], [[weight]] and [[force]],
+/// and the table [wind] of a scene.
 void write_toml_blocks(std::ostream& out, const Scene& scene);
 
 /// Writes what the text refers to and the value itself holds: `fixed_0.txt`, `region_0.txt`, ... with the vertices of a
 /// region that lists them, by its number, `control_0.txt`, ... with the weights of a control point, `inner_0.ply`,
-/// ... with inner bodies, and `timestamps.txt` [s]. Throws InputError where a file cannot be written.
+/// ... with inner bodies, `obstacle_0.ply`, ... with obstacles that are meshes, and `timestamps.txt` [s]. Throws
+/// InputError where a file cannot be written.
 void write_scene_files(const std::filesystem::path& folder, const Scene& scene);
 
 }  // namespace pliant

@@ -37,27 +37,25 @@ std::vector<RigidContact> inner_contacts(const Body& body,
   return contacts;
 }
 
-std::vector<int> held_nodes(const Body& body, const Scene& scene) {
+std::vector<Hold> holds_of(const Body& body, const Scene& scene) {
   constexpr double near = 0.12;  // of an element's edge: middles of edges that cut a curved body's corners are on it
-  std::vector<int> held = held_nodes(body, held_regions(scene));
-  std::vector<Vector3> nodes;
-  for (Eigen::Index n = 0; n < body.nodes.rows(); ++n) nodes.push_back(body.nodes.row(n).transpose());
-  for (std::size_t i = 0; i < scene.inner.size(); ++i) {
-    if (scene.inner[i].contact != InnerBody::Contact::Glued) continue;
-    const std::vector<double> distances = distances_to_surface(scene.inner[i].surface, nodes);
-    const double reach = near * mean_edge(body);
-    const std::size_t before = held.size();
-    for (std::size_t n = 0; n < nodes.size(); ++n)
-      if (distances[n] <= reach) held.push_back(int(n));
-    if (held.size() == before)
-      throw InputError({{scene.inner[i].file},
+  std::vector<Hold> holds = held_regions(scene);
+  const double reach = near * mean_edge(body);
+  for (const InnerBody& inner : scene.inner) {
+    if (inner.contact != InnerBody::Contact::Glued) continue;
+    const auto contains = [distance = SurfaceDistance(inner.surface), reach](const Vector3& p) {
+      return distance(p) <= reach;
+    };
+    if (held_nodes(body, {{contains}}).empty())
+      throw InputError({{inner.file},
                         "no node of the object's elements lies on the rigid body that it is glued to",
                         "a body that the object's surface touches",
                         "see that both surfaces meet where the object is at rest"});
+    holds.push_back({contains});
   }
-  std::ranges::sort(held);
-  held.erase(std::unique(held.begin(), held.end()), held.end());
-  return held;
+  return holds;
 }
+
+std::vector<int> held_nodes(const Body& body, const Scene& scene) { return held_nodes(body, holds_of(body, scene)); }
 
 }  // namespace pliant

@@ -25,7 +25,7 @@ VectorX model_theta(const Model& model, const Scene& scene, const Vector3& gravi
   theta.segment<3>(blocks.gravity) = gravity;
   theta.segment<3>(blocks.linear_velocity) = scene.initial.linear_velocity;
   theta.segment<3>(blocks.angular_velocity) = scene.initial.angular_velocity;
-  set_planes(scene.planes, blocks, theta);
+  set_obstacles(scene, blocks, theta);
   set_loads(scene, blocks, theta);
   return theta;
 }

@@ -11,7 +11,9 @@
 #include "motion/patch_forces.hpp"
 #include "motion/wind.hpp"
 #include "scene/region.hpp"
+#include "simulation/inner_bodies.hpp"
 #include "simulation/key_changes.hpp"
+#include "simulation/obstacles.hpp"
 
 namespace pliant {
 
@@ -104,6 +106,13 @@ double hex_cell_size(const Scene& scene, const SignedDistance& distance, double 
 
 namespace {
 
+/// Regions that something holds, standing still or led, as they are at rest.
+std::vector<Hold> gripped_regions(const Scene& scene) {
+  std::vector<Hold> regions = held_regions(scene);
+  for (const LedRegion& led : scene.led) regions.push_back({is_in_region(*scene.object.surface, led.region)});
+  return regions;
+}
+
 /// Where a held region ends within the object along an axis, and on which side of it the region lies.
 struct HeldEnd {
   double at;     // [m]
@@ -118,13 +127,15 @@ std::array<std::optional<HeldEnd>, 3> held_ends(const Scene& scene, const Box& o
     if (!ends[std::size_t(axis)] && at > object.min[axis] + slack && at < object.max[axis] - slack)
       ends[std::size_t(axis)] = HeldEnd{at, inner};
   };
-  for (const FixedRegion& fixed : scene.fixed) {
-    if (const auto* box = std::get_if<RegionBox>(&fixed.region))
+  const auto add_region = [&](const Region& region) {
+    if (const auto* box = std::get_if<RegionBox>(&region))
       for (int axis = 0; axis < 3; ++axis) add(axis, box->min[axis], 1.0), add(axis, box->max[axis], -1.0);
-    if (const auto* half = std::get_if<RegionHalfSpace>(&fixed.region))
+    if (const auto* half = std::get_if<RegionHalfSpace>(&region))
       for (int axis = 0; axis < 3; ++axis)
         if (std::abs(half->normal[axis]) > 1.0 - 1e-9) add(axis, half->point[axis], half->normal[axis]);
-  }
+  };
+  for (const FixedRegion& fixed : scene.fixed) add_region(fixed.region);
+  for (const LedRegion& led : scene.led) add_region(led.region);
   return ends;
 }
 
@@ -143,7 +154,7 @@ HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double c
       shift[axis] = from_plane - std::round(from_plane);
     }
   HexGridOptions options;
-  options.is_held = [holds = held_regions(scene)](const Vector3& p) {
+  options.is_held = [holds = gripped_regions(scene)](const Vector3& p) {
     return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); });
   };
   return make_hex_grid(distance, object, cell_size, options, shift);
@@ -165,7 +176,7 @@ TetMesh tetrahedra_of(const Scene& scene, const Resolution& resolution,
   options.offset = offset;
   options.cell_size = object_size(scene) / resolution.cells;
   options.quadratic = quadratic;
-  for (const Hold& hold : held_regions(scene)) options.parts.push_back(hold.contains);
+  for (const Hold& hold : gripped_regions(scene)) options.parts.push_back(hold.contains);
   return make_tet_mesh(*scene.object.surface, options);
 }
 
@@ -182,7 +193,7 @@ HexGrid hexahedra_of(const Scene& scene, const SignedDistance& distance, const R
 /// The body with its surface beside the scan but where it is held, on the same lattice or by the same elements; as
 /// heavy where the scene tells the mass.
 Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body& body, const Resolution& resolution) {
-  const auto offset = [&, holds = held_regions(scene)](const Vector3& p) {
+  const auto offset = [&, holds = gripped_regions(scene)](const Vector3& p) {
     return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); }) ? 0.0 : resolution.offset(p);
   };
   Body other;
@@ -268,12 +279,15 @@ ShapeField shape_field(const Scene& scene, const Resolution& resolution) {
 
 }  // namespace
 
-void set_planes(const std::vector<Plane>& planes, const MotionBlocks& blocks, VectorX& theta) {
+void set_obstacles(const Scene& scene, const MotionBlocks& blocks, VectorX& theta) {
+  const std::vector<Plane>& planes = scene.planes;
   for (std::size_t i = 0; i < planes.size(); ++i) {
     theta.segment<3>(blocks.planes[i].point) = planes[i].point;
     theta.segment<3>(blocks.planes[i].normal) = planes[i].normal;
     theta[blocks.planes[i].friction] = planes[i].friction;
   }
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
+    theta[blocks.obstacles[i].friction] = scene.obstacles[i].friction;
 }
 
 void add_loads(const Scene& scene, SimulationOptions& simulation) {
@@ -305,6 +319,7 @@ void set_loads(const Scene& scene, const MotionBlocks& blocks, VectorX& theta) {
 MotionCounts load_counts(const Scene& scene) {
   MotionCounts counts;
   counts.planes = int(scene.planes.size());
+  counts.obstacles = int(scene.obstacles.size());
   counts.wind = scene.wind.has_value();
   counts.strengths = int(scene.forces.size());
   return counts;
@@ -312,12 +327,6 @@ MotionCounts load_counts(const Scene& scene) {
 
 SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
                                   const MotionBlocks& blocks, const VectorX& theta, const SimulationOptions& settings) {
-  if (!scene.inner.empty())
-    throw InputError({{scene.inner.front().file},
-                      "a rigid body inside the object ([[inner]]) in what moves or carries loads",
-                      "presses, indentations and grips alone",
-                      "equilibria under probes know inner bodies (`pliant fit` of presses, `pliant press`); hold the "
-                      "object by [[fixed]] where it is glued, and leave out [[inner]]"});
   SimulationOptions simulation = settings;
   simulation.is_static = scene.timing.is_static;
   simulation.times.assign(scene.timing.times.begin() + scene.timing.start_frame, scene.timing.times.end());
@@ -326,7 +335,7 @@ SimulationOptions make_simulation(const Scene& scene, const Body& body, const Re
   simulation.scan_sags = scene.object.shape_is == ShapeIs::Static && !body.is_free_elsewhere();
   // What hangs and touches nothing moves smoothly; its elements are quadratic, and its steps dear.
   const std::vector<double>& times = simulation.times;
-  if (simulation.scan_sags && scene.planes.empty() && times.size() > 1)
+  if (simulation.scan_sags && !scene.is_touched() && times.size() > 1)
     simulation.max_dt = std::max(simulation.max_dt, 0.125 * (times.back() - times.front()) / double(times.size() - 1));
   simulation.max_dt /= resolution.steps;
   simulation.blocks = blocks;
@@ -337,8 +346,9 @@ SimulationOptions make_simulation(const Scene& scene, const Body& body, const Re
     simulation.released_weights.push_back({weight->at, weight->mass});
   simulation.pull_points = pull_points(scene, int(blocks.pulls.size()));
   simulation.shape = shape_field(scene, resolution);
-  simulation.holds = held_regions(scene);
+  simulation.holds = holds_of(body, scene);
   add_loads(scene, simulation);
+  add_obstacles(scene, body, theta, simulation);
   return simulation;
 }
 

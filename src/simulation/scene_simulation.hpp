@@ -83,10 +83,10 @@ std::vector<Hold> held_regions(const std::vector<FixedRegion>& fixed, const Tria
 /// Number of pulls of a scene's motion: none where it is not released, or from under a known weight.
 int pull_count(const Scene& scene, const Resolution& resolution);
 
-/// Puts a scene's planes into a parameter vector: places and coefficients of friction.
-void set_planes(const std::vector<Plane>& planes, const MotionBlocks& blocks, VectorX& theta);
+/// Puts a scene's planes and obstacles into a parameter vector: places of planes, and coefficients of friction.
+void set_obstacles(const Scene& scene, const MotionBlocks& blocks, VectorX& theta);
 
-/// Blocks of a motion's parameters that a scene's planes, wind and forces need.
+/// Blocks of a motion's parameters that a scene's planes, obstacles, wind and forces need.
 MotionCounts load_counts(const Scene& scene);
 /// Puts a scene's wind into a parameter vector, and strengths of one for its forces.
 void set_loads(const Scene& scene, const MotionBlocks& blocks, VectorX& theta);
@@ -95,10 +95,10 @@ void set_loads(const Scene& scene, const MotionBlocks& blocks, VectorX& theta);
 void add_loads(const Scene& scene, SimulationOptions& simulation);
 
 /// How a body moves in a scene: its instants and time step, what it touches, what holds and loads it.
-/// @param blocks    of the motion's parameters, with the scene's planes, wind and forces
+/// @param blocks    of the motion's parameters, with the scene's planes, obstacles, wind and forces
 /// @param theta     by those blocks; its density and gravity scale contact
 /// @param settings  what the scene does not say
-/// Throws InputError for a scene with inner bodies, of which motions know nothing.
+/// Throws InputError as `add_obstacles` does.
 SimulationOptions make_simulation(const Scene& scene, const Body& body, const Resolution& resolution,
                                   const MotionBlocks& blocks, const VectorX& theta,
                                   const SimulationOptions& settings = {});

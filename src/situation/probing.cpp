@@ -7,10 +7,12 @@
 
 #include "base/error.hpp"
 #include "meshing/mesh_distance.hpp"
+#include "scene/obstacle.hpp"
 #include "scene/region.hpp"
 #include "simulation/inner_bodies.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
+#include "simulation/obstacles.hpp"
 #include "simulation/scene_simulation.hpp"
 #include "situation/situation_scene.hpp"
 
@@ -35,7 +37,7 @@ void refuse_what_takes_time(const Situation& s) {
                         std::string(name) + " in a situation of equilibria",
                         "[[probe]], [[obstacle]] and `gravity` alone",
                         "`pliant simulate --situation` moves a model in time"});
-  if (s.probes.empty() && s.obstacles.empty())
+  if (s.probes.empty() && !s.obstacles)
     throw InputError({{s.file}, "neither [[probe]] nor [[obstacle]]", "one at least", "nothing presses the object"});
 }
 
@@ -58,19 +60,19 @@ Probing::Probing(const Model& model, const Situation& situation)
     probe.kind = facts.kind, probe.centre = facts.at, probe.radius = facts.radius;
     probe.axis = facts.axis, probe.rod = facts.rod;
     if (facts.kind == ProbeKind::Shape) {
-      const ObstacleShape shape = obstacle_shape({ShapeMesh{{}, facts.mesh}, 0.0, {}});
-      probe.shape = shape.rigid, probe.radius = 0.1 * shape.box.extent().minCoeff();
+      const RigidObstacle shape{ShapeMesh{{}, facts.mesh}};
+      probe.shape = rigid_shape(shape), probe.radius = 0.1 * box_of(shape).extent().minCoeff();
     } else {
       check_place(situation, scene, "probe", facts.at, facts.radius);
     }
     paths_.push_back({facts.led, KeyFrames<6>(facts.path)});
   }
-  for (const RigidObstacle& obstacle : situation.obstacles) {
-    const ObstacleShape shape = obstacle_shape(obstacle);
-    const bool is_bounded = shape.box.extent().minCoeff() > 0.0;
+  for (const RigidObstacle& obstacle : situation.obstacles.value_or(std::vector<RigidObstacle>{})) {
+    const Box box = box_of(obstacle);
+    const bool is_bounded = box.extent().minCoeff() > 0.0;
     ProbeOptions& probe = probes.emplace_back();
-    probe.kind = ProbeKind::Shape, probe.shape = shape.rigid, probe.centre = shape.middle;
-    probe.radius = 0.1 * (is_bounded ? shape.box.extent().minCoeff() : body_->size());
+    probe.kind = ProbeKind::Shape, probe.shape = rigid_shape(obstacle), probe.centre = 0.5 * (box.min + box.max);
+    probe.radius = 0.1 * (is_bounded ? box.extent().minCoeff() : body_->size());
     paths_.push_back(
         {ProbeFacts::Led::Displacement, obstacle.motion.empty() ? KeyFrames<6>() : KeyFrames<6>(obstacle.motion)});
   }

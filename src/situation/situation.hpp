@@ -27,38 +27,6 @@ struct Hand {
   std::vector<KeyFrames<3>::Key> path;        ///< where it is [m], in the place of a motion
 };
 
-/// A region of the object that is led.
-struct LedRegion {
-  Region region;
-  double from = -infinite, until = infinite;  ///< [s]
-  std::vector<KeyFrames<6>::Key> motion;      ///< shift [m] and rotation vector [rad] about the region's middle
-};
-
-/// A rigid shape that the object meets.
-struct ShapeBall {
-  Vector3 centre;
-  double radius;
-};
-struct ShapeCapsule {
-  Vector3 from, to;
-  double radius;
-};
-struct ShapeBox {
-  Vector3 min, max;
-};
-struct ShapePlane {
-  Vector3 point, normal;
-};
-struct ShapeMesh {
-  std::filesystem::path file;
-  TriangleMesh mesh;
-};
-struct RigidObstacle {
-  std::variant<ShapeBall, ShapeCapsule, ShapeBox, ShapePlane, ShapeMesh> shape;
-  double friction = 0.0;                  ///< Coulomb's coefficient [-]
-  std::vector<KeyFrames<6>::Key> motion;  ///< shift [m] and rotation vector [rad] about its middle
-};
-
 /// A probe that is led from equilibrium to equilibrium.
 struct ProbeFacts {
   ProbeKind kind = ProbeKind::BondedDisc;
@@ -83,7 +51,7 @@ struct Situation {
   std::filesystem::path file;                ///< that it was read from, for complaints
   double duration = 5.0;                     ///< [s]
   double frame_rate = 30.0;                  ///< [Hz]
-  bool keeps_held = true;                    ///< what the recording held is held
+  bool keeps_held = true;                    ///< what the recording held or led is held
   std::optional<bool> settles;               ///< starts from equilibrium; nothing: where something is held
   std::optional<std::vector<Plane>> planes;  ///< in the place of the model's
   std::vector<KeyFrames<3>::Key> gravity;    ///< [m/s^2] over time; empty: the model's
@@ -94,8 +62,8 @@ struct Situation {
   std::vector<AppliedForce> forces;
   std::vector<Hand> hands;
   std::vector<LedRegion> led;
-  std::vector<RigidObstacle> obstacles;
-  std::vector<ProbeFacts> probes;  ///< of presses alone: what moves has obstacles and hands
+  std::optional<std::vector<RigidObstacle>> obstacles;  ///< in the place of the model's that stand still
+  std::vector<ProbeFacts> probes;                       ///< of presses alone: what moves has obstacles and hands
   std::vector<ObjectCopy> copies;
 };
 

@@ -10,22 +10,9 @@
 
 namespace pliant {
 
-/// A rigid obstacle as a mesh that moves, for pictures and files.
-struct SeenObstacle {
-  TriangleMesh mesh;  ///< at its motion's zero; empty for planes
-  KeyedMotion motion;
-};
-std::vector<SeenObstacle> seen_obstacles(const Situation& situation);
-
-/// A rigid shape with the point about which it turns [m], and a box around it.
-struct ObstacleShape {
-  std::shared_ptr<const RigidShape> rigid;
-  Vector3 middle;
-  Box box;  ///< of no extent for planes
-};
-ObstacleShape obstacle_shape(const RigidObstacle& obstacle);
-/// A rigid motion by its keys; none: it stands still.
-KeyedMotion keyed_motion(const Vector3& centre, const std::vector<KeyFrames<6>::Key>& keys);
+/// Obstacles of a model's scene in a situation: the situation's own where it has any, else those of the recording that
+/// stand still.
+std::vector<RigidObstacle> obstacles_in(const Scene& scene, const Situation& situation);
 
 /// Throws InputError about a place that is further from the object's surface at rest than a radius and a twentieth of
 /// its size.

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <numbers>
 
-#include "base/csv.hpp"
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
+#include "scene/obstacle.hpp"
 #include "scene/scene_toml.hpp"
 #include "situation/situation.hpp"
 
@@ -22,27 +22,6 @@ void check_times(TomlTable& owner, const std::string& name, const std::vector<Ke
   std::vector<double> times;
   for (const auto& key : keys) times.push_back(key.time);
   check_key_times(owner, name, times);
-}
-
-/// Keys of a rigid motion: { time = 0, shift = [0, 0.1, 0], turn_deg = [0, 90, 0] }.
-std::vector<KeyFrames<6>::Key> read_motion(TomlTable& owner) {
-  std::vector<KeyFrames<6>::Key> keys;
-  owner.each_block("motion", [&](TomlTable& block) {
-    KeyFrames<6>::Key key{read_number(block, "time", any_time), {}};
-    key.value.head<3>() = block.optional<Vector3>("shift").value_or(Vector3::Zero());
-    key.value.tail<3>() = degree * block.optional<Vector3>("turn_deg").value_or(Vector3::Zero());
-    keys.push_back(key);
-  });
-  check_times(owner, "motion", keys);
-  return keys;
-}
-
-void read_span(TomlTable& table, double& from, double& until) {
-  from = read_number(table, "from", any_time, -infinite);
-  until = read_number(table, "until", any_time, infinite);
-  if (!(from < until))
-    table.context().complain(table.key_of("until"), fmt::format("`until` is {} s, and `from` is {} s", until, from),
-                             "an end after the beginning");
 }
 
 std::uint64_t read_seed(TomlTable& table) { return std::uint64_t(read_count(table, "seed", 0, 2'000'000'000, 1)); }
@@ -66,12 +45,12 @@ RainOptions read_rain(TomlTable& table, double duration) {
   return rain;
 }
 
-Hand read_hand(TomlTable& table) {
+Hand read_hand(TomlTable& table, const NamedFiles& files) {
   Hand hand;
   read_patch(table, hand.at, hand.radius);
   hand.stiffness = read_number(table, "stiffness", {.low = 0.0, .meaning = "in newtons a metre"}, 0.0);
   read_span(table, hand.from, hand.until);
-  hand.motion = read_motion(table);
+  hand.motion = read_motion(table, files);
   hand.path = read_key_frames(table, "path", "at");
   if (hand.motion.empty() == hand.path.empty())
     table.context().complain(
@@ -124,27 +103,9 @@ void read_path_keys(TomlTable& table, ProbeFacts& probe) {
 
 /// A path as a table: see `path_forms`.
 void read_path_file(const std::filesystem::path& file, ProbeFacts& probe) {
-  const std::string text = read_file(file);
-  std::string header = text.substr(0, text.find_first_of("\r\n"));
-  std::erase(header, ' ');
-  const auto form = std::ranges::find(path_forms, header, &PathForm::header);
-  std::vector<Problem> problems;
-  if (form == std::end(path_forms)) {
-    std::string known;
-    for (const PathForm& f : path_forms) known += fmt::format("{}`{}`", known.empty() ? "" : ", ", f.header);
-    throw InputError({{file, 1, 1}, "the header `" + header + "`", "one of " + known, "metres, newtons and degrees"});
-  }
-  probe.led = form->led;
-  read_csv(file, form->header, problems, [&](CsvRow& row) {
-    KeyFrames<6>::Key key{row.number(0).value_or(0.0), KeyFrames<6>::Value::Zero()};
-    for (int k = 0; k < form->numbers; ++k) key.value[k] = row.number(std::size_t(k) + 1).value_or(0.0);
-    key.value.tail<3>() *= degree;
-    if (!probe.path.empty() && !(key.time > probe.path.back().time))
-      row.complain(0, fmt::format("{} s after {} s", key.time, probe.path.back().time),
-                   "times that increase from line to line", "put the lines in order");
-    probe.path.push_back(key);
-  });
-  if (!problems.empty()) throw InputError(problems);
+  std::vector<KeyTable> tables;
+  for (const PathForm& f : path_forms) tables.push_back({f.header, f.numbers});
+  probe.led = path_forms[read_key_table(file, tables, probe.path)].led;
 }
 
 ProbeFacts read_probe(TomlTable& table, const NamedFiles& files) {
@@ -179,54 +140,6 @@ ProbeFacts read_probe(TomlTable& table, const NamedFiles& files) {
   return probe;
 }
 
-LedRegion read_led(TomlTable& table, const NamedFiles& files) {
-  LedRegion led{RegionBox{}, -infinite, infinite, {}};
-  if (const auto region = read_region(table, files)) led.region = *region;
-  read_span(table, led.from, led.until);
-  led.motion = read_motion(table);
-  return led;
-}
-
-RigidObstacle read_obstacle(TomlTable& table, const NamedFiles& files) {
-  RigidObstacle obstacle{ShapeBall{Vector3::Zero(), 1.0}, 0.0, {}};
-  int count = 0;
-  table.with_table("ball", [&](TomlTable& t) {
-    const Vector3 centre = t.required<Vector3>("centre").value_or(Vector3::Zero());
-    obstacle.shape = ShapeBall{centre, read_number(t, "radius", positive_metres)}, ++count;
-  });
-  table.with_table("capsule", [&](TomlTable& t) {
-    const Vector3 from = t.required<Vector3>("from").value_or(Vector3::Zero()),
-                  to = t.required<Vector3>("to").value_or(Vector3::Zero());
-    obstacle.shape = ShapeCapsule{from, to, read_number(t, "radius", positive_metres)}, ++count;
-  });
-  table.with_table("box", [&](TomlTable& t) {
-    const Vector3 min = t.required<Vector3>("min").value_or(Vector3::Zero()),
-                  max = t.required<Vector3>("max").value_or(Vector3::Ones());
-    if (!(max.array() > min.array()).all())
-      t.context().complain(t.key(), "a box whose `min` does not lie below its `max`", "min < max on each axis",
-                           "swap them");
-    obstacle.shape = ShapeBox{min, max}, ++count;
-  });
-  table.with_table("plane", [&](TomlTable& t) {
-    const Vector3 point = t.required<Vector3>("point").value_or(Vector3::Zero());
-    obstacle.shape = ShapePlane{point, read_direction(t, "normal").value_or(Vector3::UnitY())}, ++count;
-  });
-  if (const auto file = read_optional_path(table, "mesh", files)) {
-    ShapeMesh shape{*file, {}};
-    read_file_of(table, "mesh", *file, [&](const auto& path) { shape.mesh = read_mesh(path); });
-    obstacle.shape = std::move(shape), ++count;
-  } else if (table.has("mesh")) {
-    ++count;
-  }
-  if (count != 1)
-    table.context().complain(table.key(), fmt::format("an obstacle of {} shapes", count),
-                             "one of `ball`, `capsule`, `box`, `plane`, `mesh`");
-  obstacle.friction =
-      read_number(table, "friction", {.low = 0.0, .high = 5.0, .meaning = "Coulomb's coefficient"}, 0.0);
-  obstacle.motion = read_motion(table);
-  return obstacle;
-}
-
 }  // namespace
 
 Situation read_situation(const std::filesystem::path& path) {
@@ -255,9 +168,10 @@ Situation read_situation(const std::filesystem::path& path) {
   root.with_table("wind", [&](TomlTable& table) { s.wind = read_wind(table, false); });
   root.each_block("rain", [&](TomlTable& table) { s.rains.push_back(read_rain(table, s.duration)); });
   root.each_block("force", [&](TomlTable& table) { s.forces.push_back(read_force(table, false)); });
-  root.each_block("hand", [&](TomlTable& table) { s.hands.push_back(read_hand(table)); });
+  root.each_block("hand", [&](TomlTable& table) { s.hands.push_back(read_hand(table, files)); });
   root.each_block("led", [&](TomlTable& table) { s.led.push_back(read_led(table, files)); });
-  root.each_block("obstacle", [&](TomlTable& table) { s.obstacles.push_back(read_obstacle(table, files)); });
+  if (root.has("obstacle")) s.obstacles.emplace();
+  root.each_block("obstacle", [&](TomlTable& table) { s.obstacles->push_back(read_obstacle(table, files, false)); });
   root.each_block("probe", [&](TomlTable& table) { s.probes.push_back(read_probe(table, files)); });
   root.each_block("copy", [&](TomlTable& table) {
     ObjectCopy copy;

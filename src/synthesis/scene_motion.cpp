@@ -12,6 +12,7 @@
 #include "motion/press_session.hpp"
 #include "rays/ray_scene.hpp"
 #include "simulation/inner_bodies.hpp"
+#include "simulation/obstacles.hpp"
 #include "simulation/scene_simulation.hpp"
 
 namespace pliant {
@@ -74,8 +75,8 @@ class Simulated {
     if (++done_; on_progress_ && !on_progress_(done_, total_)) throw std::runtime_error("the simulation was stopped");
   }
 
-  VectorX theta_of(const Scene& facts, const MotionLayout& blocks) const {
-    VectorX theta = blocks.zero();
+  VectorX theta_of(const Scene& facts, const MotionBlocks& blocks) const {
+    VectorX theta = VectorX::Zero(blocks_of(facts).size());
     const std::vector<double> moduli = synthetic_.youngs_moduli();
     for (std::size_t k = 0; k < moduli.size(); ++k) theta[blocks.youngs_moduli[k]] = moduli[k];
     theta[blocks.poissons_ratio] = synthetic_.poissons_ratio;
@@ -85,7 +86,7 @@ class Simulated {
     theta.segment<3>(blocks.gravity) = *facts.world.gravity;
     theta.segment<3>(blocks.linear_velocity) = facts.initial.linear_velocity;
     theta.segment<3>(blocks.angular_velocity) = facts.initial.angular_velocity;
-    set_planes(facts.planes, blocks, theta);
+    set_obstacles(facts, blocks, theta);
     set_loads(facts, blocks, theta);
     return theta;
   }
@@ -99,7 +100,8 @@ class Simulated {
   SimulationOptions options_of(const Scene& facts, const MotionBlocks& blocks) const {
     SimulationOptions options;
     const double gravity = facts.world.gravity->norm();
-    options.times = {0.0};
+    const Timing& timing = facts.timing;
+    options.times = {timing.times.empty() ? 0.0 : timing.times[std::size_t(timing.start_frame)]};
     options.max_dt = 1.0;
     options.newmark_theta = synthetic_.newmark_theta;
     options.material = synthetic_.material;
@@ -108,10 +110,11 @@ class Simulated {
     if (synthetic_.contact_stiffness > 0.0) options.contact.stiffness = synthetic_.contact_stiffness;
     if (synthetic_.contact_smoothing > 0.0) options.contact.smoothing = synthetic_.contact_smoothing;
     options.blocks = blocks;
-    options.holds = held_regions(facts);
+    options.holds = holds_of(*body_, facts);
     if (law_) options.material.elastic = law_;
     for (const Weight& weight : facts.weights) options.weights.push_back({weight.at, weight.mass});
     add_loads(facts, options);
+    add_obstacles(facts, *body_, theta_of(facts, blocks), options);
     return options;
   }
 

@@ -18,6 +18,7 @@
 #include "geometry/mesh_io.hpp"
 #include "rays/ray_scene.hpp"
 #include "scene/inner_body.hpp"
+#include "scene/obstacle.hpp"
 #include "synthesis/synthetic_markers.hpp"
 
 namespace pliant {
@@ -86,7 +87,8 @@ TriangleMesh patch(const Plane& plane, double half_size, const Vector3& centre) 
   return {{middle - a - b, middle + a - b, middle + a + b, middle - a + b}, {{0, 1, 2}, {0, 2, 3}}};
 }
 
-RayScene scene_of(const Synthesis& s, const Points& frame) {
+// What rays meet at an instant [s].
+RayScene scene_of(const Synthesis& s, const Points& frame, double time) {
   RayScene scene;
   const TriangleMesh& rest = *s.scene.object.surface;
   scene.add(frame, rest.triangles);
@@ -94,6 +96,12 @@ RayScene scene_of(const Synthesis& s, const Points& frame) {
   for (size_t i = 0; i < s.scene.planes.size(); ++i)
     if (s.plane_half_sizes[i] > 0.0)
       scene.add(patch(s.scene.planes[i], s.plane_half_sizes[i], 0.5 * (box.min + box.max)));
+  for (const RigidObstacle& obstacle : s.scene.obstacles) {
+    TriangleMesh mesh = surface_of(obstacle);
+    const RigidMotion motion = motion_of(obstacle).at(time);
+    for (Vector3& vertex : mesh.vertices) vertex = motion(vertex);
+    if (!mesh.triangles.empty()) scene.add(mesh);
+  }
   return scene;
 }
 
@@ -297,14 +305,17 @@ void write_frame(const fs::path& folder, const Synthesis& s, int frame) {
   const bool has_cloud = s.cloud && frame % s.cloud->every == 0;
   std::vector<Vector3> points;
   if (!s.cameras.empty()) {
-    const RayScene at_frame = scene_of(s, s.frames[std::size_t(frame)].vertices);
+    const double time = s.scene.timing.times[std::size_t(frame)];
+    const RayScene at_frame = scene_of(s, s.frames[std::size_t(frame)].vertices, time);
     for (std::size_t k = 0; k < s.cameras.size(); ++k) {
       const bool has_image = has_images(s) && frame % s.cameras[k].every == 0;
       if (!has_image && !has_cloud) continue;
       const bool is_later = k < s.camera_frames.size() && !s.camera_frames[k].empty();
-      const SensedFrame seen = is_later
-                                   ? sensed(s, scene_of(s, s.camera_frames[k][std::size_t(frame)].vertices), k, frame)
-                                   : sensed(s, at_frame, k, frame);
+      const SensedFrame seen =
+          is_later
+              ? sensed(s, scene_of(s, s.camera_frames[k][std::size_t(frame)].vertices, time + s.cameras[k].time_offset),
+                       k, frame)
+              : sensed(s, at_frame, k, frame);
       if (has_cloud) add_points(s, k, seen, points);
       if (!has_image) continue;
       write_png(folder / image_name(s.cameras[k], frame), seen.depth);
@@ -325,7 +336,7 @@ void write_true_test(const fs::path& folder, const Synthesis& s, const std::stri
 void write_load(const fs::path& folder, const Synthesis& s, std::size_t i) {
   write_true_test(folder, s, test_name("load", i, "ply"), s.loads[i].shape);
   if (!s.cloud && !has_images(s)) return;
-  const RayScene scene = scene_of(s, s.loads[i].shape.vertices);
+  const RayScene scene = scene_of(s, s.loads[i].shape.vertices, 0.0);
   std::vector<Vector3> points;
   for (std::size_t k = 0; k < s.cameras.size(); ++k) {
     const SensedFrame seen = sensed(s, scene, k, first_load + int(i));

@@ -13,6 +13,7 @@
 #include "geometry/primitives.hpp"
 #include "rays/look_at.hpp"
 #include "scene/inner_body.hpp"
+#include "scene/obstacle.hpp"
 #include "scene/region.hpp"
 #include "scene/scene_toml.hpp"
 #include "synthesis/synthetic_markers.hpp"
@@ -50,6 +51,9 @@ class Reader {
     root.with_table("initial", [&](TomlTable& initial) { read_start(initial); });
     root.each_block("plane", [&](TomlTable& block) { read_scenery(block); });
     root.each_block("fixed", [&](TomlTable& block) { scene_.scene.fixed.push_back(read_fixed(block, files_)); });
+    root.each_block("obstacle",
+                    [&](TomlTable& block) { scene_.scene.obstacles.push_back(read_obstacle(block, files_, true)); });
+    root.each_block("led", [&](TomlTable& block) { scene_.scene.led.push_back(read_led(block, files_)); });
     root.each_block("inner", [&](TomlTable& block) { scene_.scene.inner.push_back(read_inner(block, files_)); });
     cut_out_inner_bodies(context_, scene_.scene);
     root.each_block("region", [&](TomlTable& block) {
@@ -532,16 +536,20 @@ class Reader {
   void check_what_is_held(TomlTable& root) {
     const Scene& scene = scene_.scene;
     const bool is_pressed = root.has("press") || root.has("indentation");
-    const bool is_glued =
-        std::ranges::find(scene.inner, InnerBody::Contact::Glued, &InnerBody::contact) != scene.inner.end();
     const auto need_fixed = [&](const std::string& key, const char* what) {
-      if (scene.fixed.empty() && !root.has("fixed") && !is_glued)
+      if (!scene.is_held() && !root.has("fixed"))
         context_.complain(key, std::string(what) + " that nothing holds", "a block [[fixed]], or a glued [[inner]]",
                           "say where the object stands or is clamped");
     };
-    if (!scene.inner.empty() && (root.has("timing") || root.has("load") || scene_.sags()))
-      context_.complain("inner[0]", "a rigid body inside an object that moves, carries loads or sags",
-                        "presses and indentations alone", "equilibria under probes alone know inner bodies");
+    if (is_pressed && !scene.led.empty())
+      context_.complain("led[0]", "a led region of an object that is pressed", "[[fixed]]", "presses take no time");
+    if (is_pressed && !scene.obstacles.empty())
+      context_.complain("obstacle[0]", "an obstacle beside an object that is pressed", "[[inner]] for what it lies on",
+                        "equilibria under probes know no obstacles");
+    if (scene_.sags() && (!scene.led.empty() || !scene.inner.empty()))
+      context_.complain(scene.led.empty() ? "inner[0]" : "led[0]",
+                        "a led region or a rigid body of an object that sags", "[[fixed]] alone",
+                        "load-free shapes know what is fixed");
     if (scene_.sags()) {
       need_fixed("object.shape_is", "an object that sags");
       if (scene.world.gravity && scene.world.gravity->isZero())
@@ -561,11 +569,11 @@ class Reader {
         context_.complain("weight[0]", "a weight at an object that is pressed", "one of them",
                           "fits of presses know no weights");
     }
-    if (root.has("load") && scene.fixed.empty() && scene.planes.empty())
+    if (root.has("load") && !scene.is_held() && !scene.is_touched())
       context_.complain("load[0]", "a load on an object that nothing holds", "a block [[fixed]]",
                         "say where the object stands or is clamped");
     if (scene.timing.is_static) {
-      if (scene.fixed.empty())
+      if (!scene.is_held())
         context_.complain("timing.static", "an object at rest that nothing holds", "a block [[fixed]]",
                           "say where the object stands or is clamped");
       if (scene.initial != Initial{})

@@ -451,11 +451,12 @@ Track track(const Capture& capture, const std::shared_ptr<const Body>& body, con
             const VectorX& theta, const std::vector<ObservedFrame>& observed, const std::vector<Vector3>& markers,
             const std::map<int, std::vector<TrackObservation>>& seen_markers, const TrackOptions& options,
             const std::function<bool(int, int)>& progress) {
-  if (std::ranges::any_of(capture.scene.fixed, [](const FixedRegion& f) { return f.displaced_to.has_value(); }))
+  if (std::ranges::any_of(capture.scene.fixed, [](const FixedRegion& f) { return f.displaced_to.has_value(); }) ||
+      !capture.scene.led.empty())
     throw InputError({{capture.file},
-                      "a held region is moved from rest (displaced_to)",
+                      "a held region is moved from rest (displaced_to, [[led]])",
                       "regions held where they are at rest",
-                      "tracking does not follow clamps that move; leave displaced_to out"});
+                      "tracking does not follow clamps that move; leave them out"});
   require_standing_cameras(capture, "tracking (--set tracking=off fits the points themselves)");
   if (has_time_offsets(capture))
     throw InputError({{capture.file},

@@ -21,6 +21,23 @@ std::vector<Vector3> points_around(double reach, int count) {
   return points;
 }
 
+/// A ball with a cavity that is not in its middle: solid between the two spheres, hollow within the inner one.
+TEST(SignedDistance, OfAHollowBallIsPositiveInItsCavity) {
+  const double outer = 0.1, inner = 0.04, spacing = 0.005;
+  const Vector3 middle(0.02, 0.01, 0.0);
+  TriangleMesh mesh = make_sphere(outer, 4);
+  const TriangleMesh cavity = make_sphere(inner, 4);
+  const int first = int(mesh.vertices.size());
+  for (const Vector3& v : cavity.vertices) mesh.vertices.push_back(v + middle);
+  for (const auto& [a, b, c] : cavity.triangles) mesh.triangles.push_back({first + a, first + c, first + b});
+  const SignedDistance distance = signed_distance(mesh, spacing, 0.05);
+  for (const Vector3& p : points_around(0.12, 2000)) {
+    const double exact = std::max(p.norm() - outer, inner - (p - middle).norm());
+    if (std::abs(exact) > 3.0 * spacing) continue;  // farther away it is the closest triangle of a few
+    EXPECT_NEAR(distance.value(p), exact, 0.1 * spacing);
+  }
+}
+
 TEST(SignedDistance, OfAMeshSphereIsThatOfTheSphere) {
   const double radius = 0.1, spacing = 0.005, margin = 0.05;
   const TriangleMesh mesh = make_sphere(radius, 4);

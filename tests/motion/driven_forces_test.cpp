@@ -53,6 +53,15 @@ std::vector<Family> families() {
                 [](const MotionBlocks&) { return Handles{}; }};
     grip.has_potential = true;
     list.push_back(grip);
+    grip.name = "LedSpringsAsStiffAsTheBodyOf" + kind;
+    grip.make = [](auto of, const MotionBlocks& blocks) {
+      LedSpringsOptions options;
+      options.stiffness = 0.1, options.moduli = blocks.youngs_moduli, options.from_rest = true;
+      options.motion = KeyedMotion({0.1, 0.0, 0.0}, turning());
+      return std::make_unique<LedSprings>(*of, surface_patch(*of, {0.1, 0.05, 0.05}, 0.09), options);
+    };
+    grip.parameters = [](const MotionBlocks& blocks) { return blocks.youngs_moduli; };
+    list.push_back(grip);
     Family load{"AppliedForceOn" + kind,
                 body,
                 [](auto of, const MotionBlocks& blocks) {
@@ -79,6 +88,19 @@ std::vector<Family> families() {
         [](const MotionBlocks&) { return Handles{}; },
         true};
     led.has_potential = led.sees_start = true;
+    list.push_back(led);
+    led.name = "ContactOfUnknownFrictionWithALedBoxOf" + kind;
+    led.make = [](auto of, const MotionBlocks& blocks) {
+      auto contact = std::make_unique<RigidContact>(
+          RigidContact::sliding(*of, surface_samples(*of), rigid_box({0.0, 0.06, 0.0}, {0.07, 0.05, 0.06}, 0.02),
+                                {1e5, 0.01}, blocks.obstacles[0]));
+      contact->set_friction(0.0, 0.5);
+      contact->lead(KeyedMotion({0.0, 0.05, 0.0}, turning()));
+      return contact;
+    };
+    led.parameters = [](const MotionBlocks& blocks) {
+      return Handles{blocks.obstacles[0].friction, blocks.contact_stiffness};
+    };
     list.push_back(led);
   }
   return list;

@@ -62,7 +62,9 @@ TEST(Patch, SharesSumToOne) {
     EXPECT_NEAR(std::accumulate(patch.share.begin(), patch.share.end(), 0.0), 1.0, 1e-12);
   }
   EXPECT_EQ(surface_patch(*body, {0.1, 0.0, 0.0}, 0.0).rest.size(), 1u);
-  EXPECT_THROW((void)node_patch(*body, {}), std::invalid_argument);
+  const RegionPatch none = region_patch(*body, [](const Vector3&) { return false; });
+  EXPECT_TRUE(none.patch.rest.empty());
+  EXPECT_EQ(none.volume, 0.0);
 }
 
 TEST(AppliedForce, GivesTheObjectItsImpulse) {
@@ -83,7 +85,9 @@ TEST(LedSprings, LeadsWhereItsMotionGoes) {
   std::vector<int> nodes;
   for (int n = 0; n < scene.body->node_count(); ++n)
     if (scene.body->nodes(n, 0) > 0.04) nodes.push_back(n);
-  scene.add(grip, node_patch(*scene.body, nodes));
+  const RegionPatch region = region_patch(*scene.body, [](const Vector3& p) { return p.x() > 0.0375; });
+  EXPECT_NEAR(region.volume, 0.0625 * 0.1 * 0.1, 1e-9);
+  scene.add(grip, region.patch);
   const State last = scene.run().back();
   for (const int n : nodes) EXPECT_NEAR(last.x(n, 1) - scene.body->nodes(n, 1), 0.15, 0.004);
 }

@@ -92,7 +92,7 @@ delay = 3
   EXPECT_EQ(s.forces.at(0).force.at(1).value, Vector3(0, 1, 0));
   EXPECT_EQ(s.hands.at(0).until, 1.0);
   EXPECT_NEAR(s.led.at(0).motion.at(1).value[4], 1.5707963, 1e-6);
-  EXPECT_EQ(std::get<ShapeBall>(s.obstacles.at(0).shape).radius, 0.1);
+  EXPECT_EQ(std::get<ShapeBall>(s.obstacles.value().at(0).shape).radius, 0.1);
   EXPECT_EQ(s.copies.at(0).delay, 3.0);
 }
 

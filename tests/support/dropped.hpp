@@ -12,11 +12,14 @@ namespace pliant::test {
 /// elements and law as it is fitted with, on a finer mesh: an inverse crime in part.
 struct Dropped {
   static constexpr double youngs_modulus = 6000.0, noise = 1.5e-3;  // [Pa], [m]
+  double cells = 9.0;                                               // along the block
   int frames = 30;                                                  // at 60 Hz, from when it is let go
   Vector3 normal = Vector3(0.3, 1.0, 0.1).normalized();
   double friction = 0.25;
   /// What the points are moved by beyond the simulation, frame by frame; empty: nothing.
   std::function<Vector3(int frame)> moved = {};
+  /// What else the scene has, or has in the ground's place; empty: nothing.
+  std::function<void(Scene& scene)> change = {};
 
   RecordedCapture record(unsigned seed = 5) const {
     RecordedCapture recorded;
@@ -31,6 +34,7 @@ struct Dropped {
     capture.scene.world.gravity = Vector3(0.0, -9.81, 0.0);
     for (int frame = 0; frame < frames; ++frame) capture.scene.timing.times.push_back(frame / 60.0);
     capture.scene.planes = {{Vector3::Zero(), normal, true, friction}};
+    if (change) change(capture.scene);
     capture.clouds = {{{"cloud.ply"}, 1, noise}};
     const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(block));
     VectorX theta = parameters.reference();
@@ -39,7 +43,8 @@ struct Dropped {
     theta[blocks.motion.mass_damping] = 0.2;
     theta[blocks.motion.stiffness_damping] = 0.004;
     Resolution resolution;
-    resolution.cells = 9.0;
+    resolution.cells = cells;
+    resolution.follows_thickness = true;
     const Discretisation d = discretise(capture, capture_distance(capture, 0.2), resolution, blocks, theta);
     const Embedding embedding(*d.body, block.vertices);
     std::mt19937 random(seed);

@@ -100,6 +100,7 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
     theta.segment<3>(layout.planes[1].normal) = Vector3(0.2, 0.9, -0.3).normalized();
     theta.segment<3>(layout.planes[1].point) = Vector3(0.01, 0.0, -0.02);  // through the middle: gaps of both signs
     theta[layout.planes[1].friction] = 0.4;
+    theta[layout.obstacles[0].friction] = 0.6;
     theta[layout.contact_stiffness] = 2e5;
     theta.segment<3>(layout.pulls[0]) = Vector3(0.1, -0.2, 0.05);
     theta.segment<3>(layout.pulls[1]) = Vector3(0.02, 0.15, -0.1);
@@ -125,7 +126,7 @@ struct ForceTerms : ::testing::TestWithParam<Family> {
   SceneBlocks add_blocks() {
     SceneBlocks blocks;
     const MotionCounts counts{
-        .moduli = body->modulus.controls, .planes = 2, .pulls = pulls, .wind = true, .strengths = 1};
+        .moduli = body->modulus.controls, .planes = 2, .obstacles = 1, .pulls = pulls, .wind = true, .strengths = 1};
     static_cast<MotionBlocks&>(blocks) = add_motion_blocks(all, counts);
     if (GetParam().law) blocks.law = LawLayout::of_motion(all, blocks, *GetParam().law);
     return blocks;
