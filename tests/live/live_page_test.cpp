@@ -15,7 +15,7 @@ TEST(LivePage, IsOneFileThatNeedsNoOther) {
   model.name = "a <block> & more";
   LiveRecording recording{{1.0, 1.1}, {}, {{Vector3(0, 0, 0)}, {Vector3(1, 0, 0), Vector3(2, 0, 0)}}};
   const std::string page = live_page(model, recording);
-  EXPECT_THAT(page, HasSubstr("<title>a &lt;block> &amp; more"));
+  EXPECT_THAT(page, HasSubstr("<title>a &lt;block&gt; &amp; more"));
   EXPECT_THAT(page, HasSubstr("\"times\":[0,0.1]"));
   EXPECT_THAT(page, HasSubstr("\"counts\":[1,2]"));
   EXPECT_THAT(page, Not(HasSubstr("@MODULE@")));
