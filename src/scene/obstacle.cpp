@@ -218,7 +218,12 @@ RigidObstacle read_obstacle(TomlTable& block, const NamedFiles& files, bool may_
   });
   if (const auto file = read_optional_path(block, "mesh", files)) {
     ShapeMesh shape{*file, {}};
-    read_file_of(block, "mesh", *file, [&](const fs::path& path) { shape.mesh = read_mesh(path); });
+    read_file_of(block, "mesh", *file, [&](const fs::path& path) {
+      shape.mesh = read_mesh(path);
+      if (!examine(shape.mesh).is_closed_solid)
+        block.context().reject(block.key_of("mesh"), "an open or inward surface",
+                               "a closed surface of the rigid body, facing outwards", "close holes in a mesh editor");
+    });
     obstacle.shape = std::move(shape), ++count;
   } else if (block.has("mesh")) {
     ++count;

@@ -2,6 +2,7 @@
 
 #include <sstream>
 
+#include "geometry/mesh_io.hpp"
 #include "geometry/meshes.hpp"
 #include "geometry/primitives.hpp"
 #include "geometry/surface_distance.hpp"
@@ -111,6 +112,10 @@ TEST(Obstacle, RefusesWhatMakesNoSense) {
       HasSubstr("an obstacle of 2 shapes"));
   EXPECT_THAT(complaint("[[obstacle]]\nbox = { min = [0, 0, 0], max = [1, 0, 1] }\n"), HasSubstr("`min`"));
   EXPECT_THAT(complaint("[[obstacle]]\nmesh = \"none.ply\"\n"), HasSubstr("none.ply"));
+  TriangleMesh open = test::box_mesh(Vector3::Zero(), Vector3::Ones());
+  open.triangles.pop_back();
+  write_mesh(folder.path() / "open.ply", open);
+  EXPECT_THAT(complaint("[[obstacle]]\nmesh = \"open.ply\"\n"), HasSubstr("a closed surface"));
   folder.write("bad.csv", "time,x,y,z\n0,0,0,0\n0,0,1,0\n");
   EXPECT_THAT(complaint("[[led]]\nsphere = { centre = [0, 0, 0], radius = 1 }\nmotion_file = \"bad.csv\"\n"),
               AllOf(HasSubstr("bad.csv:3"), HasSubstr("times that increase")));
