@@ -3,23 +3,10 @@
 
 #include <numbers>
 
-#include "estimation/fit.hpp"
 #include "support/dropped.hpp"
 
 namespace pliant::hidden_ground_test {
 namespace {
-
-FitOptions quick() {
-  FitOptions options;
-  options.cells = options.coarse_cells = 6.0;
-  options.budget = 0.0;
-  options.alternatives = false;
-  return options;
-}
-
-double value(const FitOutcome& outcome, const std::string& name) {
-  return outcome.theta[outcome.parameters.find(name)->at];
-}
 
 TEST(HiddenGround, IsFoundFromTenDegreesAndThirtyMillimetresOff) {
   const test::Dropped dropped;
@@ -30,14 +17,14 @@ TEST(HiddenGround, IsFoundFromTenDegreesAndThirtyMillimetresOff) {
   ground.point = -0.03 * ground.normal;
   ground.known = ground.knows_friction = false;
   ground.friction = 0.0;
-  const FitOutcome outcome = fit({recorded}, quick());
+  const FitOutcome outcome = fit({recorded}, test::six_cells());
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
   const PlaneBlock& found = outcome.recordings.front().discretisation.simulation.blocks.planes.front();
   const Vector3 normal = found.normal.vector(outcome.theta), point = found.point.vector(outcome.theta);
   EXPECT_LT(std::acos(normal.dot(dropped.normal)) * 180.0 / std::numbers::pi, 2.0);
   EXPECT_LT(std::abs(normal.dot(point)), 5e-3) << "beside the truth's point, the origin";
   EXPECT_NEAR(outcome.theta[found.friction], dropped.friction, 0.1);
-  EXPECT_NEAR(value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.15 * dropped.youngs_modulus);
+  EXPECT_NEAR(test::value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.15 * dropped.youngs_modulus);
 }
 
 TEST(Friction, IsEstimatedWhereNobodyStatedIt) {

@@ -3,23 +3,15 @@
 // are right.
 #include <gtest/gtest.h>
 
-#include "estimation/fit.hpp"
 #include "support/dropped.hpp"
 
 namespace pliant::obstacles_test {
 namespace {
 
 FitOptions quick() {
-  FitOptions options;
-  options.cells = options.coarse_cells = 6.0;
-  options.budget = 0.0;
-  options.alternatives = false;
+  FitOptions options = test::six_cells();
   options.span = 1.0;
   return options;
-}
-
-double value(const FitOutcome& outcome, const std::string& name) {
-  return outcome.theta[outcome.parameters.find(name)->at];
 }
 
 KeyFrames<6>::Key key(double time, const Vector3& shift, const Vector3& turn) {
@@ -41,8 +33,8 @@ TEST(Obstacles, ABlockThatFallsOnATableAndIsPushedByABallIsFitted) {
     obstacle.friction = 0.0, obstacle.knows_friction = false;
   const FitOutcome outcome = fit({recorded}, quick());
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
-  EXPECT_NEAR(value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.04 * dropped.youngs_modulus);
-  EXPECT_NEAR(value(outcome, "obstacle_friction"), 0.3, 0.05);
+  EXPECT_NEAR(test::value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.04 * dropped.youngs_modulus);
+  EXPECT_NEAR(test::value(outcome, "obstacle_friction"), 0.3, 0.05);
   EXPECT_TRUE(outcome.parameters.find("obstacle_friction_2")->estimated);
   // Where nothing pushes it stays where it came down.
   recorded.capture.scene.obstacles.pop_back();
@@ -63,7 +55,7 @@ TEST(Obstacles, ABlockThatAClampShakesIsFitted) {
   const RecordedCapture recorded = dropped.record();
   const FitOutcome outcome = fit({recorded}, quick());
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
-  EXPECT_NEAR(value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.04 * dropped.youngs_modulus);
+  EXPECT_NEAR(test::value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.04 * dropped.youngs_modulus);
 }
 
 /// A ball pushes a block that slides on a rigid core.
@@ -83,7 +75,7 @@ TEST(Obstacles, ABlockThatSlidesOnARigidCoreIsFitted) {
   };
   const FitOutcome outcome = fit({dropped.record()}, quick());
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
-  EXPECT_NEAR(value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.04 * dropped.youngs_modulus);
+  EXPECT_NEAR(test::value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.04 * dropped.youngs_modulus);
 }
 
 }  // namespace

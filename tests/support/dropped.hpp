@@ -3,10 +3,25 @@
 #include <functional>
 #include <random>
 
+#include "estimation/fit.hpp"
 #include "estimation/recordings.hpp"
 #include "geometry/primitives.hpp"
 
 namespace pliant::test {
+
+/// Choices of a fit on six elements along the block alone, without models beside it: seconds.
+inline FitOptions six_cells() {
+  FitOptions options;
+  options.cells = options.coarse_cells = 6.0;
+  options.budget = 0.0;
+  options.alternatives = false;
+  return options;
+}
+
+/// A parameter of one number as it was fitted.
+inline double value(const FitOutcome& outcome, const std::string& name) {
+  return outcome.theta[outcome.parameters.find(name)->at];
+}
 
 /// A block that falls, turned, on a tilted ground that rubs, seen from above as points with noise. Made by the same
 /// elements and law as it is fitted with, on a finer mesh: an inverse crime in part.
