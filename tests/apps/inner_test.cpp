@@ -126,25 +126,22 @@ TEST_P(OnACore, TheTruthIsFoundAndPredicts) {
 INSTANTIATE_TEST_SUITE_P(Contacts, OnACore, ::testing::Values("sliding", "glued"),
                          [](const auto& c) { return c.param; });
 
-TEST(Inner, IsRefusedWhereNothingKnowsIt) {
+TEST(Inner, MovesAlongAndIsRefusedWhereNothingKnowsIt) {
   const TemporaryFolder folder;
   write_mesh(folder / "core.obj", make_sphere(0.03, 3));
   const std::string timing = "[timing]\nframe_rate = 60.0\nframe_count = 3\n";
-  const ProgramRun moving =
-      run_pliant({"synth", folder.write("scene.toml", scene + inner("glued") + timing), "--out", folder / "never"});
-  EXPECT_NE(moving.exit_code, 0);
-  EXPECT_THAT(moving.err, HasSubstr("inside an object that moves"));
-  const std::string capture = folder / "capture";
-  ASSERT_EQ(run_pliant({"synth", folder.write("scene.toml", scene + inner("glued")), "--out", capture}).exit_code, 0);
-  // A recording that moves: the capture is sound, the fit refuses it.
-  std::string text = read_file(capture + "/capture.toml");
-  folder.write("capture/markers.csv", "frame,id,x,y,z\n0,0,0,0.05,0\n1,0,0,0.05,0\n");
-  folder.write("capture/tracked.csv", "id,x,y,z\n0,0,0.05,0\n");
-  folder.write("capture/capture.toml",
-               text + timing + "[[markers]]\nrest = \"tracked.csv\"\ntrack = \"markers.csv\"\n");
-  const ProgramRun refused = run_pliant({"fit", capture, "--out", folder / "out"});
+  const auto synth = [&](const std::string& text, const char* out) {
+    return run_pliant({"synth", folder.write("scene.toml", text), "--out", folder / out});
+  };
+  const ProgramRun moving = synth(scene + inner("glued") + timing, "moving");
+  EXPECT_EQ(moving.exit_code, 0) << moving.err;
+  EXPECT_EQ(run_pliant({"check", folder / "moving"}).exit_code, 0);
+  // A scan that sags: load-free shapes know what is fixed alone.
+  std::string sagging = scene;
+  sagging.replace(sagging.find("[object]"), 8, "[object]\nshape_is = \"static\"");
+  const ProgramRun refused = synth(sagging + inner("sliding") + timing, "never");
   EXPECT_NE(refused.exit_code, 0);
-  EXPECT_THAT(refused.err, HasSubstr("[[inner]]"));
+  EXPECT_THAT(refused.err, HasSubstr("a rigid body of an object that sags"));
 }
 
 }  // namespace
