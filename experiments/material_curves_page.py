@@ -10,12 +10,14 @@ def share(value):
 
 
 def terms(fit):
-    return len(fit["law"]["parameters"]) // 3 if fit["law"]["name"] == "ogden" else 0
+    return sum(name.startswith("exponent_") for name in fit["parameters"])
 
 
 def law(fit):
-    p = fit["law"]["parameters"]
-    return "; ".join(f"{p[3 * i] / 1e3:.3g} kPa, {p[3 * i + 1]:.2f}" for i in range(terms(fit)))
+    """Young's modulus, and each term's exponent with its stiffness against the first's."""
+    p = {name: value for name, (value, _) in fit["parameters"].items()}
+    ratio = lambda i: f" ({p[f'stiffness_ratio_{i}']:.1g})" if i > 1 else ""
+    return f"{p['youngs_modulus'] / 1e3:.3g} kPa; " + ", ".join(f"{p[f'exponent_{i}']:.2f}{ratio(i)}" for i in range(1, terms(fit) + 1))
 
 
 def picture(name, words):
@@ -29,8 +31,8 @@ def material_curves():
     return WORDS.format(nu=figures["poisson_ratio"]) + silicones(figures) + multiaxial(figures) + foam(figures) + f"\nMeasured on {machine(figures)}.\n"
 
 
-WORDS = ("A cube whose free faces carry no stress is what a body of one element says; the parameters are those of presses. One term of Ogden's law, then more while BIC falls (ten starts each, exponents of either sign); "
-         "residuals relative to each curve's greatest stress. Errors below are root mean squares relative to that, too. Poisson's ratio is {nu} for all but the foam: curves of rubbers hardly show it.\n\n")
+WORDS = ("`pliant fit` of captures that are curves alone: a cube whose free faces carry no stress. One term of Ogden's law, then more where half the BIC asks for them; exponents of either sign, positive ones where all that is fitted is pulled along one axis alone. "
+         "Stresses have a deviation of 1 % of each curve's greatest; errors below are root mean squares relative to that. Poisson's ratio is {nu} for all but the foam: curves of rubbers hardly show it.\n\n")
 
 
 def silicones(figures):
@@ -38,11 +40,11 @@ def silicones(figures):
     for name, s in figures["silicones"].items():
         ogden, linear, small = (s["fits"][k] for k in ("ogden", "linear", "linear, small"))
         rows.append([name.replace("_", " "), percent(s["strain"], sign=False), f"{s['greatest_stress'] / 1e6:.3g}", law(ogden), share(ogden["rms"][1]), share(linear["rms"][1]), share(small["rms"][2]),
-                     f"{small['law']['youngs_modulus'] / 1e3:.3g}"])
+                     f"{small['parameters']['youngs_modulus'][0] / 1e3:.3g}"])
     worst = max(s["fits"]["ogden"]["rms"][1] for s in figures["silicones"].values())
-    return ("**Thirteen silicones**, in tension to the greatest stress; exponents positive (see below). " + f"Fits take {figures['points']} points evenly over the strain; errors are over all points. Worst: {share(worst)}.\n\n" +
+    return ("**Thirteen silicones**, in tension to the greatest stress. " + f"Fits take {figures['points']} points evenly over the strain; errors are over all points. Worst: {share(worst)}.\n\n" +
             picture("material-silicones", "Nominal stress over strain of 13 silicones, with Ogden's law and linear ones") +
-            table(["silicone", "greatest strain", "greatest stress [MPa]", "Ogden: mu, exponent of each term", "error", "linear: error over the whole curve", f"linear to {percent(figures['small'], sign=False)}: error there", "its E [kPa]"], rows) +
+            table(["silicone", "greatest strain", "greatest stress [MPa]", "Ogden: E, exponent of each term (its stiffness against the first)", "error", "linear: error over the whole curve", f"linear to {percent(figures['small'], sign=False)}: error there", "its E [kPa]"], rows) +
             "\nThe initial slope is not to be trusted: strain is the crosshead's, in steps of 2 %. A linear law over small strain is good to some per cent there and off by a multiple of ten per cent at failure.\n\n")
 
 
@@ -66,19 +68,19 @@ def multiaxial(figures):
         fitted = max(one["rms"][i] for i in one["tests"])
         of_all = sorted(everything["rms"])
         kinds = list(dict.fromkeys(t["kind"] for t in s["tests"]))
-        rows.append([name, f"{len(s['tests'])} ({', '.join(kinds)})", s["fitted_mode"].replace("_", " "), terms(one), share(fitted), spread(other_errors(s, "one mode")), spread(other_errors(s, "one mode, positive")),
+        rows.append([name, f"{len(s['tests'])} ({', '.join(kinds)})", s["fitted_mode"].replace("_", " "), terms(one), share(fitted), spread(other_errors(s, "one mode")),
                      spread(other_errors(s, "two modes")), terms(everything), spread((of_all[len(of_all) // 2], of_all[-1])), law(everything)])
         for i, t in enumerate(s["tests"]):
             cell = lambda key: ("" if key not in s["fits"] else ("fitted: " if i in s["fits"][key]["tests"] else "") + share(s["fits"][key]["rms"][i]))
-            curves.append([name, t["name"].replace("_", " "), f"{t['range'][0]:.2f} to {t['range'][1]:.2f}", cell("one mode"), cell("one mode, positive"), cell("two modes"), share(everything["rms"][i])])
+            curves.append([name, t["name"].replace("_", " "), f"{t['range'][0]:.2f} to {t['range'][1]:.2f}", cell("one mode"), cell("two modes"), share(everything["rms"][i])])
     return ("**Several modes of loading.** Fitted to one mode, the others predicted; to that and one more (equibiaxial; shear, of brain), what is left predicted; and to all curves. The median error, and in brackets the worst curve's.\n\n" +
-            picture("material-rubbers", "Rubbers: measured, fitted to all curves (lines) and to one mode, exponents positive (dashed)") + picture("material-brain-gel", "Brain tissue and a gel, likewise; of brain exponents of any sign") +
-            table(["set", "curves", "one mode", "terms", "its error", "predicted from one mode", "likewise, exponents positive", "predicted from two modes", "terms of all", "error of all", "mu, exponent of each term"], rows) + MULTIAXIAL_WORDS +
-            "\n<details><summary>Every curve</summary>\n\n" + table(["set", "curve", "stretch or shear", "one mode", "one mode, positive", "two modes", "all"], curves) + "\n</details>\n\n")
+            picture("material-rubbers", "Rubbers: measured, fitted to all curves (lines) and to one mode (dashed)") + picture("material-brain-gel", "Brain tissue and a gel, likewise") +
+            table(["set", "curves", "one mode", "terms", "its error", "predicted from one mode", "predicted from two modes", "terms of all", "error of all", "of all: E, exponents"], rows) + MULTIAXIAL_WORDS +
+            "\n<details><summary>Every curve</summary>\n\n" + table(["set", "curve", "stretch or shear", "one mode", "two modes", "all"], curves) + "\n</details>\n\n")
 
 
-MULTIAXIAL_WORDS = ("\nUniaxial tension alone does not determine rubbers: a term with a negative exponent that takes up the last per cent of it is read at side stretches near one, and becomes anything under two stretches. BIC knows of the fitted curve "
-                    "only. Positive exponents alone, which the tension of a rubber is fitted as well with, predict the others far better; with an equibiaxial test beside, errors are some per cent. "
+MULTIAXIAL_WORDS = ("\nUniaxial tension alone does not determine rubbers: a term with a negative exponent that takes up the last per cent of it is read at side stretches near one, and becomes anything under two stretches. Hence exponents are positive there; "
+                    "with an equibiaxial test beside, errors are some per cent. "
                     "Brain: axial tests reach 10 % and say nothing of shear after 25 % of compression. "
                     "Sheared prestretched brain is taken as the data's deformation gradients have it (stretch along the shear's direction). Katashima's biaxial curve is left out: both stretches are the same in the file while the stresses differ. The Cauchy stresses of Jones and Treloar are fitted as differences.\n").replace("The Cauchy stresses of Jones and Treloar are", "Jones' biaxial Cauchy stresses are")
 
@@ -87,7 +89,7 @@ def foam(figures):
     f = figures["foam"]
     rows = []
     for name, fit in f["fits"].items():
-        rows.append([name, terms(fit) or "linear", f"{fit['law']['poisson_ratio']:.3f}", f"{fit['law']['youngs_modulus'] / 1e3:.0f}"] +
+        rows.append([name, terms(fit) or "linear", f"{fit['parameters']['poissons_ratio'][0]:.3f}", f"{fit['parameters']['youngs_modulus'][0] / 1e3:.0f}"] +
                     [("" if i in fit["tests"] else "predicted: ") + share(fit["rms"][i]) for i in range(3)])
     return ("**A shoe's foam.** Compression without side strain, as the recordings' notes say; tension with free sides.\n\n" + picture("material-foam", "Foam in tension, compression and simple shear, measured and by four fits") +
             table(["fitted to", "terms", "Poisson's ratio", "E [kPa]", "tension", "compression", "shear"], rows) + FOAM_WORDS)

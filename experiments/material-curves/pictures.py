@@ -44,8 +44,8 @@ def multiaxial(drawn, path, shown, scale, unit):
             x = of([s * scale for s in t["stretch"]])
             label = t["name"].replace("_", " ").replace("lambda ", "").replace("1d", "1.").replace("2d", "2.") if len(tests) < 9 else None
             panel.plot(x, of(t["stress"]), ".", color=colour, ms=5, label=label)
-            panel.plot(x, of(fits["all"]["predictions"][i]["stress"]), color=colour, lw=1.2)
-            panel.plot(x, of(fits.get("one mode, positive", fits["one mode"])["predictions"][i]["stress"]), "--", color=colour, lw=1)
+            panel.plot(x, of(fits["all"]["stress"][i]), color=colour, lw=1.2)
+            panel.plot(x, of(fits["one mode"]["stress"][i]), "--", color=colour, lw=1)
         panel.set_ylim(low - 0.08 * (high - low), high + 0.15 * (high - low))
         panel.set_title(name, fontsize=10)
         if len(tests) < 9:
@@ -63,7 +63,7 @@ def foam(drawn, path):
     for i, (panel, t, title) in enumerate(zip(panels, tests, ("tension", "compression", "simple shear"))):
         panel.plot(t["stretch"], [s / 1e3 for s in t["stress"]], ".", color="#999", ms=4, label="measured")
         for colour, style, (name, f) in zip(COLOURS, ("-", "--", ":", "-."), fits.items()):
-            panel.plot(t["stretch"], [s / 1e3 if s is not None else float("nan") for s in f["predictions"][i]["stress"]], style, color=colour, label=name)
+            panel.plot(t["stretch"], [s / 1e3 if s is not None else float("nan") for s in f["stress"][i]], style, color=colour, label=name)
         panel.set_title(title, fontsize=10)
         panel.set_xlabel("shear" if i == 2 else "stretch")
         low, high = min(t["stress"]) / 1e3, max(t["stress"]) / 1e3

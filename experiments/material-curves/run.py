@@ -6,7 +6,6 @@ matplotlib is installed; all else needs the standard library alone."""
 import csv
 import json
 import pathlib
-import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -16,27 +15,45 @@ import common
 INCOMPRESSIBLE = 0.4995  # Poisson's ratio of what keeps its volume: not estimated
 POINTS = 60              # of a silicone's curve that a fit takes, evenly over the strain
 SMALL = 0.5              # strain up to which a linear law is fitted, too
+NOISE = 0.01             # deviation of a stress, of its curve's greatest
 MPA = 1e6
 UNITS = {"Budday": 1e3, "Katashima": 1e3}  # [Pa]; the others are in MPa
 IMAGES = common.ROOT / "docs/images"
 
 
 def fit(work, program, name, tests, fits):
-    """The program's answer to a request: for each fit its law and, test by test, stresses and error."""
-    request = work / f"{name}-request.json"
-    request.write_text(json.dumps({"tests": tests, "fits": fits}))
-    answer = subprocess.run([program, f"request={request}"], check=True, stdout=subprocess.PIPE, text=True).stdout
-    fits = {f["name"]: f for f in json.loads(answer)["fits"]}
-    for f in fits.values():
-        print(name, f["name"], f.get("failure") or [round(p["rms"], 4) if p["rms"] is not None else None for p in f["predictions"]], flush=True)
-    return fits
+    """Each fit's law and, test by test, stresses and error: `pliant fit` of a capture of these curves."""
+    found = {}
+    for number, f in enumerate(fits):
+        folder = work / f"{name}-{number}"
+        folder.mkdir(parents=True, exist_ok=True)
+        text = f'format = "capture/1"\nname = {json.dumps(name)}\n'
+        for i, t in enumerate(tests):
+            deviation = NOISE * max(map(abs, t["stress"]))
+            columns = [t["stretch"], *([t["second"]] if "second" in t else []), t["stress"]]
+            header = "stretch,second,stress,std" if "second" in t else "stretch,stress,std"
+            rows = [",".join(map(repr, [*row, deviation])) for row in zip(*columns)]
+            (folder / f"{i}.csv").write_text("\n".join([header, *rows, ""]))
+            facts = {"name": f"{i} {t['name']}", "mode": t["mode"], "measure": t.get("measure", "first"), "curve": f"{i}.csv",
+                     "role": "fit" if i in f["tests"] else "test", **({"prestretch": t["prestretch"]} if "prestretch" in t else {})}
+            text += "[[material_curve]]\n" + "".join(f"{key} = {common.toml(value)}\n" for key, value in facts.items())
+        (folder / "capture.toml").write_text(text)
+        choices = {"material": f["law"]} if "law" in f else {}
+        if f["poisson_ratio"] is not None:
+            choices |= {"poissons_ratio": f["poisson_ratio"], "poissons_ratio.estimate": False}
+        figures = common.fit(program, folder, folder / "fit", choices)
+        result = figures["result"]
+        curves = {int(c["name"].split()[0]): c for c in result["curves"]}
+        found[f["name"]] = {"tests": f["tests"], "seconds": figures["wall_seconds"], "verdict": result["verdict"], "material": result["material"],
+                            "parameters": {key: [p["value"], p.get("std")] for key, p in result["parameters"].items() if key != "poisson_ratio"},
+                            "rms": [curves[i]["relative_rms"] for i in range(len(tests))], "stress": [curves[i]["predicted"] for i in range(len(tests))]}
+        print(name, f["name"], [None if e is None else round(e, 4) for e in found[f["name"]]["rms"]], flush=True)
+    return found
 
 
 def kept(f):
     """What results.json has of a fit."""
-    if not f["succeeded"]:
-        return {"failure": f["failure"]}
-    return {"law": f["law"], "tried": f["tried"], "tests": f["tests"], "seconds": common.number(f["seconds"], 3), "rms": [p["rms"] for p in f["predictions"]]}
+    return {key: f[key] for key in ("tests", "seconds", "verdict", "material", "parameters", "rms")}
 
 
 # ---- silicones
@@ -72,12 +89,12 @@ def silicones(work, program):
         # Under tension alone a linear law's stress does not depend on Poisson's ratio; with this one no side vanishes.
         nu = min(0.45, 0.9 / (rows[-1][0] - 1))
         fits = fit(work, program, path.stem, tests, [
-            {"name": "ogden", "tests": [0], "poisson_ratio": INCOMPRESSIBLE, "positive_exponents": True},
+            {"name": "ogden", "tests": [0], "poisson_ratio": INCOMPRESSIBLE},
             {"name": "linear", "tests": [0], "poisson_ratio": nu, "law": "linear"},
             {"name": "linear, small", "tests": [2], "poisson_ratio": nu, "law": "linear"}])
         found[path.stem] = {"points": len(rows), "strain": rows[-1][0] - 1, "greatest_stress": max(r[1] for r in rows),
                             "fits": {key: kept(f) for key, f in fits.items()}}
-        drawn.append((path.stem.replace("_", " "), rows, {key: f["predictions"][1]["stress"] for key, f in fits.items()}))
+        drawn.append((path.stem.replace("_", " "), rows, {key: f["stress"][1] for key, f in fits.items()}))
     return found, drawn
 
 
@@ -146,7 +163,6 @@ def multiaxial(work, program):
             second = []
         fits = fit(work, program, name.replace(" ", "-").replace(",", ""), tests, [
             {"name": "one mode", "tests": first, "poisson_ratio": INCOMPRESSIBLE},
-            *([] if "Budday" in name else [{"name": "one mode, positive", "tests": first, "poisson_ratio": INCOMPRESSIBLE, "positive_exponents": True}]),
             *([{"name": "two modes", "tests": first + second, "poisson_ratio": INCOMPRESSIBLE}] if second else []),
             {"name": "all", "tests": list(range(len(tests))), "poisson_ratio": INCOMPRESSIBLE}])
         found[name] = {"tests": [{"name": t["name"], "mode": t["mode"], "kind": kind_of(t), "points": len(t["stress"]),
@@ -177,10 +193,9 @@ def foam(work, program):
 
 def main():
     arguments = common.arguments(__doc__.splitlines()[0])
-    program = arguments.program.parent.parent / "experiments/pliant_material_curves"
     figures, drawn = {"poisson_ratio": INCOMPRESSIBLE, "points": POINTS, "small": SMALL}, {}
     for name, of in (("silicones", silicones), ("multiaxial", multiaxial), ("foam", foam)):
-        figures[name], drawn[name] = of(arguments.work, program)
+        figures[name], drawn[name] = of(arguments.work, arguments.program)
     common.write_results(__file__, figures)
     try:
         import pictures

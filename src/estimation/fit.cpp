@@ -68,6 +68,11 @@ FitOutcome fit_all(std::vector<RecordedCapture> recordings, const FitOptions& op
     throw InputError({{}, wrong, "", "see `pliant fit --help`"});
   if (recordings.empty()) throw InputError({{}, "no recording was given", "one or several", ""});
   if (tests_alone(recordings, held_out)) {
+    if (monitor.processes && !monitor.processes->is_alone())
+      throw InputError({{recordings.front().capture.file},
+                        "static tests alone, and " + std::to_string(monitor.processes->size()) + " processes",
+                        "one process, whose threads solve the tests side by side",
+                        "start `pliant fit` by itself; `--threads` says how many processors it takes"});
     std::vector<const Capture*> captures;
     for (const RecordedCapture& r : recordings) captures.push_back(&r.capture);
     return fit_presses(captures, options, monitor, std::move(resume), held_out ? &held_out->capture : nullptr);

@@ -26,15 +26,29 @@ std::vector<int> as_they_are(const LawForm& form) {
 }
 
 /// The estimate with one term more in each law, which begins small.
-VectorX with_term(const LawLayout& from, const VectorX& theta, const LawLayout& to, double exponent) {
+/// @param ratio  of its stiffness to the first term's
+VectorX with_term(const LawLayout& from, const VectorX& theta, const LawLayout& to, double exponent, double ratio) {
   VectorX more = carry_law(from, theta, to, as_they_are(to.form()));
   const int added = to.form().terms - 1;
   for (int law = 0; law < to.form().laws; ++law) {
     more[to.exponent(added, law)] = exponent;
-    more[to.stiffness_ratio(added, law)] = 0.2;
+    more[to.stiffness_ratio(added, law)] = ratio;
     more[to.poissons_ratio(added, law)] = theta[from.poissons_ratio(0, law)];
   }
   return more;
+}
+
+/// A cube under homogeneous strain may hardly change its volume: nothing locks. Exponents keep the sign that all of
+/// those have that they begin from.
+ParameterSet of_curves(const ParameterSet& set, const std::vector<double>& exponents) {
+  constexpr double greatest_poissons_ratio = 0.4999, least_exponent = 0.1;
+  const bool are_positive = std::ranges::all_of(exponents, [](double exponent) { return exponent > 0.0; });
+  std::vector<Parameter> list = set.parameters();
+  for (Parameter& p : list) {
+    if (p.transform == Transform::LogitHalf) p.upper = greatest_poissons_ratio;
+    if (p.transform == Transform::Shift && are_positive) p.lower = least_exponent;
+  }
+  return {set.layout(), std::move(list), set.reference()};
 }
 
 }  // namespace
@@ -47,6 +61,7 @@ ParameterSet LawFacts::parameters(const LawShape& shape) const {
   if (const auto known = known_poissons_ratio(options))
     for (const Parameter& p : set.parameters())
       if (p.transform == Transform::LogitHalf) set.fix(p.name, *known);
+  if (are_curves()) set = of_curves(set, curve_exponents);
   if (!shape.points.empty())
     set.set_joint_prior(own.modulus_names(), field_precision(shape.points, size, options.modulus_variation));
   return set;
@@ -62,7 +77,7 @@ class LawPlan::Replay {
 
   Standing run() {
     search();
-    if (now_.best && !is_pending() && options().alternatives) try_alternatives();
+    if (now_.best && !is_pending() && options().alternatives && !facts_.are_curves()) try_alternatives();
     return std::move(now_);
   }
 
@@ -129,7 +144,7 @@ class LawPlan::Replay {
     Stage stage;
     stage.id.kind = kind, stage.name = std::move(name);
     stage.from = {std::move(from)};
-    stage.iterations = options().max_iterations;
+    stage.iterations = (facts_.are_curves() ? 8 : 1) * options().max_iterations;  // theirs cost nothing
     stage.law = LawTask{shape, now_.noise};
     return stage;
   }
@@ -170,9 +185,13 @@ class LawPlan::Replay {
         {facts_.controls(), terms, 1, false, is_neo_hookean ? ElasticLaw::NeoHookean : ElasticLaw::Corotated}};
     const char* const name = terms > 0 ? "1 term" : is_neo_hookean ? "neo-Hookean" : "linear";
     std::vector<VectorX> starts = {facts_.parameters(shape).reference()};
-    if (terms == 1 && facts_.has_curves) {  // curves of growing load fit exponents of either sign
-      starts.push_back(starts.front());
-      starts.back()[facts_.layout(shape.form).exponent(0)] *= -2.0;
+    if (terms == 1) {
+      const Eigen::Index exponent = facts_.layout(shape.form).exponent(0);
+      std::vector<double> exponents = facts_.curve_exponents;
+      // Curves of growing load fit exponents of either sign.
+      if (exponents.empty() && facts_.has_curves) exponents = {starts[0][exponent], -2.0 * starts[0][exponent]};
+      starts.resize(std::max<std::size_t>(exponents.size(), 1), starts[0]);
+      for (std::size_t i = 0; i < exponents.size(); ++i) starts[i][exponent] = exponents[i];
     }
     std::optional<Estimate> first = estimate_from(shape, starts, name);
     if (!first) return false;
@@ -245,7 +264,8 @@ class LawPlan::Replay {
       const std::string name = std::to_string(form.terms) + " terms";
       std::vector<VectorX> starts;
       for (const double exponent : exponents_of_more(form.terms))
-        starts.push_back(with_term(best().layout, best().theta, facts_.layout(form), exponent));
+        starts.push_back(
+            with_term(best().layout, best().theta, facts_.layout(form), exponent, facts_.are_curves() ? 0.03 : 0.2));
       if (!fit_freer(form, starts, name)) break;
       if (form.own_ratios || known_poissons_ratio(options())) continue;
       form.own_ratios = true;
@@ -257,6 +277,7 @@ class LawPlan::Replay {
   /// Where the exponent of one term more begins. The second has the other sign, or, where forces at given depths tell
   /// how an object stiffens, is steeper than the first; the third stiffens more than the first.
   std::vector<double> exponents_of_more(int terms) const {
+    if (facts_.are_curves()) return facts_.curve_exponents;
     if (terms > 2) return {10.0};
     if (facts_.has_curves) return {-6.0, 14.0};
     return {-6.0};

@@ -17,6 +17,12 @@ struct LawFacts {
   int presses = 0;                         ///< to be fitted
   bool has_curves = false;                 ///< forces at given depths or stresses are to be fitted
   bool is_specimen = false;                ///< stresses at given strains are: the object is of one material
+  /// Exponents that a term begins from where stresses at given strains are all there is to fit: an evaluation costs
+  /// nothing, and valleys are many. Empty: there is more to fit.
+  std::vector<double> curve_exponents = {};
+
+  /// Whether stress-strain curves are all there is to fit: nothing of the mesh is in them.
+  bool are_curves() const { return !curve_exponents.empty(); }
 
   int controls() const { return modulus_names.empty() ? 1 : int(modulus_names.size()); }
   LawLayout layout(const LawForm& form) const;

@@ -29,7 +29,7 @@ struct LawTask {
 /// What a stage of a search for the law of a pressed object found, beside what every `StageRecord` says.
 struct LawFinding {
   MarkerNoise noise = {};      ///< after it
-  double deviation = 0.0;      ///< geometric mean of the coordinates' deviations by that noise [m]
+  double deviation = 0.0;      ///< geometric mean of the coordinates' deviations by that noise [m]; 1 without any
   double track_squares = 0.0;  ///< of the residuals of markers, each by that mean over its own deviation [m^2]
   double stated_cost = 0.0;    ///< of curves and grips, whose deviations are stated [-]
   double observations = 0.0;   ///< independent ones

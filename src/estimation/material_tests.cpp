@@ -2,18 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
-
-#include "base/median.hpp"
 
 namespace pliant {
 
 namespace {
-
-constexpr double greatest_poissons_ratio = 0.4999;
-constexpr double least_exponent = 0.1, largest_exponent = 100.0;  // in size
-constexpr double small_ratio = 0.03;                              // stiffness of an added term against the first
 
 /// dP for a change of F, by a law's tangent in its frame.
 Matrix3 stress_change(const PointStress& at, const Matrix3& dF) {
@@ -217,21 +210,6 @@ std::shared_ptr<const Body> unit_element(int controls) {
   return body;
 }
 
-ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
-                              bool positive_exponents) {
-  const ParameterSet set = law_parameters(LawLayout({1, terms}), youngs_modulus);
-  std::vector<Parameter> list = set.parameters();
-  for (Parameter& p : list) {
-    // Curves tell an exponent's sign themselves.
-    if (p.transform == Transform::Shift)
-      p.lower = positive_exponents ? least_exponent : -largest_exponent, p.upper = largest_exponent;
-    if (p.transform == Transform::LogitHalf) p.upper = greatest_poissons_ratio;
-  }
-  ParameterSet parameters(set.layout(), std::move(list), set.reference());
-  if (poissons_ratio) parameters.fix("poissons_ratio", *poissons_ratio);
-  return parameters;
-}
-
 CurveTrial::CurveTrial(MaterialTest test, int number, const LawLayout& layout, double noise,
                        const ParameterSet& parameters)
     : test_(std::move(test)), number_(number), layout_(layout), noise_(noise) {
@@ -255,6 +233,7 @@ double CurveTrial::std_of(std::size_t point) const {
 
 CostEvaluation CurveTrial::run(const VectorX& theta, const MatrixX& directions) {
   CostEvaluation result;
+  if (!theta.allFinite()) return result.failure = test_.name + ": the law's numbers are not finite", result;
   for (const Parameter& p : bounded_)
     if (!(theta[p.at] >= p.lower && theta[p.at] <= p.upper))
       return result.failure = p.name + " leaves its bounds", result;
@@ -287,92 +266,6 @@ CostEvaluation CurveTrial::gradient(const VectorX& theta, VectorX& theta_bar) {
   CostEvaluation result = run(theta, MatrixX::Identity(theta.size(), theta.size()));
   if (result.succeeded) theta_bar = result.frames.front().gradient;
   return result;
-}
-
-Objective curve_objective(const std::vector<MaterialTest>& tests, int terms, ParameterSet parameters, double noise) {
-  if (tests.empty()) throw std::invalid_argument("curves need a test");
-  std::vector<std::unique_ptr<Trial>> trials;
-  for (const MaterialTest& test : tests)
-    trials.push_back(std::make_unique<CurveTrial>(test, int(trials.size()), LawLayout({1, terms}), noise, parameters));
-  return {std::move(trials), std::move(parameters)};
-}
-
-namespace {
-
-/// A modulus to set out from: the median of the points' secants.
-double secant_modulus(const std::vector<MaterialTest>& tests) {
-  std::vector<double> secants;
-  for (const MaterialTest& test : tests)
-    for (const double secant : secant_moduli(test)) secants.push_back(secant);
-  if (secants.empty()) throw std::invalid_argument("no stress of the curves has the sign of its strain");
-  return median(std::move(secants));
-}
-
-/// Starts of a law with so many terms, from the one with fewer, which may be empty.
-std::vector<VectorX> starts_of(const LawLayout& layout, const VectorX& reference, const LawLayout& fewer,
-                               const VectorX& before, bool positive_exponents) {
-  std::vector<VectorX> starts;
-  if (layout.form().terms == 0) return {reference};
-  const int added = layout.form().terms - 1;
-  for (const double exponent : {1.2, 3.0, 7.0, 15.0, 30.0, -1.2, -3.0, -7.0, -15.0, -30.0}) {
-    if (positive_exponents && exponent < 0.0) continue;
-    VectorX theta = reference;
-    if (added > 0) theta = carry_law(fewer, before, layout, {0});
-    theta[layout.exponent(added)] = exponent;
-    if (added > 0) theta[layout.stiffness_ratio(added)] = small_ratio;
-    starts.push_back(theta);
-  }
-  return starts;
-}
-
-}  // namespace
-
-CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOptions& options) {
-  CurveFit best;
-  best.bic = std::numeric_limits<double>::infinity();
-  VectorX before;
-  LawLayout fewer;
-  bool falls = true;
-  const double modulus = secant_modulus(tests);
-  OptimiserOptions optimiser;
-  optimiser.max_iterations = options.max_iterations;
-  optimiser.step_tolerance = 1e-6, optimiser.cost_tolerance = 1e-8;
-  for (int terms = std::min(1, options.max_terms); terms <= options.max_terms && falls; ++terms) {
-    CurveFit fit;
-    fit.layout = LawLayout({1, terms});
-    Objective objective = curve_objective(
-        tests, terms, curve_parameters(terms, modulus, options.poissons_ratio, options.positive_exponents),
-        options.noise);
-    double least = std::numeric_limits<double>::infinity();
-    for (const VectorX& start :
-         starts_of(fit.layout, objective.parameters().reference(), fewer, before, options.positive_exponents)) {
-      const OptimiserSummary run = minimise(objective, objective.parameters().to_unconstrained(start), optimiser);
-      if (!run.succeeded) fit.failure = run.reason;
-      if (!run.succeeded || !(run.evaluation.cost < least)) continue;
-      least = run.evaluation.cost;
-      fit.converged = run.converged, fit.reason = run.reason;
-      fit.theta = objective.parameters().to_theta(run.p);
-      fit.succeeded = true;
-    }
-    if (!fit.succeeded) {
-      if (best.failure.empty()) best.failure = fit.failure;
-      break;
-    }
-    before = fit.theta, fewer = fit.layout;
-    fit.parameters = objective.parameters();
-    const CostEvaluation at = objective.evaluate(objective.parameters().to_unconstrained(fit.theta));
-    double squares = 0.0;  // over each curve's greatest stress, where it states no standard deviations
-    for (const FrameFit& curve : at.frames) squares += 2.0 * curve.cost * options.noise * options.noise;
-    const double n = at.independent_observations(), mean = std::max(squares / n, 1e-30);
-    fit.bic = n * std::log(mean) + objective.parameters().dimension() * std::log(n);
-    fit.law = press_law(*unit_element(), fit.layout, fit.theta);
-    std::vector<CurveFit::Tried> tried = best.tried;
-    tried.push_back({terms, fit.bic, std::sqrt(mean), at.cost, fit.layout.mean_modulus(fit.theta)});
-    falls = fit.bic < best.bic;
-    if (falls) best = fit;
-    best.tried = std::move(tried);
-  }
-  return best;
 }
 
 }  // namespace pliant

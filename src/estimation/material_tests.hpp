@@ -1,10 +1,7 @@
 #pragma once
 
-#include <optional>
-
 #include "capture/capture.hpp"
 #include "estimation/objective.hpp"
-#include "estimation/optimiser.hpp"
 #include "estimation/press_law.hpp"
 
 namespace pliant {
@@ -57,12 +54,6 @@ std::vector<double> secant_moduli(const MaterialTest& test);
 /// @param controls  moduli of the object: the element's is the first
 std::shared_ptr<const Body> unit_element(int controls = 1);
 
-/// `law_parameters` of one element, for materials that hardly change their volume too.
-/// @param poissons_ratio      known; nothing: estimated, up to 0.4999
-/// @param positive_exponents  else they may have any sign
-ParameterSet curve_parameters(int terms, double youngs_modulus, std::optional<double> poissons_ratio,
-                              bool positive_exponents = false);
-
 /// A stress-strain curve of a material: half the squares of simulated less measured stress over the test's standard
 /// deviations or, where it states none, over `noise` times the curve's greatest stress, so that curves count by their
 /// points, not by their units. The law is that of one element: of the first control modulus, where there are several.
@@ -93,44 +84,5 @@ class CurveTrial : public Trial {
   std::vector<Parameter> bounded_;
   std::shared_ptr<const Body> body_;
 };
-
-/// The objective of stress-strain curves.
-/// @param terms  of Ogden's law; 0: the linear law
-/// Throws std::invalid_argument where there is no test.
-Objective curve_objective(const std::vector<MaterialTest>& tests, int terms, ParameterSet parameters, double noise);
-
-struct CurveFitOptions {
-  int max_terms = 4;                     ///< of Ogden's law; 0: the linear law
-  std::optional<double> poissons_ratio;  ///< known; nothing: estimated
-  /// Exponents are positive. Pulled along one axis alone, a term with a negative exponent -a does what one with a / 2
-  /// does, by the sides' stretch; pulled along two it is another material by far.
-  bool positive_exponents = false;
-  double noise = 0.01;       ///< as of `CurveTrial`
-  int max_iterations = 200;  ///< of each start
-};
-
-/// A material that was fitted to curves.
-struct CurveFit {
-  bool succeeded = false;
-  std::string failure;
-  bool converged = false;
-  std::string reason;  ///< why the best start's optimiser stopped
-  LawLayout layout;
-  ParameterSet parameters;  ///< of that layout
-  VectorX theta;
-  std::shared_ptr<const TabulatedLaw> law;  ///< of one element
-  double bic = 0.0;                         ///< n ln(sum of squares / n) + k ln n
-  struct Tried {
-    int terms;
-    double bic, rms;        ///< rms of all residuals, over each curve's greatest stress
-    double cost;            ///< with the priors
-    double youngs_modulus;  ///< [Pa] at no strain
-  };
-  std::vector<Tried> tried;  ///< of each number of terms, the best of its starts
-};
-
-/// Fits one term from several exponents, then adds terms one by one, each from several exponents of both signs and
-/// small beside what was there, while Schwarz' criterion (BIC) falls.
-CurveFit fit_curves(const std::vector<MaterialTest>& tests, const CurveFitOptions& options = {});
 
 }  // namespace pliant

@@ -12,7 +12,6 @@
 #include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "estimation/alternative.hpp"
-#include "estimation/curve_fit.hpp"
 #include "estimation/field_choice.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/fit_config.hpp"
@@ -102,7 +101,30 @@ class LawRun : StageLoop {
       f.has_curves = f.has_curves || s.scene->static_tests().any_to_fit();
       f.is_specimen = f.is_specimen || !s.scene->static_tests().curves.empty();
     }
+    const auto has_curves_alone = [](const Capture* capture) { return is_of_material_curves(*capture); };
+    if (std::ranges::all_of(captures_, has_curves_alone)) f.curve_exponents = curve_exponents();
     return f;
+  }
+
+  /// Exponents that terms of a specimen's law begin from. Pulled along one axis alone, a term with a negative exponent
+  /// -a does what one with a / 2 does, by the sides' stretch; pulled along two it is another material by far.
+  std::vector<double> curve_exponents() const {
+    bool is_only_pulled = true, has_modulus = false;
+    for (const TestedSpecimen& s : specimens_)
+      for (const ObservedCurve& curve : s.scene->static_tests().curves) {
+        if (!is_fitted(curve.role)) continue;
+        has_modulus = has_modulus || !secant_moduli(curve.test).empty();
+        is_only_pulled = is_only_pulled && curve.test.mode == TestMode::Uniaxial &&
+                         std::ranges::all_of(curve.test.stretch, [](double stretch) { return stretch >= 1.0; });
+      }
+    if (!has_modulus)
+      throw InputError({{first().file},
+                        "no stress of the stress-strain curves has the sign of its strain",
+                        "stress-strain curves of an elastic material",
+                        "stretches are 1 and shears 0 at rest; tension is positive"});
+    std::vector<double> exponents = {1.2, 3.0, 7.0, 15.0, 30.0};
+    if (!is_only_pulled) exponents.insert(exponents.end(), {-1.2, -3.0, -7.0, -15.0, -30.0});
+    return exponents;
   }
 
   int press_count() const {
@@ -201,6 +223,7 @@ class LawRun : StageLoop {
     OptimiserOptions o;
     o.max_iterations = stage.iterations;
     o.damps_long_steps = true;
+    if (plan_.facts().are_curves()) o.step_tolerance = 1e-6, o.cost_tolerance = 1e-8;  // flat valleys, cheap steps
     OptimiserState from{0, form.parameters.to_unconstrained(theta), {}};
     if (const StageUnderWay* left = task.is_brief ? nullptr : under_way(stage.id)) from = left->optimiser;
     OptimiserSummary s;
@@ -226,7 +249,8 @@ class LawRun : StageLoop {
     record.reason = s.reason;
     record.iterations = s.iterations;
     if (!s.succeeded) {
-      if (!task.is_brief) outcome_.notes.push_back(stage.name + ": " + s.reason);
+      const bool is_one_of_many = task.is_brief || plan_.facts().are_curves();
+      if (!is_one_of_many) outcome_.notes.push_back(stage.name + ": " + s.reason);
       return record;
     }
     const CostEvaluation begin = objective->evaluate(form.parameters.to_unconstrained(theta));
@@ -249,7 +273,7 @@ class LawRun : StageLoop {
     for (std::size_t f = std::size_t(presses); f < evaluation.frames.size(); ++f)  // presses come first, a frame each
       found.stated_cost += evaluation.frames[f].cost;
     found.track_squares = objective.weighed_squares();
-    found.deviation = presses == 0 ? found.noise.at_rest : objective.typical_deviation();
+    found.deviation = presses == 0 ? 1.0 : objective.typical_deviation();
     found.observations = evaluation.independent_observations();
     found.dimension = form.parameters.dimension();
     const VectorX p = form.parameters.to_unconstrained(record.theta);
@@ -641,11 +665,8 @@ FitOutcome fit_presses(const std::vector<const Capture*>& captures, const FitOpt
   if (const std::string wrong = options.validate(); !wrong.empty())
     throw InputError({{captures.front()->file}, wrong, "", "see `pliant fit --help`"});
   require_known(*captures.front(), options);
-  const bool are_curves =
-      std::ranges::all_of(captures, [](const Capture* capture) { return is_of_material_curves(*capture); });
   const std::shared_ptr<PressScene> unseen = held_out ? scene_held_out(*held_out, options) : nullptr;
-  FitOutcome outcome =
-      are_curves ? fit_material_curves(captures, options) : LawRun(captures, options, monitor, std::move(resume)).run();
+  FitOutcome outcome = LawRun(captures, options, monitor, std::move(resume)).run();
   if (unseen && outcome.law && !outcome.interrupted) predict_held_out(*held_out, unseen, outcome);
   return outcome;
 }

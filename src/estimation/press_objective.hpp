@@ -21,7 +21,7 @@ struct TestedSpecimen {
 
 /// How well each kind of measurement of the static tests to fit is met; nothing where the evaluation failed. A press'
 /// residuals count over its own greatest displacement, those of grips over the greatest of their kind.
-/// @param evaluation    of a `PressObjective` of the specimens, or of a `curve_objective` of their curves
+/// @param evaluation    of a `PressObjective` of the specimens
 /// @param marker_noise  of a coordinate of presses' markers [m]; 0: what neighbouring markers scatter
 std::vector<Agreement> agreements_of(const std::vector<TestedSpecimen>& specimens, const CostEvaluation& evaluation,
                                      double marker_noise = 0.0);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
@@ -117,6 +118,14 @@ std::vector<ObservedCurve> observed_curves(const Capture& capture) {
     test.second = std::move(read.second);
     test.std = std::move(read.stds);
     test.prestretch = facts.prestretch;
+    try {
+      check_test(test);
+    } catch (const std::invalid_argument& wrong) {
+      throw InputError({{facts.curve},
+                        wrong.what(),
+                        "a stress-strain curve of an elastic material",
+                        "stretches are 1 and shears 0 at rest; tension is positive"});
+    }
     curves.push_back({facts.role, std::move(test)});
   }
   return curves;

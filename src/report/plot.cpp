@@ -36,6 +36,9 @@ struct Axis {
   }
 };
 
+// Whether there is no place between two numbers but what rounding makes: ticks could not be told apart.
+bool are_one(double low, double high) { return high - low <= 1e-9 * std::max(std::abs(low), std::abs(high)); }
+
 // Range of what is to be shown, and never empty.
 class Range {
  public:
@@ -47,10 +50,10 @@ class Range {
   std::pair<double, double> padded(double part) const {
     if (low_ > high_) return logarithmic_ ? std::pair{1.0, 10.0} : std::pair{0.0, 1.0};
     if (logarithmic_) {
-      const double factor = low_ == high_ ? 2.0 : std::pow(high_ / low_, part);
+      const double factor = are_one(low_, high_) ? 2.0 : std::pow(high_ / low_, part);
       return {low_ / factor, high_ * factor};
     }
-    const double pad = low_ == high_ ? std::max(std::abs(low_) * 0.1, 1e-12) : part * (high_ - low_);
+    const double pad = are_one(low_, high_) ? std::max(std::abs(low_) * 0.1, 1e-12) : part * (high_ - low_);
     return {low_ - pad, high_ + pad};
   }
 
@@ -275,7 +278,8 @@ std::string plot_svg(const std::vector<Series>& series, const PlotOptions& optio
 }
 
 std::vector<double> axis_ticks(double low, double high, int count, bool logarithmic) {
-  if (!(low < high) || !std::isfinite(low) || !std::isfinite(high) || (logarithmic && low <= 0.0)) return {};
+  if (!(low < high) || are_one(low, high) || !std::isfinite(low) || !std::isfinite(high) || (logarithmic && low <= 0.0))
+    return {};
   if (!logarithmic) return linear_ticks(low, high, count);
   const std::vector<double> ticks = logarithmic_ticks(low, high, count);
   return ticks.size() >= 2 ? ticks : linear_ticks(low, high, count);

@@ -3,12 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <random>
 
+#include "capture/curves.hpp"
+#include "estimation/press_fit.hpp"
 #include "motion/equilibrium.hpp"
 #include "support/bodies.hpp"
 #include "support/derivatives.hpp"
 #include "support/tolerance.hpp"
+#include "temporary_folder.hpp"
 
 namespace pliant::material_tests_test {
 namespace {
@@ -117,7 +121,12 @@ TEST(MaterialTests, CostOfCurvesHasTheGradientThatDifferencesShow) {
   const auto truth = ogden(foam);
   for (const MaterialTest& t : all_modes()) tests.push_back(seen_of(*truth, t));
   for (const int terms : {0, 1, 3}) {
-    Objective objective = curve_objective(tests, terms, curve_parameters(terms, 5e3, {}), 0.05);
+    const LawLayout layout({1, terms});
+    const ParameterSet parameters = law_parameters(layout, 5e3);
+    std::vector<std::unique_ptr<Trial>> trials;
+    for (const MaterialTest& t : tests)
+      trials.push_back(std::make_unique<CurveTrial>(t, int(trials.size()), layout, 0.05, parameters));
+    Objective objective(std::move(trials), parameters);
     VectorX p = objective.parameters().to_unconstrained(objective.parameters().reference());
     p.array() += 0.05;
     const CostEvaluation at = objective.linearise(p);
@@ -132,16 +141,37 @@ TEST(MaterialTests, CostOfCurvesHasTheGradientThatDifferencesShow) {
   }
 }
 
+/// A capture of curves, whose stresses have a standard deviation of so much of each curve's greatest.
+Capture capture_of(const test::TemporaryFolder& folder, const std::vector<MaterialTest>& tests, double noise) {
+  Capture capture;
+  capture.name = "specimen", capture.file = folder / "capture.toml";
+  for (const MaterialTest& t : tests) {
+    MaterialCurve& curve = capture.material_curves.emplace_back();
+    curve.mode = t.mode, curve.measure = t.measure, curve.prestretch = t.prestretch;
+    curve.curve = folder / ("curve-" + std::to_string(capture.material_curves.size()) + ".csv");
+    write_stress_curve(curve.curve, {t.stretch, t.second, t.stress,
+                                     std::vector<double>(t.stress.size(), noise * t.greatest_stress())});
+  }
+  return capture;
+}
+
+/// The law that `fit` makes of curves alone, without choices but for a Poisson's ratio that is known.
+FitOutcome fitted(const std::vector<MaterialTest>& tests, double noise, std::optional<double> poissons_ratio = {}) {
+  const test::TemporaryFolder folder;
+  const Capture capture = capture_of(folder, tests, noise);
+  FitOptions options;
+  if (poissons_ratio) options.parameters["poissons_ratio"] = {VectorX::Constant(1, *poissons_ratio), false, {}};
+  return fit_presses({&capture}, options);
+}
+
 TEST(MaterialTests, RecoverAFoamFromCurvesWithoutNoise) {
   const auto truth = ogden(foam);
-  const std::vector<MaterialTest> tests = {seen_of(*truth, TestMode::Uniaxial, 0.5, 1.4, 30),
-                                           seen_of(*truth, TestMode::ConfinedUniaxial, 0.6, 1.3, 30)};
-  CurveFitOptions options;
-  options.noise = 1e-4;
-  const CurveFit fit = fit_curves(tests, options);
-  ASSERT_TRUE(fit.succeeded) << fit.failure;
-  ASSERT_EQ(fit.layout.form().terms, 2);
-  const MatrixX& table = fit.law->table();
+  const FitOutcome fit = fitted(
+      {seen_of(*truth, TestMode::Uniaxial, 0.5, 1.4, 30), seen_of(*truth, TestMode::ConfinedUniaxial, 0.6, 1.3, 30)},
+      1e-4);
+  ASSERT_TRUE(fit.law) << fit.reason;
+  ASSERT_EQ(fit.law->layout.form().terms, 2);
+  const MatrixX& table = std::dynamic_pointer_cast<const TabulatedLaw>(fit.law->law)->table();
   for (std::size_t k = 0; k < foam.size(); ++k)
     EXPECT_NEAR(table(0, Eigen::Index(k)) / foam[k], 1.0, tolerance(2e-3)) << k;
 }
@@ -155,26 +185,23 @@ MaterialTest with_noise(MaterialTest test, double relative, unsigned seed) {
   return test;
 }
 
-/// Uniaxial tension determines terms of positive exponents; one of a negative exponent shows only where a side is
-/// stretched, too.
+/// Uniaxial tension determines terms of positive exponents, and is fitted by those; one of a negative exponent shows
+/// only where a side is stretched, too.
 TEST(MaterialTests, PredictModesThatWereNotFitted) {
   const std::vector<double> positive = {3e5, 1.4, 0.4995, 1e3, 5.2, 0.4995};
   for (const auto& parameters : {positive, rubber}) {
     const auto truth = ogden(parameters);
-    CurveFitOptions options;
-    options.noise = 1e-4;
-    options.poissons_ratio = 0.4995;
-    options.positive_exponents = parameters == positive;
-    std::vector<MaterialTest> seen = {with_noise(seen_of(*truth, TestMode::Uniaxial, 0.6, 6.0, 40), options.noise, 1)};
+    const double noise = 1e-4, from = parameters == rubber ? 0.6 : 1.02;
+    std::vector<MaterialTest> seen = {with_noise(seen_of(*truth, TestMode::Uniaxial, from, 6.0, 40), noise, 1)};
     if (parameters == rubber)
-      seen.push_back(with_noise(seen_of(*truth, TestMode::Equibiaxial, 1.0, 3.0, 40), options.noise, 2));
-    const CurveFit fit = fit_curves(seen, options);
-    ASSERT_TRUE(fit.succeeded) << fit.failure;
-    EXPECT_EQ(fit.layout.form().terms, int(parameters.size()) / 3);
+      seen.push_back(with_noise(seen_of(*truth, TestMode::Equibiaxial, 1.0, 3.0, 40), noise, 2));
+    const FitOutcome fit = fitted(seen, noise, 0.4995);
+    ASSERT_TRUE(fit.law) << fit.reason;
+    EXPECT_EQ(fit.law->layout.form().terms, int(parameters.size()) / 3);
     for (const auto& [mode, to] : {std::pair{TestMode::PureShear, 4.0}, std::pair{TestMode::Equibiaxial, 2.5},
                                    std::pair{TestMode::SimpleShear, 1.0}}) {
       const MaterialTest other = seen_of(*truth, mode, mode == TestMode::SimpleShear ? 0.0 : 1.0, to, 20);
-      EXPECT_LT(relative_rms(other, predict_test(*fit.law, other)), tolerance(1e-3));
+      EXPECT_LT(relative_rms(other, predict_test(*fit.law->law, other)), tolerance(1e-3));
     }
   }
 }
@@ -183,12 +210,31 @@ TEST(MaterialTests, AddNoTermThatTheCurvesDoNotAskFor) {
   const auto truth = ogden({2e3, 4.0, 0.3});
   MaterialTest seen = seen_of(*truth, TestMode::Uniaxial, 0.7, 1.5, 40);
   for (std::size_t i = 0; i < seen.stress.size(); ++i) seen.stress[i] += 30.0 * std::sin(37.0 * double(i * i));
-  CurveFitOptions options;
-  options.poissons_ratio = 0.3;
-  const CurveFit fit = fit_curves({seen}, options);
-  ASSERT_TRUE(fit.succeeded);
-  EXPECT_EQ(fit.layout.form().terms, 1);
-  EXPECT_EQ(fit.tried.size(), 2u);
+  const FitOutcome fit = fitted({seen}, 0.01, 0.3);
+  ASSERT_TRUE(fit.law) << fit.reason;
+  EXPECT_EQ(fit.law->layout.form().terms, 1);
+  EXPECT_EQ(fit.law->tried.size(), 2u);
+}
+
+/// As fits of presses and motions are.
+TEST(MaterialTests, AFitOfCurvesGoesOnWhereItWasInterrupted) {
+  const auto truth = ogden(foam);
+  const test::TemporaryFolder folder;
+  const Capture capture = capture_of(
+      folder,
+      {seen_of(*truth, TestMode::Uniaxial, 0.5, 1.4, 30), seen_of(*truth, TestMode::ConfinedUniaxial, 0.6, 1.3, 30)},
+      1e-3);
+  const FitOutcome whole = fit_presses({&capture}, {});
+  FitState kept;
+  int states = 0;
+  FitMonitor monitor;
+  monitor.on_state = [&](const FitState& state) { kept = state, ++states; };
+  monitor.interrupted = [&] { return states >= 12; };
+  const FitOutcome part = fit_presses({&capture}, {}, monitor);
+  EXPECT_TRUE(part.interrupted);
+  const FitOutcome resumed = fit_presses({&capture}, {}, {}, kept);
+  EXPECT_FALSE(resumed.interrupted);
+  EXPECT_EQ(resumed.theta, whole.theta);
 }
 
 /// The mean nominal stress of a body by the forces that hold its boundary: sum f X^T / V.
@@ -235,7 +281,8 @@ TEST(MaterialTests, RefuseWhatIsNoCurve) {
   EXPECT_THROW(check_test(t), std::invalid_argument);
   t = all_modes()[4], t.second.clear();
   EXPECT_THROW(check_test(t), std::invalid_argument);
-  EXPECT_THROW((void)curve_objective({}, 1, curve_parameters(1, 1.0, {}), 0.1), std::invalid_argument);
+  const LawLayout layout({1, 1});
+  EXPECT_THROW(CurveTrial(all_modes()[0], 0, layout, 0.0, law_parameters(layout, 1.0)), std::invalid_argument);
 }
 
 }  // namespace

@@ -3,12 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "estimation/curve_fit.hpp"
 #include "estimation/gradient_check.hpp"
 #include "estimation/judgement.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/start_objective.hpp"
 #include "support/curve_capture.hpp"
+#include "support/thread_ranks.hpp"
 #include "support/tolerance.hpp"
 #include "temporary_folder.hpp"
 
@@ -185,6 +185,15 @@ TEST(StaticTests, ACaptureWithNothingToFitIsRefused) {
   Capture capture = written(folder, 0.01, {.grips = false, .curves = false});
   for (Indentation& test : capture.indentations) test.role = "test";
   EXPECT_THROW((void)fit_presses({&capture}, {}), InputError);
+}
+
+TEST(StaticTests, SeveralProcessesAreRefused) {
+  const test::TemporaryFolder folder;
+  RecordedCapture recording;
+  recording.capture = written(folder, 0.01, {.indentations = false, .grips = false, .has_shape = false});
+  FitMonitor monitor;
+  monitor.processes = std::make_shared<ProcessGroup>(test::ThreadRank::make(2).front());
+  EXPECT_THROW((void)fit({recording, recording}, {}, monitor, {}, {}), InputError);
 }
 
 }  // namespace

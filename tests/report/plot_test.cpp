@@ -35,6 +35,7 @@ TEST(AxisTicks, AreRoundAndWithinTheRange) {
   EXPECT_THAT(few_decades, ElementsAre(10.0, 20.0, 50.0, 100.0));
   EXPECT_GE(axis_ticks(610.0, 690.0, 4, true).size(), 2u);  // within a decade: linear places
   EXPECT_TRUE(axis_ticks(1.0, 1.0, 4, false).empty());
+  EXPECT_TRUE(axis_ticks(136.4, std::nextafter(136.4, 200.0), 4, false).empty());  // no place between them
   EXPECT_TRUE(axis_ticks(-1.0, 1.0, 4, true).empty());
 }
 
