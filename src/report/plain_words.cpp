@@ -176,6 +176,9 @@ std::string largest_share_sentence(const Result& result) {
   const double percent = 100.0 * largest->std.at("youngs_modulus") / std::abs(std::get<double>(modulus->value));
   std::string sentence = fmt::format("Most of the uncertainty of Young's modulus comes from {} ({} %)", largest->cause,
                                      readable(percent, 2));
+  const bool are_curves = !result.curves.empty() && !result.error.surface_rms && !result.error.marker_rms;
+  if (are_curves)
+    return sentence + "; what would narrow it most is curves of other modes of loading, or with less scatter.";
   for (const auto& [cause, remedy] : remedies)
     if (largest->cause.starts_with(cause)) return sentence + "; what would narrow it most is " + remedy + ".";
   return sentence + ".";

@@ -179,6 +179,9 @@ TEST(Report, BeginsWithTheVerdictAndShowsWhatTheIntervalIsMadeOf) {
   EXPECT_THAT(html, HasSubstr("<td>mass</td><td>2 %</td>"));
   EXPECT_THAT(html, HasSubstr("553\u00a0Pa to 629\u00a0Pa"));
   EXPECT_THAT(html, HasSubstr("comes from mass (2 %); what would narrow it most is weighing the object"));
+  data.result.curves.emplace_back();  // of a specimen alone
+  data.result.error.surface_rms.reset(), data.result.error.marker_rms.reset();
+  EXPECT_THAT(report_html(data), HasSubstr("what would narrow it most is curves of other modes of loading"));
 }
 
 TEST(Report, LinesAreBrokenBetweenStages) {
