@@ -96,22 +96,24 @@ void describe_world(const Capture& capture) {
 }
 
 void describe_sensors(const Capture& capture) {
-  for (const DepthCamera& camera : capture.depth) {
+  for_each_camera(capture, [&](const RecordingCamera& camera, const char* kind, std::size_t i) {
     const PinholeCamera& lens = camera.camera;
     const double fov = 2.0 * degrees(std::atan(0.5 * lens.width / lens.fx));
+    const DepthCamera* depth = kind == std::string("depth") ? &capture.depth[i] : nullptr;
     say("camera", formatted("\"%s\" %d x %d, view of %.0f degrees%s, %s%s", camera.name.c_str(), lens.width,
                             lens.height, fov, lens.lens.bends() ? " through a lens that bends" : "",
-                            camera.masks        ? "masks"
-                            : camera.background ? "background image"
+                            !depth              ? "silhouettes alone"
+                            : depth->masks      ? "masks"
+                            : depth->background ? "background image"
                                                 : "neither masks nor background",
                             camera.every > 1 ? formatted(", every %d frames", camera.every).c_str() : ""));
-  }
-  for (const DepthCamera& camera : capture.depth)
+  });
+  for_each_camera(capture, [](const RecordingCamera& camera, auto, auto) {
     if (camera.time_offset != 0.0)
       say("", formatted("\"%s\" takes its images %.2f ms after their frames", camera.name.c_str(),
                         1e3 * camera.time_offset));
-  for (const DepthCamera& camera : capture.depth)
     if (!camera.moved.empty()) say("", formatted("\"%s\" moves: a pose for each image", camera.name.c_str()));
+  });
   for (const CloudSequence& cloud : capture.clouds) say("clouds", cloud.points.pattern);
   const auto is_test = [](const auto& item) { return item.role == "test"; };
   if (!capture.presses.empty())
@@ -165,6 +167,30 @@ void describe_markers(const Capture& capture, const Survey& seen, Json& json) {
                             {"measurements", loaded.frames},
                             {"missing", loaded.missing},
                             {"travel", loaded.travel}};
+}
+
+void describe_outlines(const Capture& capture, const Survey& seen, Json& json) {
+  for (std::size_t i = 0; i < seen.outlines.size(); ++i) {
+    const OutlineSurvey& own = seen.outlines[i];
+    const std::string& name = capture.silhouettes[i].name;
+    say("outlines", formatted("%d to %d points a frame of \"%s\"; noise %.2g mm at the object, moving across the view "
+                              "by up to %.3g m",
+                              own.points.least, own.points.greatest, name.c_str(), 1e3 * own.noise, own.travel));
+    if (!own.points.empty_frames.empty()) say("", "note: no outline in frames " + ranges_text(own.points.empty_frames));
+    if (!own.cut_frames.empty())
+      say("", "note: the object reaches the picture's border in frames " + ranges_text(own.cut_frames) +
+                  "; only what lies inside counts");
+    json["outlines"].push_back({{"camera", name},
+                                {"least", own.points.least},
+                                {"median", own.points.median},
+                                {"greatest", own.points.greatest},
+                                {"noise", own.noise},
+                                {"travel", own.travel},
+                                {"empty_frames", own.points.empty_frames},
+                                {"cut_frames", own.cut_frames}});
+  }
+  if (!seen.outlines.empty() && capture.depth.empty() && capture.clouds.empty() && seen.first_contact)
+    say("", formatted("first contact with a plane about frame %d", *seen.first_contact));
 }
 
 void describe_cleaning(const std::vector<ObservedFrame>& frames, Json& json) {
@@ -473,6 +499,7 @@ void check(const Arguments& arguments) {
   describe_sensors(capture);
   describe_markers(capture, seen, json);
   describe_observations(capture, seen, json);
+  describe_outlines(capture, seen, json);
   if (shows_the_scan(seen)) describe_flight(capture, frames, json);
   describe_cleaning(frames, json);
   describe_planes(capture, seen, json);
@@ -486,7 +513,8 @@ void check(const Arguments& arguments) {
     write_sorted_pictures(capture, arguments);
   else
     write_scenes(capture, arguments);
-  if (capture.scene.object.surface || capture.depth.empty()) write_clouds(frames, arguments);
+  if ((capture.scene.object.surface || capture.depth.empty()) && seen.points.greatest > 0)
+    write_clouds(frames, arguments);
   if (!capture.clouds.empty()) write_cloud_picture(frames, arguments);
   write_file(fs::path(arguments.out) / "check.json", json.dump(2) + "\n");
 }

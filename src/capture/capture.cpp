@@ -33,13 +33,20 @@ const std::vector<std::string>& stress_measure_names() {
   return names;
 }
 
+bool has_silhouettes_alone(const Capture& capture) {
+  return !capture.silhouettes.empty() && capture.depth.empty() && capture.clouds.empty() && capture.markers.empty();
+}
+
 bool has_time_offsets(const Capture& capture) {
-  return !capture.scene.timing.is_static &&
-         std::ranges::any_of(capture.depth, [](const DepthCamera& camera) { return camera.time_offset != 0.0; });
+  bool has = false;
+  for_each_camera(capture, [&](const RecordingCamera& camera, auto, auto) { has |= camera.time_offset != 0.0; });
+  return has && !capture.scene.timing.is_static;
 }
 
 bool has_moving_cameras(const Capture& capture) {
-  return std::ranges::any_of(capture.depth, [](const DepthCamera& camera) { return !camera.moved.empty(); });
+  bool has = false;
+  for_each_camera(capture, [&](const RecordingCamera& camera, auto, auto) { has |= !camera.moved.empty(); });
+  return has;
 }
 
 void require_standing_cameras(const Capture& capture, const std::string& what) {
@@ -61,6 +68,7 @@ Capture as_seen_from(Capture capture, const std::filesystem::path& folder) {
     lead(camera.images);
     if (camera.masks) lead(*camera.masks);
   }
+  for (SilhouetteCamera& camera : capture.silhouettes) lead(camera.masks);
   for (CloudSequence& cloud : capture.clouds) lead(cloud.points);
   capture.folder = there, capture.file = there / "capture.toml";
   return capture;

@@ -32,15 +32,11 @@ struct PoseStd {
   bool operator==(const PoseStd&) const = default;
 };
 
-struct DepthCamera {
+/// What every calibrated camera of a recording has, whatever its pixels hold.
+struct RecordingCamera {
   std::string name;
   PinholeCamera camera;
-  FramePattern images;
-  double depth_scale = 1000.0;  ///< raw units per metre
-  std::optional<FramePattern> masks;
-  std::optional<std::filesystem::path> background;  ///< absolute
   int every = 1;
-  std::optional<double> noise = {};                 ///< standard deviation of a reading [m]
   double time_offset = 0.0;                         ///< [s] its images are taken that much later than their frames
   std::optional<std::filesystem::path> poses = {};  ///< absolute; CSV of where a camera that moves was at each image
   std::vector<RigidMotion> moved = {};              ///< camera to world at each frame; empty: the camera stands
@@ -52,7 +48,23 @@ struct DepthCamera {
     if (!moved.empty()) result.camera_to_world = moved[std::size_t(frame)];
     return result;
   }
+  bool operator==(const RecordingCamera&) const = default;
+};
+
+struct DepthCamera : RecordingCamera {
+  FramePattern images;
+  double depth_scale = 1000.0;  ///< raw units per metre
+  std::optional<FramePattern> masks;
+  std::optional<std::filesystem::path> background;  ///< absolute
+  std::optional<double> noise = {};                 ///< standard deviation of a reading [m]
   bool operator==(const DepthCamera&) const = default;
+};
+
+/// A camera without depth, of which only where the object is in its pictures counts.
+struct SilhouetteCamera : RecordingCamera {
+  FramePattern masks;
+  double outline_std = 0.7;  ///< [pixels] standard deviation of the masks' outlines
+  bool operator==(const SilhouetteCamera&) const = default;
 };
 
 struct CloudSequence {
@@ -167,6 +179,7 @@ struct Capture {
   Scene scene;
 
   std::vector<DepthCamera> depth;
+  std::vector<SilhouetteCamera> silhouettes;
   std::vector<CloudSequence> clouds;
   std::vector<MarkerTrack> markers;
   std::vector<Press> presses;
@@ -178,10 +191,21 @@ struct Capture {
   int frame_count() const { return scene.timing.frame_count(); }
 };
 
-/// Whether a depth camera takes its images at other times than the frames', of an object in motion.
+/// Visits all cameras: `visit(const RecordingCamera&, const char* kind, std::size_t i)`, the i-th of the blocks that
+/// `kind` names in a file.
+template <class Visit>
+void for_each_camera(const Capture& capture, const Visit& visit) {
+  for (std::size_t i = 0; i < capture.depth.size(); ++i) visit(capture.depth[i], "depth", i);
+  for (std::size_t i = 0; i < capture.silhouettes.size(); ++i) visit(capture.silhouettes[i], "silhouette", i);
+}
+
+/// Whether silhouettes are all that is seen of the object in its frames.
+bool has_silhouettes_alone(const Capture& capture);
+
+/// Whether a camera takes its images at other times than the frames', of an object in motion.
 bool has_time_offsets(const Capture& capture);
 
-/// Whether a depth camera moves while it records.
+/// Whether a camera moves while it records.
 bool has_moving_cameras(const Capture& capture);
 
 /// Throws InputError where a depth camera moves, for what needs stationary cameras.

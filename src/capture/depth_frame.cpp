@@ -8,13 +8,13 @@ namespace pliant {
 namespace {
 
 template <class Pixel>
-Image<Pixel> of_size(Image<Pixel> image, const DepthCamera& depth, const std::filesystem::path& path) {
-  const PinholeCamera& camera = depth.camera;
+Image<Pixel> of_size(Image<Pixel> image, const RecordingCamera& recording, const std::filesystem::path& path) {
+  const PinholeCamera& camera = recording.camera;
   if (image.width == camera.width && image.height == camera.height) return image;
   const auto text = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h) + " pixels"; };
   throw InputError(Problem{{path},
                            text(image.width, image.height),
-                           text(camera.width, camera.height) + " as camera \"" + depth.name + "\" has",
+                           text(camera.width, camera.height) + " as camera \"" + recording.name + "\" has",
                            ""});
 }
 
@@ -44,7 +44,11 @@ std::optional<Image<std::uint8_t>> read_object_mask(const Capture& capture, cons
   return read_object_mask(camera, capture.folder / (*camera.masks)(frame));
 }
 
-Image<std::uint8_t> read_object_mask(const DepthCamera& camera, const std::filesystem::path& path) {
+Image<std::uint8_t> read_object_mask(const Capture& capture, const SilhouetteCamera& camera, int frame) {
+  return read_object_mask(camera, capture.folder / camera.masks(frame));
+}
+
+Image<std::uint8_t> read_object_mask(const RecordingCamera& camera, const std::filesystem::path& path) {
   return of_size(read_mask(path), camera, path);
 }
 

@@ -21,7 +21,8 @@ std::optional<DepthImage> read_background(const DepthCamera& camera);
 
 /// 255 where the pixel shows the object; nothing where the capture has no masks.
 std::optional<Image<std::uint8_t>> read_object_mask(const Capture& capture, const DepthCamera& camera, int frame);
-Image<std::uint8_t> read_object_mask(const DepthCamera& camera, const std::filesystem::path& path);
+Image<std::uint8_t> read_object_mask(const Capture& capture, const SilhouetteCamera& camera, int frame);
+Image<std::uint8_t> read_object_mask(const RecordingCamera& camera, const std::filesystem::path& path);
 
 /// Raw readings to metres.
 DepthImage to_metres(const Image<std::uint16_t>& raw, double depth_scale);

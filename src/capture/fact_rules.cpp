@@ -174,7 +174,8 @@ void check_gravity(RuleContext& context) {
 
 void check_timing(RuleContext& context) {
   const Capture& capture = context.capture;
-  const bool is_moving = !capture.depth.empty() || !capture.clouds.empty() || !capture.markers.empty();
+  const bool is_moving =
+      !capture.depth.empty() || !capture.silhouettes.empty() || !capture.clouds.empty() || !capture.markers.empty();
   if (is_moving && !context.toml.places.has("timing"))
     context.toml.complain("timing", "no table [timing]", "[timing] with `frame_rate` and `frame_count`");
   if (!context.toml.is_sound("timing")) return;
@@ -308,23 +309,24 @@ void check_planes(RuleContext& context) {
 
 void check_camera_names(RuleContext& context) {
   std::set<std::string> names;
-  for (std::size_t i = 0; i < context.capture.depth.size(); ++i)
-    if (const std::string& name = context.capture.depth[i].name; !name.empty() && !names.insert(name).second)
-      context.toml.complain(item("depth", i, "name"), "a second camera \"" + name + "\"", "different names");
+  for_each_camera(context.capture, [&](const RecordingCamera& camera, const char* kind, std::size_t i) {
+    if (!camera.name.empty() && !names.insert(camera.name).second)
+      context.toml.complain(item(kind, i, "name"), "a second camera \"" + camera.name + "\"", "different names");
+  });
 }
 
 void check_intrinsics(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
-    const PinholeCamera& camera = context.capture.depth[i].camera;
+  for_each_camera(context.capture, [&](const RecordingCamera& recording, const char* kind, std::size_t i) {
+    const PinholeCamera& camera = recording.camera;
     for (const auto& [key, value] : {std::pair("width", camera.width), std::pair("height", camera.height)})
-      if (context.toml.is_sound(item("depth", i, key)) && (value < 2 || value > 32768))
-        context.toml.reject(item("depth", i, key), "`" + std::string(key) + "` is " + std::to_string(value),
+      if (context.toml.is_sound(item(kind, i, key)) && (value < 2 || value > 32768))
+        context.toml.reject(item(kind, i, key), "`" + std::string(key) + "` is " + std::to_string(value),
                             "2 to 32768 pixels");
-    if (!context.toml.is_sound(item("depth", i))) continue;
+    if (!context.toml.is_sound(item(kind, i))) return;
     // From a view of 150 degrees to a long telephoto lens.
     for (const auto& [key, value] : {std::pair("fx", camera.fx), std::pair("fy", camera.fy)})
       if (value < 0.13 * camera.width || value > 30.0 * camera.width)
-        context.toml.reject(item("depth", i, key),
+        context.toml.reject(item(kind, i, key),
                             "a focal length of " + text_of(value, "pixels") + " in an image " +
                                 std::to_string(camera.width) + " pixels wide",
                             "0.13 to 30 times the width",
@@ -332,34 +334,34 @@ void check_intrinsics(RuleContext& context) {
     const bool is_normalised = camera.cx <= 1.0 && camera.cy <= 1.0;
     const auto is_off = [](double c, int side) { return c < -0.5 * side || c > 1.5 * side; };
     if (is_normalised || is_off(camera.cx, camera.width) || is_off(camera.cy, camera.height))
-      context.toml.reject(item("depth", i, "cx"),
+      context.toml.reject(item(kind, i, "cx"),
                           "the principal point (" + text_of(camera.cx, "") + ", " + text_of(camera.cy, "") + ")",
                           "a point in the image, in pixels", "mostly near (width / 2, height / 2)");
-  }
+  });
 }
 
 void check_lenses(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
-    const PinholeCamera& camera = context.capture.depth[i].camera;
-    if (!context.toml.is_sound(item("depth", i)) || !camera.lens.bends()) continue;
+  for_each_camera(context.capture, [&](const RecordingCamera& recording, const char* kind, std::size_t i) {
+    const PinholeCamera& camera = recording.camera;
+    if (!context.toml.is_sound(item(kind, i)) || !camera.lens.bends()) return;
     if (!sees_whole_picture(camera))
-      context.toml.reject(item("depth", i, "distortion"),
+      context.toml.reject(item(kind, i, "distortion"),
                           "a lens through which no ray reaches some pixels: beyond " +
                               text_of(std::atan(camera.lens.reach()) * 180.0 / std::numbers::pi, "degrees") +
                               " from its axis it folds back",
                           "a lens that shows each place of the image once",
                           "k1, k2, p1, p2, k3 in the order of OpenCV; calibrate with corners near the image's edges");
-  }
+  });
 }
 
 void check_time_offsets(RuleContext& context) {
-  for (std::size_t i = 0; i < context.capture.depth.size(); ++i) {
-    const double offset = context.capture.depth[i].time_offset;
-    if (!context.toml.is_sound(item("depth", i))) continue;
+  for_each_camera(context.capture, [&](const RecordingCamera& camera, const char* kind, std::size_t i) {
+    const double offset = camera.time_offset;
+    if (!context.toml.is_sound(item(kind, i))) return;
     if (std::abs(offset) > greatest_offset)
-      context.toml.complain(item("depth", i, "time_offset"), "a `time_offset` of " + text_of(offset, "s"), "-1 to 1 s",
+      context.toml.complain(item(kind, i, "time_offset"), "a `time_offset` of " + text_of(offset, "s"), "-1 to 1 s",
                             "in seconds; whole frames are better left out of the recording");
-  }
+  });
 }
 
 void check_moving_cameras(RuleContext& context) {
@@ -383,8 +385,9 @@ void check_every(RuleContext& context) {
       context.toml.reject(key, "`every` is " + std::to_string(every), "1 to the number of frames",
                           "2 means every other frame");
   };
-  for (std::size_t i = 0; i < context.capture.depth.size(); ++i)
-    check(context.capture.depth[i].every, item("depth", i, "every"));
+  for_each_camera(context.capture, [&](const RecordingCamera& camera, const char* kind, std::size_t i) {
+    check(camera.every, item(kind, i, "every"));
+  });
   for (std::size_t i = 0; i < context.capture.clouds.size(); ++i)
     check(context.capture.clouds[i].every, item("cloud", i, "every"));
 }
@@ -402,12 +405,24 @@ void check_noise(RuleContext& context) {
 }
 
 void check_has_observations(RuleContext& context) {
-  for (const char* kind : {"depth", "cloud", "markers", "press", "load", "indentation", "grip", "material_curve"})
+  for (const char* kind :
+       {"depth", "silhouette", "cloud", "markers", "press", "load", "indentation", "grip", "material_curve"})
     if (context.toml.places.has(kind)) return;
   context.toml.complain("", "no observation",
-                        "a block [[depth]], [[cloud]], [[markers]], [[press]], [[load]], [[indentation]], [[grip]] or "
-                        "[[material_curve]]",
+                        "a block [[depth]], [[silhouette]], [[cloud]], [[markers]], [[press]], [[load]], "
+                        "[[indentation]], [[grip]] or [[material_curve]]",
                         "say what was recorded");
+}
+
+/// Outlines alone tell neither how large the object is nor how it falls.
+void check_silhouettes_alone(RuleContext& context) {
+  if (!has_silhouettes_alone(context.capture) || !context.toml.is_sound("silhouette[0]")) return;
+  if (!context.capture.scene.object.surface)
+    context.toml.complain("silhouette[0]", "silhouettes alone, and no scan of the object", "[object] with `surface`",
+                          "scan the object at rest, or record depth as well");
+  if (!context.capture.scene.world.gravity)
+    context.toml.complain("silhouette[0]", "silhouettes alone, and `gravity` is unknown", "[world] with `gravity`",
+                          "outlines do not tell it from the object's distance");
 }
 
 void check_presses(RuleContext& context) {
@@ -589,6 +604,7 @@ std::vector<Rule> fact_rules() {
           check_every,
           check_noise,
           check_has_observations,
+          check_silhouettes_alone,
           check_presses,
           check_weights,
           check_wind,

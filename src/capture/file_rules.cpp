@@ -20,6 +20,7 @@ namespace {
 
 constexpr double nearest_scene = 0.02, farthest_scene = 50.0;  // [m] median depth of an image
 constexpr int least_pixels = 10;                               // that show something near the object
+constexpr double most_of_border = 0.5;                         // of a mask, that the object may cover
 constexpr double farthest_markers = 100.0;                     // sizes of the object from where they rest (median)
 constexpr double rate_tolerance = 5e-4;                        // tells 59.94 Hz from 60 Hz
 
@@ -76,7 +77,7 @@ void check_header(RuleContext& context, const std::string& key, const fs::path& 
 }
 
 // The first fault of a sequence, with the number of files that share it.
-void check_sequence(RuleContext& context, const DepthCamera& camera, const std::string& key,
+void check_sequence(RuleContext& context, const RecordingCamera& camera, const std::string& key,
                     const FramePattern& pattern, Kind kind) {
   const std::vector<int> frames = frames_of(context.capture.frame_count(), camera.every);
   if (frames.empty() || complain_missing(context, key, pattern, frames)) return;
@@ -130,6 +131,23 @@ bool may_see(const PinholeCamera& camera, const Sphere& sphere) {
 bool is_near(const std::vector<Sphere>& places, const Vector3& point) {
   return std::ranges::any_of(places,
                              [&](const Sphere& s) { return (point - s.centre).squaredNorm() < s.radius * s.radius; });
+}
+
+/// Whether a ray, from where the camera stands and of depth 1 in the world's axes, passes through a sphere.
+bool passes(const PinholeCamera& lens, double u, double v, const Sphere& sphere) {
+  const Vector3 ray = lens.unproject(u, v, 1.0) - lens.camera_to_world.translation;
+  const Vector3 to = sphere.centre - lens.camera_to_world.translation;
+  return ray.dot(to) > 0.0 && ray.cross(to).squaredNorm() < sphere.radius * sphere.radius * ray.squaredNorm();
+}
+
+int pixels_near(const Capture& capture, const SilhouetteCamera& camera, int frame, const std::vector<Sphere>& places) {
+  const Image<std::uint8_t> mask = read_object_mask(capture, camera, frame);
+  const PinholeCamera lens = camera.at(frame);
+  int count = 0;
+  for (int v = 0; v < mask.height; ++v)
+    for (int u = 0; u < mask.width; ++u)
+      if (mask(u, v) && std::ranges::any_of(places, [&](const Sphere& s) { return passes(lens, u, v, s); })) ++count;
+  return count;
 }
 
 int pixels_near(const Capture& capture, const DepthCamera& camera, int frame, const std::vector<Sphere>& places) {
@@ -253,6 +271,33 @@ void check_depth_files(RuleContext& context) {
   });
 }
 
+/// What the first mask of the free object shows: nothing, or all but the object.
+void check_first_mask(RuleContext& context, const SilhouetteCamera& camera, const std::string& key) {
+  const FramePattern& pattern = camera.masks;
+  const int frame = first_free_frame(context.capture, camera.every);
+  const Image<std::uint8_t> mask = read_object_mask(context.capture, camera, frame);
+  const std::string file = "\"" + pattern(frame).string() + "\"";
+  if (std::ranges::all_of(mask.pixels, [](std::uint8_t m) { return m == 0; }))
+    return context.toml.reject(key, file + " shows no pixel of the object", "pixels that are not zero on the object",
+                               "the object must be in the picture when it begins to move");
+  int border = 0, of_object = 0;
+  for (int v = 0; v < mask.height; ++v)
+    for (int u = 0; u < mask.width; ++u)
+      if (u == 0 || v == 0 || u == mask.width - 1 || v == mask.height - 1) ++border, of_object += mask(u, v) != 0;
+  if (of_object > most_of_border * border)
+    context.toml.reject(key, file + " shows the object along most of the picture's border",
+                        "zero around the object, and another value on it",
+                        "turn the masks round: they look inverted; or move the camera away from the object");
+}
+
+void check_silhouette_files(RuleContext& context) {
+  for_each_sound(context, "silhouette", context.capture.silhouettes, [&](const auto& camera, const std::string& key) {
+    check_sequence(context, camera, key + ".masks", camera.masks, Kind::Mask);
+    if (context.toml.is_sound(key) && has_start(context))
+      try_file(context, key, [&] { check_first_mask(context, camera, key + ".masks"); });
+  });
+}
+
 void check_clouds(RuleContext& context) {
   for_each_sound(context, "cloud", context.capture.clouds, [&](const CloudSequence& cloud, const std::string& key) {
     const std::vector<int> frames = frames_of(context.capture.frame_count(), cloud.every);
@@ -340,7 +385,7 @@ void check_cameras_see_object(RuleContext& context) {
   const Capture& capture = context.capture;
   if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || !has_start(context)) return;
   const std::vector<Sphere> places = possible_places(capture);
-  for_each_sound(context, "depth", capture.depth, [&](const DepthCamera& camera, const std::string& block) {
+  const auto check = [&](const auto& camera, const std::string& block, const std::string& what) {
     const std::string key = block + ".camera_to_world";
     const int last = (capture.frame_count() - 1) / camera.every * camera.every;
     const int first = first_free_frame(capture, camera.every);
@@ -359,11 +404,15 @@ void check_cameras_see_object(RuleContext& context) {
       if (seen < least_pixels)
         context.toml.complain(key,
                               "camera \"" + camera.name + "\" has " +
-                                  (seen == 0 ? "no" : "only " + std::to_string(seen)) +
-                                  " readings near the rest surface",
-                              "readings of the object", advice);
+                                  (seen == 0 ? "no" : "only " + std::to_string(seen)) + " " + what +
+                                  " near the rest surface",
+                              what + " of the object", advice);
     });
-  });
+  };
+  for_each_sound(context, "depth", capture.depth,
+                 [&](const auto& camera, const std::string& block) { check(camera, block, "readings"); });
+  for_each_sound(context, "silhouette", capture.silhouettes,
+                 [&](const auto& camera, const std::string& block) { check(camera, block, "pixels of its masks"); });
 }
 
 void check_clouds_near_object(RuleContext& context) {
@@ -385,9 +434,9 @@ void check_clouds_near_object(RuleContext& context) {
 std::span<const Rule> capture_rules() {
   static const std::vector<Rule> rules = [] {
     std::vector<Rule> all = fact_rules();
-    all.insert(all.end(), {check_depth_files, check_clouds, check_markers, check_press_markers, check_load_files,
-                           check_curve_files, check_grip_markers, check_depth_scale, check_cameras_see_object,
-                           check_clouds_near_object});
+    all.insert(all.end(), {check_depth_files, check_silhouette_files, check_clouds, check_markers, check_press_markers,
+                           check_load_files, check_curve_files, check_grip_markers, check_depth_scale,
+                           check_cameras_see_object, check_clouds_near_object});
     return all;
   }();
   return rules;

@@ -63,6 +63,16 @@ void keep_every(std::vector<T>& values, std::size_t wanted) {
   values.resize(wanted);
 }
 
+void append_outline(ObservedFrame& frame, const Capture& capture, int index, int most) {
+  const SilhouetteCamera& camera = capture.silhouettes[std::size_t(index)];
+  Outline outline = outline_of(read_object_mask(capture, camera, frame.frame), camera.camera);
+  if (const std::size_t wanted = std::size_t(most); most > 0 && outline.points.size() > wanted) {
+    keep_every(outline.points, wanted);
+    keep_every(outline.normals, wanted);
+  }
+  frame.outlines.push_back({index, std::move(outline)});
+}
+
 void thin_out(ObservedFrame& frame, int most) {
   const std::size_t wanted = std::size_t(most);
   if (most <= 0 || frame.points.size() <= wanted) return;
@@ -75,8 +85,9 @@ void thin_out(ObservedFrame& frame, int most) {
 
 std::vector<int> observed_frames(const Capture& capture) {
   std::set<int> frames;
-  for (const DepthCamera& camera : capture.depth)
+  for_each_camera(capture, [&](const RecordingCamera& camera, auto, auto) {
     for (const int frame : frames_of(capture.frame_count(), camera.every)) frames.insert(frame);
+  });
   for (const CloudSequence& cloud : capture.clouds)
     for (const int frame : frames_of(capture.frame_count(), cloud.every)) frames.insert(frame);
   return {frames.begin(), frames.end()};
@@ -99,6 +110,9 @@ std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions&
     frame.frame = numbers[i];
     for (std::size_t c = 0; c < capture.depth.size(); ++c)
       if (frame.frame % capture.depth[c].every == 0) append_camera(frame, capture, sorters[c], int(c));
+    for (std::size_t c = 0; c < capture.silhouettes.size(); ++c)
+      if (frame.frame % capture.silhouettes[c].every == 0)
+        append_outline(frame, capture, int(c), options.max_points_per_frame);
     for (std::size_t k = 0; k < capture.clouds.size(); ++k) {
       const CloudSequence& cloud = capture.clouds[k];
       if (frame.frame % cloud.every == 0)

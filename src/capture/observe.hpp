@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "capture/capture.hpp"
+#include "capture/outline.hpp"
 
 namespace pliant {
 
@@ -14,6 +15,12 @@ struct CloudCounts {
   int on_plane = 0;      ///< on planes, or behind them
   int background = 0;    ///< as in the background cloud
   int isolated = 0;      ///< standing alone
+};
+
+/// The outline that a silhouette camera saw in a frame.
+struct ObservedOutline {
+  int camera = 0;  ///< index into Capture::silhouettes
+  Outline outline;
 };
 
 /// What sensors saw of the object in one frame.
@@ -27,6 +34,7 @@ struct ObservedFrame {
   /// Of each depth camera, how far neighbouring pixels scatter over the noise (`pixel_scatter`); 0 where nothing tells.
   std::vector<double> scatter;
   CloudCounts cloud = {};  ///< of all clouds of the frame
+  std::vector<ObservedOutline> outlines = {};
 };
 
 struct ObserveOptions {
@@ -34,13 +42,14 @@ struct ObserveOptions {
   double edge_jump = 0.0;        ///< [m] depth jump between neighbours that marks an edge; 0: from the noise
   double band = 0.0;             ///< [m] without mask or background: keep points this near the rest surface's
                                  ///< bounding box; 0: the object's size
-  int max_points_per_frame = 0;  ///< 0: all; else an even, deterministic subset of the pixels
+  int max_points_per_frame = 0;  ///< 0: all; else an even, deterministic subset of the pixels, and of each outline's
 };
 
 /// Points on the object for every frame that was observed, in order of frames (several cameras and clouds merged).
 /// Per camera: mask, else background subtraction, else everything within the band; then pixels of planes and flying
 /// pixels at depth edges are removed; noise from the sensor model. Of clouds, what lies far from the object, on planes,
-/// as in the background cloud, or alone (`CloudSorter`) is left out. Frames are read in parallel.
+/// as in the background cloud, or alone (`CloudSorter`) is left out. Outlines are those of silhouette cameras' masks.
+/// Frames are read in parallel.
 /// @param progress  called with the number of frames done and their total; may be empty
 /// Throws InputError where an image cannot be decoded.
 std::vector<ObservedFrame> observe(const Capture& capture, const ObserveOptions& options = {},

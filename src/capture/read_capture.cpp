@@ -31,6 +31,7 @@ class Reader {
     capture_.name = root.required<std::string>("name", "give the recording a name for reports").value_or("");
     read_scene(root);
     root.each_block("depth", [&](TomlTable& block) { capture_.depth.push_back(read_depth(block)); });
+    root.each_block("silhouette", [&](TomlTable& block) { capture_.silhouettes.push_back(read_silhouette(block)); });
     root.each_block("cloud", [&](TomlTable& block) { capture_.clouds.push_back(read_cloud(block)); });
     root.each_block("markers", [&](TomlTable& block) { capture_.markers.push_back(read_markers_block(block)); });
     root.each_block("press", [&](TomlTable& block) { capture_.presses.push_back(read_press(block)); });
@@ -78,7 +79,7 @@ class Reader {
   }
 
   static bool is_of_curves_alone(const TomlTable& root) {
-    for (const char* other : {"depth", "cloud", "markers", "press", "load", "indentation", "grip"})
+    for (const char* other : {"depth", "silhouette", "cloud", "markers", "press", "load", "indentation", "grip"})
       if (root.has(other)) return false;
     return root.has("material_curve");
   }
@@ -111,22 +112,29 @@ class Reader {
     return text ? std::optional(checked_pattern(table, name, text)) : std::nullopt;
   }
 
-  DepthCamera read_depth(TomlTable& block) {
-    DepthCamera depth;
-    PinholeCamera& camera = depth.camera;
-    depth.name = block.required<std::string>("name", "give the camera a name, like \"front\"").value_or("");
+  /// What all kinds of cameras have.
+  void read_camera(TomlTable& block, RecordingCamera& recording) {
+    PinholeCamera& camera = recording.camera;
+    recording.name = block.required<std::string>("name", "give the camera a name, like \"front\"").value_or("");
     camera.width = block.required<int>("width").value_or(0);
     camera.height = block.required<int>("height").value_or(0);
     camera.fx = block.required<double>("fx", "the focal length in pixels").value_or(0);
     camera.fy = block.required<double>("fy", "the focal length in pixels").value_or(0);
     camera.cx = block.required<double>("cx", "the principal point in pixels").value_or(0);
     camera.cy = block.required<double>("cy", "the principal point in pixels").value_or(0);
-    depth.every = block.optional<int>("every").value_or(1);
+    recording.every = block.optional<int>("every").value_or(1);
     if (block.has("poses"))
-      read_poses(block, depth);
+      read_poses(block, recording);
     else if (const auto pose = block.required<RigidMotion>("camera_to_world"))
       camera.camera_to_world = *pose;
     camera.lens = read_lens(block);
+    recording.time_offset = block.optional<double>("time_offset").value_or(0.0);
+    recording.pose_std = read_pose_std(block).value_or(PoseStd());
+  }
+
+  DepthCamera read_depth(TomlTable& block) {
+    DepthCamera depth;
+    read_camera(block, depth);
     depth.images = required_pattern(block, "images");
     depth.depth_scale = block.required<double>("depth_scale", "1000 for millimetres").value_or(1000.0);
     if (!(depth.depth_scale > 0))
@@ -134,9 +142,16 @@ class Reader {
     depth.masks = optional_pattern(block, "masks");
     depth.background = optional_path(block, "background");
     depth.noise = block.optional<double>("noise");
-    depth.time_offset = block.optional<double>("time_offset").value_or(0.0);
-    depth.pose_std = read_pose_std(block).value_or(PoseStd());
     return depth;
+  }
+
+  SilhouetteCamera read_silhouette(TomlTable& block) {
+    SilhouetteCamera silhouette;
+    read_camera(block, silhouette);
+    silhouette.masks = required_pattern(block, "masks");
+    const NumberRule outline{0.05, 50.0, true, true, "pixels by which the masks' outlines err"};
+    silhouette.outline_std = read_number(block, "outline_std", outline, silhouette.outline_std);
+    return silhouette;
   }
 
   std::optional<PoseStd> read_pose_std(TomlTable& block) {
@@ -152,16 +167,16 @@ class Reader {
   }
 
   /// Where a camera that moves was at each frame.
-  void read_poses(TomlTable& block, DepthCamera& depth) {
-    depth.poses = optional_path(block, "poses");
+  void read_poses(TomlTable& block, RecordingCamera& camera) {
+    camera.poses = optional_path(block, "poses");
     const std::string key = block.key_of("poses");
     if (block.has("camera_to_world"))
       context_.reject(key, "both `poses` and `camera_to_world`", "one of the two",
                       "a stationary camera has `camera_to_world`");
-    if (!depth.poses || capture_.frame_count() == 0) return;
+    if (!camera.poses || capture_.frame_count() == 0) return;
     try {
-      depth.moved = read_camera_poses(*depth.poses, capture_.frame_count(), depth.every);
-      depth.camera.camera_to_world = depth.moved.front();
+      camera.moved = read_camera_poses(*camera.poses, capture_.frame_count(), camera.every);
+      camera.camera.camera_to_world = camera.moved.front();
     } catch (const InputError& error) {
       context_.reject(key, error.problems());
     }

@@ -19,12 +19,13 @@ constexpr double moving = 4.0;          // standard deviations of a point; the c
 constexpr double moving_markers = 8.0;  // the same of markers: they are few
 constexpr double contact_gap = 0.02;    // of the object's size: how near a plane counts as touching it
 
-PointCounts count_points(std::span<const ObservedFrame> frames) {
+/// @param counted  a frame, and how many points it shows
+PointCounts count_points(std::span<const std::pair<int, int>> counted) {
   PointCounts counts;
   std::vector<int> all;
-  for (const ObservedFrame& frame : frames) {
-    all.push_back(int(frame.points.size()));
-    if (frame.points.empty()) counts.empty_frames.push_back(frame.frame);
+  for (const auto& [frame, points] : counted) {
+    all.push_back(points);
+    if (points == 0) counts.empty_frames.push_back(frame);
   }
   if (all.empty()) return counts;
   counts.least = *std::ranges::min_element(all);
@@ -276,6 +277,59 @@ void add_markers(const Capture& capture, Survey& result) {
   result.loaded_markers = survey_loaded_markers(capture);
 }
 
+/// The outline's middle in each frame that shows one whole, where the object is at rest before the camera [m].
+std::vector<std::pair<int, Vector3>> outline_path(const Capture& capture, std::span<const ObservedFrame> frames,
+                                                  int index) {
+  const Box box = bounding_box(*capture.scene.object.surface);
+  std::vector<std::pair<int, Vector3>> path;
+  for (const ObservedFrame& frame : frames)
+    for (const ObservedOutline& seen : frame.outlines) {
+      if (seen.camera != index || seen.outline.points.empty() || seen.outline.is_cut) continue;
+      PinholeCamera straight = capture.silhouettes[std::size_t(index)].at(frame.frame);
+      straight.lens = {};
+      Vector2 middle = Vector2::Zero();
+      for (const Vector2& point : seen.outline.points) middle += point / double(seen.outline.points.size());
+      const double depth = straight.project(0.5 * (box.min + box.max)).z();
+      path.emplace_back(frame.frame, straight.unproject(middle.x(), middle.y(), depth));
+    }
+  return path;
+}
+
+/// By when an outline's middle has come nearer to a plane by the object's clearance at rest.
+std::optional<int> first_contact(const Capture& capture, const std::vector<std::pair<int, Vector3>>& path,
+                                 double noise) {
+  if (capture.scene.timing.is_static || capture.scene.initial.released || path.empty()) return std::nullopt;
+  const double gap =
+      plane_reach * noise + contact_gap * bounding_box(*capture.scene.object.surface).extent().maxCoeff();
+  for (const auto& [frame, middle] : path)
+    for (const Plane& plane : capture.scene.planes)
+      if (frame >= capture.scene.timing.start_frame &&
+          clearance(*capture.scene.object.surface, plane) + plane.normal.dot(middle - path.front().second) < gap)
+        return frame;
+  return std::nullopt;
+}
+
+void add_outlines(const Capture& capture, std::span<const ObservedFrame> frames, Survey& result) {
+  if (!capture.scene.object.surface) return;
+  for (int c = 0; c < int(capture.silhouettes.size()); ++c) {
+    OutlineSurvey& own = result.outlines.emplace_back();
+    own.noise = outline_noise(capture, capture.silhouettes[std::size_t(c)], 0);
+    std::vector<std::pair<int, int>> counts;
+    for (const ObservedFrame& frame : frames)
+      for (const ObservedOutline& seen : frame.outlines) {
+        if (seen.camera != c) continue;
+        counts.emplace_back(frame.frame, int(seen.outline.points.size()));
+        if (seen.outline.is_cut) own.cut_frames.push_back(frame.frame);
+      }
+    own.points = count_points(counts);
+    const auto path = outline_path(capture, frames, c);
+    for (const auto& [frame, middle] : path) own.travel = std::max(own.travel, (middle - path.front().second).norm());
+    result.moves = result.moves || (!capture.scene.timing.is_static && own.travel > moving * own.noise);
+    if (const auto contact = first_contact(capture, path, own.noise))
+      result.first_contact = std::min(result.first_contact.value_or(*contact), *contact);
+  }
+}
+
 std::string millimetres(double metres) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f mm", 1e3 * metres);
@@ -373,7 +427,9 @@ void add_surroundings(const Capture& capture, const Survey& seen, Identifiabilit
 
 Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
   Survey result;
-  result.points = count_points(frames);
+  std::vector<std::pair<int, int>> counts;
+  for (const ObservedFrame& frame : frames) counts.emplace_back(frame.frame, int(frame.points.size()));
+  result.points = count_points(counts);
   result.median_noise = median_noise(frames);
   result.travel = greatest_travel(frames);
   result.moves = !capture.scene.timing.is_static && result.travel > moving * result.median_noise;
@@ -382,6 +438,7 @@ Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
   result.seen_share = seen_share(capture, frames, result.median_noise);
   result.scenes = survey_scenes(capture);
   result.clouds = survey_clouds(capture);
+  add_outlines(capture, frames, result);
   add_markers(capture, result);
   return result;
 }
@@ -407,6 +464,10 @@ Identifiability identifiability(const Capture& capture, const Survey& seen) {
   add_stiffness(capture, seen, result);
   add_scale(capture, result);
   add_damping(capture, seen, result);
+  if (has_silhouettes_alone(capture))
+    result.possible.push_back(
+        "Silhouettes are all that is seen: scan, scale and gravity are taken as known, and of planes that are only "
+        "roughly known nothing but the impact tells.");
   add_surroundings(capture, seen, result);
   return result;
 }

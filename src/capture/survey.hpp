@@ -46,18 +46,27 @@ struct MarkerSurvey {
   std::optional<double> frame_rate;  ///< [Hz] as the track's file states it
 };
 
+/// The outlines of one [[silhouette]] block.
+struct OutlineSurvey {
+  PointCounts points;           ///< of the outline in each frame
+  std::vector<int> cut_frames;  ///< in which the object reaches the picture's border
+  double noise = 0.0;           ///< [m] standard deviation of the outline, at the object
+  double travel = 0.0;          ///< [m] greatest way of the outline's middle across the view, at the object
+};
+
 /// What a recording shows, in figures.
 struct Survey {
   PointCounts points;
   double median_noise = 0.0;  ///< of points along the surface normal [m]
   double travel = 0.0;        ///< greatest displacement of the seen points' centroid or box from the first frame [m]
-  bool moves = false;         ///< travel of points or markers beyond their noise
-  std::optional<int> first_contact;  ///< first frame after `start_frame` in which points or markers come to a plane
+  bool moves = false;         ///< travel of points, outlines or markers beyond their noise
+  std::optional<int> first_contact;  ///< first frame after `start_frame` in which what is seen comes to a plane
   std::optional<double>
       seen_share;  ///< of the rest surface's vertices, at the start; nothing where it is not in that pose
   std::vector<PlaneSurvey> planes;             ///< of each Capture::planes
   std::vector<Segmentation> scenes;            ///< of each camera's first frame, where there is no rest surface
   std::vector<CloudScene> clouds;              ///< of each cloud sequence's first frame, where there is no rest surface
+  std::vector<OutlineSurvey> outlines;         ///< of each Capture::silhouettes, where there is a rest surface
   std::vector<MarkerSurvey> markers;           ///< of each Capture::markers
   std::optional<MarkerSurvey> loaded_markers;  ///< of all presses and loads that have markers
 };

@@ -31,6 +31,7 @@ class Writer {
     if (!scene.timing.times.empty() || scene.initial != Initial{}) write_toml(out_, scene.initial);
     write_toml_blocks(out_, scene);
     for (const DepthCamera& camera : capture.depth) write(camera);
+    for (const SilhouetteCamera& camera : capture.silhouettes) write(camera);
     for (const CloudSequence& cloud : capture.clouds) write(cloud);
     for (const MarkerTrack& track : capture.markers)
       out_ << "[[markers]]\nrest = " << file_text(track.rest) << "\ntrack = " << file_text(track.track) << "\n\n";
@@ -58,25 +59,38 @@ class Writer {
     out_ << "pose_std = { turn = " << toml_text(std.turn) << ", shift = " << toml_text(std.shift) << " }   # rad, m\n";
   }
 
-  void write(const DepthCamera& depth) {
-    const PinholeCamera& c = depth.camera;
-    out_ << "[[depth]]\nname = " << toml_text(depth.name) << "\nwidth = " << c.width << "\nheight = " << c.height
-         << "\n";
+  /// What all kinds of cameras have.
+  void write_camera(const char* kind, const RecordingCamera& camera) {
+    const PinholeCamera& c = camera.camera;
+    out_ << "[[" << kind << "]]\nname = " << toml_text(camera.name) << "\nwidth = " << c.width
+         << "\nheight = " << c.height << "\n";
     for (const auto& [key, value] : {std::pair{"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}})
       out_ << key << " = " << toml_text(value) << "\n";
     if (!c.lens.coefficients().empty()) out_ << "distortion = " << toml_text(c.lens.coefficients()) << "\n";
-    if (depth.poses)
-      write_file_key("poses", depth.poses);
+    if (camera.poses)
+      write_file_key("poses", camera.poses);
     else
       out_ << "camera_to_world = " << toml_text(c.camera_to_world) << "\n";
+    write_every(camera.every);
+    if (camera.time_offset != 0.0) out_ << "time_offset = " << toml_text(camera.time_offset) << "   # s\n";
+    if (camera.pose_std != PoseStd()) write_pose_std(camera.pose_std);
+  }
+
+  void write(const DepthCamera& depth) {
+    write_camera("depth", depth);
     out_ << "images = " << toml_text(depth.images.pattern) << "\n";
     if (depth.masks) out_ << "masks = " << toml_text(depth.masks->pattern) << "\n";
     write_file_key("background", depth.background);
     out_ << "depth_scale = " << toml_text(depth.depth_scale) << "\n";
-    write_every(depth.every);
-    if (depth.time_offset != 0.0) out_ << "time_offset = " << toml_text(depth.time_offset) << "   # s\n";
     write_noise(depth.noise);
-    if (depth.pose_std != PoseStd()) write_pose_std(depth.pose_std);
+    out_ << "\n";
+  }
+
+  void write(const SilhouetteCamera& silhouette) {
+    write_camera("silhouette", silhouette);
+    out_ << "masks = " << toml_text(silhouette.masks.pattern) << "\n";
+    if (silhouette.outline_std != SilhouetteCamera().outline_std)
+      out_ << "outline_std = " << toml_text(silhouette.outline_std) << "   # pixels\n";
     out_ << "\n";
   }
 

@@ -19,6 +19,13 @@ double CostEvaluation::surface_median() const {
   return double(median(std::move(all)));
 }
 
+double CostEvaluation::outline_rms() const {
+  double sum = 0.0;
+  int count = 0;
+  for (const FrameFit& f : frames) sum += f.outline_sum_squares, count += f.outlines;
+  return count > 0 ? std::sqrt(sum / count) : 0.0;
+}
+
 double CostEvaluation::track_rms() const {
   double sum = 0.0;
   long long count = 0;

@@ -13,17 +13,20 @@ namespace pliant {
 struct FrameFit {
   int recording = 0;            ///< which trial of an objective it belongs to, as that counts
   int frame = 0;                ///< of the trial
-  int points = 0, matched = 0;  ///< of the surface
+  int points = 0, matched = 0;  ///< of the surface, and of outlines
+  int outlines = 0;             ///< points of outlines among them
   int tracks = 0;               ///< followed points
   double independent = 0.0;     ///< observations behind the cost
   double cost = 0.0;
-  VectorX gradient;                ///< by p; empty unless asked for
-  MatrixX gauss_newton;            ///< J^T W J
-  std::vector<float> distances;    ///< [m] of each point to the deformed surface, each at most the loss's scale
-  double sum_squares = 0.0;        ///< [m^2] of them
-  double max_distance = 0.0;       ///< [m] of matched points
-  double sum_noise_squares = 0.0;  ///< [m^2] of the sensor's standard deviations
-  double track_sum_squares = 0.0;  ///< [m^2] of the followed points' distances
+  VectorX gradient;      ///< by p; empty unless asked for
+  MatrixX gauss_newton;  ///< J^T W J
+  std::vector<float>
+      distances;  ///< [m] of each point to the deformed surface or its contour, each at most the loss's scale
+  double sum_squares = 0.0;          ///< [m^2] of them
+  double max_distance = 0.0;         ///< [m] of matched points
+  double sum_noise_squares = 0.0;    ///< [m^2] of the sensor's standard deviations
+  double outline_sum_squares = 0.0;  ///< [m^2] of the outlines' part of `sum_squares`
+  double track_sum_squares = 0.0;    ///< [m^2] of the followed points' distances
 };
 
 struct CostEvaluation {
@@ -39,6 +42,7 @@ struct CostEvaluation {
   double work = 0.0;
   double surface_rms() const;     ///< [m]; 0 where no surface was seen
   double surface_median() const;  ///< [m], likewise
+  double outline_rms() const;     ///< [m], of the outlines among them; 0 where none were seen
   double track_rms() const;       ///< [m], of the followed points; 0 where there are none
   double matched_fraction() const;
   double independent_observations() const;  ///< behind the cost, as `ObjectiveOptions` counts them

@@ -7,9 +7,10 @@ namespace {
 /// Calls each(member) for all members of a frame's fit, of which it is one type or another that is const or not.
 template <class Frame, class Each>
 void for_members_of_frame(Frame& f, const Each& each) {
-  each(f.recording), each(f.frame), each(f.points), each(f.matched), each(f.tracks);
+  each(f.recording), each(f.frame), each(f.points), each(f.matched), each(f.outlines), each(f.tracks);
   each(f.independent), each(f.cost), each(f.gradient), each(f.gauss_newton), each(f.distances);
-  each(f.sum_squares), each(f.max_distance), each(f.sum_noise_squares), each(f.track_sum_squares);
+  each(f.sum_squares), each(f.max_distance), each(f.sum_noise_squares), each(f.outline_sum_squares),
+      each(f.track_sum_squares);
 }
 
 /// All members of an evaluation but its frames.

@@ -35,7 +35,7 @@ Capture at_rest(const Capture& capture) {
   still.scene.timing.frame_rate = 0.0;
   still.scene.timing.times = {0.0};
   still.scene.timing.start_frame = 0;
-  still.depth.clear(), still.clouds.clear(), still.markers.clear();
+  still.depth.clear(), still.silhouettes.clear(), still.clouds.clear(), still.markers.clear();
   return still;
 }
 

@@ -55,8 +55,9 @@ class MotionTrial::Comparison {
   };
   Sensors sensors_at(const VectorX& theta, const MatrixX& directions) const;
   const Sensors& sensors() const { return sensors_; }
-  double frame_weight(const FrameObservations& seen) const {
-    return std::min(1.0, independent_points(seen) / double(seen.points.size()));
+  /// What each of so many points of a frame counts.
+  double share_of(const FrameObservations& seen, std::size_t points) const {
+    return std::min(1.0, independent_points(seen) / double(points));
   }
   double independent_points(const FrameObservations& seen) const {
     return seen.at_rest > 0 ? seen.at_rest * motion_.options.independent_points_at_rest
@@ -64,6 +65,7 @@ class MotionTrial::Comparison {
   }
   std::vector<SurfaceObservation> corrected(const std::vector<SurfaceObservation>& points) const;
   std::vector<TrackObservation> corrected(const std::vector<TrackObservation>& tracks) const;
+  OutlineObservation corrected(const OutlineObservation& outline) const;
   bool is_corrected(int sensor) const { return sensor < int(sensors_.corrections.size()); }
   const SensorBlocks& sensor_blocks(int sensor) const { return motion_.mismatch.sensors[std::size_t(sensor)]; }
 
@@ -83,9 +85,29 @@ class MotionTrial::Comparison {
     std::vector<Eigen::Index> along;  // which of them move it
     std::vector<Points> positions;    // one each
   };
+  /// How far something that was seen is from the simulated surface, or from its contour, and where it was seen.
+  struct Distance {
+    bool is_matched;
+    double value, stretch;  // [m]; value / stretch is the true distance
+    Vector3 direction;      // d value = direction . d surface
+    Vector3 point, view;    // as the sensor states it
+    double noise;           // [m]
+    int sensor;
+  };
+  static std::vector<Distance> distances_of(const std::vector<SurfaceObservation>& seen,
+                                            const std::vector<PointMatch>& matches);
+  static std::vector<Distance> distances_of(const OutlineObservation& seen, const std::vector<OutlineMatch>& matches);
+  /// @param share  what each counts
+  /// @param J      their changes as the surface moves, one row each
+  void add_distances(const std::vector<Distance>& distances, double share, MatrixX J, FrameFit& fit) const;
+  /// Cotangents of the distances, and of their sensors' corrections.
+  VectorX distance_bars(const std::vector<Distance>& distances, double share, VectorX& theta_bar) const;
+
   FrameFit fit_frame(const FrameObservations& seen, const Points& positions, const Tangents& tangents) const;
   void fit_surface(const FrameObservations& seen, const Points& positions, const Tangents& tangents,
                    FrameFit& fit) const;
+  void fit_outlines(const FrameObservations& seen, const Points& positions, const Tangents& tangents,
+                    FrameFit& fit) const;
   void fit_tracks(const FrameObservations& seen, const Points& positions, const Tangents& tangents,
                   FrameFit& fit) const;
   void fit_planes(const FrameObservations& seen, const Tangents& tangents, FrameFit& fit) const;
@@ -176,47 +198,107 @@ std::vector<TrackObservation> MotionTrial::Comparison::corrected(const std::vect
   return moved;
 }
 
-void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const Points& positions,
-                                          const Tangents& tangents, FrameFit& fit) const {
-  const SurfaceConstraints& surface = *motion_.mismatch.surface;
+OutlineObservation MotionTrial::Comparison::corrected(const OutlineObservation& outline) const {
+  if (!sensors_.correct || !is_corrected(outline.sensor)) return outline;
+  return pliant::corrected(outline, sensors_.corrections[std::size_t(outline.sensor)]);
+}
+
+std::vector<MotionTrial::Comparison::Distance> MotionTrial::Comparison::distances_of(
+    const std::vector<SurfaceObservation>& seen, const std::vector<PointMatch>& matches) {
+  std::vector<Distance> all;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const SurfaceObservation& o = seen[i];
+    const PointMatch& m = matches[i];
+    all.push_back({m.cell >= 0, m.distance, m.stretch, m.direction, o.position, o.view, o.noise, o.sensor});
+  }
+  return all;
+}
+
+std::vector<MotionTrial::Comparison::Distance> MotionTrial::Comparison::distances_of(
+    const OutlineObservation& seen, const std::vector<OutlineMatch>& matches) {
+  std::vector<Distance> all;
+  for (const OutlineMatch& m : matches)
+    all.push_back({m.is_found, m.distance, 1.0, m.direction, seen.camera.camera_to_world(m.seen), Vector3::Zero(),
+                   seen.noise, seen.sensor});
+  return all;
+}
+
+void MotionTrial::Comparison::add_distances(const std::vector<Distance>& distances, double share, MatrixX J,
+                                            FrameFit& fit) const {
   const double outlier_scale = motion_.options.outlier_scale;
-  fit.points = int(seen.points.size());
-  fit.independent += std::min(double(fit.points), independent_points(seen));
-  const auto matches = surface.match(corrected(seen.points), positions);
   const RobustLoss loss{outlier_scale};
-  const double share = frame_weight(seen);
-  MatrixX J = MatrixX::Zero(fit.points, tangents.directions);
-  J(Eigen::all, tangents.along) = surface.tangents(matches, tangents.positions);
-  VectorX weight(fit.points), weighted(fit.points);
-  fit.distances.assign(std::size_t(fit.points), float(outlier_scale));
-  for (int i = 0; i < fit.points; ++i) {
-    const SurfaceObservation& o = seen.points[std::size_t(i)];
-    const double noise = o.noise, w = share / (noise * noise);
-    const PointMatch& m = matches[std::size_t(i)];
-    fit.sum_noise_squares += noise * noise;
-    weight[i] = weighted[i] = 0.0;
-    if (m.cell < 0) {
+  const auto count = Eigen::Index(distances.size());
+  VectorX weight = VectorX::Zero(count), weighted = VectorX::Zero(count);
+  fit.points += int(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Distance& d = distances[std::size_t(i)];
+    const double w = share / (d.noise * d.noise);
+    fit.sum_noise_squares += d.noise * d.noise;
+    fit.distances.push_back(float(outlier_scale));
+    if (!d.is_matched) {
       fit.cost += w * loss.outlier();
       fit.sum_squares += outlier_scale * outlier_scale;
       continue;
     }
     ++fit.matched;
-    fit.cost += w * loss.value(m.distance);
-    const double true_distance = std::abs(m.distance) / m.stretch;
-    fit.distances[std::size_t(i)] = float(std::min(true_distance, outlier_scale));
+    fit.cost += w * loss.value(d.value);
+    const double true_distance = std::abs(d.value) / d.stretch;
+    fit.distances.back() = float(std::min(true_distance, outlier_scale));
     fit.sum_squares += std::pow(std::min(true_distance, outlier_scale), 2);
     fit.max_distance = std::max(fit.max_distance, true_distance);
-    weight[i] = w * loss.weight(m.distance);
-    weighted[i] = weight[i] * m.distance;
+    weight[i] = w * loss.weight(d.value);
+    weighted[i] = weight[i] * d.value;
     // A point that moves changes its distance as the object does that moves the other way.
-    if (sensors_.change && is_corrected(o.sensor))
-      J.row(i) -= m.direction.transpose() * sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, o.view) *
-                  sensors_.changes[std::size_t(o.sensor)];
+    if (sensors_.change && is_corrected(d.sensor))
+      J.row(i) -= d.direction.transpose() * sensors_.corrections[std::size_t(d.sensor)].jacobian(d.point, d.view) *
+                  sensors_.changes[std::size_t(d.sensor)];
   }
-  if (tangents.directions > 0) {
+  if (J.cols() > 0) {
     fit.gradient += J.transpose() * weighted;
     fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
   }
+}
+
+VectorX MotionTrial::Comparison::distance_bars(const std::vector<Distance>& distances, double share,
+                                               VectorX& theta_bar) const {
+  const RobustLoss loss{motion_.options.outlier_scale};
+  VectorX bar = VectorX::Zero(Eigen::Index(distances.size()));
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const Distance& d = distances[i];
+    if (!d.is_matched) continue;
+    bar[Eigen::Index(i)] = share / (d.noise * d.noise) * loss.derivative(d.value);
+    if (is_corrected(d.sensor))
+      sensor_blocks(d.sensor).add(
+          -bar[Eigen::Index(i)] * sensors_.corrections[std::size_t(d.sensor)].jacobian(d.point, d.view).transpose() *
+              d.direction,
+          theta_bar);
+  }
+  return bar;
+}
+
+void MotionTrial::Comparison::fit_surface(const FrameObservations& seen, const Points& positions,
+                                          const Tangents& tangents, FrameFit& fit) const {
+  const SurfaceConstraints& surface = *motion_.mismatch.surface;
+  fit.independent += std::min(double(seen.points.size()), independent_points(seen));
+  const auto matches = surface.match(corrected(seen.points), positions);
+  MatrixX J = MatrixX::Zero(Eigen::Index(matches.size()), tangents.directions);
+  J(Eigen::all, tangents.along) = surface.tangents(matches, tangents.positions);
+  add_distances(distances_of(seen.points, matches), share_of(seen, matches.size()), std::move(J), fit);
+}
+
+void MotionTrial::Comparison::fit_outlines(const FrameObservations& seen, const Points& positions,
+                                           const Tangents& tangents, FrameFit& fit) const {
+  const std::size_t count = seen.outline_points();
+  const double squares_before = fit.sum_squares;
+  fit.independent += std::min(double(count), independent_points(seen));
+  fit.outlines = int(count);
+  for (const OutlineObservation& outline : seen.outlines) {
+    const auto matches = motion_.mismatch.outlines->match(corrected(outline), positions);
+    MatrixX J = MatrixX::Zero(Eigen::Index(matches.size()), tangents.directions);
+    J(Eigen::all, tangents.along) = motion_.mismatch.outlines->tangents(matches, tangents.positions);
+    add_distances(distances_of(outline, matches), share_of(seen, count), std::move(J), fit);
+  }
+  fit.outline_sum_squares = fit.sum_squares - squares_before;
 }
 
 void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Points& positions,
@@ -293,6 +375,7 @@ FrameFit MotionTrial::Comparison::fit_frame(const FrameObservations& seen, const
     fit.gauss_newton.setZero(n, n);
   }
   if (!seen.points.empty()) fit_surface(seen, positions, tangents, fit);
+  if (seen.outline_points() > 0) fit_outlines(seen, positions, tangents, fit);
   if (!seen.tracks.empty()) fit_tracks(seen, positions, tangents, fit);
   fit_planes(seen, tangents, fit);
   return fit;
@@ -352,19 +435,14 @@ void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, cons
   if (!seen.points.empty()) {
     const SurfaceConstraints& surface = *motion_.mismatch.surface;
     const auto matches = surface.match(corrected(seen.points), positions);
-    VectorX bar = VectorX::Zero(Eigen::Index(matches.size()));
-    for (std::size_t i = 0; i < matches.size(); ++i) {
-      const SurfaceObservation& o = seen.points[i];
-      if (matches[i].cell < 0) continue;
-      bar[Eigen::Index(i)] = frame_weight(seen) / (o.noise * o.noise) * loss.derivative(matches[i].distance);
-      if (is_corrected(o.sensor))
-        sensor_blocks(o.sensor).add(
-            -bar[Eigen::Index(i)] *
-                sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, o.view).transpose() *
-                matches[i].direction,
-            theta_bar);
-    }
-    x_bar += surface.adjoint(matches, bar);
+    x_bar += surface.adjoint(
+        matches, distance_bars(distances_of(seen.points, matches), share_of(seen, matches.size()), theta_bar));
+  }
+  for (const OutlineObservation& outline : seen.outlines) {
+    const auto matches = motion_.mismatch.outlines->match(corrected(outline), positions);
+    motion_.mismatch.outlines->add_adjoint(
+        matches, distance_bars(distances_of(outline, matches), share_of(seen, seen.outline_points()), theta_bar),
+        x_bar);
   }
   if (!seen.tracks.empty()) {
     Points bar = motion_.mismatch.tracks->residuals(corrected(seen.tracks), positions);

@@ -6,6 +6,7 @@
 
 #include "estimation/judgement.hpp"
 #include "estimation/trial.hpp"
+#include "mismatch/outline_constraints.hpp"
 #include "mismatch/point_tracks.hpp"
 #include "mismatch/sensor_correction.hpp"
 #include "mismatch/surface_constraints.hpp"
@@ -31,6 +32,13 @@ struct FrameObservations {
   double after = 0.0;                           ///< [s] since that frame, and before the next
   int at_rest = 0;                            ///< of an object that stands still as it was scanned: frames that show it
   std::vector<PlaneObservation> planes = {};  ///< of the scene
+  std::vector<OutlineObservation> outlines = {};  ///< of cameras without depth
+
+  std::size_t outline_points() const {
+    std::size_t count = 0;
+    for (const OutlineObservation& outline : outlines) count += outline.points.size();
+    return count;
+  }
 };
 
 struct ObjectiveOptions {
@@ -44,12 +52,13 @@ struct ObjectiveOptions {
   std::function<bool()> interrupted = {};
 };
 
-/// What was observed of a body and how it is compared; either may be null where there is nothing of its kind.
+/// What was observed of a body and how it is compared; each may be null where there is nothing of its kind.
 struct Mismatch {
   std::shared_ptr<const SurfaceConstraints> surface;
   std::shared_ptr<const PointTracks> tracks;
   Vector3 centre = Vector3::Zero();        ///< about which sensors are corrected
   std::vector<SensorBlocks> sensors = {};  ///< their corrections in the parameter vector; may be fewer than there are
+  std::shared_ptr<const OutlineConstraints> outlines = {};
 };
 
 /// A body in motion, or at rest, and what was seen of it.
@@ -61,9 +70,10 @@ struct ObservedMotion {
   ObjectiveOptions options;
 };
 
-/// A motion, or an equilibrium, compared with points on its surface and points of the object that were followed: the
-/// sum over frames and points of a robust loss of the pulled-back distance, or of the distance from where a followed
-/// point was seen, over its noise; and half the squares of how far planes were seen from where they are, over theirs.
+/// A motion, or an equilibrium, compared with points on its surface, with its outlines in pictures and with points of
+/// the object that were followed: the sum over frames and points of a robust loss of the pulled-back distance, of the
+/// distance from an outline's ray to the occluding contour, or from where a followed point was seen, over its noise;
+/// and half the squares of how far planes were seen from where they are, over theirs.
 /// The comparison of a frame is evaluated beside the simulation of the next.
 /// Runs throw Interrupted at the frame where `ObjectiveOptions::interrupted` says so.
 class MotionTrial : public Trial {

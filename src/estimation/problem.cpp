@@ -89,6 +89,9 @@ Mismatch make_mismatch(const Capture& capture, const std::shared_ptr<const Signe
   if (!capture.depth.empty() || !capture.clouds.empty() || any_load)
     mismatch.surface =
         std::make_shared<SurfaceConstraints>(body, distance, resolution.band * size, size / resolution.cells);
+  if (!capture.silhouettes.empty())
+    mismatch.outlines = std::make_shared<OutlineConstraints>(*body, *capture.scene.object.surface,
+                                                             size / resolution.cells, resolution.band * size);
   if (!tracked.empty()) mismatch.tracks = std::make_shared<PointTracks>(*body, tracked);
   mismatch.centre = centre_of(*capture.scene.object.surface);
   return mismatch;
@@ -112,8 +115,13 @@ std::vector<std::string> sensor_names(const Capture& capture) {
   std::vector<std::string> names;
   for (const DepthCamera& camera : capture.depth) names.push_back(camera.name);
   if (!capture.clouds.empty()) names.emplace_back("clouds");
+  for (const SilhouetteCamera& camera : capture.silhouettes) names.push_back(camera.name);
   if (!capture.markers.empty()) names.emplace_back("markers");
   return names;
+}
+
+int silhouette_sensor(const Capture& capture, int camera) {
+  return int(capture.depth.size()) + (capture.clouds.empty() ? 0 : 1) + camera;
 }
 
 std::vector<std::string> modulus_names(const Capture& capture, int controls) {
@@ -261,6 +269,16 @@ TrackedPoints tracked_points(const Capture& capture) {
   return tracked;
 }
 
+OutlineObservation outline_observation(const Capture& capture, const ObservedOutline& seen, int frame) {
+  const SilhouetteCamera& camera = capture.silhouettes[std::size_t(seen.camera)];
+  OutlineObservation observed{
+      camera.at(frame), {}, outline_noise(capture, camera, frame), silhouette_sensor(capture, seen.camera)};
+  observed.camera.lens = {};
+  for (std::size_t i = 0; i < seen.outline.points.size(); ++i)
+    observed.points.push_back({seen.outline.points[i], seen.outline.normals[i]});
+  return observed;
+}
+
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
                                                   const TrackedPoints& tracked, int first_at_rest) {
   const Timing& timing = capture.scene.timing;
@@ -285,7 +303,11 @@ std::vector<FrameObservations> frame_observations(const Capture& capture, const 
   for (const ObservedFrame& seen : observed) {
     if (first_at_rest >= 0 && seen.frame >= first_at_rest && seen.frame <= timing.start_frame)
       ++frames[{0, 0.0}].at_rest;
-    if (seen.points.empty()) frames[instant_of(seen.frame, 0.0)];  // seen without a point
+    if (seen.points.empty() && seen.outlines.empty()) frames[instant_of(seen.frame, 0.0)];  // seen without a point
+    for (const ObservedOutline& outline : seen.outlines) {
+      const double offset = capture.silhouettes[std::size_t(outline.camera)].time_offset;
+      frames[instant_of(seen.frame, offset)].outlines.push_back(outline_observation(capture, outline, seen.frame));
+    }
     for (std::size_t i = 0; i < seen.points.size(); ++i) {
       const int camera = i < seen.camera.size() ? seen.camera[i] : -1;
       const double offset = camera < 0 ? 0.0 : capture.depth[std::size_t(camera)].time_offset;

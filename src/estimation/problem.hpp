@@ -70,8 +70,11 @@ struct CaptureParameters {
 CaptureParameters default_parameters(const Capture& capture, double volume, int controls = 1, int pulls = 0,
                                      int shapes = 0, const std::optional<LawForm>& law = std::nullopt);
 
-/// What corrections of sensors apply to: each depth camera by its name, "clouds" and "markers".
+/// What corrections of sensors apply to: each depth camera by its name, "clouds", each silhouette camera by its name
+/// and "markers".
 std::vector<std::string> sensor_names(const Capture& capture);
+/// Number of a silhouette camera among them.
+int silhouette_sensor(const Capture& capture, int camera);
 
 /// "youngs_modulus" alone; with regions followed by "youngs_modulus@name" of each; with control points
 /// "youngs_modulus@1", "youngs_modulus@2", ...
@@ -86,6 +89,9 @@ struct TrackedPoints {
 /// Reads them, each block as noisy as its track shows (`track_noise`); where too few frames tell, a thousandth of the
 /// object's size stands in.
 TrackedPoints tracked_points(const Capture& capture);
+
+/// An outline as a fit compares it.
+OutlineObservation outline_observation(const Capture& capture, const ObservedOutline& seen, int frame);
 
 /// Observations of the frames from the start on, numbered from it. Frames before a release show the pose from which the
 /// object is released, and count as looks at its first frame.

@@ -32,7 +32,8 @@ bool has_pressed(const Capture& capture) {
 
 void require_fittable(const Capture& capture, const FitOptions& options) {
   const auto refuse = [&](const std::string& found, const std::string& advice) {
-    throw InputError({{capture.file}, found, "an object seen by depth cameras, clouds or markers", advice});
+    throw InputError(
+        {{capture.file}, found, "an object seen by depth cameras, silhouettes, clouds or markers", advice});
   };
   if (options.material == MaterialKind::Sampled)
     throw InputError({{capture.file},
@@ -40,9 +41,9 @@ void require_fittable(const Capture& capture, const FitOptions& options) {
                       "material=linear, neo_hookean or ogden: stiffness is sampled under presses alone",
                       "leave out material, or fit a capture that has nothing but presses"});
   if (!capture.scene.object.surface) refuse("there is no scan of the object at rest", "add [object] surface");
-  if (capture.depth.empty() && capture.clouds.empty() && capture.markers.empty() && !has_fitted_loads(capture) &&
-      !has_pressed(capture))
-    refuse("there are no depth cameras, no clouds and no markers", "");
+  if (capture.depth.empty() && capture.silhouettes.empty() && capture.clouds.empty() && capture.markers.empty() &&
+      !has_fitted_loads(capture) && !has_pressed(capture))
+    refuse("there are no depth cameras, no silhouettes, no clouds and no markers", "");
   if (has_fitted_loads(capture) && !capture.scene.is_held() && !capture.scene.is_touched())
     refuse("weights hang from the object, but nothing holds it",
            "add the [[fixed]] region that it hangs from, or the [[plane]] that it rests on");
@@ -518,6 +519,8 @@ std::vector<std::string> Recordings::told_at_rest() const {
     if (!stands) continue;
     std::vector<int> seen(r.blocks.sensors.size(), 0);
     for (const SurfaceObservation& o : r.observations->front().points) ++seen[std::size_t(o.sensor)];
+    for (const OutlineObservation& o : r.observations->front().outlines)
+      seen[std::size_t(o.sensor)] += int(o.points.size());
     std::vector<ParameterHandle> told;
     for (std::size_t k = 0; k < seen.size(); ++k)
       if (seen[k] >= fewest) told.insert(told.end(), {r.blocks.sensors[k].turn, r.blocks.sensors[k].shift});

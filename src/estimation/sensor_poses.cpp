@@ -72,6 +72,7 @@ std::vector<PoseStd> pose_stds(const Capture& capture) {
       }
     all.push_back(of_clouds);
   }
+  for (const SilhouetteCamera& camera : capture.silhouettes) all.push_back(camera.pose_std);
   all.resize(sensor_names(capture).size(), {0.0, 0.0});  // markers' poses are those of their system
   return all;
 }

@@ -50,13 +50,22 @@ std::optional<double> swing_of(const Path& path, const Vector3& direction) {
   return sinusoid->natural();
 }
 
-Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<double>& times) {
+/// An outline's points where the object hangs: how far from the camera does not change its rhythm.
+void add_outline(const OutlineObservation& outline, const Vector3& middle, std::vector<Vector3>& points) {
+  const double depth = outline.camera.project(middle).z();
+  for (const OutlinePoint& point : outline.points)
+    points.push_back(outline.camera.unproject(point.pixel.x(), point.pixel.y(), depth));
+}
+
+/// @param centre  of the object at rest [m]
+Path seen_path(const std::vector<FrameObservations>& seen, const std::vector<double>& times, const Vector3& centre) {
   constexpr std::size_t fewest = 10;
   Path path;
   for (const FrameObservations& frame : seen) {
     std::vector<Vector3> there;
     for (const SurfaceObservation& point : frame.points) there.push_back(point.position);
     for (const TrackObservation& point : frame.tracks) there.push_back(point.position);
+    for (const OutlineObservation& outline : frame.outlines) add_outline(outline, centre, there);
     if (there.size() < fewest) continue;
     path.times.push_back(times[std::size_t(frame.frame)] + frame.after);
     path.points.push_back(middle(to_points(there)));
@@ -99,7 +108,8 @@ double factor_to(double frequency_squared, const TriedModulus& now, const std::o
 
 std::optional<SwingStart> swing_start(Simulation& simulation, VectorX parameters,
                                       const std::vector<FrameObservations>& seen) {
-  const Path path = seen_path(seen, simulation.options().times);
+  const Vector3 centre = simulation.body().scanned_positions().colwise().mean().transpose();
+  const Path path = seen_path(seen, simulation.options().times, centre);
   if (path.points.empty()) return std::nullopt;
   const Vector3 direction = path.direction();
   const auto observed = swing_of(path, direction);

@@ -32,7 +32,7 @@ TrackingUse use_of(const std::vector<RecordedCapture>& recordings, const FitOpti
   const bool suits = std::ranges::all_of(recordings, [](const RecordedCapture& r) {
     const Capture& c = r.capture;
     return !r.followed && !c.scene.timing.is_static && c.scene.object.shape_is == ShapeIs::Reference &&
-           c.markers.empty() && !has_time_offsets(c) && !has_moving_cameras(c) &&
+           c.markers.empty() && c.silhouettes.empty() && !has_time_offsets(c) && !has_moving_cameras(c) &&
            (!c.clouds.empty() || c.depth.size() > 1);
   });
   return suits ? TrackingUse::Both : TrackingUse::Off;

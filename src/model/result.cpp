@@ -74,6 +74,7 @@ Json error_json(const ErrorResult& error) {
                {"marker_rms", number(error.marker_rms)},
                {"unit", "m"},
                {"points", error.points}};
+  if (error.outline_rms) json["outline_rms"] = *error.outline_rms;
   for (const ErrorResult::Frame& f : error.frames)
     json["frames"].push_back({{"frame", f.frame}, {"rms", f.rms}, {"noise", f.noise}, {"points", f.points}});
   return json;

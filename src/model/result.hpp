@@ -74,6 +74,7 @@ struct FieldResult {
 /// Distances between what was seen and what was simulated [m].
 struct ErrorResult {
   std::optional<double> surface_rms, surface_median, surface_max, marker_rms;
+  std::optional<double> outline_rms = {};  ///< of outlines alone, which `surface_rms` counts too
   long long points = 0;
   struct Frame {
     int frame = 0;                  ///< of the simulation: 0 is its start

@@ -144,6 +144,18 @@ void add_observations(GalleryFrame& frame, const std::vector<Vector3>& seen, con
   }
 }
 
+/// Where an outline's rays pass the simulated contour, and how far they pass it.
+void add_outline(GalleryFrame& frame, const OutlineObservation& seen, const Discretisation& d, const VectorX& theta,
+                 const Points& nodes) {
+  const SensorBlocks& blocks = d.mismatch.sensors[std::size_t(seen.sensor)];
+  const OutlineObservation there = corrected(seen, SensorCorrection(d.mismatch.centre, blocks.values(theta)));
+  for (const OutlineMatch& match : d.mismatch.outlines->match(there, nodes)) {
+    if (!match.is_found) continue;
+    frame.points.push_back(there.camera.camera_to_world(match.seen));
+    frame.residuals.push_back(match.distance);
+  }
+}
+
 /// A frame's points where the estimate has them.
 std::vector<Vector3> corrected_points(const ObservedFrame& seen, const Capture& capture, const Discretisation& d,
                                       const VectorX& theta) {
@@ -163,7 +175,10 @@ Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutco
   Gallery gallery;
   gallery.triangles = capture.scene.object.surface->triangles;
   gallery.planes = planes_at(capture, d.simulation.blocks, outcome.theta);
-  if (!capture.depth.empty()) gallery.camera = capture.depth.front().camera;
+  if (!capture.depth.empty())
+    gallery.camera = capture.depth.front().camera;
+  else if (!capture.silhouettes.empty())
+    gallery.camera = capture.silhouettes.front().camera;
   gallery.up = capture.scene.world.up;
   gallery.width = 480, gallery.height = 400;
   const auto& fitted = outcome.evaluation.frames;
@@ -179,8 +194,11 @@ Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutco
     GalleryFrame drawn{
         recorded, capture.scene.timing.times[std::size_t(recorded)] - start, embedding.positions(state.x), {}, {}};
     const auto seen = std::ranges::find(recorded_capture.observed, recorded, &ObservedFrame::frame);
-    if (seen != recorded_capture.observed.end())
+    if (seen != recorded_capture.observed.end()) {
       add_observations(drawn, corrected_points(*seen, capture, d, outcome.theta), d, state.x);
+      for (const ObservedOutline& outline : seen->outlines)
+        add_outline(drawn, outline_observation(capture, outline, recorded), d, outcome.theta, state.x);
+    }
     gallery.frames.push_back(std::move(drawn));
     return frame < told.back();
   });
@@ -307,11 +325,13 @@ ErrorResult surface_errors(const CostEvaluation& evaluation) {
   }
   const bool has_surface = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.points > 0; });
   const bool has_tracks = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.tracks > 0; });
+  const bool has_outlines = std::ranges::any_of(evaluation.frames, [](const FrameFit& f) { return f.outlines > 0; });
   if (has_surface) {
     errors.surface_rms = evaluation.surface_rms();
     errors.surface_median = evaluation.surface_median();
     errors.surface_max = max;
   }
+  if (has_outlines) errors.outline_rms = evaluation.outline_rms();
   if (has_tracks) errors.marker_rms = evaluation.track_rms();
   return errors;
 }

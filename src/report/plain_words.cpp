@@ -51,6 +51,8 @@ std::string agreement_sentence(const ReportData& data) {
   if (!error.surface_rms) return "";
   std::string text = fmt::format("The simulated surface lies {} (root mean square) from the {} observed points",
                                  millimetres(*error.surface_rms), readable(double(error.points), 6));
+  if (error.outline_rms && *error.outline_rms != *error.surface_rms)
+    text += fmt::format(", and {} from those on outlines", millimetres(*error.outline_rms));
   double squares = 0.0, points = 0.0;
   for (const FrameResidual& frame : data.residuals)
     if (frame.noise) squares += frame.points * *frame.noise * *frame.noise, points += frame.points;

@@ -40,6 +40,10 @@ std::string mask_name(const SyntheticCamera& camera, int frame) {
 }
 
 bool has_images(const Synthesis& s) { return !s.frames.empty() && (!s.cloud || s.cloud->with_images); }
+bool has_images(const Synthesis& s, const SyntheticCamera& camera) {
+  return camera.is_silhouette ? !s.frames.empty() : has_images(s);
+}
+bool measures_depth(const SyntheticCamera& camera) { return !camera.is_silhouette; }
 
 void check(const Synthesis& s) {
   const auto require = [](bool good, const char* what) {
@@ -65,7 +69,8 @@ void check(const Synthesis& s) {
   require(s.scan_markers.rows() == markers, "the markers at rest do not fit those of the frames");
   require(object.mass.has_value() != object.density.has_value(), "exactly one of mass and density is needed");
   require(!s.cameras.empty() || s.markers || !s.indentations.empty(), "at least one camera, or markers, are needed");
-  require(!s.cloud || (!s.cameras.empty() && s.cloud->every >= 1), "a cloud needs a camera");
+  require(!s.cloud || (std::ranges::any_of(s.cameras, measures_depth) && s.cloud->every >= 1),
+          "a cloud needs a depth camera");
   require(s.presses.empty() || markers >= 3, "presses need three markers");
   require(s.plane_half_sizes.size() == s.scene.planes.size(), "each plane needs a visible size");
   const Timing& timing = s.scene.timing;
@@ -135,9 +140,10 @@ double rounded(double noise) { return std::stod(fmt::format("{:.3g}", noise)); }
 
 // Of the clouds' points: the root mean square over cameras.
 double cloud_noise(const Synthesis& s) {
-  double squares = 0.0;
-  for (const SyntheticCamera& camera : s.cameras) squares += std::pow(typical_noise(s, camera), 2);
-  return std::sqrt(squares / double(s.cameras.size()));
+  double squares = 0.0, count = 0.0;
+  for (const SyntheticCamera& camera : s.cameras)
+    if (measures_depth(camera)) squares += std::pow(typical_noise(s, camera), 2), ++count;
+  return std::sqrt(squares / count);
 }
 
 std::string test_name(const char* kind, std::size_t i, const char* ending) {
@@ -150,21 +156,19 @@ Capture capture_of(const Synthesis& s, const fs::path& folder) {
   capture.scene = s.scene;
   capture.scene.object.file = folder / "rest.ply";
   capture.scene.object.surface_noise = 0.0;  // it is the surface of the simulated body
-  if (has_images(s))
-    for (const SyntheticCamera& camera : s.cameras) {
-      capture.depth.push_back({camera.name,
-                               camera.camera,
-                               {camera.name + "/%06d.png"},
-                               camera.depth_scale,
-                               FramePattern{camera.name + "/mask_%06d.png"},
-                               {},
-                               camera.every,
-                               rounded(typical_noise(s, camera)),
-                               camera.stated.time_offset.value_or(camera.time_offset)});
-      PinholeCamera& stated = capture.depth.back().camera;
-      stated.camera_to_world = camera.stated.camera_to_world.value_or(stated.camera_to_world);
-      stated.lens = camera.stated.lens.value_or(stated.lens);
-    }
+  for (const SyntheticCamera& camera : s.cameras) {
+    if (!has_images(s, camera)) continue;
+    RecordingCamera facts{camera.name, camera.camera, camera.every,
+                          camera.stated.time_offset.value_or(camera.time_offset)};
+    facts.camera.camera_to_world = camera.stated.camera_to_world.value_or(facts.camera.camera_to_world);
+    facts.camera.lens = camera.stated.lens.value_or(facts.camera.lens);
+    const FramePattern masks{camera.name + "/mask_%06d.png"};
+    if (camera.is_silhouette)
+      capture.silhouettes.push_back({facts, masks});
+    else
+      capture.depth.push_back(
+          {facts, {camera.name + "/%06d.png"}, camera.depth_scale, masks, {}, rounded(typical_noise(s, camera))});
+  }
   const fs::path rest = folder / "markers_rest.csv";
   if (!s.frames.empty() && s.cloud)
     capture.clouds.push_back({{"clouds/%06d.ply"}, s.cloud->every, rounded(cloud_noise(s))});
@@ -177,6 +181,7 @@ Capture capture_of(const Synthesis& s, const fs::path& folder) {
     if (s.markers) load.markers = folder / test_name("load", i, "csv"), load.markers_rest = rest;
     if (has_images(s))
       for (const SyntheticCamera& camera : s.cameras) {
+        if (!measures_depth(camera)) continue;
         load.images[camera.name] = folder / fmt::format("load/{:03}_{}.png", i, camera.name);
         load.masks[camera.name] = folder / fmt::format("load/{:03}_{}_mask.png", i, camera.name);
       }
@@ -308,7 +313,7 @@ void write_frame(const fs::path& folder, const Synthesis& s, int frame) {
     const double time = s.scene.timing.times[std::size_t(frame)];
     const RayScene at_frame = scene_of(s, s.frames[std::size_t(frame)].vertices, time);
     for (std::size_t k = 0; k < s.cameras.size(); ++k) {
-      const bool has_image = has_images(s) && frame % s.cameras[k].every == 0;
+      const bool has_image = has_images(s, s.cameras[k]) && frame % s.cameras[k].every == 0;
       if (!has_image && !has_cloud) continue;
       const bool is_later = k < s.camera_frames.size() && !s.camera_frames[k].empty();
       const SensedFrame seen =
@@ -316,9 +321,9 @@ void write_frame(const fs::path& folder, const Synthesis& s, int frame) {
               ? sensed(s, scene_of(s, s.camera_frames[k][std::size_t(frame)].vertices, time + s.cameras[k].time_offset),
                        k, frame)
               : sensed(s, at_frame, k, frame);
-      if (has_cloud) add_points(s, k, seen, points);
+      if (has_cloud && measures_depth(s.cameras[k])) add_points(s, k, seen, points);
       if (!has_image) continue;
-      write_png(folder / image_name(s.cameras[k], frame), seen.depth);
+      if (measures_depth(s.cameras[k])) write_png(folder / image_name(s.cameras[k], frame), seen.depth);
       write_png(folder / mask_name(s.cameras[k], frame), seen.mask);
     }
   }
@@ -339,6 +344,7 @@ void write_load(const fs::path& folder, const Synthesis& s, std::size_t i) {
   const RayScene scene = scene_of(s, s.loads[i].shape.vertices, 0.0);
   std::vector<Vector3> points;
   for (std::size_t k = 0; k < s.cameras.size(); ++k) {
+    if (!measures_depth(s.cameras[k])) continue;
     const SensedFrame seen = sensed(s, scene, k, first_load + int(i));
     if (s.cloud) add_points(s, k, seen, points);
     if (!has_images(s)) continue;

@@ -21,7 +21,7 @@ struct StatedCamera {
   std::optional<double> time_offset;  ///< [s]
 };
 
-/// A depth camera of a synthetic recording.
+/// A depth camera of a synthetic recording, or one of which only the silhouettes are recorded.
 struct SyntheticCamera {
   std::string name;
   PinholeCamera camera;
@@ -30,6 +30,8 @@ struct SyntheticCamera {
   int every = 1;
   double time_offset = 0.0;  ///< [s] its images are taken that much later than their frames
   StatedCamera stated = {};
+  bool is_silhouette =
+      false;  ///< masks alone, which are in the recording beside clouds, too; clouds are not made of it
 };
 
 /// Fused point clouds of all cameras: the object's points in world coordinates.

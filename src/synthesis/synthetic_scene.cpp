@@ -346,6 +346,13 @@ class Reader {
     camera.every = read_count(block, "every", 1, 100'000, 1);
     camera.camera.lens = read_lens(block);
     camera.time_offset = read_number(block, "time_offset", offset_rule, 0.0);
+    camera.is_silhouette = block.optional<bool>("silhouette").value_or(false);
+    if (camera.is_silhouette)
+      for (const char* key : {"depth_scale", "sensor"})
+        if (block.has(key))
+          context_.reject(block.key_of(key), "a silhouette camera with `" + std::string(key) + "`",
+                          "neither `depth_scale` nor `sensor`",
+                          "its masks show where its pixels' own rays meet the object");
     block.with_table("stated", [&](TomlTable& stated) { camera.stated = read_stated(stated, camera); });
     block.with_table("sensor", [&](TomlTable& sensor) { camera.sensor = read_sensor(sensor); });
     return camera;
@@ -582,16 +589,18 @@ class Reader {
   }
 
   void check_what_is_seen(TomlTable& root) {
+    const bool has_depth = std::ranges::any_of(scene_.cameras, [](const auto& c) { return !c.is_silhouette; });
     const bool moves = root.has("timing"),
                has_images = root.has("camera") && (!scene_.cloud || scene_.cloud->with_images);
-    if (scene_.cloud && !root.has("camera"))
-      context_.complain("cloud", "a cloud without a camera", "a block [[camera]]", "clouds are fused from cameras");
+    if (scene_.cloud && !has_depth)
+      context_.complain("cloud", "a cloud without a camera that measures depth", "a block [[camera]]",
+                        "clouds are fused from depth cameras, which silhouettes are not");
     if (!moves && has_images)
       context_.complain("camera[0]", "images without frames", "[timing], or [cloud] without images",
                         "loads alone are seen as clouds or markers");
     if (root.has("press") && !root.has("markers"))
       context_.complain("press[0]", "presses without markers", "[markers]", "markers are how a press is seen");
-    if (root.has("load") && !root.has("camera") && !root.has("markers"))
+    if (root.has("load") && !has_depth && !root.has("markers"))
       context_.complain("load[0]", "loads that nobody sees", "[[camera]] or [markers]");
   }
 

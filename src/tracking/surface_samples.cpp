@@ -1,8 +1,6 @@
 #include "tracking/surface_samples.hpp"
 
 #include <cmath>
-#include <map>
-#include <utility>
 
 #include "base/points.hpp"
 #include "tracking/neighbours.hpp"
@@ -10,29 +8,6 @@
 namespace pliant {
 
 namespace {
-
-double mean_edge(const TriangleMesh& mesh) {
-  double sum = 0.0;
-  for (const auto& t : mesh.triangles)
-    for (std::size_t e = 0; e < 3; ++e)
-      sum += (mesh.vertices[std::size_t(t[e])] - mesh.vertices[std::size_t(t[(e + 1) % 3])]).norm();
-  return sum / (3.0 * double(mesh.triangles.size()));
-}
-
-TriangleMesh cut_in_four(const TriangleMesh& mesh) {
-  TriangleMesh finer{mesh.vertices, {}};
-  std::map<std::pair<int, int>, int> middle;
-  const auto middle_of = [&](int a, int b) {
-    const auto [at, is_new] = middle.try_emplace(std::minmax(a, b), int(finer.vertices.size()));
-    if (is_new) finer.vertices.push_back(0.5 * (mesh.vertices[std::size_t(a)] + mesh.vertices[std::size_t(b)]));
-    return at->second;
-  };
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const int ab = middle_of(a, b), bc = middle_of(b, c), ca = middle_of(c, a);
-    finer.triangles.insert(finer.triangles.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
-  }
-  return finer;
-}
 
 std::vector<double> vertex_areas(const TriangleMesh& mesh) {
   std::vector<double> areas(mesh.vertices.size());
@@ -69,12 +44,6 @@ SampleLevel level_of(const Points& vertices, const Neighbours& near, const std::
 }
 
 }  // namespace
-
-TriangleMesh subdivided(TriangleMesh mesh, double spacing, int most) {
-  // A closed surface has about twice as many triangles as vertices: cut in four it has four times as many of both.
-  while (4 * int(mesh.vertices.size()) <= most && mean_edge(mesh) > spacing) mesh = cut_in_four(mesh);
-  return mesh;
-}
 
 std::vector<SampleLevel> sample_levels(const TriangleMesh& mesh, int fewest) {
   const std::vector<double> areas = vertex_areas(mesh);

@@ -7,10 +7,6 @@
 
 namespace pliant {
 
-/// A mesh whose triangles are cut in four until their edges are no longer than `spacing` [m] on average, or there would
-/// be more than `most` vertices. The given vertices come first.
-TriangleMesh subdivided(TriangleMesh mesh, double spacing, int most);
-
 /// Samples of a surface at one of several spacings: a subset of its vertices, each of which stands for a share of it.
 struct SampleLevel {
   double spacing = 0.0;        ///< [m] no two samples are closer; 0: all vertices

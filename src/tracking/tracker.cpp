@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/profile.hpp"
 #include "elasticity/modes.hpp"
+#include "geometry/subdivided.hpp"
 #include "tracking/neighbours.hpp"
 
 namespace pliant {

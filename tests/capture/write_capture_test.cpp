@@ -51,6 +51,7 @@ void expect_same(const Capture& is, const Capture& was) {
   EXPECT_EQ(is.name, was.name);
   expect_same_scene(is.scene, was.scene);
   EXPECT_EQ(is.depth, was.depth);
+  EXPECT_EQ(is.silhouettes, was.silhouettes);
   EXPECT_EQ(is.clouds, was.clouds);
   EXPECT_EQ(is.markers, was.markers);
   EXPECT_EQ(is.presses, was.presses);

@@ -6,6 +6,8 @@
 #include "estimation/fit.hpp"
 #include "estimation/recordings.hpp"
 #include "geometry/primitives.hpp"
+#include "rays/look_at.hpp"
+#include "rays/ray_scene.hpp"
 
 namespace pliant::test {
 
@@ -23,7 +25,8 @@ inline double value(const FitOutcome& outcome, const std::string& name) {
   return outcome.theta[outcome.parameters.find(name)->at];
 }
 
-/// A block that falls, turned, on a tilted ground that rubs, seen from above as points with noise. Made by the same
+/// A block that falls, turned, on a tilted ground that rubs, seen from above as points with noise, or from aside as
+/// masks of cameras without depth. Made by the same
 /// elements and law as it is fitted with, on a finer mesh: an inverse crime in part.
 struct Dropped {
   static constexpr double youngs_modulus = 6000.0, noise = 1.5e-3;  // [Pa], [m]
@@ -33,6 +36,8 @@ struct Dropped {
   double friction = 0.25;
   /// What the points are moved by beyond the simulation, frame by frame; empty: nothing.
   std::function<Vector3(int frame)> moved = {};
+  /// Cameras whose masks are all that is seen; empty: points are.
+  std::vector<SilhouetteCamera> silhouettes = {};
   /// What else the scene has, or has in the ground's place; empty: nothing.
   std::function<void(Scene& scene)> change = {};
 
@@ -50,7 +55,10 @@ struct Dropped {
     for (int frame = 0; frame < frames; ++frame) capture.scene.timing.times.push_back(frame / 60.0);
     capture.scene.planes = {{Vector3::Zero(), normal, true, friction}};
     if (change) change(capture.scene);
-    capture.clouds = {{{"cloud.ply"}, 1, noise}};
+    if (silhouettes.empty())
+      capture.clouds = {{{"cloud.ply"}, 1, noise}};
+    else
+      capture.silhouettes = silhouettes;
     const auto [parameters, blocks] = default_parameters(capture, enclosed_volume(block));
     VectorX theta = parameters.reference();
     blocks.motion.set_moduli(theta, youngs_modulus);
@@ -68,7 +76,16 @@ struct Dropped {
       ObservedFrame seen;
       seen.frame = frame;
       const Points x = embedding.positions(state.x);
-      const double middle = x.col(1).mean();
+      RayScene rays;
+      if (!silhouettes.empty()) rays.add(x, block.triangles);
+      for (std::size_t c = 0; c < silhouettes.size(); ++c) {
+        const PinholeCamera& camera = silhouettes[c].camera;
+        Image<std::uint8_t> mask(camera.width, camera.height);
+        std::ranges::transform(rays.render_depth(camera).depth, mask.pixels.begin(),
+                               [](float depth) { return std::uint8_t(depth > 0.0f ? 255 : 0); });
+        seen.outlines.push_back({int(c), outline_of(mask, camera)});
+      }
+      const double middle = silhouettes.empty() ? x.col(1).mean() : 1e300;
       for (Eigen::Index v = 0; v < x.rows(); ++v) {
         if (x(v, 1) < middle) continue;  // the ground's side
         const Vector3 noise_of(normal_number(random), normal_number(random), normal_number(random));

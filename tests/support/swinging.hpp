@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "geometry/subdivided.hpp"
 #include "rays/look_at.hpp"
 #include "tracking/tracker.hpp"
 

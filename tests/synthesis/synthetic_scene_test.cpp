@@ -142,6 +142,10 @@ TEST_F(SceneFile, RefusesWhatMakesNoSense) {
   EXPECT_THAT(after("linear_velocity", "release_of = { mass = 0.1, at = [0.0, 0.3, 0.0] }\nlinear_velocity"),
               HasSubstr("release_of"));
   EXPECT_THAT(after("normal = [0.0, 1.0, 0.0]", "normal = [0.0, 0.0, 0.0]"), HasSubstr("without length"));
+  EXPECT_THAT(after("name = \"front\"", "name = \"front\"\nsilhouette = true"),
+              HasSubstr("a silhouette camera with `sensor`"));
+  EXPECT_THAT(after("sensor = { preset = \"structured-light\", hole_rate = 0.01 }", "silhouette = true\n[cloud]"),
+              HasSubstr("a cloud without a camera that measures depth"));
   EXPECT_EQ(after("seed", "seed"), "");
 }
 
@@ -161,6 +165,27 @@ TEST(Synthesis, MakesACaptureThatTheReaderAccepts) {
       1e-9);
   const double distance = (Vector3(0, 0.9, 1.0) - Vector3(0, 0.4, 0)).norm();
   EXPECT_NEAR(*capture.depth[0].noise, scene.cameras[0].sensor.noise(distance), 0.1 * *capture.depth[0].noise);
+}
+
+TEST(Synthesis, ASilhouetteCameraLeavesItsMasksAlone) {
+  const TemporaryFolder folder;
+  SyntheticScene scene = read_ring();
+  SyntheticCamera film = scene.cameras[0];
+  film.name = "film", film.is_silhouette = true;
+  scene.cameras.push_back(film);
+  scene.cloud = SyntheticCloud{};  // of the first camera, whose images are not recorded
+  write_synthetic_capture(folder.path(), synthesise(scene, fall));
+  const Capture capture = read_capture(folder.path());
+  EXPECT_TRUE(capture.depth.empty());
+  ASSERT_EQ(capture.silhouettes.size(), 1u);
+  EXPECT_EQ(capture.silhouettes[0].name, "film");
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "film/mask_000004.png"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "film/000004.png"));
+  for (const ObservedFrame& frame : observe(capture)) {
+    EXPECT_FALSE(frame.points.empty());
+    ASSERT_EQ(frame.outlines.size(), 1u);
+    EXPECT_GT(frame.outlines[0].outline.points.size(), 50u);
+  }
 }
 
 TEST(Synthesis, ObservedPointsLieOnTheTrueSurface) {

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "geometry/primitives.hpp"
+#include "geometry/subdivided.hpp"
 #include "support/tolerance.hpp"
 #include "tracking/neighbours.hpp"
 
