@@ -59,7 +59,9 @@ void bind_captures(py::module_& module) {
       .def_property_readonly("cameras",
                              [](const Capture& c) {
                                std::vector<std::string> names;
-                               for (const DepthCamera& camera : c.depth) names.push_back(camera.name);
+                               for_each_camera(c, [&](const RecordingCamera& camera, auto, auto) {
+                                 names.push_back(camera.name);
+                               });
                                return names;
                              })
       .def_property_readonly("has_clouds", [](const Capture& c) { return !c.clouds.empty(); })

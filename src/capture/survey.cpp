@@ -295,16 +295,19 @@ std::vector<std::pair<int, Vector3>> outline_path(const Capture& capture, std::s
   return path;
 }
 
-/// By when an outline's middle has come nearer to a plane by the object's clearance at rest.
+/// By when an outline's middle has come nearer to a plane by the object's clearance at rest. Where no frame before the
+/// motion shows the outline whole, it set out from the scan's middle.
 std::optional<int> first_contact(const Capture& capture, const std::vector<std::pair<int, Vector3>>& path,
                                  double noise) {
   if (capture.scene.timing.is_static || capture.scene.initial.released || path.empty()) return std::nullopt;
-  const double gap =
-      plane_reach * noise + contact_gap * bounding_box(*capture.scene.object.surface).extent().maxCoeff();
+  const Box box = bounding_box(*capture.scene.object.surface);
+  const double gap = plane_reach * noise + contact_gap * box.extent().maxCoeff();
+  const bool is_seen_before = path.front().first <= capture.scene.timing.start_frame;
+  const Vector3 start = is_seen_before ? path.front().second : Vector3(0.5 * (box.min + box.max));
   for (const auto& [frame, middle] : path)
     for (const Plane& plane : capture.scene.planes)
       if (frame >= capture.scene.timing.start_frame &&
-          clearance(*capture.scene.object.surface, plane) + plane.normal.dot(middle - path.front().second) < gap)
+          clearance(*capture.scene.object.surface, plane) + plane.normal.dot(middle - start) < gap)
         return frame;
   return std::nullopt;
 }
@@ -381,7 +384,7 @@ void add_stiffness(const Capture& capture, const Survey& seen, Identifiability& 
   } else if (is_held || capture.scene.initial.released || touches) {
     result.possible.push_back(std::string("Stiffness: from ") +
                               (touches ? "the impact and the motion after it." : "the swinging of the held object."));
-  } else if (!has_forces) {
+  } else if (!has_forces && !(has_silhouettes_alone(capture) && !capture.scene.planes.empty())) {
     result.impossible.push_back(
         "Stiffness is not identifiable: the object touches nothing and is not held, and in free fall nothing "
         "strains "

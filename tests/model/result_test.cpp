@@ -26,7 +26,12 @@ Result full_result() {
       {"plane", PlaneValue{{0, 0.1, 0}, {0, 1, 0}}, "", PlaneValue{{0, 0.01, 0}, {0, 0, 0}}, std::nullopt, true}};
   r.fields = {
       {"youngs_modulus", {{{1, 2, 3}, 4.5, 0.5}, {{1, 2, 4}, 5.5, std::nullopt}}, "model.vtu", {{2, true, 8.0, {}}}}};
-  r.error = {0.0021, 0.0014, 0.009, std::nullopt, 48211, {{0, 0.002, 0.0019, 1000}, {3, 0.0022, 0.0018, 900}}};
+  r.error = {.surface_rms = 0.0021,
+             .surface_median = 0.0014,
+             .surface_max = 0.009,
+             .marker_rms = {},
+             .points = 48211,
+             .frames = {{0, 0.002, 0.0019, 1000}, {3, 0.0022, 0.0018, 900}}};
   r.cost = {143.9, 8.46};
   r.identifiability = {{{"youngs_modulus", "stiffness_damping"}, -0.93}};
   r.starts = {{{{"youngs_modulus", 5000.0}}, {{"youngs_modulus", 590.0}}, 8.46, 12, true, "cost settled"},

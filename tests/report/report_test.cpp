@@ -65,7 +65,7 @@ ReportData example(int width, int height) {
                   {"density", 95.0, "kg/m^3", std::nullopt, std::nullopt, false},
                   {"gravity", Vector3(0, -9.81, 0), "m/s^2", std::nullopt, std::nullopt, false},
                   {"plane", PlaneValue{}, "", std::nullopt, std::nullopt, false}};
-  r.error = {0.0023, 0.0016, 0.009, std::nullopt, 48211};
+  r.error = {.surface_rms = 0.0023, .surface_median = 0.0016, .surface_max = 0.009, .marker_rms = {}, .points = 48211};
   r.cost = {143.9, 8.46};
   r.identifiability = {{{"youngs_modulus", "stiffness_damping"}, -0.93}, {{"youngs_modulus", "mass_damping"}, 0.1}};
   for (int i = 0; i < 3; ++i)
