@@ -7,14 +7,6 @@ namespace pliant {
 
 namespace {
 
-double mean_edge(const TriangleMesh& mesh) {
-  double sum = 0.0;
-  for (const auto& t : mesh.triangles)
-    for (std::size_t e = 0; e < 3; ++e)
-      sum += (mesh.vertices[std::size_t(t[e])] - mesh.vertices[std::size_t(t[(e + 1) % 3])]).norm();
-  return sum / (3.0 * double(mesh.triangles.size()));
-}
-
 TriangleMesh cut_in_four(const TriangleMesh& mesh) {
   TriangleMesh finer{mesh.vertices, {}};
   std::map<std::pair<int, int>, int> middle;
@@ -31,6 +23,14 @@ TriangleMesh cut_in_four(const TriangleMesh& mesh) {
 }
 
 }  // namespace
+
+double mean_edge(const TriangleMesh& mesh) {
+  double sum = 0.0;
+  for (const auto& t : mesh.triangles)
+    for (std::size_t e = 0; e < 3; ++e)
+      sum += (mesh.vertices[std::size_t(t[e])] - mesh.vertices[std::size_t(t[(e + 1) % 3])]).norm();
+  return sum / (3.0 * double(mesh.triangles.size()));
+}
 
 TriangleMesh subdivided(TriangleMesh mesh, double spacing, int most) {
   // A closed surface has about twice as many triangles as vertices: cut in four it has four times as many of both.

@@ -3,11 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <map>
 #include <numeric>
 
 #include "geometry/primitives.hpp"
-#include "geometry/subdivided.hpp"
 #include "support/tolerance.hpp"
 #include "tracking/neighbours.hpp"
 
@@ -16,63 +14,13 @@ namespace {
 
 using test::tolerance;
 
-double area(const TriangleMesh& mesh) {
-  double sum = 0.0;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3& p = mesh.vertices[std::size_t(a)];
-    sum += 0.5 * (mesh.vertices[std::size_t(b)] - p).cross(mesh.vertices[std::size_t(c)] - p).norm();
-  }
-  return sum;
-}
-
-/// Each edge once in either direction.
-bool is_closed(const TriangleMesh& mesh) {
-  std::map<std::pair<int, int>, int> edges;
-  for (const auto& t : mesh.triangles)
-    for (std::size_t e = 0; e < 3; ++e) ++edges[{t[e], t[(e + 1) % 3]}];
-  return std::ranges::all_of(edges, [&](const auto& edge) {
-    return edge.second == 1 && edges.contains({edge.first.second, edge.first.first});
-  });
-}
-
-double mean_edge(const TriangleMesh& mesh) {
-  double sum = 0.0;
-  for (const auto& t : mesh.triangles)
-    for (std::size_t e = 0; e < 3; ++e)
-      sum += (mesh.vertices[std::size_t(t[e])] - mesh.vertices[std::size_t(t[(e + 1) % 3])]).norm();
-  return sum / (3.0 * double(mesh.triangles.size()));
-}
-
-TEST(Subdivided, IsTheSameSurfaceInSmallerTriangles) {
-  const TriangleMesh box = make_box({0.4, 0.1, 0.2}, 0.1);
-  const TriangleMesh fine = subdivided(box, 0.02, 100000);
-  EXPECT_TRUE(is_closed(fine));
-  // Sums over tens of thousands of triangles round.
-  EXPECT_NEAR(area(fine), area(box), tolerance(1e-12) * area(box));
-  EXPECT_NEAR(enclosed_volume(fine), enclosed_volume(box), tolerance(1e-12) * enclosed_volume(box));
-  EXPECT_LE(mean_edge(fine), 0.02);
-  EXPECT_GT(mean_edge(fine), 0.01) << "no finer than asked for";
-  for (std::size_t v = 0; v < box.vertices.size(); ++v) EXPECT_EQ(fine.vertices[v], box.vertices[v]);
-}
-
-TEST(Subdivided, StopsAtTheMostVertices) {
-  const TriangleMesh ball = make_sphere(0.1, 2);
-  for (const int most : {10, 200, 1000, 5000}) {
-    const TriangleMesh fine = subdivided(ball, 1e-4, most);
-    EXPECT_LE(fine.vertices.size(), std::max<std::size_t>(ball.vertices.size(), std::size_t(most)));
-    EXPECT_GT(4 * fine.vertices.size(), std::size_t(most)) << "but no sooner";
-    EXPECT_TRUE(is_closed(fine));
-  }
-  EXPECT_EQ(subdivided(ball, 1.0, 5000).triangles, ball.triangles) << "fine enough as it is";
-}
-
 TEST(SampleLevels, CoverTheSurfaceAtEverySpacing) {
   const TriangleMesh mesh = make_torus(0.1, 0.04, 60, 30);
   const std::vector<SampleLevel> levels = sample_levels(mesh, 60);
   ASSERT_GT(levels.size(), 3U);
   EXPECT_EQ(levels.front().spacing, 0.0);
   EXPECT_EQ(levels.front().vertex.size(), mesh.vertices.size());
-  const double whole = area(mesh);
+  const double whole = surface_area(mesh);
   for (std::size_t l = 0; l < levels.size(); ++l) {
     const SampleLevel& level = levels[l];
     EXPECT_NEAR(std::accumulate(level.area.begin(), level.area.end(), 0.0), whole, tolerance(1e-12) * whole) << l;
