@@ -63,7 +63,8 @@ struct DepthCamera : RecordingCamera {
 /// A camera without depth, of which only where the object is in its pictures counts.
 struct SilhouetteCamera : RecordingCamera {
   FramePattern masks;
-  double outline_std = 0.7;  ///< [pixels] standard deviation of the masks' outlines
+  double outline_std = 0.7;        ///< [pixels] standard deviation of the masks' outlines, each point by itself
+  double outline_error_std = 1.0;  ///< [pixels] of what all reach beyond the object together; 0: taken as exact
   bool operator==(const SilhouetteCamera&) const = default;
 };
 

@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t half_window = 4;      // edges of pixels on either side that tell a normal
 constexpr std::size_t shortest_curve = 12;  // edges of pixels
+constexpr double smallest_hole = 0.01;      // over the object's pixels
 
 /// The edge between a pixel of the object and its neighbour in one of four directions, which is none.
 struct PixelEdge {
@@ -55,6 +56,14 @@ class Tracer {
   Image<std::uint8_t> visited_;  // a bit for each direction
 };
 
+/// Pixels within a closed curve; negative where the object lies around it.
+double area_within(const std::vector<PixelEdge>& curve) {
+  // By columns: each edge at the right of the object counts the pixels to its left, each at the left takes them off.
+  double area = 0.0;
+  for (const PixelEdge& e : curve) area += step_u[e.direction] * (e.u + 0.5 * step_u[e.direction]);
+  return area;
+}
+
 Vector2 middle_of(const PixelEdge& e) { return {e.u + 0.5 * step_u[e.direction], e.v + 0.5 * step_v[e.direction]}; }
 
 }  // namespace
@@ -62,6 +71,7 @@ Vector2 middle_of(const PixelEdge& e) { return {e.u + 0.5 * step_u[e.direction],
 Outline outline_of(const Image<std::uint8_t>& mask, const PinholeCamera& camera) {
   Outline outline;
   Tracer tracer(mask);
+  const auto shown = std::ranges::count_if(mask.pixels, [](std::uint8_t value) { return value != 0; });
   const auto straightened = [&](const Vector2& seen) {
     const Vector3 ray = camera.ray(seen.x(), seen.y());
     return Vector2(camera.fx * ray.x() + camera.cx, camera.fy * ray.y() + camera.cy);
@@ -69,7 +79,7 @@ Outline outline_of(const Image<std::uint8_t>& mask, const PinholeCamera& camera)
   const auto add_curve = [&](const std::vector<PixelEdge>& curve) {
     const std::size_t n = curve.size();
     for (const PixelEdge& edge : curve) outline.is_cut = outline.is_cut || tracer.is_at_border(edge);
-    if (n < shortest_curve) return;
+    if (n < shortest_curve || (area_within(curve) < 0.0 && -area_within(curve) < smallest_hole * double(shown))) return;
     for (std::size_t i = 0; i < n; ++i) {
       bool is_at_border = false;
       for (std::size_t k = 0; k <= 2 * half_window; ++k)
@@ -90,13 +100,13 @@ Outline outline_of(const Image<std::uint8_t>& mask, const PinholeCamera& camera)
   return outline;
 }
 
-double outline_noise(const Capture& capture, const SilhouetteCamera& camera, int frame) {
-  if (!capture.scene.object.surface) throw std::invalid_argument("outline_noise: a capture without a scan");
+double pixel_size(const Capture& capture, const SilhouetteCamera& camera, int frame) {
+  if (!capture.scene.object.surface) throw std::invalid_argument("pixel_size: a capture without a scan");
   const Box box = bounding_box(*capture.scene.object.surface);
   const PinholeCamera lens = camera.at(frame);
   const double nearest = 0.5 * box.extent().maxCoeff();
   const double depth = std::max(lens.project(0.5 * (box.min + box.max)).z(), nearest);
-  return camera.outline_std * depth / std::sqrt(lens.fx * lens.fy);
+  return depth / std::sqrt(lens.fx * lens.fy);
 }
 
 }  // namespace pliant

@@ -17,11 +17,12 @@ struct Outline {
 
 /// @param mask    not zero where the pixel shows the object; pixels that touch by a corner belong together
 /// @param camera  of the mask's size
-/// Curves shorter than 12 pixels are specks and left out, and so are points within four pixels of the border.
+/// Curves shorter than 12 pixels are specks, holes of less than a hundredth of the object missing readings: both are
+/// left out, and so are points within four pixels of the border.
 Outline outline_of(const Image<std::uint8_t>& mask, const PinholeCamera& camera);
 
-/// Standard deviation of an outline's point [m], where the object is at rest before the camera as it stands in a frame.
+/// Size of a pixel [m] at the object, where that is at rest before the camera as it stands in a frame.
 /// Throws std::invalid_argument where the capture has no scan.
-double outline_noise(const Capture& capture, const SilhouetteCamera& camera, int frame);
+double pixel_size(const Capture& capture, const SilhouetteCamera& camera, int frame);
 
 }  // namespace pliant

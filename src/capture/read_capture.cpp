@@ -149,8 +149,10 @@ class Reader {
     SilhouetteCamera silhouette;
     read_camera(block, silhouette);
     silhouette.masks = required_pattern(block, "masks");
-    const NumberRule outline{0.05, 50.0, true, true, "pixels by which the masks' outlines err"};
+    const NumberRule outline{0.05, 50.0, true, true, "pixels by which points of the masks' outlines err"},
+        error{0.0, 20.0, true, true, "pixels by which masks reach beyond the object, or not as far"};
     silhouette.outline_std = read_number(block, "outline_std", outline, silhouette.outline_std);
+    silhouette.outline_error_std = read_number(block, "outline_error_std", error, silhouette.outline_error_std);
     return silhouette;
   }
 

@@ -316,7 +316,8 @@ void add_outlines(const Capture& capture, std::span<const ObservedFrame> frames,
   if (!capture.scene.object.surface) return;
   for (int c = 0; c < int(capture.silhouettes.size()); ++c) {
     OutlineSurvey& own = result.outlines.emplace_back();
-    own.noise = outline_noise(capture, capture.silhouettes[std::size_t(c)], 0);
+    const SilhouetteCamera& camera = capture.silhouettes[std::size_t(c)];
+    own.noise = camera.outline_std * pixel_size(capture, camera, 0);
     std::vector<std::pair<int, int>> counts;
     for (const ObservedFrame& frame : frames)
       for (const ObservedOutline& seen : frame.outlines) {

@@ -91,6 +91,8 @@ class Writer {
     out_ << "masks = " << toml_text(silhouette.masks.pattern) << "\n";
     if (silhouette.outline_std != SilhouetteCamera().outline_std)
       out_ << "outline_std = " << toml_text(silhouette.outline_std) << "   # pixels\n";
+    if (silhouette.outline_error_std != SilhouetteCamera().outline_error_std)
+      out_ << "outline_error_std = " << toml_text(silhouette.outline_error_std) << "   # pixels\n";
     out_ << "\n";
   }
 

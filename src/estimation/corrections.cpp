@@ -50,7 +50,8 @@ std::vector<Correction> possible_corrections(const ParameterSet& parameters, con
     if (!is_free(p)) continue;
     const std::string sensor = p.name.substr(p.name.find('@') + 1);
     if (p.role == Role::Sensor && p.is_scalar())
-      corrections.push_back({"the range of " + sensor, {p.name}});
+      corrections.push_back(
+          {(p.name.starts_with("outline_error") ? "the outlines of " : "the range of ") + sensor, {p.name}});
     else if (p.role == Role::Sensor && p.unit == "rad")  // a pose is a turn and a shift
       corrections.push_back({"the pose of " + sensor, {p.name, "sensor_shift@" + sensor}});
     else if (p.transform == Transform::Direction)

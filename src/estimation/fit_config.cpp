@@ -64,6 +64,7 @@ const std::set<std::string> parameter_names = {"youngs_modulus",
                                                "strength",
                                                "pull",
                                                "range_error",
+                                               "outline_error",
                                                "sensor_turn",
                                                "sensor_shift",
                                                "scan_correction",
@@ -378,7 +379,7 @@ std::string parameter_key_help() {
          "angular_velocity, plane, plane_2 .., friction, contact_stiffness, youngs_modulus@REGION, exponent_1 .. of "
          "Ogden's law, and for what "
          "sensors get wrong "
-         "range_error@SENSOR,\n"
+         "range_error@SENSOR, outline_error@SENSOR,\n"
          "sensor_turn@SENSOR, sensor_shift@SENSOR; [2] after a name means the second recording's) have three keys "
          "each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"

@@ -26,7 +26,8 @@ std::vector<GivenQuantity> given_quantities(const ParameterSet& parameters,
   for (const Parameter& p : parameters.parameters()) {
     if (p.estimated) continue;
     if (p.role == Role::Sensor && p.is_scalar())
-      given.push_back({p.name, "range of " + sensor_of(p.name), judgement.given_shift.value});
+      given.push_back({p.name, (p.name.starts_with("outline_error") ? "outlines of " : "range of ") + sensor_of(p.name),
+                       judgement.given_shift.value});
     else if (p.role == Role::Sensor)
       given.push_back({p.name, "pose of " + sensor_of(p.name),
                        p.unit == "rad" ? std::max(judgement.given_turn.value, 2.0 * error_of(p))

@@ -90,13 +90,13 @@ class MotionTrial::Comparison {
     bool is_matched;
     double value, stretch;  // [m]; value / stretch is the true distance
     Vector3 direction;      // d value = direction . d surface
-    Vector3 point, view;    // as the sensor states it
+    Vector3 point, view;    // as the sensor states it, and along which it errs
     double noise;           // [m]
     int sensor;
   };
   static std::vector<Distance> distances_of(const std::vector<SurfaceObservation>& seen,
                                             const std::vector<PointMatch>& matches);
-  static std::vector<Distance> distances_of(const OutlineObservation& seen, const std::vector<OutlineMatch>& matches);
+  std::vector<Distance> distances_of(const OutlineObservation& seen, const std::vector<OutlineMatch>& matches) const;
   /// @param share  what each counts
   /// @param J      their changes as the surface moves, one row each
   void add_distances(const std::vector<Distance>& distances, double share, MatrixX J, FrameFit& fit) const;
@@ -215,11 +215,15 @@ std::vector<MotionTrial::Comparison::Distance> MotionTrial::Comparison::distance
 }
 
 std::vector<MotionTrial::Comparison::Distance> MotionTrial::Comparison::distances_of(
-    const OutlineObservation& seen, const std::vector<OutlineMatch>& matches) {
+    const OutlineObservation& seen, const std::vector<OutlineMatch>& matches) const {
+  const RigidMotion& pose = seen.camera.camera_to_world;
+  const double error = is_corrected(seen.sensor) ? sensors_.corrections[std::size_t(seen.sensor)].error() : 0.0;
   std::vector<Distance> all;
-  for (const OutlineMatch& m : matches)
-    all.push_back({m.is_found, m.distance, 1.0, m.direction, seen.camera.camera_to_world(m.seen), Vector3::Zero(),
-                   seen.noise, seen.sensor});
+  for (const OutlineMatch& m : matches) {
+    const Vector3 outwards = pose.rotation * m.outwards;
+    all.push_back(
+        {m.is_found, m.distance, 1.0, m.direction, pose(m.seen) + error * outwards, outwards, seen.noise, seen.sensor});
+  }
   return all;
 }
 

@@ -19,11 +19,12 @@ namespace {
 constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: only ratios follow then
 constexpr double gravity_guess = 9.81, gravity_std = 10.0;  // [m/s^2]
 constexpr double up_std = 0.05;                             // [rad], of a direction that is given as up
-constexpr double contact_std = 1.2;       // of the logarithm of its stiffness: a board, a carpet, a furry skin
-constexpr double hardest_contact = 2.0;   // times that which is as good as rigid: beyond, motions are erratic
-constexpr double friction_std = 0.5;      // of its coefficient
-constexpr double least_wind = 1.0;        // [m/s], scale of one that is not known
-constexpr double range_error_std = 0.02;  // [m], of light that enters a translucent material
+constexpr double contact_std = 1.2;          // of the logarithm of its stiffness: a board, a carpet, a furry skin
+constexpr double hardest_contact = 2.0;      // times that which is as good as rigid: beyond, motions are erratic
+constexpr double friction_std = 0.5;         // of its coefficient
+constexpr double least_wind = 1.0;           // [m/s], scale of one that is not known
+constexpr double range_error_std = 0.02;     // [m], of light that enters a translucent material
+constexpr double most_outline_error = 20.0;  // [pixels]
 
 /// Whether forces are known, which fix the absolute scale of stiffness: a weight that is let go, or weights that hang
 /// while the object is seen.
@@ -148,7 +149,10 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   MotionCounts counts = load_counts(capture.scene);
   counts.moduli = controls, counts.pulls = pulls, counts.scan_corrections = shapes;
   blocks.motion = add_motion_blocks(layout, counts, modulus_names(capture, controls));
-  for (const std::string& sensor : sensor_names(capture)) blocks.sensors.push_back(add_sensor_blocks(layout, sensor));
+  for (const std::string& sensor : sensor_names(capture)) {
+    const bool is_silhouette = std::ranges::count(capture.silhouettes, sensor, &SilhouetteCamera::name) > 0;
+    blocks.sensors.push_back(add_sensor_blocks(layout, sensor, is_silhouette ? "outline_error" : "range_error"));
+  }
   const MotionBlocks& m = blocks.motion;
   if (law) blocks.law = LawLayout::of_motion(layout, m, *law);
   VectorX theta = VectorX::Zero(layout.size());
@@ -237,8 +241,14 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   for (std::size_t k = 0; k < blocks.sensors.size(); ++k) {
     const SensorBlocks& sensor = blocks.sensors[k];
     if (k < capture.depth.size())
-      p.push_back(
-          scalar(layout, sensor.range_error, Transform::Shift, -0.2, 0.2, 0.0, range_error_std / size, false, size));
+      p.push_back(scalar(layout, sensor.error, Transform::Shift, -0.2, 0.2, 0.0, range_error_std / size, false, size));
+    const int camera = int(k) - silhouette_sensor(capture, 0);
+    if (camera >= 0 && camera < int(capture.silhouettes.size())) {
+      const SilhouetteCamera& masks = capture.silhouettes[std::size_t(camera)];
+      const double pixel = pixel_size(capture, masks, capture.scene.timing.start_frame), std = masks.outline_error_std;
+      p.push_back(scalar(layout, sensor.error, Transform::Shift, -most_outline_error * pixel,
+                         most_outline_error * pixel, 0.0, (std > 0.0 ? std : 1.0) * pixel / size, std > 0.0, size));
+    }
     pose(sensor.turn, 1.0, stds[k].turn);
     pose(sensor.shift, size, stds[k].shift);
   }
@@ -271,8 +281,9 @@ TrackedPoints tracked_points(const Capture& capture) {
 
 OutlineObservation outline_observation(const Capture& capture, const ObservedOutline& seen, int frame) {
   const SilhouetteCamera& camera = capture.silhouettes[std::size_t(seen.camera)];
+  const double pixel = pixel_size(capture, camera, frame);
   OutlineObservation observed{
-      camera.at(frame), {}, outline_noise(capture, camera, frame), silhouette_sensor(capture, seen.camera)};
+      camera.at(frame), {}, camera.outline_std * pixel, pixel, silhouette_sensor(capture, seen.camera)};
   observed.camera.lens = {};
   for (std::size_t i = 0; i < seen.outline.points.size(); ++i)
     observed.points.push_back({seen.outline.points[i], seen.outline.normals[i]});

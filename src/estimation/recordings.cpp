@@ -193,10 +193,10 @@ ParameterSet joined(const std::vector<CaptureParameters>& recordings, const Join
   }
   for (std::size_t r = 0; r < recordings.size(); ++r)
     for (Parameter p : recordings[r].set.parameters()) {
-      if (r > 0 && is_of_object(p)) {  // what one recording tells is estimated
+      if (r > 0 && !joint.layout.contains(p.name + suffix(r))) {  // shared: what one recording tells is estimated
         const auto shared = std::ranges::find(list, joint.name_of(p.name, r), &Parameter::name);
         if (shared != list.end()) shared->estimated = shared->estimated || p.estimated;
-        continue;  // a density of its own follows from its capture's mass, and stays
+        continue;
       }
       p.name = joint.name_of(p.name, r);
       p.at = joint.layout.at(p.name);

@@ -70,6 +70,7 @@ Vector3 ray_of(const PinholeCamera& camera, const Vector2& pixel) {
 }  // namespace
 
 OutlineObservation corrected(OutlineObservation outline, const SensorCorrection& correction) {
+  for (OutlinePoint& point : outline.points) point.pixel -= correction.error() / outline.pixel * point.normal;
   RigidMotion& pose = outline.camera.camera_to_world;
   const Vector3 eye = pose.translation;
   pose.translation = correction.apply(eye, Vector3::Zero());
@@ -181,6 +182,8 @@ std::vector<OutlineMatch> OutlineConstraints::match(const OutlineObservation& se
       best.direction = -normal;
       best.vertices = edge.vertices, best.weights = {1.0 - s, s};
       best.seen = pose.rotation.transpose() * ((from_eye + s * along).dot(ray) * ray);
+      best.outwards =
+          best.seen.z() / seen.pixel * Vector3(point.normal.x() / camera.fx, point.normal.y() / camera.fy, 0.0);
     }
   }
   return matches;

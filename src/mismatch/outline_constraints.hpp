@@ -22,10 +22,11 @@ struct OutlineObservation {
   PinholeCamera camera;  ///< as it stood, with a lens that does not bend
   std::vector<OutlinePoint> points;
   double noise;    ///< standard deviation of a point across the outline, at the object [m], > 0
+  double pixel;    ///< size of one at the object [m], > 0
   int sensor = 0;  ///< whose correction applies
 };
 
-/// The same with its camera where a correction puts it. The range error has no part in that.
+/// The same with its camera where a correction puts it, and less the outline's error.
 OutlineObservation corrected(OutlineObservation outline, const SensorCorrection& correction);
 
 /// The place of the deformed surface's occluding contour that is nearest to a measured ray.
@@ -36,6 +37,7 @@ struct OutlineMatch {
   std::array<int, 2> vertices;    ///< ends of the contour's edge, of the surface that `OutlineConstraints` follows
   std::array<double, 2> weights;  ///< of both
   Vector3 seen;                   ///< the ray's place next to the contour, in the camera's axes [m]
+  Vector3 outwards;               ///< its change for a metre of the outline's error, in the camera's axes
 };
 
 /// Outlines against the occluding contour of the deformed surface: rays through the measured outline should graze it.

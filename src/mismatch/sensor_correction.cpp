@@ -19,48 +19,48 @@ Matrix3 right_jacobian(const Vector3& w) {
 }  // namespace
 
 SensorCorrection::SensorCorrection(const Vector3& centre, const Values& values)
-    : centre_(centre), turn_(values.segment<3>(1)), shift_(values.tail<3>()), range_error_(values[0]) {
+    : centre_(centre), turn_(values.segment<3>(1)), shift_(values.tail<3>()), error_(values[0]) {
   const double angle = turn_.norm();
   rotation_ = angle > 0.0 ? Eigen::AngleAxisd(angle, turn_ / angle).toRotationMatrix() : Matrix3(Matrix3::Identity());
 }
 
 Vector3 SensorCorrection::apply(const Vector3& point, const Vector3& view) const {
-  return centre_ + rotation_ * (point - range_error_ * view - centre_) + shift_;
+  return centre_ + rotation_ * (point - error_ * view - centre_) + shift_;
 }
 
 SensorCorrection::Jacobian SensorCorrection::jacobian(const Vector3& point, const Vector3& view) const {
   Jacobian J;
   J.col(0) = -rotation_ * view;
-  J.middleCols<3>(1) = -rotation_ * cross_matrix(point - range_error_ * view - centre_) * right_jacobian(turn_);
+  J.middleCols<3>(1) = -rotation_ * cross_matrix(point - error_ * view - centre_) * right_jacobian(turn_);
   J.rightCols<3>().setIdentity();
   return J;
 }
 
 MatrixX SensorBlocks::rows(const MatrixX& parameters) const {
   MatrixX own(SensorCorrection::size, parameters.cols());
-  own << parameters.row(range_error), parameters.middleRows<3>(turn), parameters.middleRows<3>(shift);
+  own << parameters.row(error), parameters.middleRows<3>(turn), parameters.middleRows<3>(shift);
   return own;
 }
 
 SensorCorrection::Values SensorBlocks::values(const VectorX& theta) const {
   SensorCorrection::Values values;
-  values << theta[range_error], theta.segment<3>(turn), theta.segment<3>(shift);
+  values << theta[error], theta.segment<3>(turn), theta.segment<3>(shift);
   return values;
 }
 
 void SensorBlocks::add(const SensorCorrection::Values& values, VectorX& theta) const {
-  theta[range_error] += values[0];
+  theta[error] += values[0];
   theta.segment<3>(turn) += values.segment<3>(1);
   theta.segment<3>(shift) += values.tail<3>();
 }
 
 SensorBlocks SensorBlocks::moved(const std::function<ParameterHandle(const ParameterHandle&)>& there) const {
-  return {there(range_error), there(turn), there(shift)};
+  return {there(error), there(turn), there(shift)};
 }
 
-SensorBlocks add_sensor_blocks(ParameterLayout& layout, const std::string& name) {
+SensorBlocks add_sensor_blocks(ParameterLayout& layout, const std::string& name, const std::string& error) {
   SensorBlocks blocks;
-  blocks.range_error = layout.add({"range_error@" + name, "m", 1, Role::Sensor});
+  blocks.error = layout.add({error + "@" + name, "m", 1, Role::Sensor});
   blocks.turn = layout.add({"sensor_turn@" + name, "rad", 3, Role::Sensor});
   blocks.shift = layout.add({"sensor_shift@" + name, "m", 3, Role::Sensor});
   return blocks;

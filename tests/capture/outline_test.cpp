@@ -74,6 +74,16 @@ TEST(OutlineOf, SpecksAndEmptyMasksHaveNone) {
   EXPECT_TRUE(outline_of(nothing, camera_of(nothing)).points.empty());
 }
 
+TEST(OutlineOf, PixelsWithoutAReadingWithinTheObjectAreNoHoles) {
+  const auto radius = [](int u, int v) { return (Vector2(u, v) - Vector2(40.0, 31.0)).norm(); };
+  const auto disc = drawn(80, 64, [&](int u, int v) { return radius(u, v) < 24.0; });
+  const auto torn = drawn(80, 64, [&](int u, int v) { return radius(u, v) < 24.0 && (u < 36 || u >= 42 || v != 30); });
+  const auto pierced = drawn(80, 64, [&](int u, int v) { return radius(u, v) < 24.0 && radius(u, v) > 4.0; });
+  const std::size_t whole = outline_of(disc, camera_of(disc)).points.size();
+  EXPECT_EQ(outline_of(torn, camera_of(torn)).points.size(), whole);
+  EXPECT_GT(outline_of(pierced, camera_of(pierced)).points.size(), whole + 20);
+}
+
 TEST(OutlineOf, ALensIsTakenOutOfThePoints) {
   const auto mask = drawn(80, 60, [](int u, int v) { return u > 10 && u < 70 && v > 10 && v < 50; });
   PinholeCamera camera = camera_of(mask);
@@ -107,7 +117,8 @@ struct Silhouettes : SmallCapture {
 
 TEST(Silhouettes, AreReadObservedAndSurveyed) {
   Silhouettes small;
-  small.edit("outline_std = 0.5", "outline_std = 0.5\ntime_offset = 0.01\npose_std = { turn = 0.02, shift = 0 }");
+  small.edit("outline_std = 0.5",
+             "outline_std = 0.5\noutline_error_std = 0.25\ntime_offset = 0.01\npose_std = { turn = 0.02, shift = 0 }");
   const Capture capture = small.read();
   ASSERT_EQ(capture.silhouettes.size(), 1u);
   EXPECT_TRUE(capture.depth.empty());
@@ -115,11 +126,12 @@ TEST(Silhouettes, AreReadObservedAndSurveyed) {
   EXPECT_EQ(camera.name, "front");
   EXPECT_EQ(camera.camera.fx, 80.0);
   EXPECT_EQ(camera.outline_std, 0.5);
+  EXPECT_EQ(camera.outline_error_std, 0.25);
   EXPECT_EQ(camera.time_offset, 0.01);
   EXPECT_EQ(camera.pose_std, (PoseStd{0.02, 0.0}));
   EXPECT_TRUE(has_time_offsets(capture));
   EXPECT_TRUE(has_silhouettes_alone(capture));
-  EXPECT_NEAR(outline_noise(capture, camera, 0), 0.5 * 1.0 / 80.0, tolerance(1e-12));  // a metre away
+  EXPECT_NEAR(pixel_size(capture, camera, 0), 1.0 / 80.0, tolerance(1e-12));  // a metre away
   const std::vector<ObservedFrame> frames = observe(capture);
   ASSERT_EQ(frames.size(), 4u);
   for (const ObservedFrame& frame : frames) {
@@ -141,6 +153,7 @@ TEST(Silhouettes, AreReadObservedAndSurveyed) {
 
 TEST(Silhouettes, ComeBackAsTheyWereWritten) {
   Silhouettes small;
+  small.edit("outline_std = 0.5", "outline_std = 0.4\noutline_error_std = 0.3");
   const Capture capture = small.read();
   write_capture(small.folder.path(), capture);
   EXPECT_EQ(read_capture(small.folder.path()).silhouettes, capture.silhouettes);

@@ -1,10 +1,13 @@
 // Several recordings in one objective, and sensors that need correction.
 #include "estimation/recordings.hpp"
 
+#include "estimation/alternative.hpp"
 #include "estimation/corrections.hpp"
+#include "estimation/given_quantities.hpp"
 #include "estimation/optimiser.hpp"
 #include "geometry/primitives.hpp"
 #include "support/derivatives.hpp"
+#include "support/dropped.hpp"
 #include "support/recordings.hpp"
 #include "support/sagging_bar.hpp"
 #include "support/tolerance.hpp"
@@ -51,7 +54,7 @@ struct TwoFlights {
       motions[r].mismatch.sensors = blocks.sensors;
       const std::string number = r > 0 ? "[2]" : "";
       list.push_back({"linear_velocity" + number, "m/s", Transform::Vector, blocks.motion.linear_velocity, 0.5});
-      list.push_back({"range_error@front" + number, "m", Transform::Shift, front.range_error, 0.1});
+      list.push_back({"range_error@front" + number, "m", Transform::Shift, front.error, 0.1});
       list.push_back({"sensor_turn@front" + number, "rad", Transform::Vector, front.turn});
       list.push_back({"sensor_shift@front" + number, "m", Transform::Vector, front.shift, 0.1});
     }
@@ -256,7 +259,7 @@ TEST_F(TwoCaptures, ShareTheMaterialAndHaveTheirOwnStartPlanesAndSensors) {
   EXPECT_EQ(second.motion.planes[0].whole(), joint.layout.at("plane[2]"));
   EXPECT_EQ(second.motion.planes[0].normal.first, second.motion.planes[0].point.first + 3);
   EXPECT_EQ(first.motion.planes[0].whole(), joint.layout.at("plane"));
-  EXPECT_EQ(second.sensors[0].range_error, joint.layout.at("range_error@clouds[2]"));
+  EXPECT_EQ(second.sensors[0].error, joint.layout.at("range_error@clouds[2]"));
   EXPECT_EQ(second.sensors[0].turn, joint.layout.at("sensor_turn@clouds[2]"));
   EXPECT_EQ(first.sensors[0].shift, joint.layout.at("sensor_shift@clouds"));
   EXPECT_EQ(joint.layout.size(), 2 * joint.own[0].size() - 5) << "the material's numbers are there once";
@@ -278,6 +281,16 @@ TEST_F(TwoCaptures, ShareADensityWhereItIsEstimatedOrTheUserNamesIt) {
     r.capture.scene.initial.release_of = Weight{0.02, Vector3(0.3, 0.0, 0.0)};
   }
   EXPECT_TRUE(is_shared()) << "it is estimated";
+}
+
+TEST(Recordings, GiveADensityEachThatMayErr) {
+  test::Dropped dropped;
+  dropped.frames = 3, dropped.cells = 4.0;
+  std::vector<std::string> notes;
+  const Recordings two({dropped.record(), dropped.record()}, test::six_cells(), notes);
+  ASSERT_NE(two.parameters().find("density[2]"), nullptr);
+  EXPECT_FALSE(two.parameters().find("density[2]")->estimated);
+  EXPECT_EQ(std::ranges::count(given_quantities(two.parameters()), cause_mass, &GivenQuantity::cause), 2);
 }
 
 TEST_F(TwoCaptures, ArePartsOfTheirVector) {

@@ -150,7 +150,7 @@ TEST(PlanesSeen, DerivativesMatchCentralDifferences) {
   std::vector<Parameter> list = {
       {"youngs_modulus", "Pa", Transform::Logarithm, layout.at("youngs_modulus"), 1.0, 1.0, 1e7, true},
       {"plane", "", Transform::PlanePosition, plane.whole(), 0.1},
-      {"range_error@front", "m", Transform::Shift, sensor.range_error, 0.1, -1.0, 1.0},
+      {"range_error@front", "m", Transform::Shift, sensor.error, 0.1, -1.0, 1.0},
       {"sensor_turn@front", "rad", Transform::Vector, sensor.turn},
       {"sensor_shift@front", "m", Transform::Vector, sensor.shift, 0.1}};
   for (Parameter& q : list) q.estimated = true;

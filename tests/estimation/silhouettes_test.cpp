@@ -39,6 +39,7 @@ TEST(Silhouettes, HaveTheGradientOfTheirCostByTangentsAndByTheAdjoint) {
   const ParameterSet& parameters = recordings.parameters();
   ASSERT_TRUE(parameters.find("sensor_turn@left")->estimated);
   ASSERT_EQ(parameters.find("range_error@left"), nullptr) << "a picture has no range";
+  ASSERT_TRUE(parameters.find("outline_error@left")->estimated);
   Objective objective = recordings.objective(grid, parameters, {0.1, [](const Recording&) { return 13; }});
   VectorX p = parameters.to_unconstrained(parameters.reference()), direction(p.size());
   for (Eigen::Index i = 0; i < p.size(); ++i)

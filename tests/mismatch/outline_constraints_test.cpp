@@ -13,6 +13,8 @@ namespace {
 
 using test::tolerance;
 
+constexpr double pixel = 2.5e-3;  // [m] of those at the object
+
 PinholeCamera camera_at(const Vector3& eye, const Vector3& target) {
   PinholeCamera camera;
   camera.width = 320, camera.height = 240;
@@ -31,7 +33,7 @@ OutlinePoint seen_point(const PinholeCamera& camera, const Vector3& point, const
 
 /// Rays that pass a ball around the origin by `away`, and its outline's normals.
 OutlineObservation around_ball(const PinholeCamera& camera, double radius, double away, int count) {
-  OutlineObservation seen{camera, {}, 1e-3};
+  OutlineObservation seen{camera, {}, 1e-3, pixel};
   const Vector3 eye = camera.camera_to_world.translation, axis = -eye.normalized(), u = axis.unitOrthogonal();
   const double angle = std::asin((radius + away) / eye.norm());
   for (int i = 0; i < count; ++i) {
@@ -60,6 +62,49 @@ TEST(OutlineConstraints, RaysPastABallHaveTheirDistanceToIt) {
   }
 }
 
+TEST(OutlineConstraints, MasksThatReachTooFarAreCorrectedByTheirError) {
+  const double radius = 0.1, error = 0.004;
+  const auto body = test::box_body({0.24, 0.24, 0.24}, 0.06);
+  const OutlineConstraints outlines(*body, make_sphere(radius, 5), 0.05, 0.02);
+  PinholeCamera camera = camera_at({0.0, 0.0, -0.8}, Vector3::Zero());
+  camera.fy = camera.fx;
+  OutlineObservation seen = around_ball(camera, radius, error, 100);
+  // What a pixel spans where the ray passes the ball.
+  seen.pixel = std::sqrt(0.8 * 0.8 - radius * radius) /
+               std::hypot(camera.fx, (seen.points[0].pixel - Vector2(camera.cx, camera.cy)).norm());
+  SensorCorrection::Values values = SensorCorrection::Values::Zero();
+  values << error, 0.02, -0.01, 0.03, 0.001, -0.002, 0.003;
+  const Points X = body->reference_positions();
+  const auto distances = [&](const SensorCorrection::Values& at) {
+    VectorX all(Eigen::Index(seen.points.size()));
+    const auto matches = outlines.match(corrected(seen, SensorCorrection(Vector3::Zero(), at)), X);
+    for (Eigen::Index i = 0; i < all.size(); ++i) all[i] = matches[std::size_t(i)].distance;
+    return all;
+  };
+  SensorCorrection::Values alone = SensorCorrection::Values::Zero();
+  EXPECT_NEAR(distances(alone).mean(), error, tolerance(1e-4));
+  alone[0] = error;
+  EXPECT_NEAR(distances(alone).mean(), 0.0, tolerance(1e-4));
+  // And its derivative, in the axes of a camera that is corrected too.
+  const SensorCorrection correction(Vector3::Zero(), values);
+  const auto matches = outlines.match(corrected(seen, correction), X);
+  const auto derivative = [&](const SensorCorrection::Values& direction) {
+    VectorX change(Eigen::Index(matches.size()));
+    for (Eigen::Index i = 0; i < change.size(); ++i) {
+      const OutlineMatch& m = matches[std::size_t(i)];
+      const Vector3 view = camera.camera_to_world.rotation * m.outwards;
+      const Vector3 stated = camera.camera_to_world(m.seen) + error * view;
+      change[i] = -m.direction.dot(correction.jacobian(stated, view) * direction);
+    }
+    return change;
+  };
+  for (int k = 0; k < SensorCorrection::size; ++k) {
+    const SensorCorrection::Values direction = SensorCorrection::Values::Unit(k);
+    const auto along = [&](double h) { return distances(values + h * direction); };
+    EXPECT_LT(test::best_relative_error(along, derivative(direction), 1e-3), tolerance(1e-5)) << k;
+  }
+}
+
 TEST(OutlineConstraints, ABallThatMovesAcrossTheViewMovesItsOutlineAlongTheNormal) {
   const double radius = 0.1;
   const auto body = test::box_body({0.24, 0.24, 0.24}, 0.06);
@@ -85,12 +130,12 @@ TEST(OutlineConstraints, ContoursBeforeTheObjectItselfAreNotItsOutline) {
   // From the side the hole is hidden behind the near part of the ring; from above it is seen through.
   const PinholeCamera side = camera_at({0.0, 0.05, -0.7}, Vector3::Zero()),
                       above = camera_at({0.0, 0.7, 0.0}, Vector3::Zero());
-  const OutlineObservation inside{side, {seen_point(side, {0.0, 0.0, 0.06}, {0.0, -1.0, 0.0})}, 1e-3};
+  const OutlineObservation inside{side, {seen_point(side, {0.0, 0.0, 0.06}, {0.0, -1.0, 0.0})}, 1e-3, pixel};
   EXPECT_FALSE(outlines.match(inside, body->reference_positions())[0].is_found);
-  const OutlineObservation through{above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, -1.0})}, 1e-3};
+  const OutlineObservation through{above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, -1.0})}, 1e-3, pixel};
   EXPECT_TRUE(outlines.match(through, body->reference_positions())[0].is_found);
   // The inner rim faces the hole: a normal that points into the ring is another contour's.
-  const OutlineObservation against{above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, 1.0})}, 1e-3};
+  const OutlineObservation against{above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, 1.0})}, 1e-3, pixel};
   EXPECT_FALSE(outlines.match(against, body->reference_positions())[0].is_found);
 }
 
@@ -105,7 +150,7 @@ TEST(OutlineConstraints, TangentMatchesCentralDifferencesAndAdjointTheTangent) {
   for (int v = 0; v < embedding.point_count(); ++v) bent.vertices[std::size_t(v)] = embedding.position(v, x);
   const std::vector<Vector3> normals = vertex_normals(bent);
   const PinholeCamera camera = camera_at({0.3, 0.6, -0.5}, {0.01, 0.02, 0.0});
-  OutlineObservation seen{camera, {}, 1e-3};
+  OutlineObservation seen{camera, {}, 1e-3, pixel};
   for (std::size_t v = 0; v < normals.size(); ++v) {
     const Vector3 view = (bent.vertices[v] - camera.camera_to_world.translation).normalized();
     if (std::abs(view.dot(normals[v])) < 0.1)

@@ -59,7 +59,7 @@ struct TwoSensors : ::testing::Test {
 
 TEST_F(TwoSensors, HaveBlocksOfTheirOwn) {
   EXPECT_EQ(layout.size(), 2 * SensorCorrection::size);
-  EXPECT_EQ(right.range_error, layout.at("range_error@right"));
+  EXPECT_EQ(right.error, layout.at("range_error@right"));
   EXPECT_EQ(right.turn, layout.at("sensor_turn@right"));
   EXPECT_EQ(right.shift, layout.at("sensor_shift@right"));
   for (const ParameterHandle& block : left.all()) EXPECT_EQ(layout.block_of(block).role, Role::Sensor);
