@@ -73,7 +73,7 @@ TEST(Import, HasItsFormatsInThePageInTheOrderInWhichTheyAreTried) {
     EXPECT_NE(in_help, std::string::npos) << name;
     at = page.find("\n| `", at + 1);
   }
-  EXPECT_EQ(count, 12);
+  EXPECT_EQ(count, 13);
 }
 
 }  // namespace
