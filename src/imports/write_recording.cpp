@@ -155,7 +155,9 @@ void note_small_masks(const std::vector<int>& sizes, std::vector<std::string>& n
   const auto is_small = [usual = median(sizes)](int size) { return size < small_mask * usual; };
   if (const auto first = std::ranges::find_if(sizes, is_small); first != sizes.end())
     notes.push_back(
-        written("%d masks have less than a quarter of the usual pixels, the first that of frame %d: look at %s",
+        written("%d masks have less than a quarter of the usual pixels, the first that of frame %d: look at %s; an "
+                "object that stays "
+                "where it is needs a --background without it",
                 int(std::ranges::count_if(sizes, is_small)), int(first - sizes.begin()), overview_name));
 }
 

@@ -69,7 +69,7 @@ void expect_truth(const Capture& capture, const std::function<Image<std::uint8_t
 class Video : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg";
+    if (!has_ffmpeg()) GTEST_SKIP() << "ffmpeg is not installed: no video is made";
   }
   const TemporaryFolder folder_;
 };
@@ -201,6 +201,18 @@ TEST_F(Video, RefusesWhatIsNoneAndObjectsThatAreNotTold) {
   const std::string complaint = complaint_of([&] { (void)write_recording(folder_ / "out", recording, {}); });
   EXPECT_THAT(complaint, HasSubstr("image 12: only"));
   EXPECT_THAT(complaint, HasSubstr("--last"));
+}
+
+TEST(VideoWithoutFfmpeg, NamesThePackage) {
+  const TemporaryFolder folder;
+  folder.write("film.mp4", "whatever it holds");
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", folder.path().c_str(), 1);
+  const std::string complaint =
+      complaint_of([&] { (void)import_format("", folder / "film.mp4").read(folder / "film.mp4", with_view(60.0)); });
+  ::setenv("PATH", path.c_str(), 1);
+  EXPECT_THAT(complaint, HasSubstr("install the package ffmpeg"));
+  EXPECT_THAT(complaint, HasSubstr("film.mp4"));
 }
 
 }  // namespace pliant::video_test
