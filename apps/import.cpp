@@ -16,11 +16,11 @@ namespace pliant::apps {
 namespace {
 
 struct Arguments {
-  std::string source, out, from, surface, camera;
+  std::string source, out, from, surface, camera, background;
   std::vector<std::string> topics;
   std::vector<double> up, contact;
-  double mass = 0.0, density = 0.0, rate = 0.0, depth_scale = 0.0, length = 0.0, area = 0.0, ball = 0.0, punch = 0.0,
-         force_std = 0.0;
+  double mass = 0.0, density = 0.0, rate = 0.0, depth_scale = 0.0, fx = 0.0, fov = 0.0, threshold = 0.0, length = 0.0,
+         area = 0.0, ball = 0.0, punch = 0.0, force_std = 0.0;
   int first = 0, last = -1, every = 1;
   bool compression = false;
 };
@@ -58,7 +58,15 @@ ImportOptions options_of(const Arguments& arguments) {
   options.depth_scale = given(arguments.depth_scale), options.frame_rate = given(arguments.rate);
   if (!arguments.camera.empty()) options.camera = arguments.camera;
   options.topics = arguments.topics;
+  options.fx = given(arguments.fx), options.field_of_view_deg = given(arguments.fov);
+  options.background = arguments.background, options.threshold = given(arguments.threshold);
   return options;
+}
+
+std::string lens_text(const RecordingCamera& camera) {
+  const PinholeCamera& lens = camera.camera;
+  return formatted("\"%s\", %d x %d pixels, fx %.2f, fy %.2f, cx %.2f, cy %.2f", camera.name.c_str(), lens.width,
+                   lens.height, lens.fx, lens.fy, lens.cx, lens.cy);
 }
 
 void describe(const Capture& capture) {
@@ -68,13 +76,15 @@ void describe(const Capture& capture) {
                       (capture.scene.timing.frame_rate > 0.0 ? formatted(", %.4g Hz", capture.scene.timing.frame_rate)
                                                              : std::string(", each at its own time")));
   for (const DepthCamera& camera : capture.depth) {
-    const PinholeCamera& lens = camera.camera;
-    say("camera",
-        formatted("\"%s\", %d x %d pixels, fx %.2f, fy %.2f, cx %.2f, cy %.2f, %g units a metre", camera.name.c_str(),
-                  lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy, camera.depth_scale));
-    if (lens.lens.bends()) say("", formatted("a lens that bends: %zu coefficients", lens.lens.coefficients().size()));
+    const LensDistortion& lens = camera.camera.lens;
+    say("camera", lens_text(camera) + formatted(", %g units a metre", camera.depth_scale));
+    if (lens.bends()) say("", formatted("a lens that bends: %zu coefficients", lens.coefficients().size()));
     if (!camera.moved.empty()) say("", "it moves: a pose for each image");
     if (camera.time_offset != 0.0) say("", formatted("its images are %.2f ms late", 1e3 * camera.time_offset));
+  }
+  for (const SilhouetteCamera& camera : capture.silhouettes) {
+    say("camera", lens_text(camera) + ", masks");
+    say("masks", "their outlines over pictures of the video: masks_overview.png");
   }
   for (const Indentation& test : capture.indentations) say("indentation", test.curve.filename().string());
   for (const MaterialCurve& test : capture.material_curves) say("curve", test.curve.filename().string());
@@ -88,6 +98,7 @@ void run(const Arguments& arguments) {
   ImportedRecording recording = format.read(arguments.source, options);
   if (options.frame_rate) {
     for (DepthStream& stream : recording.depth) stream.times.clear(), stream.frame_rate = *options.frame_rate;
+    if (recording.masks) recording.masks->times.clear(), recording.masks->frame_rate = *options.frame_rate;
     if (recording.markers) recording.markers->frame_rate = options.frame_rate;
   }
   std::cout << recording.name << '\n';
@@ -110,6 +121,7 @@ std::string footer() {
          "  pliant import fall.bag --surface bear.ply --mass 0.256 --up 0,-1,0 --out recordings/bear\n"
          "  pliant import frames --from images --camera camera.json --depth-scale 1000 --rate 30 --out "
          "recordings/bear\n"
+         "  pliant import drop.mp4 --fov 62 --surface toy.ply --mass 0.08 --up 0,-1,0 --out recordings/toy\n"
          "  pliant import pull.csv --length 0.05 --area 4e-4 --out recordings/pull\n"
          "What each format holds, and what has to be said by hand: docs/imports.md.";
 }
@@ -135,6 +147,20 @@ void add_import(CommandLine& line, int& exit_code) {
       .positive()
       .type_name("UNITS");
   command.option("--camera", arguments->camera, "JSON file of the camera's intrinsics").type_name("FILE");
+  command.option("--fx", arguments->fx, "focal length of a video's camera [pixels]").positive().type_name("PIXELS");
+  command.option("--fov", arguments->fov, "its horizontal field of view, in the place of --fx [degrees]")
+      .range(1.0, 175.0)
+      .type_name("DEGREES");
+  command
+      .option(
+          "--background", arguments->background,
+          "of a video: plain, still, or a picture of the scene without the object (default: plain where the border is)")
+      .type_name("WHAT");
+  command
+      .option("--threshold", arguments->threshold,
+              "difference in colour from the background that is the object (default: found) [of 255 levels]")
+      .range(1.0, 254.0)
+      .type_name("LEVELS");
   command.option("--topic", arguments->topics, "depth images of a bag by their topic; once for each sensor")
       .one_value_a_use()
       .type_name("TOPIC");

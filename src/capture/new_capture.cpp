@@ -68,8 +68,7 @@ void take_camera(Draft& draft) {
   camera.name = "camera";
   camera.camera.width = files.header.width, camera.camera.height = files.header.height;
   std::optional<double> fx = facts.fx;
-  if (!fx && facts.field_of_view_deg)
-    fx = 0.5 * files.header.width / std::tan(*facts.field_of_view_deg * std::numbers::pi / 360.0);
+  if (!fx && facts.field_of_view_deg) fx = focal_length(*facts.field_of_view_deg, files.header.width);
   camera.camera.fx = draft.ask(fx, "--fx PIXELS (or --fov DEGREES)", "the camera's focal length in pixels", 1.0);
   camera.camera.fy = facts.fy.value_or(camera.camera.fx);
   camera.camera.cx = facts.cx.value_or(0.5 * (files.header.width - 1));
@@ -159,6 +158,10 @@ void take_surface(Draft& draft) {
 }
 
 }  // namespace
+
+double focal_length(double field_of_view_deg, int width) {
+  return 0.5 * width / std::tan(field_of_view_deg * std::numbers::pi / 360.0);
+}
 
 NewCapture new_capture(const fs::path& folder, const FolderSurvey& survey, const NewCaptureFacts& facts) {
   Draft draft{folder, survey, facts};

@@ -38,6 +38,9 @@ struct NewCapture {
   std::vector<std::string> seen;  ///< plain sentences: what was found, and what was assumed of it
 };
 
+/// Focal length [pixels] of a pinhole whose horizontal field of view is above 0 and below 180 degrees.
+double focal_length(double field_of_view_deg, int width);
+
 /// The floor is looked for in the first depth image: the largest plane that faces up. It becomes the plane y = 0 of the
 /// world, a guess to be estimated; without one the camera stands level at the world's origin. A surface stands where it
 /// does in the folder's frame, and its pose is said to be unknown where depth images are what shows the object.

@@ -15,6 +15,7 @@ const std::vector<ImportFormat>& import_formats() {
       {"r3d", "Record3D on iPhone and iPad", is_record3d, read_record3d},
       {"stray", "Stray Scanner on iPhone and iPad", is_stray_scanner, read_stray_scanner},
       {"mkv", "Azure Kinect and Orbbec, by the program ffmpeg", is_matroska, read_matroska},
+      {"video", "plain videos of an object before a background, by the program ffmpeg", is_video, read_video},
       {"weiss", "SparseSurfaceConstraints: config.json and cam0/depth0.png", is_weiss_folder, read_weiss_folder},
       {"c3d", "markers of motion capture, C3D", is_c3d, read_c3d_markers},
       {"markers", "markers as CSV: frame,id,x,y,z, or columns NAME_x, NAME_y, NAME_z", is_marker_csv, read_marker_csv},

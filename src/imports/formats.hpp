@@ -48,6 +48,8 @@ bool is_machine_csv(const std::filesystem::path& source);
 ImportedRecording read_machine_csv(const std::filesystem::path& source, const ImportOptions& options);
 bool is_matroska(const std::filesystem::path& source);
 ImportedRecording read_matroska(const std::filesystem::path& source, const ImportOptions& options);
+bool is_video(const std::filesystem::path& source);
+ImportedRecording read_video(const std::filesystem::path& source, const ImportOptions& options);
 bool is_weiss_folder(const std::filesystem::path& source);
 ImportedRecording read_weiss_folder(const std::filesystem::path& source, const ImportOptions& options);
 /// @}

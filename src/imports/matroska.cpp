@@ -11,6 +11,7 @@
 
 #include "base/files.hpp"
 #include "imports/camera_json.hpp"
+#include "imports/ffmpeg.hpp"
 #include "imports/formats.hpp"
 #include "imports/image_sequence.hpp"
 
@@ -24,53 +25,17 @@ using MkvJson = nlohmann::json;
 
 constexpr double kinect_scale = 1000.0;
 
-std::string shell_word(const std::string& text) {
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return word + "'";
-}
-
-using MkvPipe = std::unique_ptr<FILE, int (*)(FILE*)>;
-
-MkvPipe open_pipe(const std::string& command) {
-  MkvPipe pipe(::popen(command.c_str(), "r"), ::pclose);
-  if (!pipe) throw std::runtime_error("no process can be started");
-  return pipe;
-}
-
-std::string output_of(const std::string& command) {
-  const MkvPipe pipe = open_pipe(command);
-  std::string text;
-  char buffer[4096];
-  for (std::size_t n = 0; (n = std::fread(buffer, 1, sizeof buffer, pipe.get())) > 0;) text.append(buffer, n);
-  return text;
-}
-
-// ffmpeg keeps to the right end of its arguments: a name that begins with a dash is a file all the same.
-std::string mkv_argument(const fs::path& file) { return shell_word(fs::absolute(file).string()); }
-
-void require_ffmpeg(const fs::path& file) {
-  if (output_of("command -v ffmpeg && command -v ffprobe").empty())
-    refuse(file, "the programs ffmpeg and ffprobe are not installed", "both, to take a .mkv apart",
-           "install ffmpeg, or export the depth images as 16-bit PNG and import them with --from images");
-}
-
-MkvJson probed(const fs::path& file) {
-  const std::string text =
-      output_of("ffprobe -v quiet -print_format json -show_streams " + mkv_argument(file) + " 2>/dev/null </dev/null");
-  const MkvJson json = MkvJson::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.contains("streams") || !json["streams"].is_array() || json["streams"].empty())
+MkvJson mkv_streams(const fs::path& file) {
+  const MkvJson json = probed(file, "-show_streams");
+  if (json.is_null())
     refuse(file, "ffprobe finds no track in it", "a Matroska recording", "the file may be cut short; copy it again");
   return json["streams"];
 }
 
-std::string mkv_text(const MkvJson& json, const char* key) {
-  const auto it = json.find(key);
-  return it != json.end() && it->is_string() ? it->get<std::string>() : "";
-}
+bool is_grey_16(const MkvJson& stream) { return text_at(stream, "pix_fmt").starts_with("gray16"); }
 
-std::string mkv_tag(const MkvJson& stream, const char* key) {
-  return stream.contains("tags") ? mkv_text(stream["tags"], key) : "";
+bool is_called_depth(const MkvJson& stream) {
+  return tag_of(stream, "title") == "DEPTH" || tag_of(stream, "title") == "depth";
 }
 
 // The track with 16-bit grey pictures that is called depth, or the first of such.
@@ -78,12 +43,11 @@ const MkvJson& depth_track(const MkvJson& streams, const fs::path& file) {
   const MkvJson* found = nullptr;
   std::string colourised;
   for (const MkvJson& stream : streams) {
-    if (mkv_text(stream, "codec_type") != "video") continue;
-    const bool is_called_depth = mkv_tag(stream, "title") == "DEPTH" || mkv_tag(stream, "title") == "depth";
-    if (mkv_text(stream, "pix_fmt").starts_with("gray16")) {
-      if (!found || is_called_depth) found = &stream;
-    } else if (is_called_depth) {
-      colourised = mkv_text(stream, "pix_fmt");
+    if (text_at(stream, "codec_type") != "video") continue;
+    if (is_grey_16(stream)) {
+      if (!found || is_called_depth(stream)) found = &stream;
+    } else if (is_called_depth(stream)) {
+      colourised = text_at(stream, "pix_fmt");
     }
   }
   if (!found && !colourised.empty()) refuse_colourised(file, "pixel format " + colourised);
@@ -111,7 +75,7 @@ PinholeCamera kinect_camera(const std::string& text, int width, int height, cons
   if (json.is_discarded()) fail("an attachment that is no JSON");
   const MkvJson cameras = json.value("/CalibrationInformation/Cameras"_json_pointer, MkvJson::array());
   for (const MkvJson& camera : cameras) {
-    if (mkv_text(camera, "Purpose") != "CALIBRATION_CameraPurposeDepth") continue;
+    if (text_at(camera, "Purpose") != "CALIBRATION_CameraPurposeDepth") continue;
     const MkvJson p = camera.value("/Intrinsics/ModelParameters"_json_pointer, MkvJson::array());
     if (p.size() < 14 || !std::ranges::all_of(p, [](const MkvJson& v) { return v.is_number(); }))
       fail("a calibration with " + std::to_string(p.size()) + " parameters");
@@ -136,13 +100,13 @@ PinholeCamera kinect_camera(const std::string& text, int width, int height, cons
 std::string calibration_of(const MkvJson& streams, const fs::path& file) {
   int index = 0;
   for (const MkvJson& stream : streams) {
-    if (mkv_text(stream, "codec_type") != "attachment") continue;
-    if (mkv_tag(stream, "filename").ends_with(".json")) {
+    if (text_at(stream, "codec_type") != "attachment") continue;
+    if (tag_of(stream, "filename").ends_with(".json")) {
       std::string folder = (fs::temp_directory_path() / "pliant.XXXXXX").string();
       if (!::mkdtemp(folder.data())) refuse(folder, "a temporary folder that cannot be made", "a place to write to");
       const fs::path out = fs::path(folder) / "calibration.json";
       (void)output_of("ffmpeg -y -v quiet -dump_attachment:t:" + std::to_string(index) + " " +
-                      shell_word(out.string()) + " -i " + mkv_argument(file) + " 2>/dev/null </dev/null");
+                      shell_word(out.string()) + " -i " + ffmpeg_argument(file) + " 2>/dev/null </dev/null");
       const std::string text = is_file(out) ? read_file(out) : std::string();
       remove_file(out);
       std::error_code ignored;
@@ -157,7 +121,7 @@ std::string calibration_of(const MkvJson& streams, const fs::path& file) {
 std::vector<double> packet_times(const fs::path& file, int track) {
   const std::string text =
       output_of("ffprobe -v quiet -select_streams " + std::to_string(track) +
-                " -show_entries packet=pts_time -of csv=p=0 " + mkv_argument(file) + " 2>/dev/null </dev/null");
+                " -show_entries packet=pts_time -of csv=p=0 " + ffmpeg_argument(file) + " 2>/dev/null </dev/null");
   std::vector<double> times;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
@@ -174,7 +138,7 @@ std::vector<double> packet_times(const fs::path& file, int track) {
 class MkvFrames {
  public:
   MkvFrames(const fs::path& file, int track, int width, int height) : file_(file), width_(width), height_(height) {
-    command_ = "ffmpeg -v quiet -i " + mkv_argument(file) + " -map 0:" + std::to_string(track) +
+    command_ = "ffmpeg -v quiet -i " + ffmpeg_argument(file) + " -map 0:" + std::to_string(track) +
                " -fps_mode passthrough -f rawvideo -pix_fmt gray16le - 2>/dev/null </dev/null";
   }
   Image<std::uint16_t> read(int i) {
@@ -193,17 +157,24 @@ class MkvFrames {
   int width_, height_;
   std::string command_;
   std::mutex mutex_;
-  MkvPipe pipe_{nullptr, ::pclose};
+  ProgramPipe pipe_{nullptr, ::pclose};
   int next_ = 0;
 };
 
 }  // namespace
 
-bool is_matroska(const fs::path& source) { return source.extension() == ".mkv"; }
+bool is_matroska(const fs::path& source) {
+  if (ending_of(source) != ".mkv") return false;
+  if (!has_ffmpeg()) return true;
+  const MkvJson json = probed(source, "-show_streams");
+  return json.is_null() || std::ranges::any_of(json["streams"], [](const MkvJson& stream) {
+           return is_grey_16(stream) || is_called_depth(stream);
+         });
+}
 
 ImportedRecording read_matroska(const fs::path& source, const ImportOptions& options) {
-  require_ffmpeg(source);
-  const MkvJson streams = probed(source);
+  require_ffmpeg(source, ", or export the depth images as 16-bit PNG and import them with --from images");
+  const MkvJson streams = mkv_streams(source);
   const MkvJson& track = depth_track(streams, source);
   const int width = track.value("width", 0), height = track.value("height", 0), index = track.value("index", 0);
   if (width < 1 || height < 1) refuse(source, "a depth track without a size", "pictures");

@@ -22,17 +22,28 @@ namespace pliant {
 /// Raw units per metre of images that are made of depths in metres: steps of 0.2 mm, up to 13.1 m.
 inline constexpr double units_of_metres = 5000.0;
 
-/// What one depth sensor recorded.
-struct DepthStream {
+/// What one camera recorded, whatever its pixels hold.
+struct ImageStream {
   std::string name = "camera";  ///< of the sensor and of the folder of its images: letters, digits, _ and -
   PinholeCamera camera;         ///< its pose is that of all images where `poses` is empty
-  double depth_scale = 0.0;     ///< raw units per metre
   int image_count = 0;
   std::vector<double> times;       ///< [s] of each image, from any origin; empty: nobody knows them
   double frame_rate = 0.0;         ///< [Hz] where there are no times; 0: nobody knows it
   std::vector<RigidMotion> poses;  ///< camera to world at each image; empty: the camera stands
+};
+
+/// What one depth sensor recorded.
+struct DepthStream : ImageStream {
+  double depth_scale = 0.0;  ///< raw units per metre
   /// Image `i` in raw units, of the camera's size; 0 means no reading. Throws InputError where it cannot be read.
   std::function<Image<std::uint16_t>(int i)> read;
+};
+
+/// What a camera without depth recorded, with where the object is in its pictures.
+struct MaskStream : ImageStream {
+  /// Not zero where picture `i` shows the object. Throws InputError where it cannot be read, or the object not be told.
+  std::function<Image<std::uint8_t>(int i)> read;
+  std::function<Image<Rgb>(int i)> picture;  ///< for people; as many as there are masks
 };
 
 /// What a testing machine measured, in the order of time: extensions with forces, strains with stresses, or both pairs.
@@ -46,6 +57,7 @@ struct MachineTest {
 struct ImportedRecording {
   std::string name;                        ///< of the file or the folder
   std::vector<DepthStream> depth;          ///< the first gives the times of the frames
+  std::optional<MaskStream> masks;         ///< alone
   std::optional<C3dTrajectories> markers;  ///< labels are the ids
   std::optional<MachineTest> test;
   std::optional<Vector3> gravity;  ///< [m/s^2] where the recording tells it, in the poses' world
@@ -58,6 +70,14 @@ struct ImportOptions {
   std::optional<double> frame_rate;             ///< [Hz]; wins over times of files
   std::optional<std::filesystem::path> camera;  ///< a JSON file of the intrinsics
   std::vector<std::string> topics;              ///< of a bag: which depth images; empty: those that there are
+
+  /// @name Of a video
+  /// @{
+  std::optional<double> fx;                 ///< [pixels], in the place of a file of the intrinsics
+  std::optional<double> field_of_view_deg;  ///< horizontal [degrees], in the place of `fx`
+  std::string background;                   ///< "plain", "still" or a file; empty: what the pictures look like
+  std::optional<double> threshold;          ///< [levels of 255] by which the object differs from it; nothing: found
+  /// @}
 };
 
 /// 16-bit raw units of depths [m]: `units_of_metres` a metre; 0 where there is no depth, or one that does not fit.

@@ -8,10 +8,12 @@
 #include <numbers>
 
 #include "base/files.hpp"
+#include "base/median.hpp"
 #include "capture/camera_poses.hpp"
 #include "capture/curves.hpp"
 #include "capture/markers.hpp"
 #include "geometry/mesh_io.hpp"
+#include "imports/mask_overview.hpp"
 
 namespace pliant {
 
@@ -25,6 +27,11 @@ constexpr double still_turn = 0.2;         // [degrees]
 constexpr double exact_clock = 1e-4;       // [s] offsets below are none
 constexpr int curve_points = 100;          // of a curve of a testing machine
 constexpr double usual_force_std = 0.01;   // of the greatest force
+constexpr double small_mask = 0.25;        // of the usual pixels
+constexpr std::size_t shown_masks = 12;    // in the overview
+constexpr int shown_columns = 4;
+constexpr int shown_width = 480;  // [pixels]
+constexpr const char* overview_name = "masks_overview.png";
 
 std::string written(const char* format, auto... values) {
   char text[256];
@@ -39,8 +46,10 @@ struct Frames {
   double rate = 0.0;          // [Hz] of even frames; 0: times say all
 };
 
-Frames chosen_frames(const DepthStream& stream, const CaptureFacts& facts, const std::string& name,
+Frames chosen_frames(const ImageStream& stream, const CaptureFacts& facts, const std::string& name,
                      std::vector<std::string>& notes) {
+  if (stream.times.empty() && !(stream.frame_rate > 0.0))
+    refuse(name, "images without times", "times, or a frame rate", "give --rate, frames a second");
   const int last = facts.last.value_or(stream.image_count - 1);
   if (facts.first < 0 || facts.every < 1 || last >= stream.image_count || facts.first > last)
     refuse(name, "images " + std::to_string(facts.first) + " to " + std::to_string(last) + " are asked for",
@@ -68,7 +77,7 @@ Frames chosen_frames(const DepthStream& stream, const CaptureFacts& facts, const
 }
 
 // Images of another sensor for the same frames: the nearest in time, and how much later they are.
-std::vector<int> matched_images(const DepthStream& stream, const DepthStream& first, const Frames& frames,
+std::vector<int> matched_images(const ImageStream& stream, const ImageStream& first, const Frames& frames,
                                 const std::string& name, double& offset, std::vector<std::string>& notes) {
   offset = 0.0;
   if (stream.times.empty() || first.times.empty()) {
@@ -119,59 +128,120 @@ std::string folder_name(std::string name) {
   return name.empty() ? "camera" : name;
 }
 
+std::string image_name(const fs::path& folder, std::size_t frame) {
+  return (folder / written("%06zu.png", frame)).string();
+}
+
+template <class Pixel>
+void require_size(const fs::path& folder, const ImageStream& stream, int i, const Image<Pixel>& image) {
+  if (image.width != stream.camera.width || image.height != stream.camera.height)
+    refuse(folder, written("image %d has %d x %d pixels", i, image.width, image.height),
+           written("%d x %d, the camera's size", stream.camera.width, stream.camera.height));
+}
+
 void write_images(const fs::path& folder, const DepthStream& stream, const std::vector<int>& images,
                   const std::function<void()>& written_one) {
   make_folder(folder);
   for (std::size_t k = 0; k < images.size(); ++k) {
     const Image<std::uint16_t> image = stream.read(images[k]);
-    if (image.width != stream.camera.width || image.height != stream.camera.height)
-      refuse(folder, written("image %d has %d x %d pixels", images[k], image.width, image.height),
-             written("%d x %d, the camera's size", stream.camera.width, stream.camera.height));
-    write_png(folder / written("%06zu.png", k), image);
+    require_size(folder, stream, images[k], image);
+    write_png(image_name(folder, k), image);
     written_one();
   }
+}
+
+// Masks that show much less of the object than usual, where it may have been lost.
+void note_small_masks(const std::vector<int>& sizes, std::vector<std::string>& notes) {
+  const auto is_small = [usual = median(sizes)](int size) { return size < small_mask * usual; };
+  if (const auto first = std::ranges::find_if(sizes, is_small); first != sizes.end())
+    notes.push_back(
+        written("%d masks have less than a quarter of the usual pixels, the first that of frame %d: look at %s; an "
+                "object that stays "
+                "where it is needs a --background without it",
+                int(std::ranges::count_if(sizes, is_small)), int(first - sizes.begin()), overview_name));
+}
+
+void write_masks(const fs::path& out, const std::string& name, const MaskStream& stream, const std::vector<int>& images,
+                 std::vector<std::string>& notes, const std::function<void()>& written_one) {
+  make_folder(out / name);
+  std::vector<Image<Rgb>> shown;
+  std::vector<int> sizes;
+  for (std::size_t k = 0; k < images.size(); ++k) {
+    const Image<std::uint8_t> mask = stream.read(images[k]);
+    require_size(out / name, stream, images[k], mask);
+    write_png(image_name(out / name, k), mask);
+    sizes.push_back(int(std::ranges::count_if(mask.pixels, [](std::uint8_t m) { return m != 0; })));
+    const std::size_t wanted = std::min<std::size_t>(shown_masks, images.size());
+    if (k == shown.size() * (images.size() - 1) / std::max<std::size_t>(1, wanted - 1))
+      shown.push_back(outlined(stream.picture(images[k]), mask, shown_width));
+    written_one();
+  }
+  write_png(out / overview_name, side_by_side(shown, shown_columns));
+  note_small_masks(sizes, notes);
+}
+
+// What the images of all sensors have in common with a capture's cameras.
+void fill_camera(const fs::path& out, const ImageStream& stream, const std::vector<int>& images,
+                 RecordingCamera& camera) {
+  camera.name = folder_name(stream.name);
+  camera.camera = stream.camera;
+  if (stream.poses.empty()) return;
+  camera.camera.camera_to_world = stream.poses[std::size_t(images.front())];
+  if (stands(stream.poses, images)) return;
+  for (const int image : images) camera.moved.push_back(stream.poses[std::size_t(image)]);
+  camera.poses = out / camera.name / "poses.csv";
+  make_folder(out / camera.name);
+  write_camera_poses(*camera.poses, camera.moved);
+}
+
+Frames take_frames(const ImageStream& first, const ImportedRecording& recording, const CaptureFacts& facts,
+                   ImportedCapture& result) {
+  Frames frames = chosen_frames(first, facts, recording.name, result.notes);
+  result.capture.scene.timing.times = frames.times;
+  result.capture.scene.timing.frame_rate = frames.rate;
+  return frames;
 }
 
 void write_depth(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
                  ImportedCapture& result, const std::function<void(int, int)>& progress) {
   const DepthStream& first = recording.depth.front();
-  if (first.times.empty() && !(first.frame_rate > 0.0))
-    refuse(recording.name, "images without times", "times, or a frame rate", "give --rate, frames a second");
-  const Frames frames = chosen_frames(first, facts, recording.name, result.notes);
-  Capture& capture = result.capture;
-  capture.scene.timing.times = frames.times;
-  capture.scene.timing.frame_rate = frames.rate;
+  const Frames frames = take_frames(first, recording, facts, result);
   const int total = int(frames.images.size() * recording.depth.size());
   int done = 0;
   for (const DepthStream& stream : recording.depth) {
     DepthCamera camera;
-    camera.name = folder_name(stream.name);
-    camera.camera = stream.camera;
-    camera.depth_scale = stream.depth_scale;
-    camera.images = {camera.name + "/%06d.png"};
     const std::vector<int> images =
         &stream == &first ? frames.images
                           : matched_images(stream, first, frames, recording.name, camera.time_offset, result.notes);
-    if (!stream.poses.empty()) {
-      camera.camera.camera_to_world = stream.poses[std::size_t(images.front())];
-      if (!stands(stream.poses, images)) {
-        for (const int image : images) camera.moved.push_back(stream.poses[std::size_t(image)]);
-        camera.poses = out / camera.name / "poses.csv";
-        make_folder(out / camera.name);
-        write_camera_poses(*camera.poses, camera.moved);
-      }
-    }
+    fill_camera(out, stream, images, camera);
+    camera.depth_scale = stream.depth_scale;
+    camera.images = {camera.name + "/%06d.png"};
     write_images(out / camera.name, stream, images, [&] {
       if (progress) progress(++done, total);
     });
-    capture.depth.push_back(std::move(camera));
+    result.capture.depth.push_back(std::move(camera));
   }
+}
+
+void write_silhouettes(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
+                       ImportedCapture& result, const std::function<void(int, int)>& progress) {
+  const MaskStream& stream = *recording.masks;
+  const Frames frames = take_frames(stream, recording, facts, result);
+  SilhouetteCamera camera;
+  fill_camera(out, stream, frames.images, camera);
+  camera.masks = {camera.name + "/%06d.png"};
+  int done = 0;
+  write_masks(out, camera.name, stream, frames.images, result.notes, [&] {
+    if (progress) progress(++done, int(frames.images.size()));
+  });
+  result.capture.silhouettes.push_back(std::move(camera));
 }
 
 // Where the top of the first image points, in world coordinates.
 Vector3 picture_top(const ImportedRecording& recording) {
-  if (recording.depth.empty()) return Vector3::UnitY();
-  const DepthStream& first = recording.depth.front();
+  if (recording.depth.empty() && !recording.masks) return Vector3::UnitY();
+  const ImageStream& first =
+      recording.masks ? static_cast<const ImageStream&>(*recording.masks) : recording.depth.front();
   return -(first.poses.empty() ? first.camera.camera_to_world : first.poses.front()).rotation.col(1).normalized();
 }
 
@@ -188,6 +258,11 @@ void write_facts(const fs::path& out, const ImportedRecording& recording, const 
   } else if (!recording.test) {
     comment += "\n# Still to say: `surface`, the object at rest in world coordinates";
   }
+  if (recording.masks && recording.masks->camera.camera_to_world == RigidMotion())
+    comment +=
+        "\n# Still to say: `camera_to_world`, where the camera stands against the scan; as it is the world has its "
+        "axes: x to the "
+        "right of the picture, y down, z forward";
   if (!facts.mass && !facts.density && !recording.test)
     comment += "\n# Still to say: `mass` [kg] or `density` [kg/m^3]";
   if (facts.up) {
@@ -198,7 +273,7 @@ void write_facts(const fs::path& out, const ImportedRecording& recording, const 
     scene.world.up = -recording.gravity->normalized();
   } else if (!recording.test) {
     scene.world.up = picture_top(recording);
-    const std::string guess = recording.depth.empty() ? "y" : "the top of the first image";
+    const std::string guess = recording.depth.empty() && !recording.masks ? "y" : "the top of the first image";
     comment += "\n# A guess: `up` is " + guess + "; give `gravity` where it is known";
     result.notes.push_back("nobody said which way is up: taken is " + guess + " (--up X,Y,Z says otherwise)");
   }
@@ -374,6 +449,7 @@ ImportedCapture write_recording(const fs::path& out, const ImportedRecording& re
   make_folder(folder);
   write_facts(folder, recording, facts, result, comment);
   if (!recording.depth.empty()) write_depth(folder, recording, facts, result, progress);
+  if (recording.masks) write_silhouettes(folder, recording, facts, result, progress);
   if (recording.markers) write_markers(folder, recording, facts, result);
   if (recording.test) write_test(folder, recording, facts, result);
   write_capture(folder, result.capture, comment);

@@ -36,9 +36,10 @@ struct ImportedCapture {
   std::vector<std::string> notes;  ///< what a user should know, a sentence each
 };
 
-/// Writes a capture: NAME/%06d.png of each sensor (16-bit, raw units as recorded), markers, curves, and capture.toml
-/// last. Frames are those of the first sensor; others give the image that is nearest in time, and the median of how
-/// much later that is becomes their `time_offset`. A camera that moves along gets NAME/poses.csv.
+/// Writes a capture: NAME/%06d.png of each sensor (16-bit, raw units as recorded; of a video masks, with
+/// masks_overview.png, in which their outlines are drawn over twelve pictures), markers, curves, and capture.toml last.
+/// Frames are those of the first sensor; others give the image that is nearest in time, and the median of how much
+/// later that is becomes their `time_offset`. A camera that moves along gets NAME/poses.csv.
 /// @param progress  called with the number of images written and their total; may be empty, and may throw
 /// Throws InputError for a folder that holds a capture already, facts that contradict each other, images that do not
 /// exist, and whatever the recording's images do.

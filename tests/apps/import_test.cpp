@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "apps/program.hpp"
 #include "temporary_folder.hpp"
 
@@ -46,6 +48,35 @@ TEST(Import, MakesACaptureOfAPhoneThatMoves) {
   EXPECT_THAT(scan.err, HasSubstr("moves while it records"));
 }
 
+TEST(Import, MakesMasksOfAVideoByWhatTheUserSays) {
+  const TemporaryFolder folder;
+  const std::string film = (folder / "film.avi").string(), out = (folder / "out").string();
+  if (std::system("command -v ffmpeg >/dev/null && command -v ffprobe >/dev/null") != 0)
+    GTEST_SKIP() << "ffmpeg is not installed: no video is made";
+  ASSERT_EQ(std::system(("ffmpeg -v error -f lavfi -i color=white:s=160x120:r=25:d=0.4 -f lavfi -i "
+                         "color=gray:s=40x30:r=25:d=0.4 -filter_complex 'overlay=x=10+10*n:y=40' -c:v mjpeg -q:v 2 " +
+                         film + " </dev/null")
+                            .c_str()),
+            0);
+  const ProgramRun asked = run_pliant({"import", film, "--out", out});
+  EXPECT_EQ(asked.exit_code, 2);
+  EXPECT_THAT(asked.err, HasSubstr("--fov DEGREES"));
+  const ProgramRun run = run_pliant({"import", film, "--fov", "90", "--background", "still", "--threshold", "50",
+                                     "--rate", "100", "--first", "2", "--out", out});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("8 in 0.070 s, 100 Hz"));
+  EXPECT_THAT(run.out, HasSubstr("fx 80.00"));
+  EXPECT_THAT(run.out, HasSubstr("--background still"));
+  EXPECT_THAT(run.out, HasSubstr("by more than 50"));
+  const std::string toml = read_file(folder / "out/capture.toml");
+  EXPECT_THAT(toml, HasSubstr("[[silhouette]]"));
+  EXPECT_THAT(toml, HasSubstr("# Still to say: `surface`"));
+  const ProgramRun check = run_pliant({"check", out});
+  EXPECT_EQ(check.exit_code, 2);
+  EXPECT_THAT(check.err, HasSubstr("silhouettes alone, and no scan"));
+  EXPECT_THAT(check.err, HasSubstr("`gravity` is unknown"));
+}
+
 TEST(Import, SaysWhatItCannotRead) {
   const TemporaryFolder folder;
   const std::string out = (folder / "out").string();
@@ -73,7 +104,7 @@ TEST(Import, HasItsFormatsInThePageInTheOrderInWhichTheyAreTried) {
     EXPECT_NE(in_help, std::string::npos) << name;
     at = page.find("\n| `", at + 1);
   }
-  EXPECT_EQ(count, 12);
+  EXPECT_EQ(count, 13);
 }
 
 }  // namespace
