@@ -1,11 +1,11 @@
 // An object told from its background: plain and uneven ones, light that changes, objects that stay, and what is no
 // object.
-#include "geometry/camera.hpp"
 #include "imports/background_subtraction.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "geometry/camera.hpp"
 #include "picture_tools.hpp"
 
 namespace pliant::background_subtraction_test {
