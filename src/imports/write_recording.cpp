@@ -97,13 +97,12 @@ std::vector<int> matched_images(const ImageStream& stream, const ImageStream& fi
     images.push_back(int(nearest - stream.times.begin()));
     delays.push_back(*nearest - time);
   }
-  std::vector<double> sorted = delays;
-  std::ranges::sort(sorted);
-  const double median = sorted[sorted.size() / 2];
-  if (std::abs(median) > 1.0)
-    refuse(name, written("sensor \"%s\" is %.3f s beside \"%s\"", stream.name.c_str(), median, first.name.c_str()),
+  const double delay_of_most = median(delays);
+  if (std::abs(delay_of_most) > 1.0)
+    refuse(name,
+           written("sensor \"%s\" is %.3f s beside \"%s\"", stream.name.c_str(), delay_of_most, first.name.c_str()),
            "sensors that recorded at the same time", "import them one by one");
-  if (std::abs(median) > exact_clock) offset = median;
+  if (std::abs(delay_of_most) > exact_clock) offset = delay_of_most;
   double spread = 0.0;
   for (const double delay : delays) spread = std::max(spread, std::abs(delay - offset));
   if (spread > 1e-3)
