@@ -177,11 +177,13 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   p.push_back(damping(m.stiffness_damping, 1e-5 * time, 2.0 * time));
   p.push_back(scalar(layout, m.density, Transform::Logarithm, 0.1, 3e4, std::log(density), 0.5,
                      !capture.scene.object.mass && !capture.scene.object.density && has_known_forces(capture)));
+  p.back().given_std = capture.scene.object.relative_mass_std();
   if (capture.scene.world.gravity) {  // its length is known better than how the world's axes stand
     Parameter direction = vector(layout, m.gravity, 1.0, Vector3::Zero(), 0.05, false);
     direction.transform = Transform::Direction;
     direction.prior_mean = VectorX::Zero(2);
     direction.origin = *capture.scene.world.gravity;
+    direction.given_std = capture.scene.world.gravity_std;
     p.push_back(std::move(direction));
   } else {
     // How strong it is nobody said; where up is, the capture does.
@@ -236,9 +238,19 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   };
   for (std::size_t k = 0; k < blocks.sensors.size(); ++k) {
     const SensorBlocks& sensor = blocks.sensors[k];
-    if (k < capture.depth.size())
-      p.push_back(
-          scalar(layout, sensor.range_error, Transform::Shift, -0.2, 0.2, 0.0, range_error_std / size, false, size));
+    if (k < capture.depth.size()) {
+      const DepthCamera& camera = capture.depth[k];
+      const bool errs = camera.range_std.value_or(0.0) > 0.0;
+      p.push_back(scalar(layout, sensor.range_error, Transform::Shift, -0.2, 0.2, 0.0,
+                         (errs ? *camera.range_std : range_error_std) / size, errs, size));
+      if (camera.range_std) p.back().given_std = *camera.range_std / size;
+      for (const auto& [at, std] :
+           {std::pair(sensor.range_scale, camera.range_scale_std), std::pair(sensor.focal_error, camera.focal_std)}) {
+        if (std == 0.0) continue;
+        p.push_back(scalar(layout, at, Transform::Shift, -1.0, 1.0, 0.0, std, true));
+        p.back().given_std = std;
+      }
+    }
     pose(sensor.turn, 1.0, stds[k].turn);
     pose(sensor.shift, size, stds[k].shift);
   }
@@ -279,6 +291,11 @@ OutlineObservation outline_observation(const Capture& capture, const ObservedOut
   return observed;
 }
 
+Sight sight_of(const Capture& capture, const ObservedFrame& seen, std::size_t i) {
+  const int camera = i < seen.camera.size() ? seen.camera[i] : -1;
+  return camera < 0 ? Sight{} : sight_of(capture.depth[std::size_t(camera)].at(seen.frame), seen.points[i]);
+}
+
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
                                                   const TrackedPoints& tracked, int first_at_rest) {
   const Timing& timing = capture.scene.timing;
@@ -311,9 +328,8 @@ std::vector<FrameObservations> frame_observations(const Capture& capture, const 
     for (std::size_t i = 0; i < seen.points.size(); ++i) {
       const int camera = i < seen.camera.size() ? seen.camera[i] : -1;
       const double offset = camera < 0 ? 0.0 : capture.depth[std::size_t(camera)].time_offset;
-      frames[instant_of(seen.frame, offset)].points.push_back({seen.points[i], double(seen.noise[i]),
-                                                               camera < 0 ? cameras : camera,
-                                                               i < seen.view.size() ? seen.view[i] : Vector3::Zero()});
+      frames[instant_of(seen.frame, offset)].points.push_back(
+          {seen.points[i], double(seen.noise[i]), camera < 0 ? cameras : camera, sight_of(capture, seen, i)});
     }
   }
   for (const auto& [frame, points] : tracked.frames) {

@@ -108,8 +108,8 @@ class Recordings {
 
   /// Where the moduli stand in theta, and Poisson's ratio: the same of all recordings.
   const MaterialBlocks& material() const { return front().blocks.motion; }
-  /// Parameters that show while an object that will move still stands as it was scanned: estimated poses of the sensors
-  /// that see it then, and the places of planes.
+  /// Parameters that show while an object that will move still stands as it was scanned: what is estimated of the
+  /// sensors that see it then, and the places of planes.
   std::vector<std::string> told_at_rest() const;
   /// Sets the moduli [Pa], as many as controls.
   void set_moduli(VectorX& theta, const VectorX& moduli) const;

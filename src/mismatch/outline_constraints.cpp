@@ -72,9 +72,9 @@ Vector3 ray_of(const PinholeCamera& camera, const Vector2& pixel) {
 OutlineObservation corrected(OutlineObservation outline, const SensorCorrection& correction) {
   RigidMotion& pose = outline.camera.camera_to_world;
   const Vector3 eye = pose.translation;
-  pose.translation = correction.apply(eye, Vector3::Zero());
+  pose.translation = correction.apply(eye, {});
   for (int k = 0; k < 3; ++k)
-    pose.rotation.col(k) = correction.apply(eye + pose.rotation.col(k), Vector3::Zero()) - pose.translation;
+    pose.rotation.col(k) = correction.apply(eye + pose.rotation.col(k), {}) - pose.translation;
   return outline;
 }
 

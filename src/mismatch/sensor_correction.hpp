@@ -3,30 +3,45 @@
 #include <functional>
 #include <string>
 
+#include "geometry/camera.hpp"
 #include "parameters/layout.hpp"
 
 namespace pliant {
 
+/// How a sensor sees a point: along what errors of its readings move it.
+struct Sight {
+  Vector3 direction = Vector3::Zero();  ///< unit, from the sensor to the point; zero: unknown
+  double distance = 0.0;                ///< [m] from the sensor; 0: unknown
+  Vector3 off_axis = Vector3::Zero();   ///< [m] from the sensor's optical axis to the point, across it
+};
+
+/// How a camera sees a point [m].
+Sight sight_of(const PinholeCamera& camera, const Vector3& point);
+
 /// What is wrong with where a sensor puts its points: a constant error of its range (light that enters the material
-/// comes back late) and a small rigid motion, that of its own pose or of the scan:
-///   p' = o + exp(turn) (p - range_error d - o) + shift,
-/// with d the direction from the sensor to the point and o a fixed centre near the object.
+/// comes back late), the shares by which its ranges and the focal length that was taken for its own are too long, and a
+/// small rigid motion, that of its own pose or of the scan:
+///   p' = o + exp(turn) (p - (range_error + range_scale r) d + focal_error a - o) + shift,
+/// with d the direction from the sensor to the point that it read, r the distance, a the way from the optical axis to
+/// that point, and o a fixed centre near the object.
 class SensorCorrection {
  public:
-  static constexpr int size = 7;  ///< range error [m], turn [rad], shift [m]
+  static constexpr int size = 9;  ///< range error [m], turn [rad], shift [m], range scale and focal error [-]
   using Values = Eigen::Matrix<double, size, 1>;
   using Jacobian = Eigen::Matrix<double, 3, size>;
 
   SensorCorrection(const Vector3& centre, const Values& values);
   /// @param point [m]
-  /// @param view  unit direction from the sensor; zero where there is none
-  Vector3 apply(const Vector3& point, const Vector3& view) const;
+  Vector3 apply(const Vector3& point, const Sight& sight) const;
   /// Derivative of the corrected point by the values.
-  Jacobian jacobian(const Vector3& point, const Vector3& view) const;
+  Jacobian jacobian(const Vector3& point, const Sight& sight) const;
 
  private:
+  /// As the sensor would have read it, from the centre.
+  Vector3 read(const Vector3& point, const Sight& sight) const;
+
   Vector3 centre_, turn_, shift_;
-  double range_error_;
+  double range_error_, range_scale_, focal_error_;
   Matrix3 rotation_;
 };
 
@@ -35,8 +50,10 @@ struct SensorBlocks {
   ParameterHandle range_error;  ///< [m]
   ParameterHandle turn;         ///< 3, [rad]
   ParameterHandle shift;        ///< 3, [m]
+  ParameterHandle range_scale;  ///< [-]
+  ParameterHandle focal_error;  ///< [-]
 
-  std::vector<ParameterHandle> all() const { return {range_error, turn, shift}; }
+  std::vector<ParameterHandle> all() const { return {range_error, turn, shift, range_scale, focal_error}; }
   /// The sensor's rows of a matrix with one row a parameter: `SensorCorrection::size` of them.
   MatrixX rows(const MatrixX& parameters) const;
   SensorCorrection::Values values(const VectorX& theta) const;
@@ -46,7 +63,8 @@ struct SensorBlocks {
   SensorBlocks moved(const std::function<ParameterHandle(const ParameterHandle&)>& there) const;
 };
 
-/// Appends the blocks of a sensor's correction: "range_error@name", "sensor_turn@name", "sensor_shift@name".
+/// Appends the blocks of a sensor's correction: "range_error@name", "sensor_turn@name", "sensor_shift@name",
+/// "range_scale@name", "focal_error@name".
 /// Throws std::invalid_argument where they are there already.
 SensorBlocks add_sensor_blocks(ParameterLayout& layout, const std::string& name);
 
