@@ -396,6 +396,14 @@ std::vector<CommonError> Recordings::common_errors() const {
   return errors;
 }
 
+GivenScale Recordings::given_scale() const {
+  GivenScale scale;
+  for (const Recording& r : all_)
+    scale.deviation = std::max(scale.deviation, r.capture.scene.object.scale_std.value_or(0.0));
+  scale.masses_are_known = front().capture.scene.object.mass.has_value() || parameters_.find("density")->estimated;
+  return scale;
+}
+
 Grid Recordings::grid(double cells, double steps, const ModelChange& change) const {
   const Timed timed(Activity::Meshing);
   SimulationOptions settings;

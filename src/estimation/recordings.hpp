@@ -93,6 +93,8 @@ class Recordings {
 
   /// Errors that all readings of a sensor have in common, where the images show that they do.
   std::vector<CommonError> common_errors() const;
+  /// How well their lengths are known: as badly as any of them states, together.
+  GivenScale given_scale() const;
 
   [[nodiscard]] Grid grid(double cells, double steps, const ModelChange& change = {}) const;
 
