@@ -57,6 +57,10 @@ struct DepthCamera : RecordingCamera {
   std::optional<FramePattern> masks;
   std::optional<std::filesystem::path> background;  ///< absolute
   std::optional<double> noise = {};                 ///< standard deviation of a reading [m]
+  /// How well it is known what all its readings err by together: a constant range [m], shares of their range and of the
+  /// focal length; 0: exact.
+  std::optional<double> range_std = {};
+  double range_scale_std = 0.0, focal_std = 0.0;
   bool operator==(const DepthCamera&) const = default;
 };
 

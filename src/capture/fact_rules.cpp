@@ -154,6 +154,44 @@ void check_mass_or_density(RuleContext& context) {
                           "3 to 25000 kg/m^3", "mass is in kilograms and the mesh in metres");
 }
 
+/// How well something is known may be said of what is given, and of the mass less than a half.
+void check_given_deviations(RuleContext& context) {
+  constexpr double most = 0.5;  // of a mass
+  const Object& object = context.capture.scene.object;
+  const auto check = [&](const char* what, const std::optional<double>& value, const std::optional<double>& std,
+                         const char* unit) {
+    if (!std) return;
+    const std::string name = std::string(what) + "_std", key = "object." + name;
+    if (!value)
+      context.toml.complain(key, "`" + name + "` without `" + what + "`", "`" + std::string(what) + "` beside it",
+                            "it says how well that is known");
+    else if (*value > 0 && !(*std >= 0 && *std < most * *value))
+      context.toml.complain(key, "a deviation of " + text_of(*std, unit),
+                            "0 to " + text_of(most * *value, unit) + ", half of `" + what + "`",
+                            "it is a standard deviation in " + std::string(unit));
+  };
+  check("mass", object.mass, object.mass_std, "kg");
+  check("density", object.density, object.density_std, "kg/m^3");
+  if (context.capture.scene.world.gravity_std && !context.capture.scene.world.gravity)
+    context.toml.complain("world.gravity_std", "`gravity_std` without `gravity`", "`gravity` beside it",
+                          "a gravity that is unknown is estimated");
+}
+
+/// What lengths that are all off by one share do to an estimate is known where weight and inertia alone act.
+void check_scale_deviation(RuleContext& context) {
+  const Capture& capture = context.capture;
+  const Scene& scene = capture.scene;
+  if (scene.object.scale_std.value_or(0.0) == 0.0) return;
+  if (!capture.presses.empty() || !capture.indentations.empty() || !capture.grips.empty() ||
+      !capture.material_curves.empty() || scene.wind || !scene.forces.empty())
+    context.toml.complain("object.scale_std", "`scale_std` of a recording with forces that are no weight",
+                          "motions, and equilibria under weights", "leave it out, or measure the scale");
+  const bool has_weights = !scene.weights.empty() || !capture.loads.empty() || scene.initial.release_of;
+  if (scene.object.density && has_weights)
+    context.toml.complain("object.scale_std", "`scale_std` and `density`, and an attached weight",
+                          "`mass` in the place of `density`", "weigh the object: its mass has no length in it");
+}
+
 void check_gravity(RuleContext& context) {
   const auto& gravity = context.capture.scene.world.gravity;
   if (!gravity) {
@@ -586,6 +624,8 @@ std::vector<Rule> fact_rules() {
           check_pose,
           check_surface_noise,
           check_mass_or_density,
+          check_given_deviations,
+          check_scale_deviation,
           check_gravity,
           check_timing,
           check_start_frame,

@@ -52,6 +52,8 @@ class Reader {
       read_object_facts(object, scene.object);
       scene.object.pose_is_known = read_choice(object, "pose", {"known", "unknown"}) == "known";
       scene.object.scale_is_known = read_choice(object, "scale", {"known", "unknown"}) == "known";
+      const NumberRule scale{0.0, 0.2, true, true, "a share of all lengths; 0 where they are exact"};
+      scene.object.scale_std = read_optional_number(object, "scale_std", scale);
     };
     const auto read_own_world = [&](TomlTable& world) { scene.world = read_world(world); };
     if (is_of_curves_alone(root)) {  // a specimen needs neither shape nor place
@@ -142,6 +144,11 @@ class Reader {
     depth.masks = optional_pattern(block, "masks");
     depth.background = optional_path(block, "background");
     depth.noise = block.optional<double>("noise");
+    const NumberRule range{0.0, 0.2, true, true, "metres by which all ranges are off; 0 where they are exact"};
+    const NumberRule share{0.0, 0.2, true, true, "a share, like 0.003; 0 where it is exact"};
+    depth.range_std = read_optional_number(block, "range_std", range);
+    depth.range_scale_std = read_number(block, "range_scale_std", share, depth.range_scale_std);
+    depth.focal_std = read_number(block, "focal_std", share, depth.focal_std);
     return depth;
   }
 

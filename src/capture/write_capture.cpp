@@ -83,6 +83,9 @@ class Writer {
     write_file_key("background", depth.background);
     out_ << "depth_scale = " << toml_text(depth.depth_scale) << "\n";
     write_noise(depth.noise);
+    if (depth.range_std) out_ << "range_std = " << toml_text(*depth.range_std) << "   # m\n";
+    if (depth.range_scale_std > 0.0) out_ << "range_scale_std = " << toml_text(depth.range_scale_std) << "\n";
+    if (depth.focal_std > 0.0) out_ << "focal_std = " << toml_text(depth.focal_std) << "\n";
     out_ << "\n";
   }
 

@@ -7,7 +7,7 @@
 
 namespace pliant {
 
-inline constexpr const char *cause_mesh = "mesh", *cause_mass = "mass";
+inline constexpr const char *cause_mesh = "mesh", *cause_mass = "mass", *cause_scale = "scale of lengths";
 inline constexpr double largest_shift = 1.0;  ///< of an unconstrained coordinate, by a few steps
 
 /// Where an estimate goes under another model of the same object.

@@ -49,7 +49,7 @@ std::vector<Correction> possible_corrections(const ParameterSet& parameters, con
   for (const Parameter& p : parameters.parameters()) {
     if (!is_free(p)) continue;
     const std::string sensor = p.name.substr(p.name.find('@') + 1);
-    if (p.role == Role::Sensor && p.is_scalar())
+    if (p.role == Role::Sensor && p.is_scalar() && p.unit == "m")
       corrections.push_back(
           {(p.name.starts_with("outline_error") ? "the outlines of " : "the range of ") + sensor, {p.name}});
     else if (p.role == Role::Sensor && p.unit == "rad")  // a pose is a turn and a shift

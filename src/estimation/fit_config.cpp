@@ -67,6 +67,8 @@ const std::set<std::string> parameter_names = {"youngs_modulus",
                                                "outline_error",
                                                "sensor_turn",
                                                "sensor_shift",
+                                               "range_scale",
+                                               "focal_error",
                                                "scan_correction",
                                                "contact_stiffness"};
 /// Of planes from the second on, and of an Ogden law's terms.
@@ -380,7 +382,8 @@ std::string parameter_key_help() {
          "Ogden's law, and for what "
          "sensors get wrong "
          "range_error@SENSOR, outline_error@SENSOR,\n"
-         "sensor_turn@SENSOR, sensor_shift@SENSOR; [2] after a name means the second recording's) have three keys "
+         "sensor_turn@SENSOR, sensor_shift@SENSOR, range_scale@SENSOR, focal_error@SENSOR; [2] after a name means the "
+         "second recording's) have three keys "
          "each:\n"
          "  NAME=VALUE           start value, SI units; three numbers with commas for vectors\n"
          "  NAME.estimate=BOOL   estimate it, or keep the start value\n"

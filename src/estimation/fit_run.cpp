@@ -567,11 +567,13 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
 
 std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const ParameterSet& estimated, double& work) {
   const std::vector<GivenQuantity> given = given_quantities(estimated, recordings_.common_errors());
-  const ParameterSet all = with_given(estimated, given);
+  const GivenScale scale = recordings_.given_scale();
+  ParameterSet all = with_given(estimated, given);
+  if (scale.deviation > 0.0) all = with_strengths_of_gravity(all);
   Objective objective = objective_of(stage, all, grid(stage.grid));
   const CostEvaluation e = objective.linearise(all.to_unconstrained(all.reference()));
   work = e.work;
-  return e.succeeded ? pliant::shifts_of_given(e, all, given) : std::vector<ModelShift>{};
+  return e.succeeded ? pliant::shifts_of_given(e, all, given, scale) : std::vector<ModelShift>{};
 }
 
 /// Whether the mesh's part in the uncertainty of a modulus is more than half of the noise's, and the next finer mesh

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/19";
+constexpr const char* format = "fit-state/20";
 
 /// A type that is const or not: each list of members below is written and read by the same lines.
 template <class T, class Of>

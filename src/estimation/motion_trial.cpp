@@ -48,7 +48,7 @@ class MotionTrial::Comparison {
   /// The sensors' corrections and the planes that they see at a theta, and how both change along directions.
   struct Sensors {
     std::vector<SensorCorrection> corrections;
-    std::vector<MatrixX> changes;                     // 7 x directions, of each
+    std::vector<MatrixX> changes;                     // values x directions, of each
     std::vector<Eigen::Matrix<double, 6, 1>> planes;  // where they are: point and normal of each
     std::vector<MatrixX> plane_changes;               // 6 x directions, of each
     bool correct = false, change = false;
@@ -90,8 +90,9 @@ class MotionTrial::Comparison {
     bool is_matched;
     double value, stretch;  // [m]; value / stretch is the true distance
     Vector3 direction;      // d value = direction . d surface
-    Vector3 point, view;    // as the sensor states it, and along which it errs
-    double noise;           // [m]
+    Vector3 point;          // as the sensor states it
+    Sight sight;
+    double noise;  // [m]
     int sensor;
   };
   static std::vector<Distance> distances_of(const std::vector<SurfaceObservation>& seen,
@@ -185,7 +186,7 @@ std::vector<SurfaceObservation> MotionTrial::Comparison::corrected(
   std::vector<SurfaceObservation> moved = points;
   if (sensors_.correct)
     for (SurfaceObservation& o : moved)
-      if (is_corrected(o.sensor)) o.position = sensors_.corrections[std::size_t(o.sensor)].apply(o.position, o.view);
+      if (is_corrected(o.sensor)) o.position = sensors_.corrections[std::size_t(o.sensor)].apply(o.position, o.sight);
   return moved;
 }
 
@@ -193,8 +194,7 @@ std::vector<TrackObservation> MotionTrial::Comparison::corrected(const std::vect
   std::vector<TrackObservation> moved = tracks;
   if (sensors_.correct)
     for (TrackObservation& o : moved)
-      if (is_corrected(o.sensor))
-        o.position = sensors_.corrections[std::size_t(o.sensor)].apply(o.position, Vector3::Zero());
+      if (is_corrected(o.sensor)) o.position = sensors_.corrections[std::size_t(o.sensor)].apply(o.position, {});
   return moved;
 }
 
@@ -209,7 +209,7 @@ std::vector<MotionTrial::Comparison::Distance> MotionTrial::Comparison::distance
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const SurfaceObservation& o = seen[i];
     const PointMatch& m = matches[i];
-    all.push_back({m.cell >= 0, m.distance, m.stretch, m.direction, o.position, o.view, o.noise, o.sensor});
+    all.push_back({m.cell >= 0, m.distance, m.stretch, m.direction, o.position, o.sight, o.noise, o.sensor});
   }
   return all;
 }
@@ -221,8 +221,8 @@ std::vector<MotionTrial::Comparison::Distance> MotionTrial::Comparison::distance
   std::vector<Distance> all;
   for (const OutlineMatch& m : matches) {
     const Vector3 outwards = pose.rotation * m.outwards;
-    all.push_back(
-        {m.is_found, m.distance, 1.0, m.direction, pose(m.seen) + error * outwards, outwards, seen.noise, seen.sensor});
+    all.push_back({m.is_found, m.distance, 1.0, m.direction, pose(m.seen) + error * outwards, Sight{outwards},
+                   seen.noise, seen.sensor});
   }
   return all;
 }
@@ -254,7 +254,7 @@ void MotionTrial::Comparison::add_distances(const std::vector<Distance>& distanc
     weighted[i] = weight[i] * d.value;
     // A point that moves changes its distance as the object does that moves the other way.
     if (sensors_.change && is_corrected(d.sensor))
-      J.row(i) -= d.direction.transpose() * sensors_.corrections[std::size_t(d.sensor)].jacobian(d.point, d.view) *
+      J.row(i) -= d.direction.transpose() * sensors_.corrections[std::size_t(d.sensor)].jacobian(d.point, d.sight) *
                   sensors_.changes[std::size_t(d.sensor)];
   }
   if (J.cols() > 0) {
@@ -273,7 +273,7 @@ VectorX MotionTrial::Comparison::distance_bars(const std::vector<Distance>& dist
     bar[Eigen::Index(i)] = share / (d.noise * d.noise) * loss.derivative(d.value);
     if (is_corrected(d.sensor))
       sensor_blocks(d.sensor).add(
-          -bar[Eigen::Index(i)] * sensors_.corrections[std::size_t(d.sensor)].jacobian(d.point, d.view).transpose() *
+          -bar[Eigen::Index(i)] * sensors_.corrections[std::size_t(d.sensor)].jacobian(d.point, d.sight).transpose() *
               d.direction,
           theta_bar);
   }
@@ -327,7 +327,7 @@ void MotionTrial::Comparison::fit_tracks(const FrameObservations& seen, const Po
   for (int i = 0; i < fit.tracks && sensors_.change; ++i) {
     const TrackObservation& o = seen.tracks[std::size_t(i)];
     if (is_corrected(o.sensor))
-      J.middleRows<3>(3 * i) -= sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, Vector3::Zero()) *
+      J.middleRows<3>(3 * i) -= sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, {}) *
                                 sensors_.changes[std::size_t(o.sensor)];
   }
   fit.gradient += J.transpose() * weight.cwiseProduct(flat(r));
@@ -338,11 +338,14 @@ MotionTrial::Comparison::PlaneResidual MotionTrial::Comparison::plane_residual(c
   const Eigen::Matrix<double, 6, 1>& there = sensors_.planes[std::size_t(seen.plane)];
   const Vector3 point = there.head<3>(), normal = there.tail<3>();
   const SensorCorrection& sensor = sensors_.corrections[std::size_t(seen.sensor)];
-  const Vector3 at = sensor.apply(seen.point, seen.view);
-  // The normal turns as the way to a point one metre along it does.
-  const Vector3 end = seen.point + seen.normal, turned = sensor.apply(end, seen.view) - at;
-  const SensorCorrection::Jacobian at_changes = sensor.jacobian(seen.point, seen.view),
-                                   turns = sensor.jacobian(end, seen.view) - at_changes;
+  const Vector3 at = sensor.apply(seen.point, seen.sight);
+  // The normal turns as the way to a point one metre along it does; where ways off the axis grow, it turns to the axis.
+  const Vector3 end = seen.point + seen.normal;
+  Sight to_end = seen.sight;
+  to_end.off_axis -= seen.normal_off_axis;
+  const Vector3 turned = sensor.apply(end, to_end) - at;
+  const SensorCorrection::Jacobian at_changes = sensor.jacobian(seen.point, seen.sight),
+                                   turns = sensor.jacobian(end, to_end) - at_changes;
   Eigen::Matrix<double, 2, 3> across;
   across.row(0) = seen.normal.unitOrthogonal().transpose() / seen.tilt_std;
   across.row(1) = seen.normal.cross(seen.normal.unitOrthogonal()).transpose() / seen.tilt_std;
@@ -455,10 +458,9 @@ void MotionTrial::Comparison::add_cotangents(const FrameObservations& seen, cons
       const auto row = Eigen::Index(i);
       bar.row(row) *= loss.weight(bar.row(row).norm()) / (o.noise * o.noise);
       if (is_corrected(o.sensor))
-        sensor_blocks(o.sensor).add(
-            -sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, Vector3::Zero()).transpose() *
-                bar.row(row).transpose(),
-            theta_bar);
+        sensor_blocks(o.sensor).add(-sensors_.corrections[std::size_t(o.sensor)].jacobian(o.position, {}).transpose() *
+                                        bar.row(row).transpose(),
+                                    theta_bar);
     }
     motion_.mismatch.tracks->add_adjoint(seen.tracks, bar, x_bar);
   }

@@ -16,12 +16,13 @@ namespace pliant {
 
 /// A plane of the scene as a sensor saw it.
 struct PlaneObservation {
-  int plane = 0;                            ///< of the motion's blocks
-  int sensor = 0;                           ///< whose correction applies
-  Vector3 point = Vector3::Zero();          ///< [m] on it, by the sensor's stated pose
-  Vector3 normal = Vector3::UnitY();        ///< unit length, likewise
-  Vector3 view = Vector3::Zero();           ///< unit direction from the sensor to the point
-  double tilt_std = 0.0, height_std = 0.0;  ///< [rad], [m] of its normal, and of the point along it; > 0
+  int plane = 0;                              ///< of the motion's blocks
+  int sensor = 0;                             ///< whose correction applies
+  Vector3 point = Vector3::Zero();            ///< [m] on it, by the sensor's stated pose
+  Vector3 normal = Vector3::UnitY();          ///< unit length, likewise
+  Sight sight = {};                           ///< how the sensor sees the point
+  Vector3 normal_off_axis = Vector3::Zero();  ///< the normal's part across the sensor's optical axis
+  double tilt_std = 0.0, height_std = 0.0;    ///< [rad], [m] of its normal, and of the point along it; > 0
 };
 
 /// What was seen in one frame of the simulation.

@@ -397,11 +397,12 @@ class LawRun : StageLoop {
     const VectorX p = form.parameters.to_unconstrained(record.from);
     std::vector<TestedSpecimen> heavier = specimens(form);
     bool has_weight = false;
-    for (TestedSpecimen& specimen : heavier) {
-      has_weight = has_weight || specimen.scene->dead_load().cwiseAbs().maxCoeff() > 0.0;
-      auto scene = std::make_shared<PressScene>(*specimen.scene);
-      scene->density *= 1.0 + judgement.given_density;
-      specimen.scene = std::move(scene);
+    for (std::size_t i = 0; i < heavier.size(); ++i) {
+      const double deviation = captures_[i]->scene.object.relative_mass_std().value_or(judgement.given_density);
+      auto scene = std::make_shared<PressScene>(*heavier[i].scene);
+      has_weight = has_weight || (deviation > 0.0 && scene->dead_load().cwiseAbs().maxCoeff() > 0.0);
+      scene->density *= 1.0 + deviation;
+      heavier[i].scene = std::move(scene);
     }
     const PressTrialOptions as_found{task.noise, judgement.press_outlier};
     if (has_weight) {

@@ -181,11 +181,13 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   p.push_back(damping(m.stiffness_damping, 1e-5 * time, 2.0 * time));
   p.push_back(scalar(layout, m.density, Transform::Logarithm, 0.1, 3e4, std::log(density), 0.5,
                      !capture.scene.object.mass && !capture.scene.object.density && has_known_forces(capture)));
+  p.back().given_std = capture.scene.object.relative_mass_std();
   if (capture.scene.world.gravity) {  // its length is known better than how the world's axes stand
     Parameter direction = vector(layout, m.gravity, 1.0, Vector3::Zero(), 0.05, false);
     direction.transform = Transform::Direction;
     direction.prior_mean = VectorX::Zero(2);
     direction.origin = *capture.scene.world.gravity;
+    direction.given_std = capture.scene.world.gravity_std;
     p.push_back(std::move(direction));
   } else {
     // How strong it is nobody said; where up is, the capture does.
@@ -240,14 +242,26 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   };
   for (std::size_t k = 0; k < blocks.sensors.size(); ++k) {
     const SensorBlocks& sensor = blocks.sensors[k];
-    if (k < capture.depth.size())
-      p.push_back(scalar(layout, sensor.error, Transform::Shift, -0.2, 0.2, 0.0, range_error_std / size, false, size));
-    const int camera = int(k) - silhouette_sensor(capture, 0);
-    if (camera >= 0 && camera < int(capture.silhouettes.size())) {
-      const SilhouetteCamera& masks = capture.silhouettes[std::size_t(camera)];
+    if (k < capture.depth.size()) {
+      const DepthCamera& camera = capture.depth[k];
+      const bool errs = camera.range_std.value_or(0.0) > 0.0;
+      p.push_back(scalar(layout, sensor.error, Transform::Shift, -0.2, 0.2, 0.0,
+                         (errs ? *camera.range_std : range_error_std) / size, errs, size));
+      if (camera.range_std) p.back().given_std = *camera.range_std / size;
+      for (const auto& [at, std] :
+           {std::pair(sensor.range_scale, camera.range_scale_std), std::pair(sensor.focal_error, camera.focal_std)}) {
+        if (std == 0.0) continue;
+        p.push_back(scalar(layout, at, Transform::Shift, -1.0, 1.0, 0.0, std, true));
+        p.back().given_std = std;
+      }
+    }
+    const int silhouette = int(k) - silhouette_sensor(capture, 0);
+    if (silhouette >= 0 && silhouette < int(capture.silhouettes.size())) {
+      const SilhouetteCamera& masks = capture.silhouettes[std::size_t(silhouette)];
       const double pixel = pixel_size(capture, masks, capture.scene.timing.start_frame), std = masks.outline_error_std;
       p.push_back(scalar(layout, sensor.error, Transform::Shift, -most_outline_error * pixel,
                          most_outline_error * pixel, 0.0, (std > 0.0 ? std : 1.0) * pixel / size, std > 0.0, size));
+      p.back().given_std = std * pixel / size;
     }
     pose(sensor.turn, 1.0, stds[k].turn);
     pose(sensor.shift, size, stds[k].shift);
@@ -290,6 +304,11 @@ OutlineObservation outline_observation(const Capture& capture, const ObservedOut
   return observed;
 }
 
+Sight sight_of(const Capture& capture, const ObservedFrame& seen, std::size_t i) {
+  const int camera = i < seen.camera.size() ? seen.camera[i] : -1;
+  return camera < 0 ? Sight{} : sight_of(capture.depth[std::size_t(camera)].at(seen.frame), seen.points[i]);
+}
+
 std::vector<FrameObservations> frame_observations(const Capture& capture, const std::vector<ObservedFrame>& observed,
                                                   const TrackedPoints& tracked, int first_at_rest) {
   const Timing& timing = capture.scene.timing;
@@ -322,9 +341,8 @@ std::vector<FrameObservations> frame_observations(const Capture& capture, const 
     for (std::size_t i = 0; i < seen.points.size(); ++i) {
       const int camera = i < seen.camera.size() ? seen.camera[i] : -1;
       const double offset = camera < 0 ? 0.0 : capture.depth[std::size_t(camera)].time_offset;
-      frames[instant_of(seen.frame, offset)].points.push_back({seen.points[i], double(seen.noise[i]),
-                                                               camera < 0 ? cameras : camera,
-                                                               i < seen.view.size() ? seen.view[i] : Vector3::Zero()});
+      frames[instant_of(seen.frame, offset)].points.push_back(
+          {seen.points[i], double(seen.noise[i]), camera < 0 ? cameras : camera, sight_of(capture, seen, i)});
     }
   }
   for (const auto& [frame, points] : tracked.frames) {

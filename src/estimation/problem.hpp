@@ -59,8 +59,10 @@ struct CaptureParameters {
 /// All parameters of a capture with their start values, bounds and priors. What the capture leaves unknown is
 /// estimated: always stiffness and both dampings, Poisson's ratio under a prior, and gravity, velocities or planes that
 /// it does not give; density only where it is unknown and the object is released from under a known weight.
-/// Of the corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera") those of poses are
-/// estimated where the capture does not take the pose as exact (`PoseStd`), under a prior as wide as that says.
+/// Of the corrections of sensors ("range_error@camera", "sensor_turn@camera", "sensor_shift@camera", and where they are
+/// not exact "range_scale@camera", "focal_error@camera") those of poses are estimated where the capture does not take
+/// the pose as exact (`PoseStd`), and those of readings where it states a deviation, under a prior as wide as that
+/// says.
 /// @param volume    of the object [m^3], for the density that belongs to a mass
 /// @param controls  control moduli of the body: `modulus_names` tells what they are called
 /// @param pulls     that hold a released object: "pull@1", ... (see `Pull`)
@@ -92,6 +94,9 @@ TrackedPoints tracked_points(const Capture& capture);
 
 /// An outline as a fit compares it.
 OutlineObservation outline_observation(const Capture& capture, const ObservedOutline& seen, int frame);
+
+/// How its sensor sees the i-th point of a frame; nothing is known of clouds.
+Sight sight_of(const Capture& capture, const ObservedFrame& seen, std::size_t i);
 
 /// Observations of the frames from the start on, numbered from it. Frames before a release show the pose from which the
 /// object is released, and count as looks at its first frame.

@@ -160,10 +160,10 @@ void trust_planes_seen(CaptureParameters& parameters, const std::vector<int>& pl
   parameters.set = ParameterSet(parameters.set.layout(), std::move(list), parameters.set.reference());
 }
 
-void take_poses_as_exact(CaptureParameters& parameters) {
-  for (const SensorBlocks& sensor : parameters.blocks.sensors)
-    for (const ParameterHandle& block : {sensor.turn, sensor.shift})
-      parameters.set.set_estimated(parameters.set.layout().block_of(block).name, false);
+void take_sensors_as_exact(CaptureParameters& parameters) {
+  std::vector<Parameter> list = parameters.set.parameters();
+  for (Parameter& p : list) p.estimated = p.estimated && p.role != Role::Sensor;
+  parameters.set = ParameterSet(parameters.set.layout(), std::move(list), parameters.set.reference());
 }
 
 bool is_shared(const ParameterBlock& block, bool shares_density) {
@@ -323,12 +323,12 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
   recording.common_error = weigh_by_scatter(capture, recorded.observed, notes);
   recording.distance = capture_distance(capture, widest_band());
   // The tracker takes poses as they are, and so are the points that it followed.
-  const bool has_poses = !recorded.followed && estimates_poses(capture);
-  const bool stands = has_poses && starts_as_scanned(capture.scene);
+  const bool has_sensors = !recorded.followed && estimates_sensors(capture);
+  const bool stands = has_sensors && starts_as_scanned(capture.scene);
   std::vector<FrameObservations> observations =
       frame_observations(capture, recorded.observed, recording.tracked,
                          stands ? first_frame_at_rest(capture, recorded.observed, *recording.distance) : -1);
-  if (has_poses && !observations.empty()) observations.front().planes = planes_seen(capture, notes);
+  if (has_sensors && !observations.empty()) observations.front().planes = planes_seen(capture, notes);
   recording.observations = std::make_shared<std::vector<FrameObservations>>(std::move(observations));
   if (recording.observations->empty() && recording.loads.empty() && !has_pressed(capture))
     throw InputError({{capture.file},
@@ -353,8 +353,8 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
   CaptureParameters parameters = default_parameters(capture, enclosed_volume(*capture.scene.object.surface), controls_,
                                                     pull_count(capture.scene, resolution(0.0, options_.steps)),
                                                     options_.scan_points, options_.law_of_motion());
-  if (!has_poses) trust_planes_seen(parameters, planes_found);
-  if (recorded.followed) take_poses_as_exact(parameters);
+  if (!has_sensors) trust_planes_seen(parameters, planes_found);
+  if (recorded.followed) take_sensors_as_exact(parameters);
   return parameters;
 }
 
@@ -394,6 +394,14 @@ std::vector<CommonError> Recordings::common_errors() const {
     for (std::size_t c = 0; c < r.common_error.size(); ++c)
       if (r.common_error[c] > 0.0) errors.push_back({r.blocks.sensors[c], r.common_error[c] / r.size});
   return errors;
+}
+
+GivenScale Recordings::given_scale() const {
+  GivenScale scale;
+  for (const Recording& r : all_)
+    scale.deviation = std::max(scale.deviation, r.capture.scene.object.scale_std.value_or(0.0));
+  scale.masses_are_known = front().capture.scene.object.mass.has_value() || parameters_.find("density")->estimated;
+  return scale;
 }
 
 Grid Recordings::grid(double cells, double steps, const ModelChange& change) const {
@@ -514,8 +522,8 @@ std::vector<std::string> Recordings::told_at_rest() const {
   constexpr int fewest = 50;  // points of the object that a sensor sees
   std::vector<std::string> names;
   for (const Recording& r : all_) {
-    const bool stands = starts_as_scanned(r.capture.scene) && estimates_poses(r.capture) && !r.observations->empty() &&
-                        r.observations->front().frame == 0;
+    const bool stands = starts_as_scanned(r.capture.scene) && estimates_sensors(r.capture) &&
+                        !r.observations->empty() && r.observations->front().frame == 0;
     if (!stands) continue;
     std::vector<int> seen(r.blocks.sensors.size(), 0);
     for (const SurfaceObservation& o : r.observations->front().points) ++seen[std::size_t(o.sensor)];
@@ -523,7 +531,8 @@ std::vector<std::string> Recordings::told_at_rest() const {
       seen[std::size_t(o.sensor)] += int(o.points.size());
     std::vector<ParameterHandle> told;
     for (std::size_t k = 0; k < seen.size(); ++k)
-      if (seen[k] >= fewest) told.insert(told.end(), {r.blocks.sensors[k].turn, r.blocks.sensors[k].shift});
+      if (seen[k] >= fewest)
+        for (const ParameterHandle& block : r.blocks.sensors[k].all()) told.push_back(block);
     if (told.empty()) continue;
     for (const PlaneBlock& plane : r.blocks.motion.planes) told.push_back(plane.whole());
     for (const Parameter& p : parameters_.parameters())

@@ -93,6 +93,8 @@ class Recordings {
 
   /// Errors that all readings of a sensor have in common, where the images show that they do.
   std::vector<CommonError> common_errors() const;
+  /// How well their lengths are known: as badly as any of them states, together.
+  GivenScale given_scale() const;
 
   [[nodiscard]] Grid grid(double cells, double steps, const ModelChange& change = {}) const;
 
@@ -108,8 +110,8 @@ class Recordings {
 
   /// Where the moduli stand in theta, and Poisson's ratio: the same of all recordings.
   const MaterialBlocks& material() const { return front().blocks.motion; }
-  /// Parameters that show while an object that will move still stands as it was scanned: estimated poses of the sensors
-  /// that see it then, and the places of planes.
+  /// Parameters that show while an object that will move still stands as it was scanned: what is estimated of the
+  /// sensors that see it then, and the places of planes.
   std::vector<std::string> told_at_rest() const;
   /// Sets the moduli [Pa], as many as controls.
   void set_moduli(VectorX& theta, const VectorX& moduli) const;

@@ -77,8 +77,16 @@ std::vector<PoseStd> pose_stds(const Capture& capture) {
   return all;
 }
 
-bool estimates_poses(const Capture& capture) {
-  return std::ranges::any_of(pose_stds(capture), [](const PoseStd& std) { return std.turn > 0.0 || std.shift > 0.0; });
+bool estimates_sensors(const Capture& capture) {
+  return std::ranges::any_of(pose_stds(capture),
+                             [](const PoseStd& std) { return std.turn > 0.0 || std.shift > 0.0; }) ||
+         std::ranges::any_of(capture.depth,
+                             [](const DepthCamera& camera) {
+                               return camera.range_std.value_or(0.0) > 0.0 || camera.range_scale_std > 0.0 ||
+                                      camera.focal_std > 0.0;
+                             }) ||
+         std::ranges::any_of(capture.silhouettes,
+                             [](const SilhouetteCamera& camera) { return camera.outline_error_std > 0.0; });
 }
 
 bool starts_as_scanned(const Scene& scene) {
@@ -97,8 +105,12 @@ std::vector<PlaneObservation> planes_seen(const Capture& capture, std::vector<st
       PlaneObservation seen;
       seen.plane = i, seen.sensor = int(k);
       seen.point = found->point, seen.normal = found->normal;
-      if (k < capture.depth.size())
-        seen.view = (seen.point - capture.depth[k].camera.camera_to_world.translation).normalized();
+      if (k < capture.depth.size()) {
+        const PinholeCamera& camera = capture.depth[k].camera;
+        const Vector3 axis = camera.camera_to_world.rotation.col(2);
+        seen.sight = sight_of(camera, seen.point);
+        seen.normal_off_axis = seen.normal - axis.dot(seen.normal) * axis;
+      }
       seen.tilt_std = seen_plane_std, seen.height_std = seen_plane_std * object_size(capture.scene);
       if (plane.known && !is_where_known(plane, seen, stds[k])) {
         notes.push_back(fmt::format(

@@ -17,8 +17,8 @@ constexpr double seen_plane_std = 0.003;
 /// How well the pose of each sensor of `sensor_names` is known; zero where it is taken as exact.
 std::vector<PoseStd> pose_stds(const Capture& capture);
 
-/// Whether the pose of some sensor is an unknown of a fit.
-bool estimates_poses(const Capture& capture);
+/// Whether the pose of some sensor, or what its readings err by together, is an unknown of a fit.
+bool estimates_sensors(const Capture& capture);
 
 /// Whether the object stands as it was scanned when its motion begins: its shape then is known, whatever it is made of.
 bool starts_as_scanned(const Scene& scene);

@@ -73,9 +73,9 @@ OutlineObservation corrected(OutlineObservation outline, const SensorCorrection&
   for (OutlinePoint& point : outline.points) point.pixel -= correction.error() / outline.pixel * point.normal;
   RigidMotion& pose = outline.camera.camera_to_world;
   const Vector3 eye = pose.translation;
-  pose.translation = correction.apply(eye, Vector3::Zero());
+  pose.translation = correction.apply(eye, {});
   for (int k = 0; k < 3; ++k)
-    pose.rotation.col(k) = correction.apply(eye + pose.rotation.col(k), Vector3::Zero()) - pose.translation;
+    pose.rotation.col(k) = correction.apply(eye + pose.rotation.col(k), {}) - pose.translation;
   return outline;
 }
 

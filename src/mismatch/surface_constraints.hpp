@@ -5,15 +5,16 @@
 
 #include "elasticity/body.hpp"
 #include "mismatch/displacement_extension.hpp"
+#include "mismatch/sensor_correction.hpp"
 
 namespace pliant {
 
 /// A point that a sensor saw on the object, with its standard deviation.
 struct SurfaceObservation {
-  Vector3 position;                ///< [m], world
-  double noise;                    ///< [m], > 0
-  int sensor = 0;                  ///< whose correction applies
-  Vector3 view = Vector3::Zero();  ///< unit direction from the sensor; zero: unknown
+  Vector3 position;  ///< [m], world
+  double noise;      ///< [m], > 0
+  int sensor = 0;    ///< whose correction applies
+  Sight sight = {};  ///< how that sensor sees it
 };
 
 /// One observed point pulled back through the motion to the shape at rest.

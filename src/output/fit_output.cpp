@@ -162,8 +162,8 @@ std::vector<Vector3> corrected_points(const ObservedFrame& seen, const Capture& 
   std::vector<Vector3> points = seen.points;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const int sensor = seen.camera[i] < 0 ? int(capture.depth.size()) : seen.camera[i];
-    const SensorBlocks& blocks = d.mismatch.sensors[std::size_t(sensor)];
-    points[i] = SensorCorrection(d.mismatch.centre, blocks.values(theta)).apply(points[i], seen.view[i]);
+    const SensorCorrection correction(d.mismatch.centre, d.mismatch.sensors[std::size_t(sensor)].values(theta));
+    points[i] = correction.apply(points[i], sight_of(capture, seen, i));
   }
   return points;
 }

@@ -88,6 +88,8 @@ std::vector<std::string> ParameterSet::coordinate_names() const {
       names.push_back(p.name);
     else if (p.transform == Transform::Direction)
       for (const char* part : {".tilt_1", ".tilt_2"}) names.push_back(p.name + part);
+    else if (p.transform == Transform::Strength)
+      names.push_back(p.name + ".strength");
     else if (p.transform == Transform::Vector)
       for (const char* axis : {".x", ".y", ".z"}) names.push_back(p.name + axis);
     else
@@ -150,6 +152,9 @@ VectorX ParameterSet::to_unconstrained(const VectorX& theta) const {
         p.segment<2>(at) = tangents_of(v0.normalized()).transpose() * v / v.dot(v0.normalized());
         break;
       }
+      case Transform::Strength:
+        p[at] = std::log(theta.segment<3>(i).norm() / origin_of(q).norm());
+        break;
       case Transform::PlanePosition: {
         const VectorX origin = origin_of(q);
         const Vector3 n0 = origin.tail<3>(), point = theta.segment<3>(i), n = theta.segment<3>(i + 3);
@@ -184,6 +189,9 @@ VectorX ParameterSet::to_theta(const VectorX& p) const {
         theta.segment<3>(i) = v0.norm() * (n0 + tangents_of(n0) * p.segment<2>(at)).normalized();
         break;
       }
+      case Transform::Strength:  // along the direction that the numbers have by now
+        theta.segment<3>(i) = origin_of(q).norm() * std::exp(p[at]) * Vector3(theta.segment<3>(i)).normalized();
+        break;
       case Transform::Vector:
         theta.segment<3>(i) = p.segment<3>(at) * q.scale;
         break;
@@ -226,6 +234,10 @@ MatrixX ParameterSet::jacobian(const VectorX& p) const {
         J.block<3, 2>(i, at) = v0.norm() * (Matrix3::Identity() - n * n.transpose()) * T / m.norm();
         break;
       }
+      case Transform::Strength:
+        J.middleRows<3>(i) *= std::exp(p[at]);  // of what turns it
+        J.block<3, 1>(i, at) = to_theta(p).segment<3>(i);
+        break;
       case Transform::Vector:
         J.block<3, 3>(i, at) = q.scale * Matrix3::Identity();
         break;

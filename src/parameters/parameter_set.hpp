@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ enum class Transform {
   Shift,          ///< a scalar of any sign: p = value / scale
   Vector,         ///< three numbers: p = value / scale
   Direction,      ///< three numbers whose length is known: p are two tilts about the origin's direction [rad]
+  Strength,       ///< three numbers, behind what turns them: p = ln(their length / the origin's)
   PlanePosition,  ///< three numbers: shift along the origin's normal / scale, then two tilts of the normal [rad]
 };
 
@@ -40,10 +42,16 @@ struct Parameter {
   /// Whether it only stands for something else: forces for whoever held the object, parts of a scan's error. Of no
   /// interest one by one.
   bool is_auxiliary = false;
+  /// How well it is known where it is not estimated, if somebody stated that: deviation of each unconstrained number;
+  /// 0: it is exact.
+  std::optional<double> given_std = {};
   Role role = Role::Material;  ///< that of its block; a `ParameterSet` sets it
 
   bool is_scalar() const { return transform < Transform::Vector; }
-  int dimension() const { return is_scalar() ? 1 : transform == Transform::Direction ? 2 : 3; }
+  int dimension() const {
+    if (is_scalar() || transform == Transform::Strength) return 1;
+    return transform == Transform::Direction ? 2 : 3;
+  }
 };
 
 /// Whether a parameter is an elastic modulus [Pa].

@@ -10,6 +10,12 @@ std::optional<double> Object::total_mass() const {
   return std::nullopt;
 }
 
+std::optional<double> Object::relative_mass_std() const {
+  if (mass && mass_std) return *mass_std / *mass;
+  if (density && density_std) return *density_std / *density;
+  return std::nullopt;
+}
+
 namespace {
 
 bool has_inner(const Scene& scene, InnerBody::Contact contact) {

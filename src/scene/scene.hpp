@@ -180,10 +180,12 @@ enum class ShapeIs { Reference, Static };
 struct Object {
   /// Boundary of the solid [m], of bodies inside it too; nothing: no rest scan, nothing can be fitted.
   std::optional<TriangleMesh> surface;
-  std::optional<VolumeMesh> volume;  ///< tetrahedra made elsewhere, whose boundary `surface` then is
-  std::filesystem::path file;        ///< file of the surface or the volume, absolute; empty: of neither
-  std::optional<double> mass;        ///< [kg]
-  std::optional<double> density;     ///< [kg/m^3]
+  std::optional<VolumeMesh> volume;             ///< tetrahedra made elsewhere, whose boundary `surface` then is
+  std::filesystem::path file;                   ///< file of the surface or the volume, absolute; empty: of neither
+  std::optional<double> mass;                   ///< [kg]
+  std::optional<double> density;                ///< [kg/m^3]
+  std::optional<double> mass_std, density_std;  ///< how well the given one is known, in its unit; 0: exact
+  std::optional<double> scale_std;              ///< how well all lengths together are known, a share of them; 0: exact
   ShapeIs shape_is = ShapeIs::Reference;
   std::optional<double> surface_noise;  ///< standard deviation of the surface along its normals [m]; 0: it is exact
   bool pose_is_known = true;            ///< false: the surface stands anywhere, and is to be placed in the start frame
@@ -191,12 +193,15 @@ struct Object {
 
   /// Mass [kg], from the density where that is given. Nothing: neither is known.
   std::optional<double> total_mass() const;
+  /// Standard deviation of its mass, or density, over it. Nothing: nobody stated one.
+  std::optional<double> relative_mass_std() const;
 };
 
 /// Gravity, and which way is up.
 struct World {
   std::optional<Vector3> gravity;  ///< [m/s^2]; nothing: to be estimated
   Vector3 up = Vector3::UnitY();   ///< unit length, opposite to gravity's direction where that is known, else as given
+  std::optional<double> gravity_std;  ///< how well its direction is known, about each level axis [rad]; 0: exact
   bool operator==(const World&) const = default;
 };
 

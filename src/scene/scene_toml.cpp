@@ -158,6 +158,8 @@ void write_vertices(const fs::path& file, const Region& region) {
 void read_object_facts(TomlTable& table, Object& object) {
   object.mass = table.optional<double>("mass");
   object.density = table.optional<double>("density");
+  object.mass_std = table.optional<double>("mass_std");
+  object.density_std = table.optional<double>("density_std");
   const auto shape_is = table.optional<std::string>("shape_is");
   if (shape_is && *shape_is != "reference" && *shape_is != "static")
     table.context().reject(table.key_of("shape_is"), "`shape_is` is \"" + *shape_is + "\"",
@@ -201,6 +203,8 @@ World read_world(TomlTable& table, bool gravity_is_required) {
     world.up = read_direction(table, "up").value_or(world.up);
   else if (world.gravity && world.gravity->norm() > 0)
     world.up = -world.gravity->normalized();
+  const NumberRule tilt{0.0, 0.5, true, true, "radians by which its direction is off; 0 where it is exact"};
+  world.gravity_std = read_optional_number(table, "gravity_std", tilt);
   return world;
 }
 
@@ -448,9 +452,12 @@ void write_toml(std::ostream& out, const Object& object, const std::string& file
   out << "[object]\n";
   if (!file.empty()) out << (object.volume ? "volume_mesh" : "surface") << " = " << toml_text(file) << "\n";
   if (object.mass) out << "mass = " << toml_text(*object.mass) << "   # kg\n";
+  if (object.mass_std) out << "mass_std = " << toml_text(*object.mass_std) << "   # kg\n";
   if (object.density) out << "density = " << toml_text(*object.density) << "   # kg/m^3\n";
+  if (object.density_std) out << "density_std = " << toml_text(*object.density_std) << "   # kg/m^3\n";
   if (!object.pose_is_known) out << "pose = \"unknown\"   # of the scan: found in the start frame\n";
   if (!object.scale_is_known) out << "scale = \"unknown\"   # of the scan: any unit\n";
+  if (object.scale_std) out << "scale_std = " << toml_text(*object.scale_std) << "   # of all lengths, a share\n";
   if (object.shape_is == ShapeIs::Static) out << "shape_is = \"static\"   # taken as it sagged under gravity\n";
   if (object.surface_noise) out << "surface_noise = " << toml_text(*object.surface_noise) << "   # m\n";
   out << "\n";
@@ -461,6 +468,7 @@ void write_toml(std::ostream& out, const World& world) {
   if (world.gravity) out << "gravity = " << toml_text(*world.gravity) << "   # m/s^2\n";
   const bool is_told = world.gravity && world.gravity->norm() > 0.0 && world.up == -world.gravity->normalized();
   if (!is_told) out << "up = " << toml_text(world.up) << "\n";
+  if (world.gravity_std) out << "gravity_std = " << toml_text(*world.gravity_std) << "   # rad, of its direction\n";
   out << "\n";
 }
 

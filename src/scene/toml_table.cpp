@@ -152,14 +152,14 @@ std::string range_text(const NumberRule& rule) {
   return text;
 }
 
-double checked(TomlTable& table, const std::string& name, const NumberRule& rule, std::optional<double> value,
-               double fallback) {
-  if (!value) return fallback;
+std::optional<double> checked(TomlTable& table, const std::string& name, const NumberRule& rule,
+                              std::optional<double> value) {
+  if (!value) return std::nullopt;
   const bool low = rule.low_allowed ? *value >= rule.low : *value > rule.low;
   const bool high = rule.high_allowed ? *value <= rule.high : *value < rule.high;
-  if (low && high) return *value;
+  if (low && high) return value;
   table.context().reject(table.key_of(name), fmt::format("`{}` is {}", name, *value), range_text(rule), rule.meaning);
-  return fallback;
+  return std::nullopt;
 }
 
 // Whether the path may stand in such a file and something is there; complains where not.
@@ -346,11 +346,15 @@ std::string read_choice(TomlTable& table, const std::string& name, std::initiali
 }
 
 double read_number(TomlTable& table, const std::string& name, const NumberRule& rule) {
-  return checked(table, name, rule, table.required<double>(name, rule.meaning), 1.0);
+  return checked(table, name, rule, table.required<double>(name, rule.meaning)).value_or(1.0);
 }
 
 double read_number(TomlTable& table, const std::string& name, const NumberRule& rule, double fallback) {
-  return checked(table, name, rule, table.optional<double>(name), fallback);
+  return read_optional_number(table, name, rule).value_or(fallback);
+}
+
+std::optional<double> read_optional_number(TomlTable& table, const std::string& name, const NumberRule& rule) {
+  return checked(table, name, rule, table.optional<double>(name));
 }
 
 int read_count(TomlTable& table, const std::string& name, int low, int high, std::optional<int> fallback) {

@@ -136,6 +136,8 @@ struct NumberRule {
 };
 double read_number(TomlTable& table, const std::string& name, const NumberRule& rule);
 double read_number(TomlTable& table, const std::string& name, const NumberRule& rule, double fallback);
+/// Nothing where it is missing or outside.
+std::optional<double> read_optional_number(TomlTable& table, const std::string& name, const NumberRule& rule);
 int read_count(TomlTable& table, const std::string& name, int low, int high, std::optional<int> fallback = {});
 
 /// A direction [-], required, of unit length. Nothing, with a complaint, where it is missing or has no length.

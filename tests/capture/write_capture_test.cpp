@@ -12,6 +12,9 @@ void expect_same_scene(const Scene& is, const Scene& was) {
   EXPECT_EQ(is.object.file, was.object.file);
   EXPECT_EQ(is.object.mass, was.object.mass);
   EXPECT_EQ(is.object.density, was.object.density);
+  EXPECT_EQ(is.object.mass_std, was.object.mass_std);
+  EXPECT_EQ(is.object.density_std, was.object.density_std);
+  EXPECT_EQ(is.object.scale_std, was.object.scale_std);
   EXPECT_EQ(is.object.shape_is, was.object.shape_is);
   EXPECT_EQ(is.object.surface_noise, was.object.surface_noise);
   EXPECT_EQ(is.object.surface, was.object.surface);
@@ -74,10 +77,13 @@ void fill(SmallCapture& small) {
   small.folder.write("press/000_std.csv", "id,sx,sy,sz\n0,1e-4,1e-4,2e-4\n");
   write_png(small.folder / "load.png", SmallCapture::depth_image(0.0));
   write_png(small.folder / "load_mask.png", SmallCapture::mask_image(0.0));
-  small.edit("mass = 0.8", "density = 100.0\nsurface_noise = 0.0002\nshape_is = \"static\"");
+  small.edit("gravity = [0.0, 9.81, 0.0]", "gravity = [0.0, 9.81, 0.0]\ngravity_std = 0.004");
+  small.edit("mass = 0.8",
+             "density = 100.0\ndensity_std = 2.5\nscale_std = 0.0\nsurface_noise = 0.0002\nshape_is = \"static\"");
   small.edit("noise = 0.002",
              "background = \"front/background.png\"\nevery = 1\nnoise = 0.002\ntime_offset = -0.004\n"
              "pose_std = { turn = 0.002, shift = 0.0 }\n"
+             "range_std = 0.0\nrange_scale_std = 0.001\nfocal_std = 0.003\n"
              "distortion = [-0.1, 0.02, 0.001, -0.002, 0.003]");
   small.append(R"([initial]
 linear_velocity = [0, 0.5, 0]

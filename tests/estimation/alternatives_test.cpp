@@ -6,6 +6,7 @@
 #include <chrono>
 #include <thread>
 
+#include "estimation/alternative.hpp"
 #include "estimation/fit.hpp"
 #include "support/dropped.hpp"
 #include "support/interruption.hpp"
@@ -38,6 +39,84 @@ TEST(Alternatives, WidenWhatTheNoiseLeavesOpen) {
   }
   // A bar sags by its weight over its modulus: a hundredth of the mass is a hundredth of the modulus.
   EXPECT_NEAR(share(with, "mass")->std[0], 0.01, 0.002);
+}
+
+TEST(Alternatives, CountWhatIsGivenAsWellAsTheCaptureStatesIt) {
+  RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  const FitOptions options = test::quick_fit_of_bar();
+  const FitOutcome unsaid = fit({bar}, options);
+  bar.capture.scene.object.density_std = 0.03 * *bar.capture.scene.object.density;
+  bar.capture.scene.world.gravity_std = 2.0 * judgement.given_gravity;
+  const FitOutcome stated = fit({bar}, options);
+  EXPECT_EQ(stated.theta, unsaid.theta) << "they leave the estimate alone";
+  EXPECT_NEAR(share(stated, "mass")->std[0], 3.0 * share(unsaid, "mass")->std[0], 1e-4);
+  const std::string gravity = "direction of gravity";
+  EXPECT_NEAR(share(stated, gravity)->std[0], 2.0 * share(unsaid, gravity)->std[0],
+              0.2 * share(stated, gravity)->std[0])
+      << "as far as the sag itself does not tell it";
+  EXPECT_EQ(share(unsaid, cause_scale), nullptr);
+  bar.capture.scene.object.density_std = bar.capture.scene.world.gravity_std = 0.0;
+  const FitOutcome exact = fit({bar}, options);
+  EXPECT_EQ(share(exact, "mass"), nullptr);
+  EXPECT_EQ(share(exact, gravity), nullptr);
+}
+
+/// The same recording in lengths that are a share longer than they were.
+RecordedCapture stretched(RecordedCapture recorded, double factor) {
+  Capture& capture = recorded.capture;
+  for (Vector3& v : capture.scene.object.surface->vertices) v *= factor;
+  for (FixedRegion& fixed : capture.scene.fixed) {
+    auto& box = std::get<RegionBox>(fixed.region);
+    box.min *= factor, box.max *= factor;
+  }
+  for (Plane& plane : capture.scene.planes) plane.point *= factor;
+  *capture.clouds.front().noise *= factor;
+  for (ObservedFrame& frame : recorded.observed) {
+    for (Vector3& p : frame.points) p *= factor;
+    for (float& noise : frame.noise) noise *= float(factor);
+  }
+  return recorded;
+}
+
+/// By what power of the lengths' scale Young's modulus changes between fits of both, and what the share says of it.
+void expect_power_of_scale(RecordedCapture recorded, const FitOptions& options, double factor,
+                           std::optional<double> expected = {}) {
+  constexpr double little = 1e-5;  // of which no recording tells anything
+  recorded.capture.scene.object.scale_std = little;
+  const FitOutcome right = fit({recorded}, options), longer = fit({stretched(recorded, factor)}, options);
+  ASSERT_NE(share(right, cause_scale), nullptr) << ::testing::PrintToString(right.notes);
+  const double power = share(right, cause_scale)->std[0] / little;
+  const double found =
+      std::log(test::value(longer, "youngs_modulus") / test::value(right, "youngs_modulus")) / std::log(factor);
+  EXPECT_NEAR(std::abs(found), power, 0.2 * power);
+  EXPECT_NEAR(found, expected.value_or(found), 0.1);
+}
+
+TEST(ScaleOfLengths, OfWhatSagsHasThePowersOfItsDimensions) {
+  RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  FitOptions options = test::quick_fit_of_bar();
+  options.element = ElementKind::Hexahedron;  // tetrahedra of a longer object may be others
+  expect_power_of_scale(bar, options, 1.03, 1.0);
+  Object& object = bar.capture.scene.object;
+  object.mass = *object.density * enclosed_volume(*object.surface);
+  object.density.reset();
+  expect_power_of_scale(bar, options, 1.03, -2.0);
+}
+
+/// Beyond its dimensions a swing that is seen too wide asks for another modulus.
+TEST(ScaleOfLengths, OfWhatSwingsMovesTheEstimateAsTheShareSays) {
+  test::Dropped held;
+  held.change = [](Scene& scene) {
+    scene.planes.clear();
+    scene.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.04, 1, 1)}, {}}};
+  };
+  FitOptions options;
+  options.span = 1.0, options.cells = options.coarse_cells = 6.0, options.control_points = 1, options.budget = 0.0;
+  options.tracking = TrackingUse::Off, options.correct = false;
+  for (const auto& [name, truth] :
+       {std::pair("poissons_ratio", 0.3), {"mass_damping", 0.2}, {"stiffness_damping", 0.004}})
+    options.parameters[name] = {VectorX::Constant(1, truth), false, {}};
+  expect_power_of_scale(held.record(), options, 1.01);
 }
 
 TEST(Alternatives, CountWhatAScanMayErrBy) {

@@ -1,6 +1,7 @@
 #include "estimation/press_fit.hpp"
 
 #include "base/error.hpp"
+#include "estimation/alternative.hpp"
 #include "input_errors.hpp"
 #include "support/interruption.hpp"
 #include "support/press_capture.hpp"
@@ -89,6 +90,20 @@ TEST_F(PressedLayers, OfOneLawEachWhereTheCaptureNamesThem) {
   ASSERT_TRUE(exponent);
   EXPECT_NEAR(fit.theta[exponent->at], -6.0, 1.5);
   EXPECT_NEAR(fit.theta[fit.parameters.find("youngs_modulus@top")->at], 5000.0, 300.0);
+}
+
+TEST_F(PressedLayers, CountTheirMassAsWellAsItIsStated) {
+  capture.scene.object.density = 3000.0;  // so that weight acts
+  const auto share_of_mass = [&](std::optional<double> std) {
+    capture.scene.object.density_std = std;
+    const std::vector<UncertaintyShare> budget = fitted(two_zones).uncertainty.budget;
+    const auto share = std::ranges::find(budget, cause_mass, &UncertaintyShare::cause);
+    return share == budget.end() ? 0.0 : share->std[0];
+  };
+  const double usual = share_of_mass({});
+  EXPECT_GT(usual, 0.0);
+  EXPECT_NEAR(share_of_mass(90.0), 3.0 * usual, 0.3 * usual) << "3 % in the place of 1";
+  EXPECT_EQ(share_of_mass(0.0), 0.0);
 }
 
 TEST_F(PressedLayers, AFitIsResumedWhereItWasInterrupted) {

@@ -83,7 +83,7 @@ TEST(PoseStds, AreThoseOfEachSensorAndZeroWhereAPoseIsExact) {
   Capture capture = test::SmallCapture().read();
   ASSERT_EQ(pose_stds(capture).size(), 1u);
   EXPECT_EQ(pose_stds(capture)[0], PoseStd());
-  EXPECT_TRUE(estimates_poses(capture));
+  EXPECT_TRUE(estimates_sensors(capture));
   capture.clouds.resize(2);
   EXPECT_EQ(pose_stds(capture)[1], (PoseStd{0.0, 0.0})) << "clouds lie where they are";
   capture.clouds[0].pose_std = {0.02, 0.001}, capture.clouds[1].pose_std = {0.01, 0.004};
@@ -91,7 +91,7 @@ TEST(PoseStds, AreThoseOfEachSensorAndZeroWhereAPoseIsExact) {
   capture.clouds.clear();
   capture.markers.resize(1);
   capture.depth[0].pose_std = {0.0, 0.0};
-  EXPECT_FALSE(estimates_poses(capture));
+  EXPECT_FALSE(estimates_sensors(capture));
 }
 
 TEST(PoseStds, ArePriorsOfParametersThatAreEstimated) {
@@ -109,6 +109,32 @@ TEST(PoseStds, ArePriorsOfParametersThatAreEstimated) {
   EXPECT_NEAR(other.find("sensor_shift@front")->scale * other.find("sensor_shift@front")->prior_std, 0.004, 1e-15);
 }
 
+TEST(DeviationsOfReadings, ArePriorsOfParametersThatAreEstimated) {
+  Capture capture = test::SmallCapture().read();
+  capture.depth[0].pose_std = {0.0, 0.0};
+  ParameterSet set = default_parameters(capture, 1e-3).set;
+  EXPECT_FALSE(set.find("range_error@front")->estimated);
+  EXPECT_FALSE(set.find("range_error@front")->given_std.has_value());
+  for (const char* exact : {"range_scale@front", "focal_error@front"}) EXPECT_EQ(set.find(exact), nullptr);
+  EXPECT_FALSE(estimates_sensors(capture));
+  capture.depth[0].range_std = 0.0;
+  set = default_parameters(capture, 1e-3).set;
+  EXPECT_FALSE(set.find("range_error@front")->estimated);
+  EXPECT_EQ(set.find("range_error@front")->given_std, 0.0);
+  EXPECT_FALSE(estimates_sensors(capture));
+  capture.depth[0].range_std = 0.003, capture.depth[0].range_scale_std = 0.01, capture.depth[0].focal_std = 0.02;
+  EXPECT_TRUE(estimates_sensors(capture));
+  set = default_parameters(capture, 1e-3).set;
+  for (const auto& [name, std] :
+       {std::pair("range_error@front", 0.003), {"range_scale@front", 0.01}, {"focal_error@front", 0.02}}) {
+    const Parameter& p = *set.find(name);
+    EXPECT_TRUE(p.estimated) << name;
+    EXPECT_NEAR(p.scale * p.prior_std, std, 1e-15) << name;
+    EXPECT_NEAR(p.scale * p.given_std.value(), std, 1e-15) << name;
+    EXPECT_EQ(p.prior_mean, VectorX::Zero(1)) << name;
+  }
+}
+
 TEST(PlanesSeen, AreThoseOfTheImages) {
   test::SmallCapture small;
   std::vector<std::string> notes;
@@ -117,7 +143,9 @@ TEST(PlanesSeen, AreThoseOfTheImages) {
   EXPECT_EQ(seen[0].sensor, 0);
   EXPECT_LT((seen[0].normal - Vector3(0, -1, 0)).norm(), 2e-3);
   EXPECT_NEAR(seen[0].point.y(), 0.5, 2e-3);
-  EXPECT_NEAR(seen[0].view.norm(), 1.0, 1e-12);
+  EXPECT_NEAR(seen[0].sight.direction.norm(), 1.0, 1e-12);
+  EXPECT_LT((seen[0].sight.distance * seen[0].sight.direction - (seen[0].point - Vector3(0, 0, -1))).norm(), 1e-12);
+  EXPECT_LT((seen[0].normal_off_axis - seen[0].normal.cwiseProduct(Vector3(1, 1, 0))).norm(), 1e-12);
   EXPECT_TRUE(notes.empty());
 }
 
@@ -144,7 +172,8 @@ TEST(PlanesSeen, DerivativesMatchCentralDifferences) {
   PlaneObservation seen;
   seen.normal = (plane.normal.vector(theta) + Vector3(0.01, 0.0, -0.02)).normalized();
   seen.point = plane.point.vector(theta) + Vector3(0.2, 0.003, 0.1);
-  seen.view = Vector3(0.3, -0.8, 0.2).normalized();
+  seen.sight = {Vector3(0.3, -0.8, 0.2).normalized(), 1.1, Vector3(0.2, 0.3, -0.1)};
+  seen.normal_off_axis = Vector3(0.3, 0.6, -0.2);
   seen.tilt_std = 0.003, seen.height_std = 7e-4;
   r.observations->front().planes = {seen};
   std::vector<Parameter> list = {
@@ -152,7 +181,9 @@ TEST(PlanesSeen, DerivativesMatchCentralDifferences) {
       {"plane", "", Transform::PlanePosition, plane.whole(), 0.1},
       {"range_error@front", "m", Transform::Shift, sensor.error, 0.1, -1.0, 1.0},
       {"sensor_turn@front", "rad", Transform::Vector, sensor.turn},
-      {"sensor_shift@front", "m", Transform::Vector, sensor.shift, 0.1}};
+      {"sensor_shift@front", "m", Transform::Vector, sensor.shift, 0.1},
+      {"range_scale@front", "1", Transform::Shift, sensor.range_scale, 0.1, -1.0},
+      {"focal_error@front", "1", Transform::Shift, sensor.focal_error, 0.1, -1.0}};
   for (Parameter& q : list) q.estimated = true;
   list[1].origin = theta.segment<6>(plane.whole());
   const ParameterSet parameters(layout, list, theta);
@@ -284,6 +315,56 @@ TEST(PoseOfASensor, EachOfTwoThatDisagree) {
   for (const auto& [name, shift] : {std::pair("sensor_shift@left", shifts[0]), {"sensor_shift@right", shifts[1]}})
     EXPECT_LT((Vector3(outcome.theta.segment<3>(outcome.parameters.find(name)->at)) - shift).norm(), 1e-3) << name;
 }
+
+/// What the readings err by of a camera that sees a block fall freely, a metre away and far from its optical axis.
+struct ErringCamera {
+  const char* name;
+  double value, std;
+  std::function<void(DepthCamera& camera, double std)> state;
+};
+
+class ErrorOfReadings : public ::testing::TestWithParam<ErringCamera> {};
+
+TEST_P(ErrorOfReadings, IsFoundWithTheMaterial) {
+  const ErringCamera& erring = GetParam();
+  RecordedCapture recorded = test::Dropped{}.record();
+  Capture& capture = recorded.capture;
+  DepthCamera above;
+  above.name = "above";
+  above.noise = test::Dropped::noise;
+  above.pose_std = {0.0, 0.0};
+  above.camera = look_at(Vector3(0.1, 1.2, 0.2), Vector3(0.6, 0.2, 0.2), Vector3::UnitX(), 320, 240, 1.5);
+  erring.state(above, erring.std);
+  capture.clouds.clear();
+  capture.depth = {above};
+  capture.scene.planes.clear();
+  constexpr int frames = 10;  // before it lands
+  capture.scene.timing.times.resize(frames);
+  recorded.observed.resize(frames);
+  ParameterLayout layout;
+  const SensorBlocks blocks = add_sensor_blocks(layout, "above");
+  VectorX wrong = VectorX::Zero(layout.size());
+  wrong[layout.at(erring.name + std::string("@above"))] = -erring.value;
+  const SensorCorrection error(Vector3::Zero(), blocks.values(wrong));
+  for (ObservedFrame& frame : recorded.observed)
+    for (std::size_t i = 0; i < frame.points.size(); ++i) {
+      frame.camera[i] = 0, frame.pixel[i] = int(i);
+      frame.points[i] = error.apply(frame.points[i], sight_of(above.camera, frame.points[i]));
+    }
+  FitOptions options = quick();
+  options.parameters["youngs_modulus"] = {VectorX::Constant(1, test::Dropped::youngs_modulus), false, {}};
+  const FitOutcome outcome = fit({recorded}, options);
+  ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
+  EXPECT_NEAR(test::value(outcome, erring.name + std::string("@above")), erring.value, 0.15 * std::abs(erring.value));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfEachKind, ErrorOfReadings,
+    ::testing::Values(ErringCamera{"range_error", 5e-3, 0.01, [](DepthCamera& c, double std) { c.range_std = std; }},
+                      ErringCamera{"range_scale", 0.005, 0.02,
+                                   [](DepthCamera& c, double std) { c.range_scale_std = std; }},
+                      ErringCamera{"focal_error", -0.01, 0.02, [](DepthCamera& c, double std) { c.focal_std = std; }}),
+    [](const auto& kind) { return std::string(kind.param.name); });
 
 }  // namespace
 }  // namespace pliant::sensor_poses_test

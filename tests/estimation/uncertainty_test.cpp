@@ -121,6 +121,71 @@ TEST(GivenQuantities, OfASensorAreKnownNoBetterThanItReads) {
   EXPECT_EQ(given_quantities(set, {error})[2].deviation, given_quantities(set)[2].deviation) << "of another sensor";
 }
 
+TEST(GivenQuantities, AreKnownAsWellAsWasStated) {
+  const auto stated = [](double std) {
+    std::vector<Parameter> list = young_and_poisson().parameters();
+    list[2].given_std = list[3].given_std = std;
+    return given_quantities(ParameterSet(young_and_poisson().layout(), list, young_and_poisson().reference()));
+  };
+  const std::vector<GivenQuantity> given = stated(0.004);
+  ASSERT_EQ(given.size(), 3u);
+  EXPECT_EQ(given[0].deviation, 0.004);
+  EXPECT_EQ(given[1].deviation, 0.004);
+  EXPECT_EQ(given[2].deviation, judgement.given_turn);
+  ASSERT_EQ(stated(0.0).size(), 1u) << "what is exact moves nothing";
+  EXPECT_EQ(stated(0.0)[0].cause, "pose of front");
+}
+
+/// Of E in ln E, with gravity along y: a cost of both that is least along a line.
+struct Weighed {
+  explicit Weighed(bool masses_are_known) : scale{0.01, masses_are_known} {
+    ParameterLayout layout;
+    Parameter modulus{"youngs_modulus", "Pa", Transform::Logarithm,
+                      layout.add({"youngs_modulus", "Pa", 1, Role::Material})};
+    modulus.estimated = true;
+    Parameter gravity{"gravity", "m/s^2", Transform::Direction, layout.add({"gravity", "m/s^2", 3, Role::Load})};
+    gravity.origin = Vector3(0.0, -9.81, 0.0);
+    VectorX theta(4);
+    theta << 1e4, 0.0, -9.81, 0.0;
+    all = with_strengths_of_gravity({layout, {modulus, gravity}, theta});
+  }
+  /// By how much the scale moves ln E where it has the power `power` of gravity's strength, known to that strength
+  /// but for `left` of its curvature.
+  double shift(double power, double left = 0.0) const {
+    constexpr double curvature = 1e6;
+    CostEvaluation e;
+    e.gauss_newton = curvature * MatrixX{{1.0, -power}, {-power, power * power + left}};
+    const std::vector<ModelShift> shifts = shifts_of_given(e, all, {}, scale);
+    EXPECT_EQ(shifts.size(), 1u);
+    EXPECT_EQ(shifts.front().cause, "scale of lengths");
+    return shifts.front().shift[0] / scale.deviation;
+  }
+
+  GivenScale scale;
+  ParameterSet all;
+};
+
+TEST(GivenScale, MovesWhatHasLengthsInItAndWhatFollowsGravity) {
+  EXPECT_NEAR(Weighed(true).shift(0.0), -1.0, 1e-9) << "a force by an area, of masses times lengths";
+  EXPECT_NEAR(Weighed(false).shift(0.0), 2.0, 1e-9) << "and the masses by volumes";
+  EXPECT_NEAR(Weighed(true).shift(1.0), -2.0, 1e-9) << "what sags";
+  EXPECT_NEAR(Weighed(false).shift(1.0), 1.0, 1e-9);
+}
+
+TEST(GivenScale, IsNarrowerWhereTheRecordingTellsHowFastThingsFall) {
+  const double tells = 1e-2;  // a curvature of 1e4, as much as the deviation's own
+  EXPECT_NEAR(Weighed(true).shift(1.0, tells), -2.0 / std::sqrt(2.0), 1e-9);
+}
+
+TEST(GivenScale, NoGravityIsNoStrength) {
+  const Weighed still(true);
+  std::vector<Parameter> list = still.all.parameters();
+  ASSERT_EQ(list.size(), 3u);
+  list.pop_back();
+  list[1].origin = Vector3::Zero();
+  EXPECT_EQ(with_strengths_of_gravity({still.all.layout(), list, VectorX::Zero(4)}).parameters().size(), 2u);
+}
+
 TEST(Uncertainties, OfNoiseAloneAreTheNoises) {
   const CostEvaluation e = measured(curvature());
   const Uncertainty u = uncertainty_of(e, {}, {});

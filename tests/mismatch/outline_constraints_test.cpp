@@ -13,7 +13,7 @@ namespace {
 
 using test::tolerance;
 
-constexpr double pixel = 2.5e-3;  // [m] of those at the object
+constexpr double pixel_at_object = 2.5e-3;  // [m] of those at the object
 
 PinholeCamera camera_at(const Vector3& eye, const Vector3& target) {
   PinholeCamera camera;
@@ -33,7 +33,7 @@ OutlinePoint seen_point(const PinholeCamera& camera, const Vector3& point, const
 
 /// Rays that pass a ball around the origin by `away`, and its outline's normals.
 OutlineObservation around_ball(const PinholeCamera& camera, double radius, double away, int count) {
-  OutlineObservation seen{camera, {}, 1e-3, pixel};
+  OutlineObservation seen{camera, {}, 1e-3, pixel_at_object};
   const Vector3 eye = camera.camera_to_world.translation, axis = -eye.normalized(), u = axis.unitOrthogonal();
   const double angle = std::asin((radius + away) / eye.norm());
   for (int i = 0; i < count; ++i) {
@@ -94,7 +94,7 @@ TEST(OutlineConstraints, MasksThatReachTooFarAreCorrectedByTheirError) {
       const OutlineMatch& m = matches[std::size_t(i)];
       const Vector3 view = camera.camera_to_world.rotation * m.outwards;
       const Vector3 stated = camera.camera_to_world(m.seen) + error * view;
-      change[i] = -m.direction.dot(correction.jacobian(stated, view) * direction);
+      change[i] = -m.direction.dot(correction.jacobian(stated, Sight{view}) * direction);
     }
     return change;
   };
@@ -130,12 +130,14 @@ TEST(OutlineConstraints, ContoursBeforeTheObjectItselfAreNotItsOutline) {
   // From the side the hole is hidden behind the near part of the ring; from above it is seen through.
   const PinholeCamera side = camera_at({0.0, 0.05, -0.7}, Vector3::Zero()),
                       above = camera_at({0.0, 0.7, 0.0}, Vector3::Zero());
-  const OutlineObservation inside{side, {seen_point(side, {0.0, 0.0, 0.06}, {0.0, -1.0, 0.0})}, 1e-3, pixel};
+  const OutlineObservation inside{side, {seen_point(side, {0.0, 0.0, 0.06}, {0.0, -1.0, 0.0})}, 1e-3, pixel_at_object};
   EXPECT_FALSE(outlines.match(inside, body->reference_positions())[0].is_found);
-  const OutlineObservation through{above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, -1.0})}, 1e-3, pixel};
+  const OutlineObservation through{
+      above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, -1.0})}, 1e-3, pixel_at_object};
   EXPECT_TRUE(outlines.match(through, body->reference_positions())[0].is_found);
   // The inner rim faces the hole: a normal that points into the ring is another contour's.
-  const OutlineObservation against{above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, 1.0})}, 1e-3, pixel};
+  const OutlineObservation against{
+      above, {seen_point(above, {0.0, 0.0, 0.06}, {0.0, 0.0, 1.0})}, 1e-3, pixel_at_object};
   EXPECT_FALSE(outlines.match(against, body->reference_positions())[0].is_found);
 }
 
@@ -150,7 +152,7 @@ TEST(OutlineConstraints, TangentMatchesCentralDifferencesAndAdjointTheTangent) {
   for (int v = 0; v < embedding.point_count(); ++v) bent.vertices[std::size_t(v)] = embedding.position(v, x);
   const std::vector<Vector3> normals = vertex_normals(bent);
   const PinholeCamera camera = camera_at({0.3, 0.6, -0.5}, {0.01, 0.02, 0.0});
-  OutlineObservation seen{camera, {}, 1e-3, pixel};
+  OutlineObservation seen{camera, {}, 1e-3, pixel_at_object};
   for (std::size_t v = 0; v < normals.size(); ++v) {
     const Vector3 view = (bent.vertices[v] - camera.camera_to_world.translation).normalized();
     if (std::abs(view.dot(normals[v])) < 0.1)

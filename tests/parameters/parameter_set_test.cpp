@@ -215,6 +215,27 @@ TEST(ParameterSet, DirectionsKeepTheirLengthAndTheirOrigin) {
   EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-13));
 }
 
+TEST(ParameterSet, AStrengthIsTheLengthOfWhatADirectionTurns) {
+  VectorX reference = layout.zero();
+  reference.segment<3>(layout.gravity) = Vector3(0.5, -9.7, 0.3);
+  Parameter direction{"gravity", "m/s^2", Transform::Direction, layout.gravity};
+  direction.estimated = true;
+  direction.origin = reference.segment(layout.gravity, 3);
+  Parameter strength = direction;
+  strength.name = "how strong", strength.transform = Transform::Strength;
+  const ParameterSet set(layout.layout(), {direction, strength}, reference);
+  EXPECT_EQ(set.coordinate_names().back(), "how strong.strength");
+  const Vector3 p(0.1, -0.2, 0.3);
+  const VectorX theta = set.to_theta(p);
+  EXPECT_NEAR(layout.gravity.vector(theta).norm(), std::exp(0.3) * direction.origin.norm(), tolerance(1e-13));
+  EXPECT_LT((set.to_unconstrained(theta) - p).norm(), tolerance(1e-13));
+  const MatrixX J = set.jacobian(p);
+  for (int i = 0; i < 3; ++i) {
+    const auto along = [&](double h) -> VectorX { return set.to_theta(p + h * VectorX::Unit(3, i)); };
+    EXPECT_LT(test::best_relative_error(along, J.col(i), 1.0), tolerance(1e-8)) << i;
+  }
+}
+
 TEST(ParameterSet, AShiftIsALengthOfAnySign) {
   ParameterLayout own;
   own.add({"youngs_modulus", "Pa"});
