@@ -1,6 +1,7 @@
 #include "capture/outline.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -56,6 +57,28 @@ class Tracer {
   Image<std::uint8_t> visited_;  // a bit for each direction
 };
 
+/// Not zero where a pixel or one of its eight neighbours shows what is looked for, or shows nothing.
+Image<std::uint8_t> near(Image<std::uint8_t> image, bool shown) {
+  for (std::uint8_t& pixel : image.pixels) pixel = (pixel != 0) == shown ? 1 : 0;
+  for (const auto& [du, dv] : {std::array{1, 0}, std::array{0, 1}}) {
+    const Image<std::uint8_t> before = image;
+    for (int v = 0; v < image.height; ++v)
+      for (int u = 0; u < image.width; ++u) {
+        if (before.contains(u - du, v - dv)) image(u, v) |= before(u - du, v - dv);
+        if (before.contains(u + du, v + dv)) image(u, v) |= before(u + du, v + dv);
+      }
+  }
+  return image;
+}
+
+/// The mask with gaps of up to two pixels closed (morphological closing by 3 x 3 pixels): where a sensor has no
+/// reading, next to edges of what lies nearer, the object goes on.
+Image<std::uint8_t> closed(const Image<std::uint8_t>& mask) {
+  Image<std::uint8_t> result = near(near(mask, true), false);
+  for (std::uint8_t& pixel : result.pixels) pixel = pixel != 0 ? 0 : 1;
+  return result;
+}
+
 /// Pixels within a closed curve; negative where the object lies around it.
 double area_within(const std::vector<PixelEdge>& curve) {
   // By columns: each edge at the right of the object counts the pixels to its left, each at the left takes them off.
@@ -69,9 +92,10 @@ Vector2 middle_of(const PixelEdge& e) { return {e.u + 0.5 * step_u[e.direction],
 }  // namespace
 
 Outline outline_of(const Image<std::uint8_t>& mask, const PinholeCamera& camera) {
+  const Image<std::uint8_t> whole = closed(mask);
   Outline outline;
-  Tracer tracer(mask);
-  const auto shown = std::ranges::count_if(mask.pixels, [](std::uint8_t value) { return value != 0; });
+  Tracer tracer(whole);
+  const auto shown = std::ranges::count_if(whole.pixels, [](std::uint8_t value) { return value != 0; });
   const auto straightened = [&](const Vector2& seen) {
     const Vector3 ray = camera.ray(seen.x(), seen.y());
     return Vector2(camera.fx * ray.x() + camera.cx, camera.fy * ray.y() + camera.cy);

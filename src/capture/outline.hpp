@@ -17,8 +17,8 @@ struct Outline {
 
 /// @param mask    not zero where the pixel shows the object; pixels that touch by a corner belong together
 /// @param camera  of the mask's size
-/// Curves shorter than 12 pixels are specks, holes of less than a hundredth of the object missing readings: both are
-/// left out, and so are points within four pixels of the border.
+/// Gaps of up to two pixels are closed. Curves shorter than 12 pixels are specks, holes of less than a hundredth of the
+/// object missing readings: both are left out, and so are points within four pixels of the border.
 Outline outline_of(const Image<std::uint8_t>& mask, const PinholeCamera& camera);
 
 /// Size of a pixel [m] at the object, where that is at rest before the camera as it stands in a frame.

@@ -84,6 +84,18 @@ TEST(OutlineOf, PixelsWithoutAReadingWithinTheObjectAreNoHoles) {
   EXPECT_GT(outline_of(pierced, camera_of(pierced)).points.size(), whole + 20);
 }
 
+TEST(OutlineOf, GapsOfTwoPixelsAreClosedAndWiderOnesAreSeen) {
+  const auto cut = [](int gap) {
+    const auto mask = drawn(80, 60, [&](int u, int v) {
+      return u > 10 && u < 70 && v > 10 && v < 50 && (u < 40 || u >= 40 + gap || v > 40);
+    });
+    return outline_of(mask, camera_of(mask)).points.size();
+  };
+  EXPECT_EQ(cut(1), cut(0));
+  EXPECT_EQ(cut(2), cut(0));
+  EXPECT_GT(cut(3), cut(0) + 40);
+}
+
 TEST(OutlineOf, ALensIsTakenOutOfThePoints) {
   const auto mask = drawn(80, 60, [](int u, int v) { return u > 10 && u < 70 && v > 10 && v < 50; });
   PinholeCamera camera = camera_of(mask);
@@ -173,7 +185,7 @@ TEST(Silhouettes, ThatCannotBeUsedAreRefused) {
   EXPECT_THAT(slip("front/mask_%06d", "front/%06d"), HasSubstr("16 bits a channel"));
   EXPECT_THAT(slip("width = 80", "width = 90"), HasSubstr("has 80 x 60 pixels"));
   EXPECT_THAT(slip("fx = 80.0", "fx = 3.6"), HasSubstr("focal lengths are in pixels"));
-  EXPECT_THAT(slip("outline_std = 0.5", "outline_std = 0"), HasSubstr("pixels by which the masks' outlines err"));
+  EXPECT_THAT(slip("outline_std = 0.5", "outline_std = 0"), HasSubstr("pixels by which points of the masks' outlines err"));
   EXPECT_THAT(slip("outline_std = 0.5", "noise = 0.002"), HasSubstr("noise"));
   EXPECT_THAT(slip("gravity = [0.0, 9.81, 0.0]", "up = [0, -1, 0]"), HasSubstr("silhouettes alone"));
   EXPECT_THAT(slip("mass = 0.8", "mass = 0.8\npose = \"unknown\""), HasSubstr("nothing shows the surface"));
