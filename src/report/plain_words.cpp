@@ -79,6 +79,9 @@ std::string trust_sentence(const ParameterResult& p) {
   if (!p.std || !std::isfinite(std::get<double>(*p.std)))
     return fmt::format("{} has no uncertainty: the fit did not come to its end, or the recording hardly depends on it.",
                        spoken_name(p.name));
+  const auto is_of = [&](const char* error) { return p.name.starts_with(error); };
+  if (is_of("range_error@") || is_of("outline_error@") || is_of("range_scale@") || is_of("focal_error@"))
+    return "";                            // none is expected: how far from that is told by the deviation alone
   constexpr double usual_friction = 0.3;  // beside which that of a smooth floor is known though it is nearly none
   const double std = std::get<double>(*p.std), relative = std / std::abs(*value);
   const double usual = p.name.starts_with("friction") ? usual_friction : 0.0;

@@ -185,7 +185,8 @@ TEST(Silhouettes, ThatCannotBeUsedAreRefused) {
   EXPECT_THAT(slip("front/mask_%06d", "front/%06d"), HasSubstr("16 bits a channel"));
   EXPECT_THAT(slip("width = 80", "width = 90"), HasSubstr("has 80 x 60 pixels"));
   EXPECT_THAT(slip("fx = 80.0", "fx = 3.6"), HasSubstr("focal lengths are in pixels"));
-  EXPECT_THAT(slip("outline_std = 0.5", "outline_std = 0"), HasSubstr("pixels by which points of the masks' outlines err"));
+  EXPECT_THAT(slip("outline_std = 0.5", "outline_std = 0"),
+              HasSubstr("pixels by which points of the masks' outlines err"));
   EXPECT_THAT(slip("outline_std = 0.5", "noise = 0.002"), HasSubstr("noise"));
   EXPECT_THAT(slip("gravity = [0.0, 9.81, 0.0]", "up = [0, -1, 0]"), HasSubstr("silhouettes alone"));
   EXPECT_THAT(slip("mass = 0.8", "mass = 0.8\npose = \"unknown\""), HasSubstr("nothing shows the surface"));

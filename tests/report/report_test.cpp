@@ -144,6 +144,8 @@ TEST(PlainSentences, SayHowFarTheFitCanBeTrusted) {
   EXPECT_THAT(plain_sentences(data), Not(Contains(HasSubstr("Friction is known poorly")))) << "there is none";
   data.result.parameters.back().std = 0.12;
   EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("Friction is known poorly")));
+  data.result.parameters.back().name = "outline_error@film";
+  EXPECT_THAT(plain_sentences(data), Not(Contains(HasSubstr("Outline error")))) << "whose value is about zero";
   data.result.error.surface_rms = 0.00201;
   EXPECT_THAT(plain_sentences(data), Contains(HasSubstr("lies 2.0\u00a0mm")));
   data.result.error.surface_rms = 0.0063;
