@@ -57,7 +57,7 @@ class Tracer {
   Image<std::uint8_t> visited_;  // a bit for each direction
 };
 
-/// Not zero where a pixel or one of its eight neighbours shows what is looked for, or shows nothing.
+/// Not zero where a pixel or one of its eight neighbours shows the object; with `shown` false where one does not.
 Image<std::uint8_t> near(Image<std::uint8_t> image, bool shown) {
   for (std::uint8_t& pixel : image.pixels) pixel = (pixel != 0) == shown ? 1 : 0;
   for (const auto& [du, dv] : {std::array{1, 0}, std::array{0, 1}}) {
@@ -81,7 +81,7 @@ Image<std::uint8_t> closed(const Image<std::uint8_t>& mask) {
 
 /// Pixels within a closed curve; negative where the object lies around it.
 double area_within(const std::vector<PixelEdge>& curve) {
-  // By columns: each edge at the right of the object counts the pixels to its left, each at the left takes them off.
+  // Row by row: each edge at the right of the object counts the pixels to its left, each at the left takes them off.
   double area = 0.0;
   for (const PixelEdge& e : curve) area += step_u[e.direction] * (e.u + 0.5 * step_u[e.direction]);
   return area;
