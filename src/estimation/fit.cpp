@@ -35,7 +35,8 @@ OnePass pass_of_held_out(RecordedCapture held_out, const FitOutcome& fitted, con
   fixed.cells = fitted.cells, fixed.refine = 1, fixed.alternatives = false;
   fixed.control_points = fitted.recordings.front().discretisation.body->modulus.controls;
   for (const Parameter& p : fitted.parameters.parameters()) {
-    if (!is_of_object(p)) continue;
+    const bool density_of_another = p.role == Role::Inertia && p.name != "density";
+    if (!is_of_object(p) || density_of_another) continue;
     FitOptions::Override& change = fixed.parameters[p.name];
     change.estimated = false;
     if (p.name != "density" || p.estimated) change.start = VectorX::Constant(1, fitted.theta[p.at]);
