@@ -16,7 +16,7 @@ namespace pliant::apps {
 namespace {
 
 struct Arguments {
-  std::string source, out, from, surface, camera, background;
+  std::string source, out, from, surface, camera, background, time_unit;
   std::vector<std::string> topics;
   std::vector<double> up, contact;
   double mass = 0.0, density = 0.0, rate = 0.0, depth_scale = 0.0, fx = 0.0, fov = 0.0, threshold = 0.0, length = 0.0,
@@ -57,6 +57,7 @@ ImportOptions options_of(const Arguments& arguments) {
   ImportOptions options;
   options.depth_scale = given(arguments.depth_scale), options.frame_rate = given(arguments.rate);
   if (!arguments.camera.empty()) options.camera = arguments.camera;
+  if (!arguments.time_unit.empty()) options.time_unit = arguments.time_unit;
   options.topics = arguments.topics;
   options.fx = given(arguments.fx), options.field_of_view_deg = given(arguments.fov);
   options.background = arguments.background, options.threshold = given(arguments.threshold);
@@ -143,6 +144,8 @@ void add_import(CommandLine& line, int& exit_code) {
       .delimiter(',')
       .type_name("X,Y,Z");
   command.option("--rate", arguments->rate, "frames a second, in the place of the recording's times [Hz]").positive();
+  command.option("--time-unit", arguments->time_unit, "of times in files (default: what they or their steps say)")
+      .one_of({"s", "ms", "us", "ns"});
   command.option("--depth-scale", arguments->depth_scale, "raw units of depth per metre, 1000 for millimetres")
       .positive()
       .type_name("UNITS");

@@ -55,10 +55,7 @@ NumberedFiles files_of(const NumberedName& name, const Group& group) {
   const int width = *group.digits.begin();
   const bool is_padded = group.digits.size() == 1 && width > 1;
   files.pattern = name.before + (is_padded ? fmt::format("%0{}d", width) : "%d") + name.after;
-  files.first = *group.numbers.begin();
-  files.count = int(group.numbers.size());
-  for (int k = files.first; k < *group.numbers.rbegin() && files.missing.size() < 20; ++k)
-    if (!group.numbers.contains(k)) files.missing.push_back(k);
+  files.numbers.assign(group.numbers.begin(), group.numbers.end());
   return files;
 }
 
@@ -67,7 +64,7 @@ fs::path first_of(const NumberedFiles& files) {
   const auto at = text.find('%'), end = text.find('d', at);
   const std::string width = text.substr(at + 1, end - at - 1);
   const std::string number =
-      width.empty() ? std::to_string(files.first) : fmt::format("{:0{}}", files.first, std::stoi(width));
+      width.empty() ? std::to_string(files.first()) : fmt::format("{:0{}}", files.first(), std::stoi(width));
   return text.replace(at, end - at + 1, number);
 }
 
@@ -126,7 +123,7 @@ FolderSurvey survey_folder(const fs::path& folder, bool with_surfaces) {
   std::set<fs::path> in_clouds;
   for (const auto& [name, group] : meshes) {
     const NumberedFiles files = files_of(name, group);
-    if (files.count < 2 || has_triangles(folder / first_of(files))) continue;
+    if (files.count() < 2 || has_triangles(folder / first_of(files))) continue;
     survey.clouds.push_back(files);
     for (const fs::path& path : single)
       if (const auto file = numbered(path); file && !(file->name < name) && !(name < file->name))
@@ -135,7 +132,7 @@ FolderSurvey survey_folder(const fs::path& folder, bool with_surfaces) {
   std::ranges::sort(single);
   for (const fs::path& path : single)
     if (with_surfaces && !in_clouds.contains(path)) take_surface(folder, path, survey);
-  const auto most_first = [](const NumberedFiles& a, const NumberedFiles& b) { return a.count > b.count; };
+  const auto most_first = [](const NumberedFiles& a, const NumberedFiles& b) { return a.count() > b.count(); };
   std::ranges::stable_sort(survey.depth, most_first);
   std::ranges::stable_sort(survey.clouds, most_first);
   return survey;

@@ -11,10 +11,13 @@ namespace pliant {
 
 /// Files of one name but for a number, such as depth_0012.png.
 struct NumberedFiles {
-  std::string pattern;  ///< with one %d, relative to the folder, like "depth/frame_%04d.png"
-  int first = 0, count = 0;
-  std::vector<int> missing;  ///< numbers between the first and the last that have no file
-  ImageHeader header;        ///< of the first; of images alone
+  std::string pattern;             ///< with one %d, relative to the folder, like "depth/frame_%04d.png"
+  std::vector<long long> numbers;  ///< growing
+  ImageHeader header;              ///< of the first; of images alone
+  int first() const { return int(numbers.front()); }
+  int count() const { return int(numbers.size()); }
+  /// Whether the files are numbered from 0 without gaps, as the frames of a capture are.
+  bool count_from_zero() const { return first() == 0 && numbers.back() + 1 == count(); }
 };
 
 /// What lies in a folder without a capture.toml that a capture could be made of. Paths are relative to the folder.

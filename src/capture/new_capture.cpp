@@ -11,6 +11,7 @@
 #include "base/files.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
+#include "capture/frame_numbers.hpp"
 #include "capture/point_cloud.hpp"
 #include "capture/segment.hpp"
 #include "geometry/mesh_io.hpp"
@@ -45,7 +46,7 @@ struct Draft {
 void refuse_painted_depth(const fs::path& folder, const FolderSurvey& survey) {
   for (const NumberedFiles& files : survey.pictures)
     if (files.pattern.find("depth") != std::string::npos)
-      throw InputError({{folder / number_name(files, files.first)},
+      throw InputError({{folder / number_name(files, files.first())},
                         fmt::format("colourised depth: an image of {} bits and {} channels", files.header.bits,
                                     files.header.channels),
                         "16-bit grey images of depth",
@@ -76,14 +77,14 @@ void take_camera(Draft& draft) {
   camera.depth_scale = draft.ask(facts.depth_scale, "--depth-scale UNITS",
                                  "how many raw units of a depth image are one metre (1000: millimetres)", 1000.0);
   camera.images.pattern = files.pattern;
-  draft.say(fmt::format("depth: {} images {} of {} x {} pixels", files.count, files.pattern, files.header.width,
+  draft.say(fmt::format("depth: {} images {} of {} x {} pixels", files.count(), files.pattern, files.header.width,
                         files.header.height));
   if (draft.survey.depth.size() > 1)
     draft.say(fmt::format("{} further sets of depth images are left out: give each a [[depth]] of its own",
                           draft.survey.depth.size() - 1));
   for (const NumberedFiles& pictures : draft.survey.pictures)
-    if (pictures.pattern.find("mask") != std::string::npos && pictures.count == files.count &&
-        pictures.first == files.first && pictures.header.width == files.header.width) {
+    if (pictures.pattern.find("mask") != std::string::npos && pictures.count() == files.count() &&
+        pictures.first() == files.first() && pictures.header.width == files.header.width) {
       camera.masks = FramePattern{pictures.pattern};
       draft.say("masks: " + pictures.pattern);
     }
@@ -102,7 +103,7 @@ void take_world(Draft& draft) {
   if (!capture.depth.empty() && draft.made.missing.empty()) {
     DepthCamera& camera = capture.depth.front();
     const NumberedFiles& files = draft.survey.depth.front();
-    const auto floor = floor_of(camera, draft.folder / number_name(files, files.first));
+    const auto floor = floor_of(camera, draft.folder / number_name(files, files.first()));
     if (floor && !draft.facts.up) up = floor->normal;
     if (floor) {
       draft.say(fmt::format("floor: a plane {:.2f} m from the camera, which looks down by {:.0f} degrees",
@@ -181,14 +182,20 @@ NewCapture new_capture(const fs::path& folder, const FolderSurvey& survey, const
   if (survey.depth.empty()) {
     const NumberedFiles& files = survey.clouds.front();
     capture.clouds.push_back({FramePattern{files.pattern}, 1, {}, {}});
-    draft.say(fmt::format("clouds: {} files {}", files.count, files.pattern));
+    draft.say(fmt::format("clouds: {} files {}", files.count(), files.pattern));
   }
   const NumberedFiles& files = survey.depth.empty() ? survey.clouds.front() : survey.depth.front();
-  if (files.first != 0 || !files.missing.empty())
-    draft.say(fmt::format("files are numbered from {}{}: they are copied, numbered from 0", files.first,
-                          files.missing.empty() ? "" : ", with gaps"));
+  if (!files.count_from_zero())
+    draft.say(fmt::format("files are numbered from {}: they are copied, numbered from 0", files.first()));
   const double rate = draft.ask(facts.frame_rate, "--rate HZ", "frames a second", 30.0);
-  capture.scene.timing = evenly_timed(rate, files.count, facts.start_frame.value_or(0));
+  capture.scene.timing = evenly_timed(rate, files.count(), facts.start_frame.value_or(0));
+  if (const std::vector<int> periods = periods_of(files.numbers); periods.empty()) {
+    draft.say("the numbers of the files do not grow evenly: they are taken to be evenly spaced in time");
+  } else if (periods.back() + 1 > files.count()) {
+    draft.say(note_of_gaps(periods, "the numbers of the files"));
+    capture.scene.timing.frame_rate = 0.0;
+    for (std::size_t i = 0; i < periods.size(); ++i) capture.scene.timing.times[i] = periods[i] / rate;
+  }
   capture.scene.object.mass = facts.mass;
   capture.scene.object.density = facts.density;
   if (!facts.mass && !facts.density)
@@ -201,15 +208,14 @@ NewCapture new_capture(const fs::path& folder, const FolderSurvey& survey, const
 }
 
 std::string renumbered(const fs::path& folder, const NumberedFiles& files, const std::string& to) {
-  if (files.first == 0 && files.missing.empty()) return files.pattern;
+  if (files.count_from_zero()) return files.pattern;
   make_folder(folder / to);
   const std::string extension = fs::path(files.pattern).extension().string();
   const FramePattern pattern{to + "/%06d" + extension};
-  for (int number = files.first, at = 0; at < files.count; ++number) {
-    const fs::path source = folder / number_name(files, number);
-    if (!is_file(source)) continue;
+  for (int at = 0; at < files.count(); ++at) {
+    const fs::path source = folder / number_name(files, int(files.numbers[std::size_t(at)]));
     std::error_code error;
-    fs::copy_file(source, folder / pattern(at++), fs::copy_options::overwrite_existing, error);
+    fs::copy_file(source, folder / pattern(at), fs::copy_options::overwrite_existing, error);
     if (error) throw InputError({{source}, "it cannot be copied: " + error.message(), "", "make room in " + to});
   }
   return pattern.pattern;

@@ -6,6 +6,7 @@
 #include "imports/camera_json.hpp"
 #include "imports/formats.hpp"
 #include "imports/image_sequence.hpp"
+#include "imports/time_list.hpp"
 
 namespace pliant {
 
@@ -45,18 +46,35 @@ std::vector<double> times_in_names(const std::vector<fs::path>& files) {
   return times;
 }
 
+// Names that are times themselves: seconds with a point, or numbers of more than eight digits.
+std::vector<double> times_as_names(const std::vector<fs::path>& files) {
+  constexpr double least_time = 1e8;
+  std::vector<double> times;
+  for (const fs::path& file : files) {
+    const std::string name = file.stem().string();
+    double time = 0.0;
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), time, std::chars_format::fixed);
+    if (error != std::errc() || end != name.data() + name.size()) return {};
+    if (name.find('.') == std::string::npos && time < least_time) return {};
+    times.push_back(time);
+  }
+  return times;
+}
+
 void read_times(const fs::path& source, const std::vector<fs::path>& files, const CameraFile& camera,
-                DepthStream& stream) {
-  for (const char* name : {"timestamps.txt", "times.txt"}) {
-    if (!is_file(source / name)) continue;
-    for (const NumberRow& row : read_rows(source / name))
-      stream.times.push_back(number_at(row, 0, source / name, "a time in seconds"));
+                const ImportOptions& options, DepthStream& stream, std::vector<std::string>& notes) {
+  for (const char* name : {"timestamps.txt", "times.txt", "timestamps.csv", "times.csv"}) {
+    if (options.frame_rate || !is_file(source / name)) continue;
+    stream.times = read_time_list(source / name, camera.frame_rate, options, notes);
     if (stream.times.size() != files.size())
       refuse(source / name, std::to_string(stream.times.size()) + " times",
              std::to_string(files.size()) + ", one for each depth image");
     return;
   }
   stream.times = times_in_names(files);
+  if (std::vector<double> times = times_as_names(files);
+      stream.times.empty() && times.size() > 1 && !options.frame_rate)
+    stream.times = in_seconds(std::move(times), {}, camera.frame_rate, options, source, notes);
   stream.frame_rate = camera.frame_rate.value_or(0.0);
 }
 
@@ -94,7 +112,7 @@ ImportedRecording read_images(const fs::path& source, const ImportOptions& optio
   ImportedRecording recording;
   recording.name = source_name(source);
   DepthStream stream = stream_of_files(camera.camera, *scale, files, folder);
-  read_times(source, files, camera, stream);
+  read_times(source, files, camera, options, stream, recording.notes);
   for (const char* name : {"trajectory.log", "camera_trajectory.log"})
     if (is_file(source / name) && stream.poses.empty()) read_trajectory(source / name, stream);
   recording.depth.push_back(std::move(stream));

@@ -36,6 +36,15 @@ bool comes_before(const std::string& a, const std::string& b) {
   return a.size() - i < b.size() - j;
 }
 
+std::optional<long long> last_number(const std::string& name) {
+  const auto end = std::find_if(name.rbegin(), name.rend(), is_digit).base();
+  const auto begin = std::find_if_not(std::make_reverse_iterator(end), name.rend(), is_digit).base();
+  long long number = 0;
+  const auto [after, error] =
+      std::from_chars(name.data() + (begin - name.begin()), name.data() + (end - name.begin()), number);
+  return begin != end && error == std::errc() ? std::optional(number) : std::nullopt;
+}
+
 }  // namespace
 
 std::vector<fs::path> image_files(const fs::path& folder) {
@@ -58,28 +67,42 @@ DepthStream stream_of_files(const PinholeCamera& camera, double depth_scale, std
   stream.camera = camera;
   stream.depth_scale = depth_scale;
   stream.image_count = int(files.size());
+  for (const fs::path& file : files)
+    if (const auto number = last_number(file.stem().string())) stream.numbers.push_back(*number);
+  if (stream.numbers.size() != files.size()) stream.numbers.clear();
   stream.read = [files = std::move(files), camera](int i) { return read_raw_depth(files[std::size_t(i)], camera); };
   return stream;
 }
 
-std::vector<NumberRow> read_rows(const fs::path& file) {
+NumberRow row_of(std::string_view text, int line) {
+  NumberRow row{line, {}};
+  const bool has_semicolons = text.find(';') != std::string_view::npos;
+  std::string cell;
+  for (std::size_t i = 0; i <= text.size(); ++i) {
+    const char c = i < text.size() ? text[i] : '\n';
+    const bool parts = c == ';' || (c == ',' && !has_semicolons) || std::isspace(static_cast<unsigned char>(c));
+    if (!parts) {
+      cell += c == ',' ? '.' : c;
+    } else if (!cell.empty()) {
+      row.cells.push_back(std::move(cell));
+      cell.clear();
+    }
+  }
+  return row;
+}
+
+std::vector<NumberRow> read_rows(const fs::path& file, std::string* heading) {
   const std::string content = read_file(file);
   std::vector<NumberRow> rows;
   int line = 0;
   for (std::size_t at = 0; at < content.size();) {
     const std::size_t end = std::min(content.find('\n', at), content.size());
-    NumberRow row{++line, {}};
-    std::string cell;
-    for (std::size_t i = at; i <= end; ++i) {
-      const char c = i < end ? content[i] : '\n';
-      if (c != ',' && c != '\n' && !std::isspace(static_cast<unsigned char>(c))) {
-        cell += c;
-      } else if (!cell.empty()) {
-        row.cells.push_back(std::move(cell));
-        cell.clear();
-      }
-    }
-    if (!row.cells.empty() && row.cells.front()[0] != '#') rows.push_back(std::move(row));
+    const std::string_view text = std::string_view(content).substr(at, end - at);
+    NumberRow row = row_of(text, ++line);
+    if (!row.cells.empty() && row.cells.front()[0] != '#')
+      rows.push_back(std::move(row));
+    else if (heading && !row.cells.empty() && rows.empty())
+      *heading = text.substr(text.find('#') + 1);
     at = end + 1;
   }
   return rows;

@@ -5,9 +5,12 @@
 #include <map>
 
 #include "base/files.hpp"
+#include "base/median.hpp"
+#include "capture/frame_numbers.hpp"
 #include "imports/formats.hpp"
 #include "imports/image_sequence.hpp"
 #include "imports/table.hpp"
+#include "imports/time_list.hpp"
 
 namespace pliant {
 
@@ -76,28 +79,47 @@ C3dTrajectories long_markers(const TextTable& table) {
   return result;
 }
 
-// Rate of times that are even to a hundredth of their step.
-double even_rate(const std::vector<double>& times, const fs::path& file) {
-  if (times.size() < 2 || !(times.back() > times.front()))
+// Frames at times that are whole periods apart, to a tenth of one: those that are missing show no marker.
+void place_in_time(const std::vector<double>& times, const fs::path& file, C3dTrajectories& result,
+                   std::vector<std::string>& notes) {
+  constexpr double uneven = 0.1;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  if (steps.empty() || !(std::ranges::min(steps) > 0.0))
     refuse(file, "times that do not grow", "a time for each frame", "give --rate, frames a second");
-  const double step = (times.back() - times.front()) / double(times.size() - 1);
-  for (std::size_t i = 0; i < times.size(); ++i)
-    if (std::abs(times[i] - times.front() - step * double(i)) > 0.05 * step)
+  double step = median(steps);
+  std::vector<int> periods;
+  for (int round = 0; round < 2; ++round) {  // the mean over all is more exact than one rounded step
+    periods.assign(1, 0);
+    for (std::size_t i = 1; i < times.size(); ++i) periods.push_back(int(std::lround((times[i] - times[0]) / step)));
+    if (periods.back() > 0) step = (times.back() - times.front()) / periods.back();
+  }
+  for (std::size_t i = 1; i < times.size(); ++i)
+    if (periods[i] <= periods[i - 1] || std::abs(times[i] - times.front() - step * periods[i]) > uneven * step)
       refuse(file,
-             "times that are not even: line " + std::to_string(i + 2) + " is off by more than a twentieth of the step",
+             "times that are not even: line " + std::to_string(i + 2) + " is off by more than a tenth of the step",
              "a constant frame rate", "give --rate, frames a second, where it was constant");
-  return 1.0 / step;
+  result.frame_rate = 1.0 / step;
+  if (periods.back() + 1 == int(periods.size())) return;
+  notes.push_back(note_of_gaps(periods, "the column of times"));
+  if (periods.back() > most_marker_frames)
+    refuse(file, "a gap of more than ten million frames", "times of one recording");
+  std::vector<Points> all(std::size_t(periods.back()) + 1,
+                          Points::Constant(Eigen::Index(result.labels.size()), 3, not_a_number));
+  for (std::size_t i = 0; i < periods.size(); ++i) all[std::size_t(periods[i])] = std::move(result.frames[i]);
+  result.frames = std::move(all);
 }
 
-C3dTrajectories wide_markers(const TextTable& table, const ImportOptions& options) {
+C3dTrajectories wide_markers(const TextTable& table, const ImportOptions& options, std::vector<std::string>& notes) {
   C3dTrajectories result;
   std::vector<std::pair<std::size_t, MarkerColumn>> columns;
   std::map<std::string, Eigen::Index> index;
   std::optional<std::size_t> time;
+  ColumnTitle time_title;
   for (std::size_t i = 0; i < table.lines[0].size(); ++i) {
-    const std::string name = column_title(table.lines[0][i]).name;
-    if (!time && (name == "time" || name == "time_s" || name == "t")) {
-      time = i;
+    ColumnTitle title = title_with_unit(table.lines[0][i]);
+    if (!time && says_time(title)) {
+      time = i, time_title = std::move(title);
     } else if (const auto column = marker_column(table.lines[0][i], 0.0)) {
       if (column->unit == 0.0)
         throw InputError(Problem{{table.file, 1},
@@ -132,7 +154,13 @@ C3dTrajectories wide_markers(const TextTable& table, const ImportOptions& option
     if (time) times.push_back(table_number(table, line, *time).value_or(not_a_number));
   }
   if (result.frames.empty()) refuse(table.file, "no frame", "a line for each frame");
-  if (time && !options.frame_rate) result.frame_rate = even_rate(times, table.file);
+  if (time && !options.frame_rate) {
+    if (const auto bad = std::ranges::find_if_not(times, [](double t) { return std::isfinite(t); }); bad != times.end())
+      refuse(table.file, "a line without a time: that of frame " + std::to_string(bad - times.begin()),
+             "a time for each");
+    times = in_seconds(std::move(times), time_unit(time_title.unit), {}, options, table.file, notes);
+    place_in_time(times, table.file, result, notes);
+  }
   return result;
 }
 
@@ -171,7 +199,8 @@ ImportedRecording read_marker_csv(const fs::path& source, const ImportOptions& o
     refuse(source, "a first line that names no markers", "frame,id,x,y,z, or columns NAME_x_m, NAME_y_m, NAME_z_m");
   ImportedRecording recording;
   recording.name = source_name(source);
-  recording.markers = is_long_header(table.lines[0]) ? long_markers(table) : wide_markers(table, options);
+  recording.markers =
+      is_long_header(table.lines[0]) ? long_markers(table) : wide_markers(table, options, recording.notes);
   if (options.frame_rate) recording.markers->frame_rate = options.frame_rate;
   return recording;
 }

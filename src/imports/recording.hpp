@@ -29,6 +29,7 @@ struct ImageStream {
   int image_count = 0;
   std::vector<double> times;       ///< [s] of each image, from any origin; empty: nobody knows them
   double frame_rate = 0.0;         ///< [Hz] where there are no times; 0: nobody knows it
+  std::vector<long long> numbers;  ///< of each image in its file's name; gaps are gaps in time; empty: they have none
   std::vector<RigidMotion> poses;  ///< camera to world at each image; empty: the camera stands
 };
 
@@ -68,6 +69,7 @@ struct ImportedRecording {
 struct ImportOptions {
   std::optional<double> depth_scale;            ///< raw units per metre; wins over what files say
   std::optional<double> frame_rate;             ///< [Hz]; wins over times of files
+  std::optional<std::string> time_unit;         ///< "s", "ms", "us" or "ns" of times in files; wins over what they say
   std::optional<std::filesystem::path> camera;  ///< a JSON file of the intrinsics
   std::vector<std::string> topics;              ///< of a bag: which depth images; empty: those that there are
 

@@ -10,7 +10,9 @@
 #include "base/files.hpp"
 #include "base/median.hpp"
 #include "capture/camera_poses.hpp"
+#include "capture/capture_rules.hpp"
 #include "capture/curves.hpp"
+#include "capture/frame_numbers.hpp"
 #include "capture/markers.hpp"
 #include "geometry/mesh_io.hpp"
 #include "imports/mask_overview.hpp"
@@ -55,6 +57,12 @@ Frames chosen_frames(const ImageStream& stream, const CaptureFacts& facts, const
     refuse(name, "images " + std::to_string(facts.first) + " to " + std::to_string(last) + " are asked for",
            "images from 0 to " + std::to_string(stream.image_count - 1), "correct --first, --last and --every");
   Frames frames;
+  const std::vector<int> periods = stream.times.empty() ? periods_of(stream.numbers) : std::vector<int>();
+  const bool has_gaps = !periods.empty() && periods.back() >= stream.image_count;
+  if (has_gaps) notes.push_back(note_of_gaps(periods, "the numbers in the images' names"));
+  if (stream.times.empty() && periods.empty() && !stream.numbers.empty())
+    notes.push_back(
+        "the numbers in the images' names do not grow evenly: images are taken to be evenly spaced in time");
   int late = 0;
   for (int i = facts.first; i <= last; i += facts.every) {
     if (!stream.times.empty()) {
@@ -65,6 +73,8 @@ Frames chosen_frames(const ImageStream& stream, const CaptureFacts& facts, const
         continue;
       }
       frames.times.push_back(time);
+    } else if (has_gaps) {
+      frames.times.push_back((periods[std::size_t(i)] - periods[std::size_t(facts.first)]) / stream.frame_rate);
     } else {
       frames.times.push_back(double(frames.images.size()) * facts.every / stream.frame_rate);
     }
@@ -72,7 +82,7 @@ Frames chosen_frames(const ImageStream& stream, const CaptureFacts& facts, const
   }
   if (late > 0)
     notes.push_back(written("%d images are left out: their time is not after that of the image before", late));
-  if (stream.times.empty()) frames.rate = stream.frame_rate / facts.every;
+  if (stream.times.empty() && !has_gaps) frames.rate = stream.frame_rate / facts.every;
   return frames;
 }
 
@@ -139,14 +149,21 @@ void require_size(const fs::path& folder, const ImageStream& stream, int i, cons
 }
 
 void write_images(const fs::path& folder, const DepthStream& stream, const std::vector<int>& images,
-                  const std::function<void()>& written_one) {
+                  std::vector<std::string>& notes, const std::function<void()>& written_one) {
   make_folder(folder);
+  Image<std::uint16_t> before;
+  std::vector<int> repeated;
   for (std::size_t k = 0; k < images.size(); ++k) {
-    const Image<std::uint16_t> image = stream.read(images[k]);
+    Image<std::uint16_t> image = stream.read(images[k]);
     require_size(folder, stream, images[k], image);
     write_png(image_name(folder, k), image);
+    if (image.pixels == before.pixels) repeated.push_back(int(k));
+    before = std::move(image);
     written_one();
   }
+  if (!repeated.empty())
+    notes.push_back("frames that repeat the one before, to the last bit: " + ranges_text(repeated) +
+                    "; a recorder that delivers an image twice has the second one's time wrong");
 }
 
 // Masks that show much less of the object than usual, where it may have been lost.
@@ -215,7 +232,7 @@ void write_depth(const fs::path& out, const ImportedRecording& recording, const 
     fill_camera(out, stream, images, camera);
     camera.depth_scale = stream.depth_scale;
     camera.images = {camera.name + "/%06d.png"};
-    write_images(out / camera.name, stream, images, [&] {
+    write_images(out / camera.name, stream, images, result.notes, [&] {
       if (progress) progress(++done, total);
     });
     result.capture.depth.push_back(std::move(camera));
