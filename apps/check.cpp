@@ -150,6 +150,7 @@ void describe_markers(const Capture& capture, const Survey& seen, Json& json) {
                 (markers.noise ? formatted("; noise about %.2g mm a coordinate", 1e3 * *markers.noise) : ""));
     if (!markers.empty_frames.empty()) say("", "note: no marker in frames " + ranges_text(markers.empty_frames));
     if (!markers.never_seen.empty()) say("", "note: never seen: " + listed(markers.never_seen));
+    for (const std::string& doubt : markers.doubts) say("", "note: " + doubt);
     if (!markers.left_out.empty()) say("", "left out, not among those at rest: " + listed(markers.left_out));
     json["markers"].push_back({{"file", file},
                                {"markers", markers.markers},
@@ -163,6 +164,7 @@ void describe_markers(const Capture& capture, const Survey& seen, Json& json) {
   const MarkerSurvey& loaded = *seen.loaded_markers;
   say("markers", formatted("%d under %d presses and loads, %.3g %% of positions missing, moved by up to %.3g m",
                            loaded.markers, loaded.frames, 100.0 * loaded.missing, loaded.travel));
+  for (const std::string& doubt : loaded.doubts) say("", "note: " + doubt);
   json["loaded_markers"] = {{"markers", loaded.markers},
                             {"measurements", loaded.frames},
                             {"missing", loaded.missing},
@@ -224,6 +226,11 @@ void describe_observations(const Capture& capture, const Survey& seen, Json& jso
   say("points", count + formatted(" on the object; noise %.2g mm", 1e3 * seen.median_noise));
   if (!seen.points.empty_frames.empty())
     say("", "note: no point on the object in frames " + ranges_text(seen.points.empty_frames));
+  for (std::size_t i = 0; i < seen.repeated_images.size(); ++i)
+    if (const std::vector<int>& frames = seen.repeated_images[i]; !frames.empty() && !capture.scene.timing.is_static)
+      say("", "note: \"" + capture.depth[i].name +
+                  "\" shows the same as the frame before, to the last bit, in frames " + ranges_text(frames) +
+                  ": an image that was delivered twice has a wrong time");
   if (seen.seen_share) say("", formatted("%.0f %% of the surface is seen at the start", 100.0 * *seen.seen_share));
   if (!shows_the_scan(seen))
     say("",
@@ -291,13 +298,23 @@ void describe_flight(const Capture& capture, const std::vector<ObservedFrame>& f
 void describe_planes(const Capture& capture, const Survey& seen, Json& json) {
   for (std::size_t i = 0; i < capture.scene.planes.size(); ++i) {
     const PlaneSurvey& plane = seen.planes[i];
+    const Vector3 up = capture.scene.world.up;
     const std::string known = capture.scene.planes[i].known ? "known" : "roughly known";
+    const std::string from_up =
+        capture.scene.planes.size() > 1 || capture.scene.is_held() || up.dot(capture.scene.planes[i].normal) > 0.2
+            ? ""
+            : formatted(
+                  "note: its normal is %.0f degrees from up: nothing falls on it; are gravity "
+                  "and plane in the same axes (y up, z up)?",
+                  degrees(std::acos(std::clamp(up.dot(capture.scene.planes[i].normal), -1.0, 1.0))));
     if (!plane.seen) {
       say("plane", known + ", not seen by any camera");
+      if (!from_up.empty()) say("", from_up);
       continue;
     }
     say("plane", known + formatted(", seen with %.2f mm rms, %.2f degrees and %.1f mm from what is declared",
                                    1e3 * plane.seen->rms, degrees(plane.angle), 1e3 * plane.distance));
+    if (!from_up.empty()) say("", from_up);
     json["planes"].push_back({{"rms", plane.seen->rms},
                               {"point", vector_json(plane.seen->point)},
                               {"normal", vector_json(plane.seen->normal)},

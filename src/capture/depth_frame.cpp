@@ -7,6 +7,8 @@ namespace pliant {
 
 namespace {
 
+constexpr std::uint16_t greatest_raw = 65535;  // no reading, as some recorders write it
+
 template <class Pixel>
 Image<Pixel> of_size(Image<Pixel> image, const RecordingCamera& recording, const std::filesystem::path& path) {
   const PinholeCamera& camera = recording.camera;
@@ -20,9 +22,29 @@ Image<Pixel> of_size(Image<Pixel> image, const RecordingCamera& recording, const
 
 }  // namespace
 
+std::uint16_t range_limit(const Image<std::uint16_t>& raw) {
+  constexpr double least_share = 0.01, farthest = 0.5;  // of the pixels; of the limit, what else is read
+  constexpr int least_limit = 2047;
+  std::uint16_t limit = 0, below = 0;
+  for (const std::uint16_t r : raw.pixels)
+    if (r != greatest_raw) limit = std::max(limit, r);
+  std::size_t at_limit = 0, nearer = 0;
+  for (const std::uint16_t r : raw.pixels)
+    if (r == limit)
+      ++at_limit;
+    else if (r > 0 && r < limit)
+      ++nearer, below = std::max(below, r);
+  const bool is_full_scale = (limit & (limit + 1)) == 0 || limit % 1000 == 0;
+  const double least = least_share * double(raw.pixels.size());
+  const bool stands_apart = double(at_limit) > least && double(nearer) > least && below <= farthest * limit;
+  return limit >= least_limit && is_full_scale && stands_apart ? limit : greatest_raw;
+}
+
 DepthImage to_metres(const Image<std::uint16_t>& raw, double depth_scale) {
+  const std::uint16_t limit = range_limit(raw);
   DepthImage depth(raw.width, raw.height);
-  std::ranges::transform(raw.pixels, depth.pixels.begin(), [=](std::uint16_t r) { return float(r / depth_scale); });
+  std::ranges::transform(raw.pixels, depth.pixels.begin(),
+                         [=](std::uint16_t r) { return r >= limit ? 0.0f : float(r / depth_scale); });
   return depth;
 }
 

@@ -24,7 +24,12 @@ std::optional<Image<std::uint8_t>> read_object_mask(const Capture& capture, cons
 Image<std::uint8_t> read_object_mask(const Capture& capture, const SilhouetteCamera& camera, int frame);
 Image<std::uint8_t> read_object_mask(const RecordingCamera& camera, const std::filesystem::path& path);
 
-/// Raw readings to metres.
+/// The raw value from which on pixels of an image have no reading: 65535, or where the sensor's range ends. That is the
+/// greatest value of an image where it is full scale (2^n - 1, or whole thousands), a hundredth of the pixels have just
+/// that, as many have less, and none more than half of it.
+std::uint16_t range_limit(const Image<std::uint16_t>& raw);
+
+/// Raw readings to metres; 0 where there is none: 0 and `range_limit`.
 DepthImage to_metres(const Image<std::uint16_t>& raw, double depth_scale);
 
 }  // namespace pliant

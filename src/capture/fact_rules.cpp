@@ -370,11 +370,13 @@ void check_intrinsics(RuleContext& context) {
                             "0.13 to 30 times the width",
                             "focal lengths are in pixels: millimetres / sensor width x image width");
     const bool is_normalised = camera.cx <= 1.0 && camera.cy <= 1.0;
-    const auto is_off = [](double c, int side) { return c < -0.5 * side || c > 1.5 * side; };
+    const auto is_off = [](double c, int side) { return c < 0.3 * side || c > 0.7 * side; };
     if (is_normalised || is_off(camera.cx, camera.width) || is_off(camera.cy, camera.height))
-      context.toml.reject(item(kind, i, "cx"),
-                          "the principal point (" + text_of(camera.cx, "") + ", " + text_of(camera.cy, "") + ")",
-                          "a point in the image, in pixels", "mostly near (width / 2, height / 2)");
+      context.toml.reject(
+          item(kind, i, "cx"), "the principal point (" + text_of(camera.cx, "") + ", " + text_of(camera.cy, "") + ")",
+          "a point in the middle of the image (0.3 to 0.7 of its size), in pixels",
+          "these are intrinsics of another image: of the colour camera, of another resolution, or of one "
+          "that was not turned or cut; write those of the depth images");
   });
 }
 

@@ -7,7 +7,6 @@
 #include "base/median.hpp"
 #include "capture/capture_rules.hpp"
 #include "capture/curves.hpp"
-#include "capture/depth_frame.hpp"
 #include "capture/image_io.hpp"
 #include "capture/markers.hpp"
 #include "capture/point_cloud.hpp"
@@ -18,11 +17,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double nearest_scene = 0.02, farthest_scene = 50.0;  // [m] median depth of an image
-constexpr int least_pixels = 10;                               // that show something near the object
-constexpr double most_of_border = 0.5;                         // of a mask, that the object may cover
-constexpr double farthest_markers = 100.0;                     // sizes of the object from where they rest (median)
-constexpr double rate_tolerance = 5e-4;                        // tells 59.94 Hz from 60 Hz
+constexpr double farthest_markers = 100.0;  // sizes of the object from where they rest (median)
+constexpr double rate_tolerance = 5e-4;     // tells 59.94 Hz from 60 Hz
 
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
@@ -73,7 +69,9 @@ void check_header(RuleContext& context, const std::string& key, const fs::path& 
   context.toml.reject(
       key, "\"" + path.lexically_relative(context.capture.folder).string() + "\" has " + fault,
       size_text(camera.width, camera.height) + (kind == Kind::Depth ? " pixels of 16-bit grey" : " pixels of 8 bits"),
-      "correct the camera's size, or write the images again");
+      fault == size_text(camera.height, camera.width) + " pixels"
+          ? "the images are turned by 90 degrees against the camera: write them again as the sensor sees them"
+          : "correct the camera's size, or write the images again");
 }
 
 // The first fault of a sequence, with the number of files that share it.
@@ -87,105 +85,6 @@ void check_sequence(RuleContext& context, const RecordingCamera& camera, const s
     check_header(context, key, path, camera.camera, kind);
     return;
   }
-}
-
-// Whether there are frames, and `start_frame` is one of them.
-bool has_start(const RuleContext& context) {
-  return !context.capture.scene.timing.times.empty() && context.toml.is_sound("timing.start_frame");
-}
-
-// The first frame of a sequence that shows the object free.
-int first_free_frame(const Capture& capture, int every) {
-  const int frame = (capture.scene.timing.start_frame + every - 1) / every * every;
-  return frame < capture.frame_count() ? frame : (capture.frame_count() - 1) / every * every;
-}
-
-struct Sphere {
-  Vector3 centre;
-  double radius;
-};
-
-// Where the object may be: around its place at rest, and on the way of a fall. Generous on purpose.
-std::vector<Sphere> possible_places(const Capture& capture) {
-  const Box box = bounding_box(*capture.scene.object.surface);
-  const double own = 0.5 * box.extent().norm();
-  const double radius = (capture.scene.timing.is_static || capture.scene.initial.released ? 3.0 : 1.5) * own;
-  std::vector<Sphere> places{{0.5 * (box.min + box.max), radius}};
-  const bool may_fall = !capture.scene.is_held() && !capture.scene.timing.is_static;
-  for (double fallen = own; may_fall && fallen < 2.0; fallen += own)
-    places.push_back({places[0].centre - fallen * capture.scene.world.up, radius});
-  for (const FixedRegion& fixed : capture.scene.fixed)
-    if (fixed.displaced_to) places.push_back({(*fixed.displaced_to)(places[0].centre), radius});
-  for (const LedRegion& led : capture.scene.led)
-    for (const auto& key : led.motion) places.push_back({places[0].centre + key.value.head<3>(), radius});
-  return places;
-}
-
-bool may_see(const PinholeCamera& camera, const Sphere& sphere) {
-  const Vector3 seen = camera.project(sphere.centre);
-  if (seen.z() < sphere.radius) return seen.z() > -sphere.radius;
-  const double du = camera.fx * sphere.radius / seen.z(), dv = camera.fy * sphere.radius / seen.z();
-  return seen.x() + du > 0 && seen.x() - du < camera.width && seen.y() + dv > 0 && seen.y() - dv < camera.height;
-}
-
-bool is_near(const std::vector<Sphere>& places, const Vector3& point) {
-  return std::ranges::any_of(places,
-                             [&](const Sphere& s) { return (point - s.centre).squaredNorm() < s.radius * s.radius; });
-}
-
-/// Whether a ray, from where the camera stands and of depth 1 in the world's axes, passes through a sphere.
-bool passes(const PinholeCamera& lens, double u, double v, const Sphere& sphere) {
-  const Vector3 ray = lens.unproject(u, v, 1.0) - lens.camera_to_world.translation;
-  const Vector3 to = sphere.centre - lens.camera_to_world.translation;
-  return ray.dot(to) > 0.0 && ray.cross(to).squaredNorm() < sphere.radius * sphere.radius * ray.squaredNorm();
-}
-
-int pixels_near(const Capture& capture, const SilhouetteCamera& camera, int frame, const std::vector<Sphere>& places) {
-  const Image<std::uint8_t> mask = read_object_mask(capture, camera, frame);
-  const PinholeCamera lens = camera.at(frame);
-  int count = 0;
-  for (int v = 0; v < mask.height; ++v)
-    for (int u = 0; u < mask.width; ++u)
-      if (mask(u, v) && std::ranges::any_of(places, [&](const Sphere& s) { return passes(lens, u, v, s); })) ++count;
-  return count;
-}
-
-int pixels_near(const Capture& capture, const DepthCamera& camera, int frame, const std::vector<Sphere>& places) {
-  const DepthImage depth = read_depth(capture, camera, frame);
-  const auto mask = read_object_mask(capture, camera, frame);
-  const PinholeCamera lens = camera.at(frame);
-  int count = 0;
-  for (int v = 0; v < depth.height; ++v)
-    for (int u = 0; u < depth.width; ++u)
-      if (depth(u, v) > 0 && (!mask || (*mask)(u, v)) && is_near(places, lens.unproject(u, v, depth(u, v)))) ++count;
-  return count;
-}
-
-// What is wrong with a file that several blocks name is told once.
-void add_problems(RuleContext& context, const std::string& key, const InputError& error) {
-  std::vector<Problem>& told = context.toml.problems;
-  for (const Problem& problem : error.problems()) {
-    const auto is_same = [&](const Problem& other) { return to_string(other) == to_string(problem); };
-    if (std::ranges::none_of(told, is_same)) told.push_back(problem);
-  }
-  context.toml.broken.insert(key);
-}
-
-// Reads a file that a block names.
-template <class Read>
-void try_file(RuleContext& context, const std::string& key, const Read& read) {
-  try {
-    read();
-  } catch (const InputError& error) {
-    add_problems(context, key, error);
-  }
-}
-
-// Visits the blocks of an array of tables in which nothing was found broken, each with its key.
-template <class Block, class Visit>
-void for_each_sound(RuleContext& context, const char* name, const std::vector<Block>& blocks, const Visit& visit) {
-  for (std::size_t i = 0; i < blocks.size(); ++i)
-    if (const std::string key = item(name, i); context.toml.is_sound(key)) visit(blocks[i], key);
 }
 
 void check_markers_on_object(RuleContext& context, const std::string& key, const MarkerSet& markers) {
@@ -240,6 +139,15 @@ void check_marker_pair(RuleContext& context, const std::string& block, const fs:
 
 }  // namespace
 
+void add_problems(RuleContext& context, const std::string& key, const InputError& error) {
+  std::vector<Problem>& told = context.toml.problems;
+  for (const Problem& problem : error.problems()) {
+    const auto is_same = [&](const Problem& other) { return to_string(other) == to_string(problem); };
+    if (std::ranges::none_of(told, is_same)) told.push_back(problem);
+  }
+  context.toml.broken.insert(key);
+}
+
 std::vector<int> frames_of(int frame_count, int every) {
   std::vector<int> frames;
   for (int frame = 0; every > 0 && frame < frame_count; frame += every) frames.push_back(frame);
@@ -271,30 +179,9 @@ void check_depth_files(RuleContext& context) {
   });
 }
 
-/// What the first mask of the free object shows: nothing, or all but the object.
-void check_first_mask(RuleContext& context, const SilhouetteCamera& camera, const std::string& key) {
-  const FramePattern& pattern = camera.masks;
-  const int frame = first_free_frame(context.capture, camera.every);
-  const Image<std::uint8_t> mask = read_object_mask(context.capture, camera, frame);
-  const std::string file = "\"" + pattern(frame).string() + "\"";
-  if (std::ranges::all_of(mask.pixels, [](std::uint8_t m) { return m == 0; }))
-    return context.toml.reject(key, file + " shows no pixel of the object", "pixels that are not zero on the object",
-                               "the object must be in the picture when it begins to move");
-  int border = 0, of_object = 0;
-  for (int v = 0; v < mask.height; ++v)
-    for (int u = 0; u < mask.width; ++u)
-      if (u == 0 || v == 0 || u == mask.width - 1 || v == mask.height - 1) ++border, of_object += mask(u, v) != 0;
-  if (of_object > most_of_border * border)
-    context.toml.reject(key, file + " shows the object along most of the picture's border",
-                        "zero around the object, and another value on it",
-                        "turn the masks round: they look inverted; or move the camera away from the object");
-}
-
 void check_silhouette_files(RuleContext& context) {
   for_each_sound(context, "silhouette", context.capture.silhouettes, [&](const auto& camera, const std::string& key) {
     check_sequence(context, camera, key + ".masks", camera.masks, Kind::Mask);
-    if (context.toml.is_sound(key) && has_start(context))
-      try_file(context, key, [&] { check_first_mask(context, camera, key + ".masks"); });
   });
 }
 
@@ -325,6 +212,50 @@ void check_press_markers(RuleContext& context) {
   for_each_sound(context, "press", context.capture.presses, [&](const Press& press, const std::string& key) {
     check_marker_pair(context, key, press.markers_rest, press.markers, press.markers_std);
   });
+}
+
+/// Against a whole set of forces, markers next to where they act move only where the forces are the sensor's:
+/// reactions.
+void check_force_signs(RuleContext& context) {
+  constexpr double against = -0.2;  // cosine between force and motion
+  const Capture& capture = context.capture;
+  int fitted = 0, reversed = 0;
+  for_each_sound(context, "press", capture.presses, [&](const Press& press, const std::string& key) {
+    if (!is_fitted(press.role)) return;
+    try_file(context, key, [&] {
+      const MarkerSet markers = read_marker_pair(press.markers_rest, press.markers);
+      std::vector<std::pair<double, int>> nearest;
+      for (int i = 0; i < markers.marker_count(); ++i)
+        if (markers.is_seen(0, i))
+          nearest.emplace_back((markers.rest.row(i).transpose() - press.contact_centre).norm(), i);
+      std::ranges::sort(nearest);
+      nearest.resize(std::min(nearest.size(), std::max<std::size_t>(3, nearest.size() / 10)));
+      double work = 0.0, most = 0.0;
+      for (const auto& [distance, i] : nearest) {
+        const Vector3 way = markers.frames[0].row(i) - markers.rest.row(i);
+        work += way.dot(press.force), most += way.norm() * press.force.norm();
+      }
+      ++fitted, reversed += work < against * most;
+    });
+  });
+  if (fitted > 0 && reversed == fitted)
+    context.toml.complain(
+        "press[0].force",
+        fitted == 1 ? "the markers next to the contact move against the force"
+                    : "the markers next to the contact move against the force, under all " + std::to_string(fitted) +
+                          " presses",
+        "the force of the probe on the object",
+        "a force sensor behind the probe reads the reaction, which has the opposite sign: turn it round");
+  fitted = reversed = 0;
+  for_each_sound(context, "grip", capture.grips, [&](const Grip& grip, const std::string&) {
+    if (!grip.force || !is_fitted(grip.role) || grip.displacement.isZero()) return;
+    const Vector3 direction = grip.force_direction.isZero() ? grip.displacement : grip.force_direction;
+    ++fitted, reversed += *grip.force * direction.dot(grip.displacement) < 0.0;
+  });
+  if (fitted > 1 && reversed == fitted)
+    context.toml.complain("grip[0].force", "all " + std::to_string(fitted) + " forces pull against the displacements",
+                          "the force of the grip on the object",
+                          "a load cell reads the reaction, which has the opposite sign: turn it round");
 }
 
 void check_load_files(RuleContext& context) {
@@ -364,79 +295,14 @@ void check_grip_markers(RuleContext& context) {
   });
 }
 
-void check_depth_scale(RuleContext& context) {
-  if (!has_start(context)) return;
-  for_each_sound(context, "depth", context.capture.depth, [&](const DepthCamera& camera, const std::string& key) {
-    try_file(context, key, [&] {
-      auto readings = read_depth(context.capture, camera, first_free_frame(context.capture, camera.every)).pixels;
-      std::erase_if(readings, [](float z) { return !(z > 0); });
-      if (readings.empty())
-        return context.toml.reject(key + ".images", "the first image of the free object has no reading",
-                                   "depth readings", "0 means no reading");
-      const float distance = median(std::move(readings));
-      if (distance < nearest_scene || distance > farthest_scene)
-        context.toml.reject(key + ".depth_scale", "a scene " + text_of(distance, "m") + " away (median)",
-                            "0.02 to 50 m", "depth_scale is raw units per metre: 1000 for millimetres");
-    });
-  });
-}
-
-void check_cameras_see_object(RuleContext& context) {
-  const Capture& capture = context.capture;
-  if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || !has_start(context)) return;
-  const std::vector<Sphere> places = possible_places(capture);
-  const auto check = [&](const auto& camera, const std::string& block, const std::string& what) {
-    const std::string key = block + ".camera_to_world";
-    const int last = (capture.frame_count() - 1) / camera.every * camera.every;
-    const int first = first_free_frame(capture, camera.every);
-    const int middle = (first + last) / 2 / camera.every * camera.every;
-    const auto sees = [&](const Sphere& sphere) {
-      return may_see(camera.at(first), sphere) || may_see(camera.at(middle), sphere) ||
-             may_see(camera.at(last), sphere);
-    };
-    const std::string advice = "the pose maps camera (x right, y down, z forward) to world coordinates, in metres";
-    if (std::ranges::none_of(places, sees))
-      return context.toml.complain(key, "camera \"" + camera.name + "\" looks past the rest surface",
-                                   "the object in its view", advice);
-    try_file(context, block, [&] {
-      int seen = 0;
-      for (const int frame : {first, middle, last}) seen = std::max(seen, pixels_near(capture, camera, frame, places));
-      if (seen < least_pixels)
-        context.toml.complain(key,
-                              "camera \"" + camera.name + "\" has " +
-                                  (seen == 0 ? "no" : "only " + std::to_string(seen)) + " " + what +
-                                  " near the rest surface",
-                              what + " of the object", advice);
-    });
-  };
-  for_each_sound(context, "depth", capture.depth,
-                 [&](const auto& camera, const std::string& block) { check(camera, block, "readings"); });
-  for_each_sound(context, "silhouette", capture.silhouettes,
-                 [&](const auto& camera, const std::string& block) { check(camera, block, "pixels of its masks"); });
-}
-
-void check_clouds_near_object(RuleContext& context) {
-  const Capture& capture = context.capture;
-  if (!capture.scene.object.surface || !capture.scene.object.pose_is_known || !has_start(context)) return;
-  const std::vector<Sphere> places = possible_places(capture);
-  for_each_sound(context, "cloud", capture.clouds, [&](const CloudSequence& cloud, const std::string& key) {
-    try_file(context, key, [&] {
-      const auto points = read_points(capture.folder / cloud.points(first_free_frame(capture, cloud.every)));
-      if (std::ranges::none_of(points, [&](const Vector3& p) { return is_near(places, p); }))
-        context.toml.complain(key + ".points", "no point near the rest surface", "points on the object",
-                              "clouds are in metres, in world coordinates");
-    });
-  });
-}
-
 }  // namespace
 
 std::span<const Rule> capture_rules() {
   static const std::vector<Rule> rules = [] {
     std::vector<Rule> all = fact_rules();
     all.insert(all.end(), {check_depth_files, check_silhouette_files, check_clouds, check_markers, check_press_markers,
-                           check_load_files, check_curve_files, check_grip_markers, check_depth_scale,
-                           check_cameras_see_object, check_clouds_near_object});
+                           check_force_signs, check_load_files, check_curve_files, check_grip_markers});
+    std::ranges::copy(sight_rules(), std::back_inserter(all));
     return all;
   }();
   return rules;

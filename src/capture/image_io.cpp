@@ -245,11 +245,15 @@ Image<std::uint8_t> read_mask(const fs::path& path) {
   const auto bytes = pixels_of(content, path, header);
   Image<std::uint8_t> mask(header.width, header.height);
   const std::size_t channels = std::size_t(header.channels);
-  const bool has_alpha = channels == 2 || channels == 4;
+  // Alpha is the mask where it differs over the image; elsewhere colours are.
+  bool has_alpha = false;
+  for (std::size_t i = 0; (channels == 2 || channels == 4) && i < mask.pixels.size() && !has_alpha; ++i)
+    has_alpha = bytes[(i + 1) * channels - 1] != bytes[channels - 1];
+  const std::size_t colours = channels == 2 || channels == 4 ? channels - 1 : channels;
   for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
     const auto* pixel = bytes.data() + i * channels;
     const bool shown = has_alpha ? pixel[channels - 1] != 0
-                                 : std::any_of(pixel, pixel + channels, [](png_byte value) { return value != 0; });
+                                 : std::any_of(pixel, pixel + colours, [](png_byte value) { return value != 0; });
     mask.pixels[i] = shown ? 255 : 0;
   }
   return mask;

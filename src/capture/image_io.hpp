@@ -45,7 +45,8 @@ Image<std::uint16_t> read_depth_image(const std::filesystem::path& path);
 Image<std::uint16_t> decode_depth_image(const std::string& content, const std::filesystem::path& source);
 
 /// Reads a mask, PNG or PGM with at most 8 bits a channel: 255 where it shows the object, else 0.
-/// With an alpha channel alpha decides, else any channel that is not zero. Throws InputError for a damaged file.
+/// Alpha decides where it differs over the image, else any colour that is not zero. Throws InputError for a damaged
+/// file.
 Image<std::uint8_t> read_mask(const std::filesystem::path& path);
 
 /// Write PNG files, whole or not at all.

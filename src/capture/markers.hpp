@@ -54,6 +54,14 @@ Points read_marker_deviations(const std::filesystem::path& path, std::span<const
 /// appear twice in a frame or have no trajectory, frames beyond the last.
 MarkerSet read_markers(const MarkerTrack& files, int frame_count);
 
+/// What of a track may be no motion: markers that trade places from one frame to the next, and such that jump by more
+/// than a twentieth of all markers' extent, and a dozen times what they mostly move, where the others do not. A
+/// sentence each, the first few.
+/// @param begins_at_rest  the first frame shows the object about where `rest` has it; else traded names are told from
+/// the
+///                        second on
+std::vector<std::string> marker_doubts(const MarkerSet& markers, bool begins_at_rest);
+
 /// Standard deviation of a coordinate [m] that a track shows by itself, frame by frame: of third differences in time,
 /// which leave little of a smooth motion, the median over all. Nothing where fewer than a dozen of them were seen.
 std::optional<double> track_noise(const MarkerSet& markers);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/files.hpp"
 #include "base/median.hpp"
 #include "capture/depth_frame.hpp"
 #include "capture/depth_noise.hpp"
@@ -163,20 +164,6 @@ std::vector<CloudScene> survey_clouds(const Capture& capture) {
   return scenes;
 }
 
-// Standard deviation of a coordinate, from second differences over three neighbouring frames: of three independent
-// deviations, 1, -2 and 1 times. Steady motion drops out, acceleration does not: of fast motion it is an upper bound.
-std::optional<double> marker_noise(const MarkerSet& markers) {
-  constexpr double deviation_per_median = 1.4826;
-  std::vector<double> differences;
-  for (std::size_t f = 2; f < markers.frames.size(); ++f) {
-    const Points difference = markers.frames[f] - 2.0 * markers.frames[f - 1] + markers.frames[f - 2];
-    for (const double d : difference.reshaped())
-      if (std::isfinite(d)) differences.push_back(std::abs(d));
-  }
-  if (differences.empty()) return std::nullopt;
-  return deviation_per_median * median(std::move(differences)) / std::sqrt(6.0);
-}
-
 // The greatest way over all frames, of the frame's median marker.
 double median_travel(const MarkerSet& markers) {
   double travel = 0.0;
@@ -210,7 +197,7 @@ MarkerSurvey survey_markers(const MarkerSet& markers) {
   for (std::size_t i = 0; i < sightings.size(); ++i)
     if (sightings[i] == 0) result.never_seen.push_back(markers.ids[i]);
   result.left_out = markers.left_out;
-  result.noise = marker_noise(markers);
+  result.noise = track_noise(markers);
   result.travel = median_travel(markers);
   result.frame_rate = markers.frame_rate;
   return result;
@@ -218,13 +205,22 @@ MarkerSurvey survey_markers(const MarkerSet& markers) {
 
 std::optional<MarkerSurvey> survey_loaded_markers(const Capture& capture) {
   std::vector<MarkerSet> sets;
-  for (const Press& press : capture.presses) sets.push_back(read_marker_pair(press.markers_rest, press.markers));
-  for (const Load& load : capture.loads)
-    if (load.markers && load.markers_rest) sets.push_back(read_marker_pair(*load.markers_rest, *load.markers));
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < capture.presses.size(); ++i) {
+    sets.push_back(read_marker_pair(capture.presses[i].markers_rest, capture.presses[i].markers));
+    names.push_back("press " + std::to_string(i + 1));
+  }
+  for (std::size_t i = 0; i < capture.loads.size(); ++i)
+    if (const Load& load = capture.loads[i]; load.markers && load.markers_rest) {
+      sets.push_back(read_marker_pair(*load.markers_rest, *load.markers));
+      names.push_back("load " + std::to_string(i + 1));
+    }
   if (sets.empty()) return std::nullopt;
   MarkerSurvey result;
   double positions = 0.0;
-  for (const MarkerSet& set : sets) {
+  for (std::size_t k = 0; k < sets.size(); ++k) {
+    const MarkerSet& set = sets[k];
+    for (const std::string& doubt : marker_doubts(set, true)) result.doubts.push_back(names[k] + ": " + doubt);
     result.markers = std::max(result.markers, set.marker_count());
     positions += set.marker_count();
     std::vector<double> ways;
@@ -267,12 +263,13 @@ std::optional<int> first_contact(const Capture& capture, const MarkerSet& marker
 void add_markers(const Capture& capture, Survey& result) {
   for (const MarkerTrack& files : capture.markers) {
     const MarkerSet markers = read_markers(files, capture.frame_count());
-    const MarkerSurvey own = survey_markers(markers);
+    MarkerSurvey own = survey_markers(markers);
+    own.doubts = marker_doubts(markers, !capture.scene.initial.released && capture.scene.timing.start_frame == 0);
     const double noise = own.noise.value_or(0.0);
     result.moves = result.moves || (!capture.scene.timing.is_static && own.travel > moving_markers * noise);
     if (const auto contact = first_contact(capture, markers, noise))
       result.first_contact = std::min(result.first_contact.value_or(*contact), *contact);
-    result.markers.push_back(own);
+    result.markers.push_back(std::move(own));
   }
   result.loaded_markers = survey_loaded_markers(capture);
 }
@@ -332,6 +329,18 @@ void add_outlines(const Capture& capture, std::span<const ObservedFrame> frames,
     if (const auto contact = first_contact(capture, path, own.noise))
       result.first_contact = std::min(result.first_contact.value_or(*contact), *contact);
   }
+}
+
+std::vector<int> repeated_images(const Capture& capture, const DepthCamera& camera) {
+  std::vector<int> repeated;
+  std::string before;
+  for (int frame = 0; frame < capture.frame_count(); frame += camera.every) {
+    if (frame < capture.scene.timing.start_frame) continue;
+    std::string now = read_file(capture.folder / camera.images(frame));
+    if (now == before) repeated.push_back(frame);
+    before = std::move(now);
+  }
+  return repeated;
 }
 
 std::string millimetres(double metres) {
@@ -431,6 +440,7 @@ void add_surroundings(const Capture& capture, const Survey& seen, Identifiabilit
 
 Survey survey(const Capture& capture, std::span<const ObservedFrame> frames) {
   Survey result;
+  for (const DepthCamera& camera : capture.depth) result.repeated_images.push_back(repeated_images(capture, camera));
   std::vector<std::pair<int, int>> counts;
   for (const ObservedFrame& frame : frames) counts.emplace_back(frame.frame, int(frame.points.size()));
   result.points = count_points(counts);

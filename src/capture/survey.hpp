@@ -44,6 +44,7 @@ struct MarkerSurvey {
   double travel = 0.0;               ///< [m] greatest way of the seen markers (their median) from the first sighting;
                                      ///< under loads: from rest
   std::optional<double> frame_rate;  ///< [Hz] as the track's file states it
+  std::vector<std::string> doubts;   ///< traded names and jumps, a sentence each
 };
 
 /// The outlines of one [[silhouette]] block.
@@ -56,6 +57,9 @@ struct OutlineSurvey {
 
 /// What a recording shows, in figures.
 struct Survey {
+  /// Of each depth camera the frames after `start_frame` whose image file is that of the frame before, byte by byte: no
+  /// sensor reads a scene twice alike.
+  std::vector<std::vector<int>> repeated_images;
   PointCounts points;
   double median_noise = 0.0;  ///< of points along the surface normal [m]
   double travel = 0.0;        ///< greatest displacement of the seen points' centroid or box from the first frame [m]

@@ -147,8 +147,8 @@ const Slip slips[] = {
     {"PoseMirrored", "[1, 0, 0, 0]", "[-1, 0, 0, 0]", "mirrors", "camera_to_world"},
     {"PoseTransposed", "[0, 0, 1, -1], [0, 0, 0, 1]", "[0, 0, 1, 0], [0, 0, -1, 1]", "transposed", "camera_to_world"},
     {"PoseShort", ", [0, 0, 0, 1]]", "]", "a 4 x 4 matrix", "camera_to_world"},
-    {"PoseLooksAway", "[0, 0, 1, -1]", "[0, 0, 1, 9]", "looks past the rest surface", "camera_to_world"},
-    {"PoseOffTheReadings", "[0, 0, 1, -1]", "[0, 0, 1, -30]", "no readings near the rest surface", "camera_to_world"},
+    {"PoseLooksAway", "[0, 0, 1, -1]", "[0, 0, 1, 9]", "shows nothing within", "camera_to_world"},
+    {"PoseOffTheReadings", "[0, 0, 1, -1]", "[0, 0, 1, -30]", "shows nothing within", "camera_to_world"},
     {"FocalInMillimetres", "fx = 80.0", "fx = 3.6", "focal lengths are in pixels", "fx"},
     {"LensOfTwoNumbers", "fx = 80.0", "fx = 80.0\ndistortion = [0.1, 0.2]", "4, 5, 8, 12 or 14 of them", "distortion"},
     {"LensThatFoldsBack", "fx = 80.0", "fx = 80.0\ndistortion = [-2.0, 0, 0, 0]", "each place of the image once",
@@ -157,7 +157,18 @@ const Slip slips[] = {
      "radians about each axis", "pose_std"},
     {"PoseStdMisspelt", "noise = 0.002", "noise = 0.002\npose_std = { turned = 0.01 }", "turn", "pose_std"},
     {"LateInMilliseconds", "noise = 0.002", "noise = 0.002\ntime_offset = 8.0", "-1 to 1 s", "time_offset"},
-    {"PrincipalPointNormalised", "cx = 39.5\ncy = 29.5", "cx = 0.5\ncy = 0.5", "a point in the image, in pixels", "cx"},
+    {"PrincipalPointNormalised", "cx = 39.5\ncy = 29.5", "cx = 0.5\ncy = 0.5", "a point in the middle of the image",
+     "cx"},
+    {"IntrinsicsOfTheColourCamera", "cx = 39.5\ncy = 29.5", "cx = 79.5\ncy = 44.5", "of the colour camera", "cx"},
+    {"PoseInverted", "[0, 0, 1, -1]", "[0, 0, 1, 1]", "its inverse would: it looks like one from world to camera",
+     "camera_to_world"},
+    {"PoseInMillimetres", "[0, 0, 1, -1]", "[0, 0, 1, -1000]", "its translation divided by 1000", "camera_to_world"},
+    {"PoseOfOpenGl", "[0, 1, 0, 0], [0, 0, 1, -1]", "[0, -1, 0, 0], [0, 0, -1, -1]", "with the axes of OpenGL",
+     "camera_to_world"},
+    {"DepthInTenthsOfAMillimetre", "depth_scale = 1000.0", "depth_scale = 10000.0",
+     "with `depth_scale` = 1000 it would", "depth_scale"},
+    {"DepthInQuarters", "depth_scale = 1000.0", "depth_scale = 250.0", "with `depth_scale` = 1000 it would",
+     "depth_scale"},
     {"ImagesMissing", "\"front/%06d.png\"", "\"back/%06d.png\"", "nor for any other frame", "images"},
     {"PatternWithoutNumber", "\"front/%06d.png\"", "\"front/000000.png\"", "one %06d", "images"},
     {"PatternWithText", "\"front/%06d.png\"", "\"front/%s.png\"", "one %06d", "images"},
@@ -298,6 +309,30 @@ TEST(CaptureRules, RefuseAnImageOfAnotherDepth) {
               AllOf(HasSubstr("front/000002.png"), HasSubstr("16-bit grey")));
 }
 
+TEST(CaptureRules, SayThatImagesAreTurned) {
+  SmallCapture small;
+  small.edit("width = 80\nheight = 60", "width = 60\nheight = 80").edit("cx = 39.5\ncy = 29.5", "cx = 29.5\ncy = 39.5");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("turned by 90 degrees"));
+}
+
+TEST(CaptureRules, SayThatMasksAreInverted) {
+  SmallCapture small;
+  for (int frame = 0; frame < SmallCapture::frames; ++frame) {
+    Image<std::uint8_t> mask = SmallCapture::mask_image(0.02 * frame * frame);
+    for (std::uint8_t& m : mask.pixels) m = std::uint8_t(255 - m);
+    write_png(small.folder / ("front/mask_00000" + std::to_string(frame) + ".png"), mask);
+  }
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("they look inverted"));
+}
+
+TEST(CaptureRules, TakeTheScanForSeenWhereItsPoseIsOffByWhatIsStated) {
+  SmallCapture small;
+  small.edit("[0, 0, 1, -1]", "[0, 0, 1, -1.03]");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("shows nothing within"));
+  small.edit("noise = 0.002", "noise = 0.002\npose_std = { turn = 0.01, shift = 0.02 }");
+  EXPECT_EQ(complaint_of([&] { (void)small.read(); }), "");
+}
+
 TEST(CaptureRules, RefuseAnotherImageSize) {
   SmallCapture small;
   small.edit("width = 80", "width = 64");
@@ -401,6 +436,24 @@ TEST(CaptureRules, CheckPresses) {
   EXPECT_THAT(said(press_with("markers_rest =", "role = \"train\"\nmarkers_rest =")),
               HasSubstr("expected \"fit\" or \"test\""));
   EXPECT_THAT(said(press_with("markers = \"markers_rest.csv\"\n", "")), HasSubstr("has no `markers`"));
+}
+
+TEST(CaptureRules, SayThatForcesAreTheSensors) {
+  std::string forwards = press;
+  forwards.replace(forwards.find("markers_rest.csv"), 16, "b.csv");
+  forwards.replace(forwards.find("markers_rest.csv"), 16, "a.csv");
+  std::string backwards = forwards;
+  backwards.replace(backwards.find("0.0, 0.0, 3.0"), 13, "0.0, 0.0, -3.0");
+  const auto said = [](const std::string& blocks) {
+    SmallCapture small;
+    small.folder.write("a.csv", "id,x,y,z\n1,0,0,-0.1\n2,0.02,0,-0.1\n3,0,0.02,-0.1\n4,0,0,0.1\n");
+    small.folder.write("b.csv", "id,x,y,z\n1,0,0,-0.09\n2,0.02,0,-0.095\n3,0,0.02,-0.095\n4,0,0,0.099\n");
+    return complaint_of([&] { (void)small.append(blocks).read(); });
+  };
+  EXPECT_EQ(said(forwards), "");
+  EXPECT_THAT(said(backwards), AllOf(HasSubstr("move against the force"), HasSubstr("turn it round")));
+  EXPECT_THAT(said(backwards + backwards), HasSubstr("under all 2 presses"));
+  EXPECT_EQ(said(backwards + forwards), "") << "one against its force is a fault of its own";
 }
 
 TEST(CaptureRules, CheckLoads) {

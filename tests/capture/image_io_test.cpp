@@ -81,6 +81,31 @@ TEST(ReadMask, TakesGreyAndColour) {
   }
 }
 
+std::string bytes_of(std::string_view hexadecimal) {
+  std::string bytes;
+  for (std::size_t i = 0; i < hexadecimal.size(); i += 2)
+    bytes += char(std::stoi(std::string(hexadecimal.substr(i, 2)), nullptr, 16));
+  return bytes;
+}
+
+/// PNG files of two pixels with red, green, blue and alpha, the second one of the object.
+TEST(ReadMask, TakesAlphaOnlyWhereItDiffers) {
+  const TemporaryFolder folder;
+  folder.write(
+      "opaque.png",
+      bytes_of("89504e470d0a1a0a0000000d4948445200000002000000010806000000f4227f8a0000001149444154789c63606060f8"
+               "cfc0c9f01f00061e0208e98d74a90000000049454e44ae426082"));
+  folder.write(
+      "cut_out.png",
+      bytes_of("89504e470d0a1a0a0000000d4948445200000002000000010806000000f4227f8a0000000f49444154789c63e0e4e464"
+               "0082ff0001c5011b2c22e2aa0000000049454e44ae426082"));
+  for (const char* name : {"opaque.png", "cut_out.png"}) {
+    const auto mask = read_mask(folder / name);
+    EXPECT_EQ(mask(0, 0), 0) << name;
+    EXPECT_EQ(mask(1, 0), 255) << name;
+  }
+}
+
 TEST(ReadMask, RefusesSixteenBits) {
   const TemporaryFolder folder;
   write_png(folder / "a.png", noise_image(3, 3));

@@ -202,5 +202,54 @@ TEST_F(MarkerFiles, DeviationsThatAreNoneAreRefused) {
   EXPECT_THAT(of("id,sx,sy,sz\n3,1,1,1\n3,1,1,1\n"), HasSubstr("a second time"));
 }
 
+/// Five markers that fall and turn a little, with a scatter of a tenth of a millimetre.
+MarkerSet falling_markers(int frames) {
+  MarkerSet markers;
+  markers.ids = {"a", "b", "c", "d", "e"};
+  markers.rest = points({{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}, {0.1, 0.1, 0}});
+  std::mt19937 random(3);
+  std::normal_distribution<double> scatter(0.0, 1e-4);
+  for (int f = 0; f < frames; ++f) {
+    Points frame = markers.rest;
+    for (Eigen::Index i = 0; i < frame.rows(); ++i) {
+      frame(i, 0) += 0.02 * f * frame(i, 1);
+      frame(i, 1) -= 0.001 * f * f;
+      for (int d = 0; d < 3; ++d) frame(i, d) += scatter(random);
+    }
+    markers.frames.push_back(frame);
+  }
+  return markers;
+}
+
+TEST(MarkerDoubts, AreNoneOfAMotion) { EXPECT_THAT(marker_doubts(falling_markers(20), true), IsEmpty()); }
+
+TEST(MarkerDoubts, NameTradedMarkersAndTheFrame) {
+  MarkerSet markers = falling_markers(20);
+  for (std::size_t f = 12; f < 20; ++f) markers.frames[f].row(1).swap(markers.frames[f].row(3));
+  EXPECT_THAT(marker_doubts(markers, true),
+              ElementsAre("markers \"b\" and \"d\" trade places in frame 12: their names may be traded"));
+  for (std::size_t f = 0; f < 12; ++f) markers.frames[f].row(1).swap(markers.frames[f].row(3));
+  EXPECT_THAT(marker_doubts(markers, true), ElementsAre(HasSubstr("trade places in frame 0")));
+  EXPECT_THAT(marker_doubts(markers, false), IsEmpty()) << "a released object does not start where it rests";
+}
+
+TEST(MarkerDoubts, NameAJumpThatTheOthersDoNotMake) {
+  MarkerSet markers = falling_markers(20);
+  markers.frames[7](2, 2) += 0.05;
+  const auto doubts = marker_doubts(markers, true);
+  ASSERT_EQ(doubts.size(), 2u) << "away and back";
+  EXPECT_THAT(doubts[0], AllOf(HasSubstr("marker \"c\" jumps by 0.0"), HasSubstr("in frame 7")));
+  EXPECT_THAT(doubts[1], HasSubstr("in frame 8"));
+}
+
+TEST(MarkerDoubts, NameMarkersTradedUnderALoad) {
+  MarkerSet markers = falling_markers(2);
+  markers.frames = {markers.frames[1]};
+  EXPECT_THAT(marker_doubts(markers, true), IsEmpty());
+  markers.frames[0].row(0).swap(markers.frames[0].row(4));
+  EXPECT_THAT(marker_doubts(markers, true),
+              ElementsAre("markers \"a\" and \"e\" trade places: their names may be traded"));
+}
+
 }  // namespace
 }  // namespace pliant::markers_test

@@ -2,6 +2,7 @@
 
 #include <random>
 
+#include "base/files.hpp"
 #include "capture/small_capture.hpp"
 
 namespace pliant::survey_test {
@@ -30,6 +31,15 @@ TEST(SurveyTest, SeesMotionAndPlane) {
   ASSERT_TRUE(seen.planes.at(0).seen);
   EXPECT_LT(seen.planes[0].angle, 2e-3);
   EXPECT_TRUE(seen.seen_share.has_value());
+}
+
+TEST(SurveyTest, CountsImagesThatRepeatAfterTheStart) {
+  SmallCapture small;  // which starts at frame 1
+  EXPECT_THAT(surveyed(small.read()).repeated_images.at(0), ::testing::IsEmpty());
+  const auto image = [&](int frame) { return small.folder / ("front/00000" + std::to_string(frame) + ".png"); };
+  write_file(image(1), read_file(image(0)));
+  write_file(image(3), read_file(image(2)));
+  EXPECT_THAT(surveyed(small.read()).repeated_images.at(0), ElementsAre(3));
 }
 
 TEST(SurveyTest, SeesContact) {
