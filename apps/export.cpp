@@ -75,12 +75,19 @@ void run_samples(const Arguments& arguments, const ExportFormat& format, const M
       write_moving(drawn, format, folder);
     } else {
       make_folder(folder);
-      (void)write_export(export_model(drawn, elements_for(arguments, format), arguments.mesh_cells()), format, folder);
+      (void)write_export(export_model(drawn, elements_for(arguments, format), arguments.mesh_cells()), format, folder,
+                         file);
       show_progress("written", int(i) + 1, int(samples.size()));
     }
     stop_if_interrupted();
   }
   std::cout << fmt::format("{} materials in {}: sample_0001 ..., and samples.csv\n", samples.size(), arguments.out);
+}
+
+/// The result of the fit that wrote a model.
+std::optional<fs::path> result_beside(const fs::path& model) {
+  const fs::path file = model.parent_path() / "result.json";
+  return is_file(file) ? std::optional(file) : std::nullopt;
 }
 
 void run(const Arguments& arguments) {
@@ -97,7 +104,7 @@ void run(const Arguments& arguments) {
   const bool is_quadratic = kind == ElementKind::QuadraticTetrahedron;
   const ExportModel exported = export_model(model, kind, arguments.mesh_cells());
   make_folder(arguments.out);
-  const std::vector<std::string> files = write_export(exported, format, arguments.out);
+  const std::vector<std::string> files = write_export(exported, format, arguments.out, result_beside(arguments.model));
   std::cout << fmt::format("{} {} tetrahedra, {} nodes, {} of them held\n", exported.body->element_count(),
                            is_quadratic ? "quadratic" : "linear", exported.body->node_count(), exported.held.size());
   if (exported.identified != 1.0)

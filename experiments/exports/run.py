@@ -131,7 +131,7 @@ def usd(folder, about):
     except ImportError:
         return None
     stage = Usd.Stage.Open(str(folder / "model.usda"))
-    mesh = UsdGeom.TetMesh(stage.GetDefaultPrim())
+    mesh = UsdGeom.TetMesh(stage.GetPrimAtPath("/object/mesh"))
     return {"version": ".".join(str(n) for n in Usd.GetVersion()), "nodes": len(mesh.GetPointsAttr().Get()),
             "elements": len(mesh.GetTetVertexIndicesAttr().Get()), "inverted": len(UsdGeom.TetMesh.FindInvertedElements(mesh))}
 

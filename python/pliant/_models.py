@@ -66,15 +66,16 @@ class Model:
         """Simulates and writes trajectory.pvd (ParaView) and fields.html into a folder (the command `pliant simulate`)."""
         self._model.simulate(out, situation, duration or 0.0)
 
-    def export(self, to, out, *, linear=False, cells=None):
+    def export(self, to, out, *, linear=False, cells=None, result=None):
         """Writes the model for another simulator (the command `pliant export`).
 
         :param to: one of `export_formats`
         :param linear: linear tetrahedra also where the format takes quadratic ones
         :param cells: along the object's longest axis, of a mesh laid anew; left out: chosen so that frequencies agree
+        :param result: result.json of the fit, for the values and intervals of card.json
         :returns: files; what moduli were multiplied by; frequencies [Hz] and sag [m] of the model and of what was written; notes
         """
-        return self._model.export(to, out, linear, cells)
+        return self._model.export(to, out, linear, cells, result)
 
     def __repr__(self):
         return f"<pliant.Model {self.name!r}: E {self.youngs_modulus:.4g} Pa, nu {self.poissons_ratio:.3g}>"

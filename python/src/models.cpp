@@ -25,7 +25,7 @@ py::dict small_motions(const SmallMotions& motions) {
 }
 
 py::dict export_to(const Model& model, const std::string& to, const fs::path& out, bool linear,
-                   std::optional<double> cells) {
+                   std::optional<double> cells, const std::optional<fs::path>& result) {
   const ExportFormat& format = export_format(to);
   if (format.write_surface && (linear || cells))
     throw py::value_error("linear, cells: the format " + to + " has no elements");
@@ -47,7 +47,7 @@ py::dict export_to(const Model& model, const std::string& to, const fs::path& ou
                                                                        : ElementKind::Tetrahedron,
                               cells);
       make_folder(out);
-      files = write_export(exported, format, out);
+      files = write_export(exported, format, out, result);
     }
     told["moduli_factor"] = exported.identified;
     told["model"] = small_motions(exported.model);

@@ -147,6 +147,27 @@ struct Comparison {
   }
 };
 
+/// How a model's linear tetrahedra vibrate against quadratic ones of the same mesh: they lock where they are flat,
+/// where few of them lie across what bends, and where the material hardly changes its volume. Nothing where they do
+/// not, or are no linear tetrahedra.
+std::string locking_note(const ModelScene& scene, const SimulationOptions& options, double first_frequency) {
+  constexpr double much = 0.1;          // of the frequency
+  constexpr int most_elements = 20000;  // that are looked at
+  if (scene.body->kind != ElementKind::Tetrahedron || scene.body->element_count() > most_elements) return "";
+  Body quadratic = make_body(with_mid_nodes(std::get<TetMesh>(scene.body->mesh)));
+  quadratic.modulus = scene.body->modulus;
+  const auto body = std::make_shared<Body>(std::move(quadratic));
+  const double freer = small_motions(body, options, scene.theta, body->nodes, 1).frequencies.front();
+  if (first_frequency < (1.0 + much) * freer) return "";
+  return fmt::format(
+      "The model's linear tetrahedra lock: its first frequency is {:.4g} Hz, that of quadratic ones of the same mesh "
+      "{:.4g} Hz. "
+      "A modulus that was fitted with them is too small by the square of that; give quadratic elements, or more "
+      "through the "
+      "thickness.",
+      first_frequency, freer);
+}
+
 /// Other elements than its own are laid over the model's surface: linear ones, and quadratic ones of a model of
 /// hexahedra.
 Candidate chosen_mesh(const Comparison& comparison, ElementKind kind, std::optional<double> cells) {
@@ -190,6 +211,8 @@ ExportModel export_model(const Model& model, ElementKind kind, std::optional<dou
     theta[options.blocks.poissons_ratio] = out.poissons_ratio;
     out.stiffest = std::sqrt(out.identified) * stiffest_of(out.body, options, theta, out.lumped_masses(), out.held);
   }
+  if (std::string locks = locking_note(scene, options, comparison.frequencies.front()); !locks.empty())
+    out.notes.push_back(std::move(locks));
   if (out.poissons_ratio != model.poissons_ratio)
     out.notes.push_back(
         fmt::format("Poisson's ratio is {:.4g}, the model's {:.4g}: with the latter these elements lock.",

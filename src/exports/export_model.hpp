@@ -27,6 +27,7 @@ struct ExportModel {
   SmallMotions model, exported;    ///< on the model's own elements, and on these
   double stiffest = 0.0;           ///< [rad/s] highest frequency of these with lumped masses, linear elements alone
   std::vector<std::string> notes;  ///< what is left out or told otherwise
+  std::string card;                ///< `card_of`, JSON; empty before `write_export`
 
   bool is_quadratic() const { return body->kind == ElementKind::QuadraticTetrahedron; }
   /// Of each node [kg]: its share of the elements' masses.

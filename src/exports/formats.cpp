@@ -5,6 +5,7 @@
 
 #include "base/error.hpp"
 #include "base/files.hpp"
+#include "exports/card.hpp"
 
 namespace pliant {
 
@@ -33,9 +34,11 @@ const ExportFormat& export_format(const std::string& name) {
   throw InputError({{}, "no format `" + name + "`", names, ""});
 }
 
-std::vector<std::string> write_export(const ExportModel& model, const ExportFormat& format,
-                                      const std::filesystem::path& folder) {
+std::vector<std::string> write_export(ExportModel model, const ExportFormat& format,
+                                      const std::filesystem::path& folder,
+                                      const std::optional<std::filesystem::path>& result) {
   using Json = nlohmann::ordered_json;
+  model.card = card_of(model, format.name, result);
   std::vector<std::string> files = format.write(model, folder);
   const auto motions = [](const SmallMotions& m) { return Json{{"frequencies", m.frequencies}, {"sag", m.sag}}; };
   const Json json = {{"format", "export/1"},
@@ -57,7 +60,8 @@ std::vector<std::string> write_export(const ExportModel& model, const ExportForm
                      {"exported", motions(model.exported)},
                      {"notes", model.notes}};
   write_file(folder / "export.json", json.dump(2) + "\n");
-  files.push_back("export.json");
+  write_file(folder / "card.json", model.card);
+  files.insert(files.end(), {"export.json", "card.json"});
   return files;
 }
 

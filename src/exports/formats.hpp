@@ -30,12 +30,14 @@ const std::vector<ExportFormat>& export_formats();
 /// By its name. Throws InputError with those that there are.
 const ExportFormat& export_format(const std::string& name);
 
-/// Writes a model in a format, and `export.json`: elements, what moduli were multiplied by, frequencies and sag of the
-/// model and of what was written, so that the other program can be checked (docs/exports.md).
-/// @param kind  of elements; those that the format takes
-/// Returns the names of the files. Throws InputError where a file cannot be written.
-std::vector<std::string> write_export(const ExportModel& model, const ExportFormat& format,
-                                      const std::filesystem::path& folder);
+/// Writes a model in a format, `export.json`: elements, what moduli were multiplied by, frequencies and sag of the
+/// model and of what was written, so that the other program can be checked (docs/exports.md); and `card.json`
+/// (`card_of`).
+/// @param result  `result.json` of the fit, where it is known
+/// Returns the names of the files. Throws InputError where a file cannot be written, or the result not be read.
+std::vector<std::string> write_export(ExportModel model, const ExportFormat& format,
+                                      const std::filesystem::path& folder,
+                                      const std::optional<std::filesystem::path>& result = std::nullopt);
 
 // The formats, each in a file of its own.
 std::vector<std::string> write_calculix(const ExportModel& model, const std::filesystem::path& folder);

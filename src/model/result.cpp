@@ -80,6 +80,12 @@ Json error_json(const ErrorResult& error) {
   return json;
 }
 
+Json deformation_json(const DeformationResult& deformation) {
+  return {{"greatest_strain", number(deformation.greatest_strain)},
+          {"median_strain", number(deformation.median_strain)},
+          {"greatest_rate", number(deformation.greatest_rate)}};
+}
+
 Json choices_json(const std::map<std::string, std::string>& choices) {
   Json json = Json::object();
   for (const auto& [name, text] : choices) json[name] = Json::parse(text);
@@ -370,6 +376,7 @@ std::string to_json(const Result& result) {
   json["error"] = error_json(result.error);
   if (!result.recordings.empty()) json["recordings"] = list(result.recordings, recording_json);
   if (result.held_out) json["held_out"] = recording_json(*result.held_out);
+  if (result.deformation) json["deformation"] = deformation_json(*result.deformation);
   json["cost"] = {{"start", number(result.cost.start)}, {"final", number(result.cost.final)}};
   json["identifiability"] = list(result.identifiability, [](const CorrelationResult& c) {
     return Json{{"parameters", {c.parameters.first, c.parameters.second}}, {"correlation", number(c.correlation)}};

@@ -90,6 +90,13 @@ struct RecordingResult {
   ErrorResult error;
 };
 
+/// What the object did while it was measured: beyond that a model is extrapolated.
+struct DeformationResult {
+  /// Principal strain (`greatest_strain`) that a hundredth and that half of the volume exceed at some time [-].
+  double greatest_strain = 0.0, median_strain = 0.0;
+  std::optional<double> greatest_rate = {};  ///< of that strain, likewise of a hundredth [1/s]; of motions
+};
+
 struct CostResult {
   double start = 0.0, final = 0.0;
 };
@@ -181,6 +188,7 @@ struct Result {
   std::vector<RecordingResult> recordings;  ///< where there are several: the errors of each
   std::optional<RecordingResult> held_out;  ///< predicted, with its own start, planes and sensors alone estimated
   CostResult cost;
+  std::optional<DeformationResult> deformation;  ///< of the first recording, as it was simulated
   std::string material;  ///< what law the object was taken to have, and how it damps, in words; empty: it is not known
   std::vector<CorrelationResult> identifiability;
   std::string verdict;               ///< "explained", "unexplained" or "undetermined"; empty: none was made

@@ -20,6 +20,7 @@
 #include "live/live_page.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
+#include "output/strain_range.hpp"
 #include "output/track_output.hpp"
 #include "pictures/field_pictures.hpp"
 #include "report/gallery.hpp"
@@ -498,10 +499,17 @@ void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& re
   elasticity->set_parameters(first.theta);
   FieldPictures fields(first.discretisation.body, *elasticity, *capture.scene.object.surface, modulus_std,
                        frames_at(first.discretisation.simulation.times, capture.scene.timing.start_frame));
+  StrainRange strains(*first.discretisation.body);
   write_trajectory(
       folder, first.discretisation.body, first.discretisation.simulation, first.theta,
       [&](int done, int total) { return tell("trajectory", done, total), true; },
-      [&](int frame, const State& state, const BodyFields& of) { fields.add(frame, state.x, of); });
+      [&](int frame, const State& state, const BodyFields& of) {
+        fields.add(frame, state.x, of);
+        strains.add(of, capture.scene.timing.is_static
+                            ? std::nullopt
+                            : std::optional(first.discretisation.simulation.times[std::size_t(frame)]));
+      });
+  report.result.deformation = strains.result();
   for (const auto& f : surface_errors(first.evaluation).frames) {
     const int frame = f.frame + capture.scene.timing.start_frame;
     report.residuals.push_back({frame, capture.scene.timing.times[std::size_t(frame)], f.rms, f.points, f.noise});
@@ -613,9 +621,14 @@ void write_law(const fs::path& folder, const Capture& capture, const LawOutcome&
     const auto elasticity = LawElasticity::make(law.scene->body, law.law);
     fields.emplace(law.scene->body, *elasticity, *capture.scene.object.surface, modulus_std, std::move(states));
   }
+  std::optional<StrainRange> strains;
+  if (law.scene && law.scene->body) strains.emplace(*law.scene->body);
   write_presses(folder, law, tell, [&](int press, const Points& nodes, const BodyFields& of) {
     if (fields) fields->add(press, nodes, of);
+    if (strains && is_fitted(law.scene->presses[std::size_t(press)].role)) strains->add(of, std::nullopt);
   });
+  if (strains) report.result.deformation = strains->result();
+  if (!report.result.deformation) report.result.deformation = strain_range(report.result.curves);
   if (fields) report.fields = fields->draw(gallery_of(capture));
   const auto add_presses = [&](const PressScene& scene, const std::vector<PressPrediction>& predictions) {
     std::ranges::move(press_errors(scene, predictions), std::back_inserter(report.presses));
@@ -669,6 +682,7 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
     write_law(folder, capture, *outcome.law, modulus_std, report, tell);
   else
     write_motion(folder, recordings, outcome, modulus_std, report, tell);
+  write_result(folder / "result.json", report.result);  // with how far the object was strained
   write_report(folder / "report.html", report);
   if (outcome.tracking) write_tracks(folder, recordings, outcome, tell);
 }

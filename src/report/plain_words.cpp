@@ -186,6 +186,16 @@ std::string largest_share_sentence(const Result& result) {
   const bool are_curves = !result.curves.empty() && !result.error.surface_rms && !result.error.marker_rms;
   if (are_curves)
     return sentence + "; what would narrow it most is curves of other modes of loading, or with less scatter.";
+  const auto is_estimated = [&](const char* name) {
+    const ParameterResult* p = result.find(name);
+    return p && p->estimated;
+  };
+  const bool is_at_rest = !is_estimated("mass_damping") && !is_estimated("stiffness_damping");
+  if (is_at_rest && largest->cause == "noise")
+    return sentence +
+           "; what would narrow it most is more or larger loads, or forces and places that are measured better.";
+  if (is_at_rest && largest->cause == "law and damping")
+    return sentence + "; what would narrow it most is loads of other sizes and at other places.";
   for (const auto& [cause, remedy] : remedies)
     if (largest->cause.starts_with(cause)) return sentence + "; what would narrow it most is " + remedy + ".";
   return sentence + ".";

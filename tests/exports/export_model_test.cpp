@@ -69,6 +69,22 @@ TEST(ExportModel, OfTheSameElementsIsTheModel) {
   EXPECT_FALSE(exported.held.empty());
 }
 
+/// A sheet of 1 mm, 100 mm long, with one linear tetrahedron through its thickness.
+TEST(ExportModel, ToldThatTheModelsLinearElementsLock) {
+  const auto sheet = [](bool is_quadratic) {
+    Model model = bar(is_quadratic);
+    model.scene.object.surface = make_box(Vector3(length, 0.001, 0.02), 0.01);
+    const auto body = test::tet_body({length, 0.001, 0.02}, {20, 1, 2}, is_quadratic, 0.0);
+    model.volume.nodes = body->nodes;
+    model.volume.connectivity = body->connectivity;
+    model.volume.youngs_modulus.assign(std::size_t(body->element_count()), 2e5);
+    return model;
+  };
+  const auto locks = ::testing::Contains(::testing::HasSubstr("linear tetrahedra lock"));
+  EXPECT_THAT(export_model(sheet(false), ElementKind::Tetrahedron).notes, locks);
+  EXPECT_THAT(export_model(sheet(true), ElementKind::QuadraticTetrahedron).notes, ::testing::Not(locks));
+}
+
 /// Subspace iteration beside Lanczos's method.
 TEST(ExportModel, FrequenciesAreThoseOfModalAnalysis) {
   const Model model = bar();

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <map>
@@ -419,14 +421,68 @@ TEST_F(Formats, OfSurfacesWriteNothingWhereTheyAreStopped) {
 }
 
 TEST_F(Formats, OfUsdHoldTheMeshAndItsMaterial) {
-  const ExportModel model = exported(ElementKind::Tetrahedron);
-  write_usd(model, folder);
+  ExportModel model = exported(ElementKind::Tetrahedron);
+  model.stiffness_damping = 0.003;
+  (void)write_export(model, export_format("usd"), folder);
   const std::string stage = text_of(folder / "model.usda");
   EXPECT_EQ(stage.rfind("#usda 1.0", 0), 0u);
+  EXPECT_THAT(stage, ::testing::HasSubstr("PhysicsVolumeDeformableMaterialAPI"));
+  EXPECT_THAT(stage, ::testing::HasSubstr("pull request 111, commit "));
+  EXPECT_THAT(stage, ::testing::HasSubstr("custom float pliant:stiffnessDamping = 0.003"));
+  EXPECT_THAT(stage, ::testing::HasSubstr("dictionary \"tested\""));
   EXPECT_EQ(count(stage, "def TetMesh"), 1);
   const std::size_t begin = stage.find("int4[] tetVertexIndices"), end = stage.find('\n', begin);
   EXPECT_EQ(count(stage.substr(begin, end - begin), "("), model.body->element_count());
   EXPECT_THAT(stage, ::testing::HasSubstr("physics:poissonsRatio = 0.3"));
+}
+
+/// A result of a fit as far as a card repeats it.
+constexpr const char* fit_result = R"({"format": "result/1",
+  "software": {"name": "pliant", "version": "1", "commit": "c"}, "capture": {"name": "bar", "sha256": "abc"},
+  "material": "a law", "verdict": "explained", "reasons": [],
+  "parameters": {"youngs_modulus": {"value": 1e4, "unit": "Pa", "std": 300.0, "interval_90": [9.5e3, 1.05e4], "estimated": true},
+                 "linear_velocity": {"value": [0, 0, 0], "unit": "m/s", "estimated": true}},
+  "error": {"surface_rms": 0.001},
+  "deformation": {"greatest_strain": 0.2, "median_strain": 0.05, "greatest_rate": 3.0}})";
+
+TEST_F(Formats, HaveACardWithValuesIntervalsAndHowTheyDiffer) {
+  using nlohmann::json;
+  const ExportModel model = exported(ElementKind::Tetrahedron);
+  std::ofstream(folder / "result.json") << fit_result;
+  (void)write_export(model, export_format("gmsh"), folder, folder / "result.json");
+  const json card = json::parse(text_of(folder / "card.json"));
+  EXPECT_EQ(card["fit"]["values"].size(), 1u) << "of the material alone";
+  EXPECT_EQ(card["fit"]["values"]["youngs_modulus"]["interval_90"], json({9.5e3, 1.05e4}));
+  EXPECT_EQ(card["fit"]["capture"]["sha256"], "abc");
+  EXPECT_EQ(card["fit"]["deformation"]["greatest_rate"], 3.0);
+  EXPECT_EQ(card["exported"]["moduli_were_multiplied_by"], model.identified);
+  EXPECT_EQ(card["exported"]["differs"], json(model.notes));
+  EXPECT_EQ(card["tested"]["frequencies"]["exported"].size(), model.exported.frequencies.size());
+  const double difference = card["tested"]["frequencies"]["greatest_difference"];
+  double greatest = 0.0;
+  for (std::size_t i = 0; i < model.model.frequencies.size(); ++i)
+    greatest = std::max(greatest, std::abs(model.exported.frequencies[i] / model.model.frequencies[i] - 1.0));
+  EXPECT_NEAR(difference, greatest, 1e-12);
+}
+
+/// Cards with and without a fit, against the schema that is shipped, by Python's jsonschema.
+TEST_F(Formats, HaveCardsOfTheSchema) {
+  if (std::system("python3 -c 'import jsonschema' 2>/dev/null") != 0) GTEST_SKIP() << "no python3-jsonschema";
+  const ExportModel model = exported(ElementKind::Tetrahedron);
+  std::ofstream(folder / "result.json") << fit_result;
+  const auto is_valid = [&] {
+    return std::system(("python3 -m jsonschema -i '" + (folder / "card.json").string() +
+                        "' '" PLIANT_SOURCE_DIR "/docs/card.schema.json' 2>/dev/null")
+                           .c_str()) == 0;
+  };
+  (void)write_export(model, export_format("gmsh"), folder);
+  EXPECT_TRUE(is_valid());
+  (void)write_export(model, export_format("gmsh"), folder, folder / "result.json");
+  EXPECT_TRUE(is_valid());
+  nlohmann::json card = nlohmann::json::parse(text_of(folder / "card.json"));
+  card["tested"].erase("how");
+  std::ofstream(folder / "card.json") << card;
+  EXPECT_FALSE(is_valid()) << "a card without how it was tested";
 }
 
 }  // namespace
