@@ -268,11 +268,17 @@ class Reader {
     if (surface.triangles.empty()) surface = boundary_surface(mesh);
   }
 
+  /// Whether it has one of the fields that are saved with a model.
+  static bool is_own_volume(const fs::path& path) {
+    if (ending_of(path) != ".vtu") return false;
+    return std::ranges::any_of(vtu_cell_data(path), [](const std::string& name) {
+      return name == modulus_field || name == ratio_field || name == former_name(ratio_field) || name == fill_field;
+    });
+  }
+
   void read_volume(const fs::path& path) {
-    if (path.extension() != ".vtu") return read_plain_volume(path);
+    if (!is_own_volume(path)) return read_plain_volume(path);
     const VtuGrid grid = read_vtu(path);
-    const bool is_solid = grid.kind == VtuCell::Tetrahedron || grid.kind == VtuCell::QuadraticTetrahedron;
-    if (is_solid && grid.cell_data.empty()) return read_plain_volume(path);
     if (grid.kind == VtuCell::Triangle)
       throw InputError({{path}, "triangles", "hexahedra or tetrahedra", "save the model again"});
     ModelVolume& volume = model_.volume;
