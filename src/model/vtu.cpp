@@ -114,10 +114,10 @@ class GridReader {
     return grid(piece());
   }
   std::vector<std::string> cell_data() const {
-    std::vector<std::string> names;
+    std::vector<std::string> arrays;
     for (const pugi::xml_node node : piece().child("CellData").children("DataArray"))
-      names.emplace_back(node.attribute("Name").value());
-    return names;
+      arrays.emplace_back(node.attribute("Name").value());
+    return arrays;
   }
 
  private:
