@@ -15,6 +15,7 @@
 #include "commands.hpp"
 #include "elasticity/law_elasticity.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "simulation/trajectory.hpp"
 #include "situation/probing.hpp"
 
@@ -118,7 +119,7 @@ int run(const Arguments& arguments) {
   const Model model = load_model(arguments.model);
   Probing probing(model, situation);
   const TriangleMesh fine =
-      arguments.surface.empty() ? model.scene.object.surface.value() : read_mesh(arguments.surface);
+      arguments.surface.empty() ? model.scene.object.surface.value() : read_surface(arguments.surface);
   Record record(probing, fine, arguments.out);
   std::cout << "time [s] probe  force [N]                         displacement [mm]                 iterations\n";
   const int frames = std::max(1, int(std::lround(situation.duration * situation.frame_rate)));

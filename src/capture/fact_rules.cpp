@@ -69,8 +69,7 @@ void check_surface_is_solid(RuleContext& context) {
   context.toml.complain(surface_key(context.capture),
                         (context.capture.scene.object.volume ? "the boundary of `volume_mesh`" : "`surface`") +
                             std::string(" is no solid: ") + wrong,
-                        "a closed surface that faces outwards",
-                        "close holes and make orientations agree in a mesh editor");
+                        "a closed surface that faces outwards", report.cure);
 }
 
 /// A pose that is to be found needs the object's pixels told apart without it, and regions that can turn.

@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 
 namespace pliant {
 
@@ -78,7 +79,7 @@ bool has_triangles(const fs::path& path) {
 
 void take_surface(const fs::path& folder, const fs::path& relative, FolderSurvey& survey) {
   try {
-    const TriangleMesh mesh = read_mesh(folder / relative);
+    const TriangleMesh mesh = read_surface(folder / relative);
     if (mesh.triangles.empty()) return;
     (examine(mesh).is_closed_solid ? survey.surfaces : survey.open_surfaces).push_back(relative);
   } catch (const std::exception&) {

@@ -14,7 +14,7 @@
 #include "capture/frame_numbers.hpp"
 #include "capture/point_cloud.hpp"
 #include "capture/segment.hpp"
-#include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 
 namespace pliant {
 
@@ -146,7 +146,7 @@ void take_surface(Draft& draft) {
     return;
   }
   object.file = fs::absolute(draft.folder / *surface).lexically_normal();
-  object.surface = read_mesh(object.file);
+  object.surface = read_surface(object.file, &object.surface_remarks);
   draft.say("surface: " + surface->generic_string());
   const Capture& capture = draft.made.capture;
   const bool finds_pose = !capture.depth.empty() && (capture.depth[0].masks || capture.depth[0].background);

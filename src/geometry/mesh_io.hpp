@@ -24,8 +24,10 @@ struct MeshReport {
   int degenerate_triangles = 0, non_finite_vertices = 0, unused_vertices = 0;
   double volume = 0.0;  ///< [m^3]
   Box box;
+  bool has_shared_volume = false;  ///< closed parts cut one another, or lie in one another and face the same way
   bool is_closed_solid = false;
   std::vector<std::string> complaints;  ///< each names what is wrong and where (vertex or triangle, position)
+  std::string cure;                     ///< what to do where it is no closed solid
 };
 
 MeshReport examine(const TriangleMesh& mesh);

@@ -1,21 +1,16 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
-#include <map>
+#include <span>
 
 #include "base/disjoint_sets.hpp"
+#include "geometry/mesh_edges.hpp"
 #include "geometry/mesh_io.hpp"
 
 namespace pliant {
 
 namespace {
-
-struct EdgeUse {
-  int forward = 0, backward = 0;  // from the smaller vertex index to the larger, and against
-  int triangle = 0;               // the last one that uses it
-};
-
-using Edges = std::map<std::pair<int, int>, EdgeUse>;
 
 std::string text_of(const Vector3& p) {
   char text[96];
@@ -27,28 +22,17 @@ std::string counted(int count, const char* one, const char* many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-Edges edges_of(const TriangleMesh& mesh) {
-  Edges edges;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) {
-      const int a = mesh.triangles[t][k], b = mesh.triangles[t][(k + 1) % 3];
-      if (a == b) continue;
-      EdgeUse& use = edges[std::minmax(a, b)];
-      ++(a < b ? use.forward : use.backward);
-      use.triangle = int(t);
-    }
-  return edges;
-}
-
-// Counts edges that satisfy `is_wrong` and complains about them with the place of the first.
-int count_edges(const TriangleMesh& mesh, const Edges& edges, bool (*is_wrong)(const EdgeUse&), const char* one,
-                const char* many, MeshReport& report) {
+/// Counts edges that satisfy `is_wrong` and complains about them with the place of the first.
+int count_edges(const TriangleMesh& mesh, const std::vector<EdgeUse>& uses,
+                bool (*is_wrong)(std::span<const EdgeUse> edge), const char* one, const char* many,
+                MeshReport& report) {
   int count = 0;
   std::string first;
-  for (const auto& [ends, use] : edges)
-    if (is_wrong(use) && count++ == 0)
-      first = "vertices " + std::to_string(ends.first) + " and " + std::to_string(ends.second) + " of triangle " +
-              std::to_string(use.triangle) + " at " + text_of(mesh.vertices[ends.first]);
+  for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
+    if (is_wrong(edge) && count++ == 0)
+      first = "vertices " + std::to_string(edge[0].low) + " and " + std::to_string(edge[0].high) + " of triangle " +
+              std::to_string(edge.back().triangle) + " at " + text_of(mesh.vertices[std::size_t(edge[0].low)]);
+  });
   if (count > 0) report.complaints.push_back(counted(count, one, many) + ", first between " + first);
   return count;
 }
@@ -57,19 +41,15 @@ void examine_vertices(const TriangleMesh& mesh, MeshReport& report) {
   std::vector<bool> used(mesh.vertices.size(), false);
   for (const auto& triangle : mesh.triangles)
     for (const int v : triangle) used[v] = true;
-  int first_unused = -1, first_bad = -1;
+  int first_bad = -1;
   for (int v = 0; v < int(mesh.vertices.size()); ++v) {
-    if (!used[v] && report.unused_vertices++ == 0) first_unused = v;
+    if (!used[v]) ++report.unused_vertices;
     if (!mesh.vertices[v].allFinite() && report.non_finite_vertices++ == 0) first_bad = v;
     if (mesh.vertices[v].allFinite()) report.box.extend(mesh.vertices[v]);
   }
   if (report.non_finite_vertices > 0)
     report.complaints.push_back(counted(report.non_finite_vertices, "vertex is", "vertices are") +
                                 " not finite, first vertex " + std::to_string(first_bad));
-  if (report.unused_vertices > 0)
-    report.complaints.push_back(counted(report.unused_vertices, "vertex is", "vertices are") +
-                                " in no triangle, first vertex " + std::to_string(first_unused) + " at " +
-                                text_of(mesh.vertices[first_unused]));
 }
 
 void examine_triangles(const TriangleMesh& mesh, MeshReport& report) {
@@ -97,17 +77,63 @@ int count_components(const TriangleMesh& mesh) {
 }
 
 void examine_edges(const TriangleMesh& mesh, MeshReport& report) {
-  const Edges edges = edges_of(mesh);
+  const std::vector<EdgeUse> uses = edge_uses(mesh);
   report.boundary_edges = count_edges(
-      mesh, edges, [](const EdgeUse& use) { return use.forward + use.backward == 1; },
+      mesh, uses, [](std::span<const EdgeUse> edge) { return edge.size() == 1; },
       "edge belongs to one triangle only: the surface has a hole",
       "edges belong to one triangle only: the surface has holes", report);
   report.non_manifold_edges = count_edges(
-      mesh, edges, [](const EdgeUse& use) { return use.forward + use.backward > 2; },
+      mesh, uses, [](std::span<const EdgeUse> edge) { return edge.size() > 2; },
       "edge is shared by more than two triangles", "edges are shared by more than two triangles", report);
   report.misoriented_edges = count_edges(
-      mesh, edges, [](const EdgeUse& use) { return use.forward + use.backward == 2 && use.forward != 1; },
+      mesh, uses,
+      [](std::span<const EdgeUse> edge) { return edge.size() == 2 && edge[0].is_forward == edge[1].is_forward; },
       "edge joins triangles of opposite orientation", "edges join triangles of opposite orientation", report);
+}
+
+const char* cure_of(const MeshReport& report, bool closed) {
+  if (report.has_shared_volume)
+    return "unite the parts, in Python: import trimesh; trimesh.boolean.union(trimesh.load(\"OLD.ply\").split())"
+           ".export(\"NEW.ply\") (pip install trimesh manifold3d scipy networkx); a part that is a cavity: "
+           ".difference in the place of .union";
+  return closed ? "check which part of the object the file holds"
+                : "close holes and make orientations agree in a mesh editor";
+}
+
+/// "of 0.1 x 0.1 x 0.1 m about (0, 0.3, 0)"
+std::string text_of(const Shell& shell) {
+  char text[96];
+  const Vector3 extent = shell.box.extent();
+  std::snprintf(text, sizeof text, "of %.4g x %.4g x %.4g m about ", extent.x(), extent.y(), extent.z());
+  return text + text_of(Vector3(0.5 * (shell.box.min + shell.box.max)));
+}
+
+/// Complains about the first two shells of a closed surface that share a volume: twice counted, it would be none.
+void examine_shells(const TriangleMesh& mesh, MeshReport& report) {
+  const std::vector<Shell> shells = shells_of(mesh);
+  if (shells.size() < 2) return;
+  const auto two = [&](const char* first, std::size_t i, const char* what, std::size_t j) {
+    return first + text_of(shells[i]) + what + text_of(shells[j]);
+  };
+  std::vector<std::size_t> holder(shells.size(), shells.size());  // the smallest that each lies in
+  const auto size = [&](std::size_t i) { return std::abs(shells[i].volume); };
+  for (std::size_t i = 0; i < shells.size(); ++i)
+    for (std::size_t j = 0; j < shells.size() && !report.has_shared_volume; ++j) {
+      if (size(i) > size(j) || (size(i) == size(j) && i >= j)) continue;
+      const bool is_inside = lies_in(mesh, shells[i], shells[j]);
+      if (is_inside ? cut(mesh, shells[i], shells[j]) : share_volume(mesh, shells[i], shells[j])) {
+        report.has_shared_volume = true;
+        report.complaints.push_back(two("the part ", i, " cuts through the part ", j));
+      } else if (is_inside && (holder[i] == shells.size() || size(j) < size(holder[i]))) {
+        holder[i] = j;
+      }
+    }
+  for (std::size_t i = 0; i < shells.size() && !report.has_shared_volume; ++i)
+    if (holder[i] < shells.size() && (shells[i].volume > 0.0) == (shells[holder[i]].volume > 0.0)) {
+      report.has_shared_volume = true;
+      report.complaints.push_back(two("the part ", i, " lies in the part ", holder[i]) +
+                                  ", and both face the same way: a cavity faces inwards");
+    }
 }
 
 }  // namespace
@@ -127,7 +153,10 @@ MeshReport examine(const TriangleMesh& mesh) {
   if (closed && report.volume <= 0.0 && report.non_finite_vertices == 0)
     report.complaints.push_back(report.volume < 0.0 ? "the triangles face inwards: the enclosed volume is negative"
                                                     : "the surface encloses no volume");
-  report.is_closed_solid = closed && report.volume > 0.0 && report.non_finite_vertices == 0;
+  if (closed && report.non_finite_vertices == 0) examine_shells(mesh, report);
+  report.cure = cure_of(report, closed);
+  report.is_closed_solid =
+      closed && !report.has_shared_volume && report.volume > 0.0 && report.non_finite_vertices == 0;
   return report;
 }
 

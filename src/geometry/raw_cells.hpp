@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,8 +31,11 @@ RawCells read_gmsh(const std::filesystem::path& path);
 RawCells read_legacy_vtk(const std::filesystem::path& path);
 RawCells read_xml_vtk(const std::filesystem::path& path);
 
-/// Numbers of a type by the name that VTK's XML files have for it, like "Float64", widened to double. Nothing where the
-/// type is unknown.
+/// Bytes of a number of a type by the name that VTK's XML files have for it, like "Float64". Nothing where the type is
+/// unknown.
+std::optional<std::size_t> vtk_number_size(const std::string& type);
+
+/// Numbers of such a type, widened to double. Nothing where the type is unknown.
 std::optional<std::vector<double>> vtk_values(std::string_view bytes, const std::string& type, bool big_endian);
 
 /// The kind of a cell by VTK's number, with the nodes that it has (0: any number).

@@ -40,12 +40,13 @@ class TextTokens {
     return value;
   }
   /// A count of things of which each takes two characters at least: more than the file can hold is refused at once.
-  std::size_t count(const char* expected) {
-    const auto value = number<long long>(expected);
-    if (value < 0 || std::size_t(value) > content_.size())
+  std::size_t count(const char* expected) { return checked_count(number<long long>(expected), expected); }
+  std::size_t checked_count(long long value, const char* expected) const {
+    if (value < 0 || std::size_t(value) > most_count())
       fail_at("a count of " + std::to_string(value), std::string(expected) + " that the file can hold");
     return std::size_t(value);
   }
+  std::size_t most_count() const { return content_.size(); }
   /// The rest of the line.
   std::string_view rest_of_line() {
     const std::size_t begin = position_, end = std::min(content_.find('\n', begin), content_.size());
@@ -63,6 +64,13 @@ class TextTokens {
     position_ += size;
     line_start_ = position_;
     return content_.substr(position_ - size, size);
+  }
+  /// To behind the next `mark`. Throws InputError where there is none.
+  void skip_past(const std::string& mark) {
+    const std::size_t found = content_.find(mark, position_);
+    if (found == std::string_view::npos) fail("the file ends", mark);
+    for (; position_ < found + mark.size(); ++position_)
+      if (content_[position_] == '\n') ++line_, line_start_ = position_ + 1;
   }
   const Place& place() const { return place_; }
   [[noreturn]] void fail_word(std::string_view found, const std::string& expected) const {

@@ -1,15 +1,14 @@
-// VTK's unstructured grids: legacy files, text or binary, and XML files with inline arrays.
+// VTK's unstructured grids: legacy files, text or binary, and XML files.
 #include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstring>
 #include <map>
-#include <pugixml.hpp>
 
-#include "base/base64.hpp"
 #include "base/files.hpp"
 #include "geometry/raw_cells.hpp"
 #include "geometry/text_tokens.hpp"
+#include "geometry/vtk_xml.hpp"
 
 namespace pliant {
 
@@ -44,13 +43,6 @@ const std::map<std::string, NumberType> number_types = {
     {"Int16", number_type<std::int16_t>}, {"UInt16", number_type<std::uint16_t>},
     {"Int8", number_type<std::int8_t>},   {"UInt8", number_type<std::uint8_t>}};
 
-/// Values with the line that each came from; 0 where there are no lines.
-struct Values {
-  std::vector<double> of;
-  std::vector<int> lines;
-  int line(std::size_t i) const { return lines.empty() ? 0 : lines[i]; }
-};
-
 /// Points and cells from what both formats give: the cells' ends in the connectivity, and their types.
 class Assembler {
  public:
@@ -58,7 +50,7 @@ class Assembler {
 
   RawCells cells;
 
-  void add_points(const Values& values) {
+  void add_points(const VtkValues& values) {
     for (std::size_t i = 0; i + 2 < values.of.size(); i += 3) {
       cells.nodes.emplace_back(values.of[i], values.of[i + 1], values.of[i + 2]);
       cells.node_lines.push_back(values.line(i));
@@ -69,7 +61,7 @@ class Assembler {
                           "export the mesh again"});
     }
   }
-  void add_cell(std::size_t number, double type, const Values& connectivity, std::size_t begin, std::size_t end) {
+  void add_cell(std::size_t number, double type, const VtkValues& connectivity, std::size_t begin, std::size_t end) {
     const Place place{path_, begin < end ? connectivity.line(begin) : 0, 0};
     const VtkKind kind = vtk_kind(type == std::floor(type) ? int(type) : -1, place);
     const std::string label = "cell " + std::to_string(number);
@@ -127,10 +119,10 @@ class LegacyReader {
  private:
   void read_part() {
     const std::string part(text_.word("POINTS, CELLS and CELL_TYPES"));
-    if (part == "METADATA") {  // as far as the next empty line
-      text_.rest_of_line();
-      while (text_.rest_of_line().find_first_not_of(" \r\t") != std::string_view::npos) {
-      }
+    if (part == "METADATA") {
+      skip_metadata();
+    } else if (part == "FIELD") {
+      skip_fields();
     } else if (part == "POINTS") {
       const std::size_t count = text_.count("the number of points");
       const std::string type = xml_type(std::string(text_.word("the points' type")));
@@ -144,6 +136,42 @@ class LegacyReader {
       if (types_.empty()) text_.fail_at("no cells", "tetrahedra");
     } else {
       text_.fail_word(part, "POINTS, CELLS or CELL_TYPES");
+    }
+  }
+  /// Arrays about the whole data set, like its time.
+  void skip_fields() {
+    text_.word("the field's name");
+    const std::size_t arrays = text_.count("the number of arrays");
+    for (std::size_t a = 0; a < arrays; ++a) {
+      if (text_.word("an array's name") == "METADATA") skip_metadata(), text_.word("an array's name");
+      const std::size_t components = text_.count("the number of components"), rows = text_.count("the number of rows");
+      const std::string type(text_.word("the numbers' type"));
+      if (components > 0 && rows > text_.most_count() / components)
+        text_.fail_at("an array of " + std::to_string(rows) + " rows", "what the file can hold");
+      if (type == "string")
+        skip_strings(components * rows);
+      else
+        values(components * rows, xml_type(type), "an array");
+    }
+  }
+  /// Text has a line each. Binary ones have their length before them: of 1, 2, 4 or 8 bytes by the two highest bits.
+  void skip_strings(std::size_t count) {
+    text_.rest_of_line();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!is_binary_) {
+        text_.rest_of_line();
+        continue;
+      }
+      const auto first = static_cast<unsigned char>(text_.bytes(1, "a text").front());
+      std::size_t length = first & 0x3FU;
+      for (const char byte : text_.bytes((1U << (3U - (first >> 6U))) - 1U, "a text"))
+        length = length << 8U | static_cast<unsigned char>(byte);
+      text_.bytes(length, "a text");
+    }
+  }
+  void skip_metadata() {  // as far as the next empty line
+    text_.rest_of_line();
+    while (text_.rest_of_line().find_first_not_of(" \r\t") != std::string_view::npos) {
     }
   }
   void read_cells(std::size_t count, std::size_t size) {
@@ -167,7 +195,7 @@ class LegacyReader {
       const std::string type = xml_type(std::string(text_.word("the numbers' type")));
       return values(length, type, name);
     };
-    const Values offsets = list("OFFSETS", count);
+    const VtkValues offsets = list("OFFSETS", count);
     connectivity_ = list("CONNECTIVITY", size);
     for (std::size_t c = 0; c + 1 < offsets.of.size(); ++c) {
       if (!(offsets.of[c] >= 0.0 && offsets.of[c] <= offsets.of[c + 1] && offsets.of[c + 1] <= double(size)))
@@ -179,15 +207,27 @@ class LegacyReader {
     }
   }
   std::string xml_type(const std::string& legacy) {
-    static const std::map<std::string, std::string> names = {
-        {"double", "Float64"}, {"float", "Float32"},        {"int", "Int32"},          {"unsigned_int", "UInt32"},
-        {"long", "Int64"},     {"unsigned_long", "UInt64"}, {"vtktypeint64", "Int64"}, {"vtktypeint32", "Int32"}};
+    static const std::map<std::string, std::string> names = {{"double", "Float64"},
+                                                             {"float", "Float32"},
+                                                             {"int", "Int32"},
+                                                             {"unsigned_int", "UInt32"},
+                                                             {"long", "Int64"},
+                                                             {"unsigned_long", "UInt64"},
+                                                             {"vtktypeint64", "Int64"},
+                                                             {"vtktypeint32", "Int32"},
+                                                             {"vtktypeuint64", "UInt64"},
+                                                             {"short", "Int16"},
+                                                             {"unsigned_short", "UInt16"},
+                                                             {"char", "Int8"},
+                                                             {"signed_char", "Int8"},
+                                                             {"unsigned_char", "UInt8"},
+                                                             {"vtkIdType", "Int32"}};
     const auto found = names.find(legacy);
     if (found == names.end()) text_.fail_word(legacy, "a type like float or double");
     return found->second;
   }
-  Values values(std::size_t count, const std::string& type, const char* what) {
-    Values values;
+  VtkValues values(std::size_t count, const std::string& type, const char* what) {
+    VtkValues values;
     if (is_binary_) {
       text_.rest_of_line();
       values.of = *vtk_values(text_.bytes(count * number_types.at(type).size, what), type, true);
@@ -205,38 +245,30 @@ class LegacyReader {
   fs::path path_;
   bool is_binary_ = false, has_offsets_ = false;
   Assembler result_;
-  Values connectivity_;
+  VtkValues connectivity_;
   std::vector<std::pair<std::size_t, std::size_t>> ends_;  // of each cell in the connectivity
   std::vector<double> types_;
 };
 
+/// The cells of an XML file's pieces.
 class XmlReader {
  public:
-  XmlReader(const std::string& content, const fs::path& path) : content_(content), path_(path), result_(path) {}
+  explicit XmlReader(const fs::path& path) : file_(path, "UnstructuredGrid"), result_(path) {}
 
   RawCells read() {
-    pugi::xml_document document;
-    const pugi::xml_parse_result parsed = document.load_buffer(content_.data(), content_.size());
-    if (!parsed) fail(line_at(parsed.offset), std::string("broken XML (") + parsed.description() + ")", "a whole file");
-    const pugi::xml_node root = document.child("VTKFile");
-    if (std::string(root.attribute("type").value()) != "UnstructuredGrid")
-      fail(1, "no VTK file of type UnstructuredGrid", "the cells of a volume");
-    if (root.attribute("compressor")) fail(line_of(root), "compressed arrays", "arrays without compression");
-    big_endian_ = std::string(root.attribute("byte_order").value()) == "BigEndian";
-    wide_header_ = std::string(root.attribute("header_type").value()) == "UInt64";
-    const pugi::xml_node grid = root.child("UnstructuredGrid"), piece = grid.child("Piece");
-    if (!piece || piece.next_sibling("Piece")) fail(line_of(grid), "no piece, or several", "one <Piece>");
-
+    const pugi::xml_node grid = file_.data_set(), piece = grid.child("Piece");
+    if (!piece || piece.next_sibling("Piece")) file_.fail(file_.line_of(grid), "no piece, or several", "one <Piece>");
     const std::size_t points = count(piece, "NumberOfPoints"), cells = count(piece, "NumberOfCells");
-    result_.add_points(array(piece.child("Points").child("DataArray"), 3 * points, "points"));
-    const Values offsets = cell_array(piece, "offsets", cells), types = cell_array(piece, "types", cells);
+    result_.add_points(file_.values(piece.child("Points").child("DataArray"), 3 * points, "points"));
+    const VtkValues offsets = cell_array(piece, "offsets", cells), types = cell_array(piece, "types", cells);
     double last = 0.0;
     for (std::size_t c = 0; c < cells; ++c) {
       if (!(offsets.of[c] >= last && offsets.of[c] < 2e9))
-        fail(offsets.line(c), "the offset of cell " + std::to_string(c) + " is below the one before", "ascending ones");
+        file_.fail(offsets.line(c), "the offset of cell " + std::to_string(c) + " is below the one before",
+                   "ascending ones");
       last = offsets.of[c];
     }
-    const Values connectivity = cell_array(piece, "connectivity", std::size_t(last));
+    const VtkValues connectivity = cell_array(piece, "connectivity", std::size_t(last));
     for (std::size_t c = 0; c < cells; ++c)
       result_.add_cell(c, types.of[c], connectivity, c == 0 ? 0 : std::size_t(offsets.of[c - 1]),
                        std::size_t(offsets.of[c]));
@@ -244,56 +276,26 @@ class XmlReader {
   }
 
  private:
-  int line_at(std::ptrdiff_t offset) const {
-    const auto end = content_.begin() + std::clamp<std::ptrdiff_t>(offset, 0, std::ptrdiff_t(content_.size()));
-    return 1 + int(std::count(content_.begin(), end, '\n'));
-  }
-  int line_of(pugi::xml_node node) const { return line_at(node.offset_debug()); }
-  [[noreturn]] void fail(int line, const std::string& found, const std::string& expected) const {
-    throw InputError({{path_, line, 0}, found, expected, "export the mesh again, in ASCII or inline binary"});
-  }
   std::size_t count(pugi::xml_node piece, const char* name) const {
     const long long value = piece.attribute(name).as_llong(-1);
-    if (value < 0 || std::size_t(value) > content_.size())
-      fail(line_of(piece), std::string("no sensible ") + name, "a count that the file can hold");
+    if (value < 0 || value > 1'000'000'000)
+      file_.fail(file_.line_of(piece), std::string("no sensible ") + name, "a count");
     return std::size_t(value);
   }
-  Values cell_array(pugi::xml_node piece, const char* name, std::size_t length) const {
-    return array(piece.child("Cells").find_child_by_attribute("DataArray", "Name", name), length, name);
-  }
-  Values array(pugi::xml_node node, std::size_t length, const std::string& name) const {
-    if (!node) fail(0, "there is no array of " + name, "points, connectivity, offsets and types");
-    const std::string format = node.attribute("format").value(), type = node.attribute("type").value();
-    const int line = line_of(node);
-    if (!number_types.contains(type)) fail(line, "an array of type \"" + type + "\"", "numbers");
-    Values values;
-    if (format == "ascii") {
-      const pugi::xml_node text = node.first_child();
-      TextTokens tokens(text.value(), path_, line_of(text ? text : node));
-      while (!tokens.at_end()) {
-        values.of.push_back(tokens.number<double>(("a number of " + name).c_str()));
-        values.lines.push_back(tokens.place().line);
-      }
-    } else if (format == "binary") {
-      const std::optional<std::string> bytes = decode_base64(node.text().get());
-      const std::size_t header = wide_header_ ? 8 : 4;
-      if (!bytes || bytes->size() < header) fail(line, "an array of " + name + " that is not base64", "base64");
-      values.of = *vtk_values(std::string_view(*bytes).substr(header), type, big_endian_);
-    } else {
-      fail(line, "an array in the encoding \"" + format + "\"", "\"ascii\" or \"binary\"");
-    }
-    if (values.of.size() != length)
-      fail(line, std::to_string(values.of.size()) + " numbers in the array of " + name, std::to_string(length));
-    return values;
+  VtkValues cell_array(pugi::xml_node piece, const char* name, std::size_t length) const {
+    return file_.values(piece.child("Cells").find_child_by_attribute("DataArray", "Name", name), length, name);
   }
 
-  const std::string& content_;
-  fs::path path_;
-  bool big_endian_ = false, wide_header_ = false;
+  VtkXmlFile file_;
   Assembler result_;
 };
 
 }  // namespace
+
+std::optional<std::size_t> vtk_number_size(const std::string& type) {
+  const auto found = number_types.find(type);
+  return found == number_types.end() ? std::nullopt : std::optional(found->second.size);
+}
 
 std::optional<std::vector<double>> vtk_values(std::string_view bytes, const std::string& type, bool big_endian) {
   const auto found = number_types.find(type);
@@ -341,9 +343,6 @@ RawCells read_legacy_vtk(const fs::path& path) {
   return LegacyReader(content, path).read();
 }
 
-RawCells read_xml_vtk(const fs::path& path) {
-  const std::string content = read_file(path);
-  return XmlReader(content, path).read();
-}
+RawCells read_xml_vtk(const fs::path& path) { return XmlReader(path).read(); }
 
 }  // namespace pliant

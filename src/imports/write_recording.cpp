@@ -14,7 +14,7 @@
 #include "capture/curves.hpp"
 #include "capture/frame_numbers.hpp"
 #include "capture/markers.hpp"
-#include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "imports/mask_overview.hpp"
 
 namespace pliant {
@@ -268,7 +268,7 @@ void write_facts(const fs::path& out, const ImportedRecording& recording, const 
     refuse(recording.name, "both a mass and a density", "one of the two", "keep what was measured");
   scene.object.mass = facts.mass, scene.object.density = facts.density;
   if (facts.surface) {
-    scene.object.surface = read_mesh(*facts.surface);
+    scene.object.surface = read_surface(*facts.surface);
     scene.object.file = out / ("rest" + facts.surface->extension().string());
     write_file(scene.object.file, read_file(*facts.surface));
   } else if (!recording.test) {

@@ -106,7 +106,10 @@ void check_surface(const TriangleMesh& surface) {
   if (report.is_closed_solid && report.degenerate_triangles == 0) return;
   std::vector<Problem> problems;
   for (const std::string& complaint : report.complaints)
-    problems.push_back({{}, complaint, "a closed, outward oriented surface without flat triangles", "repair the scan"});
+    problems.push_back({{},
+                        complaint,
+                        "a closed, outward oriented surface without flat triangles",
+                        report.is_closed_solid ? "repair the scan" : report.cure});
   throw InputError(problems);
 }
 

@@ -9,6 +9,7 @@
 #include "base/files.hpp"
 #include "base/old_names.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "geometry/volume_mesh.hpp"
 #include "model/vtu.hpp"
 #include "scene/inner_body.hpp"
@@ -185,10 +186,18 @@ class Reader {
     if (const auto path = read_path(table, name, files_)) read_file_of(table, name, *path, read);
   }
 
+  static TriangleMesh read_solid(const fs::path& path) {
+    TriangleMesh surface = read_surface(path);
+    const MeshReport report = examine(surface);
+    if (!report.is_closed_solid)
+      throw InputError({{path}, report.complaints.front(), "a closed surface that faces outwards", report.cure});
+    return surface;
+  }
+
   void read_object(TomlTable& object) {
     TriangleMesh& surface = model_.scene.object.surface.emplace();
     if (object.has("surface") || !object.has("volume_mesh"))
-      with_file(object, "surface", [&](const fs::path& path) { surface = read_mesh(path); });
+      with_file(object, "surface", [&](const fs::path& path) { surface = read_solid(path); });
     if (object.has("volume_mesh")) with_file(object, "volume_mesh", [&](const fs::path& path) { read_volume(path); });
     model_.scene.object.mass =
         read_number(object, "mass", {.low = 0.0, .low_allowed = false, .meaning = "the mass in kilograms"});
@@ -268,11 +277,17 @@ class Reader {
     if (surface.triangles.empty()) surface = boundary_surface(mesh);
   }
 
+  /// Whether it has one of the fields that are saved with a model.
+  static bool is_own_volume(const fs::path& path) {
+    if (ending_of(path) != ".vtu") return false;
+    return std::ranges::any_of(vtu_cell_data(path), [](const std::string& name) {
+      return name == modulus_field || name == ratio_field || name == former_name(ratio_field) || name == fill_field;
+    });
+  }
+
   void read_volume(const fs::path& path) {
-    if (path.extension() != ".vtu") return read_plain_volume(path);
+    if (!is_own_volume(path)) return read_plain_volume(path);
     const VtuGrid grid = read_vtu(path);
-    const bool is_solid = grid.kind == VtuCell::Tetrahedron || grid.kind == VtuCell::QuadraticTetrahedron;
-    if (is_solid && grid.cell_data.empty()) return read_plain_volume(path);
     if (grid.kind == VtuCell::Triangle)
       throw InputError({{path}, "triangles", "hexahedra or tetrahedra", "save the model again"});
     ModelVolume& volume = model_.volume;

@@ -11,7 +11,7 @@
 #include "base/base64.hpp"
 #include "base/error.hpp"
 #include "base/files.hpp"
-#include "geometry/raw_cells.hpp"
+#include "geometry/vtk_xml.hpp"
 
 namespace pliant {
 
@@ -105,29 +105,23 @@ void save(const fs::path& path, const pugi::xml_document& document) {
 
 // ---- reading
 
-pugi::xml_node load_root(const fs::path& path, pugi::xml_document& document, const char* type) {
-  const std::string content = read_file(path);
-  const pugi::xml_parse_result result = document.load_buffer(content.data(), content.size());
-  if (!result)
-    fail(path, std::string("broken XML at byte ") + std::to_string(result.offset) + " (" + result.description() + ")",
-         std::string("a whole VTK ") + type + " file");
-  const pugi::xml_node root = document.child("VTKFile");
-  if (std::string(root.attribute("type").value()) != type)
-    fail(path, "a VTK file of type \"" + std::string(root.attribute("type").value()) + "\"",
-         std::string("\"") + type + "\"");
-  return root;
-}
-
 class GridReader {
  public:
-  GridReader(fs::path path, pugi::xml_node root) : path_(std::move(path)) {
-    if (root.attribute("compressor")) fail(path_, "compressed arrays", "arrays without compression");
-    if (std::string(root.attribute("byte_order").value()) != "LittleEndian")
-      fail(path_, "another byte order", "byte_order=\"LittleEndian\"");
-    if (std::string(root.attribute("header_type").value()) != "UInt64")
-      fail(path_, "another header type", "header_type=\"UInt64\"");
+  explicit GridReader(const fs::path& path) : path_(path), file_(path, "UnstructuredGrid") {}
+
+  VtuGrid grid() const {
+    if (!piece() || piece().next_sibling("Piece")) fail(path_, "not exactly one piece", "one piece");
+    return grid(piece());
+  }
+  std::vector<std::string> cell_data() const {
+    std::vector<std::string> arrays;
+    for (const pugi::xml_node node : piece().child("CellData").children("DataArray"))
+      arrays.emplace_back(node.attribute("Name").value());
+    return arrays;
   }
 
+ private:
+  pugi::xml_node piece() const { return file_.data_set().child("Piece"); }
   VtuGrid grid(pugi::xml_node piece) const {
     VtuGrid grid;
     const int points = count(piece, "NumberOfPoints"), cells = count(piece, "NumberOfCells");
@@ -140,7 +134,6 @@ class GridReader {
     return grid;
   }
 
- private:
   int count(pugi::xml_node piece, const char* attribute) const {
     const long long value = piece.attribute(attribute).as_llong(-1);
     if (value < 0 || value > 1'000'000'000) fail(path_, std::string("no sensible ") + attribute, "a count");
@@ -155,33 +148,16 @@ class GridReader {
 
   VtuArray array(pugi::xml_node node, int rows) const {
     VtuArray array{node.attribute("Name").value(), node.attribute("NumberOfComponents").as_int(1), {}};
-    const std::string label = "array \"" + array.name + "\"", type = node.attribute("type").value();
-    if (!node) fail(path_, "an array is missing", "points, connectivity, offsets and types");
-    if (std::string(node.attribute("format").value()) != "binary")
-      fail(path_, label + " in another encoding", "format=\"binary\"");
-    if (array.components < 1) fail(path_, label + " without components", "at least one");
-    auto values = vtk_values(bytes(node, label), type, false);
-    if (!values) fail(path_, label + " of type \"" + type + "\"", "numbers, like Float64");
-    array.values = std::move(*values);
-    if (array.values.size() != size_t(rows) * size_t(array.components))
-      fail(path_, label + " of " + std::to_string(array.values.size()) + " values",
-           std::to_string(size_t(rows) * size_t(array.components)));
+    if (array.components < 1) fail(path_, "array \"" + array.name + "\" without components", "at least one");
+    array.values = file_.values(node, std::size_t(rows) * std::size_t(array.components), '"' + array.name + '"').of;
     return array;
   }
 
-  std::string bytes(pugi::xml_node node, const std::string& label) const {
-    const std::optional<std::string> raw = decode_base64(node.text().get());
-    uint64_t announced = 0;
-    if (!raw || raw->size() < sizeof announced) fail(path_, label + " that is not base64", "an array of binary values");
-    std::memcpy(&announced, raw->data(), sizeof announced);
-    if (announced != raw->size() - sizeof announced)
-      fail(path_, label + " of " + std::to_string(raw->size() - sizeof announced) + " bytes",
-           std::to_string(announced) + " bytes");
-    return raw->substr(sizeof announced);
-  }
-
   VtuArray named(pugi::xml_node parent, const char* name, int rows) const {
-    return array(parent.find_child_by_attribute("DataArray", "Name", name), rows);
+    const pugi::xml_node node = parent.find_child_by_attribute("DataArray", "Name", name);
+    if (!node)
+      fail(path_, std::string("the array \"") + name + "\" is missing", "points, connectivity, offsets and types");
+    return array(node, rows);
   }
 
   void read_cells(pugi::xml_node node, int cells, VtuGrid& grid) const {
@@ -204,6 +180,7 @@ class GridReader {
   }
 
   fs::path path_;
+  VtkXmlFile file_;
 };
 
 }  // namespace
@@ -269,13 +246,9 @@ void write_vtu(const fs::path& path, const VtuGrid& grid, VtuPrecision precision
   save(path, document);
 }
 
-VtuGrid read_vtu(const fs::path& path) {
-  pugi::xml_document document;
-  const pugi::xml_node root = load_root(path, document, "UnstructuredGrid");
-  const pugi::xml_node piece = root.child("UnstructuredGrid").child("Piece");
-  if (!piece || piece.next_sibling("Piece")) fail(path, "not exactly one piece", "one piece");
-  return GridReader(path, root).grid(piece);
-}
+VtuGrid read_vtu(const fs::path& path) { return GridReader(path).grid(); }
+
+std::vector<std::string> vtu_cell_data(const fs::path& path) { return GridReader(path).cell_data(); }
 
 void write_pvd(const fs::path& path, const std::vector<PvdEntry>& entries) {
   pugi::xml_document document;

@@ -54,9 +54,12 @@ std::vector<int> from_vtk_order(VtuCell kind, std::span<const int> points);
 /// InputError where the file cannot be written.
 void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, VtuPrecision precision = VtuPrecision::Double);
 
-/// Reads what `write_vtu` writes (also with 32 or 64 bit integers). Throws InputError with the file's name and what is
-/// wrong in it: not XML, cut off, arrays of another length, several kinds of cells, compressed or appended data.
+/// Reads a grid in any of VTK's codings. Throws InputError with the file's name and what is wrong in it: not XML, cut
+/// off, arrays of another length, several kinds of cells.
 VtuGrid read_vtu(const std::filesystem::path& path);
+
+/// Names of the arrays of its cells. Throws InputError where the file is no grid.
+std::vector<std::string> vtu_cell_data(const std::filesystem::path& path);
 
 /// One time of a collection.
 struct PvdEntry {

@@ -7,6 +7,7 @@
 
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "scene/inner_body.hpp"
 #include "scene/scene_toml.hpp"
 
@@ -73,11 +74,11 @@ class Reader {
     if (const auto file = read_path(object, "surface", files_)) {
       own.file = *file;
       read_file_of(object, "surface", *file, [&](const fs::path& path) {
-        own.surface = read_mesh(path);
+        own.surface = read_surface(path, &own.surface_remarks);
         const MeshReport report = examine(*own.surface);
         if (!report.is_closed_solid)
-          context_.reject("object.surface", report.complaints.empty() ? "an open surface" : report.complaints.front(),
-                          "a closed surface that faces outwards", "close holes in a mesh editor");
+          context_.reject("object.surface", report.complaints.front(), "a closed surface that faces outwards",
+                          report.cure);
       });
     }
     read_object_facts(object, own);

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "geometry/surface_distance.hpp"
 #include "scene/region.hpp"
 
@@ -65,12 +66,11 @@ InnerBody read_inner(TomlTable& block, const NamedFiles& files) {
   if (!file) return body;
   body.file = *file;
   read_file_of(block, "surface", *file, [&](const fs::path& path) {
-    body.surface = read_mesh(path);
+    body.surface = read_surface(path);
     const MeshReport report = examine(body.surface);
     if (report.is_closed_solid) return;
-    block.context().reject(block.key_of("surface"),
-                           report.complaints.empty() ? "an open surface" : report.complaints.front(),
-                           "a closed surface of the rigid body, facing outwards", "close holes in a mesh editor");
+    block.context().reject(block.key_of("surface"), report.complaints.front(),
+                           "a closed surface of the rigid body, facing outwards", report.cure);
   });
   return body;
 }

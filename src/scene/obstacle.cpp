@@ -9,6 +9,7 @@
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
+#include "geometry/solid_surface.hpp"
 #include "geometry/surface_distance.hpp"
 #include "scene/region.hpp"
 #include "scene/scene_toml.hpp"
@@ -219,10 +220,11 @@ RigidObstacle read_obstacle(TomlTable& block, const NamedFiles& files, bool may_
   if (const auto file = read_optional_path(block, "mesh", files)) {
     ShapeMesh shape{*file, {}};
     read_file_of(block, "mesh", *file, [&](const fs::path& path) {
-      shape.mesh = read_mesh(path);
-      if (!examine(shape.mesh).is_closed_solid)
-        block.context().reject(block.key_of("mesh"), "an open or inward surface",
-                               "a closed surface of the rigid body, facing outwards", "close holes in a mesh editor");
+      shape.mesh = read_surface(path);
+      const MeshReport report = examine(shape.mesh);
+      if (!report.is_closed_solid)
+        block.context().reject(block.key_of("mesh"), report.complaints.front(),
+                               "a closed surface of the rigid body, facing outwards", report.cure);
     });
     obstacle.shape = std::move(shape), ++count;
   } else if (block.has("mesh")) {

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "base/files.hpp"
-#include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "scene/inner_body.hpp"
 #include "scene/obstacle.hpp"
 #include "scene/region.hpp"
@@ -177,7 +177,8 @@ void read_object_shape(TomlTable& table, const NamedFiles& files, Object& object
                            "leave out `surface`: the volume's boundary takes its place");
   } else if (surface) {
     object.file = *surface;
-    read_file_of(table, "surface", *surface, [&](const fs::path& path) { object.surface = read_mesh(path); });
+    read_file_of(table, "surface", *surface,
+                 [&](const fs::path& path) { object.surface = read_surface(path, &object.surface_remarks); });
   } else if (volume) {
     object.file = *volume;
     read_file_of(table, "volume_mesh", *volume, [&](const fs::path& path) {

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "base/files.hpp"
-#include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "scene/obstacle.hpp"
 #include "scene/scene_toml.hpp"
 #include "situation/situation.hpp"
@@ -127,7 +127,7 @@ ProbeFacts read_probe(TomlTable& table, const NamedFiles& files) {
   }
   if (probe.kind == ProbeKind::Shape)
     if (const auto file = read_path(table, "mesh", files))
-      read_file_of(table, "mesh", *file, [&](const auto& path) { probe.mesh = read_mesh(path); });
+      read_file_of(table, "mesh", *file, [&](const auto& path) { probe.mesh = read_surface(path); });
   if (const auto file = read_optional_path(table, "path_file", files)) {
     read_file_of(table, "path_file", *file, [&](const auto& path) { read_path_file(path, probe); });
     if (table.has("path"))

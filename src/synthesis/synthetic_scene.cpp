@@ -11,6 +11,7 @@
 #include "base/files.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/primitives.hpp"
+#include "geometry/solid_surface.hpp"
 #include "rays/look_at.hpp"
 #include "scene/inner_body.hpp"
 #include "scene/obstacle.hpp"
@@ -116,11 +117,10 @@ class Reader {
     const auto file = read_path(object, "surface", files_);
     if (!file) return;
     read_file_of(object, "surface", *file, [&](const fs::path& path) {
-      surface() = read_mesh(path);
+      surface() = read_surface(path);
       const MeshReport report = examine(surface());
       if (!report.is_closed_solid)
-        context_.reject("object.surface", report.complaints.empty() ? "an open surface" : report.complaints.front(),
-                        "a closed surface");
+        context_.reject("object.surface", report.complaints.front(), "a closed surface", report.cure);
     });
   }
 

@@ -1,5 +1,8 @@
 #include "geometry/mesh_io.hpp"
 
+#include <cctype>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 
@@ -171,6 +174,70 @@ TEST(ReadStl, RefusesTextThatIsCutShort) {
   const TemporaryFolder folder;
   folder.write("a.stl", "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n");
   EXPECT_THAT(complaint_of([&] { (void)read_mesh(folder / "a.stl"); }), HasSubstr("cut short"));
+}
+
+const char* const text_facet =
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+
+TEST(ReadStl, TakesTextBesideTheLetter) {
+  const TemporaryFolder folder;
+  std::string capitals = std::string("solid one\n") + text_facet + "endsolid one\n";
+  for (char& c : capitals) c = char(std::toupper(static_cast<unsigned char>(c)));
+  for (const std::string& text : {capitals, std::string("\n\n  solid\n\n") + text_facet + "\n\nendsolid\n\n",
+                                  std::string("\xEF\xBB\xBFsolid \xC3\xA9\r\n") + text_facet + "end solid",
+                                  std::string("solid a\nendsolid a\nsolid b\n") + text_facet + "endsolid b"}) {
+    folder.write("a.stl", text);
+    EXPECT_EQ(read_mesh(folder / "a.stl").triangles.size(), 1u) << text;
+  }
+  folder.write("a.stl", std::string("solid a\n") + text_facet + "endsolid a\nsolid b\n" + text_facet + "endsolid b\n");
+  EXPECT_EQ(read_mesh(folder / "a.stl").triangles.size(), 2u);
+}
+
+TEST(ReadStl, RefusesASecondSolidThatIsCutShort) {
+  const TemporaryFolder folder;
+  folder.write("a.stl", std::string("solid a\n") + text_facet + "endsolid a\nsolid b\n" + text_facet);
+  EXPECT_THAT(complaint_of([&] { (void)read_mesh(folder / "a.stl"); }), HasSubstr("cut short"));
+  folder.write("a.stl",
+               "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid");
+  EXPECT_THAT(complaint_of([&] { (void)read_mesh(folder / "a.stl"); }),
+              AllOf(HasSubstr("a.stl:7"), HasSubstr("without three corners")));
+}
+
+class BinaryStl : public ::testing::Test {
+ protected:
+  BinaryStl() {
+    write_mesh(folder / "a.stl", sample());
+    whole = read_file(folder / "a.stl");
+  }
+  TriangleMesh read(const std::string& bytes) const {
+    write_file(folder / "a.stl", bytes);
+    return read_mesh(folder / "a.stl");
+  }
+  static std::string promising(std::string bytes, std::uint32_t count) {
+    std::memcpy(bytes.data() + 80, &count, 4);
+    return bytes;
+  }
+  TemporaryFolder folder;
+  std::string whole;
+};
+
+TEST_F(BinaryStl, MayBeginWithSolidAndGoOnBehindTheEnd) {
+  std::string solid = whole;
+  solid.replace(0, 14, "solid facet\nfa");
+  for (const std::string& tail : {std::string(), std::string("made by a scanner"), std::string(100, '\0')})
+    for (const std::string& bytes : {whole, solid}) EXPECT_EQ(read(bytes + tail), read(whole)) << tail.size();
+}
+
+TEST_F(BinaryStl, IsCountedWhereItsHeadingDoesNot) {
+  for (const std::uint32_t count : {0U, 0xFFFFFFFFU}) EXPECT_EQ(read(promising(whole, count)).triangles.size(), 12u);
+  EXPECT_EQ(read(promising(whole, 11)).triangles.size(), 12u);  // which closes the surface
+}
+
+TEST_F(BinaryStl, SaysWhichCountsDisagree) {
+  EXPECT_THAT(complaint_of([&] { (void)read(promising(whole, 13)); }),
+              AllOf(HasSubstr("which hold 12 triangles"), HasSubstr("promises 13"), HasSubstr("cut short")));
+  EXPECT_THAT(complaint_of([&] { (void)read(promising(whole.substr(0, whole.size() - 50), 10)); }),
+              AllOf(HasSubstr("promises 10 triangles"), HasSubstr("holds 11"), HasSubstr("meshio convert")));
 }
 
 TEST(SharedMeshes, RestScansAreClosedSolids) {

@@ -1,6 +1,10 @@
 // Tetrahedra from files: one mesh in every format that is read, what is mended, and what is refused in which words.
 #include "geometry/volume_mesh.hpp"
 
+#include <lz4.h>
+#include <lzma.h>
+#include <zlib.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -16,6 +20,28 @@ using test::complaint_of;
 using test::TemporaryFolder;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+
+constexpr const char* zlib = "vtkZLibDataCompressor";
+constexpr const char* lz4 = "vtkLZ4DataCompressor";
+constexpr const char* lzma = "vtkLZMADataCompressor";
+
+std::string packed(const std::string& compressor, std::string_view bytes) {
+  std::string result(bytes.size() + 1000, '\0');
+  std::size_t size = 0;
+  if (compressor == zlib) {
+    uLongf length = result.size();
+    compress(reinterpret_cast<Bytef*>(result.data()), &length, reinterpret_cast<const Bytef*>(bytes.data()),
+             bytes.size());
+    size = length;
+  } else if (compressor == lz4) {
+    size = std::size_t(LZ4_compress_default(bytes.data(), result.data(), int(bytes.size()), int(result.size())));
+  } else {
+    lzma_easy_buffer_encode(6, LZMA_CHECK_CRC32, nullptr, reinterpret_cast<const std::uint8_t*>(bytes.data()),
+                            bytes.size(), reinterpret_cast<std::uint8_t*>(result.data()), &size, result.size());
+  }
+  result.resize(size);
+  return result;
+}
 
 template <class T>
 std::string raw(const std::vector<T>& values, bool big_endian) {
@@ -86,6 +112,107 @@ std::string vtu_binary(bool big_endian) {
              coded(raw(std::vector<std::uint8_t>{5, 10, 10}, big_endian)), "binary");
 }
 
+/// The same with its arrays compressed in blocks of `block` bytes, and those inline, or appended raw or in base64.
+enum class Place { Inline, Raw, Base64 };
+template <class Header>
+std::string vtu_coded(const std::string& compressor, Place place, bool big_endian) {
+  constexpr std::size_t block = 40;
+  std::string appended;
+  const auto heading = [&](std::vector<Header> numbers) { return raw(numbers, big_endian); };
+  const auto coded = [&](const std::string& bytes) {
+    std::vector<Header> sizes = {Header(bytes.size())};
+    std::string data = bytes;
+    if (!compressor.empty()) {
+      sizes = {Header((bytes.size() + block - 1) / block), Header(block), Header(bytes.size() % block)};
+      data.clear();
+      for (std::size_t at = 0; at < bytes.size(); at += block) {
+        const std::string one = packed(compressor, std::string_view(bytes).substr(at, block));
+        sizes.push_back(Header(one.size()));
+        data += one;
+      }
+    }
+    if (place == Place::Raw) return heading(sizes) + data;
+    return compressor.empty() ? encode_base64(heading(sizes) + data)
+                              : encode_base64(heading(sizes)) + encode_base64(data);
+  };
+  const std::string arrays[] = {
+      coded(raw(coordinates, big_endian)), coded(raw(std::vector<int>{0, 1, 2, 0, 1, 2, 3, 1, 3, 2, 5}, big_endian)),
+      coded(raw(std::vector<int>{3, 7, 11}, big_endian)), coded(raw(std::vector<std::uint8_t>{5, 10, 10}, big_endian))};
+  std::string root = std::string("byte_order=\"") + (big_endian ? "Big" : "Little") + "Endian\" header_type=\"UInt" +
+                     std::to_string(8 * sizeof(Header)) + "\"";
+  if (!compressor.empty()) root += " compressor=\"" + compressor + "\"";
+  if (place == Place::Inline) return vtu(root, arrays[0], arrays[1], arrays[2], arrays[3], "binary");
+  std::string text = vtu(root, "", "", "", "", "appended");
+  std::size_t at = 0, offset = 0;
+  for (const std::string& array : arrays) {
+    at = text.find("format=\"appended\"", at) + 17;
+    text.insert(at, " offset=\"" + std::to_string(offset) + "\"");
+    offset += array.size(), appended += array;
+  }
+  const std::string tail = std::string("<AppendedData encoding=\"") + (place == Place::Raw ? "raw" : "base64") +
+                           "\">\n_" + appended + "\n</AppendedData>\n";
+  return text.insert(text.find("</VTKFile>"), tail);
+}
+
+template <class T>
+std::string number(T value, bool big_endian) {
+  return raw(std::vector<T>{value}, big_endian);
+}
+/// Gmsh's version 2.2 in binary: runs of elements of one type.
+std::string gmsh_2_binary(bool big_endian) {
+  const auto integers = [&](const std::vector<std::int32_t>& values) { return raw(values, big_endian); };
+  const int ids[] = {10, 20, 30, 40, 60, 50};
+  std::string text =
+      "$MeshFormat\n2.2 1 8\n" + integers({1}) + "\n$EndMeshFormat\n$Periodic\n$ $End 3\n$EndPeriodic\n$Nodes\n6\n";
+  for (std::size_t n = 0; n < 6; ++n)
+    text += integers({ids[n]}) + raw(std::vector<double>(coordinates.begin() + 3 * std::ptrdiff_t(n),
+                                                         coordinates.begin() + 3 * std::ptrdiff_t(n) + 3),
+                                     big_endian);
+  return text + "$EndNodes\n$Elements\n3\n" + integers({2, 1, 2, 1, 7, 7, 10, 20, 30}) +
+         integers({4, 1, 2, 2, 7, 7, 10, 20, 30, 40}) + integers({4, 1, 0, 3, 20, 40, 30, 50}) + "$EndElements\n";
+}
+/// Version 4 in binary, whose nodes on a face have parametric coordinates.
+std::string gmsh_4_binary(bool big_endian, bool is_4_0) {
+  using Ids = std::vector<std::int64_t>;
+  const auto integers = [&](const std::vector<std::int32_t>& values) { return raw(values, big_endian); };
+  const auto wide = [&](const Ids& values) { return raw(values, big_endian); };
+  const auto reals = [&](const std::vector<double>& values) { return raw(values, big_endian); };
+  const auto ids = [&](const Ids& values) {
+    return is_4_0 ? raw(std::vector<std::int32_t>(values.begin(), values.end()), big_endian) : wide(values);
+  };
+  const auto entity = [&](int dimension, int tag) {
+    return is_4_0 ? integers({tag, dimension}) : integers({dimension, tag});
+  };
+  const auto range = [&](std::int64_t low, std::int64_t high) { return is_4_0 ? std::string() : wide({low, high}); };
+  const auto nodes = [&](const Ids& of, const std::vector<std::vector<double>>& at) {
+    std::string bytes = wide({std::int64_t(of.size())});
+    if (!is_4_0) bytes += wide(of);
+    for (std::size_t n = 0; n < of.size(); ++n) bytes += (is_4_0 ? ids({of[n]}) : "") + reals(at[n]);
+    return bytes;
+  };
+  return std::string("$MeshFormat\n") + (is_4_0 ? "4" : "4.1") + " 1 8\n" + integers({1}) +
+         "\n$EndMeshFormat\n$Entities\n" + wide({0, 0, 0, 0}) + "\n$EndEntities\n$Nodes\n" + wide({2, 6}) +
+         range(10, 60) + entity(2, 1) + integers({1}) +
+         nodes({10, 20, 30}, {{0, 0, 0, 7, 7}, {1, 0, 0, 7, 7}, {0, 1, 0, 7, 7}}) + entity(3, 1) + integers({0}) +
+         nodes({40, 60, 50}, {{0, 0, 1}, {5, 5, 5}, {1, 1, 1}}) + "\n$EndNodes\n$Elements\n" + wide({2, 3}) +
+         range(1, 3) + entity(2, 1) + integers({2}) + wide({1}) + ids({1, 10, 20, 30}) + entity(3, 1) + integers({4}) +
+         wide({2}) + ids({2, 10, 20, 30, 40, 3, 20, 40, 30, 50}) + "\n$EndElements\n";
+}
+const std::string gmsh_parametric =
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$ParametricNodes\n6\n10 0 0 0 0 1\n20 1 0 0 1 4 0.5\n30 0 1 0 2 1 0.25 0.5\n"
+    "40 0 0 1 3 1\n60 5 5 5 3 1\n50 1 1 1 3 1\n$EndParametricNodes\n"
+    "$Elements\n3\n1 2 2 1 1 10 20 30\n2 4 2 1 1 10 20 30 40\n3 4 0 20 40 30 50\n$EndElements\n";
+/// What VTK's own writer puts before the points: fields of numbers and of texts.
+std::string vtk_fields() {
+  return vtk_heading("5.1", "BINARY") + "FIELD FieldData 2\nTIME 1 1 double\n" + number(0.5, true) +
+         "\nnames 1 2 string\n\xC1"
+         "a\x80\x03one\nPOINTS 6 double\n" +
+         raw(coordinates, true) + "\nCELLS 4 11\nOFFSETS vtktypeint64\n" +
+         raw(std::vector<std::int64_t>{0, 3, 7, 11}, true) + "\nCONNECTIVITY vtktypeint64\n" +
+         raw(std::vector<std::int64_t>{0, 1, 2, 0, 1, 2, 3, 1, 3, 2, 5}, true) + "\nCELL_TYPES 3\n" +
+         raw(std::vector<int>{5, 10, 10}, true) + "\n";
+}
+
 struct Format {
   const char* name;
   const char* file;
@@ -127,14 +254,24 @@ TEST_P(VolumeFormat, IsRefusedWhereItIsCutOff) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, VolumeFormat,
-                         ::testing::Values(Format{"Gmsh1", "a.msh", gmsh_1}, Format{"Gmsh2", "a.msh", gmsh_2},
-                                           Format{"Gmsh4", "a.msh", gmsh_4}, Format{"VtkText", "a.vtk", vtk_text},
-                                           Format{"Vtk5", "a.vtk", vtk_5}, Format{"VtkBinary", "a.vtk", vtk_binary()},
-                                           Format{"VtuText", "a.vtu", vtu_text},
-                                           Format{"VtuLittle", "a.vtu", vtu_binary<std::uint64_t>(false)},
-                                           Format{"VtuBig", "a.VTU", vtu_binary<std::uint32_t>(true)}),
-                         [](const auto& format) { return format.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    All, VolumeFormat,
+    ::testing::Values(
+        Format{"Gmsh1", "a.msh", gmsh_1}, Format{"Gmsh2", "a.msh", gmsh_2}, Format{"Gmsh4", "a.msh", gmsh_4},
+        Format{"VtkText", "a.vtk", vtk_text}, Format{"Vtk5", "a.vtk", vtk_5},
+        Format{"VtkBinary", "a.vtk", vtk_binary()}, Format{"VtuText", "a.vtu", vtu_text},
+        Format{"VtuLittle", "a.vtu", vtu_binary<std::uint64_t>(false)},
+        Format{"VtuBig", "a.VTU", vtu_binary<std::uint32_t>(true)}, Format{"GmshParametric", "a.msh", gmsh_parametric},
+        Format{"Gmsh2Little", "a.msh", gmsh_2_binary(false)}, Format{"Gmsh2Big", "a.msh", gmsh_2_binary(true)},
+        Format{"Gmsh40", "a.msh", gmsh_4_binary(false, true)}, Format{"Gmsh41", "a.msh", gmsh_4_binary(false, false)},
+        Format{"Gmsh41Big", "a.msh", gmsh_4_binary(true, false)}, Format{"VtkFields", "a.vtk", vtk_fields()},
+        Format{"VtuZlib", "a.vtu", vtu_coded<std::uint32_t>(zlib, Place::Inline, false)},
+        Format{"VtuLz4", "a.vtu", vtu_coded<std::uint64_t>(lz4, Place::Inline, true)},
+        Format{"VtuLzma", "a.vtu", vtu_coded<std::uint32_t>(lzma, Place::Base64, false)},
+        Format{"VtuZlibRaw", "a.vtu", vtu_coded<std::uint64_t>(zlib, Place::Raw, true)},
+        Format{"VtuRaw", "a.vtu", vtu_coded<std::uint64_t>("", Place::Raw, false)},
+        Format{"VtuBase64", "a.vtu", vtu_coded<std::uint32_t>("", Place::Base64, true)}),
+    [](const auto& format) { return format.param.name; });
 
 /// Mid nodes go to the edges that they halve, in the order of every format, and of elements that are turned.
 TEST(VolumeMesh, QuadraticElementsKeepTheirMidNodesOnTheirEdges) {
@@ -211,8 +348,9 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"TooMany", "a.msh", gmsh_1, "$NOD\n6", "$NOD\n600000", {"a.msh:2:1", "600000", "can hold"}},
         Fault{"TooFew", "a.msh", gmsh_1, "$NOD\n6", "$NOD\n5", {"a.msh:8:1", "\"50\"", "$ENDNOD"}},
         Fault{"CountOfNodes", "a.msh", gmsh_1, "4 1 1 4 10", "4 1 1 5 10", {"a.msh:13", "tetrahedron of 5 nodes"}},
-        Fault{"Version", "a.msh", gmsh_2, "2.2 0 8", "3.0 0 8", {"a.msh:2:1", "version 3.0", "MshFileVersion"}},
-        Fault{"Binary", "a.msh", gmsh_2, "2.2 0 8", "2.2 1 8", {"a.msh:2:5", "binary", "Mesh.Binary = 0"}},
+        Fault{"Version", "a.msh", gmsh_2, "2.2 0 8", "3.0 0 8", {"a.msh:2:1", "version 3.0", "-format msh41"}},
+        Fault{"ByteOrder", "a.msh", gmsh_2, "2.2 0 8", "2.2 1 8", {"a.msh:2", "bytes in an unknown order"}},
+        Fault{"Fluent", "a.msh", "(1 \"meshio 5.3.5\")\n", "", "", {"a.msh:1", "ANSYS Fluent", "meshio convert"}},
         Fault{"NoElements", "a.msh", gmsh_1, gmsh_1.substr(gmsh_1.find("$ELM")), "", {"a.msh", "no elements"}},
         Fault{"UnknownType", "a.msh", gmsh_1, "3 4 1 1 4 20", "3 99 1 1 4 20", {"a.msh:14", "type 99"}},
         Fault{"OtherSolid",
@@ -246,7 +384,19 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"XmlNoNumber", "a.vtu", vtu_text, "5 5 5", "5 x 5", {"a.vtu:7:3", "\"x\""}},
         Fault{"XmlTooFew", "a.vtu", vtu_text, "5 5 5", "5 5", {"a.vtu:5", "17 numbers in the array of points", "18"}},
         Fault{"XmlOffsets", "a.vtu", vtu_text, "3 7 11", "3 2 11", {"a.vtu:", "offset of cell 1"}},
-        Fault{"XmlAppended", "a.vtu", vtu_text, "format=\"ascii\"", "format=\"appended\"", {"a.vtu:5", "\"appended\""}},
+        Fault{"XmlAppended",
+              "a.vtu",
+              vtu_text,
+              "format=\"ascii\"",
+              "format=\"appended\"",
+              {"a.vtu:5", "beyond the appended data"}},
+        Fault{"XmlCompressor",
+              "a.vtu",
+              vtu_text,
+              "byte_order",
+              "compressor=\"vtkZstd\" byte_order",
+              {"a.vtu:1", "compressed by \"vtkZstd\"", "meshio convert"}},
+        Fault{"XmlHeader", "a.vtu", vtu_text, "byte_order", "header_type=\"UInt16\" byte_order", {"a.vtu:1", "UInt16"}},
         Fault{"XmlMissing", "a.vtu", vtu_text, "Name=\"types\"", "Name=\"kinds\"", {"a.vtu", "no array of types"}}),
     [](const auto& fault) { return fault.param.name; });
 
