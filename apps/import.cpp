@@ -16,13 +16,13 @@ namespace pliant::apps {
 namespace {
 
 struct Arguments {
-  std::string source, out, from, surface, camera, background, time_unit;
-  std::vector<std::string> topics;
+  std::string source, out, from, surface, camera, background, time_unit, strain;
+  std::vector<std::string> topics, kept;
   std::vector<double> up, contact;
   double mass = 0.0, density = 0.0, rate = 0.0, depth_scale = 0.0, fx = 0.0, fov = 0.0, threshold = 0.0, length = 0.0,
          area = 0.0, ball = 0.0, punch = 0.0, force_std = 0.0;
   int first = 0, last = -1, every = 1;
-  bool compression = false;
+  bool compression = false, tension = false;
 };
 
 std::optional<double> given(double value) { return value > 0.0 ? std::optional(value) : std::nullopt; }
@@ -42,7 +42,9 @@ CaptureFacts facts_of(const Arguments& arguments) {
   if (facts.up && !(facts.up->norm() > 0.0)) refuse({}, "--up is zero", "the direction away from the ground");
   facts.first = arguments.first, facts.every = arguments.every;
   if (arguments.last >= 0) facts.last = arguments.last;
-  facts.is_compression = arguments.compression;
+  if (arguments.compression && arguments.tension) refuse({}, "both --compression and --tension", "one of the two");
+  facts.is_compression = arguments.compression, facts.is_tension = arguments.tension;
+  facts.kept = arguments.kept;
   facts.length = given(arguments.length), facts.area = given(arguments.area);
   if (arguments.ball > 0.0 && arguments.punch > 0.0) refuse({}, "both --ball and --punch", "one of the two");
   if (arguments.ball > 0.0) facts.probe = IndenterShape::Ball;
@@ -60,6 +62,10 @@ ImportOptions options_of(const Arguments& arguments) {
   if (!arguments.time_unit.empty()) options.time_unit = arguments.time_unit;
   options.topics = arguments.topics;
   options.fx = given(arguments.fx), options.field_of_view_deg = given(arguments.fov);
+  if (!arguments.strain.empty() && arguments.strain != "strain" && arguments.strain != "percent" &&
+      arguments.strain != "stretch")
+    refuse({}, "--strain " + arguments.strain, "strain, percent or stretch");
+  options.strain = arguments.strain;
   options.background = arguments.background, options.threshold = given(arguments.threshold);
   return options;
 }
@@ -172,14 +178,28 @@ void add_import(CommandLine& line, int& exit_code) {
   command.option("--every", arguments->every, "takes every N-th image").range(1, 1000000).type_name("N");
   command.option("--length", arguments->length, "of a specimen between the grips of a testing machine [m]").positive();
   command.option("--area", arguments->area, "cross section of the specimen at rest [m^2]").positive();
-  command.flag("--compression", arguments->compression, "positive extensions and forces of the machine compress");
+  command.flag("--compression", arguments->compression, "the specimen is compressed, whatever the machine's signs");
+  command.flag("--tension", arguments->tension, "the specimen is pulled, whatever the machine's signs");
+  command
+      .option("--strain", arguments->strain,
+              "what a machine's column of strains holds: strain (0 at rest), percent or stretch (1 at rest)")
+      .type_name("WHAT");
+  command
+      .option("--keep", arguments->kept,
+              "leaves as recorded: force-zero (the force at no extension), extension-zero (slack, absolute positions, "
+              "air before contact) or break (rows behind it); may be repeated")
+      .one_value_a_use()
+      .type_name("WHAT");
   command.option("--ball", arguments->ball, "radius of a ball that a machine presses into the object [m]").positive();
   command.option("--punch", arguments->punch, "radius of a flat-ended punch [m]").positive();
   command.option("--contact", arguments->contact, "point of the surface that the probe touches first [m]")
       .expected(3)
       .delimiter(',')
       .type_name("X,Y,Z");
-  command.option("--force-std", arguments->force_std, "standard deviation of a machine's force [N]").positive();
+  command
+      .option("--force-std", arguments->force_std,
+              "standard deviation of a machine's force (default: what its curve shows) [N]")
+      .positive();
   command.footer(footer());
   command.callback([arguments, &exit_code] {
     run(*arguments);

@@ -273,6 +273,29 @@ void check_load_files(RuleContext& context) {
   });
 }
 
+constexpr double greatest_stretch = 20.0;  // of a material that people test
+constexpr double about_rest = 0.02;        // [-] of a stretch from 1, within which residual stresses may have any sign
+constexpr double small_stress = 0.02;      // of the greatest, likewise
+
+/// Stretches that are percents or strains: 1 is the unloaded length, above it stresses pull and below it they press.
+void check_stretches(RuleContext& context, const std::string& key, const StressCurve& curve) {
+  const char* advice = "percents p are the stretches 1 + p / 100, strains e are 1 + e";
+  const auto [least, greatest] = std::ranges::minmax(curve.stretches);
+  if (greatest > greatest_stretch)
+    return context.toml.complain(key, "stretches up to " + text_of(greatest, ""), "lengths over the unloaded one",
+                                 advice);
+  double most = 0.0;
+  for (const double s : curve.stresses) most = std::max(most, std::abs(s));
+  int pressed = 0, pulled = 0;
+  for (std::size_t i = 0; i < curve.stretches.size(); ++i) {
+    if (curve.stretches[i] > 1.0 - about_rest || std::abs(curve.stresses[i]) < small_stress * most) continue;
+    ++(curve.stresses[i] < 0.0 ? pressed : pulled);
+  }
+  if (pulled > pressed)
+    context.toml.complain(key, "stresses that pull at stretches below 1, from " + text_of(least, "") + " on",
+                          "negative stresses of a compressed specimen", advice);
+}
+
 void check_curve_files(RuleContext& context) {
   const Capture& capture = context.capture;
   for_each_sound(context, "indentation", capture.indentations, [&](const Indentation& test, const std::string& key) {
@@ -285,6 +308,8 @@ void check_curve_files(RuleContext& context) {
       if (std::ranges::all_of(curve.stresses, [](double s) { return s == 0.0; }))
         context.toml.complain(key + ".curve", "a curve whose stresses are all zero", "a measured stress",
                               "stresses are in pascals");
+      const bool is_along_x = test.measure == StressMeasure::First && test.mode != TestMode::Biaxial;
+      if (is_along_x && test.mode != TestMode::SimpleShear) check_stretches(context, key + ".curve", curve);
     });
   });
 }

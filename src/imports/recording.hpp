@@ -47,11 +47,13 @@ struct MaskStream : ImageStream {
   std::function<Image<Rgb>(int i)> picture;  ///< for people; as many as there are masks
 };
 
-/// What a testing machine measured, in the order of time: extensions with forces, strains with stresses, or both pairs.
+/// What a testing machine measured, in the order of time: columns of as many rows, or of none where the machine has not
+/// written them; NaN where a cell is empty. Negative numbers compress, where the machine says so.
 struct MachineTest {
   std::string name;
-  std::vector<double> extensions, forces;  ///< [m] of the crosshead, [N]; as many; negative: compressed
-  std::vector<double> strains, stresses;   ///< [-] of the length, [Pa] of the area at rest; as many; negative likewise
+  std::vector<double> extensions, strains;                 ///< [m] of the crosshead, [-] of the length at rest
+  std::vector<double> forces, stresses;                    ///< [N], [Pa] of the area at rest
+  double force_resolution = 0.0, stress_resolution = 0.0;  ///< [N], [Pa] of the last digit
 };
 
 /// A recording of another program.
@@ -72,6 +74,8 @@ struct ImportOptions {
   std::optional<std::string> time_unit;         ///< "s", "ms", "us" or "ns" of times in files; wins over what they say
   std::optional<std::filesystem::path> camera;  ///< a JSON file of the intrinsics
   std::vector<std::string> topics;              ///< of a bag: which depth images; empty: those that there are
+
+  std::string strain;  ///< of a testing machine's strains: "strain", "percent" or "stretch"; empty: what the file says
 
   /// @name Of a video
   /// @{

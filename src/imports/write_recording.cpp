@@ -15,6 +15,7 @@
 #include "capture/frame_numbers.hpp"
 #include "capture/markers.hpp"
 #include "geometry/solid_surface.hpp"
+#include "imports/first_loading.hpp"
 #include "imports/mask_overview.hpp"
 
 namespace pliant {
@@ -27,8 +28,6 @@ constexpr double standard_gravity = 9.81;  // [m/s^2]
 constexpr double still_shift = 2e-3;       // [m] a camera that moves no farther, and turns no farther, stands
 constexpr double still_turn = 0.2;         // [degrees]
 constexpr double exact_clock = 1e-4;       // [s] offsets below are none
-constexpr int curve_points = 100;          // of a curve of a testing machine
-constexpr double usual_force_std = 0.01;   // of the greatest force
 constexpr double small_mask = 0.25;        // of the usual pixels
 constexpr std::size_t shown_masks = 12;    // in the overview
 constexpr int shown_columns = 4;
@@ -347,38 +346,19 @@ void write_markers(const fs::path& out, const ImportedRecording& recording, cons
   result.capture.markers.push_back(track);
 }
 
-// The first loading: from the first row to the greatest extension of either sign, averaged to a curve that grows.
-struct LoadingCurve {
-  std::vector<double> extensions, forces;
-};
-LoadingCurve loading_of(const std::vector<double>& extensions, const std::vector<double>& forces,
-                        const std::string& name) {
-  std::size_t end = 0;
-  for (std::size_t i = 0; i < extensions.size(); ++i)
-    if (std::abs(extensions[i]) > std::abs(extensions[end])) end = i;
-  const double reach = extensions.empty() ? 0.0 : std::abs(extensions[end]);
-  if (!(reach > 0.0)) refuse(name, "an extension that is zero throughout", "a test that moves the crosshead");
-  LoadingCurve curve;
-  const double sign = extensions[end] < 0 ? -1.0 : 1.0;
-  for (int k = 0; k < curve_points; ++k) {
-    const double low = reach * k / curve_points, high = reach * (k + 1) / curve_points;
-    double extension = 0.0, force = 0.0;
-    int inside = 0;
-    for (std::size_t i = 0; i <= end; ++i)
-      if (const double e = sign * extensions[i]; e > low && e <= high)
-        extension += extensions[i], force += forces[i], ++inside;
-    if (inside == 0) continue;
-    curve.extensions.push_back(extension / inside);
-    curve.forces.push_back(force / inside);
+LoadingOptions loading_options(const CaptureFacts& facts) {
+  LoadingOptions options;
+  for (const std::string& what : facts.kept) {
+    if (what == "force-zero")
+      options.keeps_force_zero = true;
+    else if (what == "extension-zero")
+      options.keeps_extension_zero = true;
+    else if (what == "break")
+      options.keeps_break = true;
+    else
+      refuse({}, "--keep " + what, "force-zero, extension-zero or break");
   }
-  return curve;
-}
-
-double greatest_of(const std::vector<double>& values, const std::string& name) {
-  double greatest = 0.0;
-  for (const double value : values) greatest = std::max(greatest, std::abs(value));
-  if (!(greatest > 0.0)) refuse(name, "a force that is zero throughout", "a measured force");
-  return greatest;
+  return options;
 }
 
 void write_indentation(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
@@ -387,10 +367,13 @@ void write_indentation(const fs::path& out, const ImportedRecording& recording, 
   if (!facts.contact || !facts.surface)
     refuse(recording.name, "an indenter without a place", "--surface and --contact X,Y,Z",
            "say which point of the scan it touches first");
-  if (test.extensions.empty())
+  if (test.extensions.empty() || test.forces.empty())
     refuse(recording.name, "no column of an extension and a force", "both", "export them too");
-  const LoadingCurve loading = loading_of(test.extensions, test.forces, recording.name);
-  const double greatest = greatest_of(loading.forces, recording.name);
+  LoadingOptions options = loading_options(facts);
+  options.is_indentation = true;
+  options.power = *facts.probe == IndenterShape::Ball ? 1.5 : 1.0;
+  options.force_std = facts.force_std.value_or(0.0), options.force_resolution = test.force_resolution;
+  const LoadingCurve loading = first_loading(test.extensions, test.forces, options, recording.name);
   Indentation indentation;
   indentation.name = test.name;
   indentation.probe = *facts.probe;
@@ -398,31 +381,44 @@ void write_indentation(const fs::path& out, const ImportedRecording& recording, 
   indentation.contact = *facts.contact;
   indentation.direction = -facts.up.value_or(Vector3::UnitY()).normalized();
   indentation.curve = out / "curve.csv";
-  ForceCurve curve;
-  for (std::size_t i = 0; i < loading.forces.size(); ++i) {
-    curve.depths.push_back(std::abs(loading.extensions[i]));
-    curve.forces.push_back(std::abs(loading.forces[i]));
-    curve.stds.push_back(facts.force_std.value_or(usual_force_std * greatest));
-  }
-  write_force_curve(indentation.curve, curve);
+  write_force_curve(indentation.curve, {loading.extensions, loading.forces, loading.stds});
   result.capture.indentations.push_back(indentation);
-  result.notes.push_back("depths count from the machine's zero: it must be where the probe touches the object");
+  result.notes.insert(result.notes.end(), loading.notes.begin(), loading.notes.end());
+}
+
+// Whether what a machine calls positive pulls (1) or compresses (-1) the specimen.
+double pulling_sign(const LoadingCurve& loading, const CaptureFacts& facts, const std::string& name,
+                    std::vector<std::string>& notes) {
+  if (facts.is_compression || facts.is_tension) return facts.is_compression ? -1.0 : 1.0;
+  if (loading.extension_sign != loading.force_sign)
+    refuse(name, "an extension and a force of opposite signs", "a specimen that is pulled, or one that is compressed",
+           "say which: --tension or --compression");
+  if (loading.force_sign > 0.0)
+    notes.emplace_back("positive numbers pull the specimen (--compression, where they do not)");
+  else
+    notes.emplace_back("negative numbers compress the specimen (--tension, where they do not)");
+  return loading.force_sign;
 }
 
 void write_material_curve(const fs::path& out, const ImportedRecording& recording, const CaptureFacts& facts,
                           ImportedCapture& result) {
   const MachineTest& test = *recording.test;
-  const bool has_size = facts.length && facts.area;
-  const bool takes_forces = !test.extensions.empty() && has_size;
-  if (!takes_forces && test.strains.empty())
+  const bool takes_forces = facts.area && !test.forces.empty() && (facts.length || !test.strains.empty());
+  const bool has_stresses = !takes_forces && !test.stresses.empty();
+  const bool takes_extensions = facts.length && !test.extensions.empty() && (takes_forces || test.strains.empty());
+  if (!(takes_forces || has_stresses) || !(takes_extensions || !test.strains.empty()))
     refuse(recording.name, "a specimen of unknown size", "its length between the grips and its cross section",
            "give --length METRES and --area SQUARE_METRES at rest; of an indenter --ball or --punch RADIUS");
-  const double length = takes_forces ? *facts.length : 1.0, area = takes_forces ? *facts.area : 1.0;
-  const LoadingCurve loading = takes_forces ? loading_of(test.extensions, test.forces, recording.name)
-                                            : loading_of(test.strains, test.stresses, recording.name);
-  const double greatest = greatest_of(loading.forces, recording.name);
-  const double std = takes_forces && facts.force_std ? *facts.force_std / area : usual_force_std * greatest / area;
-  const double sign = facts.is_compression ? -1.0 : 1.0;
+  const double length = takes_extensions ? *facts.length : 1.0, area = takes_forces ? *facts.area : 1.0;
+  LoadingOptions options = loading_options(facts);
+  options.force_std = takes_forces ? facts.force_std.value_or(0.0) : 0.0;
+  options.force_resolution = takes_forces ? test.force_resolution : test.stress_resolution;
+  if (!takes_extensions) options.extension = {"%", 100.0};
+  if (!takes_forces) options.force = {"kPa", 1e-3};
+  const LoadingCurve loading = first_loading(takes_extensions ? test.extensions : test.strains,
+                                             takes_forces ? test.forces : test.stresses, options, recording.name);
+  result.notes.insert(result.notes.end(), loading.notes.begin(), loading.notes.end());
+  const double sign = pulling_sign(loading, facts, recording.name, result.notes);
   MaterialCurve material;
   material.name = test.name;
   material.curve = out / "curve.csv";
@@ -430,9 +426,9 @@ void write_material_curve(const fs::path& out, const ImportedRecording& recordin
   for (std::size_t i = 0; i < loading.forces.size(); ++i) {
     curve.stretches.push_back(1.0 + sign * loading.extensions[i] / length);
     curve.stresses.push_back(sign * loading.forces[i] / area);
-    curve.stds.push_back(std);
+    curve.stds.push_back(loading.stds[i] / area);
   }
-  if (curve.stretches.back() <= 0.0)
+  if (*std::ranges::min_element(curve.stretches) <= 0.0)
     refuse(recording.name, "a specimen that is compressed by more than its length", "--length in metres");
   write_stress_curve(material.curve, curve);
   result.capture.material_curves.push_back(material);
@@ -444,10 +440,6 @@ void write_test(const fs::path& out, const ImportedRecording& recording, const C
     write_indentation(out, recording, facts, result);
   else
     write_material_curve(out, recording, facts, result);
-  if (!facts.force_std)
-    result.notes.push_back(
-        "the force's standard deviation is taken as a hundredth of the greatest force (--force-std)");
-  result.notes.push_back("taken is the first loading, up to the greatest extension");
 }
 
 }  // namespace

@@ -22,11 +22,13 @@ struct CaptureFacts {
   /// @name Of a test in a machine
   /// @{
   std::optional<double> length, area;  ///< [m], [m^2] of the specimen at rest, for a stress-strain curve of forces
-  bool is_compression = false;         ///< extensions and forces are positive where the specimen is compressed
+  bool is_compression = false;         ///< the specimen is compressed, whatever the signs of extensions and forces
+  bool is_tension = false;             ///< it is pulled, likewise
+  std::vector<std::string> kept;       ///< what stays as recorded: "force-zero", "extension-zero", "break"
   std::optional<IndenterShape> probe;  ///< an indenter: a force-depth curve
   double probe_radius = 0.0;           ///< [m]
   std::optional<Vector3> contact;      ///< [m] point of the surface that the indenter touches first
-  std::optional<double> force_std;     ///< [N]; nothing: a hundredth of the greatest force
+  std::optional<double> force_std;     ///< [N]; nothing: what the curve shows, see first_loading.hpp
   /// @}
 };
 

@@ -523,6 +523,11 @@ TEST(CaptureRules, CheckMaterialCurves) {
   EXPECT_THAT(said("mode = \"torsion\"\n", curve), HasSubstr("\"simple_shear\""));
   EXPECT_THAT(said("mode = \"biaxial\"\n", curve), HasSubstr("stretch,second,stress,std"));
   EXPECT_THAT(said("mode = \"uniaxial\"\nprestretch = 1.1\n", curve), HasSubstr("of another test"));
+  EXPECT_THAT(said("mode = \"uniaxial\"\n", "stretch,stress,std\n1,1000,10\n15,15000,10\n30,30000,10\n"),
+              AllOf(HasSubstr("stretches up to 30"), HasSubstr("percents")));
+  EXPECT_THAT(said("mode = \"uniaxial\"\n", "stretch,stress,std\n0.1,1000,10\n0.2,2000,10\n0.3,3000,10\n"),
+              HasSubstr("stretches below 1"));
+  EXPECT_EQ(said("mode = \"uniaxial\"\n", "stretch,stress,std\n0.8,-1000,10\n0.99,50,10\n1.3,3000,10\n"), "");
   EXPECT_THAT(said("mode = \"uniaxial\"\n", "stretch,stress,std\n-0.1,1000,10\n"), HasSubstr("curve.csv:2:1"));
   EXPECT_EQ(said("mode = \"simple_shear\"\n", "stretch,stress,std\n-0.1,-1000,10\n"), "");
   EXPECT_THAT(said("mode = \"uniaxial\"\n", "stretch,stress,std\n1.1,0,10\n"), HasSubstr("all zero"));
