@@ -22,9 +22,8 @@ struct SolidSurface {
 /// - Triangles that are an edge or a point then, or are there twice, are left out, if that leaves fewer faults.
 /// - Triangles are turned where neighbours face opposite sides, and whole shells that face inwards. A shell within
 ///   another that faces the other way is a cavity and stays.
-/// - Crumbs are left out: parts of less than a hundredth of the greatest part's volume, open ones of its area; and
-/// parts
-///   that are a copy of another.
+/// - Crumbs are left out: parts of less than a hundredth of the greatest part's volume, open ones of its area. So are
+///   copies of another part.
 ///
 /// Vertices keep their number and order, so that their indices stay valid. One that is in no triangle, and was not
 /// joined to one that is, is moved onto the first that is in one, where it widens no box. What cannot be mended stays
