@@ -20,6 +20,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "geometry/mesh_io.hpp"
+#include "geometry/solid_surface.hpp"
 #include "plan.hpp"
 #include "scan/calibrate.hpp"
 #include "scan/scan_pose.hpp"
@@ -60,7 +61,8 @@ void describe_object(const Capture& capture, Json& json) {
       formatted("%zu vertices, %zu triangles, closed, %d part%s, %d triangles without area, %d vertices unused",
                 capture.scene.object.surface->vertices.size(), capture.scene.object.surface->triangles.size(),
                 mesh.components, mesh.components == 1 ? "" : "s", mesh.degenerate_triangles, mesh.unused_vertices));
-  for (const std::string& remark : capture.scene.object.surface_remarks) say("", "note: " + remark);
+  if (!capture.scene.object.volume)
+    for (const std::string& remark : mend(read_mesh(capture.scene.object.file)).remarks) say("", "note: " + remark);
   for (const std::string& complaint : mesh.complaints) say("", "note: " + complaint);
   json["object"] = {{"extent", vector_json(extent)}, {"volume", mesh.volume}, {"parts", mesh.components}};
   if (const auto mass = capture.scene.object.total_mass()) json["object"]["mass"] = *mass;

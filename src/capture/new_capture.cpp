@@ -146,7 +146,7 @@ void take_surface(Draft& draft) {
     return;
   }
   object.file = fs::absolute(draft.folder / *surface).lexically_normal();
-  object.surface = read_surface(object.file, &object.surface_remarks);
+  object.surface = read_surface(object.file);
   draft.say("surface: " + surface->generic_string());
   const Capture& capture = draft.made.capture;
   const bool finds_pose = !capture.depth.empty() && (capture.depth[0].masks || capture.depth[0].background);

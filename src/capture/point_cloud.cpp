@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <ostream>
 #include <sstream>
 #include <string>
@@ -27,7 +28,35 @@ namespace {
   throw InputError(Problem{std::move(place), std::move(found), std::move(expected), std::move(advice)});
 }
 
-enum class PcdData { Ascii, Binary };
+enum class PcdData { Ascii, Binary, Compressed };
+
+/// Bytes that LZF packed: runs of up to 32 bytes as they are, and copies of up to 264 bytes from up to 8192 before.
+/// Nothing where they are broken, or not so many as `size`. Source: liblzf's lzf_d.c for the layout.
+std::optional<std::string> unpack_lzf(std::string_view packed, std::size_t size) {
+  std::string bytes;
+  auto next = [&, at = std::size_t(0)]() mutable -> int {
+    return at < packed.size() ? int(static_cast<unsigned char>(packed[at++])) : -1;
+  };
+  for (int control = next(); control >= 0; control = next()) {
+    if (control < 32) {
+      for (int i = 0; i <= control; ++i) {
+        const int byte = next();
+        if (byte < 0) return std::nullopt;
+        bytes += char(byte);
+      }
+    } else {
+      int length = control >> 5;
+      if (length == 7) length += std::max(next(), 0);
+      const int low = next();
+      const std::size_t back = (std::size_t(control & 31) << 8U | std::size_t(std::max(low, 0))) + 1;
+      if (low < 0 || back > bytes.size()) return std::nullopt;
+      for (int i = 0; i < length + 2; ++i) bytes += bytes[bytes.size() - back];
+    }
+    if (bytes.size() > size) return std::nullopt;
+  }
+  if (bytes.size() != size) return std::nullopt;
+  return bytes;
+}
 
 struct PcdField {
   std::string name;
@@ -53,7 +82,10 @@ class PcdReader {
   std::vector<Vector3> points() const {
     if (header_.points > content_.size()) fail_short(0);  // each takes a byte at least
     std::vector<Vector3> points(header_.points);
-    header_.data == PcdData::Binary ? read_binary(points) : read_ascii(points);
+    if (header_.data == PcdData::Ascii)
+      read_ascii(points);
+    else
+      header_.data == PcdData::Binary ? read_binary(points) : read_compressed(points);
     return points;
   }
 
@@ -82,10 +114,10 @@ class PcdReader {
   void read_data_kind(std::istringstream& words) {
     std::string kind;
     words >> kind;
-    if (kind != "ascii" && kind != "binary")
-      fail({path_, header_.lines, 0}, "PCD data \"" + kind.substr(0, 40) + "\"", "ascii or binary",
+    if (kind != "ascii" && kind != "binary" && kind != "binary_compressed")
+      fail({path_, header_.lines, 0}, "PCD data \"" + kind.substr(0, 40) + "\"", "ascii, binary or binary_compressed",
            "convert the file with pcl_convert_pcd_ascii_binary");
-    header_.data = kind == "binary" ? PcdData::Binary : PcdData::Ascii;
+    header_.data = kind == "ascii" ? PcdData::Ascii : kind == "binary" ? PcdData::Binary : PcdData::Compressed;
   }
 
   void read_declaration(const std::string& keyword, std::istringstream& words) {
@@ -142,6 +174,23 @@ class PcdReader {
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t axis = 0; axis < 3; ++axis)
         points[i][Eigen::Index(axis)] = number_at(body.data() + i * stride_ + offsets_[axis], sizes_[axis]);
+  }
+
+  /// Two sizes, and by LZF the values of all points field by field.
+  void read_compressed(std::vector<Vector3>& points) const {
+    const std::string_view body = content_.substr(header_.body);
+    std::uint32_t packed = 0, size = 0;
+    if (body.size() < 8) fail_short(0);
+    std::memcpy(&packed, body.data(), 4), std::memcpy(&size, body.data() + 4, 4);
+    if (packed > body.size() - 8) fail_short(0);
+    const std::optional<std::string> bytes = unpack_lzf(body.substr(8, packed), size);
+    if (!bytes || bytes->size() != stride_ * points.size())
+      fail({path_}, bytes ? std::to_string(bytes->size()) + " bytes of points" : "compressed points that are broken",
+           std::to_string(stride_ * points.size()) + " bytes, as the header says", "write or copy the file again");
+    for (std::size_t i = 0; i < points.size(); ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        points[i][Eigen::Index(axis)] =
+            number_at(bytes->data() + offsets_[axis] * points.size() + i * sizes_[axis], sizes_[axis]);
   }
 
   static double number_at(const char* bytes, std::size_t size) {

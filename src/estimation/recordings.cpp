@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.hpp"
+#include "base/files.hpp"
 #include "base/profile.hpp"
 #include "capture/find_plane.hpp"
 #include "capture/markers.hpp"
@@ -14,7 +15,10 @@
 #include "estimation/judgement.hpp"
 #include "estimation/press_objective.hpp"
 #include "estimation/sensor_poses.hpp"
+#include "geometry/mesh_io.hpp"
 #include "geometry/random_field.hpp"
+#include "geometry/solid_surface.hpp"
+#include "simulation/flat_sheet.hpp"
 
 namespace pliant {
 
@@ -290,6 +294,16 @@ int Recording::horizon(double part) const {
   return std::max({1, last_frame / 3, int(part * last_frame)});
 }
 
+namespace {
+
+/// Whether the object is a sheet that hexahedra do not resolve, and has no elements of its own.
+bool is_thin(const Recording& recording) {
+  const Object& object = recording.capture.scene.object;
+  return object.surface && !object.volume && is_thinner_than_hexahedra(recording.capture.scene);
+}
+
+}  // namespace
+
 Recordings::Recordings(std::vector<RecordedCapture> recorded, const FitOptions& options,
                        std::vector<std::string>& notes)
     : options_(options) {
@@ -298,6 +312,10 @@ Recordings::Recordings(std::vector<RecordedCapture> recorded, const FitOptions& 
     all_.emplace_back();
     parameters.push_back(make_ready(std::move(r), all_.back(), notes));
   }
+  if (!options_.element && std::ranges::any_of(all_, is_thin))
+    notes.emplace_back(
+        "The object is a flat sheet, thinner than hexahedra resolve: it is made of quadratic tetrahedra "
+        "with one through the thickness.");
   const JointLayout joint = join(parameters, shares_density(parameters, options_));
   parameters_ = joined(parameters, joint);
   apply_overrides(parameters_, options_);
@@ -314,6 +332,8 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
   require_fittable(capture, options_);
   for (const Load& load : capture.loads)
     if (is_fitted(load.role)) recording.loads.push_back(load_case(capture, load, options_.points_per_frame));
+  if (const Object& object = capture.scene.object; object.surface && !object.volume && is_file(object.file))
+    for (const std::string& remark : mend(read_mesh(object.file)).remarks) notes.push_back("The scan: " + remark + ".");
   const std::vector<int> planes_found = take_planes_from_images(capture);
   for (const int plane : planes_found)
     notes.push_back("Plane " + std::to_string(plane + 1) +
@@ -364,7 +384,7 @@ Resolution Recordings::resolution(double cells, double steps) const {
   Resolution r;
   const bool has_law = options_.law_of_motion().has_value();
   // At rest what bends shows alone, and an equilibrium of quadratic elements costs a second.
-  const bool wants_tetrahedra = moves_reference() || has_law || all_static();
+  const bool wants_tetrahedra = moves_reference() || has_law || all_static() || std::ranges::any_of(all_, is_thin);
   r.element = options_.element.value_or(wants_tetrahedra ? ElementKind::QuadraticTetrahedron : ElementKind::Hexahedron);
   if (has_law && r.element == ElementKind::Hexahedron)
     throw InputError({{front().capture.file},

@@ -407,10 +407,6 @@ class Mender {
 
 SolidSurface mend(TriangleMesh mesh) { return Mender(std::move(mesh)).run(); }
 
-TriangleMesh read_surface(const std::filesystem::path& path, std::vector<std::string>* remarks) {
-  SolidSurface surface = mend(read_mesh(path));
-  if (remarks != nullptr) remarks->insert(remarks->end(), surface.remarks.begin(), surface.remarks.end());
-  return std::move(surface.mesh);
-}
+TriangleMesh read_surface(const std::filesystem::path& path) { return mend(read_mesh(path)).mesh; }
 
 }  // namespace pliant

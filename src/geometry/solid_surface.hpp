@@ -30,9 +30,7 @@ struct SolidSurface {
 /// as it is, for `examine` to tell.
 SolidSurface mend(TriangleMesh mesh);
 
-/// `read_mesh` and `mend`.
-/// @param remarks  those of `mend` are added; none: nobody asks for them
-/// Throws InputError where the file cannot be read as a mesh.
-TriangleMesh read_surface(const std::filesystem::path& path, std::vector<std::string>* remarks = nullptr);
+/// `read_mesh`, and of `mend` the mesh. Throws InputError where the file cannot be read as a mesh.
+TriangleMesh read_surface(const std::filesystem::path& path);
 
 }  // namespace pliant

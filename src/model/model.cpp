@@ -11,6 +11,7 @@
 #include "geometry/mesh_io.hpp"
 #include "geometry/solid_surface.hpp"
 #include "geometry/volume_mesh.hpp"
+#include "geometry/vtk_xml.hpp"
 #include "model/vtu.hpp"
 #include "scene/inner_body.hpp"
 #include "scene/obstacle.hpp"
@@ -280,9 +281,12 @@ class Reader {
   /// Whether it has one of the fields that are saved with a model.
   static bool is_own_volume(const fs::path& path) {
     if (ending_of(path) != ".vtu") return false;
-    return std::ranges::any_of(vtu_cell_data(path), [](const std::string& name) {
-      return name == modulus_field || name == ratio_field || name == former_name(ratio_field) || name == fill_field;
-    });
+    const VtkXmlFile file(path, "UnstructuredGrid");
+    return std::ranges::any_of(
+        file.data_set().child("Piece").child("CellData").children("DataArray"), [](const auto& array) {
+          const std::string name = array.attribute("Name").value();
+          return name == modulus_field || name == ratio_field || name == former_name(ratio_field) || name == fill_field;
+        });
   }
 
   void read_volume(const fs::path& path) {

@@ -113,12 +113,6 @@ class GridReader {
     if (!piece() || piece().next_sibling("Piece")) fail(path_, "not exactly one piece", "one piece");
     return grid(piece());
   }
-  std::vector<std::string> cell_data() const {
-    std::vector<std::string> arrays;
-    for (const pugi::xml_node node : piece().child("CellData").children("DataArray"))
-      arrays.emplace_back(node.attribute("Name").value());
-    return arrays;
-  }
 
  private:
   pugi::xml_node piece() const { return file_.data_set().child("Piece"); }
@@ -247,8 +241,6 @@ void write_vtu(const fs::path& path, const VtuGrid& grid, VtuPrecision precision
 }
 
 VtuGrid read_vtu(const fs::path& path) { return GridReader(path).grid(); }
-
-std::vector<std::string> vtu_cell_data(const fs::path& path) { return GridReader(path).cell_data(); }
 
 void write_pvd(const fs::path& path, const std::vector<PvdEntry>& entries) {
   pugi::xml_document document;

@@ -58,9 +58,6 @@ void write_vtu(const std::filesystem::path& path, const VtuGrid& grid, VtuPrecis
 /// off, arrays of another length, several kinds of cells.
 VtuGrid read_vtu(const std::filesystem::path& path);
 
-/// Names of the arrays of its cells. Throws InputError where the file is no grid.
-std::vector<std::string> vtu_cell_data(const std::filesystem::path& path);
-
 /// One time of a collection.
 struct PvdEntry {
   double time = 0.0;           ///< [s]

@@ -74,7 +74,7 @@ class Reader {
     if (const auto file = read_path(object, "surface", files_)) {
       own.file = *file;
       read_file_of(object, "surface", *file, [&](const fs::path& path) {
-        own.surface = read_surface(path, &own.surface_remarks);
+        own.surface = read_surface(path);
         const MeshReport report = examine(*own.surface);
         if (!report.is_closed_solid)
           context_.reject("object.surface", report.complaints.front(), "a closed surface that faces outwards",

@@ -180,7 +180,6 @@ enum class ShapeIs { Reference, Static };
 struct Object {
   /// Boundary of the solid [m], of bodies inside it too; nothing: no rest scan, nothing can be fitted.
   std::optional<TriangleMesh> surface;
-  std::vector<std::string> surface_remarks;     ///< what was mended in it when it was read, for people
   std::optional<VolumeMesh> volume;             ///< tetrahedra made elsewhere, whose boundary `surface` then is
   std::filesystem::path file;                   ///< file of the surface or the volume, absolute; empty: of neither
   std::optional<double> mass;                   ///< [kg]

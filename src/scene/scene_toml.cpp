@@ -177,8 +177,7 @@ void read_object_shape(TomlTable& table, const NamedFiles& files, Object& object
                            "leave out `surface`: the volume's boundary takes its place");
   } else if (surface) {
     object.file = *surface;
-    read_file_of(table, "surface", *surface,
-                 [&](const fs::path& path) { object.surface = read_surface(path, &object.surface_remarks); });
+    read_file_of(table, "surface", *surface, [&](const fs::path& path) { object.surface = read_surface(path); });
   } else if (volume) {
     object.file = *volume;
     read_file_of(table, "volume_mesh", *volume, [&](const fs::path& path) {

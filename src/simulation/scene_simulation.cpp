@@ -1,5 +1,7 @@
 #include "simulation/scene_simulation.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +13,7 @@
 #include "motion/patch_forces.hpp"
 #include "motion/wind.hpp"
 #include "scene/region.hpp"
+#include "simulation/flat_sheet.hpp"
 #include "simulation/inner_bodies.hpp"
 #include "simulation/key_changes.hpp"
 #include "simulation/obstacles.hpp"
@@ -55,9 +58,18 @@ ControlledField modulus_field(const Body& body, const Scene& scene, const FieldO
 double object_size(const Scene& scene) { return bounding_box(*scene.object.surface).extent().maxCoeff(); }
 
 std::shared_ptr<const SignedDistance> scene_distance(const Scene& scene, double band) {
-  constexpr double usual = 80.0, finest = 120.0;  // grid points along the object
-  constexpr double across = 24.0;                 // and through it: edges are rounded between grid points
+  constexpr double usual = 80.0, finest = 120.0, finest_of_sheets = 400.0;  // grid points along the object
+  constexpr double across = 24.0;  // and through it: edges are rounded between grid points
   const double size = object_size(scene), margin = (band + 0.1) * size;
+  if (const auto sheet = flat_sheet(*scene.object.surface); sheet && sheet->thickness < size / finest) {
+    const double spacing = 0.9 * sheet->thickness;
+    if (spacing < size / finest_of_sheets)
+      throw InputError({{},
+                        fmt::format("a sheet of {:.2g} m thickness", sheet->thickness),
+                        fmt::format("{:.2g} m at least, of an object of {:.2g} m", size / finest_of_sheets / 0.9, size),
+                        "what is thinner is no solid any more: fit a smaller piece of it"});
+    return std::make_shared<SignedDistance>(signed_distance(*scene.object.surface, spacing, margin));
+  }
   auto distance = std::make_shared<SignedDistance>(signed_distance(*scene.object.surface, size / usual, margin));
   const double spacing = std::max(thickness(scene, *distance) / across, size / finest);
   if (spacing < 0.8 * distance->spacing()) *distance = signed_distance(*scene.object.surface, spacing, margin);
@@ -98,10 +110,7 @@ double thickness(const Scene& scene, const SignedDistance& distance) {
 }
 
 double hex_cell_size(const Scene& scene, const SignedDistance& distance, double cells, int most) {
-  constexpr double slenderness = 5.0, usual_cells = 12.0;
-  const double size = object_size(scene);
-  const double by_count = usual_cells * std::cbrt(enclosed_volume(*scene.object.surface) / most);
-  return std::min(size, std::max(slenderness * thickness(scene, distance), by_count)) / cells;
+  return hex_cell_size_of_thickness(scene, thickness(scene, distance), cells, most);
 }
 
 namespace {
@@ -173,17 +182,41 @@ TetMesh tetrahedra_of(const Scene& scene, const Resolution& resolution,
     return offset ? with_offset_boundary(own, offset) : own;
   }
   TetMeshOptions options;
-  options.offset = offset;
   options.cell_size = object_size(scene) / resolution.cells;
   options.quadratic = quadratic;
   for (const Hold& hold : gripped_regions(scene)) options.parts.push_back(hold.contains);
+  // Linear elements lock where they are flat.
+  const auto sheet = flat_sheet(*scene.object.surface);
+  if (quadratic && sheet && sheet->thickness < least_through * options.cell_size) {
+    const TetMesh own = flat_tetrahedra(*scene.object.surface, *sheet, options);
+    return offset ? with_offset_boundary(own, offset) : own;
+  }
+  options.offset = offset;
   return make_tet_mesh(*scene.object.surface, options);
+}
+
+/// Of an object that is thinner than cells see.
+[[noreturn]] void refuse_hexahedra(const Scene& scene, double cell_size) {
+  const TriangleMesh& surface = *scene.object.surface;
+  const double thin = 2.0 * enclosed_volume(surface) / surface_area(surface);
+  throw InputError(
+      {{},
+       fmt::format("hexahedra of {:.2g} m in an object of about {:.2g} m thickness", cell_size, thin),
+       fmt::format("two through it at least, which are {:.0f} along the object", 2.0 * object_size(scene) / thin),
+       "where it is flat, set element=quadratic_tetrahedra: one through the thickness bends as it does; of a "
+       "curved shell make quadratic tetrahedra elsewhere and name them as `volume_mesh` (docs/formats.md)"});
 }
 
 HexGrid hexahedra_of(const Scene& scene, const SignedDistance& distance, const Resolution& resolution) {
   double cell_size = resolution.follows_thickness ? hex_cell_size(scene, distance, resolution.cells)
                                                   : object_size(scene) / resolution.cells;
-  HexGrid grid = hex_grid_of(scene, distance, cell_size);
+  HexGrid grid;
+  try {
+    grid = hex_grid_of(scene, distance, cell_size);
+  } catch (const InputError&) {
+    refuse_hexahedra(scene, cell_size);
+  }
+  if (std::abs(grid.volume() / enclosed_volume(*scene.object.surface) - 1.0) > 0.5) refuse_hexahedra(scene, cell_size);
   // Where a neck falls between cells, a part of the object would hang by an edge, or not at all.
   for (int smaller = 0; smaller < 6 && face_connected_parts(grid) > 1; ++smaller)
     grid = hex_grid_of(scene, distance, cell_size *= 0.85);

@@ -117,7 +117,7 @@ class Reader {
     const auto file = read_path(object, "surface", files_);
     if (!file) return;
     read_file_of(object, "surface", *file, [&](const fs::path& path) {
-      surface() = read_surface(path);
+      surface() = pliant::read_surface(path);
       const MeshReport report = examine(surface());
       if (!report.is_closed_solid)
         context_.reject("object.surface", report.complaints.front(), "a closed surface", report.cure);

@@ -206,6 +206,29 @@ TEST(CaptureRules, RefuseASurfaceThatIsOpen) {
               AllOf(HasSubstr("`surface` is no solid"), HasSubstr("has holes")));
 }
 
+TEST(CaptureRules, TakeASurfaceThatFacesInwardsTurnedOver) {
+  SmallCapture small;
+  TriangleMesh inwards = test::box_mesh(Vector3::Constant(-0.1), Vector3::Constant(0.1));
+  for (auto& triangle : inwards.triangles) std::swap(triangle[0], triangle[1]);
+  write_mesh(small.folder / "rest.ply", inwards);
+  EXPECT_NEAR(enclosed_volume(*small.read().scene.object.surface), 0.008, 1e-12);
+}
+
+TEST(CaptureRules, RefusePartsThatShareAVolume) {
+  SmallCapture small;
+  TriangleMesh both = test::box_mesh(Vector3::Constant(-0.1), Vector3::Constant(0.1));
+  for (const Vector3& vertex : test::box_mesh(Vector3::Constant(-0.05), Vector3::Constant(0.08)).vertices)
+    both.vertices.push_back(vertex);
+  for (std::size_t t = 0; t < 12; ++t) {
+    const auto [a, b, c] = both.triangles[t];
+    both.triangles.push_back({a + 8, b + 8, c + 8});
+  }
+  write_mesh(small.folder / "rest.ply", both);
+  EXPECT_THAT(
+      complaint_of([&] { (void)small.read(); }),
+      AllOf(HasSubstr("`surface` is no solid"), HasSubstr("lies in the part"), HasSubstr("trimesh.boolean.union")));
+}
+
 /// A box of +-half, cut into six tetrahedra; `cells` of them.
 std::string box_of_tetrahedra(const std::string& half, int cells = 6) {
   std::string text = "# vtk DataFile Version 2.0\nbox\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n";

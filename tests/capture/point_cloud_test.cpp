@@ -1,5 +1,6 @@
 #include "capture/point_cloud.hpp"
 
+#include <cstdint>
 #include <cstring>
 #include <limits>
 
@@ -32,6 +33,33 @@ std::string binary_pcd() {
   return text;
 }
 
+/// Both points twice, field by field: the colours a byte and a copy of it 15 bytes on, the rest as it is.
+std::string compressed_pcd() {
+  std::string places;
+  for (int axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto value = float(sample[i % 2][axis]);
+      places.append(reinterpret_cast<const char*>(&value), sizeof value);
+    }
+  const std::string packed =
+      std::string{0, 0, char(7 << 5), 6, 0} + char(31) + places.substr(0, 32) + char(15) + places.substr(32);
+  std::string text = pcd_header("binary_compressed", 4);
+  for (const std::uint32_t size : {std::uint32_t(packed.size()), std::uint32_t(64)})
+    text.append(reinterpret_cast<const char*>(&size), sizeof size);
+  return text + packed;
+}
+
+TEST(PointCloud, ReadsCompressedPcd) {
+  const TemporaryFolder folder;
+  folder.write("a.pcd", compressed_pcd());
+  EXPECT_THAT(read_points(folder / "a.pcd"), ElementsAre(sample[0], sample[1], sample[0], sample[1]));
+  std::string broken = compressed_pcd();
+  broken[broken.find("compressed\n") + 11 + 8 + 4] = 100;  // a copy from before the beginning
+  folder.write("a.pcd", broken);
+  EXPECT_THAT(complaint_of([&] { (void)read_points(folder / "a.pcd"); }),
+              HasSubstr("compressed points that are broken"));
+}
+
 TEST(PointCloud, PlyComesBack) {
   const TemporaryFolder folder;
   write_points(folder / "a.ply", sample);
@@ -56,7 +84,8 @@ TEST(PointCloud, RefusesEveryTruncation) {
   const TemporaryFolder folder;
   write_points(folder / "a.ply", sample);
   folder.write("a.pcd", binary_pcd());
-  for (const char* name : {"a.ply", "a.pcd"}) {
+  folder.write("b.pcd", compressed_pcd());
+  for (const char* name : {"a.ply", "a.pcd", "b.pcd"}) {
     const std::string whole = read_file(folder / name);
     for (std::size_t length = 0; length < whole.size(); ++length) {
       write_file(folder / name, std::string_view(whole).substr(0, length));
@@ -71,7 +100,7 @@ TEST(PointCloud, SaysWhatIsWrong) {
     return complaint_of([&] { (void)read_points(folder.write(name, content)); });
   };
   EXPECT_THAT(said("a.xyz", "1 2 3\n"), HasSubstr(".ply or .pcd"));
-  EXPECT_THAT(said("a.pcd", pcd_header("binary_compressed", 2)), HasSubstr("expected ascii or binary"));
+  EXPECT_THAT(said("a.pcd", pcd_header("binary_packed", 2)), HasSubstr("expected ascii, binary or binary_compressed"));
   EXPECT_THAT(said("a.pcd", pcd_header("ascii", 1) + "7 0.5 x 3\n"), HasSubstr("a.pcd:12: \"x\" in point 0"));
   EXPECT_THAT(said("a.pcd", pcd_header("ascii", 999999999)), HasSubstr("cut short"));
   EXPECT_THAT(said("a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nCOUNT 1 1\nPOINTS 1\nDATA ascii\n1 2\n"),

@@ -168,12 +168,10 @@ TEST(Mend, LeavesWhatIsAmbiguousForExamine) {
   EXPECT_THAT(mend({}).mesh.triangles, IsEmpty());
 }
 
-TEST(ReadSurface, TellsWhatWasMended) {
+TEST(ReadSurface, Mends) {
   const test::TemporaryFolder folder;
   write_mesh(folder / "a.ply", turned(ball));
-  std::vector<std::string> remarks;
-  EXPECT_GT(enclosed_volume(read_surface(folder / "a.ply", &remarks)), 0.0);
-  EXPECT_THAT(remarks, ElementsAre(HasSubstr("inwards")));
+  EXPECT_GT(enclosed_volume(read_surface(folder / "a.ply")), 0.0);
 }
 
 }  // namespace

@@ -126,6 +126,36 @@ TEST(Model, TakesTetrahedraMadeElsewhereAsOfOneMaterial) {
   EXPECT_EQ(read.volume.youngs_modulus, std::vector<double>{read.youngs_modulus});
   EXPECT_EQ(read.volume.poissons_ratio, std::vector<double>{read.poissons_ratio});
   EXPECT_EQ(read.scene.object.surface->triangles.size(), 4u);
+  // With a triangle among them and data of another program.
+  text.replace(text.find("made.msh"), 8, "made.vtu");
+  folder.write("model.toml", text);
+  folder.write("made.vtu",
+               R"(<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="2">
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 2 1 0 2 3</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">3 7</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">5 10</DataArray></Cells>
+<CellData><DataArray type="Int64" Name="gmsh:physical" format="ascii">1 2</DataArray></CellData>
+</Piece></UnstructuredGrid></VTKFile>)");
+  EXPECT_EQ(load_model(folder / "model.toml").volume.connectivity, (std::vector<int>{0, 1, 2, 3}));
+}
+
+TEST(Model, RefusesPartsThatShareAVolume) {
+  const TemporaryFolder folder;
+  Model m = full_model();
+  m.scene.fixed.clear();
+  TriangleMesh& surface = m.scene.object.surface.emplace(make_sphere(0.15, 3));
+  const TriangleMesh core = make_sphere(0.09, 3);
+  const int first = int(surface.vertices.size());
+  surface.vertices.insert(surface.vertices.end(), core.vertices.begin(), core.vertices.end());
+  for (const auto& [a, b, c] : core.triangles) surface.triangles.push_back({first + a, first + b, first + c});
+  save_model(folder.path(), m);
+  EXPECT_THAT(complaint_of([&] { load_model(folder / "model.toml"); }),
+              testing::AllOf(HasSubstr("surface.ply"), HasSubstr("lies in the part"), HasSubstr("trimesh")));
+  for (std::size_t t = surface.triangles.size() - core.triangles.size(); t < surface.triangles.size(); ++t)
+    std::swap(surface.triangles[t][0], surface.triangles[t][1]);
+  save_model(folder.path(), m);
+  EXPECT_EQ(*load_model(folder / "model.toml").scene.object.surface, surface);  // hollow
 }
 
 TEST(Model, PlanesRegionsAndVelocitiesComeBack) {

@@ -1,11 +1,14 @@
 #include "simulation/scene_simulation.hpp"
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <numeric>
 
 #include "base/error.hpp"
 #include "geometry/primitives.hpp"
+#include "input_errors.hpp"
 #include "motion/linear_statics.hpp"
+#include "simulation/flat_sheet.hpp"
 
 namespace pliant::scene_simulation_test {
 namespace {
@@ -106,6 +109,64 @@ TEST(SceneSimulation, ASurfaceBesideItsScanMakesAThickerBodyAsHeavy) {
   thin.offset = [](const Vector3&) { return -0.6 * edge; };
   std::vector<Vector3> controls;
   EXPECT_THROW((void)make_body_of(scene, *scene_distance(scene, 0.15), thin, controls), InputError);
+}
+
+/// A sheet in any plane, held at one end, sags as an Euler-Bernoulli beam.
+TEST(SceneSimulation, FlatSheetsBendWithOneElementThroughThem) {
+  const double length = 0.1, thickness = 0.0005, width = 0.02, modulus = 3e7, density = 1000.0;
+  const Eigen::AngleAxisd turn(0.5, Vector3::UnitX());
+  Scene scene;
+  scene.object.surface = make_box(Vector3(length, thickness, width), 0.002);
+  for (Vector3& vertex : scene.object.surface->vertices) vertex = turn * vertex;
+  scene.timing = evenly_timed(50.0, 3);
+  scene.fixed = {{RegionBox{Vector3(-1, -1, -1), Vector3(-0.5 * length + 1e-4, 1, 1)}, std::nullopt}};
+  const auto sheet = flat_sheet(*scene.object.surface);
+  ASSERT_TRUE(sheet);
+  EXPECT_NEAR(sheet->thickness, thickness, 1e-9);
+  EXPECT_NEAR(std::abs(sheet->normal.dot(turn * Vector3::UnitY())), 1.0, 1e-9);
+  EXPECT_TRUE(is_thinner_than_hexahedra(scene));
+  Resolution resolution;
+  std::vector<Vector3> controls;
+  const auto distance = scene_distance(scene, 0.15);
+  for (const double cells : {8.0, 12.0, 20.0}) {
+    resolution.element = ElementKind::QuadraticTetrahedron, resolution.cells = cells;
+    const auto body = make_body_of(scene, *distance, resolution, controls);
+    EXPECT_NEAR(body->volume(), length * thickness * width, 1e-6 * length * thickness * width);
+    VectorX theta = blocks.zero();
+    blocks.set_moduli(theta, modulus);
+    theta[blocks.poissons_ratio] = 0.0;
+    const LinearStatics statics(body, held_nodes(*body, held_regions(scene)), blocks, theta);
+    Points down(body->node_count(), 3), force = Points::Zero(body->node_count(), 3);
+    down.rowwise() = sheet->normal.transpose();
+    body->add_mass_product(9.81 * density, down, force);
+    const double beam = 9.81 * density * std::pow(length, 4) * 12.0 / (8.0 * modulus * thickness * thickness);
+    // Flattened elements are a little stiff, by the square of their length.
+    EXPECT_NEAR(statics.greatest_displacement(force) / beam, 1.0, 10.0 / (cells * cells)) << cells;
+  }
+  const TriangleMesh bowl =
+      make_level_surface([](const Vector3& p) { return std::max(std::abs(p.norm() - 0.05) - 0.002, p.y()); },
+                         grown(Box{Vector3::Constant(-0.05), Vector3::Constant(0.05)}, 0.005), 0.002);
+  EXPECT_FALSE(flat_sheet(bowl));
+}
+
+/// A curved shell that no cell sees, and a sheet that no grid of distances does.
+TEST(SceneSimulation, ObjectsTooThinForTheirElementsAreTold) {
+  Scene scene;
+  TriangleMesh& shell = scene.object.surface.emplace(make_sphere(0.05, 4));
+  const int first = int(shell.vertices.size());
+  const TriangleMesh inner = make_sphere(0.0495, 4);
+  shell.vertices.insert(shell.vertices.end(), inner.vertices.begin(), inner.vertices.end());
+  for (const auto& [a, b, c] : inner.triangles) shell.triangles.push_back({first + a, first + c, first + b});
+  scene.timing = evenly_timed(50.0, 3);
+  EXPECT_FALSE(flat_sheet(shell));
+  std::vector<Vector3> controls;
+  const auto distance = scene_distance(scene, 0.15);
+  EXPECT_THAT(test::complaint_of([&] { (void)make_body_of(scene, *distance, Resolution(), controls); }),
+              testing::AllOf(testing::HasSubstr("about 0.0005 m thickness"), testing::HasSubstr("400 along the object"),
+                             testing::HasSubstr("`volume_mesh`")));
+  scene.object.surface = make_box(Vector3(0.1, 0.0001, 0.02), 0.005);
+  EXPECT_THAT(test::complaint_of([&] { (void)scene_distance(scene, 0.15); }),
+              testing::AllOf(testing::HasSubstr("a sheet of 0.0001 m thickness"), testing::HasSubstr("0.00028 m at least")));
 }
 
 TEST(SceneSimulation, ThicknessIsThatOfMostOfTheSurface) {
