@@ -86,6 +86,7 @@ class Joiner {
   void join(const std::vector<int>& vertices) {
     std::vector<int> next(vertices.size(), -1);  // of the same cell
     std::unordered_map<std::uint64_t, int> first;
+    first.reserve(vertices.size());
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       const Vector3& p = position(vertices[i]);
       for_each_cell(p, [&](std::uint64_t cell) {
@@ -228,6 +229,7 @@ class Mender {
   }
 
   void leave_out_repeated() {
+    if (faults_.count() == 0) return;  // one triangle more would crowd an edge
     TriangleMesh fewer = without_repeated(mesh_);
     const std::size_t count = mesh_.triangles.size() - fewer.triangles.size();
     if (count == 0) return;
@@ -269,16 +271,18 @@ class Mender {
       int triangle;
       bool agrees;
     };
-    std::vector<std::vector<Neighbour>> neighbours(mesh_.triangles.size());
     const std::vector<EdgeUse> uses = edge_uses(mesh_);
     bool all_agree = true;
     for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
+      all_agree = all_agree && edge[0].is_forward != edge[1].is_forward;
+    });
+    if (all_agree) return;
+    std::vector<std::vector<Neighbour>> neighbours(mesh_.triangles.size());
+    for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
       const bool agrees = edge[0].is_forward != edge[1].is_forward;
-      all_agree = all_agree && agrees;
       neighbours[std::size_t(edge[0].triangle)].push_back({edge[1].triangle, agrees});
       neighbours[std::size_t(edge[1].triangle)].push_back({edge[0].triangle, agrees});
     });
-    if (all_agree) return;
     std::size_t turned = 0;
     std::vector<int> side(mesh_.triangles.size(), 0);  // 1: as the shell's first triangle, -1: against it
     for (const Shell& shell : shells_) {
@@ -309,6 +313,7 @@ class Mender {
   }
 
   void leave_out_copies() {
+    if (shells_.size() < 2) return;
     using Corners = std::array<std::array<double, 3>, 3>;
     std::set<Corners> seen;
     std::vector<const Shell*> copies;
@@ -323,7 +328,7 @@ class Mender {
         std::ranges::sort(corners);
         own.push_back(corners);
       }
-      if (shells_.size() > 1 && std::ranges::all_of(own, [&](const Corners& c) { return seen.contains(c); }))
+      if (std::ranges::all_of(own, [&](const Corners& c) { return seen.contains(c); }))
         copies.push_back(&shell);
       else
         seen.insert(own.begin(), own.end());

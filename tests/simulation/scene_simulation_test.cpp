@@ -165,8 +165,9 @@ TEST(SceneSimulation, ObjectsTooThinForTheirElementsAreTold) {
               testing::AllOf(testing::HasSubstr("about 0.0005 m thickness"), testing::HasSubstr("400 along the object"),
                              testing::HasSubstr("`volume_mesh`")));
   scene.object.surface = make_box(Vector3(0.1, 0.0001, 0.02), 0.005);
-  EXPECT_THAT(test::complaint_of([&] { (void)scene_distance(scene, 0.15); }),
-              testing::AllOf(testing::HasSubstr("a sheet of 0.0001 m thickness"), testing::HasSubstr("0.00028 m at least")));
+  EXPECT_THAT(
+      test::complaint_of([&] { (void)scene_distance(scene, 0.15); }),
+      testing::AllOf(testing::HasSubstr("a sheet of 0.0001 m thickness"), testing::HasSubstr("0.00028 m at least")));
 }
 
 TEST(SceneSimulation, ThicknessIsThatOfMostOfTheSurface) {
