@@ -122,6 +122,7 @@ struct Indentation {
   Vector3 direction = -Vector3::UnitY();      ///< unit vector along which the probe advances, into the object
   std::filesystem::path curve;                ///< absolute; CSV `depth,force,std`
   std::string role = "fit";                   ///< "fit" or "test"
+  double contact_std = 0.0;                   ///< [m] of the depth at which it touches, 0 in the curve; 0: exact
   bool operator==(const Indentation&) const = default;
 };
 

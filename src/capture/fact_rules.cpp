@@ -564,6 +564,9 @@ void check_indentations(RuleContext& context) {
       context.toml.complain(item("indentation", i, "radius"), "a probe's radius of " + text_of(test.radius, "m"),
                             "above 0 and smaller than the object", "radii are in metres");
     complain_off_surface(context, item("indentation", i, "contact"), test.contact);
+    if (test.contact_std < 0 || test.contact_std > limit)
+      context.toml.complain(item("indentation", i, "contact_std"), text_of(test.contact_std, "m"),
+                            "0 or above, and smaller than the object", "a standard deviation in metres");
   }
 }
 

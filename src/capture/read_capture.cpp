@@ -273,6 +273,7 @@ class Reader {
                        .value_or(Vector3::Zero());
     test.direction = read_direction(block, "direction", "the direction in which the probe advances, into the object")
                          .value_or(test.direction);
+    test.contact_std = block.optional<double>("contact_std").value_or(0.0);
     test.curve = required_path(block, "curve");
     test.role = read_role(block);
     return test;

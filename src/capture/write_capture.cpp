@@ -147,8 +147,9 @@ class Writer {
     write_name(test.name);
     out_ << "probe = " << (test.probe == IndenterShape::Ball ? "\"ball\"" : "\"punch\"")
          << "\nradius = " << toml_text(test.radius) << "   # m\ncontact = " << toml_text(test.contact)
-         << "\ndirection = " << toml_text(test.direction) << "\ncurve = " << file_text(test.curve)
-         << "\nrole = " << toml_text(test.role) << "\n\n";
+         << "\ndirection = " << toml_text(test.direction) << "\n";
+    if (test.contact_std > 0.0) out_ << "contact_std = " << toml_text(test.contact_std) << "   # m\n";
+    out_ << "curve = " << file_text(test.curve) << "\nrole = " << toml_text(test.role) << "\n\n";
   }
 
   void write(const Grip& test, std::size_t i) {

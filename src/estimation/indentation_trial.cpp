@@ -1,5 +1,7 @@
 #include "estimation/indentation_trial.hpp"
 
+#include <cmath>
+
 #include "estimation/law_derivatives.hpp"
 
 namespace pliant {
@@ -52,11 +54,62 @@ bool IndentedBody::force_derivative(std::size_t depth, const PressedMaterial& ma
   return true;
 }
 
+DepthOffset::DepthOffset(const ForceCurve& curve, double std) : curve_(curve), std_(std) {
+  if (!is_unknown()) return;
+  // Slopes of the parabola through a depth and its neighbours; before the first one no force at no depth.
+  const std::vector<double>& d = curve.depths;
+  const auto n = Eigen::Index(d.size());
+  slope_ = MatrixX::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double here = d[std::size_t(i)], before = i > 0 ? d[std::size_t(i - 1)] : 0.0;
+    const double a = here - before, b = i + 1 < n ? d[std::size_t(i + 1)] - here : 0.0;
+    if (a > 0.0) slope_(i, i) += b > 0.0 ? b / (a * (a + b)) : 1.0 / a;
+    if (a > 0.0 && i > 0) slope_(i, i - 1) -= slope_(i, i);
+    if (b > 0.0) {
+      const double forward = a > 0.0 ? a / (b * (a + b)) : 1.0 / b;
+      slope_(i, i + 1) += forward, slope_(i, i) -= forward;
+    }
+  }
+}
+
+void DepthOffset::fit(const VectorX& forces) {
+  if (!is_unknown()) return;
+  slopes_ = slope_ * forces;
+  double along = 0.0, bend = 1.0 / (std_ * std_);
+  for (Eigen::Index i = 0; i < forces.size(); ++i) {
+    const double weight = slopes_[i] / std::pow(curve_.stds[std::size_t(i)], 2);
+    along -= weight * (forces[i] - curve_.forces[std::size_t(i)]), bend += weight * slopes_[i];
+  }
+  value_ = along / bend;
+}
+
+MatrixX DepthOffset::with_offset(const MatrixX& changes) const {
+  if (!is_unknown()) return changes;
+  return changes + value_ * (slope_ * changes);
+}
+
+VectorX DepthOffset::change(const MatrixX& changes) const {
+  VectorX along = VectorX::Zero(changes.cols());
+  if (!is_unknown()) return along;
+  double bend = 1.0 / (std_ * std_);
+  for (Eigen::Index i = 0; i < changes.rows(); ++i) {
+    const double weight = slopes_[i] / std::pow(curve_.stds[std::size_t(i)], 2);
+    along -= weight * changes.row(i).transpose(), bend += weight * slopes_[i];
+  }
+  return along / bend;
+}
+
+VectorX DepthOffset::transposed(const VectorX& bar) const {
+  if (!is_unknown()) return bar;
+  return bar + value_ * (slope_.transpose() * bar);
+}
+
 IndentationTrial::IndentationTrial(std::shared_ptr<const PressScene> scene, int indentation,
                                    std::shared_ptr<PressedMaterial> material, const VectorX& reference, int number)
     : EquilibriumTrial(std::move(scene), std::move(material), number),
       indentation_(indentation),
-      body_(*scene_, test(), material_->law(reference), mean_modulus(material_->body(), *material_->law(reference))) {}
+      body_(*scene_, test(), material_->law(reference), mean_modulus(material_->body(), *material_->law(reference))),
+      offset_(test().curve, test().contact_std) {}
 
 const ObservedIndentation& IndentationTrial::test() const {
   return scene_->tests->indentations[std::size_t(indentation_)];
@@ -66,28 +119,51 @@ CostEvaluation IndentationTrial::run(const VectorX& theta, const MatrixX& direct
   CostEvaluation result;
   const ForceCurve& curve = test().curve;
   body_.set_law(material_->law(theta));
-  const Eigen::Index n = directions.cols();
-  VectorX by_theta;
-  for (std::size_t d = 0; d < curve.depths.size(); ++d) {
-    if (!body_.solve(d)) return result.failure = test().name + ": " + body_.failure(), result;
+  const Eigen::Index n = directions.cols(), count = Eigen::Index(curve.depths.size());
+  VectorX by_theta, forces(count);
+  MatrixX changes(count, n);
+  for (Eigen::Index d = 0; d < count; ++d) {
+    if (!body_.solve(std::size_t(d))) return result.failure = test().name + ": " + body_.failure(), result;
     ++result.steps, result.work += steps_of_an_equilibrium * scene_->body->node_count();
-    const double r = (body_.force(d) - curve.forces[d]) / curve.stds[d];
+    forces[d] = body_.force(std::size_t(d));
+    if (n == 0) continue;
+    if (!body_.force_derivative(std::size_t(d), *material_, theta, by_theta))
+      return unstable(std::move(result), test().name);
+    changes.row(d) = by_theta.transpose() * directions;
+  }
+  offset_.fit(forces);
+  changes = offset_.with_offset(changes);
+  const VectorX offset_change = offset_.change(changes);
+  if (offset_.is_unknown()) forces += offset_.value() * offset_.slopes();
+  for (Eigen::Index d = 0; d < count; ++d) {
+    const double std = curve.stds[std::size_t(d)], r = (forces[d] - curve.forces[std::size_t(d)]) / std;
     FrameFit fit;
     fit.recording = number_;
     fit.frame = int(d);
     fit.independent = 1.0;
     fit.cost = 0.5 * r * r;
-    result.cost += fit.cost;
     if (n > 0) {
-      if (!body_.force_derivative(d, *material_, theta, by_theta)) return unstable(std::move(result), test().name);
-      const VectorX J = directions.transpose() * by_theta / curve.stds[d];
+      VectorX J = changes.row(d).transpose() / std;
+      if (offset_.is_unknown()) J += offset_.slopes()[d] / std * offset_change;
       fit.gradient = r * J;
       fit.gauss_newton = J * J.transpose();
     }
+    if (offset_.is_unknown() && d + 1 == count) add_prior(offset_change, fit);
+    result.cost += fit.cost;
     result.frames.push_back(std::move(fit));
   }
   result.succeeded = true;
   return result;
+}
+
+/// The offset's own square, beside the last depth.
+void IndentationTrial::add_prior(const VectorX& offset_change, FrameFit& fit) const {
+  const double r = offset_.value() / offset_.prior_std();
+  fit.cost += 0.5 * r * r;
+  if (offset_change.size() == 0) return;
+  const VectorX J = offset_change / offset_.prior_std();
+  fit.gradient += r * J;
+  fit.gauss_newton += J * J.transpose();
 }
 
 /// A back-substitution a depth gives the force's derivative by all parameters: nothing is left to sweep back.
@@ -101,10 +177,16 @@ CostEvaluation IndentationTrial::gradient(const VectorX& theta, VectorX& theta_b
   theta_bar = VectorX::Zero(theta.size());
   result = run(theta, MatrixX(theta.size(), 0));
   if (!result.succeeded) return result;
-  VectorX by_theta;
+  // The offset fits best: its own change does not move the cost.
+  VectorX by_theta, bar(Eigen::Index(curve.depths.size()));
+  for (std::size_t d = 0; d < curve.depths.size(); ++d) {
+    const double offset = offset_.is_unknown() ? offset_.value() * offset_.slopes()[Eigen::Index(d)] : 0.0;
+    bar[Eigen::Index(d)] = (body_.force(d) + offset - curve.forces[d]) / (curve.stds[d] * curve.stds[d]);
+  }
+  bar = offset_.transposed(bar);
   for (std::size_t d = 0; d < curve.depths.size(); ++d) {
     if (!body_.force_derivative(d, *material_, theta, by_theta)) return unstable(std::move(result), test().name);
-    theta_bar += (body_.force(d) - curve.forces[d]) / (curve.stds[d] * curve.stds[d]) * by_theta;
+    theta_bar += bar[Eigen::Index(d)] * by_theta;
   }
   return result;
 }

@@ -31,8 +31,39 @@ class IndentedBody {
   std::vector<Placement> placements_;
 };
 
+/// An error that all depths of a curve have in common, as where the probe first touched is not exactly known: a length
+/// of normal prior, by which forces change along the slope of the simulated curve. Fitted to each simulation anew, it
+/// needs no place among the parameters.
+class DepthOffset {
+ public:
+  /// @param std  [m] of the prior about zero; 0: depths are exact
+  DepthOffset(const ForceCurve& curve, double std);
+
+  bool is_unknown() const { return std_ > 0.0; }
+  /// Finds the offset with which simulated forces come nearest to the measured ones.
+  /// @param forces  [N] at the curve's depths
+  void fit(const VectorX& forces);
+  double value() const { return value_; }  ///< [m] that the probe is deeper than the curve says; 0 where exact
+  const VectorX& slopes() const { return slopes_; }  ///< [N/m] of the simulated curve
+  double prior_std() const { return std_; }
+  /// Changes of the forces with the offset kept, by those at the curve's depths, both one row a depth: slopes change
+  /// too.
+  MatrixX with_offset(const MatrixX& changes) const;
+  /// Change of the offset for such changes, one row.
+  VectorX change(const MatrixX& changes) const;
+  /// What a cotangent of forces with the offset is of those at the curve's depths.
+  VectorX transposed(const VectorX& bar) const;
+
+ private:
+  const ForceCurve& curve_;
+  double std_, value_ = 0.0;
+  MatrixX slope_;  // of the forces at the curve's depths
+  VectorX slopes_;
+};
+
 /// Force-depth curve: half the squares of simulated less measured force over its standard deviation, one frame a depth.
-/// Derivatives are those of the equilibrium, by one back-substitution a depth for any number of parameters.
+/// Derivatives are those of the equilibrium, by one back-substitution a depth for any number of parameters. Where
+/// depths have an offset, costs are those with the best one, whose square over its prior belongs to the last frame.
 class IndentationTrial : public EquilibriumTrial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is
@@ -48,9 +79,11 @@ class IndentationTrial : public EquilibriumTrial {
 
  private:
   const ObservedIndentation& test() const;
+  void add_prior(const VectorX& offset_change, FrameFit& fit) const;
 
   int indentation_;
   IndentedBody body_;
+  DepthOffset offset_;
 };
 
 }  // namespace pliant

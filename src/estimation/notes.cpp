@@ -200,6 +200,28 @@ std::string told(const SampledMaterial& sampled, const std::vector<PressSample>&
       sampled.mean_samples, samples.size(), least, most, 100.0 * sampled.stress_misfit);
 }
 
+/// Probes whose contact spans fewer nodes than show where it ends: their force is that of the mesh.
+void say_what_contacts_are_coarse(const LawOutcome& law, std::vector<std::string>& notes) {
+  constexpr int enough_nodes = 12;
+  const Body& body = *law.scene->body;
+  for (const ObservedIndentation& test : law.scene->static_tests().indentations) {
+    const double deepest = test.curve.depths.back(), radius = test.probe.radius;
+    const double reach = test.probe.kind == ProbeKind::Ball ? std::sqrt(radius * deepest) : radius;
+    const Vector3 axis = probe_axis(body, test.probe);
+    int nodes = 0;
+    for (int n = 0; n < body.node_count(); ++n) {
+      const Vector3 r = body.reference_positions().row(n).transpose() - test.probe.centre;
+      const double along = r.dot(axis);
+      nodes += std::abs(along) < 0.5 * reach && (r - along * axis).norm() < reach;
+    }
+    if (nodes < enough_nodes)
+      notes.push_back(fmt::format(
+          "The contact of {} has a radius of about {:.2g} mm and spans {} nodes of the mesh: too few for its "
+          "force. Ask for more cells (--set cells=N), or give a volume_mesh that is finer there.",
+          test.name, 1e3 * reach, nodes));
+  }
+}
+
 }  // namespace
 
 void add_law_notes(FitOutcome& outcome, const LawOutcome& law, const Capture& capture) {
@@ -209,6 +231,7 @@ void add_law_notes(FitOutcome& outcome, const LawOutcome& law, const Capture& ca
     notes.push_back(fmt::format("{}: {}", form_of(tried.form, capture), verdict_on(tried)));
   for (std::size_t c = 0; c < law.cuts.size(); ++c)
     notes.push_back(fmt::format("Zones: {}.", describe(law.cuts[c], int(c) + 1)));
+  say_what_contacts_are_coarse(law, notes);
   if (!law.scene->presses.empty())
     notes.push_back(law.noise.growth > 0.0
                         ? fmt::format("A marker's coordinate is taken to err by {:.3g} mm and, on top of it, by "

@@ -560,6 +560,13 @@ void require_known(const Capture& capture, const FitOptions& options) {
     refuse("element=hexahedra: presses are met by tetrahedra, which follow the shape",
            "leave out element, or choose tetrahedra or quadratic_tetrahedra");
   if (options.refine > 1) refuse("presses and --refine", "fit with other `cells` and compare");
+  if (options.law_terms > 0 &&
+      (options.material == MaterialKind::Linear || options.material == MaterialKind::NeoHookean))
+    refuse("law_terms: they are of Ogden's law, and another one is chosen",
+           "leave out law_terms, or choose material=ogden");
+  if (is_of_material_curves(capture) && (options.law_zones > 1 || options.control_points > 1))
+    refuse("a material that differs over the object, and stress-strain curves alone, which are of one material",
+           "leave out law_zones and control_points");
   for (const auto& [name, choice] : options.parameters)
     if (name != "poissons_ratio" || !choice.start || choice.estimated != false)
       refuse("choices about single parameters, of which fits of static tests know a given Poisson's ratio alone",

@@ -64,7 +64,7 @@ ObservedIndentation observe_indentation(const Capture& capture, std::size_t i) {
   probe.centre = test.contact;
   probe.radius = test.radius;
   probe.axis = test.direction;
-  return {name_or(test.name, "indentation", i), test.role, probe, read_force_curve(test.curve)};
+  return {name_or(test.name, "indentation", i), test.role, probe, read_force_curve(test.curve), test.contact_std};
 }
 
 /// Points of the first third of a curve, at least one, whose force is beyond doubt: where depths are great the material
@@ -162,22 +162,37 @@ namespace {
 
 CurvePrediction predict(const PressScene& scene, const ObservedIndentation& test,
                         const std::shared_ptr<const MaterialLaw>& law, double modulus) {
-  CurvePrediction result{test.name,         "indentation",     test.role,       "depth [m]", "N",
-                         test.curve.depths, test.curve.forces, test.curve.stds, {},          {}};
+  CurvePrediction result{test.name,         "indentation",   test.role, "depth [m]", "N", test.curve.depths,
+                         test.curve.forces, test.curve.stds, {},        {},          {}};
   IndentedBody body(scene, test, law, modulus);
-  for (std::size_t d = 0; d < test.curve.depths.size(); ++d) {
-    const bool solved = body.solve(d);
-    result.predicted.push_back(solved ? body.force(d) : not_a_number);
-    if (!solved && result.failure.empty()) result.failure = body.failure();
+  VectorX forces = VectorX::Constant(Eigen::Index(test.curve.depths.size()), not_a_number);
+  for (std::size_t d = 0; d < test.curve.depths.size(); ++d)
+    if (body.solve(d))
+      forces[Eigen::Index(d)] = body.force(d);
+    else if (result.failure.empty())
+      result.failure = body.failure();
+  if (DepthOffset offset(test.curve, test.contact_std); result.failure.empty() && offset.is_unknown()) {
+    offset.fit(forces);
+    result.depth_offset = offset.value();
+    forces += offset.value() * offset.slopes();
   }
+  result.predicted.assign(forces.begin(), forces.end());
   return result;
 }
 
 CurvePrediction predict(const PressScene& scene, const ObservedGrip& test,
                         const std::shared_ptr<const MaterialLaw>& law) {
-  CurvePrediction result{
-      test.name,        "grip force",   test.role, "displacement [m]", "N", {test.displacement.norm()}, {test.force},
-      {test.force_std}, {not_a_number}, {}};
+  CurvePrediction result{test.name,
+                         "grip force",
+                         test.role,
+                         "displacement [m]",
+                         "N",
+                         {test.displacement.norm()},
+                         {test.force},
+                         {test.force_std},
+                         {not_a_number},
+                         {},
+                         {}};
   GrippedBody body(scene, test, law);
   if (body.solve())
     result.predicted = {body.force()};
@@ -197,6 +212,7 @@ CurvePrediction predict(const ObservedCurve& curve, const MaterialLaw& law) {
                          test.stress,
                          test.std,
                          predict_test(law, test),
+                         {},
                          {}};
   if (!std::ranges::all_of(result.predicted, [](double s) { return std::isfinite(s); }))
     result.failure = "no state without stress on the free faces";
@@ -226,8 +242,13 @@ std::vector<CurvePrediction> predict_curves(const PressScene& scene, const std::
 std::string curve_sentence(const CurvePrediction& curve) {
   const std::string head = curve.name + " (" + curve.role + "): ";
   if (!curve.failure.empty()) return head + "the model finds no equilibrium: " + curve.failure;
-  return head + fmt::format("{:.3g} {} rms, {:.1f} % of the greatest measured", curve.rms(), curve.unit,
-                            100.0 * curve.relative_rms());
+  return head +
+         fmt::format("{:.3g} {} rms, {:.1f} % of the greatest measured", curve.rms(), curve.unit,
+                     100.0 * curve.relative_rms()) +
+         (curve.depth_offset
+              ? fmt::format("; touched {:.3g} mm {} than its depths say", 1e3 * std::abs(*curve.depth_offset),
+                            *curve.depth_offset > 0.0 ? "earlier" : "later")
+              : "");
 }
 
 }  // namespace pliant

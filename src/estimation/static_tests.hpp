@@ -20,6 +20,7 @@ struct ObservedIndentation {
   std::string name, role;  ///< "indentation 1" or as the capture names it; "fit" or "test"
   ProbeOptions probe;      ///< with its axis
   ForceCurve curve;
+  double contact_std = 0.0;  ///< [m] of an error that all depths have in common; 0: they are exact
 };
 
 /// Measurement between grips as it was made.

@@ -384,6 +384,9 @@ StrainMeasure strain_measure(const TextTable& table, const MachineTitles& titles
   if ((column.is_stretch && !begins_at_rest) || std::abs(first * unit - 1.0) <= stretch_at_rest)
     ask("begins at " + text(first));
   if (column.unit > 0.0 && greatest * unit > greatest_strain) ask("reaches " + text(greatest));
+  if (column.unit == percent.unit && greatest < surely_a_strain)
+    return {unit, 0.0,
+            title + " reaches " + text(greatest) + " % alone: --strain strain, where these are parts of the length"};
   if (column.unit > 0.0) return {unit, 0.0, ""};
   if (names_any(column.title.name, {"percent", "prozent"})) return percent;
   const bool may_be_strain = agrees_with_true_strain(table, titles, values, 1.0);

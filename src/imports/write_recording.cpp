@@ -380,6 +380,7 @@ void write_indentation(const fs::path& out, const ImportedRecording& recording, 
   indentation.radius = facts.probe_radius;
   indentation.contact = *facts.contact;
   indentation.direction = -facts.up.value_or(Vector3::UnitY()).normalized();
+  indentation.contact_std = loading.zero_std;
   indentation.curve = out / "curve.csv";
   write_force_curve(indentation.curve, {loading.extensions, loading.forces, loading.stds});
   result.capture.indentations.push_back(indentation);
@@ -411,7 +412,10 @@ void write_material_curve(const fs::path& out, const ImportedRecording& recordin
            "give --length METRES and --area SQUARE_METRES at rest; of an indenter --ball or --punch RADIUS");
   const double length = takes_extensions ? *facts.length : 1.0, area = takes_forces ? *facts.area : 1.0;
   LoadingOptions options = loading_options(facts);
-  options.force_std = takes_forces ? facts.force_std.value_or(0.0) : 0.0;
+  if (facts.force_std && !facts.area)
+    refuse(recording.name, "the standard deviation of a force, and stresses",
+           "--area, over which it is one of a stress");
+  options.force_std = facts.force_std.value_or(0.0) / (takes_forces ? 1.0 : facts.area.value_or(1.0));
   options.force_resolution = takes_forces ? test.force_resolution : test.stress_resolution;
   if (!takes_extensions) options.extension = {"%", 100.0};
   if (!takes_forces) options.force = {"kPa", 1e-3};

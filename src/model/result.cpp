@@ -178,6 +178,7 @@ Json curve_json(const CurvePrediction& curve) {
                {"predicted", numbers_json(curve.predicted)},
                {"rms", number(curve.rms())},
                {"relative_rms", number(curve.relative_rms())}};
+  if (curve.depth_offset) json["depth_offset"] = number(*curve.depth_offset);
   if (!curve.failure.empty()) json["failure"] = curve.failure;
   return json;
 }

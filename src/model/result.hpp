@@ -157,14 +157,15 @@ struct TrackingResult {
 
 /// Curve or measurement between grips beside what a material predicts of it.
 struct CurvePrediction {
-  std::string name, kind, role;       ///< kind: "indentation", "grip force" or "material curve"
-  std::string abscissa, unit;         ///< what the points stand over, like "depth [m]"; the ordinate's unit: N or Pa
-  std::vector<double> at;             ///< depths [m], displacements [m], stretches or shears [-]
-  std::vector<double> measured, std;  ///< [unit], as many
-  std::vector<double> predicted;      ///< [unit], as many; not a number where no equilibrium was found
-  std::string failure;                ///< why not; empty: all points have one
-  double rms() const;                 ///< [unit] of predicted less measured; not a number where one is missing
-  double relative_rms() const;        ///< over the greatest measured size
+  std::string name, kind, role;        ///< kind: "indentation", "grip force" or "material curve"
+  std::string abscissa, unit;          ///< what the points stand over, like "depth [m]"; the ordinate's unit: N or Pa
+  std::vector<double> at;              ///< depths [m], displacements [m], stretches or shears [-]
+  std::vector<double> measured, std;   ///< [unit], as many
+  std::vector<double> predicted;       ///< [unit], as many; not a number where no equilibrium was found
+  std::string failure;                 ///< why not; empty: all points have one
+  std::optional<double> depth_offset;  ///< [m] of an indentation: estimated, to be added to `at`; in `predicted`
+  double rms() const;                  ///< [unit] of predicted less measured; not a number where one is missing
+  double relative_rms() const;         ///< over the greatest measured size
 };
 
 struct TimeResult {

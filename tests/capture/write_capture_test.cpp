@@ -158,6 +158,7 @@ probe = "punch"
 radius = 0.01
 contact = [0, 0, -0.1]
 direction = [0, 0.6, 0.8]
+contact_std = 0.0001
 curve = "depths.csv"
 [[indentation]]
 probe = "ball"

@@ -7,6 +7,7 @@
 #include "estimation/judgement.hpp"
 #include "estimation/press_fit.hpp"
 #include "estimation/start_objective.hpp"
+#include "input_errors.hpp"
 #include "support/curve_capture.hpp"
 #include "support/thread_ranks.hpp"
 #include "support/tolerance.hpp"
@@ -80,15 +81,21 @@ TEST_P(OfEachKind, KnownTruthIsFoundWithinWhatIsStated) {
   for (const CurvePrediction& curve : predict_curves(*found.law->scene, found.law->law)) {
     EXPECT_EQ(curve.failure, "") << curve.name;
     EXPECT_LT(curve.relative_rms(), tolerance(0.05)) << curve_sentence(curve);
+    EXPECT_EQ(curve.depth_offset.has_value(), GetParam().contact_error > 0.0) << curve_sentence(curve);
+    EXPECT_NEAR(curve.depth_offset.value_or(0.0), GetParam().contact_error, tolerance(5e-4)) << curve_sentence(curve);
   }
 }
 
 std::string name_of(const ::testing::TestParamInfo<CurveKinds>& kinds) {
-  return !kinds.param.grips ? "Indentations" : !kinds.param.curves ? "Grips" : "All";
+  return kinds.param.contact_error > 0.0 ? "Contacts"
+         : !kinds.param.grips            ? "Indentations"
+         : !kinds.param.curves           ? "Grips"
+                                         : "All";
 }
 
 INSTANTIATE_TEST_SUITE_P(Tests, OfEachKind,
                          ::testing::Values(CurveKinds{.grips = false, .curves = false},
+                                           CurveKinds{.grips = false, .curves = false, .contact_error = 1e-3},
                                            CurveKinds{.indentations = false, .curves = false}, CurveKinds{}),
                          name_of);
 
@@ -178,6 +185,22 @@ TEST(StaticTests, GuessesComeNearWhereTheFormulaHolds) {
     EXPECT_GT(guess, 0.1 * modulus);
     EXPECT_LT(guess, 10.0 * modulus);
   }
+}
+
+TEST(StaticTests, FormsOfALawThatCurvesCannotHaveAreRefused) {
+  const test::TemporaryFolder folder;
+  const Capture capture = written(folder, 0.01, {.indentations = false, .grips = false, .has_shape = false});
+  const auto complaint = [&](const std::function<void(FitOptions&)>& choose) {
+    FitOptions options;
+    choose(options);
+    return test::complaint_of([&] { (void)fit_presses({&capture}, options); });
+  };
+  using ::testing::HasSubstr;
+  EXPECT_THAT(complaint([](FitOptions& o) { o.material = MaterialKind::Sampled; }), HasSubstr("no press"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.material = MaterialKind::NeoHookean, o.law_terms = 2; }),
+              HasSubstr("law_terms"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.law_zones = 2; }), HasSubstr("one material"));
+  EXPECT_THAT(complaint([](FitOptions& o) { o.control_points = 3; }), HasSubstr("one material"));
 }
 
 TEST(StaticTests, ACaptureWithNothingToFitIsRefused) {

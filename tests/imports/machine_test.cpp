@@ -77,6 +77,8 @@ TEST(MachineCsv, BecomesAnIndentationWhereAProbeIsTold) {
   const Capture capture = imported(folder / "pull.csv", folder / "out", "", {}, facts);
   ASSERT_EQ(capture.indentations.size(), 1u);
   EXPECT_EQ(capture.indentations[0].direction, Vector3(0, 0, -1));
+  EXPECT_GT(capture.indentations[0].contact_std, 0.0);
+  EXPECT_LT(capture.indentations[0].contact_std, 1e-4);
   const ForceCurve curve = read_force_curve(capture.indentations[0].curve);
   EXPECT_NEAR(curve.depths.back(), 0.01, 1e-4);
   for (std::size_t i = 0; i < curve.depths.size(); ++i) EXPECT_NEAR(curve.forces[i], 2000.0 * curve.depths[i], 1e-3);

@@ -13,6 +13,7 @@ namespace pliant::test {
 /// Which static tests a capture of a block has.
 struct CurveKinds {
   bool indentations = true, grips = true, curves = true, has_shape = true;
+  double contact_error = 0.0;  ///< [m] by which indentations are deeper than they say, and its standard deviation
 };
 
 /// Static tests of a block on the floor (`PressedBlock`), with the forces and stresses that a law makes.
@@ -21,7 +22,7 @@ class CurveCapture {
   /// @param noise  standard deviation of forces and stresses over each curve's greatest
   CurveCapture(const std::filesystem::path& folder, const std::shared_ptr<const MaterialLaw>& law,
                const std::shared_ptr<const MaterialLaw>& element_law, double noise, const CurveKinds& kinds = {})
-      : folder_(folder), noise_(noise) {
+      : folder_(folder), noise_(noise), contact_error_(kinds.contact_error) {
     scene_ = block_.scene({}, law);
     capture.name = "tested block";
     if (kinds.has_shape) {
@@ -61,11 +62,14 @@ class CurveCapture {
     test.probe = {facts.probe == IndenterShape::Ball ? ProbeKind::Ball : ProbeKind::Punch, facts.contact, facts.radius,
                   facts.direction};
     test.curve.depths = {0.002, 0.004, 0.006, 0.008, 0.01};
+    for (double& depth : test.curve.depths) depth += contact_error_;
     IndentedBody body(scene_, test, law, mean_modulus(*scene_.body, *law));
     for (std::size_t d = 0; d < test.curve.depths.size(); ++d) {
       EXPECT_TRUE(body.solve(d)) << body.failure();
       test.curve.forces.push_back(body.force(d));
     }
+    for (double& depth : test.curve.depths) depth -= contact_error_;
+    facts.contact_std = contact_error_;
     const double std = std::max(1e-6, noise_) * test.curve.forces.back();
     test.curve.stds.assign(test.curve.depths.size(), std);
     for (double& force : test.curve.forces) force += noise_ > 0.0 ? std * error() : 0.0;
@@ -131,7 +135,7 @@ class CurveCapture {
   }
 
   std::filesystem::path folder_;
-  double noise_;
+  double noise_, contact_error_;
   PressedBlock block_;
   PressScene scene_;
   MarkerPositions marked_, resting_;
