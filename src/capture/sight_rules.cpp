@@ -228,9 +228,9 @@ std::vector<Vector3> readings_of(const Capture& capture, const DepthCamera& came
 
 /// Whether the free object is seen where its scan stands at all. What would have it there is said.
 void check_scan_is_seen(RuleContext& context) {
-  constexpr double reach = 0.05;           // of the object's size
-  constexpr double least_of_masked = 0.3;  // of the object's readings, that another sight must put there
-  constexpr double least = 5.0;
+  constexpr double reach = 0.05;                         // of the object's size
+  constexpr double few_masked = 0.2, most_masked = 0.6;  // of the object's readings, as stated and by another sight
+  constexpr double least = 5.0;                          // readings that another sight must put there without masks
   constexpr double infinite = std::numeric_limits<double>::infinity();
   const Scene& scene = context.capture.scene;
   const bool is_elsewhere = scene.initial.released || scene.timing.is_static ||
@@ -258,20 +258,24 @@ void check_scan_is_seen(RuleContext& context) {
         }
         return seen;
       };
-      if (readings.empty() || sight(camera.at(frame).camera_to_world, 1.0).near > 0) return;
+      if (readings.empty()) return;
+      const double all = double(readings.size());
+      const double stated = double(sight(camera.at(frame).camera_to_world, 1.0).near);
+      if (stated > (camera.masks ? few_masked * all : 0.0)) return;
       const OtherSight* best = nullptr;
       const std::vector<OtherSight> others = camera.moved.empty() ? other_sights(camera) : std::vector<OtherSight>();
-      const double enough = camera.masks ? std::max(least, least_of_masked * double(readings.size())) : least;
+      const double enough = camera.masks ? most_masked * all : least;
       double closest = infinite;
       for (const OtherSight& other : others) {
         const Sight seen = sight(other.camera_to_world, camera.depth_scale / other.depth_scale);
         if (double(seen.near) >= enough && seen.distance < closest) best = &other, closest = seen.distance;
       }
+      if (stated > 0.0 && !best) return;  // no other convention explains it
       const bool is_scale = best && best->depth_scale != camera.depth_scale;
       context.toml.reject(
           key + (is_scale ? ".depth_scale" : ".camera_to_world"),
-          "camera \"" + camera.name + "\" shows nothing within " + text_of(near + off, "m") + " of the scan" +
-              (best ? "; " + best->words : ""),
+          "camera \"" + camera.name + (stated > 0.0 ? "\" shows little within " : "\" shows nothing within ") +
+              text_of(near + off, "m") + " of the scan" + (best ? "; " + best->words : ""),
           "the object where its scan stands at the start frame",
           best ? ""
                : "the pose maps camera (x right, y down, z forward) to world coordinates, in metres; the "

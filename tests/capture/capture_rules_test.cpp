@@ -338,6 +338,31 @@ TEST(CaptureRules, SayThatImagesAreTurned) {
   EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("turned by 90 degrees"));
 }
 
+/// Images that were written upright, with the camera's size and centre traded, and its pose as it was.
+TEST(CaptureRules, SayThatImagesWereTurnedWithTheirIntrinsics) {
+  SmallCapture small;
+  const auto turned = [](const auto& image) {
+    auto upright = image;
+    std::swap(upright.width, upright.height);
+    for (int v = 0; v < image.height; ++v)
+      for (int u = 0; u < image.width; ++u) upright(v, image.width - 1 - u) = image(u, v);
+    return upright;
+  };
+  small.edit("[1, 0, 0, 0], [0, 1, 0, 0]", "[1, 0, 0, 0.3], [0, 1, 0, 0]");
+  for (int frame = 0; frame < SmallCapture::frames; ++frame) {
+    // The object stands left of the picture's middle: the camera is moved, and so are the images.
+    const std::string number = std::to_string(frame);
+    Image<std::uint16_t> depth(SmallCapture::width, SmallCapture::height, 2000);
+    Image<std::uint8_t> mask(SmallCapture::width, SmallCapture::height);
+    for (int v = 22; v < 38; ++v)
+      for (int u = 5; u < 21; ++u) depth(u, v) = 900, mask(u, v) = 255;
+    write_png(small.folder / ("front/00000" + number + ".png"), turned(depth));
+    write_png(small.folder / ("front/mask_00000" + number + ".png"), turned(mask));
+  }
+  small.edit("width = 80\nheight = 60", "width = 60\nheight = 80").edit("cx = 39.5\ncy = 29.5", "cx = 29.5\ncy = 39.5");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("with images turned by 90 degrees it would"));
+}
+
 TEST(CaptureRules, SayThatMasksAreInverted) {
   SmallCapture small;
   for (int frame = 0; frame < SmallCapture::frames; ++frame) {

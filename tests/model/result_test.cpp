@@ -67,10 +67,12 @@ TEST(Result, PoissonsRatioHasItsFormerNameToo) {
 TEST(Result, CurvesStandThereWithTheirErrors) {
   Result result = full_result();
   result.curves = {
-      {"site", "indentation", "test", "depth [m]", "N", {1e-3, 2e-3}, {0.1, 0.3}, {0.01, 0.01}, {0.13, 0.26}, ""},
-      {"tension", "material curve", "fit", "stretch", "Pa", {1.1}, {9.0}, {1.0}, {NAN}, "none"}};
+      {"site", "indentation", "test", "depth [m]", "N", {1e-3, 2e-3}, {0.1, 0.3}, {0.01, 0.01}, {0.13, 0.26}, "", 4e-4},
+      {"tension", "material curve", "fit", "stretch", "Pa", {1.1}, {9.0}, {1.0}, {NAN}, "none", {}}};
   const auto json = nlohmann::json::parse(to_json(result))["curves"];
   ASSERT_EQ(json.size(), 2u);
+  EXPECT_EQ(json[0]["depth_offset"], 4e-4);
+  EXPECT_FALSE(json[1].contains("depth_offset"));
   EXPECT_NEAR(json[0]["rms"].get<double>(), 0.035355, 1e-5);
   EXPECT_NEAR(json[0]["relative_rms"].get<double>(), 0.117851, 1e-5);
   EXPECT_EQ(json[0], nlohmann::json({{"name", "site"},
