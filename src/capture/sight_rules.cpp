@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <type_traits>
 
 #include "base/median.hpp"
 #include "capture/capture_rules.hpp"
@@ -92,13 +93,15 @@ int pixels_near(const Capture& capture, const DepthCamera& camera, int frame, co
   return count;
 }
 
-/// What the first mask of the free object shows: nothing, or all but the object.
+/// What the first mask of the free object shows: nothing, or all but the object. A depth camera beside others may see
+/// it later.
 template <class Camera>
 void check_first_mask(RuleContext& context, const Camera& camera, const FramePattern& pattern, const std::string& key) {
   const int frame = first_free_frame(context.capture, camera.every);
   const Image<std::uint8_t> mask = read_object_mask(camera, context.capture.folder / pattern(frame));
   const std::string file = "\"" + pattern(frame).string() + "\"";
-  if (std::ranges::all_of(mask.pixels, [](std::uint8_t m) { return m == 0; }))
+  if (std::is_same_v<Camera, SilhouetteCamera> &&
+      std::ranges::all_of(mask.pixels, [](std::uint8_t m) { return m == 0; }))
     return context.toml.reject(key, file + " shows no pixel of the object", "pixels that are not zero on the object",
                                "the object must be in the picture when it begins to move");
   int border = 0, of_object = 0;

@@ -83,9 +83,12 @@ TEST_F(New, NumbersFilesFromZeroWhereTheyBeginElsewhereOrHaveGaps) {
   remove_file(folder.path() / "depth_100.png");
   const ProgramRun run = run_pliant(words());
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("numbered from 98, with gaps"));
+  EXPECT_THAT(run.out, HasSubstr("numbered from 98: they are copied"));
+  EXPECT_THAT(run.out, HasSubstr("1 of 5 frames are missing"));
   const Capture capture = read_capture(folder.path());
-  EXPECT_EQ(capture.frame_count(), 4);
+  ASSERT_EQ(capture.frame_count(), 4);
+  const std::vector<double>& times = capture.scene.timing.times;
+  EXPECT_NEAR((times[2] - times[1]) / (times[1] - times[0]), 2.0, 1e-6) << "time passes where a frame is missing";
   EXPECT_EQ(read_depth_image(folder.path() / capture.depth[0].images(2)).pixels, view(0.03).pixels);
 }
 
@@ -112,10 +115,11 @@ TEST_F(New, TakesTheCameraFromItsFile) {
 
 TEST_F(New, TakesTheSurfaceAndMasks) {
   record("depth/%03d.png", 0, 3);
-  for (int k = 0; k < 3; ++k) {
-    make_folder(folder.path() / "mask");
-    write_png(folder.path() / FramePattern{"mask/mask_%03d.png"}(k), Image<std::uint8_t>(width, height, 255));
-  }
+  Image<std::uint8_t> mask(width, height);
+  for (int v = height / 4; v < height / 2; ++v)
+    for (int u = width / 4; u < width / 2; ++u) mask(u, v) = 255;
+  make_folder(folder.path() / "mask");
+  for (int k = 0; k < 3; ++k) write_png(folder.path() / FramePattern{"mask/mask_%03d.png"}(k), mask);
   std::ofstream(folder.path() / "bear.obj")
       << "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
   const ProgramRun run = run_pliant(words());
