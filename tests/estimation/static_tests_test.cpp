@@ -152,7 +152,7 @@ TEST(StaticTests, ALawThatMissesForcesLeavesThemUnexplained) {
   options.law_zones = 1, options.control_points = 1, options.alternatives = false;
   options.law_terms = 1;
   EXPECT_EQ(fit_presses({&capture}, options).verdict.kind, Verdict::Kind::Explained);
-  options.material = MaterialKind::Linear;
+  options.material = MaterialKind::Linear, options.law_terms = 0;
   const FitOutcome linear = fit_presses({&capture}, options);
   EXPECT_EQ(linear.verdict.kind, Verdict::Kind::Unexplained);
   EXPECT_THAT(linear.verdict.reasons, ::testing::Contains(::testing::HasSubstr("The model misses")));
