@@ -24,15 +24,15 @@ Json read_fit(const std::filesystem::path& file) {
   return result;
 }
 
-/// Values with their deviation and interval, of the material and of nothing else.
+/// Values with their deviation and interval, of the material and of nothing else: those of regions ("@left"), and of
+/// the terms of Ogden's law ("exponent_2"), too.
 Json values_of(const Json& parameters) {
   Json values = Json::object();
   for (const auto& [name, parameter] : parameters.items()) {
-    const std::string base = name.substr(0, name.find_first_of("@["));
-    const bool is_material = base == "youngs_modulus" || base == "poissons_ratio" || base == "density" ||
-                             base == "mass_damping" || base == "stiffness_damping" || base == "friction" ||
-                             base.starts_with("ogden") || base.starts_with("law");
-    if (!is_material || !parameter.is_object()) continue;
+    constexpr const char* of_material[] = {"youngs_modulus", "poissons_ratio",    "density",  "mass_damping",
+                                           "exponent_",      "stiffness_damping", "friction", "stiffness_ratio_"};
+    const auto begins = [&](const char* word) { return name.starts_with(word); };
+    if (std::ranges::none_of(of_material, begins) || !parameter.is_object()) continue;
     Json value;
     for (const char* member : {"value", "unit", "std", "interval_90", "estimated"})
       if (parameter.contains(member)) value[member] = parameter[member];

@@ -441,6 +441,7 @@ constexpr const char* fit_result = R"({"format": "result/1",
   "software": {"name": "pliant", "version": "1", "commit": "c"}, "capture": {"name": "bar", "sha256": "abc"},
   "material": "a law", "verdict": "explained", "reasons": [],
   "parameters": {"youngs_modulus": {"value": 1e4, "unit": "Pa", "std": 300.0, "interval_90": [9.5e3, 1.05e4], "estimated": true},
+                 "exponent_2": {"value": 4.0, "unit": "1", "estimated": true},
                  "linear_velocity": {"value": [0, 0, 0], "unit": "m/s", "estimated": true}},
   "error": {"surface_rms": 0.001},
   "deformation": {"greatest_strain": 0.2, "median_strain": 0.05, "greatest_rate": 3.0}})";
@@ -451,7 +452,8 @@ TEST_F(Formats, HaveACardWithValuesIntervalsAndHowTheyDiffer) {
   std::ofstream(folder / "result.json") << fit_result;
   (void)write_export(model, export_format("gmsh"), folder, folder / "result.json");
   const json card = json::parse(text_of(folder / "card.json"));
-  EXPECT_EQ(card["fit"]["values"].size(), 1u) << "of the material alone";
+  EXPECT_EQ(card["fit"]["values"].size(), 2u) << "of the material alone";
+  EXPECT_EQ(card["fit"]["values"]["exponent_2"]["value"], 4.0);
   EXPECT_EQ(card["fit"]["values"]["youngs_modulus"]["interval_90"], json({9.5e3, 1.05e4}));
   EXPECT_EQ(card["fit"]["capture"]["sha256"], "abc");
   EXPECT_EQ(card["fit"]["deformation"]["greatest_rate"], 3.0);
