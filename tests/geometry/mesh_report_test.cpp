@@ -66,44 +66,33 @@ TEST(Examine, CountsComponents) {
   EXPECT_DOUBLE_EQ(examine(mesh).volume, 2.0);
 }
 
-TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
-  const int first = int(a.vertices.size());
-  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const auto& [i, j, k] : b.triangles) a.triangles.push_back({first + i, first + j, first + k});
-  return a;
-}
-
-TriangleMesh turned(TriangleMesh mesh) {
-  for (auto& triangle : mesh.triangles) std::swap(triangle[0], triangle[1]);
-  return mesh;
-}
-
 TEST(Examine, RefusesPartsThatCutOneAnother) {
-  const TriangleMesh mesh = joined(unit_box(), test::box_mesh({0.5, 0.3, 0.4}, {1.5, 0.8, 0.9}));
+  const TriangleMesh mesh = test::joined(unit_box(), test::box_mesh({0.5, 0.3, 0.4}, {1.5, 0.8, 0.9}));
   const MeshReport report = examine(mesh);
   EXPECT_FALSE(report.is_closed_solid);
   EXPECT_TRUE(report.has_shared_volume);
   EXPECT_THAT(report.complaints,
               Contains(HasSubstr("of 1 x 0.5 x 0.5 m about (1, 0.55, 0.65) cuts through the part of 1 x 1 x 1 m")));
   EXPECT_THAT(report.cure, HasSubstr("trimesh.boolean.union"));
-  EXPECT_TRUE(examine(joined(unit_box(), test::box_mesh({0.2, 0, 0}, {1.2, 1, 1}))).has_shared_volume);
+  EXPECT_TRUE(examine(test::joined(unit_box(), test::box_mesh({0.2, 0, 0}, {1.2, 1, 1}))).has_shared_volume);
 }
 
 TEST(Examine, TellsACavityFromASolidInASolid) {
   const TriangleMesh inner = test::box_mesh(Vector3::Constant(0.2), Vector3::Constant(0.8));
-  const MeshReport solid = examine(joined(unit_box(), inner)), hollow = examine(joined(unit_box(), turned(inner)));
+  const MeshReport solid = examine(test::joined(unit_box(), inner)),
+                   hollow = examine(test::joined(unit_box(), test::turned(inner)));
   EXPECT_FALSE(solid.is_closed_solid);
   EXPECT_THAT(solid.complaints, Contains(HasSubstr("both face the same way: a cavity faces inwards")));
   EXPECT_TRUE(hollow.is_closed_solid);
   EXPECT_THAT(hollow.complaints, IsEmpty());
   EXPECT_NEAR(hollow.volume, 1.0 - 0.216, 1e-12);
   const TriangleMesh core = test::box_mesh(Vector3::Constant(0.4), Vector3::Constant(0.6));
-  EXPECT_TRUE(examine(joined(joined(unit_box(), turned(inner)), core)).is_closed_solid);
+  EXPECT_TRUE(examine(test::joined(test::joined(unit_box(), test::turned(inner)), core)).is_closed_solid);
 }
 
 TEST(Examine, PartsThatOnlyTouchAreNoFault) {
-  EXPECT_TRUE(examine(joined(unit_box(), test::box_mesh({1, 0, 0}, {2, 1, 1}))).is_closed_solid);
-  EXPECT_TRUE(examine(joined(unit_box(), test::box_mesh({1, 0.2, 0.3}, {2, 0.7, 0.6}))).is_closed_solid);
+  EXPECT_TRUE(examine(test::joined(unit_box(), test::box_mesh({1, 0, 0}, {2, 1, 1}))).is_closed_solid);
+  EXPECT_TRUE(examine(test::joined(unit_box(), test::box_mesh({1, 0.2, 0.3}, {2, 0.7, 0.6}))).is_closed_solid);
 }
 
 TEST(Examine, CountsUnusedDegenerateAndNonFinite) {

@@ -23,18 +23,6 @@ TriangleMesh ball_at(double radius, const Vector3& centre) {
 
 const TriangleMesh ball = ball_at(0.1, {0.3, -0.2, 5.0});
 
-TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
-  const int first = int(a.vertices.size());
-  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const auto& [i, j, k] : b.triangles) a.triangles.push_back({first + i, first + j, first + k});
-  return a;
-}
-
-TriangleMesh turned(TriangleMesh mesh) {
-  for (auto& triangle : mesh.triangles) std::swap(triangle[0], triangle[1]);
-  return mesh;
-}
-
 /// Three vertices of its own for each triangle, off by at most `error`.
 TriangleMesh soup(const TriangleMesh& mesh, double error = 0.0) {
   std::mt19937 random(3);
@@ -57,7 +45,7 @@ void expect_solid(const SolidSurface& surface, double volume, int components = 1
 }
 
 TEST(Mend, LeavesASolidAsItIs) {
-  for (const TriangleMesh& mesh : {ball, joined(ball, turned(ball_at(0.05, {0.3, -0.2, 5.0})))}) {
+  for (const TriangleMesh& mesh : {ball, test::joined(ball, test::turned(ball_at(0.05, {0.3, -0.2, 5.0})))}) {
     const SolidSurface surface = mend(mesh);
     EXPECT_EQ(surface.mesh, mesh);
     EXPECT_THAT(surface.remarks, IsEmpty());
@@ -108,7 +96,7 @@ TEST(Mend, LeavesOutTrianglesThatAreNoneOrTwice) {
 }
 
 TEST(Mend, TurnsWhatFacesInwards) {
-  const SolidSurface surface = mend(turned(ball));
+  const SolidSurface surface = mend(test::turned(ball));
   expect_solid(surface, enclosed_volume(ball));
   EXPECT_THAT(surface.remarks, ElementsAre(HasSubstr("faced inwards; all are turned over")));
 }
@@ -116,10 +104,10 @@ TEST(Mend, TurnsWhatFacesInwards) {
 TEST(Mend, TurnsTheWallsOfACavityWithTheSkin) {
   const TriangleMesh inner = ball_at(0.05, {0.3, -0.2, 5.0});
   const double volume = enclosed_volume(ball) - enclosed_volume(inner);
-  expect_solid(mend(joined(turned(ball), inner)), volume, 2);
+  expect_solid(mend(test::joined(test::turned(ball), inner)), volume, 2);
   // One part that faces inwards, beside one that does not.
   const TriangleMesh other = ball_at(0.1, {0.6, -0.2, 5.0});
-  const SolidSurface two = mend(joined(ball, turned(other)));
+  const SolidSurface two = mend(test::joined(ball, test::turned(other)));
   expect_solid(two, enclosed_volume(ball) + enclosed_volume(other), 2);
   EXPECT_THAT(two.remarks, ElementsAre(HasSubstr("1 part that faced inwards is"), HasSubstr("in 2 parts")));
 }
@@ -135,11 +123,11 @@ TEST(Mend, MakesNeighboursFaceOneSide) {
 TEST(Mend, LeavesOutCrumbsWhereverTheyAre) {
   TriangleMesh mesh = ball;
   for (const Vector3& at : {Vector3(0.8, -0.2, 5.0), Vector3(0.3, -0.2, 5.0), Vector3(0.3, -0.1, 5.0)})
-    mesh = joined(mesh, ball_at(0.004, at));  // apart, within, and through the surface
+    mesh = test::joined(mesh, ball_at(0.004, at));  // apart, within, and through the surface
   mesh.vertices.emplace_back(9, 9, 9);
   TriangleMesh open = test::box_mesh({0.3, 0.5, 5}, {0.302, 0.502, 5.002});
   open.triangles.resize(3);
-  const SolidSurface surface = mend(joined(mesh, open));
+  const SolidSurface surface = mend(test::joined(mesh, open));
   expect_solid(surface, enclosed_volume(ball));
   EXPECT_EQ(surface.mesh.triangles, ball.triangles);
   EXPECT_THAT(surface.remarks, ElementsAre(HasSubstr("2 open crumbs"), HasSubstr("3 crumbs of together")));
@@ -150,12 +138,12 @@ TEST(Mend, LeavesOutCrumbsWhereverTheyAre) {
 }
 
 TEST(Mend, KeepsBubbles) {
-  const TriangleMesh bubble = turned(ball_at(0.004, {0.3, -0.2, 5.0}));
-  EXPECT_EQ(mend(joined(ball, bubble)).mesh, joined(ball, bubble));
+  const TriangleMesh bubble = test::turned(ball_at(0.004, {0.3, -0.2, 5.0}));
+  EXPECT_EQ(mend(test::joined(ball, bubble)).mesh, test::joined(ball, bubble));
 }
 
 TEST(Mend, LeavesOutCopies) {
-  const SolidSurface surface = mend(joined(ball, turned(ball)));
+  const SolidSurface surface = mend(test::joined(ball, test::turned(ball)));
   EXPECT_EQ(surface.mesh.triangles, ball.triangles);
   EXPECT_THAT(surface.remarks, ElementsAre(HasSubstr("1 part that is a copy of another left out")));
 }
@@ -164,13 +152,13 @@ TEST(Mend, LeavesWhatIsAmbiguousForExamine) {
   TriangleMesh hole = ball;
   hole.triangles.pop_back();
   EXPECT_EQ(mend(hole).mesh, hole);
-  EXPECT_EQ(examine(mend(joined(ball, ball_at(0.1, {0.4, -0.2, 5.0}))).mesh).has_shared_volume, true);
+  EXPECT_EQ(examine(mend(test::joined(ball, ball_at(0.1, {0.4, -0.2, 5.0}))).mesh).has_shared_volume, true);
   EXPECT_THAT(mend({}).mesh.triangles, IsEmpty());
 }
 
 TEST(ReadSurface, Mends) {
   const test::TemporaryFolder folder;
-  write_mesh(folder / "a.ply", turned(ball));
+  write_mesh(folder / "a.ply", test::turned(ball));
   EXPECT_GT(enclosed_volume(read_surface(folder / "a.ply")), 0.0);
 }
 
