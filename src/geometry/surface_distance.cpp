@@ -54,13 +54,18 @@ double SurfaceDistance::operator()(const Vector3& point) const {
   const auto& [surface, boxes] = *tree_;
   const TreePoint at = tree_point(point);
   double least = std::numeric_limits<double>::infinity();
-  // Boxes come in the order of their distance, which is never more than that of what they hold.
-  for (auto it = boxes.qbegin(bg::index::nearest(at, unsigned(surface.triangles.size()))); it != boxes.qend(); ++it) {
-    if (bg::comparable_distance(at, it->first) > least) break;
-    const auto& [a, b, c] = surface.triangles[std::size_t(it->second)];
+  const auto hold_against = [&](const std::pair<TreeBox, int>& box) {
+    const auto& [a, b, c] = surface.triangles[std::size_t(box.second)];
     const Vector3 closest = closest_on_triangle(point, surface.vertices[a], surface.vertices[b], surface.vertices[c]);
     least = std::min(least, (closest - point).squaredNorm());
-  }
+  };
+  // The triangles of the nearest boxes bound the distance: what is nearer has a box within that bound.
+  constexpr unsigned some = 8;
+  for (auto it = boxes.qbegin(bg::index::nearest(at, some)); it != boxes.qend(); ++it) hold_against(*it);
+  const Vector3 bound = Vector3::Constant(std::sqrt(least));
+  const TreeBox around(tree_point(point - bound), tree_point(point + bound));
+  for (auto it = boxes.qbegin(bg::index::intersects(around)); it != boxes.qend(); ++it)
+    if (bg::comparable_distance(at, it->first) < least) hold_against(*it);
   return std::sqrt(least);
 }
 

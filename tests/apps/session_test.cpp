@@ -339,22 +339,26 @@ TEST_F(Session, TrackFollowsTheObject) {
 }
 
 TEST_F(Session, TrackSaysThatTheObjectIsLost) {
+  std::string scene = read_file(PLIANT_TEST_SCENE);
+  const std::string here = "translation = [0.0, 0.07, 0.0]";
+  ASSERT_NE(scene.find(here), std::string::npos);
+  write_file(at("moved.toml"), scene.replace(scene.find(here), here.size(), "translation = [-0.12, 0.07, -0.08]"));
+  ASSERT_EQ(run_pliant({"synth", at("moved.toml"), "--out", at("moved")}).exit_code, fine);
   const fs::path elsewhere = at("elsewhere");
   fs::copy(capture(), elsewhere, fs::copy_options::recursive);
-  std::string facts = read_file(elsewhere / "capture.toml");
-  const std::size_t row = facts.find("camera_to_world = [[");
-  ASSERT_NE(row, std::string::npos);
-  const std::size_t end = facts.find(']', row), begin = facts.rfind(',', end) + 1;
-  facts.replace(begin, end - begin, std::to_string(std::stod(facts.substr(begin, end - begin)) + 0.15));
-  write_file(elsewhere / "capture.toml", facts);
+  constexpr int gone = 6;  // from this frame on the pictures show it elsewhere
+  for (const fs::directory_entry& picture : fs::directory_iterator(at("moved") + "/front")) {
+    const std::string name = picture.path().stem().string();
+    if (std::stoi(name.substr(name.size() - 6)) >= gone)
+      fs::copy(picture, elsewhere / "front", fs::copy_options::overwrite_existing);
+  }
   const ProgramRun run = run_pliant({"track", elsewhere, "--out", at("lost track"), "--set", "cells=6",
                                      "--points-per-frame", "400", "--no-pictures"});
   EXPECT_EQ(run.exit_code, not_converged) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("was lost in frame 0"));
-  EXPECT_EQ(read_json(at("lost track") + "/track.json")["lost_at"], 0);
+  EXPECT_THAT(run.out, HasSubstr("was lost in frame 6"));
+  EXPECT_EQ(read_json(at("lost track") + "/track.json")["lost_at"], gone);
   EXPECT_FALSE(fs::exists(at("lost track") + "/pictures/000000.png"));
 }
-
 TEST_F(Session, TrackRefusesBadInputWithItsPlace) {
   write_file(at("broken.csv"), "id,x,y,z\ntop,0,high,0\n");
   const ProgramRun points = run_pliant({"track", capture(), "--out", at("no track"), "--points", at("broken.csv")});
