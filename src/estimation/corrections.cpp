@@ -96,4 +96,30 @@ std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluatio
   return needed;
 }
 
+std::optional<TimeDoubt> doubt_of_time(const CostEvaluation& stated, const std::vector<ShiftedInTime>& shifted) {
+  constexpr double least_share = 0.5, abrupt = 4.0;
+  const double observations = stated.independent_observations(), excess = stated.cost - 0.5 * observations;
+  if (!may_need_correction(stated.cost, observations)) return std::nullopt;
+  std::optional<TimeDoubt> best;
+  for (const auto& [later, evaluation] : shifted) {
+    std::map<std::pair<int, int>, double> costs;  // of recording and frame as stated
+    for (const FrameFit& f : evaluation.frames) costs[{f.recording, f.frame - later}] = f.cost;
+    const auto gain_at = [&](const FrameFit& f) {
+      const auto other = costs.find({f.recording, f.frame});
+      return other != costs.end() ? f.cost - other->second : 0.0;
+    };
+    for (std::size_t first = 1; first < stated.frames.size(); ++first) {
+      const FrameFit &before = stated.frames[first - 1], &f = stated.frames[first];
+      const bool begins_here = f.recording == before.recording && f.cost > abrupt * before.cost;
+      if (!begins_here || gain_at(f) < (1.0 - 1.0 / abrupt) * f.cost) continue;
+      double gain = 0.0;  // of frames from there on, while it grows
+      for (std::size_t i = first; i < stated.frames.size() && stated.frames[i].recording == f.recording; ++i) {
+        gain += gain_at(stated.frames[i]);
+        if (gain > (best ? best->share : least_share) * excess) best = {f.recording, f.frame, later, gain / excess};
+      }
+    }
+  }
+  return best;
+}
+
 }  // namespace pliant

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,5 +39,28 @@ bool may_need_correction(double cost, double observations);
 /// @param observations  independent ones behind the cost
 std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluation, const ParameterSet& parameters,
                                                  const std::vector<Correction>& corrections, double observations);
+
+/// All frames of all recordings, compared with what was simulated so many frames later.
+struct ShiftedInTime {
+  int later = 0;
+  CostEvaluation evaluation;
+};
+
+/// Frames of a recording, from one on, that fit what was simulated some frames later or earlier.
+struct TimeDoubt {
+  int recording = 0;   ///< as `FrameFit` numbers it
+  int frame = 0;       ///< as stated
+  int later = 0;       ///< frames; negative: earlier
+  double share = 0.0;  ///< of what noise does not explain that goes with it
+};
+
+/// Whether frames are missing in a recording, or repeated, that its times do not tell. A motion that a model does not
+/// follow drifts from it, a gap in time begins at once: a frame that costs four times what the one before it does, and
+/// less than a quarter of that at another time. Nothing where residuals are about noise, or where the shift takes off
+/// less than half of what noise does not explain, as far after that frame as it takes off most: parameters that were
+/// estimated across a gap are wrong, and times soon differ again.
+/// @param stated   of all frames as they are
+/// @param shifted  the same at other times; what has no frame there counts as it does as stated
+std::optional<TimeDoubt> doubt_of_time(const CostEvaluation& stated, const std::vector<ShiftedInTime>& shifted);
 
 }  // namespace pliant

@@ -80,6 +80,7 @@ class FitRun : StageLoop {
   /// At an estimate, with derivatives by these parameters: what its optimiser found where the record has it, else anew.
   /// @param stage  of the same grid and band as the estimate's
   CostEvaluation linearised_at(const StageRecord& estimate, const Stage& stage, const ParameterSet& parameters);
+  void say_doubts_of_time(const Stage& narrow, const ParameterSet& parameters);
   void say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate);
   const StageRecord& refined(const std::vector<StageRecord>& done, const StageRecord& first);
   std::vector<Alternative> alternatives() const;

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "base/error.hpp"
+#include "estimation/corrections.hpp"
 #include "estimation/fit_run.hpp"
 #include "estimation/notes.hpp"
 #include "estimation/verdict.hpp"
@@ -120,6 +121,37 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   std::vector<const Capture*> captures;
   for (const Recording& r : recordings_.all()) captures.push_back(&r.capture);
   add_notes(outcome_, captures);
+  if (outcome_.evaluation.succeeded && !interrupted_) say_doubts_of_time(narrow, parameters);
+}
+
+void FitRun::say_doubts_of_time(const Stage& narrow, const ParameterSet& parameters) {
+  constexpr int most_repeated = 2, most_missing = 4;  // frames
+  const bool is_whole = std::ranges::all_of(recordings_.all(), [](const Recording& r) {
+    return r.capture.scene.timing.is_static || r.last_frame >= r.last_seen;
+  });
+  if (plan_.facts().limits.ends_if_unexplained || recordings_.all_static() ||
+      (is_whole && is_explained(outcome_.evaluation)))
+    return;
+  const auto shifted = [&](int later) {
+    const Compared compared{options_.wide_band, [](const Recording& r) { return r.last_seen; }, {}, later};
+    return recordings_.objective(grid(narrow.grid), parameters, compared, {}, monitor_.processes)
+        .evaluate(parameters.to_unconstrained(parameters.reference()));
+  };
+  const CostEvaluation stated = shifted(0);
+  if (!stated.succeeded || !may_need_correction(stated.cost, stated.independent_observations())) return;
+  std::vector<ShiftedInTime> others;
+  for (int later = -most_repeated; later <= most_missing; ++later)
+    if (later != 0) others.push_back({later, shifted(later)});
+  const auto doubt = doubt_of_time(stated, others);
+  if (!doubt) return;
+  const Capture& capture = recordings_.all()[std::size_t(doubt->recording)].capture;
+  const bool misses = doubt->later > 0;
+  const int many = std::abs(doubt->later);
+  outcome_.notes.push_back(fmt::format(
+      "{}: frame {} and those after it fit what was simulated {} frame{} {} ({:.0f} % of what noise does not explain). "
+      "Frames seem to be {} there, which the times of the recording do not tell.",
+      capture.name, capture.scene.timing.start_frame + doubt->frame, many, many == 1 ? "" : "s",
+      misses ? "later" : "earlier", 100.0 * doubt->share, misses ? "missing" : "repeated"));
 }
 
 FitOptions FitRun::used_options(const Grid& at) const {

@@ -225,6 +225,17 @@ void start_in_pose(const VectorX& theta, ObservedMotion& motion) {
   motion.simulation.start = std::move(pose);
 }
 
+/// All of the motion, as if its frames had been taken so many frames later.
+void compare_later(const Recording& recording, int later, ObservedMotion& motion) {
+  motion.options.last_frame = std::min(recording.last_seen, int(motion.simulation.times.size()) - 1);
+  auto seen = std::make_shared<std::vector<FrameObservations>>();
+  for (FrameObservations frame : *recording.observations) {
+    frame.frame += later;
+    if (frame.frame >= 0 && frame.frame <= motion.options.last_frame) seen->push_back(std::move(frame));
+  }
+  motion.observations = std::move(seen);
+}
+
 /// The first frame of a released object by points that were registered there: all of them are the object's.
 void compare_pose(const Recording& recording, ObservedMotion& motion) {
   constexpr double far = 10.0;  // times the size: what is no outlier counts fully
@@ -483,6 +494,7 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
     o.interrupted = interrupted;
     options.push_back(o);
     ObservedMotion motion{d.mismatch, d.body, d.simulation, r.observations, o};
+    if (compared.later && !d.simulation.is_static) compare_later(r, *compared.later, motion);
     if (compared.by_pose && r.pose) compare_pose(r, motion);
     if (compared.pose_of.size() > 0) start_in_pose(compared.pose_of, motion);
     trials.push_back(std::make_unique<MotionTrial>(std::move(motion), int(i)));

@@ -57,7 +57,8 @@ struct Compared {
   /// Parameters whose pulls hold released objects in the pose from which they start, whatever their material; empty:
   /// the equilibrium under their pulls is that.
   VectorX pose_of = {};
-  bool by_pose = false;  ///< the first frame of released objects by where they were registered, if they were
+  std::optional<int> later = {};  ///< by which all frames of all of each motion are taken later than stated
+  bool by_pose = false;           ///< the first frame of released objects by where they were registered, if they were
 };
 
 /// The recordings of one object side by side: they share its material, and each has its own start, planes and sensors.

@@ -4,6 +4,7 @@
 
 #include "base/error.hpp"
 #include "base/parallel.hpp"
+#include "estimation/corrections.hpp"
 #include "estimation/problem.hpp"
 #include "support/derivatives.hpp"
 #include "support/recordings.hpp"
@@ -85,6 +86,44 @@ TEST_P(Gradient, MatchesCentralDifferencesInEveryParameter) {
     const double error = test::best_relative_error(along, VectorX::Constant(1, gradient[i]), 0.1);
     EXPECT_LT(error, tolerance(1e-5)) << scene.parameters.coordinate_names()[std::size_t(i)];
   }
+}
+
+/// Of a recording that lacks frames which nothing tells, or shows one twice.
+TEST(TimeDoubt, NamesTheFrameFromWhichAnotherTimeExplainsWhatWasSeen) {
+  const test::Recording whole = test::torus_recording(cell_size, 12, 0, 1e-3);
+  const auto doubt_of = [&](const std::vector<FrameObservations>& seen) {
+    const auto evaluated = [&](int later) {
+      test::Recording r = whole;
+      r.observations = std::make_shared<std::vector<FrameObservations>>();
+      for (FrameObservations frame : seen)
+        if ((frame.frame += later) >= 0 && frame.frame < 12) r.observations->push_back(frame);
+      return r.objective(r.parameters).evaluate(VectorX(0));
+    };
+    std::vector<ShiftedInTime> shifted;
+    for (const int later : {-1, 1, 2}) shifted.push_back({later, evaluated(later)});
+    return doubt_of_time(evaluated(0), shifted);
+  };
+  std::vector<FrameObservations> missing = *whole.observations, twice = missing;  // of frames 1 to 11
+  EXPECT_FALSE(doubt_of(missing));
+  missing.erase(missing.begin() + 5, missing.begin() + 7);
+  for (std::size_t i = 5; i < missing.size(); ++i) missing[i].frame -= 2;
+  const auto later = doubt_of(missing);
+  ASSERT_TRUE(later);
+  EXPECT_EQ(later->frame, 6);
+  EXPECT_EQ(later->later, 2);
+  EXPECT_GT(later->share, 0.9);
+  twice.insert(twice.begin() + 4, twice[3]);
+  for (std::size_t i = 4; i < twice.size(); ++i) ++twice[i].frame;
+  twice.pop_back();
+  const auto earlier = doubt_of(twice);
+  ASSERT_TRUE(earlier);
+  EXPECT_EQ(earlier->frame, 5);
+  EXPECT_EQ(earlier->later, -1);
+  // Noise that is taken for less than it is does not lie in time.
+  std::vector<FrameObservations> noisy = *whole.observations;
+  for (FrameObservations& frame : noisy)
+    for (SurfaceObservation& point : frame.points) point.noise *= 0.3;
+  EXPECT_FALSE(doubt_of(noisy));
 }
 
 /// Every other sensor looks at 0.4 of the way to the next frame: frames are seen twice, at two times.
