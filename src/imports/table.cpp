@@ -95,8 +95,11 @@ std::string decoded(std::string bytes, const std::filesystem::path& file) {
 }
 
 void replace_all(std::string& text, std::string_view old, std::string_view by) {
-  for (std::size_t at = text.find(old); at != std::string::npos; at = text.find(old, at + by.size()))
-    text.replace(at, old.size(), by);
+  std::string replaced;
+  std::size_t at = 0;
+  for (std::size_t next = 0; (next = text.find(old, at)) != std::string::npos; at = next + old.size())
+    replaced.append(text, at, next - at).append(by);
+  if (at > 0) text = std::move(replaced.append(text, at));
 }
 
 // A cell without a plus, and without spaces and apostrophes between digits; a minus of any kind as '-'.
