@@ -233,7 +233,7 @@ double number_resolution(const TextTable& table, std::size_t line, std::size_t c
   const std::size_t end = std::min(text.find_first_of("eE"), text.size());
   const std::size_t point = text.substr(0, end).find(table.decimal);
   const int digits = point == std::string::npos ? 0 : int(end - point) - 1;
-  return std::pow(10.0, (end < text.size() ? std::atoi(text.c_str() + end + 1) : 0) - digits);
+  return std::pow(10.0, (end < text.size() ? std::atof(text.c_str() + end + 1) : 0.0) - digits);
 }
 
 ColumnTitle column_title(std::string_view cell) {
