@@ -45,7 +45,7 @@ for reader in "${readers[@]}"; do
   [[ -d "tests/fuzz/findings/$reader" ]] && known+=("tests/fuzz/findings/$reader")
   echo "fuzz: $reader, $seconds s"
   "$program" --reader="$reader" "$found" "${known[@]}" -max_total_time="$seconds" -max_len=16384 -timeout=10 \
-    -rss_limit_mb=1024 -malloc_limit_mb=512 -artifact_prefix="$faults/" -print_final_stats=1 -verbosity=0 2> "$faults.log" \
+    -rss_limit_mb=1024 -malloc_limit_mb=256 -artifact_prefix="$faults/" -print_final_stats=1 -verbosity=0 2> "$faults.log" \
     || failed+=("$reader")
 done
 if [[ ${#failed[@]} -gt 0 ]]; then

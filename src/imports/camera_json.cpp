@@ -24,12 +24,12 @@ std::vector<double> flat_numbers(const CameraJson& value, const fs::path& file, 
     numbers.push_back(v.get<double>());
     if (!std::isfinite(numbers.back())) refuse(file, "`" + key + "` has a number that is not finite", "numbers");
   };
-  for (const CameraJson& row : value.is_array() ? value : CameraJson::array({value})) {
+  if (!value.is_array()) return add(value), numbers;
+  for (const CameraJson& row : value)
     if (row.is_array())
       for (const CameraJson& item : row) add(item);
     else
       add(row);
-  }
   return numbers;
 }
 

@@ -376,7 +376,7 @@ INSTANTIATE_TEST_SUITE_P(
               vtk_text,
               "4 0 1 2 3",
               "4 0 1 2 1e30",
-              {"a.vtk:13", "names point 1000000000000000019884624838656,"}},
+              {"a.vtk:13", "names point 1000000000000000019884624838656; expected"}},
         Fault{"CellBeyondAll",
               "a.vtk",
               vtk_text,
