@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Installs the Debian packages of scripts/debian-packages.txt that are missing, with `tests` those of
-# scripts/debian-packages-tests.txt, too, and with `mpi` those of scripts/debian-packages-mpi.txt. Quick when all are there.
+# Installs the Debian packages of scripts/debian-packages.txt that are missing, with `tests`, `mpi` or `fuzz` those of
+# scripts/debian-packages-tests.txt and so on, too. Quick when all are there.
 set -euo pipefail
 
 folder="$(dirname "${BASH_SOURCE[0]}")"
 lists=("$folder/debian-packages.txt")
 for more in "$@"; do
   case "$more" in
-    tests | mpi) lists+=("$folder/debian-packages-$more.txt") ;;
+    tests | mpi | fuzz) lists+=("$folder/debian-packages-$more.txt") ;;
     *)
-      echo "setup: found $more; expected nothing, tests or mpi" >&2
+      echo "setup: found $more; expected nothing, tests, mpi or fuzz" >&2
       exit 2
       ;;
   esac

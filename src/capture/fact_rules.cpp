@@ -6,6 +6,7 @@
 #include <set>
 
 #include "capture/capture_rules.hpp"
+#include "capture/image_io.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/surface_distance.hpp"
 #include "geometry/whole_picture.hpp"
@@ -356,7 +357,7 @@ void check_intrinsics(RuleContext& context) {
   for_each_camera(context.capture, [&](const RecordingCamera& recording, const char* kind, std::size_t i) {
     const PinholeCamera& camera = recording.camera;
     for (const auto& [key, value] : {std::pair("width", camera.width), std::pair("height", camera.height)})
-      if (context.toml.is_sound(item(kind, i, key)) && (value < 2 || value > 32768))
+      if (context.toml.is_sound(item(kind, i, key)) && (value < 2 || value > largest_side))
         context.toml.reject(item(kind, i, key), "`" + std::string(key) + "` is " + std::to_string(value),
                             "2 to 32768 pixels");
     if (!context.toml.is_sound(item(kind, i))) return;

@@ -22,11 +22,13 @@ constexpr double rate_tolerance = 5e-4;     // tells 59.94 Hz from 60 Hz
 
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
-// Frames whose file is not there.
+constexpr std::size_t most_missing = 10000;  // frames: a wrong count of millions is told without a look at each
+
+// Frames whose file is not there, the first ones where they are too many.
 std::vector<int> missing_frames(const Capture& capture, const FramePattern& pattern, const std::vector<int>& frames) {
   std::vector<int> missing;
-  for (const int frame : frames)
-    if (!is_file(capture.folder / pattern(frame))) missing.push_back(frame);
+  for (auto frame = frames.begin(); frame != frames.end() && missing.size() < most_missing; ++frame)
+    if (!is_file(capture.folder / pattern(*frame))) missing.push_back(*frame);
   return missing;
 }
 
@@ -37,9 +39,9 @@ bool complain_missing(RuleContext& context, const std::string& key, const FrameP
   const std::string of = " of " + std::to_string(frames.size());
   context.toml.reject(
       key,
-      missing.size() == frames.size()
-          ? "no file \"" + pattern(frames.front()).string() + "\", nor for any other frame"
-          : "no file for " + std::to_string(missing.size()) + of + " frames: " + ranges_text(missing),
+      missing.size() == frames.size() ? "no file \"" + pattern(frames.front()).string() + "\", nor for any other frame"
+                                      : "no file for " + std::string(missing.size() < most_missing ? "" : "at least ") +
+                                            std::to_string(missing.size()) + of + " frames: " + ranges_text(missing),
       "a file for each frame from 0 to " + std::to_string(frames.back()),
       "correct the pattern or `frame_count`, or give `every` where images exist for every n-th frame only");
   return true;

@@ -12,14 +12,13 @@
 #include <string>
 
 #include "base/files.hpp"
+#include "base/plausible_size.hpp"
 
 namespace pliant {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-constexpr int largest_side = 32768;  // beyond any depth sensor; a damaged header must not become a huge allocation
 
 [[noreturn]] void fail(const fs::path& path, std::string found, std::string expected, std::string advice = "") {
   throw InputError(Problem{{path}, std::move(found), std::move(expected), std::move(advice)});
@@ -85,6 +84,11 @@ std::optional<PgmHeader> pgm_header(std::string_view content) {
   return header;
 }
 
+std::size_t pixel_bytes(const ImageHeader& header) {
+  return std::size_t(header.width) * std::size_t(header.height) * std::size_t(header.channels) *
+         std::size_t(header.bits > 8 ? 2 : 1);
+}
+
 ImageHeader header_of(std::string_view content, const fs::path& path) {
   if (content.empty()) fail(path, "the file is empty", "a PNG or PGM image");
   if (is_png(content)) {
@@ -147,6 +151,7 @@ bool decode_png(PngSource& source, std::vector<png_byte>& bytes, std::vector<png
 }
 
 std::vector<png_byte> png_pixels(const std::string& content, const fs::path& path, ImageHeader& header) {
+  require_plausible_size(content.size(), pixel_bytes(header), {path}, "an image");
   PngSource source{content, 0, {}};
   std::vector<png_byte> bytes;
   std::vector<png_bytep> rows;
@@ -156,7 +161,7 @@ std::vector<png_byte> png_pixels(const std::string& content, const fs::path& pat
 
 std::vector<png_byte> pgm_pixels(const std::string& content, const fs::path& path, const ImageHeader& header) {
   const PgmHeader pgm = *pgm_header(content);
-  const std::size_t size = std::size_t(header.width) * std::size_t(header.height) * std::size_t(header.bits / 8);
+  const std::size_t size = pixel_bytes(header);
   if (content.size() < pgm.body + size) fail_damaged(path, "the file ends too early");
   std::vector<png_byte> bytes(content.begin() + std::ptrdiff_t(pgm.body),
                               content.begin() + std::ptrdiff_t(pgm.body + size));

@@ -26,6 +26,9 @@ struct Image {
   bool contains(int column, int row) const { return column >= 0 && row >= 0 && column < width && row < height; }
 };
 
+/// Pixels beyond any sensor: a damaged header must not become a huge allocation.
+inline constexpr int largest_side = 32768;
+
 using Rgb = std::array<std::uint8_t, 3>;
 
 /// What the first bytes of an image file say.

@@ -14,6 +14,7 @@
 #include "base/csv.hpp"
 #include "base/files.hpp"
 #include "base/median.hpp"
+#include "base/plausible_size.hpp"
 #include "base/points.hpp"
 #include "capture/c3d.hpp"
 #include "scene/toml_table.hpp"
@@ -91,12 +92,17 @@ MarkerPositions read_positions(const fs::path& path, Problems& problems, const c
   return markers;
 }
 
-// The markers at rest, and frames in which none is seen yet.
-MarkerSet begin_set(const fs::path& rest, int frame_count, Problems& problems) {
+// The markers at rest, and frames in which none is seen yet. Throws InputError for more frames than their file can
+// mean.
+MarkerSet begin_set(const fs::path& rest, const fs::path& seen, int frame_count, Problems& problems) {
   MarkerPositions markers = read_positions(rest, problems);
   MarkerSet set;
   set.ids = std::move(markers.ids);
   set.rest = std::move(markers.positions);
+  std::error_code not_there;  // which the file's reader tells
+  require_plausible_size(fs::file_size(seen, not_there),
+                         std::size_t(frame_count) * (sizeof(Points) + set.ids.size() * sizeof(Vector3)), {seen},
+                         std::to_string(frame_count) + " frames of markers");
   set.frames.assign(std::size_t(frame_count),
                     Points::Constant(set.rest.rows(), 3, std::numeric_limits<double>::quiet_NaN()));
   return set;
@@ -250,7 +256,7 @@ Points read_marker_deviations(const fs::path& path, std::span<const std::string>
 
 MarkerSet read_marker_pair(const fs::path& rest, const fs::path& under_load) {
   Problems problems;
-  MarkerSet set = begin_set(rest, 1, problems);
+  MarkerSet set = begin_set(rest, under_load, 1, problems);
   Collector collector(set, problems.empty());
   gather(problems,
          [&] { read_csv(under_load, header_of_positions, problems, [&](CsvRow& row) { collector.add(row, 0, 0); }); });
@@ -260,7 +266,7 @@ MarkerSet read_marker_pair(const fs::path& rest, const fs::path& under_load) {
 
 MarkerSet read_markers(const MarkerTrack& files, int frame_count) {
   Problems problems;
-  MarkerSet set = begin_set(files.rest, frame_count, problems);
+  MarkerSet set = begin_set(files.rest, files.track, frame_count, problems);
   gather(problems, [&] {
     ending_of(files.track) == ".c3d" ? read_c3d_track(files.track, set, problems)
                                      : read_csv_track(files.track, set, problems);

@@ -145,6 +145,11 @@ class PcdReader {
     std::size_t offset = 0, column = 0;
     std::array<bool, 3> found{};
     for (const PcdField& field : header_.fields) {
+      if (field.size > 8 || field.count > content_.size())
+        fail({path_},
+             "the field " + field.name + " of " + std::to_string(field.count) + " numbers of " +
+                 std::to_string(field.size) + " bytes",
+             "numbers of 1, 2, 4 or 8 bytes that the file can hold", "the file was cut short or its header is wrong");
       for (std::size_t axis = 0; axis < 3; ++axis)
         if (field.name == std::string(1, char('x' + axis))) {
           if (field.type != 'F' || (field.size != 4 && field.size != 8) || field.count != 1)
@@ -170,7 +175,7 @@ class PcdReader {
 
   void read_binary(std::vector<Vector3>& points) const {
     const std::string_view body = content_.substr(header_.body);
-    if (stride_ == 0 || body.size() / stride_ < points.size()) fail_short(stride_ == 0 ? 0 : body.size() / stride_);
+    if (body.size() / stride_ < points.size()) fail_short(body.size() / stride_);
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t axis = 0; axis < 3; ++axis)
         points[i][Eigen::Index(axis)] = number_at(body.data() + i * stride_ + offsets_[axis], sizes_[axis]);
@@ -184,9 +189,10 @@ class PcdReader {
     std::memcpy(&packed, body.data(), 4), std::memcpy(&size, body.data() + 4, 4);
     if (packed > body.size() - 8) fail_short(0);
     const std::optional<std::string> bytes = unpack_lzf(body.substr(8, packed), size);
-    if (!bytes || bytes->size() != stride_ * points.size())
+    if (!bytes || bytes->size() % stride_ != 0 || bytes->size() / stride_ != points.size())
       fail({path_}, bytes ? std::to_string(bytes->size()) + " bytes of points" : "compressed points that are broken",
-           std::to_string(stride_ * points.size()) + " bytes, as the header says", "write or copy the file again");
+           std::to_string(points.size()) + " points of " + std::to_string(stride_) + " bytes, as the header says",
+           "write or copy the file again");
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t axis = 0; axis < 3; ++axis)
         points[i][Eigen::Index(axis)] =

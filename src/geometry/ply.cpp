@@ -191,8 +191,10 @@ class Reader {
 
   void read_element(std::size_t e) {
     PlyElement& element = header_.file.elements[e];
+    if (element.properties.empty()) return;
+    const std::size_t most_rows = (content_.size() - at_) / row_bytes(e);
     for (PlyProperty& property : element.properties) {
-      property.values.reserve(element.count);
+      property.values.reserve(std::min(element.count, most_rows));
       if (property.is_list) property.offsets.push_back(0);
     }
     const bool text = header_.encoding == Encoding::Text;
@@ -200,6 +202,17 @@ class Reader {
     for (std::size_t row = 0; row < element.count; ++row)
       for (std::size_t p = 0; p < element.properties.size(); ++p)
         read_value(element, row, element.properties[p], header_.layouts[e][p]);
+  }
+
+  /// The least that a row takes: of text a character a value, of lists their lengths.
+  std::size_t row_bytes(std::size_t e) const {
+    std::size_t bytes = 0;
+    for (std::size_t p = 0; p < header_.layouts[e].size(); ++p) {
+      const Layout& layout = header_.layouts[e][p];
+      const bool is_list = header_.file.elements[e].properties[p].is_list;
+      bytes += header_.encoding == Encoding::Text ? 1 : size_of(is_list ? layout.count_type : layout.type);
+    }
+    return bytes;
   }
 
   void read_value(const PlyElement& element, std::size_t row, PlyProperty& property, const Layout& layout) {

@@ -45,7 +45,7 @@ struct VtkKind {
   const char* name;
 };
 /// Throws InputError for a number that VTK does not have, or of a kind that no mesh of tetrahedra holds.
-VtkKind vtk_kind(int type, const Place& place);
+VtkKind vtk_kind(double type, const Place& place);
 
 /// Mid nodes from VTK's order (01 12 02 03 13 23) to ours; nothing happens to other cells.
 void reorder_from_vtk(RawCells::Cell& cell);

@@ -205,6 +205,7 @@ class Mender {
       std::optional<TriangleMesh> joined = joiner.joined();
       if (!joined) break;
       joined = without_repeated(*joined);
+      if (joined->triangles.empty()) break;
       if (const Faults faults = faults_of(*joined); faults.count() < faults_.count())
         faults_ = faults, mesh_ = std::move(*joined), used = tolerance;
       tolerance = tolerance > 0.0 ? 10.0 * tolerance : std::max(least_tolerance * diagonal, single_rounding * farthest);
@@ -232,7 +233,7 @@ class Mender {
     if (faults_.count() == 0) return;  // one triangle more would crowd an edge
     TriangleMesh fewer = without_repeated(mesh_);
     const std::size_t count = mesh_.triangles.size() - fewer.triangles.size();
-    if (count == 0) return;
+    if (count == 0 || fewer.triangles.empty()) return;
     const Faults faults = faults_of(fewer);
     if (faults.count() >= faults_.count()) return;
     faults_ = faults, mesh_ = std::move(fewer);

@@ -63,7 +63,7 @@ class Assembler {
   }
   void add_cell(std::size_t number, double type, const VtkValues& connectivity, std::size_t begin, std::size_t end) {
     const Place place{path_, begin < end ? connectivity.line(begin) : 0, 0};
-    const VtkKind kind = vtk_kind(type == std::floor(type) ? int(type) : -1, place);
+    const VtkKind kind = vtk_kind(type, place);
     const std::string label = "cell " + std::to_string(number);
     if (kind.nodes > 0 && end - begin != std::size_t(kind.nodes))
       throw InputError({place, label + ", a " + kind.name + ", has " + std::to_string(end - begin) + " points",
@@ -73,8 +73,8 @@ class Assembler {
       const double point = connectivity.of[i];
       if (!(point >= 0.0 && point < double(cells.nodes.size()) && point == std::floor(point)))
         throw InputError({{path_, connectivity.line(i), 0},
-                          label + " names point " + std::to_string((long long)(point)),
-                          "0 to " + std::to_string((long long)(cells.nodes.size()) - 1),
+                          label + " names point " + text_of_number(point),
+                          "0 to " + text_of_number(double(cells.nodes.size()) - 1.0),
                           "export the mesh again"});
       cell.nodes.push_back(int(point));
     }
@@ -306,28 +306,28 @@ std::optional<std::vector<double>> vtk_values(std::string_view bytes, const std:
   return values;
 }
 
-VtkKind vtk_kind(int type, const Place& place) {
-  static const std::map<int, VtkKind> kinds = {{1, {RawCell::Flat, 1, "vertex"}},
-                                               {2, {RawCell::Flat, 0, "poly-vertex"}},
-                                               {3, {RawCell::Flat, 2, "line"}},
-                                               {4, {RawCell::Flat, 0, "poly-line"}},
-                                               {5, {RawCell::Flat, 3, "triangle"}},
-                                               {6, {RawCell::Flat, 0, "triangle strip"}},
-                                               {7, {RawCell::Flat, 0, "polygon"}},
-                                               {8, {RawCell::Flat, 4, "pixel"}},
-                                               {9, {RawCell::Flat, 4, "quadrangle"}},
-                                               {10, {RawCell::Tetrahedron, 4, "tetrahedron"}},
-                                               {11, {RawCell::OtherSolid, 8, "voxel"}},
-                                               {12, {RawCell::OtherSolid, 8, "hexahedron"}},
-                                               {13, {RawCell::OtherSolid, 6, "wedge"}},
-                                               {14, {RawCell::OtherSolid, 5, "pyramid"}},
-                                               {21, {RawCell::Flat, 3, "quadratic edge"}},
-                                               {22, {RawCell::Flat, 6, "quadratic triangle"}},
-                                               {23, {RawCell::Flat, 8, "quadratic quadrangle"}},
-                                               {24, {RawCell::QuadraticTetrahedron, 10, "quadratic tetrahedron"}}};
+VtkKind vtk_kind(double type, const Place& place) {
+  static const std::map<double, VtkKind> kinds = {{1, {RawCell::Flat, 1, "vertex"}},
+                                                  {2, {RawCell::Flat, 0, "poly-vertex"}},
+                                                  {3, {RawCell::Flat, 2, "line"}},
+                                                  {4, {RawCell::Flat, 0, "poly-line"}},
+                                                  {5, {RawCell::Flat, 3, "triangle"}},
+                                                  {6, {RawCell::Flat, 0, "triangle strip"}},
+                                                  {7, {RawCell::Flat, 0, "polygon"}},
+                                                  {8, {RawCell::Flat, 4, "pixel"}},
+                                                  {9, {RawCell::Flat, 4, "quadrangle"}},
+                                                  {10, {RawCell::Tetrahedron, 4, "tetrahedron"}},
+                                                  {11, {RawCell::OtherSolid, 8, "voxel"}},
+                                                  {12, {RawCell::OtherSolid, 8, "hexahedron"}},
+                                                  {13, {RawCell::OtherSolid, 6, "wedge"}},
+                                                  {14, {RawCell::OtherSolid, 5, "pyramid"}},
+                                                  {21, {RawCell::Flat, 3, "quadratic edge"}},
+                                                  {22, {RawCell::Flat, 6, "quadratic triangle"}},
+                                                  {23, {RawCell::Flat, 8, "quadratic quadrangle"}},
+                                                  {24, {RawCell::QuadraticTetrahedron, 10, "quadratic tetrahedron"}}};
   const auto found = kinds.find(type);
   if (found == kinds.end())
-    throw InputError({place, "a cell of VTK's type " + std::to_string(type), "tetrahedra (10 or, quadratic, 24)",
+    throw InputError({place, "a cell of VTK's type " + text_of_number(type), "tetrahedra (10 or, quadratic, 24)",
                       "export the mesh as tetrahedra"});
   return found->second;
 }

@@ -5,12 +5,15 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <limits>
 #include <optional>
 
 #include "base/base64.hpp"
 #include "base/files.hpp"
+#include "base/plausible_size.hpp"
 #include "geometry/raw_cells.hpp"
 #include "geometry/text_tokens.hpp"
 
@@ -99,6 +102,12 @@ VtkXmlFile::VtkXmlFile(const std::filesystem::path& path, const char* type)
   read_coding(root);
 }
 
+std::string text_of_number(double value) {
+  char text[400];  // the greatest has 309 digits
+  std::snprintf(text, sizeof text, value == std::floor(value) ? "%.0f" : "%g", value);
+  return text;
+}
+
 pugi::xml_node VtkXmlFile::data_set() const { return document_.child("VTKFile").child(type_.c_str()); }
 
 void VtkXmlFile::fail(int line, const std::string& found, const std::string& expected) const {
@@ -168,8 +177,9 @@ std::string VtkXmlFile::bytes_of(pugi::xml_node array, std::size_t size, const s
     return *bytes;
   };
   const auto take_size = [&] {
-    return std::size_t(
-        vtk_values(take(wide_header_ ? 8 : 4), wide_header_ ? "UInt64" : "UInt32", big_endian_)->front());
+    constexpr double beyond_all = 0x1p62;  // as a size of what a file holds, and an integer still
+    const auto value = vtk_values(take(wide_header_ ? 8 : 4), wide_header_ ? "UInt64" : "UInt32", big_endian_)->front();
+    return std::size_t(std::min(value, beyond_all));
   };
   const auto require_size = [&](std::size_t found) {
     if (found == size) return;
@@ -183,8 +193,10 @@ std::string VtkXmlFile::bytes_of(pugi::xml_node array, std::size_t size, const s
   const std::size_t blocks = take_size(), block_size = take_size(), last_size = take_size();
   if (blocks > source.most_left())
     fail(line, what + " in " + std::to_string(blocks) + " blocks", "what the file can hold");
-  if (blocks > 1 && block_size > size / (blocks - 1))
-    fail(line, what + " in blocks of " + std::to_string(block_size) + " bytes", std::to_string(size) + " bytes in all");
+  if ((blocks > 1 && block_size > size / (blocks - 1)) || last_size > size)
+    fail(line, what + " in blocks of " + std::to_string(std::max(block_size, last_size)) + " bytes",
+         std::to_string(size) + " bytes in all");
+  require_plausible_size(source.most_left(), size, {path_, line}, what);
   require_size(blocks == 0 ? 0 : last_size == 0 ? blocks * block_size : (blocks - 1) * block_size + last_size);
   std::vector<std::size_t> packed_sizes(blocks);
   for (std::size_t& packed : packed_sizes) packed = take_size();

@@ -18,6 +18,9 @@ struct VtkValues {
   int line(std::size_t i) const { return lines.empty() ? 0 : lines[i]; }
 };
 
+/// A number of an array for people; whole ones without a fraction.
+std::string text_of_number(double value);
+
 /// One of VTK's XML files: its document, and the numbers of its arrays in any coding that VTK has. Those are text, or
 /// bytes of either order with sizes of 32 or 64 bits, in base64 within the document or, raw or in base64, appended
 /// behind it, where raw bytes are no XML; plain, or compressed in blocks by zlib, LZ4 or LZMA.

@@ -19,17 +19,17 @@ constexpr const char* camera_names[] = {"camera_intrinsic.json", "intrinsic.json
 // Numbers of an array, also of an array of arrays, row by row.
 std::vector<double> flat_numbers(const CameraJson& value, const fs::path& file, const std::string& key) {
   std::vector<double> numbers;
-  const auto add = [&](const CameraJson& v, const auto& self) -> void {
-    if (v.is_number())
-      numbers.push_back(v.get<double>());
-    else if (v.is_array())
-      for (const CameraJson& item : v) self(item, self);
-    else
-      refuse(file, "`" + key + "` holds something else than numbers", "numbers");
+  const auto add = [&](const CameraJson& v) {
+    if (!v.is_number()) refuse(file, "`" + key + "` holds something else than numbers", "numbers, or rows of them");
+    numbers.push_back(v.get<double>());
+    if (!std::isfinite(numbers.back())) refuse(file, "`" + key + "` has a number that is not finite", "numbers");
   };
-  add(value, add);
-  for (const double number : numbers)
-    if (!std::isfinite(number)) refuse(file, "`" + key + "` has a number that is not finite", "numbers");
+  if (!value.is_array()) return add(value), numbers;
+  for (const CameraJson& row : value)
+    if (row.is_array())
+      for (const CameraJson& item : row) add(item);
+    else
+      add(row);
   return numbers;
 }
 
@@ -50,7 +50,7 @@ double needed_number(const CameraJson& json, const fs::path& file, std::initiali
 
 int needed_size(const CameraJson& json, const fs::path& file, std::initializer_list<const char*> keys) {
   const double size = needed_number(json, file, keys);
-  if (!(size >= 1 && size <= 32768) || size != std::floor(size))
+  if (!(size >= 1 && size <= largest_side) || size != std::floor(size))
     refuse(file, "`" + std::string(*keys.begin()) + "` is " + std::to_string(size), "a number of pixels");
   return int(size);
 }

@@ -48,15 +48,4 @@ nlohmann::json probed(const fs::path& file, const std::string& entries) {
   return streams != json.end() && streams->is_array() && !streams->empty() ? json : nlohmann::json();
 }
 
-std::string text_at(const nlohmann::json& json, const char* key) {
-  if (!json.is_object()) return "";
-  const auto it = json.find(key);
-  return it != json.end() && it->is_string() ? it->get<std::string>() : "";
-}
-
-std::string tag_of(const nlohmann::json& stream, const char* key) {
-  const auto tags = stream.find("tags");
-  return tags != stream.end() ? text_at(*tags, key) : "";
-}
-
 }  // namespace pliant

@@ -35,10 +35,4 @@ void require_ffmpeg(const std::filesystem::path& file, const std::string& otherw
 /// "-show_streams -show_format". Null where it can make nothing of the file.
 nlohmann::json probed(const std::filesystem::path& file, const std::string& entries);
 
-/// @name Texts of what ffprobe says; "" where there is none
-/// @{
-std::string text_at(const nlohmann::json& json, const char* key);
-std::string tag_of(const nlohmann::json& stream, const char* key);
-/// @}
-
 }  // namespace pliant

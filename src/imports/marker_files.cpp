@@ -6,6 +6,7 @@
 
 #include "base/files.hpp"
 #include "base/median.hpp"
+#include "base/plausible_size.hpp"
 #include "capture/frame_numbers.hpp"
 #include "imports/formats.hpp"
 #include "imports/image_sequence.hpp"
@@ -19,6 +20,13 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int most_marker_frames = 10000000;
+
+// Frames that show no marker take room as well.
+std::vector<Points> unseen_frames(int count, std::size_t markers, const fs::path& file) {
+  require_plausible_size(fs::file_size(file), std::size_t(count) * (sizeof(Points) + markers * sizeof(Vector3)), {file},
+                         std::to_string(count) + " frames of markers");
+  return std::vector<Points>(std::size_t(count), Points::Constant(Eigen::Index(markers), 3, not_a_number));
+}
 
 // A column of a coordinate: "tip1_x_m", "tip1_x (mm)", "tip1 X".
 struct MarkerColumn {
@@ -74,7 +82,7 @@ C3dTrajectories long_markers(const TextTable& table) {
     last = std::max(last, rows.back().frame);
   }
   if (rows.empty()) refuse(table.file, "no marker", "frame,id,x,y,z a line");
-  result.frames.assign(std::size_t(last) + 1, Points::Constant(Eigen::Index(index.size()), 3, not_a_number));
+  result.frames = unseen_frames(last + 1, index.size(), table.file);
   for (const Row& row : rows) result.frames[std::size_t(row.frame)].row(row.marker) = row.at;
   return result;
 }
@@ -104,8 +112,7 @@ void place_in_time(const std::vector<double>& times, const fs::path& file, C3dTr
   notes.push_back(note_of_gaps(periods, "the column of times"));
   if (periods.back() > most_marker_frames)
     refuse(file, "a gap of more than ten million frames", "times of one recording");
-  std::vector<Points> all(std::size_t(periods.back()) + 1,
-                          Points::Constant(Eigen::Index(result.labels.size()), 3, not_a_number));
+  std::vector<Points> all = unseen_frames(periods.back() + 1, result.labels.size(), file);
   for (std::size_t i = 0; i < periods.size(); ++i) all[std::size_t(periods[i])] = std::move(result.frames[i]);
   result.frames = std::move(all);
 }

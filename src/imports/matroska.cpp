@@ -14,6 +14,7 @@
 #include "imports/ffmpeg.hpp"
 #include "imports/formats.hpp"
 #include "imports/image_sequence.hpp"
+#include "imports/json_values.hpp"
 
 namespace pliant {
 
@@ -32,10 +33,10 @@ MkvJson mkv_streams(const fs::path& file) {
   return json["streams"];
 }
 
-bool is_grey_16(const MkvJson& stream) { return text_at(stream, "pix_fmt").starts_with("gray16"); }
+bool is_grey_16(const MkvJson& stream) { return text_at(stream, "/pix_fmt").starts_with("gray16"); }
 
 bool is_called_depth(const MkvJson& stream) {
-  return tag_of(stream, "title") == "DEPTH" || tag_of(stream, "title") == "depth";
+  return text_at(stream, "/tags/title") == "DEPTH" || text_at(stream, "/tags/title") == "depth";
 }
 
 // The track with 16-bit grey pictures that is called depth, or the first of such.
@@ -43,11 +44,11 @@ const MkvJson& depth_track(const MkvJson& streams, const fs::path& file) {
   const MkvJson* found = nullptr;
   std::string colourised;
   for (const MkvJson& stream : streams) {
-    if (text_at(stream, "codec_type") != "video") continue;
+    if (text_at(stream, "/codec_type") != "video") continue;
     if (is_grey_16(stream)) {
       if (!found || is_called_depth(stream)) found = &stream;
     } else if (is_called_depth(stream)) {
-      colourised = text_at(stream, "pix_fmt");
+      colourised = text_at(stream, "/pix_fmt");
     }
   }
   if (!found && !colourised.empty()) refuse_colourised(file, "pixel format " + colourised);
@@ -73,11 +74,11 @@ PinholeCamera kinect_camera(const std::string& text, int width, int height, cons
     refuse(file, found, "the calibration of an Azure Kinect or what records like it", "give --camera FILE");
   };
   if (json.is_discarded()) fail("an attachment that is no JSON");
-  const MkvJson cameras = json.value("/CalibrationInformation/Cameras"_json_pointer, MkvJson::array());
+  const MkvJson& cameras = value_at(json, "/CalibrationInformation/Cameras");
   for (const MkvJson& camera : cameras) {
-    if (text_at(camera, "Purpose") != "CALIBRATION_CameraPurposeDepth") continue;
-    const MkvJson p = camera.value("/Intrinsics/ModelParameters"_json_pointer, MkvJson::array());
-    if (p.size() < 14 || !std::ranges::all_of(p, [](const MkvJson& v) { return v.is_number(); }))
+    if (text_at(camera, "/Purpose") != "CALIBRATION_CameraPurposeDepth") continue;
+    const MkvJson& p = value_at(camera, "/Intrinsics/ModelParameters");
+    if (!p.is_array() || p.size() < 14 || !std::ranges::all_of(p, [](const MkvJson& v) { return v.is_number(); }))
       fail("a calibration with " + std::to_string(p.size()) + " parameters");
     const auto at = [&](std::size_t i) { return p[i].get<double>(); };
     for (const DepthMode& mode : depth_modes) {
@@ -100,8 +101,8 @@ PinholeCamera kinect_camera(const std::string& text, int width, int height, cons
 std::string calibration_of(const MkvJson& streams, const fs::path& file) {
   int index = 0;
   for (const MkvJson& stream : streams) {
-    if (text_at(stream, "codec_type") != "attachment") continue;
-    if (tag_of(stream, "filename").ends_with(".json")) {
+    if (text_at(stream, "/codec_type") != "attachment") continue;
+    if (text_at(stream, "/tags/filename").ends_with(".json")) {
       std::string folder = (fs::temp_directory_path() / "pliant.XXXXXX").string();
       if (!::mkdtemp(folder.data())) refuse(folder, "a temporary folder that cannot be made", "a place to write to");
       const fs::path out = fs::path(folder) / "calibration.json";
@@ -176,7 +177,8 @@ ImportedRecording read_matroska(const fs::path& source, const ImportOptions& opt
   require_ffmpeg(source, ", or export the depth images as 16-bit PNG and import them with --from images");
   const MkvJson streams = mkv_streams(source);
   const MkvJson& track = depth_track(streams, source);
-  const int width = track.value("width", 0), height = track.value("height", 0), index = track.value("index", 0);
+  const int width = whole_number_at(track, "/width", 0), height = whole_number_at(track, "/height", 0),
+            index = whole_number_at(track, "/index", 0);
   if (width < 1 || height < 1) refuse(source, "a depth track without a size", "pictures");
   ImportedRecording recording;
   recording.name = source_name(source);

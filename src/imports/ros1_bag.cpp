@@ -10,6 +10,7 @@
 #include <mutex>
 
 #include "base/files.hpp"
+#include "base/plausible_size.hpp"
 #include "imports/binary_cursor.hpp"
 #include "imports/formats.hpp"
 #include "imports/ros_messages.hpp"
@@ -126,6 +127,7 @@ class Ros1File {
     const std::size_t size = fields.number<std::uint32_t>("size");
     const std::string kind(fields.text("compression"));
     if (size > largest_chunk) refuse(path_, "a chunk of " + std::to_string(size) + " bytes", "less than 2 GB");
+    require_plausible_size(found.data_size, size, {path_}, "a chunk");
     std::string data = bytes(found.data_at, found.data_size, "a chunk");
     has_chunk_ = false;
     if (kind == "none")

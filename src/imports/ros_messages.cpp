@@ -62,6 +62,14 @@ class RosMessage {
   bool is_cdr_;
 };
 
+// A number of pixels.
+int ros_side(RosMessage& message, const char* what) {
+  const auto side = message.number<std::uint32_t>(what);
+  if (side < 1 || side > largest_side)
+    message.cursor().fail(what + (" of " + std::to_string(side)), "1 to " + std::to_string(largest_side) + " pixels");
+  return int(side);
+}
+
 struct RosImage {
   double time = 0.0;
   int width = 0, height = 0;
@@ -74,8 +82,8 @@ struct RosImage {
 RosImage ros_image(RosMessage& message) {
   RosImage image;
   image.time = message.header();
-  image.height = int(message.number<std::uint32_t>("an image's height"));
-  image.width = int(message.number<std::uint32_t>("an image's width"));
+  image.height = ros_side(message, "an image's height");
+  image.width = ros_side(message, "an image's width");
   image.encoding = message.text("an image's encoding");
   image.is_big_endian = message.number<std::uint8_t>("an image's byte order") != 0;
   image.step = message.number<std::uint32_t>("an image's step");
@@ -128,6 +136,8 @@ const RosTopic& camera_info_topic(const RosBag& bag, const std::string& image) {
 
 LensDistortion lens_of(const std::string& model, std::vector<double> d, const std::filesystem::path& file) {
   if (std::ranges::all_of(d, [](double c) { return c == 0.0; })) return {};
+  if (!std::ranges::all_of(d, [](double c) { return std::isfinite(c); }))
+    refuse(file, "a coefficient of the lens that is not finite", "a calibrated camera", "give --camera FILE");
   const std::string name = lower(model);
   const bool is_known = name == "plumb_bob" || name == "rational_polynomial" || name == "brown conrady" ||
                         name == "brown_conrady" || name == "none" || name.empty();
@@ -144,8 +154,8 @@ PinholeCamera camera_of_info(const RosBag& bag, const std::string& image_topic) 
   RosMessage message(bytes, bag, topic.name);
   (void)message.header();
   PinholeCamera camera;
-  camera.height = int(message.number<std::uint32_t>("a height"));
-  camera.width = int(message.number<std::uint32_t>("a width"));
+  camera.height = ros_side(message, "a height");
+  camera.width = ros_side(message, "a width");
   const std::string model = message.text("a distortion model");
   const std::size_t count = message.number<std::uint32_t>("distortion coefficients");
   std::vector<double> d = message.doubles(count, "distortion coefficients");
@@ -156,8 +166,9 @@ PinholeCamera camera_of_info(const RosBag& bag, const std::string& image_topic) 
   const bool is_rectified = lower(image_topic).find("rect") != std::string::npos && P[0] > 0.0;
   camera.fx = is_rectified ? P[0] : K[0], camera.fy = is_rectified ? P[5] : K[4];
   camera.cx = is_rectified ? P[2] : K[2], camera.cy = is_rectified ? P[6] : K[5];
-  if (!(camera.fx > 0 && camera.fy > 0))
-    message.cursor().fail("a focal length that is not positive", "a calibrated camera", "give --camera FILE");
+  if (!(camera.fx > 0 && camera.fy > 0) || !std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy))
+    message.cursor().fail("a focal length that is not positive, or a number that is not finite", "a calibrated camera",
+                          "give --camera FILE");
   if (!is_rectified) camera.lens = lens_of(model, std::move(d), message.cursor().file());
   return camera;
 }

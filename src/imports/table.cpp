@@ -95,8 +95,11 @@ std::string decoded(std::string bytes, const std::filesystem::path& file) {
 }
 
 void replace_all(std::string& text, std::string_view old, std::string_view by) {
-  for (std::size_t at = text.find(old); at != std::string::npos; at = text.find(old, at + by.size()))
-    text.replace(at, old.size(), by);
+  std::string replaced;
+  std::size_t at = 0;
+  for (std::size_t next = 0; (next = text.find(old, at)) != std::string::npos; at = next + old.size())
+    replaced.append(text, at, next - at).append(by);
+  if (at > 0) text = std::move(replaced.append(text, at));
 }
 
 // A cell without a plus, and without spaces and apostrophes between digits; a minus of any kind as '-'.
@@ -230,7 +233,7 @@ double number_resolution(const TextTable& table, std::size_t line, std::size_t c
   const std::size_t end = std::min(text.find_first_of("eE"), text.size());
   const std::size_t point = text.substr(0, end).find(table.decimal);
   const int digits = point == std::string::npos ? 0 : int(end - point) - 1;
-  return std::pow(10.0, (end < text.size() ? std::atoi(text.c_str() + end + 1) : 0) - digits);
+  return std::pow(10.0, (end < text.size() ? std::atof(text.c_str() + end + 1) : 0.0) - digits);
 }
 
 ColumnTitle column_title(std::string_view cell) {

@@ -15,6 +15,7 @@
 #include "imports/ffmpeg.hpp"
 #include "imports/formats.hpp"
 #include "imports/image_sequence.hpp"
+#include "imports/json_values.hpp"
 
 namespace pliant {
 
@@ -67,12 +68,12 @@ class VideoPictures {
 };
 
 bool is_film(const VideoJson& stream) {
-  return text_at(stream, "codec_type") == "video" && stream.value("/disposition/attached_pic"_json_pointer, 0) == 0;
+  return text_at(stream, "/codec_type") == "video" && whole_number_at(stream, "/disposition/attached_pic", 0) == 0;
 }
 
 int film_track(const VideoJson& json, const fs::path& file) {
   for (const VideoJson& stream : json["streams"])
-    if (is_film(stream)) return stream.value("index", 0);
+    if (is_film(stream)) return whole_number_at(stream, "/index", 0);
   refuse(file, "no pictures in it", "a video", "");
 }
 
@@ -86,8 +87,8 @@ std::vector<double> picture_times(const fs::path& file, int track) {
   const VideoJson json = probed(file, "-select_streams " + std::to_string(track) +
                                           " -show_entries stream=index:frame=best_effort_timestamp_time");
   std::vector<double> times;
-  for (const VideoJson& frame : json.value("frames", VideoJson::array())) {
-    const std::string text = text_at(frame, "best_effort_timestamp_time");
+  for (const VideoJson& frame : value_at(json, "/frames")) {
+    const std::string text = text_at(frame, "/best_effort_timestamp_time");
     char* end = nullptr;
     const double time = std::strtod(text.c_str(), &end);
     times.push_back(end != text.c_str() ? time : not_a_number);
@@ -110,12 +111,11 @@ void take_times(const VideoJson& json, const fs::path& file, int track, MaskStre
     refuse(file, "a video of which no picture can be decoded", "pictures", "the file may be cut short; copy it again");
   std::string rate;
   for (const VideoJson& candidate : json["streams"])
-    if (candidate.value("index", -1) == track) rate = text_at(candidate, "avg_frame_rate");
+    if (whole_number_at(candidate, "/index", -1) == track) rate = text_at(candidate, "/avg_frame_rate");
   stream.frame_rate = ratio_of(rate);
   const bool knows_times = std::ranges::all_of(times, [](double time) { return std::isfinite(time); });
   if (knows_times && !(stream.frame_rate > 0.0 && are_even(times, stream.frame_rate))) stream.times = std::move(times);
-  const VideoJson format = json.value("format", VideoJson::object());
-  const double recorded = std::atof(tag_of(format, "com.android.capture.fps").c_str());
+  const double recorded = std::atof(text_at(json, "/format/tags/com.android.capture.fps").c_str());
   if (recorded > 0.0 && std::abs(recorded / stream.frame_rate - 1.0) > same_rate)
     notes.push_back("slow motion: " + std::to_string(std::lround(recorded)) +
                     " images a second were recorded, and the video plays " +

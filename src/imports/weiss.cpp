@@ -8,6 +8,7 @@
 #include "base/files.hpp"
 #include "imports/formats.hpp"
 #include "imports/image_sequence.hpp"
+#include "imports/json_values.hpp"
 
 namespace pliant {
 
@@ -97,21 +98,24 @@ ImportedRecording read_weiss_folder(const fs::path& source, const ImportOptions&
   if (json.is_discarded() || !json.is_object()) refuse(file, "no JSON object", "the configuration of a recording");
   const double width = weiss_number(json, "width", file), height = weiss_number(json, "height", file);
   const double duration = weiss_number(json, "duration", file), rate = weiss_number(json, "framerate", file);
-  if (!(width >= 2 && height >= 2 && width <= 32768 && height <= 32768 && duration >= 1 && duration <= 1e7 && rate > 0))
+  if (!(width >= 2 && height >= 2 && width <= largest_side && height <= largest_side && duration >= 1 &&
+        duration <= 1e7 && rate > 0))
     refuse(file, "a size, duration or framerate that is none", "pixels, frames, and frames a second");
   ImportedRecording recording;
   recording.name = source_name(source);
-  const WeissJson cameras = json.value("cameras", WeissJson::array());
+  const WeissJson& cameras = value_at(json, "/cameras");
   if (!cameras.is_array() || cameras.empty()) refuse(file, "no camera", "`cameras` with a matrix each");
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const WeissJson& entry = cameras[i];
     Eigen::Matrix4d m;
-    const WeissJson numbers = entry.is_object() ? entry.value("matrix", WeissJson::array()) : WeissJson::array();
-    if (numbers.size() != 16 || !std::ranges::all_of(numbers, [](const WeissJson& n) { return n.is_number(); }))
+    const WeissJson& numbers = value_at(entry, "/matrix");
+    if (!numbers.is_array() || numbers.size() != 16 ||
+        !std::ranges::all_of(numbers, [](const WeissJson& n) { return n.is_number(); }))
       refuse(file, "camera " + std::to_string(i) + " has no matrix of 16 numbers", "one");
     for (int k = 0; k < 16; ++k) m(k % 4, k / 4) = numbers[std::size_t(k)].get<double>();
     const ClipCamera clip = clip_camera(m, int(width), int(height), file);
-    const FramePattern pattern{entry.value("depthPath", "cam" + std::to_string(i) + "/depth%d.png")};
+    const std::string usual_path = "cam" + std::to_string(i) + "/depth%d.png";
+    const FramePattern pattern{entry.contains("depthPath") ? text_at(entry, "/depthPath") : usual_path};
     if (!pattern.is_valid())
       refuse(file, "the path \"" + pattern.pattern + "\"", "one %d where the frame's number stands");
     DepthStream stream;
@@ -120,7 +124,7 @@ ImportedRecording read_weiss_folder(const fs::path& source, const ImportOptions&
     stream.depth_scale = units_of_metres;
     stream.image_count = int(duration);
     stream.frame_rate = rate;
-    stream.read = [source, pattern, clip, is_top_down = entry.value("flipY", true)](int frame) {
+    stream.read = [source, pattern, clip, is_top_down = value_at(entry, "/flipY") != false](int frame) {
       return clip_image(source / pattern(frame), clip, is_top_down);
     };
     (void)stream.read(0);

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "base/files.hpp"
+#include "base/plausible_size.hpp"
 #include "imports/binary_cursor.hpp"
 
 namespace pliant {
@@ -15,6 +16,7 @@ namespace {
 constexpr std::size_t largest_file = std::size_t(1) << 31;
 
 std::string inflated(std::string& packed, std::size_t size, const std::filesystem::path& place) {
+  require_plausible_size(packed.size(), size, {place}, "a file");
   std::string result(size, '\0');
   z_stream stream{};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::runtime_error("zlib gives no stream");

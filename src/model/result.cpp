@@ -280,7 +280,7 @@ std::optional<PriorResult> read_prior(const Member& parameter) {
   const auto interval = read_interval(prior);
   const auto std = optional_value(prior, "std");
   if (!interval && !std) prior.fail("a `median` and an `interval_90`, or a `std`");
-  return PriorResult{prior["median"].value(), interval, std ? std::optional(std::get<Vector3>(*std)) : std::nullopt};
+  return PriorResult{prior["median"].value(), interval, std ? std::optional(prior["std"].vector()) : std::nullopt};
 }
 
 ParameterResult read_parameter(const std::string& name, const Member& member) {
@@ -303,9 +303,17 @@ CorrelationResult read_correlation(const Member& member) {
 }
 
 Json parse(const fs::path& path) {
+  constexpr int deepest = 64;
   const std::string content = read_file(path);
+  const auto require_shallow = [&](int depth, Json::parse_event_t, const Json&) {
+    if (depth > deepest)
+      throw InputError({{path}, "values nested more than " + std::to_string(deepest) + " deep", "a result.json", ""});
+    return true;
+  };
   try {
-    return Json::parse(content);
+    return Json::parse(content, require_shallow);
+  } catch (const Json::out_of_range& error) {
+    throw InputError({{path}, std::string("a number that is too great (") + error.what() + ")", "a result.json", ""});
   } catch (const Json::parse_error& error) {
     Place place{path, 1, 1};
     for (size_t i = 0; i + 1 < std::min(error.byte, content.size() + 1); ++i)

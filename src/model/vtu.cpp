@@ -156,11 +156,11 @@ class GridReader {
 
   void read_cells(pugi::xml_node node, int cells, VtuGrid& grid) const {
     const VtuArray types = named(node, "types", cells), offsets = named(node, "offsets", cells);
-    const int kind = cells > 0 ? int(types.values[0]) : int(VtuCell::Hexahedron);
+    const double kind = cells > 0 ? types.values[0] : double(VtuCell::Hexahedron);
     if (kind != 5 && kind != 10 && kind != 12 && kind != 24)
-      fail(path_, "cells of VTK type " + std::to_string(kind),
+      fail(path_, "cells of VTK type " + text_of_number(kind),
            "triangles (5), tetrahedra (10 or, quadratic, 24) or hexahedra (12)");
-    grid.kind = VtuCell(kind);
+    grid.kind = VtuCell(int(kind));
     const int corners = corner_count(grid.kind);
     for (int i = 0; i < cells; ++i)
       if (types.values[i] != kind || offsets.values[i] != double(i + 1) * corners)

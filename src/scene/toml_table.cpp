@@ -64,7 +64,7 @@ std::optional<Mismatch> convert(const toml::node& node, double& value) {
 std::optional<Mismatch> convert(const toml::node& node, int& value) {
   const auto number = node.as_integer();
   if (!number) return Mismatch{kind_of(node), "a whole number", ""};
-  if (std::abs(number->get()) > std::numeric_limits<int>::max())
+  if (number->get() > std::numeric_limits<int>::max() || number->get() < -std::numeric_limits<int>::max())
     return Mismatch{std::to_string(number->get()), "a smaller number", ""};
   value = int(number->get());
   return {};

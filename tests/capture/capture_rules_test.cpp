@@ -393,6 +393,9 @@ TEST(CaptureRules, NameTheFramesThatAreMissing) {
   SmallCapture small;
   small.edit("frame_count = 4", "frame_count = 6");
   EXPECT_THAT(complaint_of([&] { (void)small.read(); }), HasSubstr("no file for 2 of 6 frames: 4-5"));
+  small.edit("frame_count = 6", "frame_count = 1000000");
+  EXPECT_THAT(complaint_of([&] { (void)small.read(); }),
+              HasSubstr("no file for at least 10000 of 1000000 frames: 4-10003"));
 }
 
 TEST(CaptureRules, RefuseAnImageThatIsCutShort) {

@@ -58,6 +58,15 @@ TEST(ReadDepthImage, RefusesEveryTruncation) {
   }
 }
 
+TEST(ReadDepthImage, RefusesASizeThatTheFileCannotHold) {
+  const TemporaryFolder folder;
+  write_png(folder / "a.png", noise_image(9, 5));
+  std::string content = read_file(folder / "a.png");
+  for (const std::size_t side : {16, 20}) content[side + 2] = 0x7f;  // 32512 pixels and more
+  folder.write("a.png", content);
+  EXPECT_THAT(complaint_of([&] { (void)read_depth_image(folder / "a.png"); }), HasSubstr("an image of 211"));
+}
+
 TEST(ReadDepthImage, RefusesWhatIsNoImage) {
   const TemporaryFolder folder;
   folder.write("a.png", "GIF89a");

@@ -73,6 +73,10 @@ TEST_F(MarkerFiles, ATrackIsMatchedById) {
   EXPECT_EQ(set.frame_rate, std::nullopt);
 }
 
+TEST_F(MarkerFiles, AFewRowsAreNotMillionsOfFrames) {
+  EXPECT_THAT(said("frame,id,x,y,z\n0,3,4,5,6\n", 10'000'000), HasSubstr("track.csv: 10000000 frames of markers of"));
+}
+
 TEST_F(MarkerFiles, ATrackComesBack) {
   const MarkerSet set = read("frame,id,x,y,z\n0,3,4,5,6\n2,3,7,8,9\n2,tip 1,1,2,3\n");
   write_marker_track(folder / "again.csv", set.ids, set.frames);

@@ -106,6 +106,12 @@ TEST(PointCloud, SaysWhatIsWrong) {
   EXPECT_THAT(said("a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nCOUNT 1 1\nPOINTS 1\nDATA ascii\n1 2\n"),
               HasSubstr("no fields x, y and z"));
   EXPECT_THAT(said("a.pcd", pcd_header("ascii", 1) + "7 nan nan nan\n"), HasSubstr("no finite point"));
+  // sizes whose sum wraps around to the few bytes of a row
+  EXPECT_THAT(said("a.pcd",
+                   "FIELDS x y z pad\nSIZE 4 4 4 1\nTYPE F F F U\nCOUNT 1 1 1 18446744073709551608\nPOINTS 1\n"
+                   "DATA binary\n" +
+                       std::string(12, 'x')),
+              HasSubstr("18446744073709551608 numbers"));
 }
 
 }  // namespace

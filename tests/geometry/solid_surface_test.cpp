@@ -95,6 +95,13 @@ TEST(Mend, LeavesOutTrianglesThatAreNoneOrTwice) {
   EXPECT_THAT(surface.remarks, ElementsAre(HasSubstr("3 triangles without area, or there twice, left out")));
 }
 
+TEST(Mend, LeavesASurfaceOfEdgesAloneAsItIs) {
+  const TriangleMesh edges{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {1, 2, 2}}};
+  EXPECT_EQ(mend(edges).mesh, edges);
+  const TriangleMesh two_twice{{{0, 0, 0}, {1, 0, 0}, {0, 0, 0}, {1, 0, 0}}, {{0, 1, 2}, {1, 0, 3}}};
+  EXPECT_FALSE(mend(two_twice).mesh.triangles.empty());
+}
+
 TEST(Mend, TurnsWhatFacesInwards) {
   const SolidSurface surface = mend(test::turned(ball));
   expect_solid(surface, enclosed_volume(ball));

@@ -112,6 +112,9 @@ TEST(CameraJson, ReadsOpen3dPlainAndMatrixForms) {
   EXPECT_THAT(complaint_of([&] { (void)read(R"({"width":64,"height":48,"fx":50)"); }), HasSubstr("no JSON object"));
   EXPECT_THAT(complaint_of([&] { (void)read(R"({"width":64,"height":48,"fx":50})"); }), HasSubstr("`fy`"));
   EXPECT_THAT(complaint_of([&] { (void)read(R"({"width":-3,"height":48,"fx":50})"); }), HasSubstr("`width`"));
+  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
+  EXPECT_THAT(complaint_of([&] { (void)read((R"({"width":64,"height":48,"K":)" + deep + "}").c_str()); }),
+              HasSubstr("numbers, or rows of them"));
 }
 
 TEST(RedwoodFolder, TakesMillimetresTimesInNamesAndATrajectoryThatStands) {

@@ -45,6 +45,16 @@ TEST(MarkerCsv, TakesRowsOfMarkersWithARate) {
   EXPECT_EQ(markers.rest(1, 2), 3.0);
 }
 
+TEST(MarkerCsv, RefusesFramesThatTheFileCannotMean) {
+  const TemporaryFolder folder;
+  folder.write("far.csv", "frame,id,x,y,z\n0,a,0,0,0\n9999999,a,0,0,0\n");
+  EXPECT_THAT(complaint_of([&] { (void)read_marker_csv(folder / "far.csv", {}); }),
+              HasSubstr("10000000 frames of markers"));
+  folder.write("late.csv", "time_s,a_x_m,a_y_m,a_z_m\n0,0,0,0\n1,0,0,0\n2,0,0,0\n9000000,0,0,0\n");
+  EXPECT_THAT(complaint_of([&] { (void)read_marker_csv(folder / "late.csv", {}); }),
+              HasSubstr("9000001 frames of markers"));
+}
+
 TEST(MarkerCsv, TakesColumnsWithUnitsAndTimes) {
   const TemporaryFolder folder;
   folder.write("m.csv",

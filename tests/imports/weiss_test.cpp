@@ -93,4 +93,22 @@ TEST(WeissFolder, RefusesEightBitsAndOtherMatrices) {
   EXPECT_THAT(complaint_of([&] { (void)read_weiss_folder(folder / "in", {}); }), HasSubstr("16 numbers"));
 }
 
+TEST(WeissFolder, RefusesValuesOfAnotherKind) {
+  const TemporaryFolder folder;
+  write_layout(folder, camera(), true);
+  const std::string whole = read_file(folder / "in/config.json");
+  const auto at = whole.find("\"matrix\"");
+  ASSERT_NE(at, std::string::npos);
+  std::string odd = whole;
+  folder.write("in/config.json", odd.insert(at, R"("depthPath": 5, )"));
+  EXPECT_THAT(complaint_of([&] { (void)read_weiss_folder(folder / "in", {}); }), HasSubstr("one %d"));
+  odd = whole;
+  folder.write("in/config.json", odd.insert(at, R"("flipY": "yes", )"));
+  EXPECT_EQ(read_weiss_folder(folder / "in", {}).depth.size(), 1u);
+  std::string object = R"({"width": 48, "height": 36, "framerate": 40, "duration": 2, "cameras": [{"matrix": {)";
+  for (int i = 0; i < 16; ++i) object += (i > 0 ? ", \"" : "\"") + std::to_string(i) + "\": 1";
+  folder.write("in/config.json", object + "}}]}");
+  EXPECT_THAT(complaint_of([&] { (void)read_weiss_folder(folder / "in", {}); }), HasSubstr("16 numbers"));
+}
+
 }  // namespace pliant::weiss_import_test

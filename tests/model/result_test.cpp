@@ -270,6 +270,8 @@ TEST(Result, ReaderNamesTheMemberThatIsWrong) {
   EXPECT_THAT(complaint("/parameters/gravity/value", {1, 2}), HasSubstr("three numbers"));
   EXPECT_THAT(complaint("/parameters/gravity/estimated", 1), HasSubstr("true or false"));
   EXPECT_THAT(complaint("/parameters/youngs_modulus/prior", {{"median", 1.0}}), HasSubstr("an `interval_90`"));
+  EXPECT_THAT(complaint("/parameters/gravity/prior", {{"median", {0, 0, 0}}, {"std", 2.0}}),
+              HasSubstr("gravity.prior.std"));
   EXPECT_THAT(complaint("/identifiability/0/parameters", {"one"}), HasSubstr("two names"));
   EXPECT_THAT(complaint("/identifiability", "none"), HasSubstr("a list"));
   EXPECT_THAT(complaint("/error/surface_rms", "small"), HasSubstr("error.surface_rms"));
@@ -285,6 +287,14 @@ TEST(Result, TruncatedAndForeignFilesAreRefusedWithAPlace) {
   const auto path = folder.write("result.json", "{\n  \"format\": oops}");
   EXPECT_THAT(complaint_of([&] { read_result(path); }), HasSubstr("result.json:2:1"));
   EXPECT_THAT(complaint_of([&] { read_result(folder.write("result.json", "[]")); }), HasSubstr("an object"));
+}
+
+TEST(Result, NumbersAndDepthsBeyondAllAreRefused) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(complaint_of([&] { read_result(folder.write("result.json", R"({"format": 1e999})")); }),
+              HasSubstr("too great"));
+  const std::string deep = R"({"format": )" + std::string(100000, '[') + std::string(100000, ']') + "}";
+  EXPECT_THAT(complaint_of([&] { read_result(folder.write("result.json", deep)); }), HasSubstr("64 deep"));
 }
 
 TEST(Convergence, IsATableWithNamesAndUnits) {

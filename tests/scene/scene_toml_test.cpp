@@ -150,6 +150,8 @@ INSTANTIATE_TEST_SUITE_P(
             "[[fixed]]\nsphere = { centre = [0,0,0], radius = 1 }\nhalf_space = { point = [0,0,0], normal = [1,0,0] }",
             "2 regions in one block"},
         Wrong{"BoxInsideOut", "[[fixed]]\nbox = { min = [1,0,0], max = [0,1,1] }", "scene.toml:2:7: a box whose `min`"},
+        Wrong{"CountBelowAll", "[timing]\nframe_rate = 10\nframe_count = 9\nstart_frame = -9223372036854775808",
+              "scene.toml:4:1: `start_frame` is -9223372036854775808; expected a smaller number"},
         Wrong{"Radius", "[[fixed]]\nsphere = { centre = [0,0,0], radius = 0 }", "`radius` is 0; expected above 0"},
         Wrong{"Normal", "[[plane]]\npoint = [0,0,0]\nnormal = [0,0,0]",
               "scene.toml:3:1: `normal` is a direction without"},
