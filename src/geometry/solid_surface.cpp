@@ -209,6 +209,7 @@ class Mender {
       if (const Faults faults = faults_of(*joined); faults.count() < faults_.count())
         faults_ = faults, mesh_ = std::move(*joined), used = tolerance;
       tolerance = tolerance > 0.0 ? 10.0 * tolerance : std::max(least_tolerance * diagonal, single_rounding * farthest);
+      if (tolerance == 0.0) break;  // all corners lie at the origin
     }
     if (mesh_ == before) return;
     joined_ = used_in(before);

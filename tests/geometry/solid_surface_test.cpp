@@ -100,6 +100,8 @@ TEST(Mend, LeavesASurfaceOfEdgesAloneAsItIs) {
   EXPECT_EQ(mend(edges).mesh, edges);
   const TriangleMesh two_twice{{{0, 0, 0}, {1, 0, 0}, {0, 0, 0}, {1, 0, 0}}, {{0, 1, 2}, {1, 0, 3}}};
   EXPECT_FALSE(mend(two_twice).mesh.triangles.empty());
+  const TriangleMesh at_origin{{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, {{0, 1, 2}, {1, 2, 3}}};
+  EXPECT_EQ(mend(at_origin).mesh, at_origin);
 }
 
 TEST(Mend, TurnsWhatFacesInwards) {
