@@ -239,7 +239,9 @@ Image<std::uint16_t> decode_depth_image(const std::string& content, const fs::pa
     fail(path, "a " + describe(header) + " image", "16-bit grey", "write depth without colour mapping");
   const auto bytes = pixels_of(content, path, header);
   Image<std::uint16_t> image(header.width, header.height);
-  std::memcpy(image.pixels.data(), bytes.data(), image.pixels.size() * 2);
+  // A grey that is named as transparent comes with a second channel.
+  const std::size_t stride = 2 * std::size_t(header.channels);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) std::memcpy(&image.pixels[i], bytes.data() + i * stride, 2);
   return image;
 }
 

@@ -38,6 +38,16 @@ TEST(ReadDepthImage, ReadsBigEndianPgmWithComments) {
   EXPECT_EQ(image(1, 0), 0xff00);
 }
 
+TEST(ReadDepthImage, ReadsGreysOfWhichOneIsNamedAsTransparent) {
+  const TemporaryFolder folder;
+  const auto image = noise_image(37, 11);
+  write_png(folder / "a.png", image);
+  std::string png = read_file(folder / "a.png");
+  png.insert(33, std::string("\0\0\0\x02tRNS\0\x07\xe8\xf7\x58\x9b", 14));  // behind the header
+  folder.write("a.png", png);
+  EXPECT_EQ(read_depth_image(folder / "a.png").pixels, image.pixels);
+}
+
 TEST(ReadDepthImage, RefusesEightBits) {
   const TemporaryFolder folder;
   write_png(folder / "a.png", Image<std::uint8_t>(4, 4, 9));
