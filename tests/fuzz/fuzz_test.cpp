@@ -11,14 +11,15 @@
 #include "fuzz/fuzzed_readers.hpp"
 
 // No reader needs more at once for what is kept here: room is made by what a file holds, not by what it says.
-void* operator new(std::size_t size) {
+// Not inlined: else GCC sees `free` beside a `new` that it takes for the library's.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   constexpr std::size_t most = std::size_t(64) << 20;
   void* const room = size <= most ? std::malloc(size > 0 ? size : 1) : nullptr;
   if (!room) throw std::bad_alloc();
   return room;
 }
-void operator delete(void* room) noexcept { std::free(room); }
-void operator delete(void* room, std::size_t) noexcept { std::free(room); }
+[[gnu::noinline]] void operator delete(void* room) noexcept { std::free(room); }
+[[gnu::noinline]] void operator delete(void* room, std::size_t) noexcept { std::free(room); }
 
 namespace pliant::fuzz_test {
 
