@@ -133,7 +133,8 @@ void FitRun::say_doubts_of_time(const Stage& narrow, const ParameterSet& paramet
       (is_whole && is_explained(outcome_.evaluation)))
     return;
   const auto shifted = [&](int later) {
-    const Compared compared{options_.wide_band, [](const Recording& r) { return r.last_seen; }, {}, later};
+    Compared compared{options_.wide_band, [](const Recording& r) { return r.last_seen; }};
+    compared.later = later;
     return recordings_.objective(grid(narrow.grid), parameters, compared, {}, monitor_.processes)
         .evaluate(parameters.to_unconstrained(parameters.reference()));
   };

@@ -57,8 +57,9 @@ struct Compared {
   /// Parameters whose pulls hold released objects in the pose from which they start, whatever their material; empty:
   /// the equilibrium under their pulls is that.
   VectorX pose_of = {};
-  std::optional<int> later = {};  ///< by which all frames of all of each motion are taken later than stated
-  bool by_pose = false;           ///< the first frame of released objects by where they were registered, if they were
+  bool by_pose = false;  ///< the first frame of released objects by where they were registered, if they were
+  /// Frames by which all that was seen of a motion is taken later than stated; nothing: as stated, up to `last_frame`.
+  std::optional<int> later = {};
 };
 
 /// The recordings of one object side by side: they share its material, and each has its own start, planes and sensors.
