@@ -51,7 +51,8 @@ SurfaceDistance::SurfaceDistance(TriangleMesh surface) {
 }
 
 double SurfaceDistance::operator()(const Vector3& point) const {
-  const auto& [surface, boxes] = *tree_;
+  const TriangleMesh& surface = tree_->surface;
+  const BoxTree& boxes = tree_->boxes;
   const TreePoint at = tree_point(point);
   double least = std::numeric_limits<double>::infinity();
   const auto hold_against = [&](const std::pair<TreeBox, int>& box) {
