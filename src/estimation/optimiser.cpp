@@ -116,12 +116,15 @@ DampedStep damped_step(const Run& run, const OptimiserOptions& options, double d
   if (options.damps_long_steps)
     for (double more = std::max(damping, 1e-8); step.cwiseAbs().maxCoeff() > options.max_step && more < 1e4;)
       step = step_with(more *= 2.0);
-  const double longest = step.cwiseAbs().maxCoeff();
-  if (longest > options.max_step) step *= options.max_step / longest;
-  DampedStep made{damping, run.clamp(p + step)};
-  const VectorX way = made.to - p;
-  made.moved = way.cwiseAbs().maxCoeff();
-  made.predicted = -(g.dot(way) + 0.5 * way.dot(H * way));
+  DampedStep made;
+  made.damping = damping;
+  const auto go = [&] {
+    made.to = run.parameters().moved(p, step);
+    return made.moved = (made.to - p).cwiseAbs().maxCoeff();
+  };
+  constexpr double nearly = 1.01;  // a curve is not cut to its length at once
+  while (go() > nearly * options.max_step) step *= options.max_step / made.moved;
+  made.predicted = -(g.dot(step) + 0.5 * step.dot(H * step));
   return made;
 }
 

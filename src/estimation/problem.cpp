@@ -220,6 +220,7 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
     p.push_back(scalar(layout, m.contact_stiffness, Transform::Logarithm, 1e-3 * theta[m.contact_stiffness],
                        hardest_contact * theta[m.contact_stiffness], std::log(theta[m.contact_stiffness]), contact_std,
                        !capture.scene.timing.is_static));
+    p.back().acts_by_inverse = true;
   }
   set_loads(capture.scene, m, theta);
   if (m.wind.exists()) {

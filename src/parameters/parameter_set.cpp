@@ -270,6 +270,17 @@ VectorX ParameterSet::clamp(const VectorX& p) const {
   return out;
 }
 
+VectorX ParameterSet::moved(const VectorX& p, const VectorX& step) const {
+  VectorX to = p + step;
+  for_each_estimated([&](const Parameter& q, int at) {
+    constexpr double tangent_from = 0.5;  // a share of the inverse; beyond, the curve would leave for infinity
+    if (!q.acts_by_inverse) return;
+    const double bent = std::min(step[at], tangent_from);
+    to[at] = p[at] - std::log(1.0 - bent) + (step[at] - bent) / (1.0 - tangent_from);
+  });
+  return clamp(to);
+}
+
 double ParameterSet::prior(const VectorX& p, VectorX* gradient, MatrixX* curvature) const {
   double sum = 0.0;
   if (gradient) gradient->setZero(p.size());

@@ -42,6 +42,9 @@ struct Parameter {
   /// Whether it only stands for something else: forces for whoever held the object, parts of a scan's error. Of no
   /// interest one by one.
   bool is_auxiliary = false;
+  /// Of a logarithm: what is observed follows the inverse of the value (a compliance, in series with others), so that
+  /// a step is one of the inverse. Estimates, priors and deviations stay those of the logarithm.
+  bool acts_by_inverse = false;
   /// How well it is known where it is not estimated, if somebody stated that: deviation of each unconstrained number;
   /// 0: it is exact.
   std::optional<double> given_std = {};
@@ -102,6 +105,10 @@ class ParameterSet {
   [[nodiscard]] MatrixX jacobian(const VectorX& p) const;
   /// Moves p into the bounds.
   [[nodiscard]] VectorX clamp(const VectorX& p) const;
+
+  /// Where a step leads from p, within the bounds: p + step to first order, along a curve where the parameter acts by
+  /// its inverse.
+  [[nodiscard]] VectorX moved(const VectorX& p, const VectorX& step) const;
 
   /// Negative logarithm of the priors (up to a constant), its gradient and its curvature.
   double prior(const VectorX& p, VectorX* gradient = nullptr, MatrixX* curvature = nullptr) const;

@@ -346,6 +346,53 @@ TEST(LevenbergMarquardt, DampingOfLongStepsLetsWhatIsKnownArrive) {
   EXPECT_NEAR(sum_after(true), 0.4, 0.02);
 }
 
+/// A body and the contact that it stands on, springs in series: their common compliance is measured to a
+/// ten-thousandth, that of the contact, less than a tenth of it, to an eighth. The cost is a narrow valley, nearly
+/// straight by the contact's compliance and bent by its logarithm.
+class SpringsInSeries : public CostFunction {
+ public:
+  explicit SpringsInSeries(bool contact_acts_by_inverse) {
+    ParameterLayout layout;
+    std::vector<Parameter> list;
+    for (const char* name : {"body", "contact"})
+      list.push_back({name, "N/m", Transform::Logarithm, layout.add({name, "N/m"}), 1.0, 1e-3, 1e3, true});
+    list[1].acts_by_inverse = contact_acts_by_inverse;
+    set_ = ParameterSet(std::move(layout), std::move(list), Eigen::Vector2d(1.0, 50.0));
+  }
+  const ParameterSet& parameters() const override { return set_; }
+  using CostFunction::evaluate;
+  CostEvaluation evaluate(const VectorX& p) override { return linearise(p); }
+  CostEvaluation gradient(const VectorX& p) override { return linearise(p); }
+  CostEvaluation linearise(const VectorX& p) override {
+    ++linearisations;
+    const double body = std::exp(-p[0]), contact = std::exp(-p[1]);  // compliances
+    const Eigen::Vector2d r((body + contact - 1.03) / 1e-4, (contact - 0.08) / 0.01);
+    const Eigen::Matrix2d J{{-body / 1e-4, -contact / 1e-4}, {0.0, -contact / 0.01}};
+    CostEvaluation e;
+    e.succeeded = true;
+    e.cost = 0.5 * r.squaredNorm();
+    e.gradient = J.transpose() * r;
+    e.gauss_newton = J.transpose() * J;
+    return e;
+  }
+  int linearisations = 0;
+
+ private:
+  ParameterSet set_;
+};
+
+TEST(LevenbergMarquardt, ACompliancesValleyIsFollowedAtOnce) {
+  SpringsInSeries by_inverse(true), by_logarithm(false);
+  const OptimiserOptions options{.max_iterations = 200, .step_tolerance = 1e-9, .cost_tolerance = 1e-12};
+  for (SpringsInSeries* cost : {&by_inverse, &by_logarithm}) {
+    const ParameterSet& set = cost->parameters();
+    const OptimiserSummary s = minimise(*cost, set.to_unconstrained(set.reference()), options);
+    EXPECT_NEAR(std::exp(-s.p[0]), 0.95, 1e-5) << s.reason;
+    EXPECT_NEAR(std::exp(-s.p[1]), 0.08, 1e-5) << s.reason;
+  }
+  EXPECT_LT(4 * by_inverse.linearisations, by_logarithm.linearisations) << by_inverse.linearisations;
+}
+
 OptimiserOptions precise(OptimiserKind kind) {
   OptimiserOptions options;
   options.kind = kind;

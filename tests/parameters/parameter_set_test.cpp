@@ -65,6 +65,26 @@ TEST(ParameterSet, AnInverseHyperbolicSineIsLinearNearZeroAndALogarithmFarBeyond
   EXPECT_NEAR(set.to_theta(set.clamp(VectorX::Constant(1, 50.0)))[layout.mass_damping], 1e4, tolerance(1e-6));
 }
 
+TEST(ParameterSet, AStepOfWhatActsByItsInverseChangesTheInverseInProportion) {
+  Parameter stiffness{"youngs_modulus", "Pa", Transform::Logarithm, layout.youngs_moduli[0], 1.0, 1.0, 1e9, true};
+  stiffness.acts_by_inverse = true;
+  const Parameter damping{
+      "stiffness_damping", "s", Transform::Logarithm, layout.stiffness_damping, 1.0, 0.0, 1e4, true};
+  const ParameterSet set(layout.layout(), {stiffness, damping}, VectorX::Ones(layout.size()));
+  const Eigen::Vector2d p(7.0, -3.0);
+  const auto to = [&](double step) -> VectorX { return set.moved(p, Eigen::Vector2d(step, step)); };
+  for (const double step : {-5.0, -0.5, 0.2, 0.5}) {
+    EXPECT_NEAR(std::exp(p[0] - to(step)[0]), 1.0 - step, tolerance(1e-12)) << "the inverse";
+    EXPECT_EQ(to(step)[1], p[1] + step) << "any other";
+  }
+  for (const double step : {-0.7, 0.3, 0.5, 3.0}) {  // smooth where the curve passes into its tangent, too
+    const double h = 1e-5, slope = (to(step + h)[0] - to(step - h)[0]) / (2.0 * h);
+    EXPECT_NEAR(slope, 1.0 / (1.0 - std::min(step, 0.5)), 1e-4);
+  }
+  EXPECT_NEAR(to(1e-6)[0] - p[0], 1e-6, tolerance(1e-11)) << "to first order a step of p";
+  EXPECT_NEAR(to(100.0)[0], std::log(1e9), tolerance(1e-12)) << "within the bounds";
+}
+
 TEST(ParameterSet, WhatIsNotEstimatedStays) {
   ParameterSet set = all_estimated();
   set.set_estimated("gravity", false);
