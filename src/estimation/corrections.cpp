@@ -97,7 +97,7 @@ std::vector<NeededCorrection> needed_corrections(const CostEvaluation& evaluatio
 }
 
 std::optional<TimeDoubt> doubt_of_time(const CostEvaluation& stated, const std::vector<ShiftedInTime>& shifted) {
-  constexpr double least_share = 0.5, abrupt = 4.0;
+  const double least_share = judgement.share_of_shifted_times, abrupt = judgement.onset_of_shifted_times;
   const double observations = stated.independent_observations(), excess = stated.cost - 0.5 * observations;
   if (!may_need_correction(stated.cost, observations)) return std::nullopt;
   std::optional<TimeDoubt> best;

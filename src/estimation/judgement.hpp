@@ -108,6 +108,12 @@ struct Judgement {
   Judged nearly_whole{"hypothesis.nearly_whole", 0.9, "part of a recording from which on the whole is fitted"};
   Judged plane_deviations{"hypothesis.plane_deviations", 4.0,
                           "deviations of a plane that a camera sees from a given one, up to which it is that one"};
+  Judged share_of_shifted_times{"hypothesis.share_of_shifted_times", 0.5,
+                                "least part of the cost beyond noise that other times of a recording take off, from "
+                                "which on they are suspected"};
+  Judged onset_of_shifted_times{"hypothesis.onset_of_shifted_times", 4.0,
+                                "cost of the first frame that fits at another time, over that of the one before it, "
+                                "and over what it has at that time"};
   Judged press_outlier{"hypothesis.press_outlier", 6.0,
                        "deviations of a marker under a press, from which on it is an outlier"};
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 
@@ -98,11 +99,11 @@ void write_stl_mesh(std::ostream& stream, const TriangleMesh& mesh) {
 }  // namespace
 
 void require_vertex(double index, std::size_t vertex_count, const std::string& owner, const Place& place) {
-  if (index >= 0 && index < double(vertex_count)) return;
+  if (index >= 0 && index < double(vertex_count) && index == std::floor(index)) return;
   char text[64];
-  std::snprintf(text, sizeof text, "%.0f", index);
+  std::snprintf(text, sizeof text, "%.10g", index);
   throw InputError({place, owner + " names vertex " + text,
-                    vertex_count == 0 ? "some vertices" : "0 to " + std::to_string(vertex_count - 1),
+                    vertex_count == 0 ? "some vertices" : "a whole number of 0 to " + std::to_string(vertex_count - 1),
                     "the file is damaged or was written by a faulty program"});
 }
 

@@ -37,12 +37,12 @@ std::string describe(const FitEvent& event, double seconds) {
   const double rms = 1e3 * (event.surface_rms > 0.0 ? event.surface_rms : event.marker_rms);
   std::string text;
   if (event.kind == StageKind::Sample)
-    text = fmt::format("{:<18} {:2} iterations  rms {:6.2f} mm", event.stage, event.iteration, rms);
+    text = fmt::format("{:<18} {:2} iterations  rms {:6.3g} mm", event.stage, event.iteration, rms);
   else if (event.kind == StageKind::Law)
     text = fmt::format("{:<18} iteration {:2}  cost {:10.4g}", event.stage, event.iteration, event.cost) +
-           (rms > 0.0 ? fmt::format("  rms {:6.2f} mm", rms) : "");
+           (rms > 0.0 ? fmt::format("  rms {:6.3g} mm", rms) : "");
   else
-    text = fmt::format("{:<15} start {}  iteration {:2}  cost {:10.4g}  rms {:6.2f} mm", event.stage, event.start + 1,
+    text = fmt::format("{:<15} start {}  iteration {:2}  cost {:10.4g}  rms {:6.3g} mm", event.stage, event.start + 1,
                        event.iteration, event.cost, rms);
   text += "  E " + with_prefix(event.youngs_modulus, "Pa") + describe_others(event);
   if (event.fraction_done > 0.02)
@@ -65,7 +65,7 @@ void observe_recording(RecordedCapture& recording, const FitOptions& options, co
       },
       &pose);
   if (pose)
-    say(fmt::format("the scan was placed: {:.2f} mm rms, outlines overlap by {:.0f} %", 1e3 * pose->rms,
+    say(fmt::format("the scan was placed: {:.3g} mm rms, outlines overlap by {:.0f} %", 1e3 * pose->rms,
                     100.0 * pose->overlap));
   if (pose && pose->runner_up > 0.0 && pose->runner_up < 1.3)
     say("note: another pose of the scan fits nearly as well; `pliant place` draws the one that was taken");

@@ -140,7 +140,7 @@ std::string load_sentence(const LoadError& error) {
   const std::string name = error.name + " (" + error.role + "): ";
   if (!error.failure.empty()) return name + error.failure;
   const auto part = [](const char* word, double length, double relative) {
-    return fmt::format("{} {:.2f} mm ({:.2f} % of the object's size)", word, 1e3 * length, 100.0 * relative);
+    return fmt::format("{} {:.3g} mm ({:.2f} % of the object's size)", word, 1e3 * length, 100.0 * relative);
   };
   std::string text = name + part("mean", *error.mean, *error.relative_mean) + ", " +
                      part("max", *error.max, *error.relative_max) +

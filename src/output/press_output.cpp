@@ -85,7 +85,7 @@ std::vector<StaticError> predict_presses(const Model& model, const Capture& capt
 std::string press_sentence(const StaticError& press) {
   const std::string head = press.name + " (" + press.role + "): ";
   if (!press.marker_rms) return head + "the model finds no equilibrium";
-  return head + fmt::format("{:.2f} mm rms, {:.2f} mm at most, {:.1f} % of the greatest displacement",
+  return head + fmt::format("{:.3g} mm rms, {:.3g} mm at most, {:.1f} % of the greatest displacement",
                             1e3 * *press.marker_rms, 1e3 * *press.marker_max,
                             100.0 * press.relative_error.value_or(0.0));
 }

@@ -297,6 +297,29 @@ TEST(Recordings, GiveADensityEachThatMayErr) {
   EXPECT_EQ(std::ranges::count(given_quantities(two.parameters()), cause_mass, &GivenQuantity::cause), 2);
 }
 
+TEST(Recordings, CompareWhatWasSeenLaterThanStated) {
+  test::Dropped dropped;
+  dropped.frames = 4, dropped.cells = 4.0;
+  std::vector<std::string> notes;
+  const Recordings one({dropped.record()}, test::six_cells(), notes);
+  const Grid grid = one.grid(4.0, 1.0);
+  ParameterSet nothing = one.parameters();
+  for (const Parameter& p : one.parameters().parameters()) nothing.set_estimated(p.name, false);
+  const auto frames = [&](std::optional<int> later, int last) {
+    Compared compared{1.0, [&](const Recording&) { return last; }};
+    compared.later = later;
+    std::vector<int> seen;
+    for (const FrameFit& f : one.objective(grid, nothing, compared).evaluate(VectorX(0)).frames)
+      seen.push_back(f.frame);
+    return seen;
+  };
+  const std::vector<int> as_stated = frames({}, 3);
+  ASSERT_GE(as_stated.size(), 3u);
+  EXPECT_EQ(frames(0, 1), as_stated) << "all of the motion, not up to a frame";
+  EXPECT_EQ(frames(1, 1), std::vector<int>(as_stated.begin() + 1, as_stated.end())) << "but what falls behind its end";
+  EXPECT_EQ(frames(-1, 1), std::vector<int>(as_stated.begin(), as_stated.end() - 1)) << "or before its beginning";
+}
+
 TEST_F(TwoCaptures, ArePartsOfTheirVector) {
   const JointLayout joint = this->joint();
   const VectorX theta = VectorX::LinSpaced(joint.layout.size(), 1.0, joint.layout.size());

@@ -121,7 +121,16 @@ TEST(ReadPly, NamesFaceAndVertexOutOfRange) {
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
       "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 3\n");
   EXPECT_THAT(complaint_of([&] { (void)read_mesh(folder / "a.ply"); }),
-              AllOf(HasSubstr("face 1 names vertex 3"), HasSubstr("expected 0 to 2")));
+              AllOf(HasSubstr("face 1 names vertex 3"), HasSubstr("expected a whole number of 0 to 2")));
+}
+
+TEST(ReadPly, RefusesAFaceOfFractionsOfVertices) {
+  const TemporaryFolder folder;
+  folder.write(
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar float vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 1.5\n");
+  EXPECT_THAT(complaint_of([&] { (void)read_mesh(folder / "a.ply"); }), HasSubstr("face 0 names vertex 1.5"));
 }
 
 TEST(ReadPly, SaysThatAPointCloudIsNoMesh) {

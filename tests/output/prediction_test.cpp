@@ -187,7 +187,7 @@ TEST_F(LoadClouds, TooHeavyALoadLeavesTheOthers) {
 
 TEST(LoadSentence, IsToldInMillimetresAndPercent) {
   EXPECT_EQ(load_sentence(test::seen_load()),
-            "load 1 (test): mean 1.00 mm (0.50 % of the object's size), max 4.00 mm (2.00 % of the object's size), "
+            "load 1 (test): mean 1 mm (0.50 % of the object's size), max 4 mm (2.00 % of the object's size), "
             "400 points, 3 that stand alone left out");
 }
 
