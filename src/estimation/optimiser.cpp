@@ -118,12 +118,12 @@ DampedStep damped_step(const Run& run, const OptimiserOptions& options, double d
       step = step_with(more *= 2.0);
   DampedStep made;
   made.damping = damping;
-  const auto go = [&] {
+  constexpr double tolerance = 1.01;  // half a step along a curve is not half as long: it is cut several times
+  for (;; step *= options.max_step / made.moved) {
     made.to = run.parameters().moved(p, step);
-    return made.moved = (made.to - p).cwiseAbs().maxCoeff();
-  };
-  constexpr double nearly = 1.01;  // a curve is not cut to its length at once
-  while (go() > nearly * options.max_step) step *= options.max_step / made.moved;
+    made.moved = (made.to - p).cwiseAbs().maxCoeff();
+    if (!(made.moved > tolerance * options.max_step)) break;
+  }
   made.predicted = -(g.dot(step) + 0.5 * step.dot(H * step));
   return made;
 }
