@@ -19,12 +19,12 @@ namespace {
 constexpr double density_guess = 200.0;  // [kg/m^3], where nothing anchors it: only ratios follow then
 constexpr double gravity_guess = 9.81, gravity_std = 10.0;  // [m/s^2]
 constexpr double up_std = 0.05;                             // [rad], of a direction that is given as up
-constexpr double contact_std = 1.2;          // of the logarithm of its stiffness: a board, a carpet, a furry skin
-constexpr double hardest_contact = 2.0;      // times that which is as good as rigid: beyond, motions are erratic
-constexpr double friction_std = 0.5;         // of its coefficient
-constexpr double least_wind = 1.0;           // [m/s], scale of one that is not known
-constexpr double range_error_std = 0.02;     // [m], of light that enters a translucent material
-constexpr double most_outline_error = 20.0;  // [pixels]
+constexpr double contact_std = 1.2;      // of the logarithm of its stiffness: a board, a carpet, a furry skin
+constexpr double hardest_contact = 2.0;  // times that which is as good as rigid: beyond, motions are erratic
+constexpr double friction_guess = 0.3, friction_std = 0.5;  // of its coefficient, of cloth, rubber or skin on floors
+constexpr double least_wind = 1.0;                          // [m/s], scale of one that is not known
+constexpr double range_error_std = 0.02;                    // [m], of light that enters a translucent material
+constexpr double most_outline_error = 20.0;                 // [pixels]
 
 /// Whether forces are known, which fix the absolute scale of stiffness: a weight that is let go, or weights that hang
 /// while the object is seen.
@@ -201,19 +201,22 @@ CaptureParameters default_parameters(const Capture& capture, double volume, int 
   p.push_back(vector(layout, m.linear_velocity, speed, m.linear_velocity.vector(theta) / speed, 3.0, moves));
   p.push_back(vector(layout, m.angular_velocity, 1.0 / time, m.angular_velocity.vector(theta) * time, 3.0, moves));
   set_obstacles(capture.scene, m, theta);
+  // What is not known begins in the middle of what is usual: where nothing rubs, an object that tumbles takes another
+  // way, from which steps rarely lead back.
+  const auto friction = [&](const ParameterHandle& at, bool is_known) {
+    const bool is_estimated = !is_known && !capture.scene.timing.is_static;
+    if (is_estimated) theta[at] = friction_guess;
+    return scalar(layout, at, Transform::Shift, 0.0, 5.0, theta[at], friction_std, is_estimated);
+  };
   for (std::size_t i = 0; i < m.planes.size(); ++i) {
     Parameter plane = vector(layout, m.planes[i].whole(), size, Vector3::Zero(), 0.2, !capture.scene.planes[i].known);
     plane.transform = Transform::PlanePosition;
     plane.origin = theta.segment<6>(m.planes[i].whole());
     p.push_back(std::move(plane));
-    p.push_back(scalar(layout, m.planes[i].friction, Transform::Shift, 0.0, 5.0, capture.scene.planes[i].friction,
-                       friction_std, !capture.scene.planes[i].knows_friction && !capture.scene.timing.is_static));
+    p.push_back(friction(m.planes[i].friction, capture.scene.planes[i].knows_friction));
   }
-  for (std::size_t i = 0; i < m.obstacles.size(); ++i) {
-    const RigidObstacle& obstacle = capture.scene.obstacles[i];
-    p.push_back(scalar(layout, m.obstacles[i].friction, Transform::Shift, 0.0, 5.0, obstacle.friction, friction_std,
-                       !obstacle.knows_friction && !capture.scene.timing.is_static));
-  }
+  for (std::size_t i = 0; i < m.obstacles.size(); ++i)
+    p.push_back(friction(m.obstacles[i].friction, capture.scene.obstacles[i].knows_friction));
   if (m.contact_stiffness.exists()) {
     theta[m.contact_stiffness] = default_contact_stiffness(density * volume * std::max(gravity, 0.1),
                                                            surface_area(*capture.scene.object.surface), size);
