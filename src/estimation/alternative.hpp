@@ -7,7 +7,8 @@
 
 namespace pliant {
 
-inline constexpr const char *cause_mesh = "mesh", *cause_mass = "mass", *cause_scale = "scale of lengths";
+inline constexpr const char *cause_mesh = "mesh", *cause_mass = "mass", *cause_scale = "scale of lengths",
+                            *cause_scan = "errors of the scan", *cause_unevenness = "uneven stiffness";
 inline constexpr double largest_shift = 1.0;  ///< of an unconstrained coordinate, by a few steps
 
 /// Where an estimate goes under another model of the same object.

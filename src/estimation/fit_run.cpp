@@ -47,8 +47,7 @@ constexpr double most_cells = 64.0;  // along the object's longest axis
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
 constexpr int few_iterations = 2, many_iterations = 5;
-const std::string cause_scan = "errors of the scan";
-constexpr int smooth_scan_errors = 2;
+constexpr int smooth_scan_errors = 2, uneven_objects = 3;
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 
 }  // namespace
@@ -189,6 +188,18 @@ std::vector<Alternative> FitRun::alternatives() const {
     add(common_scan_error, 0.5);
     for (int realisation = 1; realisation <= smooth_scan_errors; ++realisation)
       add(realisation, 0.5 / smooth_scan_errors);
+  }
+  if (recordings_.any_uneven()) {
+    double worst = 0.0;  // what an object is as stiff as, on some mean, varies by less than its stiffness does
+    for (const Recording& r : recordings_.all()) worst = std::max(worst, r.unevenness);
+    const double share = 1.0 / std::sqrt(double(uneven_objects));
+    for (int realisation = 1; realisation <= uneven_objects; ++realisation) {
+      Alternative uneven{cause_unevenness, cells, 1.0, {.unevenness = realisation}};
+      uneven.size = share / part_of_unevenness;
+      uneven.most = share * worst;
+      uneven.beside_the_first = has_coarser, uneven.iterations = few_iterations;
+      all.push_back(std::move(uneven));
+    }
   }
   if (!options_.law_of_motion() && options_.material != MaterialKind::Linear)
     all.push_back({"law at large strain",

@@ -66,6 +66,8 @@ struct Horizon {
 /// first order as much larger, and an optimiser finds back from there at once.
 inline constexpr double part_of_scan_error = 0.25;
 inline constexpr int common_scan_error = -1;
+/// The same of how much an object's stiffness varies.
+inline constexpr double part_of_unevenness = 0.5;
 
 /// Where a pass of a search among several ends early.
 struct PassLimits {
@@ -80,6 +82,7 @@ struct ModelChange {
   /// The object's surface lies beside its scan, by a part of what that errs: `common_scan_error` everywhere, from 1 on
   /// a smooth realisation; 0: on it.
   int scan_error = 0;
+  int unevenness = 0;  ///< a realisation of how stiffness varies over the object, from 1 on; 0: it is even
   bool operator==(const ModelChange&) const = default;
 };
 

@@ -88,6 +88,9 @@ struct Judgement {
       "hand-held scanners and photogrammetry"};
   Judged scan_error_of_thickness{"interval.given.scan_error_of_thickness", 0.03,
                                  "the most of that over the object's thickness: what a scan shows at all"};
+  Judged unevenness{"interval.given.unevenness", 0.08,
+                    "deviation of the logarithm of the stiffness over an object of one material where `stiffness_std` "
+                    "is not stated: stuffing and foam vary by 5 to 20 %, cast rubber hardly"};
   Judged given_friction{"interval.given.friction", 0.05, "deviation of a given coefficient of friction"};
   Judged given_contact{"interval.given.contact_stiffness", 0.3,
                        "deviation of the logarithm of the stiffness of contact, where it was chosen"};

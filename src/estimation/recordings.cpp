@@ -72,6 +72,13 @@ double scan_error(const Recording& recording, bool is_estimated) {
   return std::min(judgement.scan_error * recording.size, judgement.scan_error_of_thickness * recording.thickness);
 }
 
+/// The same of the logarithm of its stiffness, where the object has one material.
+double unevenness(const Capture& capture, int controls) {
+  return controls > 1 ? 0.0 : capture.scene.object.stiffness_std.value_or(judgement.unevenness);
+}
+
+constexpr double stiffness_alike = 0.25;  // of the object's size: over so far stuffing and foam are as stiff
+
 /// A realisation of a scan's error along its normals [m]: one that the whole surface has in common, or a smooth one.
 std::function<double(const Vector3&)> scan_error_field(double deviation, double size, int realisation) {
   constexpr double alike = 0.1;  // of the object's size: over so far are smooth errors alike
@@ -376,6 +383,7 @@ CaptureParameters Recordings::make_ready(RecordedCapture recorded, Recording& re
   recording.size = object_size(capture.scene);
   recording.thickness = thickness(capture.scene, *recording.distance);
   recording.scan_error = scan_error(recording, options_.scan_points > 0);
+  recording.unevenness = unevenness(capture, controls_);
   if (!recording.observations->empty())
     recording.last_frame = std::min(int(capture.scene.timing.times.size()) - capture.scene.timing.start_frame - 1,
                                     recording.observations->back().frame);
@@ -454,6 +462,9 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
     Resolution own = resolution(cells, steps);
     if (change.scan_error != 0 && r.scan_error > 0.0)
       own.offset = scan_error_field(part_of_scan_error * r.scan_error, r.size, change.scan_error);
+    if (change.unevenness != 0 && r.unevenness > 0.0)
+      own.unevenness =
+          RandomField(part_of_unevenness * r.unevenness, stiffness_alike * r.size, std::uint64_t(change.unevenness));
     grid.recording.push_back(
         discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
     grid.presses.push_back(press_scene(r, grid.recording.back(), own));

@@ -29,6 +29,7 @@ struct Recording {
   double size = 0.0;                 ///< of the object [m]
   double thickness = 0.0;            ///< of the object [m], as `thickness` has it
   double scan_error = 0.0;           ///< standard deviation of its scan along the normals [m]; 0: exact
+  double unevenness = 0.0;           ///< standard deviation of the logarithm of its stiffness; 0: even
   int last_frame = 0;                ///< that is compared
   int last_seen = 0;                 ///< of the whole recording
   std::vector<double> common_error;  ///< of each depth camera, what all its readings err by together [m]
@@ -85,6 +86,9 @@ class Recordings {
   }
   bool any_scan_errs() const {
     return std::ranges::any_of(all_, [](const Recording& r) { return r.scan_error > 0.0; });
+  }
+  bool any_uneven() const {
+    return std::ranges::any_of(all_, [](const Recording& r) { return r.unevenness > 0.0; });
   }
   bool any_meshed_here() const {
     return std::ranges::any_of(all_, [](const Recording& r) { return !r.capture.scene.object.volume; });

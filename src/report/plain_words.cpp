@@ -160,6 +160,9 @@ std::string largest_share_sentence(const Result& result) {
       {"mesh", "a finer mesh (--set cells)"},
       {"time step", "smaller time steps (--set steps)"},
       {"errors of the scan", "a scan that errs less (surface_noise of [object])"},
+      {"uneven stiffness",
+       "a second recording that loads other places of the object, or saying how even it is "
+       "(stiffness_std of [object])"},
       {"stiffness of contact", "a hard floor, or less of it in the recording"},
       {"form of the law", "presses of other sizes and at other places"},
       {"law at large strain", "smaller strains, or the law of the object's material (--set material)"},

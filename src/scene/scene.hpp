@@ -188,8 +188,11 @@ struct Object {
   std::optional<double> scale_std;              ///< how well all lengths together are known, a share of them; 0: exact
   ShapeIs shape_is = ShapeIs::Reference;
   std::optional<double> surface_noise;  ///< standard deviation of the surface along its normals [m]; 0: it is exact
-  bool pose_is_known = true;            ///< false: the surface stands anywhere, and is to be placed in the start frame
-  bool scale_is_known = true;           ///< false: the surface is in any unit; its pose is unknown then too
+  /// By how much the stiffness of its material varies from place to place, a share (a standard deviation); 0: it is
+  /// even.
+  std::optional<double> stiffness_std;
+  bool pose_is_known = true;   ///< false: the surface stands anywhere, and is to be placed in the start frame
+  bool scale_is_known = true;  ///< false: the surface is in any unit; its pose is unknown then too
 
   /// Mass [kg], from the density where that is given. Nothing: neither is known.
   std::optional<double> total_mass() const;

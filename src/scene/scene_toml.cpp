@@ -167,6 +167,9 @@ void read_object_facts(TomlTable& table, Object& object) {
                            "\"static\" means that the scan was taken sagging under gravity");
   object.shape_is = shape_is == "static" ? ShapeIs::Static : ShapeIs::Reference;
   object.surface_noise = table.optional<double>("surface_noise");
+  object.stiffness_std =
+      read_optional_number(table, "stiffness_std",
+                           {0.0, 0.5, true, true, "a share of the stiffness; 0 where it is even, as of cast rubber"});
 }
 
 void read_object_shape(TomlTable& table, const NamedFiles& files, Object& object) {
@@ -460,6 +463,7 @@ void write_toml(std::ostream& out, const Object& object, const std::string& file
   if (object.scale_std) out << "scale_std = " << toml_text(*object.scale_std) << "   # of all lengths, a share\n";
   if (object.shape_is == ShapeIs::Static) out << "shape_is = \"static\"   # taken as it sagged under gravity\n";
   if (object.surface_noise) out << "surface_noise = " << toml_text(*object.surface_noise) << "   # m\n";
+  if (object.stiffness_std) out << "stiffness_std = " << toml_text(*object.stiffness_std) << "   # a share\n";
   out << "\n";
 }
 

@@ -249,6 +249,20 @@ Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body&
   return other;
 }
 
+/// Makes the stiffness vary over the body, which is as stiff on the geometric mean.
+void make_uneven(Body& body, const std::function<double(const Vector3&)>& unevenness) {
+  std::vector<double>& relative = body.modulus.relative;
+  std::vector<double> logarithm(relative.size());
+  double mean = 0.0;
+  for (int e = 0; e < body.element_count(); ++e) {
+    Vector3 centre = Vector3::Zero();
+    for (const int node : body.element(e)) centre += body.nodes.row(node).transpose() / body.nodes_per_element();
+    logarithm[std::size_t(e)] = unevenness(centre);
+    mean += body.element_volume[std::size_t(e)] / body.volume() * logarithm[std::size_t(e)];
+  }
+  for (std::size_t e = 0; e < relative.size(); ++e) relative[e] *= std::exp(logarithm[e] - mean);
+}
+
 }  // namespace
 
 std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
@@ -257,6 +271,7 @@ std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistanc
   Body body = are_hexahedra ? make_body(hexahedra_of(scene, distance, resolution))
                             : make_body(tetrahedra_of(scene, resolution));
   if (resolution.offset) body = beside_scan(scene, distance, body, resolution);
+  if (resolution.unevenness) make_uneven(body, resolution.unevenness);
   ControlledField field = modulus_field(body, scene, resolution.field);
   body.modulus = std::move(field.field);
   control_points = std::move(field.points);

@@ -36,6 +36,8 @@ struct Resolution {
   double band = 0.15;              ///< of the mismatch, times the object's longest axis
   /// By which the object's surface lies outside its scan, at a place of the scan [m]; none: it is the scan.
   std::function<double(const Vector3&)> offset = {};
+  /// By which the logarithm of the stiffness differs at a place of the scan, but for its mean; none: it is even.
+  std::function<double(const Vector3&)> unevenness = {};
 };
 
 /// Moduli of the scene's regions or control points, or as many as are asked for where it names none.

@@ -156,6 +156,7 @@ Capture capture_of(const Synthesis& s, const fs::path& folder) {
   capture.scene = s.scene;
   capture.scene.object.file = folder / "rest.ply";
   capture.scene.object.surface_noise = 0.0;  // it is the surface of the simulated body
+  capture.scene.object.stiffness_std = 0.0;
   for (const SyntheticCamera& camera : s.cameras) {
     if (!has_images(s, camera)) continue;
     RecordingCamera facts{camera.name, camera.camera, camera.every,

@@ -78,6 +78,8 @@ const Slip slips[] = {
     {"GravityStdOfNoGravity", "gravity = [0.0, 9.81, 0.0]", "up = [0, -1, 0]\ngravity_std = 0.01",
      "`gravity_std` without `gravity`", "gravity_std"},
     {"ScaleStdInPercent", "mass = 0.8", "mass = 0.8\nscale_std = 3", "a share of all lengths", "scale_std"},
+    {"StiffnessStdInPercent", "mass = 0.8", "mass = 0.8\nstiffness_std = 15", "a share of the stiffness",
+     "stiffness_std"},
     {"ScaleStdBesideAForce", "mass = 0.8\n\n[world]",
      "mass = 0.8\nscale_std = 0.03\n\n[[force]]\nat = [0.1, 0, 0]\nforce = [0, 1, 0]\n[world]",
      "forces that are no weight", "scale_std"},

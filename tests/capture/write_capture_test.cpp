@@ -17,6 +17,7 @@ void expect_same_scene(const Scene& is, const Scene& was) {
   EXPECT_EQ(is.object.scale_std, was.object.scale_std);
   EXPECT_EQ(is.object.shape_is, was.object.shape_is);
   EXPECT_EQ(is.object.surface_noise, was.object.surface_noise);
+  EXPECT_EQ(is.object.stiffness_std, was.object.stiffness_std);
   EXPECT_EQ(is.object.surface, was.object.surface);
   EXPECT_EQ(is.object.volume.has_value(), was.object.volume.has_value());
   EXPECT_EQ(is.world, was.world);
@@ -79,7 +80,8 @@ void fill(SmallCapture& small) {
   write_png(small.folder / "load_mask.png", SmallCapture::mask_image(0.0));
   small.edit("gravity = [0.0, 9.81, 0.0]", "gravity = [0.0, 9.81, 0.0]\ngravity_std = 0.004");
   small.edit("mass = 0.8",
-             "density = 100.0\ndensity_std = 2.5\nscale_std = 0.0\nsurface_noise = 0.0002\nshape_is = \"static\"");
+             "density = 100.0\ndensity_std = 2.5\nscale_std = 0.0\nsurface_noise = 0.0002\n"
+             "stiffness_std = 0.15\nshape_is = \"static\"");
   small.edit("noise = 0.002",
              "background = \"front/background.png\"\nevery = 1\nnoise = 0.002\ntime_offset = -0.004\n"
              "pose_std = { turn = 0.002, shift = 0.0 }\n"

@@ -8,6 +8,7 @@
 
 #include "estimation/alternative.hpp"
 #include "estimation/fit.hpp"
+#include "estimation/judgement.hpp"
 #include "support/dropped.hpp"
 #include "support/interruption.hpp"
 #include "support/sagging_bar.hpp"
@@ -120,11 +121,10 @@ TEST(ScaleOfLengths, OfWhatSwingsMovesTheEstimateAsTheShareSays) {
 }
 
 TEST(Alternatives, CountWhatAScanMayErrBy) {
-  const std::string scan = "errors of the scan";
   RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
   const FitOptions options = test::quick_fit_of_bar();
   const FitOutcome exact = fit({bar}, options);  // as the capture states
-  EXPECT_EQ(share(exact, scan), nullptr);
+  EXPECT_EQ(share(exact, cause_scan), nullptr);
   EXPECT_EQ(exact.used.element, ElementKind::QuadraticTetrahedron);
   EXPECT_EQ(exact.used.control_points, 1);
   EXPECT_EQ(exact.used.material, MaterialKind::NeoHookean);
@@ -135,8 +135,8 @@ TEST(Alternatives, CountWhatAScanMayErrBy) {
     bar.capture.scene.object.surface_noise = noise;
     const FitOutcome outcome = fit({bar}, options);
     EXPECT_EQ(outcome.theta, exact.theta) << "it leaves the estimate alone";
-    ASSERT_NE(share(outcome, scan), nullptr) << ::testing::PrintToString(outcome.notes);
-    std.push_back(share(outcome, scan)->std[0]);
+    ASSERT_NE(share(outcome, cause_scan), nullptr) << ::testing::PrintToString(outcome.notes);
+    std.push_back(share(outcome, cause_scan)->std[0]);
     EXPECT_GT(outcome.uncertainty.std[0], exact.uncertainty.std[0]);
   }
   // Were all errors alike, a millimetre on either side of 50 would be 8 % of the modulus by the density and the sag,
@@ -149,8 +149,32 @@ TEST(Alternatives, CountWhatAScanMayErrBy) {
   EXPECT_LT(std[1], 8.0 * 0.001 / 0.05) << "both sides of 50 mm err, by the fourth power of the thickness at most";
   bar.capture.scene.object.surface_noise.reset();
   const FitOutcome unsaid = fit({bar}, options);
-  ASSERT_NE(share(unsaid, scan), nullptr);
-  EXPECT_NEAR(share(unsaid, scan)->std[0], std[1], 1e-6) << "0.25 % of 0.4 m are a millimetre";
+  ASSERT_NE(share(unsaid, cause_scan), nullptr);
+  EXPECT_NEAR(share(unsaid, cause_scan)->std[0], std[1], 1e-6) << "0.25 % of 0.4 m are a millimetre";
+}
+
+TEST(Alternatives, CountHowUnevenAnObjectMayBe) {
+  RecordedCapture bar = test::sagging_bar(test::stiffness_of_bar);
+  const FitOptions options = test::quick_fit_of_bar();
+  const FitOutcome even = fit({bar}, options);  // as the capture states
+  EXPECT_EQ(share(even, cause_unevenness), nullptr);
+  std::vector<double> std;
+  for (const double varies : {0.05, 0.1}) {
+    bar.capture.scene.object.stiffness_std = varies;
+    const FitOutcome outcome = fit({bar}, options);
+    EXPECT_EQ(outcome.theta, even.theta) << "it leaves the estimate alone";
+    ASSERT_NE(share(outcome, cause_unevenness), nullptr) << ::testing::PrintToString(outcome.notes);
+    std.push_back(share(outcome, cause_unevenness)->std[0]);
+  }
+  EXPECT_NEAR(std[1], 2.0 * std[0], 0.2 * std[1]) << "to first order";
+  // How far the bar sags tells its stiffness near the clamp, by 4 (1 - x)^3 of what lies at the part x of its length:
+  // of stiffness that is alike over a quarter of that, about two thirds of its deviation are left.
+  EXPECT_GT(std[1], 0.3 * 0.1);
+  EXPECT_LT(std[1], 1.2 * 0.1);
+  bar.capture.scene.object.stiffness_std.reset();
+  const FitOutcome unsaid = fit({bar}, options);
+  ASSERT_NE(share(unsaid, cause_unevenness), nullptr);
+  EXPECT_NEAR(share(unsaid, cause_unevenness)->std[0], judgement.unevenness / 0.1 * std[1], 0.1 * std[1]);
 }
 
 TEST(Alternatives, OfAMotionAreEachTriedFromTheSamePlace) {
@@ -167,8 +191,8 @@ TEST(Alternatives, OfAMotionAreEachTriedFromTheSamePlace) {
   block.capture.scene.object.surface_noise = 0.004;
   const FitOutcome errs = fit({block}, options);
   EXPECT_EQ(errs.theta, exact.theta);
-  ASSERT_NE(share(errs, "errors of the scan"), nullptr) << ::testing::PrintToString(errs.notes);
-  EXPECT_GT(share(errs, "errors of the scan")->std[0], 0.01);
+  ASSERT_NE(share(errs, cause_scan), nullptr) << ::testing::PrintToString(errs.notes);
+  EXPECT_GT(share(errs, cause_scan)->std[0], 0.01);
   ASSERT_NE(share(exact, law), nullptr) << ::testing::PrintToString(exact.notes);
   EXPECT_EQ(share(errs, law)->std, share(exact, law)->std) << "wherever the scan's errors led before";
 }

@@ -28,14 +28,22 @@ TEST(HiddenGround, IsFoundFromTenDegreesAndThirtyMillimetresOff) {
 }
 
 TEST(Friction, IsEstimatedWhereNobodyStatedIt) {
-  RecordedCapture recorded = test::Dropped{}.record();
+  const test::Dropped dropped;
+  RecordedCapture recorded = dropped.record();
   const auto friction = [&] {
     const CaptureParameters p = default_parameters(recorded.capture, 1e-3);
     return *p.set.find("friction");
   };
+  const auto begins_at = [&] {
+    const CaptureParameters p = default_parameters(recorded.capture, 1e-3);
+    return p.set.reference()[p.blocks.motion.planes.front().friction];
+  };
   EXPECT_FALSE(friction().estimated);
+  EXPECT_EQ(begins_at(), dropped.friction);
   recorded.capture.scene.planes.front().knows_friction = false;
   EXPECT_TRUE(friction().estimated);
+  EXPECT_EQ(friction().prior_mean[0], begins_at());
+  EXPECT_GT(begins_at(), 0.0) << "where nothing rubs what tumbles goes another way";
   recorded.capture.scene.timing.is_static = true;
   EXPECT_FALSE(friction().estimated) << "at rest it does not show";
 }

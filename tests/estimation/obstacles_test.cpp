@@ -25,7 +25,8 @@ TEST(Obstacles, ABlockThatFallsOnATableAndIsPushedByABallIsFitted) {
   test::Dropped dropped{.cells = 6.0};
   dropped.change = [](Scene& scene) {
     scene.planes.clear();
-    scene.obstacles = {{ShapeBox{{-0.5, -0.2, -0.5}, {0.5, 0.03, 0.5}}, 0.3}, {ShapeBall{{0.3, 0.1, 0.0}, 0.06}, 0.3}};
+    scene.obstacles = {{ShapeBox{{-0.5, -0.2, -0.5}, {0.5, 0.03, 0.5}}, 0.45},
+                       {ShapeBall{{0.3, 0.1, 0.0}, 0.06}, 0.45}};
     scene.obstacles[1].motion = {key(0.15, {0, 0, 0}, {0, 0, 0}), key(0.45, {-0.18, 0, 0}, {0, 0, 0})};
   };
   RecordedCapture recorded = dropped.record();
@@ -34,7 +35,7 @@ TEST(Obstacles, ABlockThatFallsOnATableAndIsPushedByABallIsFitted) {
   const FitOutcome outcome = fit({recorded}, quick());
   ASSERT_TRUE(outcome.evaluation.succeeded) << outcome.reason;
   EXPECT_NEAR(test::value(outcome, "youngs_modulus"), dropped.youngs_modulus, 0.04 * dropped.youngs_modulus);
-  EXPECT_NEAR(test::value(outcome, "obstacle_friction"), 0.3, 0.05);
+  EXPECT_NEAR(test::value(outcome, "obstacle_friction"), 0.45, 0.05);
   EXPECT_TRUE(outcome.parameters.find("obstacle_friction_2")->estimated);
   // Where nothing pushes it stays where it came down.
   recorded.capture.scene.obstacles.pop_back();

@@ -1,6 +1,7 @@
 #include "simulation/scene_simulation.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -109,6 +110,24 @@ TEST(SceneSimulation, ASurfaceBesideItsScanMakesAThickerBodyAsHeavy) {
   thin.offset = [](const Vector3&) { return -0.6 * edge; };
   std::vector<Vector3> controls;
   EXPECT_THROW((void)make_body_of(scene, *scene_distance(scene, 0.15), thin, controls), InputError);
+}
+
+TEST(SceneSimulation, AnUnevenBodyIsAsStiffOnTheGeometricMean) {
+  const Scene scene = bar();
+  Resolution resolution;
+  resolution.cells = 8.0;
+  resolution.unevenness = [](const Vector3& p) { return 0.3 + 2.0 * p.x(); };
+  for (const ElementKind element : {ElementKind::Hexahedron, ElementKind::QuadraticTetrahedron}) {
+    resolution.element = element;
+    std::vector<Vector3> controls;
+    const auto body = make_body_of(scene, *scene_distance(scene, 0.15), resolution, controls);
+    const std::vector<double>& relative = body->modulus.relative;
+    double mean = 0.0;
+    for (std::size_t e = 0; e < relative.size(); ++e) mean += body->element_volume[e] * std::log(relative[e]);
+    EXPECT_NEAR(mean, 0.0, 1e-12 * body->volume());
+    const auto [softest, stiffest] = std::ranges::minmax(relative);
+    EXPECT_NEAR(std::log(stiffest / softest), 2.0 * 0.2, 2.0 * 0.05) << "but for half an element at each end";
+  }
 }
 
 /// A sheet in any plane, held at one end, sags as an Euler-Bernoulli beam.

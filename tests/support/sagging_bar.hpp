@@ -27,7 +27,7 @@ inline RecordedCapture sagging_bar(double beyond, const Vector3& gravity = {0.0,
   Capture& capture = recorded.capture;
   capture.name = "bar";
   capture.scene.object.surface = make_box(Vector3(length, edge, edge), 0.0125);
-  capture.scene.object.surface_noise = 0.0;
+  capture.scene.object.surface_noise = capture.scene.object.stiffness_std = 0.0;
   capture.scene.object.density = 400.0;
   capture.scene.world.gravity = gravity;
   capture.scene.world.up = -gravity.normalized();
