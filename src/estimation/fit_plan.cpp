@@ -91,8 +91,9 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
       // The pose before a release was found for another stiffness, which sags otherwise: it is looked for anew.
       StageChain chain = left_of(motion(2, without_pulls(swung->theta)), done);
       if (!chain.empty()) return {chain};
-    } else if (swung && !find_record(done, {StageKind::Scan})) {
-      return {{scan(before_starts(done))}};
+    } else if (swung) {
+      for (int i = 0; i < scan_count(); ++i)
+        if (!find_record(done, {StageKind::Scan, 0, i})) return {{scan(i, before_starts(done))}};
     }
     if (std::vector<StageChain> starts = starts_left(done); !starts.empty()) return starts;
   }
@@ -181,17 +182,19 @@ std::vector<double> fine_horizons(const PlanFacts& facts) {
 }  // namespace
 
 /// Over decades from the softest on that may hold itself up.
-Stage FitPlan::scan(const VectorX& from) const {
+Stage FitPlan::scan(int number, const VectorX& from) const {
   const FitOptions& options = facts_.options;
-  Stage stage{{StageKind::Scan}, "scan", facts_.coarse};
+  Stage stage{{StageKind::Scan, 0, number}, "scan", facts_.coarse};
   stage.band = options.wide_band;
   stage.horizon.part = growing_horizon(facts_).front();
-  stage.from = {from};
+  stage.from = {with_friction(from, number)};
   const double g = std::max(facts_.gravity.vector(from).norm(), 0.1);
   const double softest = facts_.softest > 0.0 ? facts_.softest : from[facts_.density] * g * facts_.size;
   const int per_decade = options.scan_per_decade * (facts_.swings ? 2 : 1);
   for (int i = 0; i <= 4 * per_decade; ++i) stage.trials.push_back(softest * std::pow(10.0, double(i) / per_decade));
-  stage.done_from = 0.05, stage.done_to = 0.15;
+  stage.iterations_before = number * int(stage.trials.size());
+  const double share = 0.1 / scan_count();
+  stage.done_from = 0.05 + number * share, stage.done_to = stage.done_from + share;
   return stage;
 }
 
@@ -216,12 +219,8 @@ StageChain FitPlan::start(int index, const Records& done) const {
     chain.push_back(std::move(stage));
   }
   chain.front().tries_moduli = facts_.swings && facts_.moduli.size() > 1;
-  const VectorX theta = before_starts(done);
-  const std::vector<double> moduli = start_moduli(done);
-  if (index >= int(moduli.size()))
-    chain.front().from = {drawn_start(index, done)};
-  else
-    chain.front().from = {facts_.is_scanned ? with_modulus(theta, moduli[std::size_t(index)], done) : theta};
+  const std::vector<VectorX> found = found_starts(done);
+  chain.front().from = {index < int(found.size()) ? found[std::size_t(index)] : drawn_start(index, done)};
   return chain;
 }
 
@@ -331,12 +330,13 @@ StageChain FitPlan::finer(const Records& done) const {
   return {};
 }
 
-/// Those that are left, at the result.
+/// Those that are left, at the result; those beside the first one once that is done.
 std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
   const StageRecord* at = result(done);
   if (!at) return {};
   const Spacing own = spacing_of(*at);
-  std::vector<StageChain> chains;
+  const StageRecord* first = find_record(done, {StageKind::Alternative, at->id.start, 0});
+  std::vector<StageChain> left;
   for (std::size_t i = 0; i < facts_.alternatives.size(); ++i) {
     const Alternative& a = facts_.alternatives[i];
     Stage stage{{StageKind::Alternative, at->id.start, int(i)}, a.cause, {own.cells * a.cells, own.steps * a.steps}};
@@ -344,16 +344,10 @@ std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
     stage.free = free_at_last(done);
     stage.alternative = a;
     stage.done_from = stage.done_to = 1.0;
-    if (a.beside_the_first) {  // from where that ends
-      chains.front().push_back(std::move(stage));
-      continue;
-    }
-    stage.from = {at->theta};
-    chains.push_back({std::move(stage)});
+    if (find_record(done, stage.id) || (a.beside_the_first && !first)) continue;
+    stage.from = {a.beside_the_first ? first->theta : at->theta};
+    left.push_back({std::move(stage)});
   }
-  std::vector<StageChain> left;
-  for (StageChain& chain : chains)
-    if (StageChain rest = left_of(std::move(chain), done); !rest.empty()) left.push_back(std::move(rest));
   return left;
 }
 

@@ -11,20 +11,21 @@ namespace pliant {
 struct PlanFacts {
   FitOptions options;
   PassLimits limits;
-  ParameterSet parameters;                ///< where the fit begins, with the choices
-  std::vector<ParameterHandle> moduli;    ///< of the object
-  ParameterHandle density, gravity;       ///< of the first recording
-  double size = 0.0;                      ///< of the object [m]
-  VectorX relative_moduli;                ///< of scan and starts, the first one's being one
-  std::vector<std::string> told_at_rest;  ///< parameters that show before anything moves: poses of sensors, planes
-  bool is_scanned = true;                 ///< Young's modulus is looked for
-  double softest = 0.0;                   ///< Young's modulus that is tried [Pa]; 0: the stress under its own weight
-  bool swings = false;                    ///< some object is let go
-  Spacing coarse;                         ///< of the grid on which starts are followed
-  bool coarse_is_as_fine = false;         ///< its elements are those of the full grid
-  std::vector<Spacing> repetitions;       ///< on finer grids, after the first estimate
-  bool repeats_by_need = false;           ///< each only where a look at the resolution asks for it
-  std::vector<Alternative> alternatives;  ///< models that are tried at the last estimate
+  ParameterSet parameters;                 ///< where the fit begins, with the choices
+  std::vector<ParameterHandle> moduli;     ///< of the object
+  ParameterHandle density, gravity;        ///< of the first recording
+  double size = 0.0;                       ///< of the object [m]
+  VectorX relative_moduli;                 ///< of scan and starts, the first one's being one
+  std::vector<ParameterHandle> frictions;  ///< coefficients that nobody knows: they are scanned along
+  std::vector<std::string> told_at_rest;   ///< parameters that show before anything moves: poses of sensors, planes
+  bool is_scanned = true;                  ///< Young's modulus is looked for
+  double softest = 0.0;                    ///< Young's modulus that is tried [Pa]; 0: the stress under its own weight
+  bool swings = false;                     ///< some object is let go
+  Spacing coarse;                          ///< of the grid on which starts are followed
+  bool coarse_is_as_fine = false;          ///< its elements are those of the full grid
+  std::vector<Spacing> repetitions;        ///< on finer grids, after the first estimate
+  bool repeats_by_need = false;            ///< each only where a look at the resolution asks for it
+  std::vector<Alternative> alternatives;   ///< models that are tried at the last estimate
 };
 
 /// The stages of a fit of motions and equilibria: where sensors stand, by an object that still is as it was scanned;
@@ -75,7 +76,7 @@ class FitPlan {
   Stage pose() const;
   StageChain motion(int first, const VectorX& from) const;
   Stage swing(const VectorX& from) const;
-  Stage scan(const VectorX& from) const;
+  Stage scan(int number, const VectorX& from) const;
   /// One start on the coarse grid.
   StageChain start(int index, const Records& done) const;
   Stage pulls(const VectorX& from, const Spacing& grid, int number) const;
@@ -94,7 +95,10 @@ class FitPlan {
   VectorX beginning(const Records& done) const;
   /// Where the fit is before any start is followed.
   VectorX before_starts(const Records& done) const;
-  std::vector<double> start_moduli(const Records& done) const;
+  /// Where starts begin that scan or swing showed.
+  std::vector<VectorX> found_starts(const Records& done) const;
+  int scan_count() const;
+  VectorX with_friction(VectorX theta, int scan) const;
   /// How many starts are followed as far as is known: more than there are moduli where the best of them is not good.
   int start_count(const Records& done) const;
   /// Why a start is not followed any further: it leads nowhere, or where another leads. Empty: it is followed.
@@ -143,8 +147,16 @@ PassState begun_from(const PassState& state);
 /// Iterations that are counted on in the stages after it.
 int counted_iterations(const StageRecord& record);
 
-/// Moduli to follow, at most so many: every start is a valley of the scan before it is merely low, since neighbours
-/// lead to the same place; valleys far above the lowest are left out.
-std::vector<double> best_of_scan(const std::vector<std::pair<double, double>>& trials, int most);
+/// Young's modulus [Pa] of a trial, and in which of the scans.
+struct ScannedStart {
+  int scan = 0;
+  double modulus = 0.0;
+  bool operator==(const ScannedStart&) const = default;
+};
+
+/// Starts to follow, at most so many: every one is a valley of its scan before it is merely low, since neighbours lead
+/// to the same place; valleys far above the lowest are left out.
+/// @param scans  of each the trials: modulus [Pa], ascending, and cost
+std::vector<ScannedStart> best_of_scans(const std::vector<std::vector<std::pair<double, double>>>& scans, int most);
 
 }  // namespace pliant

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -11,33 +12,61 @@
 
 namespace pliant {
 
-std::vector<double> best_of_scan(const std::vector<std::pair<double, double>>& trials, int most) {
+std::vector<ScannedStart> best_of_scans(const std::vector<std::vector<std::pair<double, double>>>& scans, int most) {
   constexpr double hopeless = 4.0;  // times the lowest cost
-  std::vector<int> order(trials.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto cost = [&](int i) { return trials[std::size_t(i)].second; };
-  const auto is_valley = [&](int i) {
-    return (i == 0 || cost(i) <= cost(i - 1)) && (i + 1 == int(order.size()) || cost(i) <= cost(i + 1));
+  struct Candidate {
+    ScannedStart start;
+    double cost;
+    bool is_valley;
   };
-  std::ranges::stable_sort(order, [&](int a, int b) {
-    if (is_valley(a) != is_valley(b)) return is_valley(a);
-    return cost(a) < cost(b);
-  });
+  std::vector<Candidate> all;
   double least = infinite;
-  for (const auto& trial : trials) least = std::min(least, trial.second);
-  std::vector<double> best;
-  for (const int i : order) {
-    if (int(best.size()) >= most || !std::isfinite(cost(i))) break;
-    if (cost(i) <= hopeless * least) best.push_back(trials[std::size_t(i)].first);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    const auto& trials = scans[s];
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      const auto [modulus, cost] = trials[i];
+      const bool is_valley =
+          (i == 0 || cost <= trials[i - 1].second) && (i + 1 == trials.size() || cost <= trials[i + 1].second);
+      all.push_back({{int(s), modulus}, cost, is_valley});
+      least = std::min(least, cost);
+    }
+  }
+  std::ranges::stable_sort(all, [](const Candidate& a, const Candidate& b) {
+    return a.is_valley != b.is_valley ? a.is_valley : a.cost < b.cost;
+  });
+  std::vector<ScannedStart> best;
+  for (const Candidate& c : all) {
+    if (int(best.size()) >= most || !std::isfinite(c.cost)) break;
+    if (c.cost <= hopeless * least) best.push_back(c.start);
   }
   return best;
 }
 
-std::vector<double> FitPlan::start_moduli(const Records& done) const {
+namespace {
+
+/// Coefficients of friction: what slides and what sticks take different ways, and no step leads from one to the other.
+constexpr std::array scanned_frictions = {0.1, 0.4};
+
+}  // namespace
+
+int FitPlan::scan_count() const { return facts_.frictions.empty() ? 1 : int(scanned_frictions.size()); }
+
+VectorX FitPlan::with_friction(VectorX theta, int scan) const {
+  for (const ParameterHandle& friction : facts_.frictions) theta[friction] = scanned_frictions[std::size_t(scan)];
+  return theta;
+}
+
+std::vector<VectorX> FitPlan::found_starts(const Records& done) const {
+  const VectorX theta = before_starts(done);
   const StageRecord* swung = find_record(done, {StageKind::Swing});
-  if (!facts_.is_scanned || (swung && swung->converged)) return {before_starts(done)[facts_.moduli.front()]};
-  const StageRecord* scan = find_record(done, {StageKind::Scan});
-  return scan ? best_of_scan(scan->trials, facts_.options.starts) : std::vector<double>{};
+  if (!facts_.is_scanned || (swung && swung->converged)) return {theta};
+  std::vector<std::vector<std::pair<double, double>>> scans;
+  for (int i = 0; i < scan_count(); ++i)
+    if (const StageRecord* scan = find_record(done, {StageKind::Scan, 0, i})) scans.push_back(scan->trials);
+  std::vector<VectorX> found;
+  for (const ScannedStart& best : best_of_scans(scans, facts_.options.starts))
+    found.push_back(with_friction(with_modulus(theta, best.modulus, done), best.scan));
+  return found;
 }
 
 /// Starts are followed over the first frames, and on if one leads about as far down as the best one, elsewhere.
@@ -49,7 +78,7 @@ std::string FitPlan::why_given_up(int index, const Records& done) const {
     if (r.id.kind == StageKind::Coarse && r.id.start == index && !r.succeeded) return r.reason;
   const StageRecord* first = first_of_start(index, done);
   if (!first) return {};
-  const int given = int(start_moduli(done).size());
+  const int given = int(found_starts(done).size());
   double least = infinite;
   bool is_explained = false;
   for (int i = 0; i < given; ++i) {
@@ -109,7 +138,7 @@ std::optional<int> FitPlan::joined(int index, const Records& done) const {
 int FitPlan::start_count(const Records& done) const {
   constexpr double good = 3.0;  // misfit on the coarse grid, in the wide band
   constexpr int at_once = 2;
-  int count = int(start_moduli(done).size());
+  int count = int(found_starts(done).size());
   if (!facts_.is_scanned || count == 0) return count;
   double least = infinite;
   for (int i = 0; i < facts_.options.most_starts; ++i) {
@@ -131,9 +160,11 @@ VectorX FitPlan::drawn_start(int index, const Records& done) const {
   const auto normal = [&] {
     return std::sqrt(-2.0 * std::log(uniform())) * std::cos(2.0 * std::numbers::pi * uniform());
   };
-  const std::vector<double> moduli = start_moduli(done);
-  const auto [least, most] = std::ranges::minmax(moduli);
-  const double log_least = std::log10(least) - decades, log_most = std::log10(most) + decades;
+  double log_least = infinite, log_most = -infinite;
+  for (const VectorX& found : found_starts(done)) {
+    const double log = std::log10(found[facts_.moduli.front()]);
+    log_least = std::min(log_least, log - decades), log_most = std::max(log_most, log + decades);
+  }
   const double modulus = std::pow(10.0, log_least + (log_most - log_least) * uniform());
   VectorX theta = with_modulus(before_starts(done), modulus, done);
   ParameterSet drawn = facts_.parameters;
@@ -162,9 +193,11 @@ VectorX FitPlan::drawn_start(int index, const Records& done) const {
 }
 
 VectorX FitPlan::start_theta(const Records& done) const {
-  const std::vector<double> moduli = start_moduli(done);
-  const VectorX& theta = facts_.parameters.reference();
-  return facts_.is_scanned && !moduli.empty() ? with_modulus(theta, moduli.front(), done) : theta;
+  const std::vector<VectorX> found = found_starts(done);
+  VectorX theta = facts_.parameters.reference();
+  if (!facts_.is_scanned || found.empty()) return theta;
+  for (const ParameterHandle& friction : facts_.frictions) theta[friction] = found.front()[friction];
+  return with_modulus(theta, found.front()[facts_.moduli.front()], done);
 }
 
 std::vector<FitStart> FitPlan::starts(const Records& done) const {

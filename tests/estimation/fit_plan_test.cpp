@@ -148,6 +148,34 @@ TEST_F(Plans, ScanWhereNoSwingWasSeen) {
   EXPECT_NEAR(scan.trials.back() / scan.trials.front(), 1e4, 1e-8);
 }
 
+/// Starts differ by how floors rub where nobody said it.
+TEST_F(Plans, ScanFrictionAlongWhereNobodySaidIt) {
+  const ParameterHandle friction = facts.parameters.find("range_error@front")->at;  // any number will do
+  facts.frictions = {friction};
+  has_moved();
+  has_done(record({StageKind::Swing}, 0.0));
+  const auto chains = next();
+  const Stage& slides = only(chains);
+  EXPECT_EQ(slides.id, (StageId{StageKind::Scan}));
+  StageRecord scan = record(slides.id, 0.0);
+  scan.trials = {{2e2, 7.0}, {4e2, 5.0}, {4e3, 6.0}};
+  has_done(scan);
+  const auto more = next();
+  const Stage& sticks = only(more);
+  EXPECT_EQ(sticks.id, (StageId{StageKind::Scan, 0, 1}));
+  EXPECT_EQ(sticks.trials, slides.trials);
+  EXPECT_GT(sticks.from.front()[friction], slides.from.front()[friction]);
+  scan.id = sticks.id;
+  scan.trials = {{2e2, 7.0}, {4e2, 6.0}, {4e3, 3.0}};
+  has_done(scan);
+  const auto starts = next();
+  ASSERT_GE(starts.size(), 2u);
+  EXPECT_EQ(starts[0].front().from.front()[friction], sticks.from.front()[friction]);
+  EXPECT_EQ(starts[0].front().from.front()[facts.moduli.front()], 4e3);
+  EXPECT_EQ(starts[1].front().from.front()[friction], slides.from.front()[friction]);
+  EXPECT_EQ(starts[1].front().from.front()[facts.moduli.front()], 4e2);
+}
+
 TEST_F(Plans, ScanFromTheSoftestThatMayHoldItselfUp) {
   facts.softest = 7e3;
   has_moved();
@@ -631,15 +659,23 @@ TEST_F(Plans, LookOnceAtWhatWasReachedWhereTheyAreInterrupted) {
   EXPECT_EQ(FitPlan(facts).last_look(state).from.front(), theta(420.0));
 }
 
-TEST(BestOfScan, AreValleysFirst) {
+TEST(BestOfScans, AreValleysFirst) {
   const std::vector<std::pair<double, double>> trials = {{1.0, 3.0}, {2.0, 1.0}, {3.0, 1.5}, {4.0, 2.0}, {5.0, 1.9}};
-  EXPECT_THAT(best_of_scan(trials, 2), ElementsAre(2.0, 5.0)) << "a neighbour of the lowest leads to the same place";
-  EXPECT_THAT(best_of_scan(trials, 3), ElementsAre(2.0, 5.0, 3.0));
+  using S = ScannedStart;
+  EXPECT_THAT(best_of_scans({trials}, 2), ElementsAre(S{0, 2.0}, S{0, 5.0}))
+      << "a neighbour of the lowest leads to the same place";
+  EXPECT_THAT(best_of_scans({trials}, 3), ElementsAre(S{0, 2.0}, S{0, 5.0}, S{0, 3.0}));
 }
 
-TEST(BestOfScan, LeavesOutWhatIsHopelessAndWhatCannotBeSimulated) {
-  EXPECT_THAT(best_of_scan({{1.0, 1.0}, {2.0, 9.0}, {3.0, 4.5}}, 3), ElementsAre(1.0));
-  EXPECT_THAT(best_of_scan({{1.0, infinite}, {2.0, infinite}}, 3), ElementsAre());
+TEST(BestOfScans, LeaveOutWhatIsHopelessAndWhatCannotBeSimulated) {
+  EXPECT_THAT(best_of_scans({{{1.0, 1.0}, {2.0, 9.0}, {3.0, 4.5}}}, 3), ElementsAre(ScannedStart{0, 1.0}));
+  EXPECT_THAT(best_of_scans({{{1.0, infinite}, {2.0, infinite}}}, 3), ElementsAre());
+}
+
+TEST(BestOfScans, AreTheBestOfAll) {
+  EXPECT_THAT(best_of_scans({{{1.0, 5.0}, {2.0, 6.0}}, {{1.0, 4.0}, {2.0, 3.0}}}, 2),
+              ElementsAre(ScannedStart{1, 2.0}, ScannedStart{0, 1.0}))
+      << "valleys of each, however low a neighbour in the other";
 }
 
 }  // namespace
