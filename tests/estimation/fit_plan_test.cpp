@@ -601,9 +601,9 @@ TEST_F(Plans, LookForPullsAnewOnEveryGrid) {
                         {"law", 0.5, 1.0, {.small_strain = true}, false, 0.5, true},
                         {"what is given", 0.5, 1.0, {}, true, 1.0}};
   const auto others = next();
-  const auto numbers = [](const std::vector<StageChain>& chains) {
+  const auto numbers = [](const std::vector<StageChain>& of) {
     std::vector<int> all;
-    for (const StageChain& chain : chains)
+    for (const StageChain& chain : of)
       for (const Stage& stage : chain) all.push_back(stage.id.number);
     return all;
   };
