@@ -66,7 +66,7 @@ struct Horizon {
 /// first order as much larger, and an optimiser finds back from there at once.
 inline constexpr double part_of_scan_error = 0.25;
 inline constexpr int common_scan_error = -1;
-/// The same of how much an object's stiffness varies.
+/// Of how much an object's stiffness varies, the part that is tried: estimates follow to first order.
 inline constexpr double part_of_unevenness = 0.5;
 
 /// Where a pass of a search among several ends early.

@@ -72,7 +72,8 @@ double scan_error(const Recording& recording, bool is_estimated) {
   return std::min(judgement.scan_error * recording.size, judgement.scan_error_of_thickness * recording.thickness);
 }
 
-/// The same of the logarithm of its stiffness, where the object has one material.
+/// Standard deviation of the logarithm of an object's stiffness from place to place: what the capture states or, where
+/// it states nothing, what stuffing and foam have; 0 where the object has several moduli.
 double unevenness(const Capture& capture, int controls) {
   return controls > 1 ? 0.0 : capture.scene.object.stiffness_std.value_or(judgement.unevenness);
 }

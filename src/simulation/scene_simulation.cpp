@@ -253,12 +253,13 @@ Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body&
 void make_uneven(Body& body, const std::function<double(const Vector3&)>& unevenness) {
   std::vector<double>& relative = body.modulus.relative;
   std::vector<double> logarithm(relative.size());
+  const double volume = body.volume();
   double mean = 0.0;
   for (int e = 0; e < body.element_count(); ++e) {
     Vector3 centre = Vector3::Zero();
     for (const int node : body.element(e)) centre += body.nodes.row(node).transpose() / body.nodes_per_element();
     logarithm[std::size_t(e)] = unevenness(centre);
-    mean += body.element_volume[std::size_t(e)] / body.volume() * logarithm[std::size_t(e)];
+    mean += body.element_volume[std::size_t(e)] / volume * logarithm[std::size_t(e)];
   }
   for (std::size_t e = 0; e < relative.size(); ++e) relative[e] *= std::exp(logarithm[e] - mean);
 }
