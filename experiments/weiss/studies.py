@@ -121,7 +121,7 @@ half_size = {half_size!r}
 
 
 TORUS = (5000.0, 0.3, 0.1, 0.004)
-TORUS_KNOWN = {"poissons_ratio": 0.3, "mass_damping": 0.1, "stiffness_damping": 0.004}
+TORUS_KNOWN = {"poissons_ratio": 0.3, "mass_damping": 0.1, "stiffness_damping": 0.004, "friction": 0.0}
 
 
 def torus_cells(study):
@@ -345,7 +345,7 @@ def costs(study):
 
 
 BALL = (2000.0, 0.3, 0.1, 0.004)
-BALL_KNOWN = {"cells": 10, "poissons_ratio": 0.3, "mass_damping": 0.1, "stiffness_damping": 0.004}
+BALL_KNOWN = {"cells": 10, "poissons_ratio": 0.3, "mass_damping": 0.1, "stiffness_damping": 0.004, "friction": 0.0}
 
 
 def ball(study, name, tilt=(0.0, 0.0), height=0.0, velocity=(0.0, 0.0, 0.0), change=None):
@@ -360,7 +360,7 @@ def ball(study, name, tilt=(0.0, 0.0), height=0.0, velocity=(0.0, 0.0, 0.0), cha
 
 def error_of_fit(study, name, capture):
     """Of `pliant fit`, which is given no start."""
-    known = {f"{key}.estimate": False for key in BALL_KNOWN if key != "cells"} | {"contact_stiffness.estimate": False, "friction.estimate": False}
+    known = {f"{key}.estimate": False for key in BALL_KNOWN if key != "cells"} | {"contact_stiffness.estimate": False}
     figures = common.fit(study.pliant, capture, study.work / f"fit-{name}", BALL_KNOWN | known | {"alternatives": False})
     return common.number(figures["result"]["parameters"]["youngs_modulus"]["value"] / BALL[0] - 1.0, 3)
 
