@@ -6,6 +6,7 @@
 #include "output/press_output.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
+#include "simulation/trajectory.hpp"
 
 namespace pliant {
 
