@@ -9,6 +9,13 @@
 
 namespace pliant {
 
+/// Residuals of one kind in a frame, and what they count.
+struct ResidualRows {
+  VectorX residual;  ///< [m]
+  VectorX weight;    ///< [1/m^2]; 0 where a point is not matched
+  MatrixX J;         ///< their changes along directions, one row each; no columns where derivatives were not asked for
+};
+
 /// How one instant of what was simulated fits what was measured: a frame of a motion, a press, a load, a curve.
 struct FrameFit {
   int recording = 0;            ///< which trial of an objective it belongs to, as that counts
@@ -27,6 +34,7 @@ struct FrameFit {
   double sum_noise_squares = 0.0;    ///< [m^2] of the sensor's standard deviations
   double outline_sum_squares = 0.0;  ///< [m^2] of the outlines' part of `sum_squares`
   double track_sum_squares = 0.0;    ///< [m^2] of the followed points' distances
+  std::vector<ResidualRows> rows;    ///< of surface and outlines, where `ObjectiveOptions::keeps_rows` asks for them
 };
 
 struct CostEvaluation {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimation/notes.hpp"
+#include "estimation/scan_errors.hpp"
 
 namespace pliant {
 
@@ -50,7 +51,8 @@ bool shapes_law(const Parameter& p) { return p.role == Role::Material && p.unit 
 bool is_help(StageKind kind) { return kind == StageKind::Pose || kind == StageKind::Motion; }
 
 bool is_on_full_grid(StageKind kind) {
-  return kind == StageKind::Fine || kind == StageKind::Corrected || kind == StageKind::Finer;
+  return kind == StageKind::Fine || kind == StageKind::Corrected || kind == StageKind::OffScan ||
+         kind == StageKind::Finer;
 }
 
 int counted_iterations(const StageRecord& record) { return record.id.kind == StageKind::Pulls ? 0 : record.iterations; }
@@ -75,7 +77,7 @@ PassState begun_from(const PassState& state) {
     if (r.id.kind == StageKind::Fine || r.id.kind == StageKind::Corrected) begun.begin->stage = r.id.number;
   std::erase_if(begun.done, [](const StageRecord& r) {
     return is_on_full_grid(r.id.kind) || r.id.kind == StageKind::Pulls || r.id.kind == StageKind::Alternative ||
-           r.id.kind == StageKind::Resolution;
+           r.id.kind == StageKind::ScanErrors || r.id.kind == StageKind::Resolution;
   });
   return begun;
 }
@@ -104,6 +106,7 @@ std::vector<StageChain> FitPlan::next(const PassState& state) const {
   if (StageChain chain = left_of(corrected(done, state.begin), done); !chain.empty()) return {chain};
   if (has_failed(done, StageKind::Corrected)) return {};
   if (const StageRecord* at = estimate(done); at && facts_.limits.ends_if_unexplained && !at->is_explained) return {};
+  if (StageChain chain = off_scan(done); !chain.empty()) return {chain};
   if (StageChain chain = finer(done); !chain.empty()) return {chain};
   if (std::vector<StageChain> left = alternatives(done); !left.empty()) return left;
   return resolution(done);
@@ -300,6 +303,34 @@ StageChain FitPlan::corrected(const Records& done, const std::optional<PassState
   return {stage};
 }
 
+/// Looks at the scan's errors and estimates off it in turns, until a look shows none that are worth it: the differences
+/// of models are taken about the last estimate.
+StageChain FitPlan::off_scan(const Records& done) const {
+  constexpr int most_estimates = 2;
+  if (!facts_.looks_at_scan_errors) return {};
+  const FitOptions& options = facts_.options;
+  for (int i = 0; const StageRecord* at = estimate(done); ++i) {
+    Stage look{{StageKind::ScanErrors, at->id.start, i}, "errors of the scan", {options.cells, options.steps}};
+    Stage off{{StageKind::OffScan, at->id.start, i}, "off the scan", {options.cells, options.steps}};
+    const StageRecord *looked = find_record(done, look.id), *ended = find_record(done, off.id);
+    look.change = surface(done);
+    look.band = off.band = options.fine_band;
+    look.free = off.free = free_at_last(done);
+    look.done_from = look.done_to = off.done_from = off.done_to = 1.0;
+    look.from = {at->theta};
+    if (!looked) return {look};
+    if (!looked->converged || i >= most_estimates || (ended && !ended->succeeded)) return {};
+    if (ended) continue;
+    off.change.scan_errors = looked->scan_errors;
+    off.iterations = options.max_iterations;
+    off.iterations_before = iterations_on_full_grid(done);
+    off.give_up_above = at->cost + prior_of_scan_errors(at->scan_errors) - prior_of_scan_errors(looked->scan_errors);
+    off.from = {at->theta, looked->theta};
+    return {off};
+  }
+  return {};
+}
+
 /// The next repetition, from where the one before ended.
 StageChain FitPlan::finer(const Records& done) const {
   const StageRecord* before = estimate(done);
@@ -322,6 +353,8 @@ StageChain FitPlan::finer(const Records& done) const {
     stage.free = free_at_last(done);
     StageChain chain;
     if (!names(is_pull).empty()) chain.push_back(pulls(before->theta, grid, int(i) + 1));
+    for (Stage& s : chain) s.change = surface(done);
+    stage.change = surface(done);
     chain.push_back(std::move(stage));
     if (chain.front().from.empty()) chain.front().from = {before->theta};
     chain.front().iterations_before = iterations_on_full_grid(done);
@@ -343,6 +376,8 @@ std::vector<StageChain> FitPlan::alternatives(const Records& done) const {
     stage.band = facts_.options.fine_band;
     stage.free = free_at_last(done);
     stage.alternative = a;
+    stage.change = a.change;
+    stage.change.scan_errors = surface(done).scan_errors;
     stage.done_from = stage.done_to = 1.0;
     if (find_record(done, stage.id) || (a.beside_the_first && !first)) continue;
     stage.from = {a.beside_the_first ? first->theta : at->theta};
@@ -359,6 +394,7 @@ std::vector<StageChain> FitPlan::resolution(const Records& done) const {
   const bool has_failed = find_record(done, {StageKind::Finer, at->id.start, int(next)});
   if (next >= facts_.repetitions.size() || has_failed || find_record(done, stage.id)) return {};
   stage.band = facts_.options.fine_band;
+  stage.change = surface(done);
   stage.free = free_at_last(done);
   stage.from = {at->theta};
   stage.done_from = stage.done_to = 1.0;
@@ -470,9 +506,18 @@ const StageRecord* FitPlan::narrow(const Records& done) const {
 }
 
 const StageRecord* FitPlan::estimate(const Records& done) const {
+  const StageRecord* off = nullptr;
+  for (const StageRecord& r : done)
+    if (r.id.kind == StageKind::OffScan && r.succeeded) off = &r;
+  if (off) return off;
   const auto it = std::ranges::find(done, StageKind::Corrected, [](const StageRecord& r) { return r.id.kind; });
   if (it != done.end()) return it->succeeded ? &*it : nullptr;
   return narrow(done);
+}
+
+ModelChange FitPlan::surface(const Records& done) const {
+  const StageRecord* at = estimate(done);
+  return {.scan_errors = at ? at->scan_errors : std::vector<double>()};
 }
 
 std::vector<const StageRecord*> FitPlan::repetitions(const Records& done) const {

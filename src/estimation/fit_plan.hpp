@@ -25,15 +25,16 @@ struct PlanFacts {
   bool coarse_is_as_fine = false;          ///< its elements are those of the full grid
   std::vector<Spacing> repetitions;        ///< on finer grids, after the first estimate
   bool repeats_by_need = false;            ///< each only where a look at the resolution asks for it
+  bool looks_at_scan_errors = false;       ///< some scan errs, and estimates are made off it where that shows
   std::vector<Alternative> alternatives;   ///< models that are tried at the last estimate
 };
 
 /// The stages of a fit of motions and equilibria: where sensors stand, by an object that still is as it was scanned;
 /// how it moves at first; the swing that was seen, or a scan over decades of Young's modulus; the best values followed
 /// on the coarse grid, wide band, horizon growing as the early frames match; the best of them on the full grid, first
-/// in the wide band; a test of which corrections the residuals ask for, and the estimate with them; repetitions on
-/// finer grids; a few steps under each of some alternative models; where these show that the mesh matters, repetitions
-/// on finer ones within the budget.
+/// in the wide band; a test of which corrections the residuals ask for, and the estimate with them; looks at the errors
+/// of the scan, and estimates off it where they show; repetitions on finer grids; a few steps under each of some
+/// alternative models; where these show that the mesh matters, repetitions on finer ones within the budget.
 class FitPlan {
  public:
   explicit FitPlan(PlanFacts facts) : facts_(std::move(facts)) {}
@@ -54,6 +55,8 @@ class FitPlan {
   std::vector<FitStart> starts(const std::vector<StageRecord>& done) const;
   /// The parameters that are estimated at last, with the corrections that were found to be needed.
   ParameterSet estimated(const std::vector<StageRecord>& done) const;
+  /// How the model of the estimate differs from one on the scan.
+  ModelChange surface(const std::vector<StageRecord>& done) const;
   /// The first estimate, before any repetition, and the repetitions that succeeded; null where there is none.
   const StageRecord* estimate(const std::vector<StageRecord>& done) const;
   std::vector<const StageRecord*> repetitions(const std::vector<StageRecord>& done) const;
@@ -83,6 +86,7 @@ class FitPlan {
   StageChain fine(const Records& done, const std::optional<PassState::Beginning>& begin) const;
   Stage test(const StageRecord& estimate) const;
   StageChain corrected(const Records& done, const std::optional<PassState::Beginning>& begin) const;
+  StageChain off_scan(const Records& done) const;
   StageChain finer(const Records& done) const;
   std::vector<StageChain> alternatives(const Records& done) const;
   /// A look at whether the next repetition is needed; none where they are not by need, or one has failed.

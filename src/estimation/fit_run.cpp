@@ -15,6 +15,7 @@
 #include "estimation/judgement.hpp"
 #include "estimation/load_free.hpp"
 #include "estimation/notes.hpp"
+#include "estimation/scan_errors.hpp"
 #include "estimation/verdict.hpp"
 
 namespace pliant {
@@ -47,7 +48,9 @@ constexpr double most_cells = 64.0;  // along the object's longest axis
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
 constexpr int few_iterations = 2, many_iterations = 5;
-constexpr int smooth_scan_errors = 2, uneven_objects = 3;
+constexpr int uneven_objects = 3;
+constexpr double width_of_scan_errors =
+    0.5;  // of a coefficient: differences by it are those of the least changes that show
 constexpr int trials_after_rejection = 3;  // costs alone are a third of the work, and two threads share them
 
 }  // namespace
@@ -148,6 +151,7 @@ PlanFacts FitRun::facts(const PassLimits& limits) {
   f.repetitions = refined_spacings({options_.cells, options_.steps}, options_.refine, recordings_.any_meshed_here(),
                                    !recordings_.all_static());
   if (options_.alternatives) f.alternatives = alternatives();
+  f.looks_at_scan_errors = options_.alternatives && recordings_.any_scan_errs();
   f.repeats_by_need =
       options_.refine == 1 && options_.alternatives && options_.budget > 0.0 && recordings_.any_meshed_here();
   for (double cells = options_.cells * Refinement::mesh_ratio; f.repeats_by_need && cells <= most_cells;
@@ -163,7 +167,7 @@ PlanFacts FitRun::facts(const PassLimits& limits) {
 }
 
 /// Each stands for what is known to differ between a model and what is recorded: its mesh and time step, the law at
-/// large strain, how thick the object is where its scan errs, and what the capture gives.
+/// large strain, how evenly stiff the object is, and what the capture gives.
 std::vector<Alternative> FitRun::alternatives() const {
   const bool is_static = recordings_.all_static();
   std::vector<Alternative> all;
@@ -184,22 +188,6 @@ std::vector<Alternative> FitRun::alternatives() const {
                    judgement.size_of_longer_step,
                    false,
                    few_iterations});
-  if (recordings_.any_scan_errs()) {
-    // Stiffness goes at most with the fourth power of a thickness, of which both sides err. A few steps to where an
-    // impact is another one tell less well than that.
-    double most = 0.0;
-    for (const Recording& r : recordings_.all()) most = std::max(most, 4.0 * 2.0 * r.scan_error / r.thickness);
-    const auto add = [&](int realisation, double share_of_variance) {
-      Alternative errs{cause_scan, cells, 1.0, {.scan_error = realisation}};
-      errs.size = std::sqrt(share_of_variance) / part_of_scan_error;
-      errs.most = std::sqrt(share_of_variance) * most;
-      errs.beside_the_first = has_coarser, errs.iterations = many_iterations;
-      all.push_back(std::move(errs));
-    };
-    add(common_scan_error, 0.5);
-    for (int realisation = 1; realisation <= smooth_scan_errors; ++realisation)
-      add(realisation, 0.5 / smooth_scan_errors);
-  }
   // An impact shakes all of an object, and few steps tell poorly what unevenness changes there: 0.3, 0.9, 2, 5 and 12 %
   // were found of five recordings, by a fifth more time. What hangs or swings feels what is near its clamp.
   const bool meets_nothing =
@@ -235,7 +223,7 @@ std::vector<StageChain> FitRun::next() {
   std::vector<StageChain> chains = plan_.next(state_);
   ended_before_ = state_.done;  // what stages beside each other may know of others
   const bool at_alternatives = !chains.empty() && chains.front().front().alternative;
-  if (at_alternatives) (void)grid(plan_.spacing_of(*plan_.result(state_.done)));  // that of the estimate
+  if (at_alternatives) (void)grid(plan_.spacing_of(*plan_.result(state_.done)), plan_.surface(state_.done));
   if (at_alternatives && !grids_of_fit_) grids_of_fit_ = grids_.size();
   if (!at_alternatives && grids_of_fit_) {  // those of alternatives are not used again
     grids_.resize(*grids_of_fit_);
@@ -247,14 +235,14 @@ std::vector<StageChain> FitRun::next() {
 }
 
 void FitRun::make_grid(const Stage& stage) {
-  if (!stage.alternative) {
-    (void)grid(stage.grid);
+  if (!stage.alternative && stage.id.kind != StageKind::OffScan) {
+    (void)grid(stage);
     return;
   }
   try {
-    (void)grid(stage.grid, stage.alternative->change);
-  } catch (const InputError& error) {  // no mesh as fine, or too small an object
-    not_made_[stage.id.number] = error.what();
+    (void)grid(stage);
+  } catch (const InputError& error) {  // no mesh as fine, too small an object, or one too thin for such errors
+    not_made_[stage.id] = error.what();
   }
 }
 
@@ -268,6 +256,8 @@ StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
       return find_pulls(stage, is_cut);
     case StageKind::Test:
       return test_corrections(stage);
+    case StageKind::ScanErrors:
+      return look_at_scan_errors(stage);
     case StageKind::Alternative:
       return try_alternative(stage, is_cut);
     case StageKind::Resolution:
@@ -282,7 +272,7 @@ PassState FitRun::reached() const {
   PassState reached = state_;
   for (const StageRecord& r : partial_)
     if (r.id.kind != StageKind::Scan && r.id.kind != StageKind::Finer && r.id.kind != StageKind::Alternative &&
-        r.id.kind != StageKind::Resolution)
+        r.id.kind != StageKind::ScanErrors && r.id.kind != StageKind::OffScan && r.id.kind != StageKind::Resolution)
       reached.done.push_back(r);
   return reached;
 }
@@ -318,10 +308,16 @@ VectorX FitRun::pose_of(const Stage& stage) const {
   return record ? record->theta : VectorX();
 }
 
-Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const {
+Objective FitRun::objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid,
+                               bool keeps_rows) const {
   return recordings_.objective(
       grid, parameters,
-      {stage.band, [&](const Recording& r) { return last_frame(stage.horizon, r); }, pose_of(stage), stage.by_pose},
+      {stage.band,
+       [&](const Recording& r) { return last_frame(stage.horizon, r); },
+       pose_of(stage),
+       stage.by_pose,
+       {},
+       keeps_rows},
       [this] { return !stages_are_over_ && monitor_.is_asked_to_stop(); }, monitor_.processes);
 }
 
@@ -384,11 +380,29 @@ VectorX FitRun::with_tried_moduli(Objective& objective, VectorX p, double& work)
   return p;
 }
 
+/// Of the places where a stage may begin the one of the least cost.
+VectorX FitRun::best_of(const Stage& stage) {
+  const VectorX* best = &stage.from.front();
+  double least = infinite;
+  for (const VectorX& theta : stage.from) {
+    if (stage.from.size() == 1) break;
+    const ParameterSet parameters = parameters_of(stage, theta);
+    const CostEvaluation e = objective_of(stage, parameters, grid(stage)).evaluate(parameters.to_unconstrained(theta));
+    if (e.succeeded && e.cost < least) least = e.cost, best = &theta;
+  }
+  return *best;
+}
+
 StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
+  if (const auto failure = not_made_.find(stage.id); failure != not_made_.end()) {
+    StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
+    record.reason = failure->second;
+    return record;
+  }
   const StageUnderWay* left = under_way(stage.id);
-  const VectorX from = left ? left->from : stage.from.front();
+  const VectorX from = left ? left->from : best_of(stage);
   const ParameterSet parameters = parameters_of(stage, from);
-  Objective objective = objective_of(stage, parameters, grid(stage.grid));
+  Objective objective = objective_of(stage, parameters, grid(stage));
   Stage own = stage;
   own.from = {from};
   OptimiserState begin = left && left->optimiser.p.size() > 0 ? left->optimiser : start_of(parameters);
@@ -399,6 +413,7 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
   is_cut = s.interrupted && !joined;
   StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = s.succeeded, record.converged = s.converged, record.reason = s.reason;
+  record.scan_errors = stage.change.scan_errors;
   if (joined) record.joined = joined, record.reason = "came into the valley of start " + std::to_string(*joined + 1);
   record.iterations = s.iterations, record.work = tried + s.work;
   record.start_cost = s.start_cost, record.cost = s.succeeded ? s.evaluation.cost : infinite;
@@ -407,7 +422,7 @@ StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
     record.reason = s.evaluation.failure = "the cost falls by too little to be followed further";
   }
   if (s.succeeded) record.misfit = misfit_of(s.evaluation), record.is_explained = is_explained(s.evaluation);
-  record.elements = grid(stage.grid).recording.front().body->element_count();
+  record.elements = grid(stage).recording.front().body->element_count();
   if (s.succeeded) record.theta = parameters.to_theta(s.p);
   if (is_on_full_grid(stage.id.kind))
     record.evaluation = std::make_shared<const CostEvaluation>(std::move(s.evaluation));
@@ -426,7 +441,7 @@ StageRecord FitRun::find_pulls(const Stage& stage, bool& is_cut) {
       if (by_pose && !is_registered) continue;
       part.by_pose = by_pose;
       const ParameterSet pulls = parameters_of(part, theta);
-      Objective objective = objective_of(part, pulls, grid(part.grid));
+      Objective objective = objective_of(part, pulls, grid(part));
       OptimiserOptions o;
       o.max_iterations = part.iterations;
       s = minimise(objective, start_of(pulls), o, [&](const Iteration&) { return !is_interrupted(); });
@@ -445,7 +460,7 @@ StageRecord FitRun::find_pulls(const Stage& stage, bool& is_cut) {
 StageRecord FitRun::find_swing(const Stage& stage) {
   StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
   record.succeeded = true;
-  if (auto found = seen_swing(recordings_, plan_.facts(), grid(stage.grid), stage.from.front())) {
+  if (auto found = seen_swing(recordings_, plan_.facts(), grid(stage), stage.from.front())) {
     record.converged = true;
     record.theta = std::move(found->theta);
     record.told = std::move(found->told);
@@ -489,7 +504,7 @@ StageRecord FitRun::scan(const Stage& stage, bool& is_cut) {
   StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
   record.succeeded = true;
   const VectorX& theta = stage.from.front();
-  Objective objective = objective_of(stage, parameters_of(stage, theta), grid(stage.grid));
+  Objective objective = objective_of(stage, parameters_of(stage, theta), grid(stage));
   const ParameterSet moduli = moduli_alone(plan_.facts().parameters, theta);
   objective.set_parameters(moduli);
   std::vector<VectorX> trials, points;
@@ -544,7 +559,7 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
   for (const Correction& c : possible)
     for (const std::string& name : c.parameters) with_all.set_estimated(name, true);
   with_all.set_reference(theta);
-  Objective objective = objective_of(stage, with_all, grid(stage.grid));
+  Objective objective = objective_of(stage, with_all, grid(stage));
   const CostEvaluation e = objective.linearise(with_all.to_unconstrained(theta));
   record.work = e.work;
   if (!e.succeeded) return record;
@@ -555,6 +570,62 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
   return record;
 }
 
+/// One Gauss-Newton step of the estimate and the scan's errors together; what the latter leave open moves the estimate.
+StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
+  constexpr double worth = 0.5;  // a standard deviation of what is estimated and of the errors together
+  const VectorX& theta = stage.from.front();
+  StageRecord record{stage.id, stage.name, theta, theta};
+  record.succeeded = true;
+  const ParameterSet parameters = parameters_of(stage, theta);
+  const VectorX p = parameters.to_unconstrained(theta);
+  const CostEvaluation e = objective_of(stage, parameters, grid(stage), true).linearise(p);
+  record.work = e.work;
+  if (!e.succeeded) return record;
+  std::vector<double> coefficients = stage.change.scan_errors;
+  coefficients.resize(ScanErrors::count);
+  // What moves with the surface is seen on a coarser mesh as well, for a third of the work.
+  const bool has_coarser = recordings_.any_meshed_here() && !recordings_.all_static();
+  const double cells = stage.grid.cells / (has_coarser ? Refinement::mesh_ratio : 1.0);
+  std::vector<CostEvaluation> moved(coefficients.size() + 1);  // the last one is not
+  const auto evaluate = [&](std::size_t k) {
+    ModelChange change = stage.change;
+    change.scan_errors = coefficients;
+    if (k < coefficients.size()) change.scan_errors[k] += width_of_scan_errors;
+    try {
+      const Grid there = recordings_.grid(cells, stage.grid.steps, change);
+      moved[k] = objective_of(stage, parameters, there, true).evaluate(p);
+    } catch (const InputError& error) {
+      moved[k].failure = error.what();
+    }
+  };
+  if (monitor_.has_others())  // what they exchange has an order
+    for (std::size_t k = 0; k < moved.size(); ++k) evaluate(k);
+  else
+    parallel_tasks(moved.size(), evaluate);
+  for (const CostEvaluation& m : moved) record.work += m.work;
+  if (!moved.back().succeeded) return record;
+  const ScanErrorStep step =
+      scan_error_step(e, moved.back(), std::span(moved).first(coefficients.size()), width_of_scan_errors, coefficients);
+  record.cost = e.cost;
+  record.converged = step.promise > worth;
+  record.scan_errors = step.coefficients;
+  record.theta = parameters.to_theta(parameters.clamp(p + step.shift.cwiseMax(-largest_shift).cwiseMin(largest_shift)));
+  // Stiffness goes at most with the fourth power of a thickness, of which both sides err. Differences about an impact
+  // tell less well than that.
+  double most = 0.0;
+  for (const Recording& r : recordings_.all()) most = std::max(most, 4.0 * 2.0 * r.scan_error / r.thickness);
+  MatrixX follows = step.follows.cwiseMax(-largest_shift).cwiseMin(largest_shift);
+  const std::vector<const Parameter*> coordinates = parameters.coordinate_parameters();
+  VectorX of_all = VectorX::Zero(follows.rows());
+  for (Eigen::Index i = 0; i < follows.rows(); ++i) of_all[i] = follows.row(i).norm();
+  follows *= share_within(of_all, coordinates, most);
+  for (Eigen::Index k = 0; k < follows.cols(); ++k) record.shifts.push_back({cause_scan, follows.col(k)});
+  const std::lock_guard lock(mutex_);
+  outcome_.forward_steps += e.steps;
+  for (const CostEvaluation& m : moved) outcome_.forward_steps += m.steps;
+  return record;
+}
+
 StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   const Alternative& alternative = *stage.alternative;
   const VectorX& from = stage.from.front();
@@ -562,7 +633,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = true;
   const ParameterSet parameters = parameters_of(stage, from);
-  if (const auto failure = not_made_.find(stage.id.number); failure != not_made_.end()) {
+  if (const auto failure = not_made_.find(stage.id); failure != not_made_.end()) {
     record.reason = failure->second;
     return record;
   }
@@ -570,7 +641,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
     record.shifts = shifts_of_given(stage, parameters, record.work);
     return record;
   }
-  Objective objective = objective_of(stage, parameters, grid(stage.grid, alternative.change));
+  Objective objective = objective_of(stage, parameters, grid(stage));
   const MovedEstimate moved =
       move_estimate(objective, parameters, alternative.iterations, [&] { return !is_interrupted(); });
   const OptimiserSummary& s = moved.summary;
@@ -596,7 +667,7 @@ std::vector<ModelShift> FitRun::shifts_of_given(const Stage& stage, const Parame
   const GivenScale scale = recordings_.given_scale();
   ParameterSet all = with_given(estimated, given);
   if (scale.deviation > 0.0) all = with_strengths_of_gravity(all);
-  Objective objective = objective_of(stage, all, grid(stage.grid));
+  Objective objective = objective_of(stage, all, grid(stage));
   const CostEvaluation e = objective.linearise(all.to_unconstrained(all.reference()));
   work = e.work;
   return e.succeeded ? pliant::shifts_of_given(e, all, given, scale) : std::vector<ModelShift>{};

@@ -34,10 +34,12 @@ class FitRun : StageLoop {
   std::vector<StageChain> next() override;
   StageRecord run_stage(const Stage& stage, bool& is_cut) override;
   StageRecord minimise_stage(const Stage& stage, bool& is_cut);
+  VectorX best_of(const Stage& stage);
   StageRecord find_pulls(const Stage& stage, bool& is_cut);
   StageRecord find_swing(const Stage& stage);
   StageRecord scan(const Stage& stage, bool& is_cut);
   StageRecord test_corrections(const Stage& stage);
+  StageRecord look_at_scan_errors(const Stage& stage);
   StageRecord look_at_resolution(const Stage& stage);
   std::optional<VectorX> mesh_shift(const std::vector<StageRecord>& done, const VectorX& own) const;
   /// The least cost that is found where each modulus in turn is several times smaller or larger.
@@ -52,9 +54,11 @@ class FitRun : StageLoop {
   ParameterSet parameters_of(const Stage& stage, const VectorX& theta) const;
   /// Parameters that hold released objects in the pose in which a stage has them start; empty: those of the stage do.
   VectorX pose_of(const Stage& stage) const;
-  Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid) const;
+  Objective objective_of(const Stage& stage, const ParameterSet& parameters, const Grid& grid,
+                         bool keeps_rows = false) const;
   const Grid& grid(const Spacing& spacing, const ModelChange& change = {});
-  /// Makes a stage's grid; an alternative's that cannot be made is told by the stage.
+  const Grid& grid(const Stage& stage) { return grid(stage.grid, stage.change); }
+  /// Makes a stage's grid; one of an alternative or of a surface off the scan that cannot be made is told by the stage.
   void make_grid(const Stage& stage);
 
   void tell(FitEvent event);
@@ -81,7 +85,8 @@ class FitRun : StageLoop {
   /// @param stage  of the same grid and band as the estimate's
   CostEvaluation linearised_at(const StageRecord& estimate, const Stage& stage, const ParameterSet& parameters);
   void say_doubts_of_time(const Stage& narrow, const ParameterSet& parameters);
-  void say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate);
+  void say_corrections(const std::vector<StageRecord>& done);
+  void say_scan_errors(const std::vector<StageRecord>& done, const StageRecord& estimate);
   const StageRecord& refined(const std::vector<StageRecord>& done, const StageRecord& first);
   std::vector<Alternative> alternatives() const;
   /// By how much the estimate would move under each alternative that could be tried.
@@ -95,7 +100,7 @@ class FitRun : StageLoop {
   std::shared_ptr<const ParameterLayout> layout_;
   std::vector<std::unique_ptr<Grid>> grids_;
   std::optional<std::size_t> grids_of_fit_;  // how many there were before the alternatives'
-  std::map<int, std::string> not_made_;      // why, by the alternative's number
+  std::map<StageId, std::string> not_made_;  // why
   FitPlan plan_;
   std::vector<StageRecord> ended_before_;  // the chains that run side by side
   bool has_looked_last_ = false;           // at what an interrupted fit has reached

@@ -55,7 +55,7 @@ StageRecord FitRun::last_look(const PassState& at) {
   record.reason = "interrupted";
   constexpr double at_most = 0.25;                                         // minutes: who interrupts does not wait
   const bool has_begun = left || find_record(at.done, {StageKind::Fine});  // many simulations came before
-  if (!has_begun && work_of_a_look(grid(stage.grid)) > at_most * work_of_a_minute) {
+  if (!has_begun && work_of_a_look(grid(stage)) > at_most * work_of_a_minute) {
     record.cost = infinite;
     record.reason = fmt::format(
         "interrupted before the first estimate on the full mesh, where one simulation takes long; Young's modulus was "
@@ -67,10 +67,10 @@ StageRecord FitRun::last_look(const PassState& at) {
     return record;
   }
   const ParameterSet parameters = parameters_of(stage, theta);
-  CostEvaluation e = objective_of(stage, parameters, grid(stage.grid)).evaluate(parameters.to_unconstrained(theta));
+  CostEvaluation e = objective_of(stage, parameters, grid(stage)).evaluate(parameters.to_unconstrained(theta));
   record.succeeded = e.succeeded;
   record.cost = e.succeeded ? e.cost : infinite;
-  record.elements = grid(stage.grid).recording.front().body->element_count();
+  record.elements = grid(stage).recording.front().body->element_count();
   record.evaluation = std::make_shared<const CostEvaluation>(std::move(e));
   return record;
 }
@@ -80,13 +80,14 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   std::ranges::stable_sort(outcome_.history, {},
                            [](const FitEvent& e) { return std::tuple(e.kind, e.start, e.iteration); });
   const StageRecord* first = plan_.estimate(done);
-  if (first) say_corrections(done, *first);
+  if (first) say_corrections(done);
   for (const StageRecord& r : done)
     if (r.id.kind == StageKind::Resolution && !r.told.empty()) outcome_.notes.push_back(r.told);
   const auto failed =
       std::ranges::find_if(done, [](const StageRecord& r) { return is_on_full_grid(r.id.kind) && !r.succeeded; });
   const StageRecord& last = first ? refined(done, *first) : *failed;
-  const Grid& at = grid(plan_.spacing_of(last));
+  const ModelChange surface = plan_.surface(done);
+  const Grid& at = grid(plan_.spacing_of(last), surface);
   ParameterSet parameters = plan_.estimated(done);
   parameters.set_reference(last.theta);
   outcome_.starts = plan_.starts(done);
@@ -100,7 +101,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   outcome_.parameters = recordings_.with_field_prior(parameters, at);
   outcome_.final_cost = last.cost;
   Stage narrow{last.id, last.name, plan_.spacing_of(last)};
-  narrow.band = options_.fine_band;
+  narrow.band = options_.fine_band, narrow.change = surface;
   if (last.succeeded || !interrupted_)
     outcome_.start_cost =
         objective_of(narrow, parameters_of(narrow, outcome_.start_theta), at).evaluate(VectorX(0)).cost;
@@ -114,6 +115,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   if (outcome_.evaluation.succeeded && has_derivatives && parameters.dimension() > 0)
     add_uncertainty(outcome_, shifts_in(done, gauss_newton_shift(outcome_.evaluation, largest_shift)),
                     floor(outcome_.parameters, outcome_.theta));
+  if (first) say_scan_errors(done, *first);
   say_untried(done);
   if (outcome_.evaluation.succeeded && !interrupted_) time_steps(narrow, parameters);
   if (const StageRecord* swing = find_record(done, {StageKind::Swing}); swing && !swing->told.empty())
@@ -135,7 +137,7 @@ void FitRun::say_doubts_of_time(const Stage& narrow, const ParameterSet& paramet
   const auto shifted = [&](int later) {
     Compared compared{options_.wide_band, [](const Recording& r) { return r.last_seen; }};
     compared.later = later;
-    return recordings_.objective(grid(narrow.grid), parameters, compared, {}, monitor_.processes)
+    return recordings_.objective(grid(narrow), parameters, compared, {}, monitor_.processes)
         .evaluate(parameters.to_unconstrained(parameters.reference()));
   };
   const CostEvaluation stated = shifted(0);
@@ -175,18 +177,39 @@ CostEvaluation FitRun::evaluation_of(const StageRecord& record, const Stage& nar
 CostEvaluation FitRun::linearised_at(const StageRecord& estimate, const Stage& stage, const ParameterSet& parameters) {
   if (estimate.evaluation && estimate.evaluation->gauss_newton.rows() == parameters.dimension())
     return *estimate.evaluation;
-  return objective_of(stage, parameters, grid(stage.grid)).linearise(parameters.to_unconstrained(estimate.theta));
+  return objective_of(stage, parameters, grid(stage)).linearise(parameters.to_unconstrained(estimate.theta));
 }
 
-void FitRun::say_corrections(const std::vector<StageRecord>& done, const StageRecord& estimate) {
+void FitRun::say_corrections(const std::vector<StageRecord>& done) {
   const StageRecord* test = find_record(done, {StageKind::Test});
-  if (!test || test->corrected.empty()) return;
+  const auto corrected = std::ranges::find(done, StageKind::Corrected, [](const StageRecord& r) { return r.id.kind; });
+  if (!test || test->corrected.empty() || corrected == done.end()) return;
   outcome_.notes.push_back(
       "The residuals showed that " + test->told +
       " needed correction, which was estimated along with the "
       "material: the cost fell from " +
-      in_three_digits(test->cost) + " to " + in_three_digits(estimate.cost) + ". Without it Young's modulus was " +
+      in_three_digits(test->cost) + " to " + in_three_digits(corrected->cost) + ". Without it Young's modulus was " +
       in_three_digits(test->theta[plan_.facts().moduli.front()]) + " Pa; correct = false leaves it so.");
+}
+
+void FitRun::say_scan_errors(const std::vector<StageRecord>& done, const StageRecord& estimate) {
+  const StageRecord* look = find_record(done, {StageKind::ScanErrors, estimate.id.start, 0});
+  if (estimate.id.kind != StageKind::OffScan || !look) return;
+  const TriangleMesh &scan = *recordings_.front().capture.scene.object.surface,
+                     &surface = outcome_.recordings.front().discretisation.surface.value();
+  double mean = 0.0, squares = 0.0;
+  const std::vector<Vector3> normals = vertex_normals(scan);
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    const double out = normals[v].dot(surface.vertices[v] - scan.vertices[v]);
+    mean += out / double(normals.size()), squares += out * out / double(normals.size());
+  }
+  outcome_.notes.push_back(fmt::format(
+      "The scan seems to err: the object's surface was found {:.2g} mm {} it in the mean and {:.2g} mm from it in the "
+      "root mean square, and the cost fell from {} to {}. On the scan Young's modulus was {} Pa; alternatives = false "
+      "leaves it so, and surface_noise of [object] says how well the scan is known.",
+      1e3 * std::abs(mean), mean > 0.0 ? "outside of" : "inside of", 1e3 * std::sqrt(squares),
+      in_three_digits(look->cost), in_three_digits(estimate.cost),
+      in_three_digits(look->from[plan_.facts().moduli.front()])));
 }
 
 /// Of the alternatives that could be tried, less that of the model that each stands beside: the fit's own, whose
@@ -216,6 +239,12 @@ std::vector<ModelShift> FitRun::shifts_in(const std::vector<StageRecord>& done, 
       shifts.push_back({s.cause, std::move(shift)});
     }
   }
+  const StageRecord* scan = nullptr;  // the last look
+  for (const StageRecord& r : done)
+    if (r.id.kind == StageKind::ScanErrors) scan = &r;
+  if (scan)
+    std::ranges::copy_if(scan->shifts, std::back_inserter(shifts),
+                         [&](const ModelShift& s) { return s.shift.size() == own.size(); });
   return shifts;
 }
 
@@ -258,7 +287,7 @@ const StageRecord& FitRun::refined(const std::vector<StageRecord>& done, const S
 
 void FitRun::time_steps(const Stage& narrow, const ParameterSet& parameters) {
   Objective objective = recordings_.objective(
-      grid(narrow.grid), parameters, {narrow.band, [](const Recording&) { return 20; }}, {}, monitor_.processes);
+      grid(narrow), parameters, {narrow.band, [](const Recording&) { return 20; }}, {}, monitor_.processes);
   const VectorX p = parameters.to_unconstrained(parameters.reference());
   auto begin = std::chrono::steady_clock::now();
   const CostEvaluation forward = objective.evaluate(p);

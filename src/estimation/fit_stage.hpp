@@ -26,6 +26,8 @@ enum class StageKind {
   Fine,           ///< the estimate on the full grid
   Test,           ///< which corrections the residuals ask for; no iterations
   Corrected,      ///< the estimate together with those
+  ScanErrors,     ///< by how much the scan seems to err, and whether that is worth an estimate; no iterations
+  OffScan,        ///< the estimate again with the surface where the scan's errors leave it
   Finer,          ///< the estimate again with finer steps or on a finer grid
   Alternative,    ///< a few steps from the estimate under another model
   Resolution,     ///< whether the next finer mesh is needed, and there is time for it; no iterations
@@ -62,10 +64,6 @@ struct Horizon {
   bool operator==(const Horizon&) const = default;
 };
 
-/// Of a scan's standard deviation, how far an object's surface lies beside it where that is tried: what follows is to
-/// first order as much larger, and an optimiser finds back from there at once.
-inline constexpr double part_of_scan_error = 0.25;
-inline constexpr int common_scan_error = -1;
 /// Of how much an object's stiffness varies, the part that is tried: estimates follow to first order.
 inline constexpr double part_of_unevenness = 0.5;
 
@@ -78,10 +76,8 @@ struct PassLimits {
 
 /// In what a model differs from the one that is fitted.
 struct ModelChange {
-  bool small_strain = false;  ///< corotated linear elasticity, and Rayleigh's damping
-  /// The object's surface lies beside its scan, by a part of what that errs: `common_scan_error` everywhere, from 1 on
-  /// a smooth realisation; 0: on it.
-  int scan_error = 0;
+  bool small_strain = false;             ///< corotated linear elasticity, and Rayleigh's damping
+  std::vector<double> scan_errors = {};  ///< of `ScanErrors`: the surface lies beside the scan; none: on it
   int unevenness = 0;  ///< a realisation of how stiffness varies over the object, from 1 on; 0: it is even
   bool operator==(const ModelChange&) const = default;
 };
@@ -105,6 +101,7 @@ struct Stage {
   StageId id;
   std::string name;  ///< for people
   Spacing grid;
+  ModelChange change = {};
   Horizon horizon = {};
   double band = 0.0;  ///< outlier scale, times the object's size
   int iterations = 0;
@@ -142,7 +139,8 @@ struct StageRecord {
   bool is_explained = true;             ///< of a minimisation: see `is_explained`
   int iterations = 0;
   bool succeeded = false;
-  /// Of a search for a swing: one was found; of a look at the resolution: the next finer mesh is made.
+  /// Of a search for a swing: one was found; of a look at the resolution: the next finer mesh is made; of one at the
+  /// scan's errors: they are worth an estimate.
   bool converged = false;
   std::string reason = {};         ///< why it ended
   int elements = 0;                ///< of the first recording's body
@@ -152,8 +150,10 @@ struct StageRecord {
   std::vector<std::pair<double, double>> trials = {};
   std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction
   std::string told = {};                    ///< for people: the swing that was found, what needs correction
-  std::vector<ModelShift> shifts = {};      ///< of an alternative: of the estimate
-  std::optional<LawFinding> law = {};       ///< of a search for the law of a pressed object
+  std::vector<ModelShift> shifts = {};      ///< of an alternative, or of errors of the scan: of the estimate
+  /// Of a look at the errors of the scan: what they seem to be; of an estimate off the scan: what they were taken for.
+  std::vector<double> scan_errors = {};
+  std::optional<LawFinding> law = {};  ///< of a search for the law of a pressed object
   /// Of a minimisation, at its end; null where another process made it: files do not keep it.
   std::shared_ptr<const CostEvaluation> evaluation = {};
 };

@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/20";
+constexpr const char* format = "fit-state/21";
 
 /// A type that is const or not: each list of members below is written and read by the same lines.
 template <class T, class Of>
@@ -49,7 +49,7 @@ void members(Is<StageRecord> auto& r, const Each& each) {
   each("is_explained", r.is_explained), each("iterations", r.iterations), each("succeeded", r.succeeded);
   each("converged", r.converged), each("reason", r.reason), each("elements", r.elements), each("work", r.work);
   each("joined", r.joined), each("trials", r.trials), each("corrected", r.corrected), each("told", r.told);
-  each("shifts", r.shifts), each("law", r.law);
+  each("shifts", r.shifts), each("law", r.law), each("scan_errors", r.scan_errors);
 }
 template <class Each>
 void members(Is<OptimiserState> auto& o, const Each& each) {

@@ -261,6 +261,11 @@ void MotionTrial::Comparison::add_distances(const std::vector<Distance>& distanc
     fit.gradient += J.transpose() * weighted;
     fit.gauss_newton += J.transpose() * weight.asDiagonal() * J;
   }
+  if (!motion_.options.keeps_rows) return;
+  VectorX residual = VectorX::Zero(count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    if (distances[std::size_t(i)].is_matched) residual[i] = distances[std::size_t(i)].value;
+  fit.rows.push_back({std::move(residual), std::move(weight), std::move(J)});
 }
 
 VectorX MotionTrial::Comparison::distance_bars(const std::vector<Distance>& distances, double share,
@@ -430,6 +435,11 @@ CostEvaluation MotionTrial::Comparison::run(const VectorX& theta, const MatrixX&
     MatrixX matrix = MatrixX::Zero(n, n);
     if (!columns.empty()) gradient(columns) = fit.gradient, matrix(columns, columns) = fit.gauss_newton;
     fit.gradient = std::move(gradient), fit.gauss_newton = std::move(matrix);
+    for (ResidualRows& rows : fit.rows) {
+      MatrixX J = MatrixX::Zero(rows.residual.size(), n);
+      J(Eigen::all, columns) = rows.J;
+      rows.J = std::move(J);
+    }
   }
   evaluation.frames = std::move(fits);
   return evaluation.succeeded = true, evaluation;

@@ -49,6 +49,7 @@ struct ObjectiveOptions {
   double independent_points = judgement.independent_points;
   /// Of an object that stands still as it was scanned there is no model to err.
   double independent_points_at_rest = judgement.independent_points_at_rest;
+  bool keeps_rows = false;  ///< evaluations have the residuals by themselves: `FrameFit::rows`
   /// Asked at each frame whether the work is to end; may be empty.
   std::function<bool()> interrupted = {};
 };

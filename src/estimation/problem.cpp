@@ -91,7 +91,7 @@ Mismatch make_mismatch(const Capture& capture, const std::shared_ptr<const Signe
     mismatch.surface =
         std::make_shared<SurfaceConstraints>(body, distance, resolution.band * size, size / resolution.cells);
   if (!capture.silhouettes.empty())
-    mismatch.outlines = std::make_shared<OutlineConstraints>(*body, *capture.scene.object.surface,
+    mismatch.outlines = std::make_shared<OutlineConstraints>(*body, surface_of(capture.scene, resolution),
                                                              size / resolution.cells, resolution.band * size);
   if (!tracked.empty()) mismatch.tracks = std::make_shared<PointTracks>(*body, tracked);
   mismatch.centre = centre_of(*capture.scene.object.surface);
@@ -103,13 +103,18 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
                           const VectorX& parameters, const SimulationOptions& settings,
                           const std::vector<Vector3>& tracked) {
   Discretisation d;
-  d.distance = std::move(distance);
+  if (resolution.offset) d.surface = surface_of(capture.scene, resolution);
+  d.distance = distance_of(capture.scene, std::move(distance), resolution);
   d.body = std::move(body);
   d.mismatch = make_mismatch(capture, d.distance, d.body, resolution, tracked);
   d.mismatch.sensors = blocks.sensors;
   d.simulation = make_simulation(capture.scene, *d.body, resolution, blocks.motion, parameters, settings);
   if (blocks.law) d.simulation.material.elastic = *blocks.law;
   return d;
+}
+
+const TriangleMesh& surface_of(const Capture& capture, const Discretisation& discretisation) {
+  return discretisation.surface ? *discretisation.surface : *capture.scene.object.surface;
 }
 
 std::vector<std::string> sensor_names(const Capture& capture) {

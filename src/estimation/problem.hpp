@@ -19,7 +19,12 @@ struct Discretisation {
   Mismatch mismatch;
   std::vector<Vector3> control_points;  ///< of the field of moduli; empty: homogeneous, or regions
   SimulationOptions simulation;
+  std::optional<TriangleMesh> surface =
+      {};  ///< of the object, where that is off its scan; none: the scan is the surface
 };
+
+/// The object's surface in a model of a capture.
+const TriangleMesh& surface_of(const Capture& capture, const Discretisation& discretisation);
 
 /// Signed distance of the capture's surface, fine enough for every resolution.
 /// Throws InputError where the capture has no surface.

@@ -14,6 +14,7 @@
 #include "estimation/fit_config.hpp"
 #include "estimation/judgement.hpp"
 #include "estimation/press_objective.hpp"
+#include "estimation/scan_errors.hpp"
 #include "estimation/sensor_poses.hpp"
 #include "geometry/mesh_io.hpp"
 #include "geometry/random_field.hpp"
@@ -79,13 +80,6 @@ double unevenness(const Capture& capture, int controls) {
 }
 
 constexpr double stiffness_alike = 0.25;  // of the object's size: over so far stuffing and foam are as stiff
-
-/// A realisation of a scan's error along its normals [m]: one that the whole surface has in common, or a smooth one.
-std::function<double(const Vector3&)> scan_error_field(double deviation, double size, int realisation) {
-  constexpr double alike = 0.1;  // of the object's size: over so far are smooth errors alike
-  if (realisation == common_scan_error) return [deviation](const Vector3&) { return deviation; };
-  return RandomField(deviation, alike * size, std::uint64_t(realisation));
-}
 
 /// What was seen under a load, as the one frame of a recording.
 LoadCase load_case(const Capture& capture, const Load& load, int points) {
@@ -461,8 +455,8 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
   Grid grid{cells, steps, change, {}, {}};
   for (const Recording& r : all_) {
     Resolution own = resolution(cells, steps);
-    if (change.scan_error != 0 && r.scan_error > 0.0)
-      own.offset = scan_error_field(part_of_scan_error * r.scan_error, r.size, change.scan_error);
+    if (!change.scan_errors.empty() && r.scan_error > 0.0)
+      own.offset = ScanErrors(*r.capture.scene.object.surface, r.scan_error, r.size, change.scan_errors);
     if (change.unevenness != 0 && r.unevenness > 0.0)
       own.unevenness =
           RandomField(part_of_unevenness * r.unevenness, stiffness_alike * r.size, std::uint64_t(change.unevenness));
@@ -504,6 +498,7 @@ Objective Recordings::objective(const Grid& grid, const ParameterSet& parameters
     o.outlier_scale = compared.band * r.size;
     o.last_frame = std::min(r.last_frame, compared.last_frame(r));
     o.interrupted = interrupted;
+    o.keeps_rows = compared.keeps_rows;
     options.push_back(o);
     ObservedMotion motion{d.mismatch, d.body, d.simulation, r.observations, o};
     if (compared.later && !d.simulation.is_static) compare_later(r, *compared.later, motion);

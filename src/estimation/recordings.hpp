@@ -61,6 +61,7 @@ struct Compared {
   bool by_pose = false;  ///< the first frame of released objects by where they were registered, if they were
   /// Frames by which all that was seen of a motion is taken later than stated; nothing: as stated, up to `last_frame`.
   std::optional<int> later = {};
+  bool keeps_rows = false;  ///< evaluations have the residuals by themselves
 };
 
 /// The recordings of one object side by side: they share its material, and each has its own start, planes and sensors.

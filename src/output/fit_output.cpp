@@ -186,7 +186,7 @@ Gallery gallery_of(const RecordedCapture& recorded_capture, const RecordingOutco
   std::vector<int> told;
   for (const int i : spread_frames(0, int(fitted.size()) - 1, 6)) told.push_back(fitted[std::size_t(i)].frame);
   if (told.empty()) return gallery;
-  const Embedding embedding(*d.body, capture.scene.object.surface->vertices);
+  const Embedding embedding(*d.body, surface_of(capture, d).vertices);
   const double start = capture.scene.timing.times[std::size_t(capture.scene.timing.start_frame)];
   Simulation simulation(d.body, d.simulation);
   simulation.run(outcome.theta, [&](int frame, const State& state, auto) {
@@ -497,7 +497,7 @@ void write_motion(const fs::path& folder, const std::vector<RecordedCapture>& re
   const RecordingOutcome& first = outcome.recordings.front();
   const auto elasticity = scene_elasticity(first.discretisation.body, first.discretisation.simulation);
   elasticity->set_parameters(first.theta);
-  FieldPictures fields(first.discretisation.body, *elasticity, *capture.scene.object.surface, modulus_std,
+  FieldPictures fields(first.discretisation.body, *elasticity, surface_of(capture, first.discretisation), modulus_std,
                        frames_at(first.discretisation.simulation.times, capture.scene.timing.start_frame));
   StrainRange strains(*first.discretisation.body);
   write_trajectory(

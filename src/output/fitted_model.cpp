@@ -81,7 +81,7 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   const MotionBlocks& blocks = d.simulation.blocks;
   Model model;
   model.name = capture.name;
-  TriangleMesh surface = *capture.scene.object.surface;
+  TriangleMesh surface = surface_of(capture, d);
   model.youngs_modulus = modulus.mean;
   model.poissons_ratio = t[blocks.poissons_ratio];
   if (const LawLayout* law = d.simulation.material.law_layout()) model.law = model_law(*law_at(*d.body, *law, t));
@@ -160,12 +160,28 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   return model;
 }
 
+namespace {
+
+/// Whether a surface has the vertices of a scan, no farther from it than a scan errs.
+bool is_same_scan(const TriangleMesh& scan, const TriangleMesh& surface) {
+  constexpr double errs = 0.03;  // of the size
+  const double most = errs * bounding_box(scan).extent().maxCoeff();
+  if (scan.vertices.size() != surface.vertices.size() || scan.triangles != surface.triangles) return false;
+  for (std::size_t v = 0; v < scan.vertices.size(); ++v)
+    if ((scan.vertices[v] - surface.vertices[v]).norm() > most) return false;
+  return true;
+}
+
+}  // namespace
+
 CaptureScene make_scene(const Model& model, const Capture& recorded) {
   Capture capture = recorded;
   if (capture.scene.object.shape_is == ShapeIs::Static) {  // the model's surface and mesh are stress-free already
     capture.scene.object.surface = model.scene.object.surface;
     capture.scene.object.shape_is = ShapeIs::Reference;
   }
+  if (is_same_scan(*capture.scene.object.surface, *model.scene.object.surface))  // off which the fit found it
+    capture.scene.object.surface = model.scene.object.surface;
   std::vector<Plane>& planes = capture.scene.planes;  // how they rub the model knows, where nobody said it
   for (std::size_t i = 0; i < std::min(planes.size(), model.scene.planes.size()); ++i)
     if (!planes[i].knows_friction) planes[i].friction = model.scene.planes[i].friction;

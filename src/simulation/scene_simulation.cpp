@@ -226,9 +226,7 @@ HexGrid hexahedra_of(const Scene& scene, const SignedDistance& distance, const R
 /// The body with its surface beside the scan but where it is held, on the same lattice or by the same elements; as
 /// heavy where the scene tells the mass.
 Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body& body, const Resolution& resolution) {
-  const auto offset = [&, holds = gripped_regions(scene)](const Vector3& p) {
-    return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); }) ? 0.0 : resolution.offset(p);
-  };
+  const auto offset = offset_of(scene, resolution);
   Body other;
   if (body.kind == ElementKind::Hexahedron) {
     const SignedDistance moved(distance.box(), distance.spacing(),
@@ -265,6 +263,29 @@ void make_uneven(Body& body, const std::function<double(const Vector3&)>& uneven
 }
 
 }  // namespace
+
+std::function<double(const Vector3&)> offset_of(const Scene& scene, const Resolution& resolution) {
+  return [offset = resolution.offset, holds = gripped_regions(scene)](const Vector3& p) {
+    return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); }) ? 0.0 : offset(p);
+  };
+}
+
+TriangleMesh surface_of(const Scene& scene, const Resolution& resolution) {
+  TriangleMesh surface = *scene.object.surface;
+  if (!resolution.offset) return surface;
+  const auto offset = offset_of(scene, resolution);
+  const std::vector<Vector3> normals = vertex_normals(surface);
+  for (std::size_t v = 0; v < normals.size(); ++v) surface.vertices[v] += offset(surface.vertices[v]) * normals[v];
+  return surface;
+}
+
+std::shared_ptr<const SignedDistance> distance_of(const Scene& scene, std::shared_ptr<const SignedDistance> scan,
+                                                  const Resolution& resolution) {
+  if (!resolution.offset) return scan;
+  const auto offset = offset_of(scene, resolution);
+  return std::make_shared<SignedDistance>(scan->box(), scan->spacing(),
+                                          [&](const Vector3& p) { return scan->value(p) - offset(p); });
+}
 
 std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
                                          const Resolution& resolution, std::vector<Vector3>& control_points) {

@@ -46,6 +46,15 @@ int control_count(const Scene& scene, int asked_for);
 /// The field of a body: of the scene's regions or control points, or as the options say where it names none.
 ControlledField modulus_field(const Body& body, const Scene& scene, const FieldOptions& options);
 
+/// By how far the surface of the object lies outside its scan at a place of it [m]: the resolution's offset, 0 where it
+/// is held.
+std::function<double(const Vector3&)> offset_of(const Scene& scene, const Resolution& resolution);
+/// The object's surface: its scan, or beside that by the resolution's offset along its normals.
+TriangleMesh surface_of(const Scene& scene, const Resolution& resolution);
+/// Signed distance of that surface, on the grid of the scan's.
+std::shared_ptr<const SignedDistance> distance_of(const Scene& scene, std::shared_ptr<const SignedDistance> scan,
+                                                  const Resolution& resolution);
+
 /// Longest edge of the surface's box [m].
 double object_size(const Scene& scene);
 

@@ -511,6 +511,44 @@ TEST_F(Plans, RepeatTheEstimateFinerOneAfterTheOther) {
   EXPECT_TRUE(next().empty());
 }
 
+TEST_F(Plans, EstimateOffTheScanUntilItsErrorsAreNotWorthIt) {
+  facts.options.correct = false;
+  facts.looks_at_scan_errors = true;
+  facts.repetitions = {{18.0, 1.0}};
+  facts.alternatives = {{"mesh", 1.0 / 1.5, 1.0, {}, false, 0.8}};
+  has_estimated();
+  const auto looks = next();
+  EXPECT_EQ(only(looks).id, (StageId{StageKind::ScanErrors}));
+  EXPECT_EQ(only(looks).change, ModelChange{});
+  StageRecord look = record(only(looks).id, 1.5, 460.0);
+  look.converged = true, look.scan_errors = {-1.0, 0.5};
+  has_done(look);
+  const auto estimates = next();
+  const Stage& off = only(estimates);
+  EXPECT_EQ(off.id, (StageId{StageKind::OffScan}));
+  EXPECT_EQ(off.change.scan_errors, look.scan_errors);
+  EXPECT_THAT(off.from, ElementsAre(theta(430.0), theta(460.0))) << "where it is, and where the step leads";
+  EXPECT_DOUBLE_EQ(off.give_up_above, 1.5 - 0.5 * (1.0 + 0.25)) << "what the errors are worth by themselves";
+  const PassState before = state;
+  has_done(record(off.id, infinite));
+  EXPECT_EQ(only(next()).name, "18 cells") << "the estimate on the scan stands";
+  EXPECT_EQ(only(next()).change, ModelChange{});
+  state = before;
+  StageRecord ended = record(off.id, 0.5, 450.0);
+  ended.scan_errors = look.scan_errors;
+  has_done(ended);
+  const auto again = next();
+  EXPECT_EQ(only(again).id, (StageId{StageKind::ScanErrors, 0, 1}));
+  EXPECT_EQ(only(again).from.front(), theta(450.0));
+  EXPECT_EQ(only(again).change.scan_errors, look.scan_errors);
+  has_done(record(only(again).id, 0.5));
+  EXPECT_EQ(only(next()).change.scan_errors, look.scan_errors) << "of the finer mesh";
+  EXPECT_EQ(only(next()).from.front(), theta(450.0));
+  has_done(record({StageKind::Finer, 0, 0}, 0.4, 455.0));
+  EXPECT_EQ(only(next()).id.kind, StageKind::Alternative);
+  EXPECT_EQ(only(next()).change.scan_errors, look.scan_errors);
+}
+
 TEST_F(Plans, RepeatTheEstimateByNeed) {
   facts.options.correct = false;
   facts.repetitions = {{18.0, 1.0}, {27.0, 1.0}};
