@@ -242,8 +242,13 @@ void FitRun::make_grid(const Stage& stage) {
   try {
     (void)grid(stage);
   } catch (const InputError& error) {  // no mesh as fine, too small an object, or one too thin for such errors
-    not_made_[stage.id] = error.what();
+    not_made_.emplace_back(stage.id, error.what());
   }
+}
+
+std::string FitRun::why_not_made(const Stage& stage) const {
+  const auto failure = std::ranges::find(not_made_, stage.id, &std::pair<StageId, std::string>::first);
+  return failure == not_made_.end() ? "" : failure->second;
 }
 
 StageRecord FitRun::run_stage(const Stage& stage, bool& is_cut) {
@@ -394,9 +399,9 @@ VectorX FitRun::best_of(const Stage& stage) {
 }
 
 StageRecord FitRun::minimise_stage(const Stage& stage, bool& is_cut) {
-  if (const auto failure = not_made_.find(stage.id); failure != not_made_.end()) {
+  if (const std::string why = why_not_made(stage); !why.empty()) {
     StageRecord record{stage.id, stage.name, stage.from.front(), stage.from.front()};
-    record.reason = failure->second;
+    record.reason = why;
     return record;
   }
   const StageUnderWay* left = under_way(stage.id);
@@ -633,10 +638,7 @@ StageRecord FitRun::try_alternative(const Stage& stage, bool& is_cut) {
   StageRecord record{stage.id, stage.name, from, from};
   record.succeeded = true;
   const ParameterSet parameters = parameters_of(stage, from);
-  if (const auto failure = not_made_.find(stage.id); failure != not_made_.end()) {
-    record.reason = failure->second;
-    return record;
-  }
+  if (record.reason = why_not_made(stage); !record.reason.empty()) return record;
   if (alternative.given) {
     record.shifts = shifts_of_given(stage, parameters, record.work);
     return record;

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <atomic>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimation/alternative.hpp"
@@ -60,6 +60,8 @@ class FitRun : StageLoop {
   const Grid& grid(const Stage& stage) { return grid(stage.grid, stage.change); }
   /// Makes a stage's grid; one of an alternative or of a surface off the scan that cannot be made is told by the stage.
   void make_grid(const Stage& stage);
+  /// Empty: it was made.
+  std::string why_not_made(const Stage& stage) const;
 
   void tell(FitEvent event);
 
@@ -99,8 +101,8 @@ class FitRun : StageLoop {
   Recordings recordings_;
   std::shared_ptr<const ParameterLayout> layout_;
   std::vector<std::unique_ptr<Grid>> grids_;
-  std::optional<std::size_t> grids_of_fit_;  // how many there were before the alternatives'
-  std::map<StageId, std::string> not_made_;  // why
+  std::optional<std::size_t> grids_of_fit_;                // how many there were before the alternatives'
+  std::vector<std::pair<StageId, std::string>> not_made_;  // why
   FitPlan plan_;
   std::vector<StageRecord> ended_before_;  // the chains that run side by side
   bool has_looked_last_ = false;           // at what an interrupted fit has reached

@@ -83,10 +83,10 @@ struct Judgement {
   Judged given_density{"interval.given.density", 0.01,
                        "deviation of the logarithm of a given density: a kitchen scale, and the volume of a scan"};
   Judged scan_error{
-      "interval.given.scan_error", 0.0035,
+      "interval.given.scan_error", 0.0025,
       "deviation of a scan along its normals where `surface_noise` is not stated, over the object's size: "
       "hand-held scanners and photogrammetry, and the cover of plush; half of the variance is common to all of it"};
-  Judged scan_error_of_thickness{"interval.given.scan_error_of_thickness", 0.04,
+  Judged scan_error_of_thickness{"interval.given.scan_error_of_thickness", 0.03,
                                  "the most of that over the object's thickness: what a scan shows at all"};
   Judged unevenness{"interval.given.unevenness", 0.08,
                     "deviation of the logarithm of the stiffness over an object of one material where `stiffness_std` "

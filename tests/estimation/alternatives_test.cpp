@@ -150,7 +150,7 @@ TEST(Alternatives, CountWhatAScanMayErrBy) {
   bar.capture.scene.object.surface_noise.reset();
   const FitOutcome unsaid = fit({bar}, options);
   ASSERT_NE(share(unsaid, cause_scan), nullptr);
-  EXPECT_NEAR(share(unsaid, cause_scan)->std[0], 1.4 * std[1], 0.05 * std[1]) << "0.35 % of 0.4 m are 1.4 mm";
+  EXPECT_NEAR(share(unsaid, cause_scan)->std[0], std[1], 1e-5) << "0.25 % of 0.4 m are a millimetre";
 }
 
 TEST(Alternatives, CountHowUnevenAnObjectMayBe) {

@@ -50,7 +50,7 @@ TEST(SceneSimulation, ASurfaceOffItsScanLiesBesideItButWhereItIsHeld) {
   const auto distance = distance_of(scene, scan, resolution);
   for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
     const Vector3& p = scene.object.surface->vertices[v];
-    const double out = p.x() < -0.05 ? 0.0 : 0.002 + 0.01 * p.y();
+    const double out = p.x() < -0.05 + 1e-9 ? 0.0 : 0.002 + 0.01 * p.y();
     EXPECT_NEAR(surface.vertices[v].norm(), p.norm() + out, 2e-5);
     if (std::abs(p.x() + 0.05) > 0.01) {
       EXPECT_NEAR(distance->value(p), scan->value(p) - out, 2e-5);
