@@ -150,7 +150,8 @@ std::array<std::optional<HeldEnd>, 3> held_ends(const Scene& scene, const Box& o
 
 }  // namespace
 
-HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size) {
+HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size,
+                    const std::optional<Vector3>& corner) {
   constexpr double inside = 1e-6;  // of a cell: nodes between the layers are held
   const Box object = bounding_box(*scene.object.surface);
   const auto ends = held_ends(scene, object);
@@ -162,6 +163,12 @@ HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double c
       const double from_plane = (origin - end->at) / cell_size - inside * end->inner;
       shift[axis] = from_plane - std::round(from_plane);
     }
+  for (int axis = 0; axis < 3 && corner; ++axis) {
+    const double cells = std::ceil(object.extent()[axis] / cell_size);
+    const double origin = 0.5 * (object.min[axis] + object.max[axis] - cells * cell_size) - shift[axis] * cell_size;
+    const double beside = (origin - (*corner)[axis]) / cell_size, more = beside - std::round(beside);
+    if (std::abs(more) > 0.1 * inside) shift[axis] += more;
+  }
   HexGridOptions options;
   options.is_held = [holds = gripped_regions(scene)](const Vector3& p) {
     return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); });

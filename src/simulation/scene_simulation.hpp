@@ -77,7 +77,9 @@ double hex_cell_size(const Scene& scene, const SignedDistance& distance, double 
 /// axis as their normal, end between two layers of cells: held is then what the region contains, and no part of a cell
 /// more. One such face an axis can be met, the first in the scene's order.
 /// @param cell_size  [m]
-HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size);
+/// @param corner     [m] of a cell of the lattice, where that is given
+HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size,
+                    const std::optional<Vector3>& corner = {});
 
 /// The object's elements at one resolution; `control_points` are those of its field of moduli, if any. One whose
 /// surface is not its scan has the same mass where the scene tells that.
