@@ -68,6 +68,8 @@ int run(const Arguments& arguments) {
   const bool has_frames = !seen->empty(), has_loads = !capture.loads.empty();
   std::optional<CaptureScene> scene;
   if (has_frames || has_loads || !arguments.markers.empty()) scene = make_scene(model, capture);
+  if (const std::string guesses = taken_as_known(capture); has_frames && !guesses.empty())
+    std::cerr << "pliant: " << guesses << "\n";
   if (has_frames && !evaluate_frames(capture, *scene, seen, result)) {
     converged = false;
     if (!has_loads && result.presses.empty() && result.curves.empty()) return NotConverged;

@@ -309,7 +309,9 @@ StageChain FitPlan::off_scan(const Records& done) const {
   constexpr int most_estimates = 2;
   if (!facts_.looks_at_scan_errors) return {};
   const FitOptions& options = facts_.options;
-  for (int i = 0; const StageRecord* at = estimate(done); ++i) {
+  for (int i = 0; i < most_estimates; ++i) {
+    const StageRecord* at = estimate(done);
+    if (!at) return {};
     Stage look{{StageKind::ScanErrors, at->id.start, i}, "errors of the scan", {options.cells, options.steps}};
     Stage off{{StageKind::OffScan, at->id.start, i}, "off the scan", {options.cells, options.steps}};
     const StageRecord *looked = find_record(done, look.id), *ended = find_record(done, off.id);
@@ -319,7 +321,7 @@ StageChain FitPlan::off_scan(const Records& done) const {
     look.done_from = look.done_to = off.done_from = off.done_to = 1.0;
     look.from = {at->theta};
     if (!looked) return {look};
-    if (!looked->converged || i >= most_estimates || (ended && !ended->succeeded)) return {};
+    if (!looked->converged || (ended && !ended->succeeded)) return {};
     if (ended) continue;
     off.change.scan_errors = looked->scan_errors;
     off.iterations = options.max_iterations;

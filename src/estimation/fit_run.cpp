@@ -588,16 +588,14 @@ StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   if (!e.succeeded) return record;
   std::vector<double> coefficients = stage.change.scan_errors;
   coefficients.resize(ScanErrors::count);
-  // What moves with the surface is seen on a coarser mesh as well, for a third of the work.
-  const bool has_coarser = recordings_.any_meshed_here() && !recordings_.all_static();
-  const double cells = stage.grid.cells / (has_coarser ? Refinement::mesh_ratio : 1.0);
-  std::vector<CostEvaluation> moved(coefficients.size() + 1);  // the last one is not
+  const Grid& beside = grid(stage);
+  std::vector<CostEvaluation> moved(coefficients.size());
   const auto evaluate = [&](std::size_t k) {
     ModelChange change = stage.change;
     change.scan_errors = coefficients;
-    if (k < coefficients.size()) change.scan_errors[k] += width_of_scan_errors;
+    change.scan_errors[k] += width_of_scan_errors;
     try {
-      const Grid there = recordings_.grid(cells, stage.grid.steps, change);
+      const Grid there = recordings_.grid(stage.grid.cells, stage.grid.steps, change, &beside);
       moved[k] = objective_of(stage, parameters, there, true).evaluate(p);
     } catch (const InputError& error) {
       moved[k].failure = error.what();
@@ -608,9 +606,7 @@ StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   else
     parallel_tasks(moved.size(), evaluate);
   for (const CostEvaluation& m : moved) record.work += m.work;
-  if (!moved.back().succeeded) return record;
-  const ScanErrorStep step =
-      scan_error_step(e, moved.back(), std::span(moved).first(coefficients.size()), width_of_scan_errors, coefficients);
+  const ScanErrorStep step = scan_error_step(e, moved, width_of_scan_errors, coefficients);
   record.cost = e.cost;
   record.converged = step.promise > worth;
   record.scan_errors = step.coefficients;

@@ -11,6 +11,7 @@
 #include "estimation/press_law.hpp"
 #include "estimation/pull_places.hpp"
 #include "estimation/sensor_poses.hpp"
+#include "meshing/mesh_distance.hpp"
 
 namespace pliant {
 
@@ -91,7 +92,7 @@ Mismatch make_mismatch(const Capture& capture, const std::shared_ptr<const Signe
     mismatch.surface =
         std::make_shared<SurfaceConstraints>(body, distance, resolution.band * size, size / resolution.cells);
   if (!capture.silhouettes.empty())
-    mismatch.outlines = std::make_shared<OutlineConstraints>(*body, surface_of(capture.scene, resolution),
+    mismatch.outlines = std::make_shared<OutlineConstraints>(*body, *capture.scene.object.surface,
                                                              size / resolution.cells, resolution.band * size);
   if (!tracked.empty()) mismatch.tracks = std::make_shared<PointTracks>(*body, tracked);
   mismatch.centre = centre_of(*capture.scene.object.surface);
@@ -102,9 +103,18 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
                           std::shared_ptr<const Body> body, const Resolution& resolution, const CaptureBlocks& blocks,
                           const VectorX& parameters, const SimulationOptions& settings,
                           const std::vector<Vector3>& tracked) {
+  if (resolution.offset) {  // what is simulated and compared is an object of that surface
+    Capture off = capture;
+    TriangleMesh& surface = off.scene.object.surface.emplace(surface_of(capture.scene, resolution));
+    Resolution on = resolution;
+    on.offset = {};
+    Discretisation d = discretise(off, std::make_shared<SignedDistance>(signed_distance(surface, *distance)),
+                                  std::move(body), on, blocks, parameters, settings, tracked);
+    d.surface = std::move(surface);
+    return d;
+  }
   Discretisation d;
-  if (resolution.offset) d.surface = surface_of(capture.scene, resolution);
-  d.distance = distance_of(capture.scene, std::move(distance), resolution);
+  d.distance = std::move(distance);
   d.body = std::move(body);
   d.mismatch = make_mismatch(capture, d.distance, d.body, resolution, tracked);
   d.mismatch.sensors = blocks.sensors;

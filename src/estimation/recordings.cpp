@@ -79,6 +79,10 @@ double unevenness(const Capture& capture, int controls) {
   return controls > 1 ? 0.0 : capture.scene.object.stiffness_std.value_or(judgement.unevenness);
 }
 
+ScanErrors scan_errors(const Recording& r, const std::vector<double>& coefficients) {
+  return {*r.capture.scene.object.surface, r.scan_error, r.size, coefficients};
+}
+
 constexpr double stiffness_alike = 0.25;  // of the object's size: over so far stuffing and foam are as stiff
 
 /// What was seen under a load, as the one frame of a recording.
@@ -438,7 +442,31 @@ GivenScale Recordings::given_scale() const {
   return scale;
 }
 
-Grid Recordings::grid(double cells, double steps, const ModelChange& change) const {
+/// A recording of an object whose surface is off its scan. Hexahedra are those of that surface, or of one near
+/// another's on the lattice of that; tetrahedra are those of the scan, moved.
+/// @param own  with the errors as its offset
+Discretisation Recordings::off_scan(const Recording& r, Resolution own, const SimulationOptions& settings,
+                                    const std::vector<double>& errors, const Grid* about,
+                                    const Discretisation* beside) const {
+  if (own.element != ElementKind::Hexahedron || r.capture.scene.object.volume)
+    return discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest);
+  std::vector<double> from = about ? about->change.scan_errors : errors, more = errors;
+  from.resize(errors.size());
+  for (std::size_t k = 0; k < more.size(); ++k) more[k] -= from[k];
+  own.offset = scan_errors(r, from);
+  Capture off = r.capture;
+  TriangleMesh& surface = off.scene.object.surface.emplace(surface_of(r.capture.scene, own));
+  if (off.scene.object.mass)
+    own.relative_density = enclosed_volume(*r.capture.scene.object.surface) / enclosed_volume(surface);
+  own.offset = nullptr;
+  if (beside) own.offset = scan_errors(r, more);
+  Discretisation d = discretise(off, beside ? beside->distance : capture_distance(off, widest_band()), own, r.blocks,
+                                parameters_.reference(), settings, r.tracked.rest);
+  if (!beside) d.surface = std::move(surface);
+  return d;
+}
+
+Grid Recordings::grid(double cells, double steps, const ModelChange& change, const Grid* about) const {
   const Timed timed(Activity::Meshing);
   SimulationOptions settings;
   settings.newmark_theta = options_.newmark_theta;
@@ -455,13 +483,17 @@ Grid Recordings::grid(double cells, double steps, const ModelChange& change) con
   Grid grid{cells, steps, change, {}, {}};
   for (const Recording& r : all_) {
     Resolution own = resolution(cells, steps);
-    if (!change.scan_errors.empty() && r.scan_error > 0.0)
-      own.offset = ScanErrors(*r.capture.scene.object.surface, r.scan_error, r.size, change.scan_errors);
     if (change.unevenness != 0 && r.unevenness > 0.0)
       own.unevenness =
           RandomField(part_of_unevenness * r.unevenness, stiffness_alike * r.size, std::uint64_t(change.unevenness));
-    grid.recording.push_back(
-        discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
+    if (r.scan_error > 0.0 && !change.scan_errors.empty()) {
+      const Discretisation* beside = about ? &about->recording[grid.recording.size()] : nullptr;
+      own.offset = scan_errors(r, change.scan_errors);
+      grid.recording.push_back(off_scan(r, own, settings, change.scan_errors, about, beside));
+    } else {
+      grid.recording.push_back(
+          discretise(r.capture, r.distance, own, r.blocks, parameters_.reference(), settings, r.tracked.rest));
+    }
     grid.presses.push_back(press_scene(r, grid.recording.back(), own));
   }
   return grid;

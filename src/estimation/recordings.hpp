@@ -103,7 +103,10 @@ class Recordings {
   /// How well their lengths are known: as badly as any of them states, together.
   GivenScale given_scale() const;
 
-  [[nodiscard]] Grid grid(double cells, double steps, const ModelChange& change = {}) const;
+  /// @param about  of the same resolution and another surface near that of the change's scan errors, on whose lattice
+  ///               elements are laid, so that both differ as smoothly as the surfaces do; null: on their own
+  [[nodiscard]] Grid grid(double cells, double steps, const ModelChange& change = {},
+                          const Grid* about = nullptr) const;
 
   /// The objective of the recordings' motions and, where parameters of the object are estimated or none are, of their
   /// loads and presses.
@@ -127,6 +130,8 @@ class Recordings {
   Resolution resolution(double cells, double steps) const;
 
  private:
+  Discretisation off_scan(const Recording& r, Resolution own, const SimulationOptions& settings,
+                          const std::vector<double>& errors, const Grid* about, const Discretisation* beside) const;
   CaptureParameters make_ready(RecordedCapture recorded, Recording& recording, std::vector<std::string>& notes);
   std::shared_ptr<const PressScene> press_scene(const Recording& recording, const Discretisation& d,
                                                 const Resolution& resolution) const;

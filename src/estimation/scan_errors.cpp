@@ -56,8 +56,7 @@ double prior_of_scan_errors(std::span<const double> coefficients) {
   return sum;
 }
 
-ScanErrorStep scan_error_step(const CostEvaluation& at, const CostEvaluation& beside,
-                              std::span<const CostEvaluation> moved, double width,
+ScanErrorStep scan_error_step(const CostEvaluation& at, std::span<const CostEvaluation> moved, double width,
                               std::span<const double> coefficients) {
   const Eigen::Index n = at.gradient.size(), m = Eigen::Index(moved.size());
   MatrixX by_both = MatrixX::Zero(n, m), by_errors = MatrixX::Identity(m, m);
@@ -66,15 +65,13 @@ ScanErrorStep scan_error_step(const CostEvaluation& at, const CostEvaluation& be
   for (std::size_t f = 0; f < at.frames.size(); ++f)
     for (std::size_t part = 0; part < at.frames[f].rows.size(); ++part) {
       const ResidualRows& rows = at.frames[f].rows[part];
-      const ResidualRows& unmoved = beside.frames[f].rows[part];
       MatrixX D = MatrixX::Zero(rows.residual.size(), m);
       for (Eigen::Index k = 0; k < m; ++k) {
         const CostEvaluation& other = moved[std::size_t(k)];
         if (!other.succeeded) continue;
         const ResidualRows& there = other.frames[f].rows[part];
         for (Eigen::Index i = 0; i < D.rows(); ++i)  // what is not matched in both has no difference
-          if (unmoved.weight[i] > 0.0 && there.weight[i] > 0.0)
-            D(i, k) = (there.residual[i] - unmoved.residual[i]) / width;
+          if (rows.weight[i] > 0.0 && there.weight[i] > 0.0) D(i, k) = (there.residual[i] - rows.residual[i]) / width;
       }
       const MatrixX weighted = rows.weight.asDiagonal() * D;
       by_both += rows.J.transpose() * weighted;

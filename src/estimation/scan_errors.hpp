@@ -46,11 +46,9 @@ inline constexpr double most_deviations = 2.5;  ///< of a coefficient from none
 /// The step from an evaluation with the rows of its residuals and their derivatives, and from evaluations at the same
 /// estimate of models whose surfaces lie elsewhere: residuals by coefficients are their differences. One that could not
 /// be simulated tells nothing of its coefficient.
-/// @param beside        what the others are differences to: `at`, or the same on their mesh
 /// @param moved         one a coefficient, which is larger by `width` there
-/// @param coefficients  of `at` and `beside`
-ScanErrorStep scan_error_step(const CostEvaluation& at, const CostEvaluation& beside,
-                              std::span<const CostEvaluation> moved, double width,
+/// @param coefficients  of `at`
+ScanErrorStep scan_error_step(const CostEvaluation& at, std::span<const CostEvaluation> moved, double width,
                               std::span<const double> coefficients);
 
 }  // namespace pliant

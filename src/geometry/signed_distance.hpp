@@ -35,6 +35,7 @@ class SignedDistance {
 
  private:
   friend SignedDistance signed_distance(const TriangleMesh&, double, double);
+  friend SignedDistance signed_distance(const TriangleMesh&, const SignedDistance&);
   void allocate(const Box& box, double spacing);
   float& at(int i, int j, int k) { return values_[(std::size_t(k) * size_.y() + j) * size_.x() + i]; }
   const float* corner(const Vector3& point, Vector3& local, Vector3& outside) const;

@@ -11,6 +11,8 @@
 #include <string>
 #include <unsupported/Eigen/BVH>
 
+#include "base/points.hpp"
+#include "geometry/offset_surface.hpp"
 #include "mesh/tet_boundary.hpp"
 
 namespace pliant {
@@ -255,32 +257,13 @@ void move_along_inside(const std::vector<std::array<int, 4>>& tets, const std::f
 }  // namespace
 
 TetMesh with_offset_boundary(const TetMesh& mesh, const std::function<double(const Vector3&)>& offset) {
-  // Of the planes of the faces about a node each moves by one: n . d = 1, by least squares over their areas, of all
-  // answers the shortest. What two nearly parallel faces differ by says nothing.
-  constexpr double hardly = 0.05;  // of the greatest eigenvalue
-  std::vector<Matrix3> squares(std::size_t(mesh.node_count()), Matrix3::Zero());
-  std::vector<Vector3> sums(std::size_t(mesh.node_count()), Vector3::Zero());
-  for (const auto& face : mesh.boundary) {
-    const Vector3 a = mesh.nodes.row(face[0]), b = mesh.nodes.row(face[1]), c = mesh.nodes.row(face[2]);
-    const Vector3 area = 0.5 * (b - a).cross(c - a), normal = area.normalized();
-    for (const int n : face) {
-      squares[std::size_t(n)] += area * normal.transpose();
-      sums[std::size_t(n)] += area;
-    }
-  }
+  const std::vector<Vector3> directions = offset_directions({to_vectors(mesh.nodes), mesh.boundary});
   Points moves = Points::Zero(mesh.node_count(), 3);
-  for (std::size_t n = 0; n < sums.size(); ++n) {
-    if (squares[n].isZero(0.0)) continue;
-    const double by = offset(mesh.nodes.row(Eigen::Index(n)));
-    const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(squares[n]);
-    for (int k = 0; k < 3; ++k)
-      if (eigen.eigenvalues()[k] > hardly * eigen.eigenvalues()[2]) {
-        const Vector3 axis = eigen.eigenvectors().col(k);
-        moves.row(Eigen::Index(n)) += by * axis.dot(sums[n]) / eigen.eigenvalues()[k] * axis.transpose();
-      }
-  }
+  for (std::size_t n = 0; n < directions.size(); ++n)
+    if (!directions[n].isZero(0.0))
+      moves.row(Eigen::Index(n)) = offset(mesh.nodes.row(Eigen::Index(n))) * directions[n].transpose();
   move_along_inside(
-      mesh.tets, [&](int n) { return !squares[std::size_t(n)].isZero(0.0); }, moves);
+      mesh.tets, [&](int n) { return !directions[std::size_t(n)].isZero(0.0); }, moves);
   for (std::size_t e = 0; e < mesh.mid_nodes.size(); ++e)
     for (std::size_t m = 0; m < 6; ++m) {
       const auto& [a, b] = tet_edges[m];

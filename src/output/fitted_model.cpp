@@ -87,7 +87,8 @@ Model make_model(const Capture& capture, const Discretisation& d, const VectorX&
   if (const LawLayout* law = d.simulation.material.law_layout()) model.law = model_law(*law_at(*d.body, *law, t));
   model.mass_damping = t[blocks.mass_damping];
   model.stiffness_damping = t[blocks.stiffness_damping];
-  const double mass = t[blocks.density] * enclosed_volume(*capture.scene.object.surface);
+  const bool knows_mass = capture.scene.object.mass.has_value();  // then that is kept where the surface is off the scan
+  const double mass = t[blocks.density] * enclosed_volume(knows_mass ? *capture.scene.object.surface : surface);
   if (d.body->kind != ElementKind::Hexahedron) {  // the scan may have been taken under load
     const Points free = Embedding(*d.body, surface.vertices).positions(d.body->reference_positions());
     for (Eigen::Index v = 0; v < free.rows(); ++v) surface.vertices[std::size_t(v)] = free.row(v).transpose();

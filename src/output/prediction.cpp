@@ -84,6 +84,21 @@ class LoadComparison {
 
 }  // namespace
 
+std::string taken_as_known(const Capture& capture) {
+  const Scene& scene = capture.scene;
+  std::vector<std::string> guesses;
+  if (!scene.initial.known && !scene.initial.released && !scene.timing.is_static)
+    guesses.emplace_back("the velocity at the start");
+  if (std::ranges::any_of(scene.planes, [](const Plane& plane) { return !plane.known; }))
+    guesses.emplace_back("where the ground lies");
+  if (guesses.empty()) return "";
+  const bool are_two = guesses.size() > 1;
+  return guesses.front() + (are_two ? " and " + guesses.back() + " are" : " is") + " taken as the capture has " +
+         (are_two ? "them" : "it") +
+         ", though only roughly known; `pliant fit FITTED --hold-out CAPTURE` predicts a recording with what is not "
+         "known of it estimated, and the material kept";
+}
+
 MarkerPrediction predict_markers(const Capture& capture, const CaptureScene& scene) {
   MarkerPrediction prediction;
   std::set<std::string> known;

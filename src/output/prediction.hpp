@@ -25,6 +25,10 @@ MarkerPrediction predict_markers(const Capture& capture, const CaptureScene& sce
 /// why. Throws InputError where a file of a load cannot be read.
 std::vector<LoadError> predict_loads(const Capture& capture, const CaptureScene& scene);
 
+/// What a prediction takes as a capture has it, though the capture does not know it and a fit would estimate it, for
+/// people; empty: nothing.
+std::string taken_as_known(const Capture& capture);
+
 /// "load 2 (test): mean 0.61 mm (0.30 % of the object's size), max ..." for people.
 std::string load_sentence(const LoadError& error);
 

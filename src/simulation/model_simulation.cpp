@@ -40,10 +40,7 @@ std::shared_ptr<const Body> body_of(const Model& model, const Scene& scene, cons
   const ModelVolume& volume = model.volume;
   Body body;
   if (!has_tetrahedra(model)) {
-    const std::optional<TriangleMesh>&own = model.scene.object.surface, &there = scene.object.surface;
-    const bool is_own = own && there && own->vertices == there->vertices;  // it may lie off the scan that was meshed
-    body = make_body(hex_grid_of(scene, *distance, model.cell_size,
-                                 is_own ? std::optional(model.grid_origin) : std::nullopt));
+    body = make_body(hex_grid_of(scene, *distance, model.cell_size));
   } else {
     const auto points = std::size_t(corner_count(volume.kind));
     std::vector<std::array<int, 4>> tets;

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/error.hpp"
+#include "geometry/offset_surface.hpp"
 #include "meshing/mesh_distance.hpp"
 #include "motion/patch_forces.hpp"
 #include "motion/wind.hpp"
@@ -150,8 +151,7 @@ std::array<std::optional<HeldEnd>, 3> held_ends(const Scene& scene, const Box& o
 
 }  // namespace
 
-HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size,
-                    const std::optional<Vector3>& corner) {
+HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size) {
   constexpr double inside = 1e-6;  // of a cell: nodes between the layers are held
   const Box object = bounding_box(*scene.object.surface);
   const auto ends = held_ends(scene, object);
@@ -163,12 +163,6 @@ HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double c
       const double from_plane = (origin - end->at) / cell_size - inside * end->inner;
       shift[axis] = from_plane - std::round(from_plane);
     }
-  for (int axis = 0; axis < 3 && corner; ++axis) {
-    const double cells = std::ceil(object.extent()[axis] / cell_size);
-    const double origin = 0.5 * (object.min[axis] + object.max[axis] - cells * cell_size) - shift[axis] * cell_size;
-    const double beside = (origin - (*corner)[axis]) / cell_size, more = beside - std::round(beside);
-    if (std::abs(more) > 0.1 * inside) shift[axis] += more;
-  }
   HexGridOptions options;
   options.is_held = [holds = gripped_regions(scene)](const Vector3& p) {
     return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); });
@@ -230,18 +224,23 @@ HexGrid hexahedra_of(const Scene& scene, const SignedDistance& distance, const R
   return grid;
 }
 
+/// By how far the surface of the object lies outside its scan at a place of it [m]: 0 where it is held.
+std::function<double(const Vector3&)> offset_of(const Scene& scene, const Resolution& resolution) {
+  return [offset = resolution.offset, holds = gripped_regions(scene)](const Vector3& p) {
+    return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); }) ? 0.0 : offset(p);
+  };
+}
+
 /// The body with its surface beside the scan but where it is held, on the same lattice or by the same elements; as
 /// heavy where the scene tells the mass.
 Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body& body, const Resolution& resolution) {
-  const auto offset = offset_of(scene, resolution);
   Body other;
+  const TriangleMesh surface = surface_of(scene, resolution);
   if (body.kind == ElementKind::Hexahedron) {
-    const SignedDistance moved(distance.box(), distance.spacing(),
-                               [&](const Vector3& p) { return distance.value(p) - offset(p); });
-    other = make_body(hex_grid_of(scene, moved, body.grid().cell_size), body.options);
+    other = make_body(hex_grid_of(scene, signed_distance(surface, distance), body.grid().cell_size), body.options);
   } else {
     try {
-      other = make_body(tetrahedra_of(scene, resolution, offset), body.options);
+      other = make_body(tetrahedra_of(scene, resolution, offset_of(scene, resolution)), body.options);
     } catch (const std::invalid_argument&) {
       throw InputError({{},
                         "elements turn inside out where the surface is as far from the scan as that may err",
@@ -250,7 +249,7 @@ Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body&
     }
   }
   if (scene.object.mass)
-    for (double& mass : other.mass) mass *= body.volume() / other.volume();
+    for (double& mass : other.mass) mass *= enclosed_volume(*scene.object.surface) / enclosed_volume(surface);
   return other;
 }
 
@@ -271,27 +270,13 @@ void make_uneven(Body& body, const std::function<double(const Vector3&)>& uneven
 
 }  // namespace
 
-std::function<double(const Vector3&)> offset_of(const Scene& scene, const Resolution& resolution) {
-  return [offset = resolution.offset, holds = gripped_regions(scene)](const Vector3& p) {
-    return std::ranges::any_of(holds, [&](const Hold& hold) { return hold.contains(p); }) ? 0.0 : offset(p);
-  };
-}
-
 TriangleMesh surface_of(const Scene& scene, const Resolution& resolution) {
   TriangleMesh surface = *scene.object.surface;
   if (!resolution.offset) return surface;
   const auto offset = offset_of(scene, resolution);
-  const std::vector<Vector3> normals = vertex_normals(surface);
-  for (std::size_t v = 0; v < normals.size(); ++v) surface.vertices[v] += offset(surface.vertices[v]) * normals[v];
+  const std::vector<Vector3> outwards = offset_directions(surface);
+  for (std::size_t v = 0; v < outwards.size(); ++v) surface.vertices[v] += offset(surface.vertices[v]) * outwards[v];
   return surface;
-}
-
-std::shared_ptr<const SignedDistance> distance_of(const Scene& scene, std::shared_ptr<const SignedDistance> scan,
-                                                  const Resolution& resolution) {
-  if (!resolution.offset) return scan;
-  const auto offset = offset_of(scene, resolution);
-  return std::make_shared<SignedDistance>(scan->box(), scan->spacing(),
-                                          [&](const Vector3& p) { return scan->value(p) - offset(p); });
 }
 
 std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
@@ -300,6 +285,7 @@ std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistanc
   Body body = are_hexahedra ? make_body(hexahedra_of(scene, distance, resolution))
                             : make_body(tetrahedra_of(scene, resolution));
   if (resolution.offset) body = beside_scan(scene, distance, body, resolution);
+  for (double& mass : body.mass) mass *= resolution.relative_density;
   if (resolution.unevenness) make_uneven(body, resolution.unevenness);
   ControlledField field = modulus_field(body, scene, resolution.field);
   body.modulus = std::move(field.field);

@@ -34,6 +34,8 @@ struct Resolution {
   int shape_points = 0;            ///< about which the scan may err; 0: it is exact. Tetrahedra only
   double shape_std = 0.01;         ///< by how much, times the object's longest axis
   double band = 0.15;              ///< of the mismatch, times the object's longest axis
+  double relative_density =
+      1.0;  ///< of the body to the parameter: where an object of known mass is larger than its scan
   /// By which the object's surface lies outside its scan, at a place of the scan [m]; none: it is the scan.
   std::function<double(const Vector3&)> offset = {};
   /// By which the logarithm of the stiffness differs at a place of the scan, but for its mean; none: it is even.
@@ -46,14 +48,8 @@ int control_count(const Scene& scene, int asked_for);
 /// The field of a body: of the scene's regions or control points, or as the options say where it names none.
 ControlledField modulus_field(const Body& body, const Scene& scene, const FieldOptions& options);
 
-/// By how far the surface of the object lies outside its scan at a place of it [m]: the resolution's offset, 0 where it
-/// is held.
-std::function<double(const Vector3&)> offset_of(const Scene& scene, const Resolution& resolution);
-/// The object's surface: its scan, or beside that by the resolution's offset along its normals.
+/// The object's surface: its scan, or beside that by the resolution's offset along its normals, but where it is held.
 TriangleMesh surface_of(const Scene& scene, const Resolution& resolution);
-/// Signed distance of that surface, on the grid of the scan's.
-std::shared_ptr<const SignedDistance> distance_of(const Scene& scene, std::shared_ptr<const SignedDistance> scan,
-                                                  const Resolution& resolution);
 
 /// Longest edge of the surface's box [m].
 double object_size(const Scene& scene);
@@ -77,9 +73,7 @@ double hex_cell_size(const Scene& scene, const SignedDistance& distance, double 
 /// axis as their normal, end between two layers of cells: held is then what the region contains, and no part of a cell
 /// more. One such face an axis can be met, the first in the scene's order.
 /// @param cell_size  [m]
-/// @param corner     [m] of a cell of the lattice, where that is given
-HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size,
-                    const std::optional<Vector3>& corner = {});
+HexGrid hex_grid_of(const Scene& scene, const SignedDistance& distance, double cell_size);
 
 /// The object's elements at one resolution; `control_points` are those of its field of moduli, if any. One whose
 /// surface is not its scan has the same mass where the scene tells that.

@@ -122,5 +122,19 @@ TEST(SignedDistance, RefusesASurfaceThatEnclosesNothing) {
   EXPECT_THROW(signed_distance(make_sphere(0.003, 1), 0.01, 0.02), InputError);
 }
 
+/// The least change of a surface is that of its distances: both lie on one grid.
+TEST(SignedDistance, OnTheGridOfAnothersIsFartherByAsMuchAsTheSurfaceShrank) {
+  const SignedDistance distance = signed_distance(make_sphere(0.1, 4), 0.005, 0.05);
+  for (const double less : {1e-5, 1e-3}) {
+    const SignedDistance smaller = signed_distance(make_sphere(0.1 - less, 4), distance);
+    EXPECT_EQ(smaller.box().min, distance.box().min);
+    EXPECT_EQ(smaller.box().max, distance.box().max);
+    for (const Vector3& p : points_around(0.11, 500))
+      if (std::abs(p.norm() - 0.1) < 0.01) {
+        EXPECT_NEAR(smaller.value(p) - distance.value(p), less, 0.02 * less + 2e-7);
+      }
+  }
+}
+
 }  // namespace
 }  // namespace pliant::mesh_distance_test

@@ -50,6 +50,18 @@ struct Predictions : ::testing::Test {
   Model model;
 };
 
+TEST_F(Predictions, SayWhatTheyTakeAsKnownThatIsNot) {
+  capture.scene.planes = {{Vector3::Zero(), Vector3::UnitZ(), true}};
+  EXPECT_EQ(taken_as_known(capture), "");
+  capture.scene.initial.known = false;
+  EXPECT_THAT(taken_as_known(capture), testing::StartsWith("the velocity at the start is taken as the capture has it"));
+  capture.scene.planes.front().known = false;
+  EXPECT_THAT(taken_as_known(capture), testing::HasSubstr("start and where the ground lies are taken"));
+  EXPECT_THAT(taken_as_known(capture), testing::HasSubstr("--hold-out"));
+  capture.scene.initial.released = true;  // from rest
+  EXPECT_THAT(taken_as_known(capture), testing::StartsWith("where the ground lies is"));
+}
+
 TEST_F(Predictions, LoadsAreEquilibriaUnderGravityAndTheirWeight) {
   const CaptureScene scene = make_scene(model, capture);
   SimulationOptions options = scene.discretisation.simulation;
