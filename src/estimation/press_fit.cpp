@@ -223,7 +223,10 @@ class LawRun : StageLoop {
     OptimiserOptions o;
     o.max_iterations = stage.iterations;
     o.damps_long_steps = true;
-    if (plan_.facts().are_curves()) o.step_tolerance = 1e-6, o.cost_tolerance = 1e-8;  // flat valleys, cheap steps
+    if (plan_.facts().are_curves())
+      o.step_tolerance = 1e-6, o.cost_tolerance = 1e-8;  // flat valleys, cheap steps
+    else
+      o.growth_of_max_step = 8.0;
     OptimiserState from{0, form.parameters.to_unconstrained(theta), {}};
     if (const StageUnderWay* left = task.is_brief ? nullptr : under_way(stage.id)) from = left->optimiser;
     OptimiserSummary s;
