@@ -233,18 +233,21 @@ class LawRun : StageLoop {
     // Twice: contact is as stiff, and outliers weigh as little, as the law and the noise at the beginning say.
     for (int round = 0; round < (task.is_brief ? 1 : 2) && !is_cut; ++round) {
       std::optional<PressObjective> next(objective_of(form, noise));
+      o.cost_to_reach = round == 0 ? task.cost_to_reach : infinite;
       const OptimiserSummary done = minimise(next->cost(), from, o, [&](const Iteration& i) {
         report(stage, i, *next, form);
         if (!task.is_brief) keep_under_way(stage, i.state());
         return !(is_cut = is_cut || is_interrupted());
       });
       is_cut = is_cut || done.interrupted;
+      if (round == 0) record.start_cost = done.start_cost;
       if (round > 0 && !done.succeeded) break;  // the first round stands
       s = done;
       objective.emplace(std::move(*next));
       placements_ = objective->placements();
       if (!s.succeeded) break;
       form.parameters.set_reference(form.parameters.to_theta(s.p));
+      if (s.is_out_of_reach) break;
       if (!task.is_brief && options_.marker_noise <= 0.0) noise = objective->own_noise(1e-6 * scene_->body->size());
       objective->set_options({noise, judgement.press_outlier});
       from = {0, s.p, {}};
@@ -256,8 +259,6 @@ class LawRun : StageLoop {
       if (!is_one_of_many) outcome_.notes.push_back(stage.name + ": " + s.reason);
       return record;
     }
-    const CostEvaluation begin = objective->evaluate(form.parameters.to_unconstrained(theta));
-    record.start_cost = begin.succeeded ? begin.cost : 0.0;
     record.theta = form.parameters.to_theta(s.p);
     record.converged = s.converged;
     CostEvaluation evaluation = objective->linearise(s.p);
@@ -522,7 +523,9 @@ class LawRun : StageLoop {
         ended != ended_.end()
             ? std::move(ended->second)
             : objective_of(form, best.found.noise).linearise(form.parameters.to_unconstrained(best.theta));
-    outcome_.start_cost = best.start_cost, outcome_.final_cost = best.cost;
+    const CostEvaluation begin =
+        objective_of(form, best.found.noise).evaluate(form.parameters.to_unconstrained(best.from));
+    outcome_.start_cost = begin.succeeded ? begin.cost : 0.0, outcome_.final_cost = best.cost;
     outcome_.converged = best.converged && !interrupted_;
     outcome_.reason = interrupted_ ? "interrupted" : best.reason;
     std::vector<ModelShift> shifts =
