@@ -25,6 +25,27 @@ namespace {
 
 Matrix3 matrix_of(const Vector9& v) { return Eigen::Map<const Matrix3>(v.data()); }
 
+/// Of an isotropic law's tangent M(ij, kl) in the frame of the principal stretches, where it is none but where its
+/// indices are equal in pairs: that with i and k of the world. For j and l
+///   j = l: U diag_i(M(ij, ij)) U^T,   else: M(jj, ll) u_j u_l^T + M(lj, jl) u_l u_j^T.
+Matrix9 with_left_in_world(const Matrix3& U, const Matrix9& M) {
+  const auto at = [](int i, int j) { return i + 3 * j; };
+  Matrix9 turned;
+  for (int l = 0; l < 3; ++l)
+    for (int j = 0; j < 3; ++j) {
+      auto block = turned.block<3, 3>(3 * j, 3 * l);
+      if (j == l) {
+        const Vector3 own(M(at(0, j), at(0, j)), M(at(1, j), at(1, j)), M(at(2, j), at(2, j)));
+        const Matrix3 weighted = U * own.asDiagonal();
+        block.noalias() = weighted * U.transpose();
+      } else {
+        block.noalias() = U.col(j) * (M(at(j, j), at(l, l)) * U.col(l)).transpose();
+        block.noalias() += U.col(l) * (M(at(l, j), at(j, l)) * U.col(j)).transpose();
+      }
+    }
+  return turned;
+}
+
 /// A tangent that stands in the frame of a stress's.
 Matrix9 in_world(const PointStress& frame, const Matrix9& tangent) {
   if (frame.left.isIdentity(0.0) && frame.right.isIdentity(0.0)) return tangent;
@@ -66,6 +87,7 @@ class TetLawElasticity : public LawElasticity {
   double evaluate(const Points& x, bool with_tangent) override;
   void add_gradient(Points& gradient) const override;
   void add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const override;
+  void add_product(Stiffness which, const Points& d, double scale, Points& product) const override;
   void for_parameter_derivatives(const VisitDerivatives& visit) const override;
   Matrix3 cauchy_stress(int element) const override;
   double tangent_modulus(int element) const override;
@@ -129,12 +151,15 @@ class TetLawElasticity : public LawElasticity {
   void for_all_points(Function&& function) const;
   /// The tangents in their own frames, without negative parts, at the last `evaluate`.
   const std::vector<TangentProjection>& projections() const;
-  /// product += K d at the last `evaluate`, K the positive stiffness.
-  void add_product(const Points& d, double scale, Points& product) const;
+  /// A tangent M(ij, kl) and the gradients that belong to it: i and k are of the world, j and l of their frame.
+  struct Turned {
+    Matrix9 tangent;
+    Nodes gradient;
+  };
   /// matrix += scale times the elements' stiffness.
-  /// @param tangent_at  tangent of a point, by its number, in the frame of the world
-  template <bool is_symmetric, class TangentAt>
-  void add_elements(const TangentAt& tangent_at, double scale, BlockMatrix& matrix) const;
+  /// @param turned_at  of a point, by its number
+  template <bool is_symmetric, class TurnedAt>
+  void add_elements(const TurnedAt& turned_at, double scale, BlockMatrix& matrix) const;
   /// The same of elements of one point whose tangents stand in the frame of the principal stretches.
   /// @param tangent_at  in that frame
   template <class TangentAt>
@@ -290,24 +315,24 @@ void TetLawElasticity<N>::add_gradient(Points& gradient) const {
 
 /// K_ab(i, k) = sum over points of V g_a^T M_ik g_b with (M_ik)(j, l) = M(ij, kl): for each i and k all nodes at once.
 template <int N>
-template <bool is_symmetric, class TangentAt>
-void TetLawElasticity<N>::add_elements(const TangentAt& tangent_at, double scale, BlockMatrix& matrix) const {
+template <bool is_symmetric, class TurnedAt>
+void TetLawElasticity<N>::add_elements(const TurnedAt& turned_at, double scale, BlockMatrix& matrix) const {
   using Plane = Eigen::Matrix<double, N, N>;
   using Part = Eigen::Map<const Matrix3, 0, Eigen::Stride<27, 3>>;  // M_ik
   body_->loop->each([&](int e) {
     std::array<std::array<Plane, 3>, 3> K;
     for (int q = 0; q < points; ++q) {
       const std::size_t p = std::size_t(e) * points + std::size_t(q);
-      const Nodes& g = points_[p].gradient;
+      const Turned turned = turned_at(p);
+      const Nodes& g = turned.gradient;
       const Nodes weighted = scale * points_[p].volume * g;
-      const Matrix9& M = tangent_at(p);
       for (int i = 0; i < 3; ++i)
         for (int k = is_symmetric ? i : 0; k < 3; ++k) {
-          const Nodes left = weighted * Part(&M(i, k));
+          const Nodes left = weighted.lazyProduct(Part(&turned.tangent(i, k)));
           if (q == 0)
-            K[i][k].noalias() = left * g.transpose();
+            K[i][k].noalias() = left.lazyProduct(g.transpose());  // small: without the blocking of large products
           else
-            K[i][k].noalias() += left * g.transpose();
+            K[i][k].noalias() += left.lazyProduct(g.transpose());
         }
     }
     const int* blocks = blocks_->data() + std::size_t(e) * (N * N);
@@ -367,8 +392,15 @@ void TetLawElasticity<N>::add_stiffness(Stiffness which, double scale, BlockMatr
   };
   if constexpr (points == 1)
     if (law_->has_principal_frame()) return add_principal_elements(own_tangent, scale, matrix);
-  add_elements<true>([&](std::size_t p) -> Matrix9 { return in_world(points_[p].stress, own_tangent(p)); }, scale,
-                     matrix);
+  const bool is_principal = law_->has_principal_frame();
+  add_elements<true>(
+      [&](std::size_t p) {
+        const Point& point = points_[p];
+        const PointStress& s = point.stress;
+        return is_principal ? Turned{with_left_in_world(s.left, own_tangent(p)), point.gradient.lazyProduct(s.right)}
+                            : Turned{in_world(s, own_tangent(p)), point.gradient};
+      },
+      scale, matrix);
 }
 
 template <int N>
@@ -457,15 +489,15 @@ void TetLawElasticity<N>::find_rotations() {
 }
 
 template <int N>
-void TetLawElasticity<N>::add_product(const Points& d, double scale, Points& product) const {
-  projections();
+void TetLawElasticity<N>::add_product(Stiffness which, const Points& d, double scale, Points& product) const {
+  if (which == Stiffness::Positive) projections();
   for (int e = 0; e < body_->element_count(); ++e)
     for (int q = 0; q < points; ++q) {
       const std::size_t p = std::size_t(e) * points + std::size_t(q);
       const Point& point = points_[p];
       const PointStress& s = point.stress;
       const Matrix3 local = s.left.transpose() * deformation(e, point.gradient, d) * s.right;
-      const Vector9 turned = projections_[p].positive * vec(local);
+      const Vector9 turned = (which == Stiffness::Exact ? s.tangent : projections_[p].positive) * vec(local);
       const Matrix3 dP = s.left * matrix_of(turned) * s.right.transpose();
       const Nodes force = scale * point.volume * point.gradient * dP.transpose();
       for (int a = 0; a < N; ++a) product.row(nodes_of(e)[a]) += force.row(a);
@@ -485,7 +517,7 @@ void TetLawElasticity<N>::add_force(const Points& z, Points& force) {
     }
   if (z == lag_) return;
   const Points d = z - lag_;
-  add_product(d, -1.0, force);
+  add_product(Stiffness::Positive, d, -1.0, force);
 }
 
 /// With M's eigenvectors v (the first n of negative values), y = V^T H and D[v] the change of M along v, which is
@@ -557,7 +589,7 @@ auto TetLawElasticity<N>::changes(const Points& z, bool by_parameters) -> const 
 template <int N>
 void TetLawElasticity<N>::add_lag_matrix(const Points& z, double scale, BlockMatrix& matrix) {
   const std::vector<PointChange>& all = changes(z, false);
-  add_elements<false>([&](std::size_t p) -> const Matrix9& { return all[p].by_lag; }, scale, matrix);
+  add_elements<false>([&](std::size_t p) { return Turned{all[p].by_lag, points_[p].gradient}; }, scale, matrix);
 }
 
 template <int N>

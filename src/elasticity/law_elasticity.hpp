@@ -48,6 +48,8 @@ class LawElasticity : public Elasticity {
   virtual void add_gradient(Points& gradient) const = 0;
   /// matrix += scale K there.
   virtual void add_stiffness(Stiffness which, double scale, BlockMatrix& matrix) const = 0;
+  /// product += scale K d there, without the matrix; n x 3 each.
+  virtual void add_product(Stiffness which, const Points& d, double scale, Points& product) const = 0;
   /// Gives, element by element, the derivatives of dW/dx by the law's parameters of that element, there.
   /// @param visit  (element, nodes, derivatives 3 N x parameters)
   using VisitDerivatives =

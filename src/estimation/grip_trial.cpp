@@ -1,6 +1,7 @@
 #include "estimation/grip_trial.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/dense.hpp"
 #include "estimation/law_derivatives.hpp"
@@ -21,13 +22,13 @@ std::vector<int> held_by_all(const PressScene& scene, const ObservedGrip& test) 
 
 }  // namespace
 
-GrippedBody::GrippedBody(const PressScene& scene, const ObservedGrip& test, std::shared_ptr<const MaterialLaw> law)
+GrippedBody::GrippedBody(const PressScene& scene, const ObservedGrip& test,
+                         const std::shared_ptr<const MaterialLaw>& law)
     : body_(scene.body),
       test_(test),
       equilibrium_(scene.body, law, held_by_all(scene, test),
                    scene.contacts(std::nullopt, mean_modulus(*scene.body, *law)),
-                   EquilibriumOptions{.tolerance = 1e-9}),
-      forces_(LawElasticity::make(scene.body, std::move(law))),
+                   EquilibriumOptions{.tolerance = 1e-9, .reuse_factor = true}),
       markers_(*scene.body, test.rest),
       dead_load_(scene.dead_load()),
       direction_(Points::Zero(scene.body->node_count(), 3)) {
@@ -36,19 +37,10 @@ GrippedBody::GrippedBody(const PressScene& scene, const ObservedGrip& test, std:
   for (const int n : test_.nodes) direction_.row(n) = test_.direction.transpose();
 }
 
-void GrippedBody::set_law(const std::shared_ptr<const MaterialLaw>& law) {
-  equilibrium_.set_law(law);
-  forces_->set_law(law);
-}
-
-Points GrippedBody::stiffness_times(const Points& nodes, const Points& change) {
-  (void)forces_->evaluate(nodes, true);
-  BlockMatrix stiffness(body_->pattern);
-  stiffness.set_zero();
-  forces_->add_stiffness(LawElasticity::Stiffness::Exact, 1.0, stiffness);
-  VectorX product;
-  stiffness.multiply(flat(change), product);
-  return Eigen::Map<const Points>(product.data(), body_->node_count(), 3);
+Points GrippedBody::stiffness_times(const Points& change) const {
+  Points product = Points::Zero(body_->node_count(), 3);
+  elasticity().add_product(LawElasticity::Stiffness::Exact, change, 1.0, product);
+  return product;
 }
 
 Points GrippedBody::linear_way() {
@@ -56,7 +48,7 @@ Points GrippedBody::linear_way() {
   Points way = Points::Zero(body_->node_count(), 3);
   for (const int n : test_.nodes) way.row(n) = test_.displacement.transpose();
   if (!equilibrium_.prepare_derivatives(rest)) return way;
-  const Points forces = -stiffness_times(rest.nodes, way);
+  const Points forces = -stiffness_times(way);
   return way + response(forces);
 }
 
@@ -84,10 +76,16 @@ bool GrippedBody::solve() {
   return false;
 }
 
+bool GrippedBody::solve_from(const Placement& guess) {
+  const Placement last = std::exchange(placement_, guess);
+  if (lead(1.0)) return true;
+  placement_ = last;
+  return solve();
+}
+
 Points GrippedBody::internal_forces() const {
   Points forces = Points::Zero(body_->node_count(), 3);
-  (void)forces_->evaluate(placement_.nodes, false);
-  forces_->add_gradient(forces);
+  elasticity().add_gradient(forces);
   for (int c = 0; c < equilibrium_.contact_count(); ++c) {
     const RigidContact& contact = equilibrium_.contact(c);
     for (int i = 0; i < contact.points().point_count(); ++i) {
@@ -98,7 +96,7 @@ Points GrippedBody::internal_forces() const {
   return forces;
 }
 
-Points GrippedBody::response(const Points& forces) { return responses({forces}).front(); }
+Points GrippedBody::response(const Points& forces) { return responses({forces}).front().topRows(body_->node_count()); }
 
 std::vector<Points> GrippedBody::responses(std::vector<Points> forces) {
   const Eigen::Index nodes = body_->node_count();
@@ -107,7 +105,6 @@ std::vector<Points> GrippedBody::responses(std::vector<Points> forces) {
     of.bottomRows(equilibrium_.contact_count()).setZero();
   }
   equilibrium_.respond(forces);
-  for (Points& change : forces) change.conservativeResize(nodes, 3);
   return forces;
 }
 
@@ -115,7 +112,7 @@ double GrippedBody::force() const { return (internal_forces() - dead_load_).cwis
 
 bool GrippedBody::prepare_derivatives() {
   if (!equilibrium_.prepare_derivatives(placement_)) return false;
-  force_by_nodes_ = stiffness_times(placement_.nodes, direction_);
+  force_by_nodes_ = stiffness_times(direction_);
   for (int c = 0; c < equilibrium_.contact_count(); ++c) {
     const RigidContact& contact = equilibrium_.contact(c);
     for (int i = 0; i < contact.points().point_count(); ++i) {
@@ -140,7 +137,9 @@ bool GripTrial::compare(const VectorX& theta, CostEvaluation& result, Points& of
   const ObservedGrip& seen = test();
   body_.set_law(material_->law(theta));
   result.steps = 1, result.work = steps_of_an_equilibrium * scene_->body->node_count();
-  if (!body_.solve()) return result.failure = seen.name + ": " + body_.failure(), false;
+  const std::optional<Placement> nearly = guess(linearised_, theta);
+  if (!(nearly ? body_.solve_from(*nearly) : body_.solve()))
+    return result.failure = seen.name + ": " + body_.failure(), false;
   FrameFit fit;
   fit.recording = number_;
   fit.frame = grip_;
@@ -171,9 +170,9 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
   const std::vector<Points> forces =
       force_changes(body_.elasticity(), *material_, theta, numbers, scene_->body->node_count());
   MatrixX by_parameters(off.size() + 1, Eigen::Index(numbers.count()));
-  const std::vector<Points> moves = body_.responses(forces);
+  std::vector<Points> moves = body_.responses(forces);
   for (std::size_t k = 0; k < numbers.count(); ++k) {
-    const Points& moved = moves[k];
+    const Points moved = moves[k].topRows(forces[k].rows());
     Points there = body_.embedding().positions(moved);
     there = (there * seen.seen / seen.markers_std).eval();
     by_parameters.col(Eigen::Index(k)).head(off.size()) = flat(there);
@@ -183,6 +182,7 @@ CostEvaluation GripTrial::run(const VectorX& theta, const MatrixX& directions) {
                   seen.force_std
             : 0.0;
   }
+  linearised_.set(material_->form(), theta, body_.placement(), numbers.rows, std::move(moves));
   VectorX residuals(off.size() + 1);
   residuals << flat(off), pull;
   const MatrixX J = by_parameters * directions(numbers.rows, Eigen::all);

@@ -12,18 +12,25 @@ IndentedBody::IndentedBody(const PressScene& scene, const ObservedIndentation& t
       axis_(probe_axis(*scene.body, test.probe)),
       equilibrium_(scene.body, std::move(law), scene.held,
                    scene.contacts(probe_contact(*scene.body, test.probe, modulus), modulus),
-                   EquilibriumOptions{.tolerance = 1e-8}),
+                   EquilibriumOptions{.tolerance = 1e-8, .reuse_factor = true}),
       placements_(depths_.size()) {
   equilibrium_.set_dead_load(scene.dead_load());
   keep_inner_bodies(equilibrium_, 1);
 }
 
-bool IndentedBody::solve(std::size_t depth) {
+bool IndentedBody::solve(std::size_t depth, const std::optional<Placement>& guess) {
   ProbeControl control;
   control.kind = ProbeControl::Kind::Position;
   control.translation = depths_[depth] * axis_;
   equilibrium_.set_control(0, control);
   Placement& placement = placements_[depth];
+  if (guess) {
+    Placement near = *guess;
+    if (equilibrium_.solve(near).converged) {
+      placement = std::move(near);
+      return true;
+    }
+  }
   if (placement.nodes.size() > 0 && equilibrium_.solve(placement).converged) return true;
   placement = depth > 0 && placements_[depth - 1].nodes.size() > 0 ? placements_[depth - 1] : equilibrium_.rest();
   const bool solved = equilibrium_.solve(placement).converged;
@@ -36,21 +43,39 @@ double IndentedBody::force(std::size_t depth) const {
 }
 
 /// The force on the object is -sum grad psi(x - u). With u kept it changes with the nodes, and they with the law.
-bool IndentedBody::force_derivative(std::size_t depth, const PressedMaterial& material, const VectorX& theta,
-                                    VectorX& by_theta) {
+Points IndentedBody::force_by_nodes(std::size_t depth) const {
   const Placement& placement = placements_[depth];
-  if (!equilibrium_.prepare_derivatives(placement)) return false;
   const RigidContact& contact = equilibrium_.contact(0);
-  const int n = equilibrium_.body().node_count();
-  Points bar = Points::Zero(n + equilibrium_.contact_count(), 3), of_nodes = Points::Zero(n, 3);
+  Points of_nodes = Points::Zero(equilibrium_.body().node_count(), 3);
   for (int i = 0; i < contact.points().point_count(); ++i) {
     const Vector3 y =
         contact.points().position(i, placement.nodes) - Vector3(placement.translations.row(0).transpose());
     contact.points().add_transpose(i, -contact.potential(i, y, false).hessian * axis_, of_nodes);
   }
-  bar.topRows(n) = of_nodes;
+  return of_nodes;
+}
+
+bool IndentedBody::force_derivative(std::size_t depth, const PressedMaterial& material, const VectorX& theta,
+                                    VectorX& by_theta) {
+  if (!equilibrium_.prepare_derivatives(placements_[depth])) return false;
+  const int n = equilibrium_.body().node_count();
+  Points bar = Points::Zero(n + equilibrium_.contact_count(), 3);
+  bar.topRows(n) = force_by_nodes(depth);
   by_theta = VectorX::Zero(theta.size());
   add_force_adjoint(equilibrium_.elasticity(), material, theta, equilibrium_.response(bar), by_theta);
+  return true;
+}
+
+bool IndentedBody::force_derivatives(std::size_t depth, const PressedMaterial& material, const VectorX& theta,
+                                     const LawNumbers& numbers, VectorX& by_numbers, std::vector<Points>& changes) {
+  if (!equilibrium_.prepare_derivatives(placements_[depth])) return false;
+  const int n = equilibrium_.body().node_count();
+  const Points by_nodes = force_by_nodes(depth);
+  changes = force_changes(equilibrium_.elasticity(), material, theta, numbers, n + equilibrium_.contact_count());
+  equilibrium_.respond(changes);
+  by_numbers.resize(Eigen::Index(changes.size()));
+  for (std::size_t k = 0; k < changes.size(); ++k)
+    by_numbers[Eigen::Index(k)] = by_nodes.cwiseProduct(changes[k].topRows(n)).sum();
   return true;
 }
 
@@ -109,6 +134,7 @@ IndentationTrial::IndentationTrial(std::shared_ptr<const PressScene> scene, int 
     : EquilibriumTrial(std::move(scene), std::move(material), number),
       indentation_(indentation),
       body_(*scene_, test(), material_->law(reference), mean_modulus(material_->body(), *material_->law(reference))),
+      linearised_(test().curve.depths.size()),
       offset_(test().curve, test().contact_std) {}
 
 const ObservedIndentation& IndentationTrial::test() const {
@@ -120,16 +146,21 @@ CostEvaluation IndentationTrial::run(const VectorX& theta, const MatrixX& direct
   const ForceCurve& curve = test().curve;
   body_.set_law(material_->law(theta));
   const Eigen::Index n = directions.cols(), count = Eigen::Index(curve.depths.size());
-  VectorX by_theta, forces(count);
+  const LawNumbers numbers(material_->layout(), theta.size());
+  VectorX by_numbers, forces(count);
   MatrixX changes(count, n);
   for (Eigen::Index d = 0; d < count; ++d) {
-    if (!body_.solve(std::size_t(d))) return result.failure = test().name + ": " + body_.failure(), result;
+    LinearisedEquilibrium& linearised = linearised_[std::size_t(d)];
+    if (!body_.solve(std::size_t(d), guess(linearised, theta)))
+      return result.failure = test().name + ": " + body_.failure(), result;
     ++result.steps, result.work += steps_of_an_equilibrium * scene_->body->node_count();
     forces[d] = body_.force(std::size_t(d));
     if (n == 0) continue;
-    if (!body_.force_derivative(std::size_t(d), *material_, theta, by_theta))
+    std::vector<Points> moves;
+    if (!body_.force_derivatives(std::size_t(d), *material_, theta, numbers, by_numbers, moves))
       return unstable(std::move(result), test().name);
-    changes.row(d) = by_theta.transpose() * directions;
+    changes.row(d) = by_numbers.transpose() * directions(numbers.rows, Eigen::all);
+    linearised.set(material_->form(), theta, body_.placements()[std::size_t(d)], numbers.rows, std::move(moves));
   }
   offset_.fit(forces);
   changes = offset_.with_offset(changes);

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <optional>
+#include <vector>
+
+#include "estimation/law_derivatives.hpp"
 #include "estimation/press_trial.hpp"
 #include "estimation/static_tests.hpp"
 
@@ -13,18 +17,26 @@ class IndentedBody {
                double modulus);
 
   void set_law(std::shared_ptr<const MaterialLaw> law) { equilibrium_.set_law(std::move(law)); }
-  /// To equilibrium at one depth, from where it was last or from the depth before. False: `failure` says why.
-  bool solve(std::size_t depth);
+  /// To equilibrium at one depth, from a guess, from where it was last or from the depth before. False: `failure` says
+  /// why.
+  bool solve(std::size_t depth, const std::optional<Placement>& guess = std::nullopt);
   const std::string& failure() const { return equilibrium_.failure(); }
   /// One a depth; without nodes where none was found.
   const std::vector<Placement>& placements() const { return placements_; }
   void begin_from(const std::vector<Placement>& placements) { placements_ = placements; }
   /// Force of the probe on the object along its axis [N].
   double force(std::size_t depth) const;
-  /// Derivative of that force by theta at a depth that was solved. False where the equilibrium is not stable.
+  /// Derivative of that force by theta at a depth that was solved, by the adjoint. False where the equilibrium is not
+  /// stable.
   bool force_derivative(std::size_t depth, const PressedMaterial& material, const VectorX& theta, VectorX& by_theta);
+  /// The same by each of the law's numbers, with how the nodes and then the rigid bodies change by it [m].
+  bool force_derivatives(std::size_t depth, const PressedMaterial& material, const VectorX& theta,
+                         const LawNumbers& numbers, VectorX& by_numbers, std::vector<Points>& changes);
 
  private:
+  /// Change of the force for a change of the nodes, probe kept [N/m], one row a node.
+  Points force_by_nodes(std::size_t depth) const;
+
   std::vector<double> depths_;
   Vector3 axis_;
   Equilibrium equilibrium_;
@@ -62,8 +74,9 @@ class DepthOffset {
 };
 
 /// Force-depth curve: half the squares of simulated less measured force over its standard deviation, one frame a depth.
-/// Derivatives are those of the equilibrium, by one back-substitution a depth for any number of parameters. Where
-/// depths have an offset, costs are those with the best one, whose square over its prior belongs to the last frame.
+/// Derivatives are those of the equilibrium: a back-substitution a parameter, or one for all by the adjoint. Runs set
+/// out as those of presses do. Where depths have an offset, costs are those with the best one, whose square over its
+/// prior belongs to the last frame.
 class IndentationTrial : public EquilibriumTrial {
  public:
   /// @param reference  parameters whose modulus says how stiff the contact is
@@ -83,6 +96,7 @@ class IndentationTrial : public EquilibriumTrial {
 
   int indentation_;
   IndentedBody body_;
+  std::vector<LinearisedEquilibrium> linearised_;  // one a depth
   DepthOffset offset_;
 };
 

@@ -84,6 +84,7 @@ class LawPlan::Replay {
  private:
   const FitOptions& options() const { return facts_.options; }
   Estimate& best() { return *now_.best; }
+  const Estimate& best() const { return *now_.best; }
 
   void search() {
     const MaterialKind material = options().material;
@@ -152,17 +153,17 @@ class LawPlan::Replay {
   /// Minimises from theta; nothing where it is next, or cannot be evaluated (`failed`).
   std::optional<Estimate> estimate(const LawShape& shape, const VectorX& from, const std::string& name,
                                    LawTask::Evidence evidence = LawTask::Evidence::None, int cut = 0,
-                                   bool is_brief = false) {
+                                   bool is_brief = false, double cost_to_reach = infinite) {
     Stage stage = task_stage(StageKind::Law, shape, from, name);
     LawTask& task = *stage.law;
-    task.evidence = evidence, task.cut = cut, task.is_brief = is_brief;
+    task.evidence = evidence, task.cut = cut, task.is_brief = is_brief, task.cost_to_reach = cost_to_reach;
     if (is_brief) stage.iterations = brief_iterations;
     if (evidence == LawTask::Evidence::Field) task.before = best().shape;
     const StageRecord* record = ask(std::move(stage));
     if (!record) return std::nullopt;
     now_.noise = record->law->noise;
     if (!record->succeeded) return std::nullopt;
-    return Estimate{shape,        facts_.layout(shape.form), record->theta,  record->id,  record->start_cost,
+    return Estimate{shape,        facts_.layout(shape.form), record->theta,  record->id,  record->from,
                     record->cost, record->converged,         record->reason, *record->law};
   }
 
@@ -212,12 +213,15 @@ class LawPlan::Replay {
 
   /// From each of the starts, each in a valley of its own; that with the least squares. Nothing where the next one is
   /// not known yet: the first form of all is the best that there is until then.
+  /// @param is_compared  with the best by its squares: a start may end where the evidence is sure to rule the form out
   std::optional<Estimate> estimate_from(const LawShape& shape, const std::vector<VectorX>& starts,
-                                        const std::string& name) {
+                                        const std::string& name, bool is_compared = false) {
     std::optional<Estimate> found;
     for (const VectorX& start : starts) {
       const MarkerNoise noise = now_.noise;
-      std::optional<Estimate> next = estimate(shape, now_.best ? start : scaled(shape, start, name), name);
+      std::optional<Estimate> next =
+          estimate(shape, now_.best ? start : scaled(shape, start, name), name, LawTask::Evidence::None, 0, false,
+                   is_compared ? cost_to_reach(shape) : infinite);
       if (is_pending()) {
         if (!now_.best) now_.best = std::move(found);
         return std::nullopt;
@@ -234,22 +238,34 @@ class LawPlan::Replay {
     return a.found.squares(b.found.deviation) < b.found.squares(b.found.deviation);
   }
 
+  /// Half of what Schwarz's criterion asks of a form of the law for the numbers that it has more than the best.
+  double price(double more) const { return 0.5 * more * std::log(best().found.observations); }
+
+  /// The cost above which a form is ruled out (`fit_freer`), with the noise at hand, if it is the best one's: half the
+  /// squares, about.
+  double cost_to_reach(const LawShape& shape) const {
+    if (facts_.are_curves() || !(now_.noise == best().found.noise)) return infinite;
+    const double more = double(facts_.parameters(shape).dimension() - best().found.dimension);
+    const double gain = price(more) - judgement.strong_evidence;  // of n/2 ln(sum r^2)
+    return best().cost * std::exp(-2.0 * gain / best().found.observations);
+  }
+
   /// More terms, or Poisson's ratios of their own for them. False where that is not kept.
   bool fit_freer(const LawForm& form, const std::vector<VectorX>& starts, const std::string& name) {
     const MarkerNoise noise = now_.noise;
     LawShape shape = best().shape;
     shape.form = form;
-    std::optional<Estimate> next = estimate_from(shape, starts, name);
+    const bool is_chosen = options().law_terms > 0 && form.terms > best().shape.form.terms;
+    std::optional<Estimate> next = estimate_from(shape, starts, name, !is_chosen);
     TriedLaw tried{form, next ? next->cost : infinite, -infinite, false};
     if (next) {
       // Half the BIC by residuals whose deviation is unknown: n/2 ln(sum r^2) + k/2 ln n.
       const double deviation = next->found.deviation;
       const double n = next->found.observations;
       const auto more = double(next->found.dimension - best().found.dimension);
-      tried.evidence = 0.5 * n * std::log(best().found.squares(deviation) / next->found.squares(deviation)) -
-                       0.5 * more * std::log(n);
-      tried.kept = (options().law_terms > 0 && form.terms > best().shape.form.terms) ||
-                   tried.evidence > judgement.strong_evidence;
+      tried.evidence =
+          0.5 * n * std::log(best().found.squares(deviation) / next->found.squares(deviation)) - price(more);
+      tried.kept = is_chosen || tried.evidence > judgement.strong_evidence;
     }
     conclude(std::move(next), tried, noise);
     return tried.kept && !is_pending();
@@ -323,7 +339,7 @@ class LawPlan::Replay {
 
   /// Moves cuts one after the other to where they fit better, as long as that gains something.
   void move_cuts(Estimate& e, int split, const std::string& name) {
-    const double start_cost = e.start_cost;
+    const VectorX from = e.from;
     bool any = false;
     for (int pass = 0, gained = 1; pass < most_passes && gained > 0; ++pass) {
       gained = 0;
@@ -339,7 +355,7 @@ class LawPlan::Replay {
         if (is_pending()) return;
         if (!moved || moved->cost > e.cost - judgement.strong_evidence) continue;
         e = std::move(*moved);
-        e.start_cost = start_cost;
+        e.from = from;
         ++gained;
       }
       any = any || gained > 0;
@@ -350,7 +366,7 @@ class LawPlan::Replay {
       e = std::move(*converged);
     else
       now_.noise = noise;
-    e.start_cost = start_cost;
+    e.from = from;
   }
 
   /// A law of its own for each region, against one shape of the law for all.

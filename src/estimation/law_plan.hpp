@@ -46,8 +46,9 @@ class LawPlan {
     LawShape shape;
     LawLayout layout;
     VectorX theta;
-    StageId id;  ///< of the stage that ended there
-    double start_cost = 0.0, cost = 0.0;
+    StageId id;    ///< of the stage that ended there
+    VectorX from;  ///< where it began: numbers of the same form
+    double cost = 0.0;
     bool converged = false;
     std::string reason = {};
     LawFinding found = {};

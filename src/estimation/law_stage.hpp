@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -21,7 +22,8 @@ struct LawTask {
   LawShape shape;
   MarkerNoise noise = {};  ///< at the beginning
   bool is_brief = false;   ///< of a minimisation: once and with that noise; else twice, the second time with its own
-  int cut = 0;             ///< of a move: which of the cuts; with evidence of a zone: the zone that it was cut from
+  double cost_to_reach = std::numeric_limits<double>::infinity();  ///< with that noise; above it, it may end early
+  int cut = 0;  ///< of a move: which of the cuts; with evidence of a zone: the zone that it was cut from
   enum class Evidence { None, Zone, OwnLaws, Field } evidence = Evidence::None;  ///< to be computed where it ends
   LawShape before = {};  ///< what the evidence of a field is against
 };

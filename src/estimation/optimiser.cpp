@@ -103,7 +103,8 @@ struct DampedStep {
   bool may_lower = true;   // false: known not to lower it
 };
 
-DampedStep damped_step(const Run& run, const OptimiserOptions& options, double damping) {
+/// @param longest  that any number may move
+DampedStep damped_step(const Run& run, const OptimiserOptions& options, double damping, double longest) {
   const VectorX &p = run.summary.p, &g = run.summary.evaluation.gradient;
   const MatrixX& H = run.summary.evaluation.gauss_newton;
   const double floor = 1e-9 * std::max(H.trace() / double(H.rows()), 1e-300);
@@ -113,16 +114,26 @@ DampedStep damped_step(const Run& run, const OptimiserOptions& options, double d
     return step_within_bounds(run.parameters(), p, g, damped).step;
   };
   VectorX step = step_with(damping);
-  if (options.damps_long_steps)
-    for (double more = std::max(damping, 1e-8); step.cwiseAbs().maxCoeff() > options.max_step && more < 1e4;)
-      step = step_with(more *= 2.0);
+  if (options.damps_long_steps && step.cwiseAbs().maxCoeff() > longest) {
+    constexpr double factor = 8.0;  // of damping, until the step is short enough
+    double more = std::max(damping, 1e-8);
+    for (; step.cwiseAbs().maxCoeff() > longest && more < 1e4; more *= factor) step = step_with(more * factor);
+    double less = more / factor;
+    for (int halving = 0; halving < 4; ++halving) {  // of the interval of its logarithm
+      const double middle = std::sqrt(less * more);
+      const VectorX longer = step_with(middle);
+      const bool is_short_enough = longer.cwiseAbs().maxCoeff() <= longest;
+      (is_short_enough ? more : less) = middle;
+      if (is_short_enough) step = longer;
+    }
+  }
   DampedStep made;
   made.damping = damping;
   constexpr double tolerance = 1.01;  // half a step along a curve is not half as long: it is cut several times
-  for (;; step *= options.max_step / made.moved) {
+  for (;; step *= longest / made.moved) {
     made.to = run.parameters().moved(p, step);
     made.moved = (made.to - p).cwiseAbs().maxCoeff();
-    if (!(made.moved > tolerance * options.max_step)) break;
+    if (!(made.moved > tolerance * longest)) break;
   }
   made.predicted = -(g.dot(step) + 0.5 * step.dot(H * step));
   return made;
@@ -130,11 +141,11 @@ DampedStep damped_step(const Run& run, const OptimiserOptions& options, double d
 
 /// Rejections come in series. The step among several dampings whose cost is least; the last and shortest where none is
 /// lower than at hand.
-DampedStep best_of_several(Run& run, const OptimiserOptions& options, double damping, double raise) {
+DampedStep best_of_several(Run& run, const OptimiserOptions& options, double damping, double raise, double longest) {
   std::vector<DampedStep> steps;
   std::vector<VectorX> ends;
   for (int i = 0; i < options.trials_after_rejection; ++i, damping = std::min(damping * raise, 1e8)) {
-    steps.push_back(damped_step(run, options, damping));
+    steps.push_back(damped_step(run, options, damping, longest));
     ends.push_back(steps.back().to);
   }
   const std::vector<CostEvaluation> costs = run.evaluate(ends);
@@ -146,21 +157,54 @@ DampedStep best_of_several(Run& run, const OptimiserOptions& options, double dam
   return steps[best];
 }
 
-/// Memory: the damping, and whether the last step was rejected.
+/// How far a step may move any number: as far as `max_step` at first, and always where that may not grow.
+class TrustRegion {
+ public:
+  TrustRegion(const OptimiserOptions& options, double radius)
+      : options_(options), radius_(radius > 0.0 ? radius : options.max_step) {}
+  double radius() const { return radius_; }
+
+  /// @param quality  what a step has gained over what it promised; not above zero: it was rejected
+  void learn(double quality, double moved) {
+    constexpr double at_border = 0.8, growth = 2.0;
+    const double most = options_.growth_of_max_step;
+    if (most <= 1.0) return;
+    if (quality > 0.75 && moved > at_border * radius_)
+      radius_ = std::min(growth * radius_, most * options_.max_step);
+    else if (quality < 0.25)
+      radius_ = std::min(radius_, moved) / growth;
+  }
+
+ private:
+  const OptimiserOptions& options_;
+  double radius_;
+};
+
+/// Memory: the damping, whether the last step was rejected, and the radius of the trust region.
 void levenberg_marquardt(Run& run, const OptimiserOptions& options, const VectorX& memory) {
   constexpr double raise = 5.0, most = 1e8, undamped = 1e-10;  // damping
+  constexpr double hope = 3.0;                                 // of what is promised
+  constexpr int iterations_to_hope = 2;
   OptimiserSummary& s = run.summary;
   double lambda = memory.size() > 0 ? memory[0] : 1e-2;
   bool was_rejected = memory.size() > 1 && memory[1] > 0.0;
+  TrustRegion trusted(options, memory.size() > 2 ? memory[2] : 0.0);
   for (bool done = false; !done;) {
-    if (damped_step(run, options, undamped).predicted < options.promise_tolerance) {
+    if (s.iterations >= iterations_to_hope && std::isfinite(options.cost_to_reach) &&
+        s.evaluation.cost - hope * damped_step(run, options, undamped, infinite).predicted > options.cost_to_reach) {
+      s.is_out_of_reach = true;
+      run.end(false, "the cost that would be of use is out of reach");
+      return;
+    }
+    if (damped_step(run, options, undamped, trusted.radius()).predicted < options.promise_tolerance) {
       run.end(true, "the minimum is within a fraction of its standard deviation");
-      if (s.iterations == 0) run.report(lambda, true, Eigen::Vector2d(lambda, 0.0), true);  // a run is seen to be one
+      if (s.iterations == 0)  // a run is seen to be one
+        run.report(lambda, true, Vector3(lambda, 0.0, trusted.radius()), true);
       return;
     }
     const bool looks_ahead = was_rejected && options.trials_after_rejection > 1;
-    const DampedStep step =
-        looks_ahead ? best_of_several(run, options, lambda, raise) : damped_step(run, options, lambda);
+    const DampedStep step = looks_ahead ? best_of_several(run, options, lambda, raise, trusted.radius())
+                                        : damped_step(run, options, lambda, trusted.radius());
     lambda = step.damping;
     if (step.moved == 0.0) {
       run.end(true, "the step is zero");
@@ -170,8 +214,9 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
     if (step.may_lower) e = run.evaluate(step.to, Derivatives::Tangents);
     const double gain = s.evaluation.cost - e.cost;
     const bool accepted = e.succeeded && gain > 0.0;
+    const double quality = !accepted ? 0.0 : step.predicted > 0.0 ? gain / step.predicted : 0.0;
+    trusted.learn(quality, step.moved);
     if (accepted) {
-      const double quality = step.predicted > 0.0 ? gain / step.predicted : 0.0;
       // The longer step that was just refused would be refused again.
       const bool may_lengthen = quality > 0.75 && !was_rejected;
       lambda = std::clamp(may_lengthen ? lambda / raise : quality < 0.25 ? lambda * 3.0 : lambda, 1e-8, most);
@@ -186,7 +231,7 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
       lambda = std::min(std::max(lambda, 1e-3) * raise, most);
     }
     was_rejected = !accepted;
-    done = run.report(lambda, accepted, Eigen::Vector2d(lambda, was_rejected ? 1.0 : 0.0), done);
+    done = run.report(lambda, accepted, Vector3(lambda, was_rejected ? 1.0 : 0.0, trusted.radius()), done);
   }
 }
 

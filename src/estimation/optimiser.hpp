@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "estimation/objective.hpp"
@@ -23,9 +24,15 @@ struct OptimiserOptions {
   /// Or an undamped Gauss-Newton step promises the cost, a negative log likelihood, to fall by less than this, >= 0:
   /// the minimum is then sqrt(2 * this) standard deviations away. Levenberg-Marquardt's alone.
   double promise_tolerance = 0.0;
+  /// Or, after two iterations, three times what an undamped Gauss-Newton step promises would leave the cost above this:
+  /// it is out of reach, and nothing less is of use. Levenberg-Marquardt's alone.
+  double cost_to_reach = std::numeric_limits<double>::infinity();
   /// Most that any unconstrained number moves in one iteration (a factor of two), > 0; Nelder-Mead's first simplex has
   /// edges of half of it.
   double max_step = 0.7;
+  /// Up to so many times that it may become with steps that keep what they promise, while others shorten it: a trust
+  /// region (Nocedal and Wright 2006, algorithm 4.1), >= 1; 1: it stays. Levenberg-Marquardt's alone.
+  double growth_of_max_step = 1.0;
   /// How Levenberg-Marquardt keeps to that: by more damping in that step, so that combinations of numbers that the data
   /// hardly tell do not hold up what they do, or by a shorter step in the same direction.
   bool damps_long_steps = false;
@@ -63,6 +70,7 @@ struct OptimiserSummary {
   long long steps = 0;  ///< time steps simulated
   double work = 0.0;    ///< see `CostEvaluation::work`
   bool converged = false, interrupted = false, succeeded = false;
+  bool is_out_of_reach = false;  ///< it ended for that reason (`OptimiserOptions::cost_to_reach`)
   std::string reason = "not run";
 };
 

@@ -147,6 +147,9 @@ class LawRun : StageLoop {
   }
 
   StageRecord run_stage(const Stage& stage, bool& is_cut) override {
+    const bool looks = stage.id.kind == StageKind::Cut || stage.id.kind == StageKind::Move ||
+                       stage.id.kind == StageKind::ControlPoints;
+    if (!looks) looking_.reset();  // factors take much memory
     switch (stage.id.kind) {
       case StageKind::Scale:
         return scale(stage, is_cut);
@@ -199,6 +202,18 @@ class LawRun : StageLoop {
   PressObjective objective_of(const Form& form, const MarkerNoise& noise) const {
     return {specimens(form), form.layout, form.parameters, {noise, judgement.press_outlier}, placements_};
   }
+  /// The same for stages that only look at what other forms of a law promise, one after the other from one estimate:
+  /// where contacts and noise are those of the last of them, its equilibria and solvers are those of this one.
+  PressObjective& objective_to_look(const Form& form, const MarkerNoise& noise) {
+    constexpr double same = 1e-9;  // but for rounding, of another form
+    const Body& body = *form.scene->body;
+    const double modulus = mean_modulus(body, *press_law(body, form.layout, form.parameters.reference()));
+    if (looking_ && looking_->noise == noise && std::abs(modulus - looking_->modulus) < same * modulus)
+      looking_->objective.set_form(form.scene->body, form.layout, form.parameters);
+    else
+      looking_.emplace(Looking{objective_of(form, noise), noise, modulus});
+    return looking_->objective;
+  }
   MatrixX carried(const LawShape& before, const PressScene& scene) const {
     return carried_over(*scene.body, scene_of(before)->body->modulus, scene.body->modulus);
   }
@@ -223,25 +238,31 @@ class LawRun : StageLoop {
     OptimiserOptions o;
     o.max_iterations = stage.iterations;
     o.damps_long_steps = true;
-    if (plan_.facts().are_curves()) o.step_tolerance = 1e-6, o.cost_tolerance = 1e-8;  // flat valleys, cheap steps
+    if (plan_.facts().are_curves())
+      o.step_tolerance = 1e-6, o.cost_tolerance = 1e-8;  // flat valleys, cheap steps
+    else
+      o.growth_of_max_step = 8.0;
     OptimiserState from{0, form.parameters.to_unconstrained(theta), {}};
     if (const StageUnderWay* left = task.is_brief ? nullptr : under_way(stage.id)) from = left->optimiser;
     OptimiserSummary s;
     // Twice: contact is as stiff, and outliers weigh as little, as the law and the noise at the beginning say.
     for (int round = 0; round < (task.is_brief ? 1 : 2) && !is_cut; ++round) {
       std::optional<PressObjective> next(objective_of(form, noise));
+      o.cost_to_reach = round == 0 ? task.cost_to_reach : infinite;
       const OptimiserSummary done = minimise(next->cost(), from, o, [&](const Iteration& i) {
         report(stage, i, *next, form);
         if (!task.is_brief) keep_under_way(stage, i.state());
         return !(is_cut = is_cut || is_interrupted());
       });
       is_cut = is_cut || done.interrupted;
+      if (round == 0) record.start_cost = done.start_cost;
       if (round > 0 && !done.succeeded) break;  // the first round stands
       s = done;
       objective.emplace(std::move(*next));
       placements_ = objective->placements();
       if (!s.succeeded) break;
       form.parameters.set_reference(form.parameters.to_theta(s.p));
+      if (s.is_out_of_reach) break;
       if (!task.is_brief && options_.marker_noise <= 0.0) noise = objective->own_noise(1e-6 * scene_->body->size());
       objective->set_options({noise, judgement.press_outlier});
       from = {0, s.p, {}};
@@ -253,8 +274,6 @@ class LawRun : StageLoop {
       if (!is_one_of_many) outcome_.notes.push_back(stage.name + ": " + s.reason);
       return record;
     }
-    const CostEvaluation begin = objective->evaluate(form.parameters.to_unconstrained(theta));
-    record.start_cost = begin.succeeded ? begin.cost : 0.0;
     record.theta = form.parameters.to_theta(s.p);
     record.converged = s.converged;
     CostEvaluation evaluation = objective->linearise(s.p);
@@ -326,11 +345,11 @@ class LawRun : StageLoop {
     return record;
   }
 
-  StageRecord find_cut(const Stage& stage) const {
+  StageRecord find_cut(const Stage& stage) {
     StageRecord record = begun(stage);
     const LawTask& task = *stage.law;
     const Form form = form_at(task.shape, record.from);
-    PressObjective objective = objective_of(form, task.noise);
+    PressObjective& objective = objective_to_look(form, task.noise);
     const auto promised = most_promising_cut(objective, *form.scene, form.layout, record.from, task.shape.cuts,
                                              options_.modulus_variation);
     record.succeeded = promised.has_value();
@@ -338,11 +357,11 @@ class LawRun : StageLoop {
     return record;
   }
 
-  StageRecord find_move(const Stage& stage) const {
+  StageRecord find_move(const Stage& stage) {
     StageRecord record = begun(stage);
     const LawTask& task = *stage.law;
     const Form form = form_at(task.shape, record.from);
-    PressObjective objective = objective_of(form, task.noise);
+    PressObjective& objective = objective_to_look(form, task.noise);
     const auto move = best_move(objective, *form.scene, form.layout, record.from, task.shape.cuts,
                                 std::size_t(task.cut), options_.modulus_variation);
     record.succeeded = move.has_value();
@@ -354,7 +373,7 @@ class LawRun : StageLoop {
 
   /// Where a field's control points lie, its parameters as the coarser form has them, and what a step from there
   /// promises, where that decides whether it is fitted.
-  StageRecord find_points(const Stage& stage) const {
+  StageRecord find_points(const Stage& stage) {
     StageRecord record = begun(stage);
     const LawTask& task = *stage.law;
     LawShape shape = task.shape;
@@ -377,7 +396,7 @@ class LawRun : StageLoop {
     for (int k = 0; k < shape.form.controls; ++k) record.theta[to.modulus(k)] = moduli[k];
     if (options_.control_points > 1) return record;
     const Form form = form_at(shape, record.theta);
-    PressObjective objective = objective_of(form, task.noise);
+    PressObjective& objective = objective_to_look(form, task.noise);
     const VectorX p = form.parameters.to_unconstrained(record.theta);
     const CostEvaluation evaluation = objective.linearise(p);
     if (!(record.succeeded = evaluation.succeeded)) return record;
@@ -519,7 +538,9 @@ class LawRun : StageLoop {
         ended != ended_.end()
             ? std::move(ended->second)
             : objective_of(form, best.found.noise).linearise(form.parameters.to_unconstrained(best.theta));
-    outcome_.start_cost = best.start_cost, outcome_.final_cost = best.cost;
+    const CostEvaluation begin =
+        objective_of(form, best.found.noise).evaluate(form.parameters.to_unconstrained(best.from));
+    outcome_.start_cost = begin.succeeded ? begin.cost : 0.0, outcome_.final_cost = best.cost;
     outcome_.converged = best.converged && !interrupted_;
     outcome_.reason = interrupted_ ? "interrupted" : best.reason;
     std::vector<ModelShift> shifts =
@@ -549,6 +570,12 @@ class LawRun : StageLoop {
   LawPlan plan_;
   std::map<int, CostEvaluation> ended_;    // of this run, by the stage's number
   PressObjective::Placements placements_;  // of the stage that was minimised last: equilibria of the next are near
+  struct Looking {
+    PressObjective objective;
+    MarkerNoise noise;
+    double modulus = 0.0;  // that contacts are stiff about [Pa]
+  };
+  std::optional<Looking> looking_;  // of the last stage, where it only looked
 };
 
 /// What presses do not know is refused; what they merely do not use is told (`unused_choices`).

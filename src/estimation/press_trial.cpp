@@ -25,6 +25,26 @@ void PressedMaterial::set_form(std::shared_ptr<const Body> body, LawLayout layou
   ++form_;
 }
 
+void LinearisedEquilibrium::set(int form, const VectorX& theta, const Placement& placement,
+                                const std::vector<Eigen::Index>& rows, std::vector<Points> changes) {
+  constexpr std::size_t most = 64;  // a field of nodes each
+  form_ = changes.empty() || changes.size() > most ? -1 : form;
+  if (form_ < 0) return;
+  theta_ = theta, placement_ = placement, rows_ = rows, changes_ = std::move(changes);
+}
+
+std::optional<Placement> LinearisedEquilibrium::at(int form, const VectorX& theta, double size) const {
+  constexpr double farthest = 0.02;  // of the object's size
+  if (form_ != form || theta_.size() != theta.size()) return std::nullopt;
+  Points change = Points::Zero(changes_.front().rows(), 3);
+  for (std::size_t k = 0; k < changes_.size(); ++k)
+    if (const double d = theta[rows_[k]] - theta_[rows_[k]]; d != 0.0) change += d * changes_[k];
+  if (!(change.cwiseAbs().maxCoeff() < farthest * size)) return std::nullopt;
+  const Eigen::Index n = placement_.nodes.rows();
+  return Placement{placement_.nodes + change.topRows(n),
+                   placement_.translations + change.bottomRows(change.rows() - n)};
+}
+
 PressTrial::PressTrial(std::shared_ptr<const PressScene> scene, int press,
                        const std::shared_ptr<PressedMaterial>& material, const VectorX& reference,
                        const PressTrialOptions& options, int number, const Placement* begin)
@@ -78,25 +98,12 @@ std::unique_ptr<Trial> PressTrial::anew() const {
   return trial;
 }
 
-std::optional<Placement> PressTrial::guess(const VectorX& theta) const {
-  constexpr double farthest = 0.02;  // of the object's size
-  const Linearised& l = linearised_;
-  if (l.form != material_->form() || l.theta.size() != theta.size()) return std::nullopt;
-  Points change = Points::Zero(l.changes.front().rows(), 3);
-  for (std::size_t k = 0; k < l.changes.size(); ++k)
-    if (const double d = theta[l.rows[k]] - l.theta[l.rows[k]]; d != 0.0) change += d * l.changes[k];
-  if (!(change.cwiseAbs().maxCoeff() < farthest * scene_->body->size())) return std::nullopt;
-  const Eigen::Index n = l.placement.nodes.rows();
-  return Placement{l.placement.nodes + change.topRows(n),
-                   l.placement.translations + change.bottomRows(change.rows() - n)};
-}
-
 bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight) {
   const ObservedPress& seen = scene_->presses[std::size_t(press_)];
   body_.equilibrium().set_law(material_->law(theta));
   result.steps = 1, result.work = steps_of_an_equilibrium * scene_->body->node_count();
   const bool is_there = is_placed_ && placed_for_.size() == theta.size() && placed_for_ == theta;
-  const std::optional<Placement> nearly = is_there ? std::nullopt : guess(theta);
+  const std::optional<Placement> nearly = is_there ? std::nullopt : guess(linearised_, theta);
   const SolveSummary solved = nearly ? body_.solve_from(*nearly) : body_.solve();
   is_placed_ = solved.converged;
   iterations_ = solved.iterations;
@@ -128,10 +135,6 @@ bool PressTrial::compare(const VectorX& theta, CostEvaluation& result, VectorX& 
   return true;
 }
 
-namespace {
-constexpr std::size_t most_changes_kept = 64;  // of a press: a field of nodes for each
-}
-
 CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) {
   CostEvaluation result;
   VectorX slope, weight;
@@ -139,19 +142,17 @@ CostEvaluation PressTrial::run(const VectorX& theta, const MatrixX& directions) 
   if (!body_.equilibrium().prepare_derivatives(body_.placement())) return unstable(std::move(result), seen().name);
   const LawNumbers numbers(material_->layout(), theta.size());
   const int n = scene_->body->node_count(), rows = n + body_.equilibrium().contact_count();
-  std::vector<Points> forces = force_changes(body_.equilibrium().elasticity(), *material_, theta, numbers, rows);
-  const bool is_kept = numbers.count() > 0 && numbers.count() <= most_changes_kept;
-  linearised_ = {is_kept ? material_->form() : -1, theta, body_.placement(), numbers.rows, {}};
+  std::vector<Points> changes = force_changes(body_.equilibrium().elasticity(), *material_, theta, numbers, rows);
   MatrixX by_parameters(residuals_.size(), Eigen::Index(numbers.count()));
-  body_.equilibrium().respond(forces);
+  body_.equilibrium().respond(changes);
   for (std::size_t k = 0; k < numbers.count(); ++k) {
-    const Points& change = forces[k];
+    const Points& change = changes[k];
     Points moved = Points::Zero(residuals_.rows(), 3);
     moved.topRows(body_.embedding().point_count()) = body_.embedding().positions(change.topRows(n));
     if (body_.has_probe()) moved.row(moved.rows() - 1) = change.row(n);
     by_parameters.col(Eigen::Index(k)) = flat(moved);
-    if (is_kept) linearised_.changes.push_back(change);
   }
+  linearised_.set(material_->form(), theta, body_.placement(), numbers.rows, std::move(changes));
   const MatrixX J = by_parameters * directions(numbers.rows, Eigen::all);
   FrameFit& fit = result.frames.front();
   fit.gradient = J.transpose() * slope;

@@ -36,6 +36,26 @@ class PressedMaterial {
   std::shared_ptr<const MaterialLaw> law_;
 };
 
+/// An equilibrium and how it changes with each number of the law, by which those of other parameters are guessed.
+class LinearisedEquilibrium {
+ public:
+  /// @param form     of the law (`PressedMaterial::form`)
+  /// @param rows     of the law's numbers, in theta
+  /// @param changes  by each number, nodes' and then rigid bodies' [m]; of too many none is kept
+  void set(int form, const VectorX& theta, const Placement& placement, const std::vector<Eigen::Index>& rows,
+           std::vector<Points> changes);
+  /// Nothing where there is none of this form, or where it leads too far to be trusted.
+  /// @param size  of the object [m]
+  std::optional<Placement> at(int form, const VectorX& theta, double size) const;
+
+ private:
+  int form_ = -1;  // none
+  VectorX theta_;
+  Placement placement_;
+  std::vector<Eigen::Index> rows_;
+  std::vector<Points> changes_;
+};
+
 /// A trial of a body at rest under one load or several, whose equilibria a trial of the same may set out from.
 class EquilibriumTrial : public Trial {
  public:
@@ -54,6 +74,11 @@ class EquilibriumTrial : public Trial {
     result.succeeded = false;
     result.failure = name + ": the equilibrium is not stable";
     return result;
+  }
+
+  /// Where a linearised equilibrium leads for theta.
+  std::optional<Placement> guess(const LinearisedEquilibrium& from, const VectorX& theta) const {
+    return from.at(material_->form(), theta, scene_->body->size());
   }
 
   std::shared_ptr<const PressScene> scene_;
@@ -109,17 +134,6 @@ class PressTrial : public EquilibriumTrial {
   /// The equilibrium and its cost. `slope` and `weight` are those of each coordinate's loss.
   bool compare(const VectorX& theta, CostEvaluation& result, VectorX& slope, VectorX& weight);
 
-  /// An equilibrium and how it changes with each number of the law, by which those of other parameters are guessed.
-  struct Linearised {
-    int form = -1;  ///< of the law; -1: none
-    VectorX theta;
-    Placement placement;
-    std::vector<Eigen::Index> rows;  ///< of the law's numbers, in theta
-    std::vector<Points> changes;     ///< by each number, nodes' and then rigid bodies' [m]
-  };
-  /// Nothing where there is no linearisation of this form, or where it leads too far to be trusted.
-  std::optional<Placement> guess(const VectorX& theta) const;
-
   int press_;
   PressTrialOptions options_;
   ContactMaterial contact_;
@@ -127,7 +141,7 @@ class PressTrial : public EquilibriumTrial {
   bool is_placed_ = false;
   int iterations_ = 0;
   VectorX placed_for_;  // parameters of the placement
-  Linearised linearised_;
+  LinearisedEquilibrium linearised_;
   Points residuals_, deviations_;
 };
 

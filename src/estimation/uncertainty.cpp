@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/dense.hpp"
+#include "estimation/alternative.hpp"
 #include "estimation/field_evidence.hpp"
 #include "estimation/judgement.hpp"
 
@@ -74,7 +75,10 @@ std::optional<MatrixX> covariance_between(const CostEvaluation& evaluation, cons
     if (kept.empty()) continue;
     const VectorX scale = others.diagonal()(kept).cwiseSqrt().cwiseInverse();
     const MatrixX scaled = scale.asDiagonal() * others(kept, kept) * scale.asDiagonal();
-    without.col(r)(kept) = scale.cwiseProduct(solve_symmetric(scaled, VectorX(scale.cwiseProduct(pull(kept)))));
+    // Farther than a few steps lead the linear model says nothing: the other parts may hardly know a number.
+    without.col(r)(kept) = scale.cwiseProduct(solve_symmetric(scaled, VectorX(scale.cwiseProduct(pull(kept)))))
+                               .cwiseMax(-largest_shift)
+                               .cwiseMin(largest_shift);
   }
   const MatrixX about_mean = without.colwise() - without.rowwise().mean();
   return MatrixX((groups.count - 1.0) / groups.count * about_mean * about_mean.transpose());

@@ -307,6 +307,7 @@ LawElasticity& Equilibrium::elasticity() {
   solver_->is_linearised_ = false;  // who has it may evaluate it elsewhere
   return *solver_->elasticity_;
 }
+const LawElasticity& Equilibrium::elasticity() const { return *solver_->elasticity_; }
 bool Equilibrium::prepare_derivatives(const Placement& placement) { return solver_->prepare_derivatives(placement); }
 const Points& Equilibrium::response(const Points& forces) { return solver_->statics_.response(forces); }
 void Equilibrium::respond(std::span<Points> changes) { solver_->statics_.respond(changes); }

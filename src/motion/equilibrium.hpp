@@ -79,6 +79,8 @@ class Equilibrium {
   /// Force of a rigid body on the object [N].
   Vector3 contact_force(int contact, const Placement& placement) const;
   LawElasticity& elasticity();
+  /// The same where the last `solve` that converged or `prepare_derivatives` has evaluated it, with tangents.
+  const LawElasticity& elasticity() const;
 
   /// Factorises the exact Hessian at an equilibrium, for the two calls below. False where it is not positive definite:
   /// the equilibrium is not stable, or nothing holds the object.

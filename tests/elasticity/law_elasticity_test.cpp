@@ -63,6 +63,13 @@ TEST_P(LawForces, HaveTheirExactStiffness) {
     term->evaluate(x, true);
     BlockMatrix positive(body->pattern);
     term->add_stiffness(LawElasticity::Stiffness::Positive, 1.0, positive);
+    for (const auto which : {LawElasticity::Stiffness::Exact, LawElasticity::Stiffness::Positive}) {
+      BlockMatrix& matrix = which == LawElasticity::Stiffness::Exact ? K : positive;
+      matrix.multiply(VectorX(flat(d)), product);
+      Points without = Points::Zero(d.rows(), 3);
+      term->add_product(which, d, 2.0, without);
+      EXPECT_LT((flat(without) - 2.0 * product).norm(), tolerance(1e-12) * product.norm());
+    }
     const MatrixX P = test::dense(positive);
     EXPECT_GT(P.selfadjointView<Eigen::Lower>().eigenvalues()[0], -tolerance(1e-9) * P.norm());
   }

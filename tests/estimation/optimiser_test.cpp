@@ -401,6 +401,47 @@ OptimiserOptions precise(OptimiserKind kind) {
   return options;
 }
 
+TEST(LevenbergMarquardt, StepsThatKeepWhatTheyPromiseGrow) {
+  const Eigen::Vector2d minimum(20.0, -0.1);
+  BoundedQuadratic cost(MatrixX::Identity(2, 2), minimum, 1e3);
+  OptimiserOptions options = precise(OptimiserKind::LevenbergMarquardt);
+  options.max_step = 0.5;
+  std::vector<OptimiserState> states;
+  const auto keep = [&](const Iteration& i) {
+    states.push_back(i.state());
+    return true;
+  };
+  const OptimiserSummary limited = minimise(cost, Eigen::Vector2d(0.0, 0.0), options);
+  options.damps_long_steps = true;
+  EXPECT_GE(minimise(cost, Eigen::Vector2d(0.0, 0.0), options).iterations, 40) << "nobody lets them grow";
+  options.growth_of_max_step = 8.0;
+  const OptimiserSummary trusted = minimise(cost, Eigen::Vector2d(0.0, 0.0), options, keep);
+  for (const OptimiserSummary* s : {&limited, &trusted}) EXPECT_LT((s->p - minimum).norm(), 1e-3) << s->reason;
+  EXPECT_GE(limited.iterations, 40) << "half a unit each";
+  EXPECT_LT(trusted.iterations, 15);
+  ASSERT_GT(states.size(), 3U);
+  EXPECT_LT(states[0].p.cwiseAbs().maxCoeff(), 0.51) << "the first is as long as was said";
+  for (std::size_t i = 1; i < states.size(); ++i)
+    EXPECT_LT((states[i].p - states[i - 1].p).cwiseAbs().maxCoeff(), 8.1 * options.max_step) << i;
+  EXPECT_EQ(minimise(cost, states[2], options).p, trusted.p) << "the region is part of the state";
+}
+
+TEST(LevenbergMarquardt, EndsWhereTheCostThatIsAskedForIsOutOfReach) {
+  BoundedQuadratic cost(MatrixX::Identity(1, 1), VectorX::Constant(1, 20.0), 1e3);  // 10 - 200 at its minimum
+  OptimiserOptions options;
+  options.max_step = 0.01;
+  options.cost_tolerance = 1e-6;
+  const auto with = [&](double reach) {
+    options.cost_to_reach = reach;
+    return minimise(cost, VectorX::Zero(1), options);
+  };
+  const OptimiserSummary hopeless = with(-600.0), hopeful = with(-189.0);
+  EXPECT_TRUE(hopeless.is_out_of_reach && hopeless.succeeded && !hopeless.converged);
+  EXPECT_EQ(hopeless.iterations, 2);
+  EXPECT_FALSE(hopeful.is_out_of_reach);
+  EXPECT_EQ(hopeful.iterations, options.max_iterations);
+}
+
 /// Its curvature is fifty times what its Gauss-Newton matrix says: steps are far too long until they are damped.
 class Overshooting : public BoundedQuadratic {
  public:

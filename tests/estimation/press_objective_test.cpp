@@ -94,6 +94,22 @@ TEST_P(Presses, SetOutFromWhereDerivativesLead) {
   EXPECT_EQ(led.iterations(), 0) << "it is there";
 }
 
+TEST(LinearisedEquilibria, LeadAsFarAsTheyAreTrusted) {
+  const Points nodes = Points::Constant(2, 3, 1.0), change = Points::Constant(3, 3, 0.5);
+  LinearisedEquilibrium linearised;
+  const Eigen::Vector2d theta(1.0, 2.0);
+  EXPECT_FALSE(linearised.at(0, theta, 1.0)) << "there is none yet";
+  linearised.set(0, theta, {nodes, Points::Zero(1, 3)}, {1}, {change});
+  const auto there = linearised.at(0, theta + Eigen::Vector2d(7.0, 0.01), 1.0);
+  ASSERT_TRUE(there);
+  EXPECT_NEAR(there->nodes(1, 2), 1.005, 1e-15);
+  EXPECT_NEAR(there->translations(0, 0), 0.005, 1e-15);
+  EXPECT_FALSE(linearised.at(0, theta + Eigen::Vector2d(0.0, 0.1), 1.0)) << "0.05 of the size";
+  EXPECT_FALSE(linearised.at(1, theta, 1.0)) << "of another form";
+  linearised.set(0, theta, {nodes, Points::Zero(1, 3)}, {}, {});
+  EXPECT_FALSE(linearised.at(0, theta, 1.0)) << "no numbers";
+}
+
 /// A trial that begins where another one of the press has ended finds the same, in fewer iterations.
 TEST_P(Presses, SetOutFromAnotherTrialsPlacement) {
   const auto material = std::make_shared<PressedMaterial>(scene->body, layout);

@@ -338,6 +338,21 @@ TEST(CovarianceBetweenGroups, WidensWhatPartsOfAMotionDisagreeAbout) {
   EXPECT_LT(u.std[1], 1.01 * u.std_noise[1]) << "of which they tell the same";
 }
 
+/// All but the first quarter of a motion hardly know the second number, and ask for a step of a hundred.
+TEST(CovarianceBetweenGroups, GoesNoFartherThanTheLinearModelIsWorth) {
+  CostEvaluation e = measured(MatrixX::Zero(2, 2), 40);
+  for (FrameFit& frame : e.frames) {
+    const bool is_first = frame.frame < 10;
+    frame.gauss_newton = Eigen::Vector2d(1.0, is_first ? 1.0 : 1e-4).asDiagonal();
+    frame.gradient = Eigen::Vector2d(0.0, is_first ? 0.03 : -0.01);
+    e.gauss_newton += frame.gauss_newton;
+  }
+  const Uncertainty u = uncertainty_of(e, {}, {}, 1);
+  EXPECT_EQ(u.budget.back().cause, "what parts of the motion differ by");
+  EXPECT_GT(u.std[1], 0.5) << "the quarters do disagree";
+  EXPECT_LT(u.std[1], 1.5 * largest_shift);
+}
+
 TEST(Verdicts, AreGoodWhereResidualsAreNoise) {
   const CostEvaluation e = measured(curvature());
   const Verdict v = verdict_of(e, uncertainty_of(e, {}, {}), young_and_poisson());
