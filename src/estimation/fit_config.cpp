@@ -1,5 +1,7 @@
 #include "estimation/fit_config.hpp"
 
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cmath>
 #include <functional>
@@ -9,6 +11,7 @@
 #include "base/error.hpp"
 #include "base/files.hpp"
 #include "base/old_names.hpp"
+#include "base/types.hpp"
 #include "scene/toml_table.hpp"
 
 namespace pliant {
@@ -542,6 +545,17 @@ std::string to_toml(const FitOptions& options) {
 
 namespace {
 
+/// What is given may be beyond what an estimate keeps to, but for its sign.
+void refuse_out_of_bounds(const Parameter& parameter, double start) {
+  const double lower = parameter.estimated ? parameter.lower : parameter.lower < 0.0 ? -infinite : 0.0;
+  const double upper = parameter.estimated ? parameter.upper : infinite;
+  if (start >= lower && start <= upper) return;
+  throw InputError({{},
+                    fmt::format("{} is {:.6g}", parameter.name, start),
+                    start < lower ? fmt::format("{:.6g} or more", lower) : fmt::format("{:.6g} or less", upper),
+                    ""});
+}
+
 void change_parameter(Parameter& parameter, const FitOptions::Override& change, const ParameterLayout& layout,
                       VectorX& theta) {
   if (change.start) {
@@ -559,6 +573,7 @@ void change_parameter(Parameter& parameter, const FitOptions::Override& change, 
     if (parameter.transform == Transform::Direction) parameter.origin = *change.start;
   }
   if (change.estimated) parameter.estimated = *change.estimated;
+  if (change.start && parameter.is_scalar()) refuse_out_of_bounds(parameter, (*change.start)[0]);
   if (!change.prior_std) return;
   parameter.prior_std = *change.prior_std;
   if (!change.start) return;
@@ -590,7 +605,6 @@ std::string FitOptions::validate() const {
   if (const auto modulus = parameters.find("youngs_modulus");
       control_points == automatic && modulus != parameters.end() && modulus->second.estimated == false)
     return "control_points = auto asks how Young's modulus varies, youngs_modulus.estimate = false keeps it as it is";
-  if (law_terms < 0 || law_terms > 3) return "law_terms must lie in 0..3";
   if (refine < 1 || refine > 3) return "refine must lie in 1..3";
   if (const double finest = cells * std::pow(Refinement::mesh_ratio, refine - 1); finest > 64.0)
     return "refine takes " + text_of(cells) + " cells to " + text_of(finest) + ", more than 64: begin with fewer";

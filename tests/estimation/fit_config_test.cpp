@@ -268,6 +268,14 @@ TEST(Overrides, ANameAloneMeansThatOfEverySensor) {
   EXPECT_FALSE(overridden({"range_error@left.estimate=true"}).parameters()[2].estimated);
 }
 
+TEST(Overrides, RefuseAStartBeyondTheBoundsOfAnEstimateAndGivenNumbersOfAWrongSign) {
+  EXPECT_THAT(test::complaint_of([] { overridden({"youngs_modulus=0.5"}); }),
+              AllOf(HasSubstr("youngs_modulus is 0.5"), HasSubstr("1 or more")));
+  EXPECT_THAT(test::complaint_of([] { overridden({"youngs_modulus=2e9"}); }), HasSubstr("1e+09 or less"));
+  EXPECT_NO_THROW(overridden({"youngs_modulus=0.5", "youngs_modulus.estimate=false"}));
+  EXPECT_THAT(test::complaint_of([] { overridden({"range_error@left=-0.01"}); }), HasSubstr("0 or more"));
+}
+
 TEST(Overrides, RefusesWhatIsNotThere) { EXPECT_THROW(overridden({"range_error@middle=0.02"}), InputError); }
 
 FitState read_fit_state(const std::filesystem::path& path, const std::string& key) {

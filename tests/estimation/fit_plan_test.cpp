@@ -541,6 +541,17 @@ TEST_F(Plans, EstimateOffTheScanUntilItsErrorsAreNotWorthIt) {
   EXPECT_EQ(only(again).id, (StageId{StageKind::ScanErrors, 0, 1}));
   EXPECT_EQ(only(again).from.front(), theta(450.0));
   EXPECT_EQ(only(again).change.scan_errors, look.scan_errors);
+  const PassState looked_once = state;
+  look.id = only(again).id, look.scan_errors = {-1.5, 0.25};
+  has_done(look);
+  const auto last = next();
+  EXPECT_EQ(only(last).id, (StageId{StageKind::OffScan, 0, 1}));
+  StageRecord best = record(only(last).id, 0.3, 455.0);
+  best.scan_errors = look.scan_errors;
+  has_done(best);
+  EXPECT_EQ(only(next()).name, "18 cells") << "two estimates off the scan, and no third look";
+  EXPECT_EQ(only(next()).change.scan_errors, look.scan_errors);
+  state = looked_once, look.scan_errors = {-1.0, 0.5};
   has_done(record(only(again).id, 0.5));
   EXPECT_EQ(only(next()).change.scan_errors, look.scan_errors) << "of the finer mesh";
   EXPECT_EQ(only(next()).from.front(), theta(450.0));
