@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "geometry/primitives.hpp"
 
 namespace pliant::offset_surface_test {
