@@ -329,7 +329,7 @@ class LawPlan::Replay {
       move_cuts(*next, from, name);
       tried.cost = next->cost;
       tried.evidence = next->found.evidence;
-      tried.kept = is_chosen || (tried.evidence > judgement.strong_evidence && gains_enough(*next));
+      tried.kept = is_chosen || is_of_parts(tried.evidence, *next);
       // While its cuts move, it is the best already where it will be kept as it is.
       if (is_pending() && tried.kept) now_.best = next;
     }
@@ -414,15 +414,16 @@ class LawPlan::Replay {
       if (next) {
         tried.cost = next->cost;
         tried.evidence = next->found.evidence;
-        tried.kept = is_chosen || (tried.evidence > judgement.strong_evidence && gains_enough(*next));
+        tried.kept = is_chosen || is_of_parts(tried.evidence, *next);
       }
     }
     conclude(std::move(next), tried, noise);
   }
 
-  /// Whether moduli of their own for parts of the object take enough off the squares of the residuals: what a mesh
-  /// lacks is no noise, and many markers make evidence of little.
-  bool gains_enough(const Estimate& next) {
+  /// Whether moduli of their own for parts of the object have the evidence, and take enough off the squares of the
+  /// residuals: what a law or a mesh lacks is no noise, and many markers make evidence of little.
+  bool is_of_parts(double evidence, const Estimate& next) {
+    if (evidence <= judgement.evidence_of_parts) return false;
     const double deviation = best().found.deviation;
     const double gain = best().shape.form.controls > 1 ? judgement.gain_of_zone : judgement.gain_of_second_modulus;
     return next.found.squares(deviation) < (1.0 - gain) * best().found.squares(deviation);

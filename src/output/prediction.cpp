@@ -118,7 +118,8 @@ MarkerPrediction predict_markers(const Capture& capture, const CaptureScene& sce
                            Points::Constant(Eigen::Index(rest.size()), 3, std::numeric_limits<double>::quiet_NaN()));
   Simulation simulation(d.body, d.simulation);
   prediction.summary = simulation.run(scene.theta, [&](int frame, const State& state, auto) {
-    prediction.frames[std::size_t(capture.scene.timing.start_frame + frame)] = embedding.positions(state.x);
+    prediction.frames[std::size_t(capture.scene.timing.start_frame) + std::size_t(frame)] =
+        embedding.positions(state.x);
     return true;
   });
   return prediction;

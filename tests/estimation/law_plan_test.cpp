@@ -225,8 +225,8 @@ TEST_F(LawPlans, RegionsGetALawEachByTheEvidence) {
 }
 
 TEST_F(LawPlans, FieldsAreFittedWhereAStepPromisesSomething) {
-  double squares = 0.85;
-  answer = [&squares](const Stage& stage, StageRecord& r) {
+  double squares = 0.85, evidence = 12.0;
+  answer = [&](const Stage& stage, StageRecord& r) {
     if (stage.id.kind == StageKind::ControlPoints) {
       const int size = stage.law->shape.form.controls;
       r.law->points.assign(std::size_t(size), Vector3::Zero());
@@ -235,7 +235,7 @@ TEST_F(LawPlans, FieldsAreFittedWhereAStepPromisesSomething) {
       r.law->evidence = size == 8 ? 1.0 : -1.0;
     }
     if (stage.id.kind == StageKind::Law && stage.law->shape.form.controls == 8)
-      r.law->evidence = 5.0, r.law->track_squares *= squares;
+      r.law->evidence = evidence, r.law->track_squares *= squares;
   };
   const std::vector<std::string> all = names();
   EXPECT_EQ(std::ranges::count(all, "4 control points"), 1) << "promised only";
@@ -245,6 +245,9 @@ TEST_F(LawPlans, FieldsAreFittedWhereAStepPromisesSomething) {
   squares = 0.92;
   (void)names();
   EXPECT_EQ(end.best->shape.form.controls, 1) << "evidence, and hardly anything taken off the residuals";
+  squares = 0.85, evidence = 8.0;
+  (void)names();
+  EXPECT_EQ(end.best->shape.form.controls, 1) << "evidence that what a law lacks may have made up";
 }
 
 TEST_F(LawPlans, SamplesFollowTheLawOfAllPressesInRoundsWhileThatGains) {
