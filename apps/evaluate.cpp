@@ -11,6 +11,7 @@
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
 #include "scan/scan_pose.hpp"
+#include "speech.hpp"
 
 namespace pliant::apps {
 
@@ -59,9 +60,11 @@ int run(const Arguments& arguments) {
     }
   }
   if (has_static_tests(capture)) result.curves = predict_curves(model, capture);
+  std::optional<DeformationResult> strained;
   for (const CurvePrediction& curve : result.curves) {
     std::cerr << curve_sentence(curve) << "\n";
     converged = converged && curve.failure.empty();
+    strained = wider(strained, curve.strained);
   }
   if (seen->empty() && capture.loads.empty() && capture.presses.empty() && !has_static_tests(capture))
     throw InputError({{capture.file}, "no frame shows any point of the object", "depth images, clouds or markers", ""});
@@ -85,6 +88,7 @@ int run(const Arguments& arguments) {
     const MarkerPrediction prediction = predict_markers(capture, *scene);
     write_marker_track(arguments.markers, prediction.ids, prediction.frames);
   }
+  say_if_extrapolated(arguments.model, strained);
   return converged ? Fine : NotConverged;
 }
 

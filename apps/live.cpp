@@ -6,6 +6,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "live/live_page.hpp"
+#include "simulation/strain_range.hpp"
 
 namespace pliant::apps {
 
@@ -16,7 +17,10 @@ struct Arguments {
 };
 
 int run(const Arguments& arguments) {
-  write_file(arguments.out, live_page(load_model(arguments.model)));
+  LiveRecording recording;
+  if (const auto strained = recorded_strain_range(arguments.model))
+    recording.greatest_strain = strained->greatest_strain;
+  write_file(arguments.out, live_page(load_model(arguments.model), recording));
   std::cout << arguments.out << " (opens in a browser, without a server)\n";
   return Fine;
 }

@@ -18,6 +18,7 @@
 #include "geometry/solid_surface.hpp"
 #include "simulation/trajectory.hpp"
 #include "situation/probing.hpp"
+#include "speech.hpp"
 
 namespace pliant::apps {
 
@@ -63,10 +64,13 @@ Situation straight_press(const Arguments& arguments) {
 class Record {
  public:
   Record(const Probing& probing, const TriangleMesh& fine, std::filesystem::path folder)
-      : probing_(probing), fine_(fine), folder_(std::move(folder)) {
+      : probing_(probing),
+        fine_(fine),
+        folder_(std::move(folder)),
+        elasticity_(LawElasticity::make(probing.body(), probing.law())),
+        strains_(*probing.body()) {
     if (folder_.empty()) return;
     follower_.emplace(*probing.body(), fine.vertices);
-    elasticity_ = LawElasticity::make(probing.body(), probing.law());
     table_ << "time,probe,x,y,z,depth,fx,fy,fz,iterations\n";
   }
 
@@ -81,12 +85,12 @@ class Record {
                             moved.x(), moved.y(), moved.z(), probing_.depth(i), force.x(), force.y(), force.z(),
                             iterations);
     }
+    const State state{session.nodes(), Points::Zero(session.nodes().rows(), 3)};
+    const BodyFields fields = body_fields(*probing_.body(), *elasticity_, state.x);
+    strains_.add(fields, std::nullopt);
     if (folder_.empty()) return;
     const std::string name = fmt::format("frames/{:06}", frame);
-    const State state{session.nodes(), Points::Zero(session.nodes().rows(), 3)};
-    write_vtu(folder_ / (name + ".vtu"),
-              frame_grid(*probing_.body(), state, body_fields(*probing_.body(), *elasticity_, state.x)),
-              VtuPrecision::Single);
+    write_vtu(folder_ / (name + ".vtu"), frame_grid(*probing_.body(), state, fields), VtuPrecision::Single);
     TriangleMesh deformed = fine_;
     const Points positions = follower_->positions(session.nodes());
     for (std::size_t v = 0; v < deformed.vertices.size(); ++v)
@@ -102,12 +106,15 @@ class Record {
     write_file(folder_ / "probes.csv", [&](std::ostream& out) { out << table_.str(); });
   }
 
+  std::optional<DeformationResult> strained() const { return strains_.result(); }
+
  private:
   const Probing& probing_;
   const TriangleMesh& fine_;
   std::filesystem::path folder_;
   std::optional<SurfaceFollower> follower_;
   std::unique_ptr<LawElasticity> elasticity_;
+  StrainRange strains_;
   std::ostringstream table_;
   std::vector<PvdEntry> entries_;
 };
@@ -144,6 +151,7 @@ int run(const Arguments& arguments) {
   if (!arguments.out.empty())
     std::cout << fmt::format("; {}/press.pvd, surfaces beside them, probes.csv", arguments.out);
   std::cout << "\n";
+  say_if_extrapolated(arguments.model, record.strained());
   return Fine;
 }
 

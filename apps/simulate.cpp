@@ -6,6 +6,7 @@
 #include "command_line.hpp"
 #include "commands.hpp"
 #include "pictures/situation_output.hpp"
+#include "speech.hpp"
 
 namespace pliant::apps {
 
@@ -17,14 +18,16 @@ struct Arguments {
   bool ply = false, pictures = false;
 };
 
-int finish(const RolloutSummary& summary, const std::string& out) {
+int finish(const WrittenMotion& written, const Arguments& arguments) {
   stop_if_interrupted();
+  const RolloutSummary& summary = written.summary;
   if (!summary.succeeded) {
     std::cerr << "pliant: the simulation stopped in frame " << summary.frames << ": " << summary.failure << "\n";
     return NotConverged;
   }
-  std::cout << summary.frames << " frames in " << out << "/trajectory.pvd (opens in ParaView); stress and strain in "
-            << out << "/fields.html\n";
+  std::cout << summary.frames << " frames in " << arguments.out
+            << "/trajectory.pvd (opens in ParaView); stress and strain in " << arguments.out << "/fields.html\n";
+  say_if_extrapolated(arguments.model, written.strained);
   return Fine;
 }
 
@@ -35,11 +38,11 @@ int run_situation(const Arguments& arguments) {
   SituationFiles files;
   files.folder = arguments.out, files.video = arguments.video;
   files.ply = arguments.ply, files.pictures = arguments.pictures;
-  const RolloutSummary summary = write_situation(model, situation, files, [](const char* what, int done, int total) {
+  const WrittenMotion written = write_situation(model, situation, files, [](const char* what, int done, int total) {
     show_progress(what, done, total);
     return !is_interrupted();
   });
-  const int code = finish(summary, arguments.out);
+  const int code = finish(written, arguments);
   if (code == Fine && !arguments.video.empty()) std::cout << "video in " << arguments.video << "\n";
   return code;
 }
@@ -57,7 +60,7 @@ int run(const Arguments& arguments) {
                                    show_progress("simulated", done, total);
                                    return !is_interrupted();
                                  }),
-                arguments.out);
+                arguments);
 }
 
 }  // namespace

@@ -1,8 +1,12 @@
 #pragma once
 
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
+#include <optional>
 #include <string>
+
+#include "simulation/strain_range.hpp"
 
 /// What commands tell people on stdout.
 namespace pliant::apps {
@@ -18,6 +22,13 @@ std::string formatted(const char* format, Values... values) {
 /// A line of a description: a heading, or none, in a column of its own, and a text.
 inline void say(const std::string& heading, const std::string& text, int column = 13) {
   std::cout << formatted("%-*s", column, heading.c_str()) << text << '\n';
+}
+
+/// Where an object is strained by more than while its model was fitted: see `extrapolation_note`.
+inline void say_if_extrapolated(const std::filesystem::path& model_file,
+                                const std::optional<DeformationResult>& strained) {
+  const std::string note = extrapolation_note(recorded_strain_range(model_file), strained);
+  if (!note.empty()) std::cout << "note: " << note << '\n';
 }
 
 }  // namespace pliant::apps

@@ -68,9 +68,9 @@ void simulate(const Model& model, const fs::path& out, const std::optional<fs::p
       if (duration > 0.0) read.duration = duration;
       SituationFiles files;
       files.folder = out;
-      summary = write_situation(model, read, files, [&](const char*, int, int) { return !interruption.asked(); });
+      summary = write_situation(model, read, files, [&](const char*, int, int) { return !interruption.asked(); }).summary;
     } else {
-      summary = write_simulation(model, out, [&](int, int) { return !interruption.asked(); });
+      summary = write_simulation(model, out, [&](int, int) { return !interruption.asked(); }).summary;
     }
   }
   interruption.rethrow();

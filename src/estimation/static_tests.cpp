@@ -10,10 +10,12 @@
 #include "base/error.hpp"
 #include "base/parallel.hpp"
 #include "capture/markers.hpp"
+#include "elasticity/law_elasticity.hpp"
 #include "estimation/grip_trial.hpp"
 #include "estimation/indentation_trial.hpp"
 #include "motion/fixed_regions.hpp"
 #include "simulation/scene_simulation.hpp"
+#include "simulation/strain_range.hpp"
 
 namespace pliant {
 
@@ -160,17 +162,35 @@ std::vector<double> guessed_moduli(const StaticTests& tests, const Body& body, d
 
 namespace {
 
+/// How far a pressed or gripped body is strained.
+class Strains {
+ public:
+  Strains(const PressScene& scene, const std::shared_ptr<const MaterialLaw>& law)
+      : body_(*scene.body), elasticity_(LawElasticity::make(scene.body, law)), strains_(body_) {}
+  void add(const Placement& placement) {
+    strains_.add(body_fields(body_, *elasticity_, placement.nodes), std::nullopt);
+  }
+  std::optional<DeformationResult> range() const { return strains_.result(); }
+
+ private:
+  const Body& body_;
+  std::unique_ptr<LawElasticity> elasticity_;
+  StrainRange strains_;
+};
+
 CurvePrediction predict(const PressScene& scene, const ObservedIndentation& test,
                         const std::shared_ptr<const MaterialLaw>& law, double modulus) {
   CurvePrediction result{test.name,         "indentation",   test.role, "depth [m]", "N", test.curve.depths,
                          test.curve.forces, test.curve.stds, {},        {},          {}};
   IndentedBody body(scene, test, law, modulus);
+  Strains strains(scene, law);
   VectorX forces = VectorX::Constant(Eigen::Index(test.curve.depths.size()), not_a_number);
   for (std::size_t d = 0; d < test.curve.depths.size(); ++d)
     if (body.solve(d))
-      forces[Eigen::Index(d)] = body.force(d);
+      forces[Eigen::Index(d)] = body.force(d), strains.add(body.placements()[d]);
     else if (result.failure.empty())
       result.failure = body.failure();
+  result.strained = strains.range();
   if (DepthOffset offset(test.curve, test.contact_std); result.failure.empty() && offset.is_unknown()) {
     offset.fit(forces);
     result.depth_offset = offset.value();
@@ -194,10 +214,14 @@ CurvePrediction predict(const PressScene& scene, const ObservedGrip& test,
                          {},
                          {}};
   GrippedBody body(scene, test, law);
-  if (body.solve())
+  if (body.solve()) {
     result.predicted = {body.force()};
-  else
+    Strains strains(scene, law);
+    strains.add(body.placement());
+    result.strained = strains.range();
+  } else {
     result.failure = body.failure();
+  }
   return result;
 }
 
@@ -216,6 +240,10 @@ CurvePrediction predict(const ObservedCurve& curve, const MaterialLaw& law) {
                          {}};
   if (!std::ranges::all_of(result.predicted, [](double s) { return std::isfinite(s); }))
     result.failure = "no state without stress on the free faces";
+  const double unstrained = test.mode == TestMode::SimpleShear ? 0.0 : 1.0;
+  double greatest = 0.0;
+  for (const double at : result.at) greatest = std::max(greatest, std::abs(at - unstrained));
+  result.strained = DeformationResult{greatest, greatest};  // a specimen is strained alike
   return result;
 }
 

@@ -82,10 +82,11 @@ std::string facts(const Model& model, const LiveData& data, const LiveRecording&
   const double drop = 1000.0 * 3.14159 / 6.0 * std::pow(0.004, 3), area = std::max(1e-4, size * size);
   return fmt::format(
       "{{\"up\":{},\"gravity\":{},\"size\":{},\"middle\":{},\"grid\":{},\"rain\":{:.4g},\"samples\":{},\"pressed\":{},"
-      "\"deviations\":{},\"planes\":[{}],\"times\":[{}],\"presses\":[{}]{}}}",
+      "\"deviations\":{},\"strain\":{:.4g},\"planes\":[{}],\"times\":[{}],\"presses\":[{}]{}}}",
       list(gravity.norm() > 0.0 ? Vector3(-gravity.normalized()) : scene.world.up), gravity.norm(), size,
       list(0.5 * (box.min + box.max)), magnitude, std::min(2e4, 0.5 * mass / (drop * area)), data.samples.size(),
-      data.is_pressed, data.relative_deviations.size() > 0, data.is_pressed ? "" : planes, times, presses,
+      data.is_pressed, data.relative_deviations.size() > 0, recording.greatest_strain.value_or(0.0),
+      data.is_pressed ? "" : planes, times, presses,
       recording.points.empty()
           ? ""
           : fmt::format(",\"observed\":{{\"counts\":[{}],\"points\":\"{}\"}}", counts, encode_base64(bytes)));

@@ -15,6 +15,7 @@ struct LiveRecording {
   std::vector<double> times;                 ///< of frames [s], the first being the start
   std::vector<LiveTest> presses;             ///< of an object that is pressed, in the place of `times`
   std::vector<std::vector<Vector3>> points;  ///< seen in each frame, or under each press [m]
+  std::optional<double> greatest_strain;     ///< of the object while it was recorded [-], of all but a hundredth of it
 };
 
 /// Everything that a page needs to move or press a model. What is held, at rest and of a material law is pressed:

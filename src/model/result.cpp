@@ -333,6 +333,12 @@ Result read_needed(const Member& top) {
   if (top.has("identifiability"))
     top["identifiability"].each_item([&](const Member& m) { result.identifiability.push_back(read_correlation(m)); });
   result.verdict = optional_string(top, "verdict");
+  if (top.has("deformation")) {
+    const Member strains = top["deformation"];
+    const auto greatest = optional_number(strains, "greatest_strain"), half = optional_number(strains, "median_strain");
+    if (greatest && half)
+      result.deformation = DeformationResult{*greatest, *half, optional_number(strains, "greatest_rate")};
+  }
   return result;
 }
 

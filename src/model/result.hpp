@@ -164,8 +164,9 @@ struct CurvePrediction {
   std::vector<double> predicted;       ///< [unit], as many; not a number where no equilibrium was found
   std::string failure;                 ///< why not; empty: all points have one
   std::optional<double> depth_offset;  ///< [m] of an indentation: estimated, to be added to `at`; in `predicted`
-  double rms() const;                  ///< [unit] of predicted less measured; not a number where one is missing
-  double relative_rms() const;         ///< over the greatest measured size
+  std::optional<DeformationResult> strained = {};  ///< over all points, as predicted
+  double rms() const;           ///< [unit] of predicted less measured; not a number where one is missing
+  double relative_rms() const;  ///< over the greatest measured size
 };
 
 struct TimeResult {
@@ -217,8 +218,9 @@ std::string to_json(const Result& result);
 void write_result(const std::filesystem::path& path, const Result& result);
 
 /// Reads of a `result.json` what is asked of an earlier fit: of each parameter its value, unit, deviation, interval and
-/// prior and whether it was estimated, and the correlations, the verdict and the error's surface_rms; the rest of the
-/// result stays empty. Throws InputError naming the place: line and column where the text is not JSON, the member
+/// prior and whether it was estimated, and the correlations, the verdict, the error's surface_rms and how far the
+/// object was strained; the rest of the result stays empty. Throws InputError naming the place: line and column where
+/// the text is not JSON, the member
 /// ("parameters.density.value") where something of this is missing or of another kind.
 Result read_result(const std::filesystem::path& path);
 

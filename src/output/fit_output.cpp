@@ -20,7 +20,6 @@
 #include "live/live_page.hpp"
 #include "output/prediction.hpp"
 #include "output/press_output.hpp"
-#include "output/strain_range.hpp"
 #include "output/track_output.hpp"
 #include "pictures/field_pictures.hpp"
 #include "report/gallery.hpp"
@@ -28,6 +27,7 @@
 #include "report/report.hpp"
 #include "simulation/law_table.hpp"
 #include "simulation/model_simulation.hpp"
+#include "simulation/strain_range.hpp"
 #include "simulation/trajectory.hpp"
 
 namespace pliant {
@@ -589,8 +589,9 @@ void add_motion(LiveRecording& recording, const RecordedCapture& recorded, const
 
 /// The page in which the object can be touched. Its name.
 std::string write_live_page(const fs::path& folder, const RecordedCapture& recorded, const FitOutcome& outcome,
-                            const Model& model) {
+                            const Model& model, const std::optional<DeformationResult>& strained) {
   LiveRecording recording;
+  if (strained) recording.greatest_strain = strained->greatest_strain;
   // A page knows no pose from which an object was let go.
   if (!outcome.law && !recorded.capture.scene.timing.is_static && !model.scene.initial.released)
     add_motion(recording, recorded, outcome);
@@ -627,8 +628,7 @@ void write_law(const fs::path& folder, const Capture& capture, const LawOutcome&
     if (fields) fields->add(press, nodes, of);
     if (strains && is_fitted(law.scene->presses[std::size_t(press)].role)) strains->add(of, std::nullopt);
   });
-  if (strains) report.result.deformation = strains->result();
-  if (!report.result.deformation) report.result.deformation = strain_range(report.result.curves);
+  report.result.deformation = wider(strains ? strains->result() : std::nullopt, strain_range(report.result.curves));
   if (fields) report.fields = fields->draw(gallery_of(capture));
   const auto add_presses = [&](const PressScene& scene, const std::vector<PressPrediction>& predictions) {
     std::ranges::move(press_errors(scene, predictions), std::back_inserter(report.presses));
@@ -672,17 +672,19 @@ void write_fit_output(const fs::path& folder, const std::vector<RecordedCapture>
   write_result(folder / "result.json", report.result);
   write_convergence(folder / "convergence.csv", history_of(outcome, true));
   std::vector<double> modulus_std;
+  std::optional<Model> model;
   if (capture.scene.object.surface) {
-    const Model model = make_model(capture, outcome);
-    save_model(folder, model);
-    modulus_std = model.volume.youngs_modulus_std;
-    if (is_known_to_pages(model)) report.live_page = write_live_page(folder, recordings.front(), outcome, model);
+    model = make_model(capture, outcome);
+    save_model(folder, *model);
+    modulus_std = model->volume.youngs_modulus_std;
   }
   if (outcome.law)
     write_law(folder, capture, *outcome.law, modulus_std, report, tell);
   else
     write_motion(folder, recordings, outcome, modulus_std, report, tell);
   write_result(folder / "result.json", report.result);  // with how far the object was strained
+  if (model && is_known_to_pages(*model))
+    report.live_page = write_live_page(folder, recordings.front(), outcome, *model, report.result.deformation);
   write_report(folder / "report.html", report);
   if (outcome.tracking) write_tracks(folder, recordings, outcome, tell);
 }

@@ -18,6 +18,7 @@
 #include "report/report.hpp"
 #include "scene/obstacle.hpp"
 #include "simulation/model_simulation.hpp"
+#include "simulation/strain_range.hpp"
 #include "simulation/trajectory.hpp"
 #include "situation/situation_scene.hpp"
 
@@ -210,24 +211,27 @@ void write_fields(const fs::path& folder, const Model& model, const std::vector<
 
 }  // namespace
 
-RolloutSummary write_simulation(const Model& model, const fs::path& folder,
-                                const std::function<bool(int, int)>& progress) {
+WrittenMotion write_simulation(const Model& model, const fs::path& folder,
+                               const std::function<bool(int, int)>& progress) {
   const ModelScene scene = make_scene(model);
   FieldPictures fields = fields_of(model, scene.body, scene.simulation, scene.theta);
-  const RolloutSummary summary =
-      write_trajectory(folder, scene.body, scene.simulation, scene.theta, progress,
-                       [&](int frame, const State& state, const BodyFields& of) { fields.add(frame, state.x, of); });
+  StrainRange strains(*scene.body);
+  const RolloutSummary summary = write_trajectory(folder, scene.body, scene.simulation, scene.theta, progress,
+                                                  [&](int frame, const State& state, const BodyFields& of) {
+                                                    fields.add(frame, state.x, of);
+                                                    strains.add(of, std::nullopt);
+                                                  });
   write_fields(folder, model, model.scene.planes, fields);
-  return summary;
+  return {summary, strains.result()};
 }
 
-RolloutSummary write_situation(const Model& model, const Situation& situation, const SituationFiles& files,
-                               const std::function<bool(const char*, int, int)>& progress) {
+WrittenMotion write_situation(const Model& model, const Situation& situation, const SituationFiles& files,
+                              const std::function<bool(const char*, int, int)>& progress) {
   if (!files.video.empty()) require_ffmpeg(files.folder);
   const TriangleMesh& surface = *model.scene.object.surface;
   std::vector<SeenCopy> copies;
   std::vector<double> times;
-  RolloutSummary first;
+  WrittenMotion first;
   bool was_stopped = false;
   for (int k = 0; k <= int(situation.copies.size()) && !was_stopped; ++k) {
     const SituationScene scene = make_scene(model, situation, k);
@@ -237,11 +241,13 @@ RolloutSummary write_situation(const Model& model, const Situation& situation, c
     if (k > 0) copy.shift = situation.copies[std::size_t(k) - 1].shift;
     const Embedding vertices(*scene.body, surface.vertices);
     FieldPictures fields = fields_of(model, scene.body, scene.simulation, scene.theta);
+    StrainRange strains(*scene.body);
     const RolloutSummary summary = write_trajectory(
         folder, scene.body, scene.simulation, scene.theta,
         [&](int done, int total) { return !(was_stopped = progress && !progress("simulated", done, total)); },
         [&](int frame, const State& state, const BodyFields& of) {
           fields.add(frame, state.x, of);
+          strains.add(of, std::nullopt);
           const Points now = vertices.positions(state.x);
           copy.surfaces.push_back(now.cast<float>());
           std::vector<Vector3>&drops = copy.drops.emplace_back(), &falls = copy.falls.emplace_back();
@@ -259,8 +265,8 @@ RolloutSummary write_situation(const Model& model, const Situation& situation, c
         });
     write_surfaces(folder / "surface.trajectory", times, copy);
     write_fields(folder, model, situation.planes.value_or(model.scene.planes), fields);
-    if (k == 0) first = summary;
-    if (!summary.succeeded && first.succeeded) first = summary;
+    if (k == 0) first = {summary, strains.result()};
+    if (!summary.succeeded && first.summary.succeeded) first.summary = summary;
   }
   if (!files.pictures && files.video.empty()) return first;
   if (was_stopped) return first;

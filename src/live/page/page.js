@@ -16,6 +16,7 @@ const looking = (eye, at, up) => { const f = unit(sub(at, eye)), s = unit(cross(
 const perspective = (fov, ratio, near, far) => { const f = 1 / Math.tan(fov / 2);
   return new Float32Array([f / ratio, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, 2 * far * near / (near - far), 0]); };
 const orthographic = (half, near, far) => new Float32Array([1 / half, 0, 0, 0, 0, 1 / half, 0, 0, 0, 0, 2 / (near - far), 0, 0, 0, (far + near) / (near - far), 1]);
+const percent = (x) => (100 * x).toFixed(0) + " %";
 const readable = (x, digits = 3) => { if (!isFinite(x)) return "–"; const a = Math.abs(x);
   return a === 0 ? "0" : a >= 1e6 ? (x / 1e6).toPrecision(digits) + " M" : a >= 1e3 ? (x / 1e3).toPrecision(digits) + " k" : a < 1e-3 ? (x * 1e6).toPrecision(digits) + " µ" : a < 0.1 ? (x * 1e3).toPrecision(digits) + " m" : x.toPrecision(digits); };
 
@@ -222,6 +223,7 @@ function counted() {
   if (!pressed && state.pace > 1) text += ` · steps ${state.pace} times the fit's`;
   if (state.hand) text += ` · pull <b>${readable(norm(state.hand.slice(0, 3)))}N</b>`;
   if (poke) text += ` · probe <b>${readable(norm(state.probe.slice(0, 3)))}N</b>, ${readable(dot(state.probe.slice(3), poke.inward))}m deep`;
+  if (facts.strain && recordAt < 0 && state.strain > 1.05 * facts.strain) text += ` · strained by <b>${percent(state.strain)}</b>, fitted at up to ${percent(facts.strain)}: extrapolated`;
   if (recordAt >= 0) text += ` · ${aside ? `samples 1 to ${aside} of the parameters, left to right` : "the recording"}` + (pressed ? `, press ${recordAt + 1} of ${readable(facts.presses[recordAt])}N` : `, ${(facts.times[recordAt]).toFixed(2)} s`);
   told.innerHTML = text;
   if (state.stopped) trouble(pressed ? "Held back: " + state.stopped + ". Lift the probe or reset (R)." : "Stopped: " + state.stopped + ". Reset it (R), or make it softer, slower or less pulled.");
@@ -275,6 +277,7 @@ worker.onmessage = ({ data }) => {
     if (gl) { prepare(); gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.index); gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(data.triangles), gl.STATIC_DRAW);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.quad); gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array([0, 1, 2, 0, 2, 3]), gl.STATIC_DRAW); }
     $("drop").hidden = pressed || !frameCount;
+    if (facts.strain) tell("strain");
     requestAnimationFrame(draw);
     if (!pressed) { if (frameCount) tell("start"); run(true); }
     if (frameCount) { $("recording").hidden = false; $("frame").max = frameCount - 1; rehearse(); }

@@ -1,6 +1,6 @@
 // Runs the object. Messages in: commands by name; out: what is to be drawn, as fast as the page takes it.
 let wasm, memory, running = false, speed = 1, field = 0, owed = 0, last = 0, timer = 0, stopped = "";
-let cost = 0, pace = 1, exact = false, timed_steps = 0, wants = true, pressed = false, changed = true, hidden = false;
+let watches_strain = false, cost = 0, pace = 1, exact = false, timed_steps = 0, wants = true, pressed = false, changed = true, hidden = false;
 
 const stub = (module) => {
   const imports = {};
@@ -21,6 +21,7 @@ function report() {
                     energy: wasm.kinetic_energy(), probe: doubles(wasm.probe(), 6), settled: !!wasm.is_settled() };
   const hand = wasm.hand();
   if (hand) message.hand = doubles(hand, 9);
+  if (watches_strain) message.strain = floats(wasm.field(3), wasm.vertex_count()).sort()[Math.floor(0.99 * wasm.vertex_count())];
   if (field) message.field = floats(wasm.field(field), wasm.vertex_count());
   const drops = wasm.drop_count();
   if (drops) message.drops = floats(wasm.drops(), 3 * drops);
@@ -119,6 +120,7 @@ const commands = {
     postMessage({ kind: "stepped", nodes: doubles(wasm.nodes(), 30), time: wasm.time() });
   },
   field({ value }) { field = value; report(); },
+  strain() { watches_strain = true; },
   reset() { stopped = ""; owed = 0; wasm.reset(); report(); },
   replay,
   start() { stopped = ""; wasm.start_as_recorded(); report(); },

@@ -1,6 +1,8 @@
-#include "output/strain_range.hpp"
+#include "simulation/strain_range.hpp"
 
 #include <gtest/gtest.h>
+
+#include "temporary_folder.hpp"
 
 namespace pliant::strain_range_test {
 namespace {
@@ -41,13 +43,35 @@ TEST(StrainRange, HasNoRateAtRest) {
 
 TEST(StrainRange, OfCurvesIsThatOfThoseThatWereFitted) {
   CurvePrediction tension, shear, test;
-  tension.kind = shear.kind = test.kind = "material curve";
   tension.role = shear.role = "fit", test.role = "test";
-  tension.abscissa = test.abscissa = "stretch [-]", shear.abscissa = "shear [-]";
-  tension.at = {0.8, 1.0, 1.3}, shear.at = {0.1, 0.4}, test.at = {3.0};
+  tension.strained = DeformationResult{0.3, 0.2}, shear.strained = DeformationResult{0.4, 0.1};
+  test.strained = DeformationResult{2.0, 2.0};
   EXPECT_NEAR(strain_range({tension, test})->greatest_strain, 0.3, 1e-12);
   EXPECT_NEAR(strain_range({tension, shear})->greatest_strain, 0.4, 1e-12);
+  EXPECT_NEAR(strain_range({tension, shear})->median_strain, 0.2, 1e-12);
   EXPECT_FALSE(strain_range({test}));
+}
+
+TEST(StrainRange, IsBeyondTheRecordedOneWhereAHundredthIsStrainedMore) {
+  const DeformationResult recorded{0.25, 0.1};
+  EXPECT_EQ(extrapolation_note(recorded, DeformationResult{0.26, 0.2}), "") << "as far as meshes tell";
+  EXPECT_EQ(extrapolation_note(std::nullopt, DeformationResult{0.5, 0.2}), "");
+  EXPECT_EQ(extrapolation_note(recorded, std::nullopt), "");
+  EXPECT_EQ(
+      extrapolation_note(recorded, DeformationResult{0.5, 0.2}),
+      "The object is strained by up to 50 %, and was by up to 25 % while the model was fitted (a hundredth of the "
+      "volume by more): beyond that the model is extrapolated.");
+}
+
+TEST(StrainRange, OfARecordingIsReadBesideItsModel) {
+  const test::TemporaryFolder folder;
+  EXPECT_FALSE(recorded_strain_range(folder.path() / "model.toml")) << "no result there";
+  Result result;
+  result.deformation = DeformationResult{0.25, 0.1};
+  write_result(folder.path() / "result.json", result);
+  const auto found = recorded_strain_range(folder.path() / "model.toml");
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->greatest_strain, 0.25);
 }
 
 }  // namespace

@@ -1,8 +1,12 @@
-#include "output/strain_range.hpp"
+#include "simulation/strain_range.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+
+#include "base/files.hpp"
 
 namespace pliant {
 
@@ -44,17 +48,33 @@ std::optional<DeformationResult> StrainRange::result() const {
   return result;
 }
 
+std::optional<DeformationResult> wider(const std::optional<DeformationResult>& a,
+                                       const std::optional<DeformationResult>& b) {
+  if (!a || !b) return a ? a : b;
+  return DeformationResult{std::max(a->greatest_strain, b->greatest_strain),
+                           std::max(a->median_strain, b->median_strain), std::max(a->greatest_rate, b->greatest_rate)};
+}
+
 std::optional<DeformationResult> strain_range(const std::vector<CurvePrediction>& curves) {
   std::optional<DeformationResult> result;
-  for (const CurvePrediction& curve : curves) {
-    if (curve.kind != "material curve" || curve.role != "fit") continue;
-    const double unstrained = curve.abscissa.starts_with("stretch") ? 1.0 : 0.0;
-    if (!result) result.emplace();
-    for (const double at : curve.at)
-      result->greatest_strain = std::max(result->greatest_strain, std::abs(at - unstrained));
-    result->median_strain = result->greatest_strain;  // a specimen is strained alike
-  }
+  for (const CurvePrediction& curve : curves)
+    if (curve.role == "fit") result = wider(result, curve.strained);
   return result;
+}
+
+std::optional<DeformationResult> recorded_strain_range(const std::filesystem::path& model_file) {
+  const std::filesystem::path file = model_file.parent_path() / "result.json";
+  return is_file(file) ? read_result(file).deformation : std::nullopt;
+}
+
+std::string extrapolation_note(const std::optional<DeformationResult>& recorded,
+                               const std::optional<DeformationResult>& now) {
+  constexpr double same = 1.05;
+  if (!recorded || !now || now->greatest_strain <= same * recorded->greatest_strain) return "";
+  return fmt::format(
+      "The object is strained by up to {:.2g} %, and was by up to {:.2g} % while the model was fitted (a hundredth of "
+      "the volume by more): beyond that the model is extrapolated.",
+      100.0 * now->greatest_strain, 100.0 * recorded->greatest_strain);
 }
 
 }  // namespace pliant
