@@ -12,10 +12,10 @@ namespace pliant {
 
 /// What was recorded, for a page: frames of a motion, or presses.
 struct LiveRecording {
-  std::vector<double> times;                 ///< of frames [s], the first being the start
-  std::vector<LiveTest> presses;             ///< of an object that is pressed, in the place of `times`
-  std::vector<std::vector<Vector3>> points;  ///< seen in each frame, or under each press [m]
-  std::optional<double> greatest_strain;     ///< of the object while it was recorded [-], of all but a hundredth of it
+  std::vector<double> times;                   ///< of frames [s], the first being the start
+  std::vector<LiveTest> presses;               ///< of an object that is pressed, in the place of `times`
+  std::vector<std::vector<Vector3>> points;    ///< seen in each frame, or under each press [m]
+  std::optional<double> greatest_strain = {};  ///< of the object while it was recorded [-], but for a hundredth of it
 };
 
 /// Everything that a page needs to move or press a model. What is held, at rest and of a material law is pressed:

@@ -60,6 +60,7 @@ int main(int argc, char** argv) {
   LiveRecording presses;
   presses.presses = {{{0.06, 0.025, 0.0}, 0.015, {0.0, -1.0, 0.0}}, {{0.06, 0.025, 0.0}, 0.015, {0.0, -2.0, 0.0}}};
   presses.points = {{Vector3(0.06, 0.02, 0.0)}, {Vector3(0.06, 0.015, 0.0)}};
+  presses.greatest_strain = 1e-3;
   const Model pressed = test::pressed_block();
   LiveData with_laws = live_data(pressed);
   for (const double factor : {0.5, 2.0}) {

@@ -199,6 +199,8 @@ def is_pressed(browser, folder):
     browser.open(folder / "pressed.html")
     browser.wait("pliantLive.state && pliantLive.state.settled")
     assert browser.js("document.getElementById('wind-row').hidden && document.getElementById('run').hidden"), "what moves alone is shown"
+    said = "document.getElementById('told').textContent.includes('extrapolated')"
+    assert not browser.js(said), "an object at rest is not strained beyond its fit"
     x, y = browser.js("pliantLive.project([0.06, 0.025, 0])")
     for kind, name in ((0, "a ball"), (1, "a flat end"), (2, "a rod"), (3, "a glued disc")):
         browser.js(f"document.getElementById('probe-kind').value = '{kind}'")
@@ -209,6 +211,7 @@ def is_pressed(browser, folder):
         browser.wait("pliantLive.state.settled && pliantLive.state.probe[4] < -1e-3")
         force = browser.js("pliantLive.state.probe")
         assert force[1] < -0.01, f"{name} presses with {force} N"
+        browser.wait(said)
         curve = browser.js("pliantLive.curve.slice()")
         assert len(curve) > 3 and curve[-1][1] > 0.5 * max(f for _, f in curve), f"{name}: a force-displacement curve {curve}"
         if kind == 3:

@@ -38,6 +38,7 @@ TEST(LivePage, OfPressesHoldsThem) {
   recording.points = {{Vector3(0.05, 0.02, 0.0)}};
   const std::string page = live_page(test::pressed_block(), recording);
   EXPECT_THAT(page, HasSubstr("\"pressed\":true"));
+  EXPECT_THAT(page, HasSubstr("\"strain\":0,")) << "nobody knows how far it was strained";
   EXPECT_THAT(page, HasSubstr("\"deviations\":true"));
   EXPECT_THAT(page, HasSubstr("\"presses\":[2.5]"));
   EXPECT_THAT(page, HasSubstr("\"gravity\":0,"));
