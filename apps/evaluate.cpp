@@ -42,6 +42,7 @@ bool evaluate_frames(const Capture& capture, const CaptureScene& scene, const Ob
 
 int run(const Arguments& arguments) {
   const Model model = load_model(arguments.model);
+  const std::optional<DeformationResult> recorded = recorded_strain_range(arguments.model);
   Capture capture = read_capture(arguments.capture);
   ObserveOptions options;
   options.max_points_per_frame = 1000;
@@ -88,7 +89,7 @@ int run(const Arguments& arguments) {
     const MarkerPrediction prediction = predict_markers(capture, *scene);
     write_marker_track(arguments.markers, prediction.ids, prediction.frames);
   }
-  say_if_extrapolated(arguments.model, strained);
+  say_if_extrapolated(recorded, strained);
   return converged ? Fine : NotConverged;
 }
 

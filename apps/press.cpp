@@ -124,6 +124,7 @@ int run(const Arguments& arguments) {
     throw InputError({{}, "--path beside --contact, --force or --move", "one of them", "the file says it all"});
   const Situation situation = arguments.path.empty() ? straight_press(arguments) : read_situation(arguments.path);
   const Model model = load_model(arguments.model);
+  const std::optional<DeformationResult> recorded = recorded_strain_range(arguments.model);
   Probing probing(model, situation);
   const TriangleMesh fine =
       arguments.surface.empty() ? model.scene.object.surface.value() : read_surface(arguments.surface);
@@ -151,7 +152,7 @@ int run(const Arguments& arguments) {
   if (!arguments.out.empty())
     std::cout << fmt::format("; {}/press.pvd, surfaces beside them, probes.csv", arguments.out);
   std::cout << "\n";
-  say_if_extrapolated(arguments.model, record.strained());
+  say_if_extrapolated(recorded, record.strained());
   return Fine;
 }
 

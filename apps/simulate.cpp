@@ -1,5 +1,6 @@
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/error.hpp"
@@ -18,21 +19,22 @@ struct Arguments {
   bool ply = false, pictures = false;
 };
 
-int finish(const WrittenMotion& written, const Arguments& arguments) {
+int finish(const WrittenMotion& written, const std::optional<DeformationResult>& recorded, const std::string& out) {
   stop_if_interrupted();
   const RolloutSummary& summary = written.summary;
   if (!summary.succeeded) {
     std::cerr << "pliant: the simulation stopped in frame " << summary.frames << ": " << summary.failure << "\n";
     return NotConverged;
   }
-  std::cout << summary.frames << " frames in " << arguments.out
-            << "/trajectory.pvd (opens in ParaView); stress and strain in " << arguments.out << "/fields.html\n";
-  say_if_extrapolated(arguments.model, written.strained);
+  std::cout << summary.frames << " frames in " << out << "/trajectory.pvd (opens in ParaView); stress and strain in "
+            << out << "/fields.html\n";
+  say_if_extrapolated(recorded, written.strained);
   return Fine;
 }
 
 int run_situation(const Arguments& arguments) {
   const Model model = load_model(arguments.model);
+  const std::optional<DeformationResult> recorded = recorded_strain_range(arguments.model);
   Situation situation = read_situation(arguments.situation);
   if (arguments.duration > 0.0) situation.duration = arguments.duration;
   SituationFiles files;
@@ -42,7 +44,7 @@ int run_situation(const Arguments& arguments) {
     show_progress(what, done, total);
     return !is_interrupted();
   });
-  const int code = finish(written, arguments);
+  const int code = finish(written, recorded, arguments.out);
   if (code == Fine && !arguments.video.empty()) std::cout << "video in " << arguments.video << "\n";
   return code;
 }
@@ -55,12 +57,13 @@ int run(const Arguments& arguments) {
                       "--situation FILE beside them",
                       "a file with `format = \"situation/1\"` alone is a situation: the model under gravity"});
   const Model model = load_model(arguments.model);
+  const std::optional<DeformationResult> recorded = recorded_strain_range(arguments.model);
   return finish(write_simulation(model, arguments.out,
                                  [](int done, int total) {
                                    show_progress("simulated", done, total);
                                    return !is_interrupted();
                                  }),
-                arguments);
+                recorded, arguments.out);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <optional>
 #include <string>
@@ -25,9 +24,9 @@ inline void say(const std::string& heading, const std::string& text, int column 
 }
 
 /// Where an object is strained by more than while its model was fitted: see `extrapolation_note`.
-inline void say_if_extrapolated(const std::filesystem::path& model_file,
+inline void say_if_extrapolated(const std::optional<DeformationResult>& recorded,
                                 const std::optional<DeformationResult>& strained) {
-  const std::string note = extrapolation_note(recorded_strain_range(model_file), strained);
+  const std::string note = extrapolation_note(recorded, strained);
   if (!note.empty()) std::cout << "note: " << note << '\n';
 }
 

@@ -83,6 +83,14 @@ TEST_P(OfEachKind, KnownTruthIsFoundWithinWhatIsStated) {
     EXPECT_LT(curve.relative_rms(), tolerance(0.05)) << curve_sentence(curve);
     EXPECT_EQ(curve.depth_offset.has_value(), GetParam().contact_error > 0.0) << curve_sentence(curve);
     EXPECT_NEAR(curve.depth_offset.value_or(0.0), GetParam().contact_error, tolerance(5e-4)) << curve_sentence(curve);
+    ASSERT_TRUE(curve.strained) << curve.name;
+    EXPECT_GT(curve.strained->greatest_strain, 1e-3) << curve.name;
+    if (curve.kind != "material curve") continue;
+    const double rest = curve.abscissa == "shear" ? 0.0 : 1.0;
+    double greatest = 0.0;
+    for (const double at : curve.at) greatest = std::max(greatest, std::abs(at - rest));
+    EXPECT_EQ(curve.strained->greatest_strain, greatest) << curve.name;
+    EXPECT_EQ(curve.strained->median_strain, greatest) << "a specimen is strained alike";
   }
 }
 
