@@ -11,7 +11,6 @@
 #include "estimation/press_law.hpp"
 #include "estimation/pull_places.hpp"
 #include "estimation/sensor_poses.hpp"
-#include "meshing/mesh_distance.hpp"
 
 namespace pliant {
 
@@ -108,8 +107,8 @@ Discretisation discretise(const Capture& capture, std::shared_ptr<const SignedDi
     TriangleMesh& surface = off.scene.object.surface.emplace(surface_of(capture.scene, resolution));
     Resolution on = resolution;
     on.offset = {};
-    Discretisation d = discretise(off, std::make_shared<SignedDistance>(signed_distance(surface, *distance)),
-                                  std::move(body), on, blocks, parameters, settings, tracked);
+    const auto outwards = std::make_shared<SignedDistance>(offset_distance(capture.scene, *distance, resolution));
+    Discretisation d = discretise(off, outwards, std::move(body), on, blocks, parameters, settings, tracked);
     d.surface = std::move(surface);
     return d;
   }

@@ -76,6 +76,17 @@ Matrix3 SignedDistance::hessian(const Vector3& point) const {
   return H;
 }
 
+SignedDistance SignedDistance::offset_by(const std::function<double(const Vector3&)>& offset) const {
+  constexpr double coarser = 4.0;
+  const SignedDistance outwards(box(), coarser * spacing_, offset);
+  SignedDistance other = *this;
+  for (int k = 0; k < size_.z(); ++k)
+    for (int j = 0; j < size_.y(); ++j)
+      for (int i = 0; i < size_.x(); ++i)
+        other.at(i, j, k) -= float(outwards.value(origin_ + spacing_ * Vector3(i, j, k)));
+  return other;
+}
+
 double SignedDistance::value(const Vector3& point) const { return sample(point).value; }
 
 }  // namespace pliant

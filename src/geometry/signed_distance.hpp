@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "geometry/triangle_mesh.hpp"
@@ -29,13 +30,16 @@ class SignedDistance {
   /// of one side.
   [[nodiscard]] Matrix3 hessian(const Vector3& point) const;
 
+  /// That of a surface which lies farther out by an offset [m] that changes little over as much as it moves the surface
+  /// and over four grid points, between which it is interpolated.
+  [[nodiscard]] SignedDistance offset_by(const std::function<double(const Vector3&)>& offset) const;
+
   double spacing() const { return spacing_; }
   /// Box of the grid, not of the object.
   Box box() const { return {origin_, origin_ + spacing_ * (size_.cast<double>().array() - 1.0).matrix()}; }
 
  private:
   friend SignedDistance signed_distance(const TriangleMesh&, double, double);
-  friend SignedDistance signed_distance(const TriangleMesh&, const SignedDistance&);
   void allocate(const Box& box, double spacing);
   float& at(int i, int j, int k) { return values_[(std::size_t(k) * size_.y() + j) * size_.x() + i]; }
   const float* corner(const Vector3& point, Vector3& local, Vector3& outside) const;

@@ -57,22 +57,15 @@ SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double 
   box.max.array() += margin + spacing;
   SignedDistance distance;
   distance.allocate(box, spacing);
-  return signed_distance(mesh, distance);
-}
-
-SignedDistance signed_distance(const TriangleMesh& mesh, const SignedDistance& grid) {
   static const bool initialised = (openvdb::initialize(), true);
   (void)initialised;
-  SignedDistance distance = grid;
   std::vector<openvdb::Vec3s> points;
   points.reserve(mesh.vertices.size());
   for (const Vector3& v : mesh.vertices) {
-    const Vector3 p = (v - grid.origin_) / grid.spacing_;  // index space: grid point (i, j, k) lies at (i, j, k)
+    const Vector3 p = (v - distance.origin_) / spacing;  // index space: grid point (i, j, k) lies at (i, j, k)
     points.emplace_back(float(p.x()), float(p.y()), float(p.z()));
   }
-  const Box object = bounding_box(mesh), all = grid.box();
-  const double reach = std::min((object.min - all.min).minCoeff(), (all.max - object.max).minCoeff());
-  const float band = float(reach / grid.spacing_) + 2.0f;
+  const float band = float(margin / spacing) + 3.0f;
   const Shells shells = shells_of(mesh);
   const auto fill = [&](const TriangleMesh& shell, const auto& combined) {
     const auto levels = level_set(points, shell, band);
@@ -80,7 +73,7 @@ SignedDistance signed_distance(const TriangleMesh& mesh, const SignedDistance& g
     for (int k = 0; k < distance.size_.z(); ++k)
       for (int j = 0; j < distance.size_.y(); ++j)
         for (int i = 0; i < distance.size_.x(); ++i)
-          distance.at(i, j, k) = combined(distance.at(i, j, k), accessor.getValue({i, j, k}) * float(grid.spacing_));
+          distance.at(i, j, k) = combined(distance.at(i, j, k), accessor.getValue({i, j, k}) * float(spacing));
   };
   fill(shells.outer, [](auto, auto value) { return value; });
   for (const TriangleMesh& cavity : shells.cavities)
@@ -91,7 +84,7 @@ SignedDistance signed_distance(const TriangleMesh& mesh, const SignedDistance& g
       for (int i = 0; i < distance.size_.x(); ++i) encloses = encloses || distance.at(i, j, k) < 0.0f;
   if (!encloses)
     throw InputError({{},
-                      "the surface encloses no volume at a resolution of " + std::to_string(grid.spacing_) + " m",
+                      "the surface encloses no volume at a resolution of " + std::to_string(spacing) + " m",
                       "a closed surface, oriented outwards",
                       "check the mesh or raise the resolution"});
   return distance;

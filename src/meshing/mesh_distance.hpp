@@ -10,7 +10,5 @@ namespace pliant {
 ///                 inside and outside, which keeps the work in a band around the surface
 /// Throws InputError where the mesh encloses no grid point.
 SignedDistance signed_distance(const TriangleMesh& mesh, double spacing, double margin);
-/// The same on a grid that reaches as far about the mesh: those of surfaces that differ little differ as smoothly.
-SignedDistance signed_distance(const TriangleMesh& mesh, const SignedDistance& grid);
 
 }  // namespace pliant

@@ -237,7 +237,8 @@ Body beside_scan(const Scene& scene, const SignedDistance& distance, const Body&
   Body other;
   const TriangleMesh surface = surface_of(scene, resolution);
   if (body.kind == ElementKind::Hexahedron) {
-    other = make_body(hex_grid_of(scene, signed_distance(surface, distance), body.grid().cell_size), body.options);
+    other = make_body(hex_grid_of(scene, offset_distance(scene, distance, resolution), body.grid().cell_size),
+                      body.options);
   } else {
     try {
       other = make_body(tetrahedra_of(scene, resolution, offset_of(scene, resolution)), body.options);
@@ -277,6 +278,10 @@ TriangleMesh surface_of(const Scene& scene, const Resolution& resolution) {
   const std::vector<Vector3> outwards = offset_directions(surface);
   for (std::size_t v = 0; v < outwards.size(); ++v) surface.vertices[v] += offset(surface.vertices[v]) * outwards[v];
   return surface;
+}
+
+SignedDistance offset_distance(const Scene& scene, const SignedDistance& scan, const Resolution& resolution) {
+  return scan.offset_by(offset_of(scene, resolution));
 }
 
 std::shared_ptr<const Body> make_body_of(const Scene& scene, const SignedDistance& distance,
@@ -396,10 +401,12 @@ SimulationOptions make_simulation(const Scene& scene, const Body& body, const Re
   const double gravity = std::max(blocks.gravity.vector(theta).norm(), 0.1);
   simulation.max_dt = default_time_step(body, gravity);
   simulation.scan_sags = scene.object.shape_is == ShapeIs::Static && !body.is_free_elsewhere();
-  // What hangs and touches nothing moves smoothly; its elements are quadratic, and its steps dear.
+  // What is held and touches nothing moves as smoothly as its frames show.
+  constexpr double of_frame = 0.125, longest = 4.0;  // times the default
   const std::vector<double>& times = simulation.times;
-  if (simulation.scan_sags && !scene.is_touched() && times.size() > 1)
-    simulation.max_dt = std::max(simulation.max_dt, 0.125 * (times.back() - times.front()) / double(times.size() - 1));
+  if (scene.is_held() && !scene.is_touched() && times.size() > 1)
+    simulation.max_dt *= std::clamp(
+        of_frame * (times.back() - times.front()) / double(times.size() - 1) / simulation.max_dt, 1.0, longest);
   simulation.max_dt /= resolution.steps;
   simulation.blocks = blocks;
   simulation.contact = default_contact(body, theta[blocks.density] * body.volume(), gravity);

@@ -50,6 +50,9 @@ ControlledField modulus_field(const Body& body, const Scene& scene, const FieldO
 
 /// The object's surface: its scan, or beside that by the resolution's offset along its normals, but where it is held.
 TriangleMesh surface_of(const Scene& scene, const Resolution& resolution);
+/// Its signed distance, by that of the scan.
+/// @param resolution  with an offset
+SignedDistance offset_distance(const Scene& scene, const SignedDistance& scan, const Resolution& resolution);
 
 /// Longest edge of the surface's box [m].
 double object_size(const Scene& scene);

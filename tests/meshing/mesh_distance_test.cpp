@@ -122,18 +122,29 @@ TEST(SignedDistance, RefusesASurfaceThatEnclosesNothing) {
   EXPECT_THROW(signed_distance(make_sphere(0.003, 1), 0.01, 0.02), InputError);
 }
 
-/// The least change of a surface is that of its distances: both lie on one grid.
-TEST(SignedDistance, OnTheGridOfAnothersIsFartherByAsMuchAsTheSurfaceShrank) {
+TEST(SignedDistance, OfASurfaceFartherOutIsLessByAsMuch) {
   const SignedDistance distance = signed_distance(make_sphere(0.1, 4), 0.005, 0.05);
-  for (const double less : {1e-5, 1e-3}) {
-    const SignedDistance smaller = signed_distance(make_sphere(0.1 - less, 4), distance);
-    EXPECT_EQ(smaller.box().min, distance.box().min);
-    EXPECT_EQ(smaller.box().max, distance.box().max);
-    for (const Vector3& p : points_around(0.11, 500))
-      if (std::abs(p.norm() - 0.1) < 0.01) {
-        EXPECT_NEAR(smaller.value(p) - distance.value(p), less, 0.02 * less + 2e-7);
-      }
-  }
+  const auto offset = [](const Vector3& p) { return 0.001 + 0.002 * p.x() / 0.1; };
+  const SignedDistance outwards = distance.offset_by(offset);
+  EXPECT_EQ(outwards.box().min, distance.box().min);
+  EXPECT_EQ(outwards.box().max, distance.box().max);
+  for (const Vector3& p : points_around(0.11, 500))
+    if (std::abs(p.norm() - 0.1) < 0.01) {
+      EXPECT_NEAR(distance.value(p) - outwards.value(p), offset(p), 2e-7);
+    }
+}
+
+TEST(SignedDistance, OffsetIsThatOfAGreaterBall) {
+  constexpr double more = 1e-3, spacing = 0.005;
+  constexpr double of_grid =
+      spacing * spacing / 4.0 / 0.09;  // what interpolation loses where the curvatures are 1/0.09
+  const SignedDistance greater = signed_distance(make_sphere(0.1 + more, 4), spacing, 0.05);
+  const SignedDistance moved =
+      signed_distance(make_sphere(0.1, 4), spacing, 0.05).offset_by([](const Vector3&) { return more; });
+  for (const Vector3& p : points_around(0.11, 500))
+    if (std::abs(p.norm() - 0.1) < 0.01) {
+      EXPECT_NEAR(moved.value(p), greater.value(p), of_grid);
+    }
 }
 
 }  // namespace

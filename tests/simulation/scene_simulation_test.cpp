@@ -275,5 +275,20 @@ TEST(SceneSimulation, FinerStepsAreShorter) {
             2.0 * make_simulation(scene, body, fine, blocks, parameters()).max_dt);
 }
 
+TEST(SceneSimulation, StepsOfWhatIsHeldAndTouchesNothingFollowItsFrames) {
+  Scene scene = bar();
+  const Body body = body_of(scene);
+  const auto step = [&](double frame_rate) {
+    scene.timing = evenly_timed(frame_rate, 20);
+    return make_simulation(scene, body, {}, blocks, parameters()).max_dt;
+  };
+  const double free = step(10.0);
+  EXPECT_EQ(step(1000.0), free) << "what falls may meet something between two frames";
+  scene.fixed = {{RegionBox{Vector3(-0.1, -0.1, -0.1), Vector3(-0.05, 0.1, 0.1)}, {}}};
+  EXPECT_EQ(step(1000.0), free) << "no longer than frames are apart, and no shorter than of what is free";
+  EXPECT_NEAR(step(0.0625 / free), 2.0 * free, 1e-9) << "an eighth of a frame";
+  EXPECT_NEAR(step(1.0), 4.0 * free, 1e-12) << "however rare frames are";
+}
+
 }  // namespace
 }  // namespace pliant::scene_simulation_test
