@@ -182,8 +182,8 @@ class TrustRegion {
 
 /// Memory: the damping, whether the last step was rejected, and the radius of the trust region.
 void levenberg_marquardt(Run& run, const OptimiserOptions& options, const VectorX& memory) {
-  constexpr double raise = 5.0, most = 1e8, undamped = 1e-10;  // damping
-  constexpr double hope = 3.0;                                 // of what is promised
+  constexpr double raise = 5.0, most = 1e8, undamped = 1e-10, least_refused = 1e-4;  // damping
+  constexpr double hope = 3.0;                                                       // of what is promised
   constexpr int iterations_to_hope = 2;
   OptimiserSummary& s = run.summary;
   double lambda = memory.size() > 0 ? memory[0] : 1e-2;
@@ -217,9 +217,9 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
     const double quality = !accepted ? 0.0 : step.predicted > 0.0 ? gain / step.predicted : 0.0;
     trusted.learn(quality, step.moved);
     if (accepted) {
-      // The longer step that was just refused would be refused again.
-      const bool may_lengthen = quality > 0.75 && !was_rejected;
-      lambda = std::clamp(may_lengthen ? lambda / raise : quality < 0.25 ? lambda * 3.0 : lambda, 1e-8, most);
+      // As Nielsen (1999) has it; the longer step that was just refused would be refused again.
+      const double change = quality < 0.25 ? 3.0 : std::max(1.0 / raise, 1.0 - std::pow(2.0 * quality - 1.0, 3));
+      lambda = std::clamp(lambda * (was_rejected ? std::max(change, 1.0) : change), 1e-8, most);
       const bool small = step.moved < options.step_tolerance || gain < options.cost_tolerance * s.evaluation.cost;
       s.p = step.to;
       s.evaluation = std::move(e);
@@ -228,7 +228,7 @@ void levenberg_marquardt(Run& run, const OptimiserOptions& options, const Vector
       // Where a step promises or moves next to nothing, the point is as good as the cost's smoothness allows.
       if (step.moved < options.step_tolerance || step.predicted < options.cost_tolerance * s.evaluation.cost)
         done = run.end(true, "no step lowers the cost");
-      lambda = std::min(std::max(lambda, 1e-3) * raise, most);
+      lambda = std::min(std::max(lambda, least_refused) * raise, most);
     }
     was_rejected = !accepted;
     done = run.report(lambda, accepted, Vector3(lambda, was_rejected ? 1.0 : 0.0, trusted.radius()), done);
