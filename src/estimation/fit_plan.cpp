@@ -324,6 +324,7 @@ StageChain FitPlan::off_scan(const Records& done) const {
     if (!looked->converged || (ended && !ended->succeeded)) return {};
     if (ended) continue;
     off.change.scan_errors = looked->scan_errors;
+    if (i + 1 < most_estimates) is_intermediate(off);
     off.iterations = options.max_iterations;
     off.iterations_before = iterations_on_full_grid(done);
     off.give_up_above = at->cost + prior_of_scan_errors(at->scan_errors) - prior_of_scan_errors(looked->scan_errors);

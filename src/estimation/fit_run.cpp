@@ -576,6 +576,7 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
 }
 
 /// One Gauss-Newton step of the estimate and the scan's errors together; what the latter leave open moves the estimate.
+/// What surfaces differ by is seen on the coarse mesh: derivatives lead to the minimum, they do not move it.
 StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   constexpr double worth = 0.5;  // a standard deviation of what is estimated and of the errors together
   const VectorX& theta = stage.from.front();
@@ -588,14 +589,16 @@ StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   if (!e.succeeded) return record;
   std::vector<double> coefficients = stage.change.scan_errors;
   coefficients.resize(ScanErrors::count);
-  const Grid& beside = grid(stage);
+  const Spacing spacing = coarse_spacing();
+  const Grid& beside = grid(spacing, stage.change);
+  const CostEvaluation at = objective_of(stage, parameters, beside, true).evaluate(p);
   std::vector<CostEvaluation> moved(coefficients.size());
   const auto evaluate = [&](std::size_t k) {
     ModelChange change = stage.change;
     change.scan_errors = coefficients;
     change.scan_errors[k] += width_of_scan_errors;
     try {
-      const Grid there = recordings_.grid(stage.grid.cells, stage.grid.steps, change, &beside);
+      const Grid there = recordings_.grid(spacing.cells, spacing.steps, change, &beside);
       moved[k] = objective_of(stage, parameters, there, true).evaluate(p);
     } catch (const InputError& error) {
       moved[k].failure = error.what();
@@ -605,8 +608,9 @@ StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
     for (std::size_t k = 0; k < moved.size(); ++k) evaluate(k);
   else
     parallel_tasks(moved.size(), evaluate);
+  record.work += at.work;
   for (const CostEvaluation& m : moved) record.work += m.work;
-  const ScanErrorStep step = scan_error_step(e, moved, width_of_scan_errors, coefficients);
+  const ScanErrorStep step = scan_error_step(e, at, moved, width_of_scan_errors, coefficients);
   record.cost = e.cost;
   record.converged = step.promise > worth;
   record.scan_errors = step.coefficients;
@@ -622,7 +626,7 @@ StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   follows *= share_within(of_all, coordinates, most);
   for (Eigen::Index k = 0; k < follows.cols(); ++k) record.shifts.push_back({cause_scan, follows.col(k)});
   const std::lock_guard lock(mutex_);
-  outcome_.forward_steps += e.steps;
+  outcome_.forward_steps += e.steps + at.steps;
   for (const CostEvaluation& m : moved) outcome_.forward_steps += m.steps;
   return record;
 }

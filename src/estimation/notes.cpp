@@ -12,7 +12,12 @@
 
 namespace pliant {
 
-std::string in_three_digits(double value) { return fmt::format("{:.3g}", value); }
+std::string in_three_digits(double value) {
+  constexpr double four_digits = 1e3, most_written_out = 1e8;
+  if (!(std::abs(value) >= four_digits && std::abs(value) < most_written_out)) return fmt::format("{:.3g}", value);
+  const double last = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 2.0);  // of the digits that count
+  return fmt::format("{:.0f}", std::round(value / last) * last);
+}
 
 std::string note_of_untried(const std::string& cause, const std::string& why) {
   return "How much the estimate depends on the " + cause + " could not be seen: " + why + ".";

@@ -56,7 +56,8 @@ double prior_of_scan_errors(std::span<const double> coefficients) {
   return sum;
 }
 
-ScanErrorStep scan_error_step(const CostEvaluation& at, std::span<const CostEvaluation> moved, double width,
+ScanErrorStep scan_error_step(const CostEvaluation& at, const CostEvaluation& about,
+                              std::span<const CostEvaluation> moved, double width,
                               std::span<const double> coefficients) {
   const Eigen::Index n = at.gradient.size(), m = Eigen::Index(moved.size());
   MatrixX by_both = MatrixX::Zero(n, m), by_errors = MatrixX::Identity(m, m);
@@ -68,10 +69,11 @@ ScanErrorStep scan_error_step(const CostEvaluation& at, std::span<const CostEval
       MatrixX D = MatrixX::Zero(rows.residual.size(), m);
       for (Eigen::Index k = 0; k < m; ++k) {
         const CostEvaluation& other = moved[std::size_t(k)];
-        if (!other.succeeded) continue;
-        const ResidualRows& there = other.frames[f].rows[part];
-        for (Eigen::Index i = 0; i < D.rows(); ++i)  // what is not matched in both has no difference
-          if (rows.weight[i] > 0.0 && there.weight[i] > 0.0) D(i, k) = (there.residual[i] - rows.residual[i]) / width;
+        if (!about.succeeded || !other.succeeded) continue;
+        const ResidualRows &here = about.frames[f].rows[part], &there = other.frames[f].rows[part];
+        for (Eigen::Index i = 0; i < D.rows(); ++i)  // what is not matched in all has no difference
+          if (rows.weight[i] > 0.0 && here.weight[i] > 0.0 && there.weight[i] > 0.0)
+            D(i, k) = (there.residual[i] - here.residual[i]) / width;
       }
       const MatrixX weighted = rows.weight.asDiagonal() * D;
       by_both += rows.J.transpose() * weighted;

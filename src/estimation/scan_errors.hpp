@@ -43,12 +43,14 @@ struct ScanErrorStep {
 
 inline constexpr double most_deviations = 2.5;  ///< of a coefficient from none
 
-/// The step from an evaluation with the rows of its residuals and their derivatives, and from evaluations at the same
-/// estimate of models whose surfaces lie elsewhere: residuals by coefficients are their differences. One that could not
-/// be simulated tells nothing of its coefficient.
+/// The step from an evaluation with the rows of its residuals and their derivatives. Residuals by coefficients are
+/// differences between models whose surfaces lie elsewhere and one that lies where the evaluation's does, all at the
+/// same estimate; it may be the evaluation's own or a coarser one. One that could not be simulated tells nothing.
+/// @param about         of the model that others lie beside
 /// @param moved         one a coefficient, which is larger by `width` there
 /// @param coefficients  of `at`
-ScanErrorStep scan_error_step(const CostEvaluation& at, std::span<const CostEvaluation> moved, double width,
+ScanErrorStep scan_error_step(const CostEvaluation& at, const CostEvaluation& about,
+                              std::span<const CostEvaluation> moved, double width,
                               std::span<const double> coefficients);
 
 }  // namespace pliant

@@ -529,6 +529,7 @@ TEST_F(Plans, EstimateOffTheScanUntilItsErrorsAreNotWorthIt) {
   EXPECT_EQ(off.change.scan_errors, look.scan_errors);
   EXPECT_THAT(off.from, ElementsAre(theta(430.0), theta(460.0))) << "where it is, and where the step leads";
   EXPECT_DOUBLE_EQ(off.give_up_above, 1.5 - 0.5 * (1.0 + 0.25)) << "what the errors are worth by themselves";
+  EXPECT_EQ(off.promise_tolerance, 0.5) << "another look follows";
   const PassState before = state;
   has_done(record(off.id, infinite));
   EXPECT_EQ(only(next()).name, "18 cells") << "the estimate on the scan stands";
@@ -546,6 +547,7 @@ TEST_F(Plans, EstimateOffTheScanUntilItsErrorsAreNotWorthIt) {
   has_done(look);
   const auto last = next();
   EXPECT_EQ(only(last).id, (StageId{StageKind::OffScan, 0, 1}));
+  EXPECT_EQ(only(last).promise_tolerance, Stage().promise_tolerance);
   StageRecord best = record(only(last).id, 0.3, 455.0);
   best.scan_errors = look.scan_errors;
   has_done(best);

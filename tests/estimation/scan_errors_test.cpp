@@ -82,11 +82,13 @@ struct Linear {
     e.frames = {first, second};
     return e;
   }
-  ScanErrorStep step(const VectorX& p, const VectorX& c, double width) const {
+  /// @param coarser  whose residuals differ, and what coefficients do to them does not
+  ScanErrorStep step(const VectorX& p, const VectorX& c, double width, const Linear& coarser) const {
     std::vector<CostEvaluation> moved;
-    for (std::size_t k = 0; k < count; ++k) moved.push_back(evaluation(p, c + width * VectorX::Unit(count, k)));
-    return scan_error_step(evaluation(p, c), moved, width, {c.data(), count});
+    for (std::size_t k = 0; k < count; ++k) moved.push_back(coarser.evaluation(p, c + width * VectorX::Unit(count, k)));
+    return scan_error_step(evaluation(p, c), coarser.evaluation(p, c), moved, width, {c.data(), count});
   }
+  ScanErrorStep step(const VectorX& p, const VectorX& c, double width) const { return step(p, c, width, *this); }
   /// The cost with the coefficients' prior.
   double cost(const VectorX& p, const VectorX& c) const {
     return evaluation(p, c).cost + prior_of_scan_errors({c.data(), count});
@@ -109,6 +111,19 @@ TEST(ScanErrorSteps, LeadToTheMinimumOfALinearModel) {
   }
 }
 
+TEST(ScanErrorSteps, TakeDifferencesOfACoarserModelForItsOwn) {
+  const Linear model;
+  Linear coarser = model;
+  coarser.at += 0.7 * random_matrix(Linear::points, 1, 15), coarser.J *= 1.2;
+  const VectorX p = random_matrix(Linear::estimated, 1, 5), c = 0.3 * random_matrix(Eigen::Index(count), 1, 6);
+  const ScanErrorStep own = model.step(p, c, 0.5), by_coarser = model.step(p, c, 0.5, coarser);
+  EXPECT_NEAR(by_coarser.promise, own.promise, 1e-9 * own.promise);
+  EXPECT_LT((by_coarser.shift - own.shift).norm(), 1e-9);
+  EXPECT_LT((by_coarser.follows - own.follows).norm(), 1e-9);
+  coarser.weight.setZero();  // matched nowhere
+  EXPECT_EQ(model.step(p, VectorX::Zero(Eigen::Index(count)), 0.5, coarser).follows.norm(), 0.0);
+}
+
 TEST(ScanErrorSteps, TellHowFarTheEstimateFollowsEachError) {
   const Linear model;
   const VectorX c = VectorX::Zero(Eigen::Index(count));
@@ -127,10 +142,12 @@ TEST(ScanErrorSteps, OfCoefficientsThatNothingTellsAreNone) {
   const std::vector<double> c(count, 0.0);
   const VectorX p = random_matrix(Linear::estimated, 1, 5);
   const CostEvaluation e = model.evaluation(p, VectorX::Zero(Eigen::Index(count)));
-  const ScanErrorStep step = scan_error_step(e, failed, 0.5, c);
-  EXPECT_EQ(step.coefficients, c);
-  EXPECT_EQ(step.follows.norm(), 0.0);
-  EXPECT_NEAR((e.gauss_newton * step.shift + e.gradient).norm(), 0.0, 1e-9) << "the estimate's own step is left";
+  for (const CostEvaluation& about : {e, CostEvaluation{}}) {
+    const ScanErrorStep step = scan_error_step(e, about, failed, 0.5, c);
+    EXPECT_EQ(step.coefficients, c);
+    EXPECT_EQ(step.follows.norm(), 0.0);
+    EXPECT_NEAR((e.gauss_newton * step.shift + e.gradient).norm(), 0.0, 1e-9) << "the estimate's own step is left";
+  }
 }
 
 /// Half the sum of squares that rows of residuals count.
