@@ -81,11 +81,12 @@ std::optional<double> FitRun::given_start(const std::string& name) const {
   return (*change->second.start)[0];
 }
 
-/// What swings freely meets nothing: longer steps resolve it while starts are followed.
+/// Of what sags and swings freely, whose steps are dear, longer ones do while starts are followed.
 Spacing FitRun::coarse_spacing() const {
   constexpr double of_swings = 0.5;  // steps in each of the fit's
-  const bool swings = std::ranges::all_of(
-      recordings_.all(), [](const Recording& r) { return r.is_released() && !r.capture.scene.is_touched(); });
+  const bool swings = std::ranges::all_of(recordings_.all(), [](const Recording& r) {
+    return r.is_released() && !r.capture.scene.is_touched() && r.capture.scene.object.shape_is == ShapeIs::Static;
+  });
   return {options_.coarse_cells, options_.steps * (swings ? of_swings : 1.0)};
 }
 

@@ -286,8 +286,8 @@ TEST(SceneSimulation, StepsOfWhatIsHeldAndTouchesNothingFollowItsFrames) {
   EXPECT_EQ(step(1000.0), free) << "what falls may meet something between two frames";
   scene.fixed = {{RegionBox{Vector3(-0.1, -0.1, -0.1), Vector3(-0.05, 0.1, 0.1)}, {}}};
   EXPECT_EQ(step(1000.0), free) << "no longer than frames are apart, and no shorter than of what is free";
-  EXPECT_NEAR(step(0.0625 / free), 2.0 * free, 1e-9) << "an eighth of a frame";
-  EXPECT_NEAR(step(1.0), 4.0 * free, 1e-12) << "however rare frames are";
+  EXPECT_NEAR(step(0.05 / free), 2.0 * free, 1e-9) << "a tenth of a frame";
+  EXPECT_NEAR(step(1.0), 2.5 * free, 1e-12) << "however rare frames are";
 }
 
 }  // namespace
