@@ -247,7 +247,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
   const double share = 0.15 / double(horizons.size() - 1);
   const bool is_last_one_corrected = begin && !needed_corrections(done).empty();
   const auto [start, index] = best_start(done);
-  const VectorX from = begin ? with_poses_at_rest(begin->theta, done) : start;
+  const VectorX from = begin ? with_poses_at_rest(begin->theta, done) : with_dampings(start);
   const StageRecord* best = end_of_start(index, done);
   const bool is_explained = best && best->misfit < good_misfit && !facts_.swings;
   const bool is_close = facts_.coarse_is_as_fine || (!begin && is_explained);
@@ -414,6 +414,16 @@ VectorX FitPlan::beginning(const Records& done) const {
 VectorX FitPlan::with_poses_at_rest(VectorX theta, const Records& done) const {
   for (const Parameter& p : facts_.parameters.parameters())
     if (is_pose_at_rest(p)) theta.segment<3>(p.at) = beginning(done).segment<3>(p.at);
+  return theta;
+}
+
+VectorX FitPlan::with_dampings(VectorX theta) const {
+  constexpr double nothing = 0.01, again = 0.1;  // times where they began
+  for (const Parameter& p : facts_.parameters.parameters()) {
+    if (!p.estimated || p.role != Role::Damping) continue;
+    const double began = facts_.parameters.reference()[p.at];
+    if (theta[p.at] < nothing * began) theta[p.at] = again * began;
+  }
   return theta;
 }
 

@@ -590,9 +590,14 @@ StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   if (!e.succeeded) return record;
   std::vector<double> coefficients = stage.change.scan_errors;
   coefficients.resize(ScanErrors::count);
-  const Spacing spacing = coarse_spacing();
+  Spacing spacing = coarse_spacing();
+  CostEvaluation at;
+  try {
+    at = objective_of(stage, parameters, grid(spacing, stage.change), true).evaluate(p);
+  } catch (const InputError&) {  // so coarse a mesh cannot be so far from the scan
+  }
+  if (!at.succeeded) spacing = stage.grid, at = e;
   const Grid& beside = grid(spacing, stage.change);
-  const CostEvaluation at = objective_of(stage, parameters, beside, true).evaluate(p);
   std::vector<CostEvaluation> moved(coefficients.size());
   const auto evaluate = [&](std::size_t k) {
     ModelChange change = stage.change;

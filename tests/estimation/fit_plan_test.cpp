@@ -241,6 +241,24 @@ TEST_F(Plans, DrawNoMoreStartsThanAreAllowed) {
   EXPECT_EQ(only(next()).id.kind, StageKind::Fine);
 }
 
+TEST_F(Plans, BeginAnewWithADampingThatTheCoarseGridTookForNone) {
+  ParameterLayout layout = facts.parameters.layout();
+  std::vector<Parameter> list = facts.parameters.parameters();
+  Parameter damping;
+  damping.name = "stiffness_damping", damping.unit = "s", damping.estimated = true;
+  damping.at = layout.add({damping.name, damping.unit, 1, Role::Damping});
+  list.push_back(damping);
+  VectorX began(layout.size());
+  began << facts.parameters.reference(), 3e-3;
+  facts.parameters = ParameterSet(layout, list, began);
+  has_followed();
+  for (const auto& [ended, begins] : {std::pair{1e-6, 3e-4}, std::pair{2e-4, 2e-4}, std::pair{9e-3, 9e-3}}) {
+    for (StageRecord& r : state.done) r.theta[damping.at] = ended;
+    EXPECT_EQ(only(next()).id.kind, StageKind::Fine);
+    EXPECT_DOUBLE_EQ(only(next()).from.front()[damping.at], begins);
+  }
+}
+
 TEST_F(Plans, BeginAtTheSwingThatWasSeen) {
   has_moved();
   StageRecord swing = record({StageKind::Swing}, 0.0, 5e3);
