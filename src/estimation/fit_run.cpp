@@ -577,7 +577,7 @@ StageRecord FitRun::test_corrections(const Stage& stage) {
 }
 
 /// One Gauss-Newton step of the estimate and the scan's errors together; what the latter leave open moves the estimate.
-/// What surfaces differ by is seen on the coarse mesh: derivatives lead to the minimum, they do not move it.
+/// The first time what surfaces differ by is seen on the coarse mesh, which leads most of the way.
 StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   constexpr double worth = 0.5;  // a standard deviation of what is estimated and of the errors together
   const VectorX& theta = stage.from.front();
@@ -590,13 +590,15 @@ StageRecord FitRun::look_at_scan_errors(const Stage& stage) {
   if (!e.succeeded) return record;
   std::vector<double> coefficients = stage.change.scan_errors;
   coefficients.resize(ScanErrors::count);
-  Spacing spacing = coarse_spacing();
-  CostEvaluation at;
-  try {
-    at = objective_of(stage, parameters, grid(spacing, stage.change), true).evaluate(p);
-  } catch (const InputError&) {  // so coarse a mesh cannot be so far from the scan
+  Spacing spacing = stage.grid;
+  CostEvaluation at = e;
+  if (stage.id.number == 0) {
+    try {
+      CostEvaluation coarse = objective_of(stage, parameters, grid(coarse_spacing(), stage.change), true).evaluate(p);
+      if (coarse.succeeded) spacing = coarse_spacing(), at = std::move(coarse);
+    } catch (const InputError&) {  // so coarse a mesh cannot be so far from the scan
+    }
   }
-  if (!at.succeeded) spacing = stage.grid, at = e;
   const Grid& beside = grid(spacing, stage.change);
   std::vector<CostEvaluation> moved(coefficients.size());
   const auto evaluate = [&](std::size_t k) {
