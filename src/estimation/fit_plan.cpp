@@ -247,7 +247,7 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
   const double share = 0.15 / double(horizons.size() - 1);
   const bool is_last_one_corrected = begin && !needed_corrections(done).empty();
   const auto [start, index] = best_start(done);
-  const VectorX from = begin ? with_poses_at_rest(begin->theta, done) : with_dampings(start);
+  const VectorX from = begin ? with_poses_at_rest(begin->theta, done) : without_vanished_dampings(start);
   const StageRecord* best = end_of_start(index, done);
   const bool is_explained = best && best->misfit < good_misfit && !facts_.swings;
   const bool is_close = facts_.coarse_is_as_fine || (!begin && is_explained);
@@ -417,7 +417,7 @@ VectorX FitPlan::with_poses_at_rest(VectorX theta, const Records& done) const {
   return theta;
 }
 
-VectorX FitPlan::with_dampings(VectorX theta) const {
+VectorX FitPlan::without_vanished_dampings(VectorX theta) const {
   constexpr double nothing = 0.01, again = 0.1;  // times where they began
   for (const Parameter& p : facts_.parameters.parameters()) {
     if (!p.estimated || p.role != Role::Damping) continue;

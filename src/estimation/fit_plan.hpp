@@ -95,9 +95,9 @@ class FitPlan {
   /// Whether a parameter is of a pose that is told at rest.
   bool is_pose_at_rest(const Parameter& p) const;
   VectorX with_poses_at_rest(VectorX theta, const Records& done) const;
-  /// Dampings that came to next to nothing on the coarse grid are a tenth of where they began: steps of a logarithm are
-  /// too short to find back from there.
-  VectorX with_dampings(VectorX theta) const;
+  /// With a tenth of where they began for dampings that came to next to nothing on the coarse mesh: steps of a
+  /// logarithm are too short to find back from there.
+  VectorX without_vanished_dampings(VectorX theta) const;
   /// Where the fit begins, with the poses that are told at rest.
   VectorX beginning(const Records& done) const;
   /// Where the fit is before any start is followed.

@@ -30,8 +30,8 @@ class SignedDistance {
   /// of one side.
   [[nodiscard]] Matrix3 hessian(const Vector3& point) const;
 
-  /// That of a surface which lies farther out by an offset [m] that changes little over as much as it moves the surface
-  /// and over four grid points, between which it is interpolated.
+  /// Signed distance of a surface that lies outside of this one by an offset [m], to first order: the distance less the
+  /// offset, which is interpolated between every fourth grid points.
   [[nodiscard]] SignedDistance offset_by(const std::function<double(const Vector3&)>& offset) const;
 
   double spacing() const { return spacing_; }

@@ -50,7 +50,7 @@ ControlledField modulus_field(const Body& body, const Scene& scene, const FieldO
 
 /// The object's surface: its scan, or beside that by the resolution's offset along its normals, but where it is held.
 TriangleMesh surface_of(const Scene& scene, const Resolution& resolution);
-/// Its signed distance, by that of the scan.
+/// Signed distance of that surface, where it lies beside the scan, by the scan's (`SignedDistance::offset_by`).
 /// @param resolution  with an offset
 SignedDistance offset_distance(const Scene& scene, const SignedDistance& scan, const Resolution& resolution);
 
