@@ -1,6 +1,7 @@
 #include "estimation/field_choice.hpp"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -53,6 +54,13 @@ VectorX changed(const JointLayout& from, const VectorX& theta, const JointLayout
   return with_moduli(from, theta, to, (M * logs).array().exp());
 }
 
+/// The last estimate before any off its surface.
+const StageRecord& last_on_surface(const PassState& state) {
+  return *std::ranges::find_if(state.done.rbegin(), state.done.rend(), [](const StageRecord& r) {
+    return r.succeeded && (r.id.kind == StageKind::Fine || r.id.kind == StageKind::Corrected);
+  });
+}
+
 /// A guess at how much is done after so many fields.
 double done_before(int fields) { return 0.95 * (1.0 - std::pow(0.6, fields)); }
 
@@ -93,6 +101,7 @@ std::optional<Pass> FieldChoice::next() {
 bool FieldChoice::take(FitOutcome outcome, PassState reached) {
   histories_.emplace_back(count_, outcome.history);
   forward_steps_ += outcome.forward_steps;
+  if (is_last_ && !outcome.interrupted && !holds(outcome)) return true;
   if (is_last_) {
     outcome_ = with_history(std::move(outcome));
     if (is_cut_) outcome_->interrupted = true, outcome_->converged = false, outcome_->reason = "interrupted";
@@ -139,12 +148,12 @@ std::optional<PassState> FieldChoice::beginning_of(int count) {
 PassState FieldChoice::with_field(int count, TriedField& promised) {
   std::vector<std::string> unused;
   const Recordings recordings(recordings_, with_controls(options_, count), unused);
-  const Grid grid = recordings.grid(options_.cells, options_.steps);
+  PassState begin = begun_from(*choice_.state);
+  const Grid grid = recordings.grid(options_.cells, options_.steps, {.scan_errors = begin.begin->scan_errors});
   const Body& body = *grid.recording.front().body;
   const MatrixX moduli = carried_over(body, field_of(body, best().control_points), body.modulus);
   const JointLayout before = layout_of(best().control_points), after = layout_of(count);
   const auto change = [&](VectorX& theta) { theta = changed(before, theta, after, moduli); };
-  PassState begin = begun_from(*choice_.state);
   begin.controls = count;
   for (StageRecord& r : begin.done) change(r.from), change(r.theta);
   VectorX& theta = begin.begin->theta;
@@ -165,7 +174,7 @@ PassState FieldChoice::with_field(int count, TriedField& promised) {
   }
   // Dampings and, above all, Poisson's ratio made up for what the coarser field lacks: a stage earlier, and the
   // latter where it began.
-  const bool is_corrected = estimate_of(*choice_.state)->id.kind == StageKind::Corrected;
+  const bool is_corrected = last_on_surface(*choice_.state).id.kind == StageKind::Corrected;
   begin.begin->stage = std::max(0, begin.begin->stage - (is_corrected ? 2 : 1));
   if (const Parameter* nu = parameters.find("poissons_ratio"); nu->estimated)
     theta[nu->at] = recordings.parameters().reference()[nu->at];
@@ -177,10 +186,11 @@ ModulusField FieldChoice::field_of(const Body& body, int count) const {
 }
 
 double FieldChoice::wide_band_limit() const {
-  const StageId estimate = estimate_of(*choice_.state)->id;
-  const int narrow = estimate.number - (estimate.kind == StageKind::Corrected ? 1 : 0);
-  const StageRecord* wide = find_record(choice_.state->done, {StageKind::Fine, estimate.start, narrow - 1});
-  return wide ? (1.0 - share_on_the_way * least_gain(best().control_points)) * wide->cost
+  const StageRecord& narrow = last_on_surface(*choice_.state);
+  const int number = narrow.id.number - (narrow.id.kind == StageKind::Corrected ? 1 : 0);
+  const StageRecord* wide = find_record(choice_.state->done, {StageKind::Fine, narrow.id.start, number - 1});
+  const double off_scan = narrow.cost - estimate_of(*choice_.state)->cost;  // the fall there
+  return wide ? (1.0 - share_on_the_way * least_gain(best().control_points)) * (wide->cost - off_scan)
               : std::numeric_limits<double>::infinity();
 }
 
@@ -198,9 +208,26 @@ void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {
   if (count_ == 1 || is_worth_it(tried, best())) {
     choice_.best = int(choice_.tried.size());
     choice_.state = std::move(reached);
+    if (count_ == 1) choice_.even = choice_.state;
   }
   choice_.tried.push_back(tried);
   choice_.under_way = 0;
+}
+
+bool FieldChoice::holds(const FitOutcome& outcome) {
+  if (count_ == 1 || outcome.uncertainty.std.size() != outcome.parameters.dimension()) return true;
+  const Body& body = *outcome.recordings.front().discretisation.body;
+  const VectorX p = outcome.parameters.to_unconstrained(outcome.theta);
+  const double evidence =
+      log_bayes_factor(outcome.uncertainty, outcome.parameters, p, carried_over(body, field_of(body, 1), body.modulus));
+  if (evidence > judgement.strong_evidence) return true;
+  for (TriedField& t : choice_.tried)
+    if (t.estimated && t.log_bayes_factor > judgement.strong_evidence)
+      t.log_bayes_factor = std::min(t.log_bayes_factor, evidence), t.counts_models = true;
+  choice_.best = choice_.under_way = 0;
+  choice_.state = choice_.even;
+  is_last_ = false;
+  return false;
 }
 
 Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const {
@@ -210,6 +237,7 @@ Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double d
   pass.options.refine = refine;
   pass.options.alternatives = options_.alternatives && is_last_;
   if (count > 1 && !is_last_) pass.limits.wide_band_cost = wide_band_limit();
+  pass.limits.looks_at_scan_errors = options_.alternatives && count == 1;
   pass.begin = from;
   if (count > 1) pass.stage = points(count);
   pass.done_from = done_from, pass.done_to = done_to;
@@ -252,6 +280,7 @@ std::string explained(const std::vector<TriedField>& tried) {
                 std::to_string(best.control_points) + ": " +
                 (is_possible ? text_of(t.log_bayes_factor, "%+.1f") : "cannot be simulated");
     if (is_possible && !t.estimated) evidence += " (promised by one step)";
+    if (t.counts_models) evidence += " (with what other models and parts of the motion leave open of it)";
     if (is_worth_it(t, best)) best = t;
   }
   return "Young's modulus was given " + points(best.control_points) +

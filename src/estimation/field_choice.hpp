@@ -8,11 +8,13 @@
 namespace pliant {
 
 /// Plans a fit with as many control points of Young's modulus as the recordings support. The homogeneous object is
-/// fitted first; then fields of 2, 3, 4, 6, 8, ... points, each from the best one so far and only where one step of
-/// Gauss and Newton promises enough (`is_worth_a_fit`), and to its end only where the stage in the wide band takes off
-/// as large a part of the best one's cost there. A field of more points is kept where there is strong evidence
-/// of what it has beyond the best one before (`log_bayes_factor` above `Judgement::strong_evidence`); two numbers in a
-/// row without it end the search, and the best one is repeated where the options ask for that.
+/// fitted first, off the scan where that seems to err: fields would make up for it. Then fields of 2, 3, 4, 6, 8, ...
+/// points, each from the best one so far and only where one step of Gauss and Newton promises enough
+/// (`is_worth_a_fit`), and to its end only where the stage in the wide band takes off as large a part of the best one's
+/// cost there. A field of more points is kept where there is strong evidence of what it has beyond the best one before
+/// (`log_bayes_factor` above `Judgement::strong_evidence`); two numbers in a row without it end the search, and the
+/// best one is repeated where the options ask for that. Where the evidence for that is weak once it counts what other
+/// models and parts of the motion leave open of the field, the homogeneous object stands.
 class FieldChoice : public PassPlanner {
  public:
   /// @param resume  the state of an interrupted choice goes on with the field that was under way
@@ -37,6 +39,8 @@ class FieldChoice : public PassPlanner {
   double wide_band_limit() const;
   Pass pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const;
   void judge(const FitOutcome& outcome, PassState reached);
+  /// Whether the last pass leaves strong evidence for its field; where it does not, no field is the best one.
+  bool holds(const FitOutcome& outcome);
   /// With all that was done on the way.
   FitOutcome with_history(FitOutcome outcome);
   JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }

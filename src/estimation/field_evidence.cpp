@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/dense.hpp"
 #include "estimation/bounded_step.hpp"
@@ -24,15 +25,36 @@ MatrixX field_precision(const std::vector<Vector3>& points, double length, doubl
   return ratios.transpose() * solve_symmetric(covariance, ratios);
 }
 
+namespace {
+
+/// What a field can have that a coarser one cannot: rows over the unconstrained estimate, and their prior covariance.
+struct Contrasts {
+  MatrixX rows, prior;
+};
+std::optional<Contrasts> contrasts_beyond(const ParameterSet& parameters, Eigen::Index dimension,
+                                          const MatrixX& carried) {
+  const std::vector<Eigen::Index> moduli = parameters.joint_coordinates();
+  if (Eigen::Index(moduli.size()) != carried.rows() || carried.rows() <= carried.cols()) return std::nullopt;
+  const MatrixX own = orthogonal_complement(carried);
+  MatrixX rows = MatrixX::Zero(own.rows(), dimension);
+  rows(Eigen::all, moduli) = own;
+  const MatrixX covariance = pseudo_inverse(parameters.joint_precision());  // of contrasts
+  return Contrasts{std::move(rows), own * covariance * own.transpose()};
+}
+
+/// ln N(d; 0, V + prior) - ln N(d; 0, V).
+double log_ratio_of_normals(const VectorX& d, const MatrixX& V, const MatrixX& prior) {
+  const MatrixX both = V + prior;
+  return 0.5 *
+         (d.dot(solve_symmetric(V, d)) - d.dot(solve_symmetric(both, d)) + log_determinant(V) - log_determinant(both));
+}
+
+}  // namespace
+
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& carried) {
-  const std::vector<Eigen::Index> rows = parameters.joint_coordinates();
-  if (Eigen::Index(rows.size()) != carried.rows() || carried.rows() <= carried.cols()) return 0.0;
-  const MatrixX own = orthogonal_complement(carried);
-  MatrixX contrasts = MatrixX::Zero(own.rows(), p.size());
-  contrasts(Eigen::all, rows) = own;
-  const MatrixX covariance = pseudo_inverse(parameters.joint_precision());  // of contrasts
-  return log_bayes_factor(evaluation, parameters, p, contrasts, own * covariance * own.transpose());
+  const std::optional<Contrasts> contrasts = contrasts_beyond(parameters, p.size(), carried);
+  return contrasts ? log_bayes_factor(evaluation, parameters, p, contrasts->rows, contrasts->prior) : 0.0;
 }
 
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
@@ -70,9 +92,18 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
   for (const FrameFit& frame : evaluation.frames) mean += frame.gradient / double(evaluation.frames.size());
   const MatrixX V = noise * by_gradient * contrasts.transpose() +
                     left * by_gradient * gradient_scatter(evaluation, mean) * by_gradient.transpose();
-  const MatrixX both = V + prior;
-  return 0.5 *
-         (d.dot(solve_symmetric(V, d)) - d.dot(solve_symmetric(both, d)) + log_determinant(V) - log_determinant(both));
+  return log_ratio_of_normals(d, V, prior);
+}
+
+double log_bayes_factor(const Uncertainty& uncertainty, const ParameterSet& parameters, const VectorX& p,
+                        const MatrixX& carried) {
+  const std::optional<Contrasts> contrasts = contrasts_beyond(parameters, p.size(), carried);
+  if (!contrasts) return 0.0;
+  const MatrixX by_interval =
+      contrasts->rows *
+      (uncertainty.high.array() / (normal_90 * uncertainty.std.array().max(1e-300))).matrix().asDiagonal();
+  return log_ratio_of_normals(contrasts->rows * p, by_interval * uncertainty.covariance * by_interval.transpose(),
+                              contrasts->prior);
 }
 
 MatrixX gradient_scatter(const CostEvaluation& evaluation, const VectorX& mean) {

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "estimation/objective.hpp"
+#include "estimation/uncertainty.hpp"
 
 namespace pliant {
 
@@ -35,6 +36,11 @@ double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& pa
 /// @param prior      P, rows x rows
 double log_bayes_factor(const CostEvaluation& evaluation, const ParameterSet& parameters, const VectorX& p,
                         const MatrixX& contrasts, const MatrixX& prior);
+
+/// The same of an estimate whose whole uncertainty is known: V is its covariance by noise, by other models and by what
+/// parts of a motion differ by, as wide as its 90 % intervals are beside those of a normal distribution.
+double log_bayes_factor(const Uncertainty& uncertainty, const ParameterSet& parameters, const VectorX& p,
+                        const MatrixX& carried);
 
 /// Covariance of the sum of the frames' gradients about their mean, by how they scatter; neighbouring frames may be
 /// correlated (Newey and West 1987).

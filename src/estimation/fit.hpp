@@ -43,12 +43,13 @@ struct FitStart {
   std::string reason;
 };
 
-/// What a number of control points is worth: see `fit_with_chosen_field`.
+/// What a number of control points is worth: see `FieldChoice`.
 struct TriedField {
   int control_points = 1;
   bool estimated = false;         ///< false: its evidence is what one Gauss-Newton step promised
   double cost = 0.0;              ///< of the estimate; infinite where there is none
   double log_bayes_factor = 0.0;  ///< against the best before; infinitely low where it cannot be simulated
+  bool counts_models = false;     ///< what other models and parts of the motion leave open is in that evidence
 };
 
 /// One round of tracking and estimation in turns.
@@ -82,6 +83,7 @@ struct FitState {
     std::vector<TriedField> tried;   ///< that are done
     int best = 0;                    ///< of those tried
     std::optional<PassState> state;  ///< of the best one's fit, with its estimate
+    std::optional<PassState> even;   ///< of the homogeneous object's
     int under_way = 0;               ///< control points of the fit that was under way; 0: none
   };
   std::optional<FieldChoice> field;

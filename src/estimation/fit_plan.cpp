@@ -72,7 +72,7 @@ const StageRecord* estimate_of(const PassState& state) {
 PassState begun_from(const PassState& state) {
   PassState begun = state;
   begun.under_way.reset();
-  begun.begin = PassState::Beginning{estimate_of(state)->theta, 0};
+  begun.begin = PassState::Beginning{estimate_of(state)->theta, 0, estimate_of(state)->scan_errors};
   for (const StageRecord& r : state.done)
     if (r.id.kind == StageKind::Fine || r.id.kind == StageKind::Corrected) begun.begin->stage = r.id.number;
   std::erase_if(begun.done, [](const StageRecord& r) {
@@ -277,11 +277,14 @@ StageChain FitPlan::fine(const Records& done, const std::optional<PassState::Beg
     chain.push_back(std::move(stage));
   }
   if (!chain.empty() && chain.front().from.empty()) chain.front().from = {from};
+  for (Stage& stage : chain)
+    if (begin) stage.change.scan_errors = begin->scan_errors;
   return chain;
 }
 
 Stage FitPlan::test(const StageRecord& estimate) const {
   Stage stage{{StageKind::Test}, "test", {facts_.options.cells, facts_.options.steps}};
+  stage.change.scan_errors = estimate.scan_errors;
   stage.band = facts_.options.fine_band;
   stage.from = {estimate.theta};
   stage.done_from = stage.done_to = 0.9;
@@ -299,6 +302,7 @@ StageChain FitPlan::corrected(const Records& done, const std::optional<PassState
   stage.iterations_before = iterations_on_full_grid(done);
   stage.free = free_at_last(done);
   stage.from = {fine ? fine->theta : begin->theta};
+  if (begin) stage.change.scan_errors = begin->scan_errors;
   stage.done_from = 0.9, stage.done_to = 1.0;
   return {stage};
 }

@@ -143,7 +143,7 @@ PlanFacts FitRun::facts(const PassLimits& limits) {
   f.repetitions = refined_spacings({options_.cells, options_.steps}, options_.refine, recordings_.any_meshed_here(),
                                    !recordings_.all_static());
   if (options_.alternatives) f.alternatives = alternatives();
-  f.looks_at_scan_errors = options_.alternatives && recordings_.any_scan_errs();
+  f.looks_at_scan_errors = (options_.alternatives || limits.looks_at_scan_errors) && recordings_.any_scan_errs();
   f.repeats_by_need =
       options_.refine == 1 && options_.alternatives && options_.budget > 0.0 && recordings_.any_meshed_here();
   for (double cells = options_.cells * Refinement::mesh_ratio; f.repeats_by_need && cells <= most_cells;

@@ -53,6 +53,7 @@ StageRecord FitRun::last_look(const PassState& at) {
     theta = parameters_of(next.front().front(), left->from).to_theta(left->optimiser.p);
   StageRecord record{stage.id, stage.name, theta, theta};
   record.reason = "interrupted";
+  record.scan_errors = stage.change.scan_errors;
   constexpr double at_most = 0.25;                                         // minutes: who interrupts does not wait
   const bool has_begun = left || find_record(at.done, {StageKind::Fine});  // many simulations came before
   if (!has_begun && work_of_a_look(grid(stage)) > at_most * work_of_a_minute) {
@@ -86,7 +87,7 @@ void FitRun::finish(const std::vector<StageRecord>& done) {
   const auto failed =
       std::ranges::find_if(done, [](const StageRecord& r) { return is_on_full_grid(r.id.kind) && !r.succeeded; });
   const StageRecord& last = first ? refined(done, *first) : *failed;
-  const ModelChange surface = plan_.surface(done);
+  const ModelChange surface{.scan_errors = last.scan_errors};
   const Grid& at = grid(plan_.spacing_of(last), surface);
   ParameterSet parameters = plan_.estimated(done);
   parameters.set_reference(last.theta);
@@ -193,8 +194,7 @@ void FitRun::say_corrections(const std::vector<StageRecord>& done) {
 }
 
 void FitRun::say_scan_errors(const std::vector<StageRecord>& done, const StageRecord& estimate) {
-  const StageRecord* look = find_record(done, {StageKind::ScanErrors, estimate.id.start, 0});
-  if (estimate.id.kind != StageKind::OffScan || !look) return;
+  if (estimate.scan_errors.empty()) return;
   const TriangleMesh &scan = *recordings_.front().capture.scene.object.surface,
                      &surface = outcome_.recordings.front().discretisation.surface.value();
   double mean = 0.0, squares = 0.0;
@@ -204,12 +204,15 @@ void FitRun::say_scan_errors(const std::vector<StageRecord>& done, const StageRe
     mean += out / double(normals.size()), squares += out * out / double(normals.size());
   }
   outcome_.notes.push_back(fmt::format(
-      "The scan seems to err: the object's surface was found {:.2g} mm {} it in the mean and {:.2g} mm from it in the "
-      "root mean square, and the cost fell from {} to {}. On the scan Young's modulus was {} Pa; alternatives = false "
-      "leaves it so, and surface_noise of [object] says how well the scan is known.",
-      1e3 * std::abs(mean), mean > 0.0 ? "outside of" : "inside of", 1e3 * std::sqrt(squares),
-      in_three_digits(look->cost), in_three_digits(estimate.cost),
-      in_three_digits(look->from[plan_.facts().moduli.front()])));
+      "The scan seems to err: the object's surface was found {:.2g} mm {} it in the mean and {:.2g} mm from "
+      "it in the root mean square. alternatives = false leaves it where it was scanned, and surface_noise "
+      "of [object] says how well the scan is known.",
+      1e3 * std::abs(mean), mean > 0.0 ? "outside of" : "inside of", 1e3 * std::sqrt(squares)));
+  const StageRecord* look = find_record(done, {StageKind::ScanErrors, estimate.id.start, 0});
+  if (!look || (state_.begin && !state_.begin->scan_errors.empty())) return;
+  outcome_.notes.push_back(fmt::format("Where it was scanned Young's modulus was {} Pa, at a cost of {}; off it {}.",
+                                       in_three_digits(look->from[plan_.facts().moduli.front()]),
+                                       in_three_digits(look->cost), in_three_digits(estimate.cost)));
 }
 
 /// Of the alternatives that could be tried, less that of the model that each stands beside: the fit's own, whose

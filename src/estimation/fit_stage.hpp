@@ -69,7 +69,8 @@ inline constexpr double part_of_unevenness = 0.5;
 
 /// Where a pass of a search among several ends early.
 struct PassLimits {
-  bool ends_if_unexplained = false;  ///< after its estimate
+  bool ends_if_unexplained = false;   ///< after its estimate
+  bool looks_at_scan_errors = false;  ///< though it tries no alternatives
   /// What the cost of the last stage in the wide band must come below.
   double wide_band_cost = std::numeric_limits<double>::infinity();
 };
@@ -151,7 +152,7 @@ struct StageRecord {
   std::vector<std::string> corrected = {};  ///< of a test: parameters that need correction
   std::string told = {};                    ///< for people: the swing that was found, what needs correction
   std::vector<ModelShift> shifts = {};      ///< of an alternative, or of errors of the scan: of the estimate
-  /// Of a look at the errors of the scan: what they seem to be; of an estimate off the scan: what they were taken for.
+  /// Of a look at the errors of the scan: what they seem to be; of an estimate: what they were taken for.
   std::vector<double> scan_errors = {};
   std::optional<LawFinding> law = {};  ///< of a search for the law of a pressed object
   /// Of a minimisation, at its end; null where another process made it: files do not keep it.
@@ -174,7 +175,8 @@ struct PassState {
   /// pass.
   struct Beginning {
     VectorX theta;
-    int stage = 0;  ///< number of the first one; that with corrections comes last
+    int stage = 0;                         ///< number of the first one; that with corrections comes last
+    std::vector<double> scan_errors = {};  ///< of the surface that they begin with
   };
   std::optional<Beginning> begin;
 };

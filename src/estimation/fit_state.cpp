@@ -11,7 +11,7 @@ namespace pliant {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* format = "fit-state/21";
+constexpr const char* format = "fit-state/22";
 
 /// A type that is const or not: each list of members below is written and read by the same lines.
 template <class T, class Of>
@@ -61,7 +61,7 @@ void members(Is<StageUnderWay> auto& stage, const Each& each) {
 }
 template <class Each>
 void members(Is<PassState::Beginning> auto& begin, const Each& each) {
-  each("theta", begin.theta), each("stage", begin.stage);
+  each("theta", begin.theta), each("stage", begin.stage), each("scan_errors", begin.scan_errors);
 }
 template <class Each>
 void members(Is<PassState> auto& pass, const Each& each) {
@@ -71,11 +71,12 @@ void members(Is<PassState> auto& pass, const Each& each) {
 template <class Each>
 void members(Is<TriedField> auto& t, const Each& each) {
   each("control_points", t.control_points), each("estimated", t.estimated), each("cost", t.cost);
-  each("log_bayes_factor", t.log_bayes_factor);
+  each("log_bayes_factor", t.log_bayes_factor), each("counts_models", t.counts_models);
 }
 template <class Each>
 void members(Is<FitState::FieldChoice> auto& field, const Each& each) {
-  each("tried", field.tried), each("best", field.best), each("state", field.state), each("under_way", field.under_way);
+  each("tried", field.tried), each("best", field.best), each("state", field.state), each("even", field.even);
+  each("under_way", field.under_way);
 }
 template <class Each>
 void members(Is<TrackingRound> auto& r, const Each& each) {

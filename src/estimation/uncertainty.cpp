@@ -12,8 +12,6 @@ namespace pliant {
 
 namespace {
 
-constexpr double normal_90 = 1.6448536269514722;
-
 /// Its deviations by name and whether the object meets obstacles: of ln E, nu, and of the dampings' unconstrained
 /// numbers, a share of their values, or of what is usual where they are less than that.
 struct Unmodelled {

@@ -22,6 +22,9 @@ struct UncertaintyShare {
   VectorX std;  ///< of each unconstrained coordinate
 };
 
+inline constexpr double normal_90 =
+    1.6448536269514722;  ///< half of a normal distribution's 90 % interval, in deviations
+
 /// How sure an estimate is. Unconstrained coordinates throughout.
 struct Uncertainty {
   MatrixX covariance;                    ///< noise and models together

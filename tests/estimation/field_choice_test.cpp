@@ -127,6 +127,34 @@ TEST(Evidence, ResidualsLargerThanTheNoiseCountLess) {
   EXPECT_NEAR(large, model.log_factor(model.at(p), p), tolerance(1e-3));
 }
 
+/// What other models say counts as noise does, but for what they change of all moduli in common.
+TEST(Evidence, CountsTheWholeUncertainty) {
+  LinearModel model;
+  const VectorX p = model.design.colPivHouseholderQr().solve(model.seen);
+  Uncertainty u;
+  const auto evidence = [&] {
+    u.std = u.covariance.diagonal().cwiseSqrt();
+    return log_bayes_factor(u, model.parameters, p, MatrixX::Ones(2, 1));
+  };
+  u.covariance = inverse(MatrixX(model.design.transpose() * model.design));
+  u.high = normal_90 * u.covariance.diagonal().cwiseSqrt();
+  const double of_noise = evidence();
+  EXPECT_NEAR(of_noise, model.log_factor(model.at(p), p), tolerance(1e-3));
+  u.high *= 2.0;
+  const double of_wide_intervals = evidence();
+  u.high *= 0.5;
+  const MatrixX noise = u.covariance;
+  const auto with_shift = [&](const Eigen::Vector2d& shift) {
+    u.covariance = noise + shift * shift.transpose();
+    u.high = normal_90 * u.covariance.diagonal().cwiseSqrt();
+    return evidence();
+  };
+  EXPECT_NEAR(with_shift({0.7, 0.7}), of_noise, tolerance(1e-9));
+  EXPECT_LT(std::abs(with_shift({3.0, -3.0})), 0.5 * std::abs(of_noise)) << "what is left open speaks for neither";
+  model.design /= 2.0, model.seen /= 2.0;
+  EXPECT_NEAR(of_wide_intervals, model.log_factor(model.at(p), p), tolerance(1e-3));
+}
+
 /// A damping of zero beside the moduli.
 struct WithDamping {
   /// @param slope     of the cost over the damping
@@ -365,6 +393,26 @@ TEST(FieldChoice, AFitEndsInTheWideBandWhereItGainsTooLittle) {
   EXPECT_FALSE(outcome.converged);
   EXPECT_TRUE(std::isfinite(outcome.final_cost));
   EXPECT_THAT(outcome.reason, ::testing::HasSubstr("too little"));
+}
+
+TEST(FieldChoice, KeepsNoFieldThatOtherModelsLeaveOpen) {
+  FieldChoice choice({sagging_bar(soft)}, quick(), {});
+  std::vector<int> last;  // control points of passes that are judged by other models
+  while (std::optional<Pass> pass = choice.next()) {
+    PassState reached = pass->begin;
+    FitMonitor monitor;
+    monitor.on_state = [&](const FitState& state) { reached = state.pass; };
+    FitOutcome outcome = FitRun(pass->recordings, pass->options, monitor, pass->begin, pass->limits).run();
+    EXPECT_EQ(pass->limits.looks_at_scan_errors, pass->options.control_points == 1);
+    if (pass->options.alternatives) last.push_back(pass->options.control_points), outcome.uncertainty.high *= 50.0;
+    (void)choice.take(std::move(outcome), std::move(reached));
+  }
+  EXPECT_THAT(last, ::testing::ElementsAre(::testing::Gt(1), 1));
+  const FitOutcome outcome = choice.outcome();
+  EXPECT_EQ(controls(outcome), 1);
+  EXPECT_EQ(outcome.final_cost, outcome.fields.front().cost);
+  EXPECT_THAT(outcome.notes.front(), ::testing::HasSubstr("was given 1 control point,"));
+  EXPECT_THAT(outcome.notes.front(), ::testing::HasSubstr("what other models and parts of the motion leave open"));
 }
 
 TEST(FieldChoice, RecordingsOfOneObjectShareTheField) {

@@ -344,6 +344,34 @@ TEST_F(Plans, BegunFromACorrectedFitGoOnWithItsCorrections) {
   EXPECT_THAT(all[0].front().free, testing::Contains("range_error@front"));
 }
 
+TEST_F(Plans, BegunFromAFitOffTheScanStayOffItAndLookAnew) {
+  facts.looks_at_scan_errors = true;
+  const std::vector<double> errors = {-1.0, 0.5};
+  has_estimated();
+  has_done(record({StageKind::Test}, 1.5, 430.0));
+  state.done.back().corrected = {"range_error@front"};
+  has_done(record({StageKind::Corrected, 0, 2}, 1.0, 440.0));
+  has_done(record({StageKind::ScanErrors}, 1.0, 450.0));
+  has_done(record({StageKind::OffScan}, 0.5, 460.0));
+  state.done.back().scan_errors = errors;
+  state = begun_from(state);
+  EXPECT_EQ(state.begin->scan_errors, errors);
+  state.begin->stage = 1;
+  const auto chains = next();
+  EXPECT_EQ(only(chains).id, (StageId{StageKind::Fine, 0, 1}));
+  EXPECT_EQ(only(chains).from.front(), theta(460.0));
+  EXPECT_EQ(only(chains).change.scan_errors, errors);
+  has_done(record({StageKind::Fine, 0, 1}, 0.4, 470.0));
+  state.done.back().scan_errors = errors;
+  EXPECT_EQ(only(next()).id.kind, StageKind::Corrected);
+  EXPECT_EQ(only(next()).change.scan_errors, errors);
+  EXPECT_EQ(FitPlan(facts).last_look(state).change.scan_errors, errors);
+  has_done(record({StageKind::Corrected, 0, 2}, 0.3, 480.0));
+  state.done.back().scan_errors = errors;
+  EXPECT_EQ(only(next()).id, (StageId{StageKind::ScanErrors}));
+  EXPECT_EQ(only(next()).change.scan_errors, errors) << "the differences are taken about the surface at hand";
+}
+
 TEST_F(Plans, LookOnceAtWhatWasReachedWhereTheyAreInterrupted) {
   has_moved();
   Stage look = FitPlan(facts).last_look(state);

@@ -274,6 +274,18 @@ TEST(OffTheScan, AnEstimateIsNearerToTheTruthThanOnAScanThatLiesOutside) {
   EXPECT_NEAR(mass(without), stated, 1e-4 * stated);
 }
 
+/// A field would make up for what a cover of plush adds.
+TEST(OffTheScan, IsTheHomogeneousObjectBesideWhichFieldsAreTried) {
+  FitOptions options = test::quick_fit_of_bar();
+  options.control_points = FitOptions::automatic;
+  const RecordedCapture bar = covered_bar(0.002);
+  const FitOutcome chosen = fit({bar}, options);
+  options.control_points = 1;
+  EXPECT_NEAR(chosen.fields.front().cost, fit({bar}, options).final_cost, 0.01 * chosen.fields.front().cost);
+  options.alternatives = false;
+  EXPECT_LT(chosen.fields.front().cost, 0.5 * fit({bar}, options).final_cost) << "on the scan";
+}
+
 TEST(OffTheScan, NothingIsEstimatedWhereTheScanIsRightOrTakenAsExact) {
   FitOptions options = test::quick_fit_of_bar();
   options.control_points = 1;
