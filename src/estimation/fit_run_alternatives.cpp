@@ -20,7 +20,7 @@ namespace {
 
 // Enough to tell how far another model's estimate lies: of a time step, which changes little, and on coarser meshes,
 // where they cost little.
-constexpr int few_iterations = 2, many_iterations = 5;
+constexpr int few_iterations = 2, many_iterations = 12;
 constexpr int uneven_objects = 3;
 constexpr double width_of_scan_errors =
     0.5;  // of a coefficient: differences by it are those of the least changes that show
