@@ -51,8 +51,9 @@ int run(int argc, char** argv) {
     std::cout << first_steps;
     return Fine;
   }
-  CommandLine line("pliant turns a recording of a soft object into an elastic model.", "pliant " PLIANT_VERSION,
-                   footer);
+  const std::string commit = PLIANT_COMMIT;  // none of an archive of the sources
+  CommandLine line("pliant turns a recording of a soft object into an elastic model.",
+                   "pliant " PLIANT_VERSION + (commit.empty() ? "" : " (" + commit + ")"), footer);
   int exit_code = Fine;
   add_new(line, exit_code);
   add_import(line, exit_code);

@@ -11,6 +11,7 @@ import platform
 import signal
 import struct
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -19,6 +20,8 @@ import xml.etree.ElementTree
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DEFAULT_PROGRAM = ROOT / "build/release/apps/pliant"
 INTERRUPTED = 130  # exit code of a command that was asked to stop
+_begin = time.monotonic()
+_program = None  # that `arguments` were given
 
 
 def arguments(description, **more):
@@ -29,7 +32,8 @@ def arguments(description, **more):
     for name, options in more.items():
         parser.add_argument("--" + name, **options)
     parsed = parser.parse_args()
-    parsed.program = parsed.program.resolve()
+    global _program
+    parsed.program = _program = parsed.program.resolve()
     parsed.work = parsed.work or pathlib.Path(tempfile.mkdtemp(prefix="pliant."))
     parsed.work.mkdir(parents=True, exist_ok=True)
     return parsed
@@ -146,10 +150,19 @@ def machine():
     return {"processor": model, "cores": os.cpu_count(), "load": round(os.getloadavg()[0], 1)}
 
 
+def made_by(script):
+    """The command that made figures, when, how long it took [s], and the program that it ran, with its commit."""
+    command = [pathlib.Path(script).resolve().relative_to(ROOT).as_posix()]
+    for word in sys.argv[1:]:  # without the folders of one machine
+        command.append(pathlib.Path(word).name if os.sep in word else word)
+    program = subprocess.run([str(_program), "--version"], capture_output=True, text=True).stdout.strip() if _program else ""
+    return {"command": " ".join(command), "date": time.strftime("%Y-%m-%d"), "seconds": round(time.monotonic() - _begin), "program": program}
+
+
 def write_results(script, figures):
-    """Writes results.json beside an experiment's script."""
+    """Writes results.json beside an experiment's script, with what made it."""
     path = pathlib.Path(script).resolve().parent / "results.json"
-    path.write_text(json.dumps({"machine": machine(), **figures}, indent=1, allow_nan=False) + "\n")
+    path.write_text(json.dumps({"machine": machine(), "made_by": made_by(script), **figures}, indent=1, allow_nan=False) + "\n")
     print(path)
 
 

@@ -17,7 +17,9 @@ def results(name):
 
 def machine(figures):
     m = figures["machine"]
-    return f"{m['cores']} cores ({m['processor']}), shared with other work: load {m['load']} at the end"
+    made = figures.get("made_by")
+    return (f"{m['cores']} cores ({m['processor']}), shared with other work: load {m['load']} at the end"
+            + (f", with {made['program']} on {made['date']}" if made else ""))
 
 
 def table(head, rows):

@@ -24,7 +24,7 @@ constexpr int bad_input = 2;
 TEST(Usage, VersionIsOneLineOnStdout) {
   const ProgramRun run = run_pliant({"--version"});
   EXPECT_EQ(run.exit_code, 0);
-  EXPECT_THAT(run.out, MatchesRegex("pliant [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+  EXPECT_THAT(run.out, MatchesRegex("pliant [0-9]+\\.[0-9]+\\.[0-9]+( \\([0-9a-f]+\\))?\n"));
   EXPECT_THAT(run.err, IsEmpty());
 }
 
