@@ -67,3 +67,22 @@ def coverage():
                      for p in (s["parameters"].get(n) for n in SHORT))] for part, s in scores.items()])
     return text + (f"\n{scores['all']['recordings']} of the {figures['asked_for']} recordings that the command makes were fitted, refused ones "
                    f"({scores['all']['refused']}) among them. Measured on {machine(figures)}.\n")
+
+
+def error_budget():
+    figures = results("error-budget")
+    if not figures:
+        return "Not run yet.\n"
+    recordings = figures["recordings"]
+    errors = list(dict.fromkeys(error for rows in recordings.values() for error in rows))
+
+    def cell(rows, error):
+        E = rows.get(error, {}).get("parameters", {}).get("youngs_modulus")
+        if not E:
+            return "" if error not in rows else "no estimate"
+        shown = percent(E["error"] if error == "none" else E["error"] - rows["none"]["parameters"]["youngs_modulus"]["error"])
+        return (f"{shown} (± {100 * E['deviation']:.0f})" + ("" if E["held"] else ", missed")
+                + ("" if rows[error]["verdict"] == "explained" else ", " + rows[error]["verdict"]))
+    return (table(["one thing is wrong", *recordings], [[error, *(cell(rows, error) for rows in recordings.values())] for error in errors])
+            + "\nYoung's modulus: `none` is off the truth, all others off `none`, with the deviation that the fit states; *missed*: the 90 % interval "
+            f"does not hold the truth. Empty: the recording has no such thing. Measured on {machine(figures)}.\n")

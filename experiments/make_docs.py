@@ -9,7 +9,7 @@ import sys
 
 import plots
 from bar_page import bar, dinosaur
-from battery_page import battery, coverage
+from battery_page import battery, coverage, error_budget
 from calibrated_sensors_page import calibrated_sensors
 from load_free_page import reference_shapes, rough_scan, sagging_leaf, two_mountings, two_zones
 from material_curves_page import material_curves
@@ -18,7 +18,7 @@ from page import IMAGES, ROOT, judged, machine, percent, results, table, with_tr
 from pressed_bodies_page import pressed_bodies
 from presses_page import presses
 from real_tracks_page import real_tracks
-from silicone_beam_page import silicone_beam
+from silicone_beam_page import silicone_beam, silicone_strips
 from stress_fields_page import stress_fields
 from touched_page import organ_probing, skin, slab_pokes
 from tracking_page import swinging
@@ -377,6 +377,10 @@ SECTIONS = [
      "Recordings by `pliant synth` on smaller elements and steps than a fit's. Each differs in one more way from what a fit assumes: `law`, linear elasticity in turning frames and Rayleigh's damping; "
      "`damping`, Rayleigh's alone; `contact`, a floor up to ten times softer and five times smoother; `friction`, a coefficient that the capture has wrong by 0.05; `varying`, one half a tenth stiffer, the other as much softer; `mesh`, nothing more. "
      "`held back` is every other round of the families.", coverage),
+    ("What one error of a recording costs", "error-budget",
+     "A drop, a throw on a tilted board, a hanging and a released object of the battery, and each again with one thing in its capture wrong that nobody told, of a size "
+     "that good equipment and care leave: the scan, the mass, the camera's pose and lens, its range, gravity's direction, the frame rate. Fitted with no choice of ours; the truth is read for judging only.",
+     error_budget),
     ("Another simulator's recordings", "oracle-bounce",
      "A ring dropped on the floor (twice), and a pebble dropped on a tilted board whose place is to be found too, recorded by another simulator with another material law, other elements "
      "and a model of a depth sensor's faults. Fitted with no choice of ours; the truth is read for judging only.", oracle),
@@ -400,6 +404,9 @@ SECTIONS = [
     ("A silicone beam let go", "silicone-beam",
      "A real cantilever of Dragon Skin 10 (30 x 30 x 100 mm, Dubied et al.), held straight, released, and followed by motion capture at 100 Hz; twice under its own "
      "weight and twice with 0.51 N hung from its tip. Fitted under its own weight; what the weight does is predicted.", silicone_beam),
+    ("Strips of one silicone, filmed", "silicone-strips",
+     "Real: three strips of a silicone, two lengths and a shape with a waist, filmed from the side at 240 Hz as they swing from a clamp (films from a public repository, not shipped). "
+     "Fitted with no choice of ours.", silicone_strips),
     ("Silicone bars at rest", "silicone",
      "Real: one depth image each, by a lidar camera, of bars that hang from a clamp or are twisted by half a turn (recordings of Arnavaz et al. 2023).", silicone),
     ("The bouncing torus", "torus",
