@@ -31,7 +31,7 @@ constexpr double share_on_the_way = 0.3;
 
 /// Whether a field that was fitted is kept beside the best one before.
 bool is_worth_it(const TriedField& tried, const TriedField& best) {
-  return tried.estimated && tried.log_bayes_factor > judgement.strong_evidence &&
+  return tried.estimated && !tried.counts_models && tried.log_bayes_factor > judgement.strong_evidence &&
          tried.cost < (1.0 - least_gain(best.control_points)) * best.cost;
 }
 
@@ -220,7 +220,7 @@ bool FieldChoice::holds(const FitOutcome& outcome) {
   const VectorX p = outcome.parameters.to_unconstrained(outcome.theta);
   const double evidence =
       log_bayes_factor(outcome.uncertainty, outcome.parameters, p, carried_over(body, field_of(body, 1), body.modulus));
-  if (evidence > judgement.strong_evidence) return true;
+  if (evidence > judgement.evidence_of_parts) return true;
   for (TriedField& t : choice_.tried)
     if (t.estimated && t.log_bayes_factor > judgement.strong_evidence)
       t.log_bayes_factor = std::min(t.log_bayes_factor, evidence), t.counts_models = true;
@@ -280,7 +280,9 @@ std::string explained(const std::vector<TriedField>& tried) {
                 std::to_string(best.control_points) + ": " +
                 (is_possible ? text_of(t.log_bayes_factor, "%+.1f") : "cannot be simulated");
     if (is_possible && !t.estimated) evidence += " (promised by one step)";
-    if (t.counts_models) evidence += " (with what other models and parts of the motion leave open of it)";
+    if (t.counts_models)
+      evidence += " (with what other models and parts of the motion leave open of it, where " +
+                  text_of(judgement.evidence_of_parts, "%.0f") + " is needed)";
     if (is_worth_it(t, best)) best = t;
   }
   return "Young's modulus was given " + points(best.control_points) +

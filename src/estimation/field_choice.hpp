@@ -13,8 +13,9 @@ namespace pliant {
 /// (`is_worth_a_fit`), and to its end only where the stage in the wide band takes off as large a part of the best one's
 /// cost there. A field of more points is kept where there is strong evidence of what it has beyond the best one before
 /// (`log_bayes_factor` above `Judgement::strong_evidence`); two numbers in a row without it end the search, and the
-/// best one is repeated where the options ask for that. Where the evidence for that is weak once it counts what other
-/// models and parts of the motion leave open of the field, the homogeneous object stands.
+/// best one is repeated where the options ask for that. Where the evidence for that, once it counts what other models
+/// and parts of the motion leave open of the field, is not above `Judgement::evidence_of_parts`, the homogeneous object
+/// stands.
 class FieldChoice : public PassPlanner {
  public:
   /// @param resume  the state of an interrupted choice goes on with the field that was under way
@@ -39,7 +40,7 @@ class FieldChoice : public PassPlanner {
   double wide_band_limit() const;
   Pass pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const;
   void judge(const FitOutcome& outcome, PassState reached);
-  /// Whether the last pass leaves strong evidence for its field; where it does not, no field is the best one.
+  /// Whether the last pass leaves enough evidence for its field; where it does not, no field is the best one.
   bool holds(const FitOutcome& outcome);
   /// With all that was done on the way.
   FitOutcome with_history(FitOutcome outcome);
