@@ -151,7 +151,7 @@ def machine():
 
 
 def made_by(script):
-    """The command that made figures, when, how long it took [s], and the program that it ran, with its commit."""
+    """The command that made figures, when, how long its last run took [s], and the program that it ran, with its commit."""
     command = [pathlib.Path(script).resolve().relative_to(ROOT).as_posix()]
     for word in sys.argv[1:]:  # without the folders of one machine
         command.append(pathlib.Path(word).name if os.sep in word else word)

@@ -19,7 +19,7 @@ def machine(figures):
     m = figures["machine"]
     made = figures.get("made_by")
     return (f"{m['cores']} cores ({m['processor']}), shared with other work: load {m['load']} at the end"
-            + (f", with {made['program']} on {made['date']}" if made else ""))
+            + (f", with {made['program']} on {made['date']}" if made and made["program"] else ""))
 
 
 def table(head, rows):

@@ -31,7 +31,7 @@ constexpr double share_on_the_way = 0.3;
 
 /// Whether a field that was fitted is kept beside the best one before.
 bool is_worth_it(const TriedField& tried, const TriedField& best) {
-  return tried.estimated && !tried.counts_models && tried.log_bayes_factor > judgement.strong_evidence &&
+  return tried.estimated && !tried.is_refused && tried.log_bayes_factor > judgement.strong_evidence &&
          tried.cost < (1.0 - least_gain(best.control_points)) * best.cost;
 }
 
@@ -101,7 +101,13 @@ std::optional<Pass> FieldChoice::next() {
 bool FieldChoice::take(FitOutcome outcome, PassState reached) {
   histories_.emplace_back(count_, outcome.history);
   forward_steps_ += outcome.forward_steps;
-  if (is_last_ && !outcome.interrupted && !holds(outcome)) return true;
+  const bool is_judged = is_last_ && count_ > 1 && !outcome.interrupted &&
+                         outcome.uncertainty.std.size() == outcome.parameters.dimension();
+  if (const double evidence = is_judged ? whole_evidence(outcome) : infinite;
+      !(evidence > judgement.evidence_of_parts)) {
+    refuse_fields(evidence);
+    return true;
+  }
   if (is_last_) {
     outcome_ = with_history(std::move(outcome));
     if (is_cut_) outcome_->interrupted = true, outcome_->converged = false, outcome_->reason = "interrupted";
@@ -214,20 +220,19 @@ void FieldChoice::judge(const FitOutcome& outcome, PassState reached) {
   choice_.under_way = 0;
 }
 
-bool FieldChoice::holds(const FitOutcome& outcome) {
-  if (count_ == 1 || outcome.uncertainty.std.size() != outcome.parameters.dimension()) return true;
+double FieldChoice::whole_evidence(const FitOutcome& outcome) const {
   const Body& body = *outcome.recordings.front().discretisation.body;
-  const VectorX p = outcome.parameters.to_unconstrained(outcome.theta);
-  const double evidence =
-      log_bayes_factor(outcome.uncertainty, outcome.parameters, p, carried_over(body, field_of(body, 1), body.modulus));
-  if (evidence > judgement.evidence_of_parts) return true;
+  return log_bayes_factor(outcome.uncertainty, outcome.parameters, outcome.parameters.to_unconstrained(outcome.theta),
+                          carried_over(body, field_of(body, 1), body.modulus));
+}
+
+void FieldChoice::refuse_fields(double whole_evidence) {
   for (TriedField& t : choice_.tried)
     if (t.estimated && t.log_bayes_factor > judgement.strong_evidence)
-      t.log_bayes_factor = std::min(t.log_bayes_factor, evidence), t.counts_models = true;
+      t.log_bayes_factor = std::min(t.log_bayes_factor, whole_evidence), t.is_refused = true;
   choice_.best = choice_.under_way = 0;
   choice_.state = choice_.even;
   is_last_ = false;
-  return false;
 }
 
 Pass FieldChoice::pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const {
@@ -280,7 +285,7 @@ std::string explained(const std::vector<TriedField>& tried) {
                 std::to_string(best.control_points) + ": " +
                 (is_possible ? text_of(t.log_bayes_factor, "%+.1f") : "cannot be simulated");
     if (is_possible && !t.estimated) evidence += " (promised by one step)";
-    if (t.counts_models)
+    if (t.is_refused)
       evidence += " (with what other models and parts of the motion leave open of it, where " +
                   text_of(judgement.evidence_of_parts, "%.0f") + " is needed)";
     if (is_worth_it(t, best)) best = t;

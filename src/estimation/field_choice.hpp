@@ -40,8 +40,10 @@ class FieldChoice : public PassPlanner {
   double wide_band_limit() const;
   Pass pass_of(int count, const PassState& from, int refine, double done_from, double done_to) const;
   void judge(const FitOutcome& outcome, PassState reached);
-  /// Whether the last pass leaves enough evidence for its field; where it does not, no field is the best one.
-  bool holds(const FitOutcome& outcome);
+  /// Logarithm of the Bayes factor of the last pass' field over one modulus, by the whole uncertainty of its estimate.
+  double whole_evidence(const FitOutcome& outcome) const;
+  /// Goes back to the homogeneous object.
+  void refuse_fields(double whole_evidence);
   /// With all that was done on the way.
   FitOutcome with_history(FitOutcome outcome);
   JointLayout layout_of(int count) const { return joint_layout(recordings_, options_, count); }

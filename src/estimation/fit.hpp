@@ -49,7 +49,7 @@ struct TriedField {
   bool estimated = false;         ///< false: its evidence is what one Gauss-Newton step promised
   double cost = 0.0;              ///< of the estimate; infinite where there is none
   double log_bayes_factor = 0.0;  ///< against the best before; infinitely low where it cannot be simulated
-  bool counts_models = false;     ///< what other models and parts of the motion leave open is in that evidence
+  bool is_refused = false;        ///< for what other models and parts of the motion leave open, which that counts then
 };
 
 /// One round of tracking and estimation in turns.

@@ -71,7 +71,7 @@ void members(Is<PassState> auto& pass, const Each& each) {
 template <class Each>
 void members(Is<TriedField> auto& t, const Each& each) {
   each("control_points", t.control_points), each("estimated", t.estimated), each("cost", t.cost);
-  each("log_bayes_factor", t.log_bayes_factor), each("counts_models", t.counts_models);
+  each("log_bayes_factor", t.log_bayes_factor), each("is_refused", t.is_refused);
 }
 template <class Each>
 void members(Is<FitState::FieldChoice> auto& field, const Each& each) {

@@ -102,9 +102,12 @@ struct Judgement {
   Judged strong_evidence{"hypothesis.strong_evidence", 3.0,
                          "logarithm of the Bayes factor by which a richer model is kept; as far below zero it is ruled "
                          "out (Kass and Raftery 1995: 2 ln B > 6)"};
-  Judged evidence_of_parts{"hypothesis.evidence_of_parts", 10.0,
-                           "the same of moduli of their own for parts of a pressed or pulled object: what a law or a "
-                           "mesh lacks made up 6 and 13 of even ones, layers of a ratio of two 440 (second physics)"};
+  Judged evidence_of_parts{
+      "hypothesis.evidence_of_parts", 10.0,
+      "the same of moduli of their own for parts of a pressed or pulled object: what a law or a "
+      "mesh lacks made up 6 and 13 of even ones, layers of a ratio of two 440 (second physics); of "
+      "what hangs or swings, with what other models leave open: about 4 of an even strip of "
+      "silicone, 36 of a bar of two stiffnesses (second physics)"};
   Judged gain_of_second_modulus{"hypothesis.gain_of_second_modulus", 0.10,
                                 "least share of the cost that a field takes off that of an even object: 0.04 was seen "
                                 "of an even bar, 0.18 of one of two stiffnesses (second physics)"};

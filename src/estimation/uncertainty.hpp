@@ -22,8 +22,8 @@ struct UncertaintyShare {
   VectorX std;  ///< of each unconstrained coordinate
 };
 
-inline constexpr double normal_90 =
-    1.6448536269514722;  ///< half of a normal distribution's 90 % interval, in deviations
+/// Half of the 90 % interval of a normal distribution, in deviations.
+inline constexpr double normal_90 = 1.6448536269514722;
 
 /// How sure an estimate is. Unconstrained coordinates throughout.
 struct Uncertainty {
