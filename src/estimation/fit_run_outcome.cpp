@@ -210,9 +210,10 @@ void FitRun::say_scan_errors(const std::vector<StageRecord>& done, const StageRe
       1e3 * std::abs(mean), mean > 0.0 ? "outside of" : "inside of", 1e3 * std::sqrt(squares)));
   const StageRecord* look = find_record(done, {StageKind::ScanErrors, estimate.id.start, 0});
   if (!look || (state_.begin && !state_.begin->scan_errors.empty())) return;
-  outcome_.notes.push_back(fmt::format("Where it was scanned Young's modulus was {} Pa, at a cost of {}; off it {}.",
-                                       in_three_digits(look->from[plan_.facts().moduli.front()]),
-                                       in_three_digits(look->cost), in_three_digits(estimate.cost)));
+  outcome_.notes.push_back(
+      fmt::format("On the scan as it is Young's modulus was {} Pa and the cost {}; off the scan the cost is {}.",
+                  in_three_digits(look->from[plan_.facts().moduli.front()]), in_three_digits(look->cost),
+                  in_three_digits(estimate.cost)));
 }
 
 /// Of the alternatives that could be tried, less that of the model that each stands beside: the fit's own, whose
